@@ -1,0 +1,49 @@
+# Two commands for everyone: `make demo` and `make test`. Both build .venv from locked versions first.
+# Another interpreter: `make demo PYTHON=python3.13`.
+
+SHELL := /bin/sh
+USABLE := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))
+PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
+	"$$p" -c '$(USABLE)' >/dev/null 2>&1 && { echo "$$p"; break; }; done)
+BIN := .venv/bin
+OUT ?= demo-out
+
+.PHONY: demo test lint format types walls check docs lock clean
+
+demo: .venv/run.stamp
+	$(BIN)/pbpp demo --out $(OUT)
+
+test: .venv/dev.stamp
+	$(BIN)/pytest -n 2 --dist worksteal
+
+.venv/pyvenv.cfg:
+	@test -n "$(PYTHON)" || { echo "PBPP Rover needs Python 3.11 or newer with its venv module; set PYTHON=..." >&2; exit 1; }
+	$(PYTHON) -m venv .venv
+
+.venv/run.stamp: requirements/run.lock pyproject.toml | .venv/pyvenv.cfg
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements/run.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@touch $@
+
+.venv/dev.stamp: requirements/dev.lock .venv/run.stamp
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements/dev.lock
+	@touch $@
+
+lint: .venv/dev.stamp
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+format: .venv/dev.stamp
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+types: .venv/dev.stamp
+	$(BIN)/mypy
+
+walls: .venv/dev.stamp
+	$(BIN)/lint-imports
+
+check: lint types walls test
+
+clean:
+	rm -rf .venv demo-out dist build .coverage* .hypothesis .mypy_cache .ruff_cache .pytest_cache

@@ -1,0 +1,84 @@
+"""Frames to bytes and back, by pymavlink's ArduPilot dialect (MAVLink 2 out, 1 and 2 in)."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from mavlink_bridge.messages import MESSAGES, Frame, Message, wire_name
+
+_FIELDS = {name: tuple(field.name for field in fields(cls)) for name, cls in MESSAGES.items()}
+_DIALECT_CLASSES: dict[str, Any] = {
+    message_class.msgname: message_class
+    for message_class in dialect.mavlink_map.values()
+    if message_class.msgname in MESSAGES
+}
+
+
+class Codec:
+    """One direction-less end of a MAVLink link: its own sequence counter and receive buffer.
+
+    Parameters
+    ----------
+    system, component : int
+        The identity stamped on what is sent.
+    """
+
+    def __init__(self, system: int, component: int) -> None:
+        self._mavlink = dialect.MAVLink(None, srcSystem=system, srcComponent=component)
+        self._mavlink.robust_parsing = True
+        self.bad_bytes = 0
+
+    @property
+    def identity(self) -> tuple[int, int]:
+        """System and component id stamped on what is sent."""
+        return self._mavlink.srcSystem, self._mavlink.srcComponent
+
+    def encode(self, message: Message) -> bytes:
+        """Give the bytes of one MAVLink 2 frame and count the sequence number up."""
+        packed: bytes = _to_dialect(message).pack(self._mavlink)
+        self._mavlink.seq = (self._mavlink.seq + 1) % 256
+        return packed
+
+    def decode(self, data: bytes) -> list[Frame]:
+        """Take received bytes; give the complete frames of known types in them, damaged ones left out."""
+        frames = []
+        for raw in self._mavlink.parse_buffer(data) or []:
+            if raw.get_type() == "BAD_DATA":
+                self.bad_bytes += len(raw.data)
+                continue
+            frame = to_frame(raw)
+            if frame is not None:
+                frames.append(frame)
+        return frames
+
+
+def to_frame(raw: Any) -> Frame | None:  # noqa: ANN401 - pymavlink ships no types
+    """Turn a pymavlink message into a `Frame`; None for a type this project does not speak."""
+    name = raw.get_type()
+    message_class = MESSAGES.get(name)
+    if message_class is None:
+        return None
+    message = message_class(*[getattr(raw, field) for field in _FIELDS[name]])
+    return Frame(raw.get_srcSystem(), raw.get_srcComponent(), message)
+
+
+def _to_dialect(message: Message) -> Any:  # noqa: ANN401 - pymavlink ships no types
+    name = wire_name(type(message))
+    dialect_class = _DIALECT_CLASSES[name]
+    values: dict[str, Any] = {field: _blank(dialect_class, field) for field in dialect_class.fieldnames}
+    for field in _FIELDS[name]:
+        value = getattr(message, field)
+        values[field] = value.encode() if isinstance(value, str) else value
+    return dialect_class(**values)
+
+
+def _blank(dialect_class: Any, field: str) -> Any:  # noqa: ANN401 - pymavlink ships no types
+    index = dialect_class.fieldnames.index(field)
+    length = dialect_class.array_lengths[dialect_class.ordered_fieldnames.index(field)]
+    kind = dialect_class.fieldtypes[index]
+    if kind == "char":
+        return b""
+    return [0] * length if length else 0

@@ -1,0 +1,46 @@
+"""What can go wrong between a message stream and a vehicle.
+
+::
+
+    BridgeError
+    ├── LogError                 a log cannot be used
+    ├── LinkError                no connection, no heartbeat, silence
+    ├── IdentityTakenError       our system and component id is already heard on the link
+    ├── VehicleNotFoundError     nobody there is the vehicle asked for
+    ├── RefusedError             the vehicle said no
+    └── OutcomeError             what is on the vehicle is not what was wanted, or unknown
+"""
+
+from __future__ import annotations
+
+
+class BridgeError(Exception):
+    """Root of the bridge's errors; ``details`` holds the numbers a person or a script needs."""
+
+    def __init__(self, message: str, **details: object) -> None:
+        super().__init__(message)
+        self.details = details
+
+
+class LogError(BridgeError):
+    """A telemetry log is missing, empty, or not one."""
+
+
+class LinkError(BridgeError):
+    """No connection, no heartbeat, or silence."""
+
+
+class IdentityTakenError(LinkError):
+    """Our own system and component id is already heard on the link."""
+
+
+class VehicleNotFoundError(LinkError):
+    """Nobody on the link or in the log is the vehicle asked for."""
+
+
+class RefusedError(BridgeError):
+    """The vehicle refused: its result by name, and the item it refused where there is one."""
+
+
+class OutcomeError(BridgeError):
+    """What is on the vehicle is not what was wanted, or it is unknown."""

@@ -1,0 +1,61 @@
+"""What can go wrong with fences, files and missions.
+
+::
+
+    MissionError
+    ├── InvalidPositionError     a latitude or longitude that is none, or too near a pole
+    ├── FenceError               a fence that cannot be used: which polygon, which item
+    ├── FenceMissingError        no fence is known, or only a part of it
+    ├── MissionFormatError       a file that cannot be read: file, line, what was expected
+    ├── SituationError           position, home or target is not known
+    └── RouteError               no route
+        ├── StartBlockedError    the vehicle stands where it must not be
+        ├── TargetBlockedError   the target lies where the vehicle must not be
+        └── NoRouteError         start and target are not connected
+"""
+
+from __future__ import annotations
+
+
+class MissionError(Exception):
+    """Root of the package's errors; ``details`` holds the numbers a person or a script needs."""
+
+    def __init__(self, message: str, **details: object) -> None:
+        super().__init__(message)
+        self.details = details
+
+
+class InvalidPositionError(MissionError):
+    """A latitude or longitude that is not a number, out of range, or too near a pole."""
+
+
+class FenceError(MissionError):
+    """A fence that cannot be used; says which polygon or item and why."""
+
+
+class FenceMissingError(MissionError):
+    """No fence is known, or only a part of one was transferred."""
+
+
+class MissionFormatError(MissionError):
+    """A file that cannot be read; says which file, where, and what was expected."""
+
+
+class SituationError(MissionError):
+    """Something a plan needs (position, home, target) is not known."""
+
+
+class RouteError(MissionError):
+    """No route keeps what was asked."""
+
+
+class StartBlockedError(RouteError):
+    """The vehicle stands on forbidden ground; says in which fence, how far in, and where free ground is."""
+
+
+class TargetBlockedError(RouteError):
+    """The target lies on forbidden ground or too near a fence; says which, and the nearest free point."""
+
+
+class NoRouteError(RouteError):
+    """Start and target are not connected; says which fences part them."""

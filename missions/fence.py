@@ -1,0 +1,167 @@
+"""Fences as drawn: inclusion and exclusion zones, from and to mission items."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+from missions.errors import FenceError, InvalidPositionError
+from missions.geo import LatLon, checked_lat_lon, to_e7
+from missions.items import Command, CoordinateFrame, MissionItem
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+
+class ZoneKind(StrEnum):
+    """Stay in, or keep out."""
+
+    INCLUSION = "inclusion"
+    EXCLUSION = "exclusion"
+
+
+@dataclass(frozen=True, slots=True)
+class PolygonZone:
+    """A fence polygon; the ring is open (its first vertex is not repeated)."""
+
+    kind: ZoneKind
+    vertices: tuple[LatLon, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class CircleZone:
+    """A fence circle, its radius in metres."""
+
+    kind: ZoneKind
+    centre: LatLon
+    radius_m: float
+
+
+Zone = PolygonZone | CircleZone
+
+
+@dataclass(frozen=True, slots=True)
+class Fence:
+    """All zones in the order in which the autopilot holds them, and the return point if there is one."""
+
+    zones: tuple[Zone, ...] = ()
+    return_point: LatLon | None = None
+
+    @property
+    def vertex_count(self) -> int:
+        """How many polygon vertices the fence has."""
+        return sum(len(zone.vertices) for zone in self.zones if isinstance(zone, PolygonZone))
+
+    def count(self, kind: ZoneKind, shape: type[Zone]) -> int:
+        """Count the zones of one kind and shape."""
+        return sum(zone.kind is kind and isinstance(zone, shape) for zone in self.zones)
+
+    def zone_names(self) -> tuple[str, ...]:
+        """Name each zone as people count them: ``exclusion polygon 2``."""
+        counts: dict[str, int] = {}
+        names = []
+        for zone in self.zones:
+            name = f"{zone.kind} {'polygon' if isinstance(zone, PolygonZone) else 'circle'}"
+            counts[name] = counts.get(name, 0) + 1
+            names.append(f"{name} {counts[name]}")
+        return tuple(names)
+
+
+_VERTEX_KINDS = {
+    Command.FENCE_POLYGON_VERTEX_INCLUSION: ZoneKind.INCLUSION,
+    Command.FENCE_POLYGON_VERTEX_EXCLUSION: ZoneKind.EXCLUSION,
+}
+_CIRCLE_KINDS = {
+    Command.FENCE_CIRCLE_INCLUSION: ZoneKind.INCLUSION,
+    Command.FENCE_CIRCLE_EXCLUSION: ZoneKind.EXCLUSION,
+}
+_VERTEX_COMMANDS = {kind: command for command, kind in _VERTEX_KINDS.items()}
+_CIRCLE_COMMANDS = {kind: command for command, kind in _CIRCLE_KINDS.items()}
+
+
+def fence_from_items(items: Sequence[MissionItem]) -> Fence:
+    """Read a fence from its mission items (MAV_CMD 5000 to 5004).
+
+    A polygon is exactly the number of vertices that its ``param1`` tells: two neighbours of the same kind and count stay two.
+
+    Raises
+    ------
+    FenceError
+        With the item's number: an unknown command, a polygon of fewer than three vertices or with vertices missing, a radius that
+        is not positive, a position that is none, two return points.
+    """
+    zones: list[Zone] = []
+    return_point = None
+    seq = 0
+    while seq < len(items):
+        item = items[seq]
+        if item.command in _VERTEX_KINDS:
+            polygon = _polygon(items, seq)
+            zones.append(polygon)
+            seq += len(polygon.vertices)
+            continue
+        if item.command in _CIRCLE_KINDS:
+            zones.append(_circle(item, seq))
+        elif item.command == Command.FENCE_RETURN_POINT:
+            if return_point is not None:
+                raise FenceError(f"fence item {seq}: a second return point", item=seq)
+            return_point = _position(item, seq)
+        else:
+            raise FenceError(f"fence item {seq}: command {item.command} does not belong in a fence", item=seq)
+        seq += 1
+    return Fence(tuple(zones), return_point)
+
+
+def fence_to_items(fence: Fence) -> tuple[MissionItem, ...]:
+    """Give a fence as mission items, the way ArduPilot reads them back (frame 0, z 0)."""
+    items: list[MissionItem] = []
+    for zone in fence.zones:
+        if isinstance(zone, PolygonZone):
+            command = _VERTEX_COMMANDS[zone.kind]
+            items += [_item(command, vertex, float(len(zone.vertices))) for vertex in zone.vertices]
+        else:
+            items.append(_item(_CIRCLE_COMMANDS[zone.kind], zone.centre, zone.radius_m))
+    if fence.return_point is not None:
+        items.append(_item(Command.FENCE_RETURN_POINT, fence.return_point, 0.0))
+    return tuple(items)
+
+
+def _item(command: Command, position: LatLon, param1: float) -> MissionItem:
+    lat_e7, lon_e7 = to_e7(position)
+    return MissionItem(command, CoordinateFrame.GLOBAL, (param1, 0.0, 0.0, 0.0), lat_e7, lon_e7)
+
+
+def _polygon(items: Sequence[MissionItem], first: int) -> PolygonZone:
+    command, param1 = items[first].command, items[first].params[0]
+    kind = _VERTEX_KINDS[Command(command)]
+    count = int(param1) if math.isfinite(param1) else 0
+    if count < 3:
+        raise FenceError(
+            f"fence item {first}: an {kind} polygon of {count} vertices; it needs at least 3", item=first
+        )
+    run = items[first : first + count]
+    for offset, item in enumerate(run):
+        if item.command != command or int(item.params[0]) != count:
+            run = run[:offset]
+            break
+    if len(run) < count:
+        raise FenceError(
+            f"fence item {first}: an {kind} polygon of {count} vertices has only {len(run)} of them", item=first
+        )
+    return PolygonZone(kind, tuple(_position(item, first + offset) for offset, item in enumerate(run)))
+
+
+def _circle(item: MissionItem, seq: int) -> CircleZone:
+    radius_m = item.params[0]
+    if not (math.isfinite(radius_m) and radius_m > 0):
+        raise FenceError(f"fence item {seq}: a circle of radius {radius_m:g} m; it must be positive", item=seq)
+    return CircleZone(_CIRCLE_KINDS[Command(item.command)], _position(item, seq), radius_m)
+
+
+def _position(item: MissionItem, seq: int) -> LatLon:
+    try:
+        return checked_lat_lon(*item.position)
+    except InvalidPositionError as error:
+        raise FenceError(f"fence item {seq}: {error}", item=seq) from None

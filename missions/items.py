@@ -121,7 +121,7 @@ def with_home(items: Sequence[MissionItem], home: LatLon) -> tuple[MissionItem, 
     """Put the home item at seq 0, where ArduPilot keeps its own home (what is sent there is not stored)."""
     lat_e7, lon_e7 = to_e7(home)
     return (
-        MissionItem(Command.NAV_WAYPOINT, CoordinateFrame.GLOBAL, lat_e7=lat_e7, lon_e7=lon_e7),
+        MissionItem(Command.NAV_WAYPOINT, CoordinateFrame.GLOBAL, lat_e7=lat_e7, lon_e7=lon_e7, current=True),
         *items,
     )
 

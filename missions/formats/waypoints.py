@@ -1,0 +1,117 @@
+"""QGC WPL 110: tab-separated items, one a line, with missions, fences (5000 to 5004) or rally points (5100).
+
+Twelve columns: seq, current, frame, command, param1 to param4, latitude, longitude, altitude, autocontinue. A mission's first line is
+home; Mission Planner pads it with command 0.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from missions.errors import FenceError, InvalidPositionError, MissionFormatError
+from missions.fence import fence_from_items
+from missions.geo import LatLon, checked_lat_lon, to_e7
+from missions.items import Command, MissionItem, with_home, without_home
+from missions.situation import Known, Mission, Situation
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+_HEADER = "QGC WPL"
+_FENCE_COMMANDS = range(5000, 5005)
+
+
+def read(text: str, source: str) -> Situation:
+    """Read a file's text.
+
+    Raises
+    ------
+    MissionFormatError
+        With the line and what was expected there.
+    """
+    lines = text.splitlines()
+    if not lines or not lines[0].strip().startswith(_HEADER):
+        raise MissionFormatError(f"{source}: line 1: expected 'QGC WPL 110'", file=source, line=1)
+    numbered = [
+        (number, line.strip())
+        for number, line in enumerate(lines[1:], start=2)
+        if line.strip() and not line.strip().startswith("#")
+    ]
+    items = [_item(line, f"{source}: line {number}") for number, line in numbered]
+    line_numbers = [number for number, _ in numbered]
+    return _situation(items, line_numbers, source)
+
+
+def write(situation: Situation) -> str:
+    """Give the text of a file with the situation's mission, home first."""
+    mission = situation.mission
+    assert mission is not None
+    home = mission.value.home or (situation.home and situation.home.value) or LatLon(0.0, 0.0)
+    return format_items(with_home(mission.value.items, home))
+
+
+def format_items(items: Sequence[MissionItem]) -> str:
+    """Give the text of a file with items as they stand (a mission with its home item)."""
+    rows = [
+        "\t".join(
+            [
+                *(str(int(value)) for value in (seq, item.current, item.frame, item.command)),
+                *(f"{param:.8g}" for param in item.params),
+                *(f"{value_e7 / 1e7:.8f}" for value_e7 in (item.lat_e7, item.lon_e7)),
+                f"{item.alt_m:.6f}",
+                str(int(item.autocontinue)),
+            ]
+        )
+        for seq, item in enumerate(items)
+    ]
+    return "\n".join([f"{_HEADER} 110", *rows]) + "\n"
+
+
+def _item(line: str, where: str) -> MissionItem:
+    columns = line.split("\t") if "\t" in line else line.split()
+    if len(columns) != 12:
+        raise MissionFormatError(f"{where}: {len(columns)} columns; expected 12", where=where)
+    try:
+        frame, command = int(columns[2]), int(columns[3])
+        numbers = [float(column) for column in columns[4:11]]
+        current, autocontinue = (int(float(columns[i])) != 0 for i in (1, 11))
+    except ValueError as error:
+        raise MissionFormatError(f"{where}: {error}; expected numbers", where=where) from None
+    lat_deg, lon_deg, alt_m = numbers[4:]
+    try:
+        lat_e7, lon_e7 = to_e7(checked_lat_lon(lat_deg, lon_deg))
+    except InvalidPositionError as error:
+        raise MissionFormatError(f"{where}: {error}", where=where) from None
+    params = (numbers[0], numbers[1], numbers[2], numbers[3])
+    return MissionItem(command, frame, params, lat_e7, lon_e7, alt_m, current, autocontinue)
+
+
+def _situation(items: list[MissionItem], line_numbers: list[int], source: str) -> Situation:
+    if not items:
+        raise MissionFormatError(f"{source}: no items after the first line", file=source)
+    home, rest = _split_home(items)
+    if rest and all(item.command in _FENCE_COMMANDS for item in rest):
+        try:
+            fence = fence_from_items(rest)
+        except FenceError as error:
+            seq = error.details.get("item")
+            line = line_numbers[seq + len(items) - len(rest)] if isinstance(seq, int) else None
+            raise MissionFormatError(f"{source}: line {line}: {error}", file=source, line=line) from None
+        return Situation(fence=Known(fence, None, source), home=home and Known(home, None, source))
+    if rest and all(item.command == Command.RALLY_POINT for item in rest):
+        return Situation(rally=Known(tuple(item.position for item in rest), None, source))
+    mission = Mission(without_home(items), items[0].position if _is_place(items[0]) else None)
+    home_known = Known(mission.home, None, source) if mission.home else None
+    return Situation(mission=Known(mission, None, source), home=home_known)
+
+
+def _split_home(items: list[MissionItem]) -> tuple[LatLon | None, list[MissionItem]]:
+    """Take off the home line that Mission Planner writes even before fences and rally points."""
+    first = items[0]
+    if first.command not in (0, Command.NAV_WAYPOINT):
+        return None, items
+    return (first.position if _is_place(first) else None), items[1:]
+
+
+def _is_place(item: MissionItem) -> bool:
+    return (item.lat_e7, item.lon_e7) != (0, 0)

@@ -1,0 +1,141 @@
+"""The planning frame: metres east and north of a field's centre.
+
+An azimuthal equidistant projection of the WGS 84 ellipsoid. Within 10 km of the origin distances agree with the geodesic to
+1 mm + 1e-6. ArduPilot drives straight in a flat frame of its own (1.113195e5 m a degree, longitude shortened by the cosine of the
+latitude); `autopilot_scale` and `bow_m` tell how far the two differ, so that plans can be padded to the safe side.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from missions.errors import InvalidPositionError
+from missions.geo import LatLon, wrap_lon_deg
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+    from pyproj import Proj
+
+MAX_LATITUDE_DEG = 85.0
+"""Beyond this the autopilot's flat frame is of no use."""
+
+_WGS84_A_M = 6378137.0
+_WGS84_E2 = 6.69437999014e-3
+
+
+class LocalPoint(NamedTuple):
+    """A point in a `LocalFrame`, metres."""
+
+    east_m: float
+    north_m: float
+
+
+class AutopilotScale(NamedTuple):
+    """True metres for each metre of the autopilot's flat frame, eastward and northward."""
+
+    east: float
+    north: float
+
+
+@dataclass(frozen=True)
+class LocalFrame:
+    """Metres east and north of an origin.
+
+    Parameters
+    ----------
+    origin : LatLon
+        Where the frame touches the Earth.
+
+    Raises
+    ------
+    InvalidPositionError
+        The origin lies beyond ±85° latitude.
+    """
+
+    origin: LatLon
+
+    def __post_init__(self) -> None:
+        if abs(self.origin.lat_deg) > MAX_LATITUDE_DEG:
+            raise InvalidPositionError(
+                f"latitude {self.origin.lat_deg:.4f}° is beyond ±{MAX_LATITUDE_DEG:g}°: "
+                "the autopilot's flat frame is too far off so near a pole",
+                lat_deg=self.origin.lat_deg,
+            )
+
+    @cached_property
+    def _proj(self) -> Proj:
+        from pyproj import Proj  # noqa: PLC0415 - 100 ms that a usage error need not wait for
+
+        return Proj(proj="aeqd", ellps="WGS84", lat_0=self.origin.lat_deg, lon_0=self.origin.lon_deg)
+
+    def to_local(self, position: LatLon) -> LocalPoint:
+        """Give the point of a position."""
+        return LocalPoint(*self._proj(position.lon_deg, position.lat_deg))
+
+    def to_lat_lon(self, point: LocalPoint) -> LatLon:
+        """Give the position of a point."""
+        lon_deg, lat_deg = self._proj(point.east_m, point.north_m, inverse=True)
+        return LatLon(lat_deg, wrap_lon_deg(lon_deg))
+
+    def to_local_array(self, positions: Sequence[LatLon]) -> NDArray[np.float64]:
+        """Give positions as an (n, 2) array, east and north in metres."""
+        lat_lon_deg = np.array(positions, dtype=float).reshape(-1, 2)
+        return np.column_stack(self._proj(lat_lon_deg[:, 1], lat_lon_deg[:, 0]))
+
+    def to_lat_lons(self, points: NDArray[np.float64]) -> list[LatLon]:
+        """Give the positions of an (n, 2) array, east and north in metres."""
+        return [self.to_lat_lon(LocalPoint(east_m, north_m)) for east_m, north_m in points.tolist()]
+
+
+def frame_around(positions: Sequence[LatLon]) -> LocalFrame:
+    """Give the frame at the centre of the positions' bounding box, the short way round across the antimeridian.
+
+    Raises
+    ------
+    InvalidPositionError
+        There are no positions, or one lies beyond ±85° latitude.
+    """
+    if not positions:
+        raise InvalidPositionError("there is no position to lay the planning frame around")
+    lats_deg = [position.lat_deg for position in positions]
+    first_lon_deg = positions[0].lon_deg
+    lons_deg = [first_lon_deg + wrap_lon_deg(position.lon_deg - first_lon_deg) for position in positions]
+    farthest = max(lats_deg, key=abs)
+    if abs(farthest) > MAX_LATITUDE_DEG:
+        LocalFrame(LatLon(farthest, first_lon_deg))
+    centre = LatLon((min(lats_deg) + max(lats_deg)) / 2, wrap_lon_deg((min(lons_deg) + max(lons_deg)) / 2))
+    return LocalFrame(centre)
+
+
+def autopilot_scale(lat_deg: float) -> AutopilotScale:
+    """Tell how many true metres a metre of ArduPilot's flat frame is, at a latitude (0.9933 to 1.0034)."""
+    w2 = 1 - _WGS84_E2 * math.sin(math.radians(lat_deg)) ** 2
+    return AutopilotScale(east=1 / math.sqrt(w2), north=(1 - _WGS84_E2) / w2**1.5)
+
+
+def bow_m(leg_m: float, lat_deg: float) -> float:
+    """Tell how far the autopilot's straight line bows off the frame's, at most, on a leg of a length.
+
+    A line straight in latitude and longitude curves with tan(latitude) / Earth's radius.
+    """
+    return leg_m**2 * math.tan(math.radians(abs(lat_deg))) / (8 * 6.35e6)
+
+
+def autopilot_line(a: LatLon, b: LatLon, step_m: float, leg_m: float) -> list[LatLon]:
+    """Sample the autopilot's straight line from ``a`` to ``b``, both included, about every ``step_m``."""
+    pieces = max(1, math.ceil(leg_m / step_m))
+    delta_lon_deg = wrap_lon_deg(b.lon_deg - a.lon_deg)
+    return [
+        LatLon(
+            a.lat_deg + (b.lat_deg - a.lat_deg) * i / pieces,
+            wrap_lon_deg(a.lon_deg + delta_lon_deg * i / pieces),
+        )
+        for i in range(pieces + 1)
+    ]

@@ -1,0 +1,120 @@
+"""What is known of a vehicle and its field: the one type that streams, logs and files are folded into."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Generic, TypeVar
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from missions.fence import Fence
+    from missions.geo import LatLon
+    from missions.items import MissionItem
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Known(Generic[T]):
+    """A fact, when it was learnt (None where there is no clock, as in a file) and from what."""
+
+    value: T
+    time_s: float | None
+    source: str
+
+
+@dataclass(frozen=True, slots=True)
+class Mission:
+    """A mission's items without the home item that ArduPilot keeps at seq 0, and that home where it is known."""
+
+    items: tuple[MissionItem, ...]
+    home: LatLon | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Where the vehicle is and where it heads (degrees clockwise from north, None where unknown)."""
+
+    position: LatLon
+    heading_deg: float | None = None
+
+
+class ListKind(StrEnum):
+    """The lists a vehicle holds."""
+
+    MISSION = "mission"
+    FENCE = "fence"
+    RALLY = "rally"
+
+
+@dataclass(frozen=True, slots=True)
+class ListTransfer:
+    """A list on its way from or to the vehicle, as far as it was seen.
+
+    Parameters
+    ----------
+    to_vehicle : bool
+        True for an upload, False for a read-back.
+    count : int or None
+        How many items were announced; None where the start was not seen.
+    items : mapping of int to MissionItem
+        The items seen, by seq.
+    """
+
+    to_vehicle: bool
+    count: int | None
+    items: Mapping[int, MissionItem]
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every announced item was seen."""
+        return self.count is not None and all(seq in self.items for seq in range(self.count))
+
+    def in_order(self) -> tuple[MissionItem, ...]:
+        """Give the items of a complete list in order."""
+        return tuple(self.items[seq] for seq in range(self.count or 0))
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """What is known, each fact with its time and source; None is not known.
+
+    A link, a log and the simulator fill it message by message, a file at once.
+
+    Parameters
+    ----------
+    system : int or None
+        The vehicle's MAVLink system id.
+    ardupilot : bool or None
+        Whether the autopilot is ArduPilot.
+    mode : int or None
+        The autopilot's own mode number (HEARTBEAT.custom_mode).
+    target : Known of LatLon
+        The newest place somebody asked the vehicle to drive to.
+    parameters : mapping of str to float
+        The autopilot's parameters, as far as they are known.
+    transfers : mapping
+        Lists on their way, by kind and direction (True: to the vehicle).
+    fence_trouble : str or None
+        Why the newest fence that was seen could not be used.
+    """
+
+    system: int | None = None
+    ardupilot: bool | None = None
+    vehicle_type: int | None = None
+    mode: int | None = None
+    armed: bool | None = None
+    fence: Known[Fence] | None = None
+    mission: Known[Mission] | None = None
+    rally: Known[tuple[LatLon, ...]] | None = None
+    home: Known[LatLon] | None = None
+    pose: Known[Pose] | None = None
+    target: Known[LatLon] | None = None
+    parameters: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    transfers: Mapping[tuple[ListKind, bool], ListTransfer] = field(
+        default_factory=lambda: MappingProxyType({})
+    )
+    fence_trouble: str | None = None

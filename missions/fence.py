@@ -148,7 +148,8 @@ def _polygon(items: Sequence[MissionItem], first: int) -> PolygonZone:
             break
     if len(run) < count:
         raise FenceError(
-            f"fence item {first}: an {kind} polygon of {count} vertices has only {len(run)} of them", item=first
+            f"fence item {first}: an {kind} polygon of {count} vertices has only {len(run)} of them",
+            item=first,
         )
     return PolygonZone(kind, tuple(_position(item, first + offset) for offset, item in enumerate(run)))
 
@@ -156,7 +157,9 @@ def _polygon(items: Sequence[MissionItem], first: int) -> PolygonZone:
 def _circle(item: MissionItem, seq: int) -> CircleZone:
     radius_m = item.params[0]
     if not (math.isfinite(radius_m) and radius_m > 0):
-        raise FenceError(f"fence item {seq}: a circle of radius {radius_m:g} m; it must be positive", item=seq)
+        raise FenceError(
+            f"fence item {seq}: a circle of radius {radius_m:g} m; it must be positive", item=seq
+        )
     return CircleZone(_CIRCLE_KINDS[Command(item.command)], _position(item, seq), radius_m)
 
 

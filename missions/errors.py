@@ -7,6 +7,7 @@
     ├── FenceError               a fence that cannot be used: which polygon, which item
     ├── FenceMissingError        no fence is known, or only a part of it
     ├── MissionFormatError       a file that cannot be read: file, line, what was expected
+    ├── VehicleError             a parameter or a footprint that no vehicle can have
     ├── SituationError           position, home or target is not known
     └── RouteError               no route
         ├── StartBlockedError    the vehicle stands where it must not be
@@ -39,6 +40,10 @@ class FenceMissingError(MissionError):
 
 class MissionFormatError(MissionError):
     """A file that cannot be read; says which file, where, and what was expected."""
+
+
+class VehicleError(MissionError):
+    """A parameter out of its range, or a footprint that is none; says which and its value."""
 
 
 class SituationError(MissionError):

@@ -1,0 +1,53 @@
+"""The vehicle: what its parameters say of how it drives and guards its fence, and its footprint."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from missions.vehicle.ardupilot import ardupilot_vehicle
+from missions.vehicle.model import Assumed, Autopilot, FenceParameters, Footprint, Steering, Vehicle
+from missions.vehicle.px4 import px4_vehicle
+from missions.vehicle.reader import ParameterReader
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+__all__ = [
+    "Assumed",
+    "Autopilot",
+    "FenceParameters",
+    "Footprint",
+    "Steering",
+    "Vehicle",
+    "vehicle_from_parameters",
+]
+
+
+def vehicle_from_parameters(parameters: Mapping[str, float], *, mav_type: int | None = None) -> Vehicle:
+    """Give the vehicle that a set of autopilot parameters describes.
+
+    Parameters
+    ----------
+    parameters : mapping of str to float
+        Names and values as in PARAM_VALUE or a parameter file; may hold others, may lack some or all.
+    mav_type : int, optional
+        MAV_TYPE of the vehicle's heartbeat.
+
+    Returns
+    -------
+    Vehicle
+        PX4's where only PX4's names are there, else ArduPilot's. What was not known stands in ``assumed``.
+
+    Raises
+    ------
+    VehicleError
+        A value that is not a number or out of its range, with its name.
+    """
+    px4 = any(name.startswith(_PX4_PREFIXES) for name in parameters)
+    ardupilot = any(name.startswith(_ARDUPILOT_PREFIXES) for name in parameters)
+    reader = ParameterReader(parameters)
+    return px4_vehicle(reader, mav_type) if px4 and not ardupilot else ardupilot_vehicle(reader, mav_type)
+
+
+_PX4_PREFIXES = ("NAV_ACC_RAD", "RA_", "RD_", "RO_", "GF_")
+_ARDUPILOT_PREFIXES = ("WP_", "CRUISE_", "ATC_", "TURN_RADIUS", "FENCE_", "AVOID_", "OA_")

@@ -1,0 +1,188 @@
+"""What is known of a vehicle: how it drives, what its fence does, how large it is."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from missions.errors import VehicleError
+
+MAV_TYPE_GROUND_ROVER = 10
+MAV_TYPE_SURFACE_BOAT = 11
+
+
+class Autopilot(StrEnum):
+    """Whose parameters they are."""
+
+    ARDUPILOT = "ArduPilot"
+    PX4 = "PX4"
+
+
+class Steering(StrEnum):
+    """Steered wheels, or two sides driven apart (which can pivot on the spot)."""
+
+    ACKERMANN = "ackermann"
+    SKID = "skid"
+
+
+@dataclass(frozen=True, slots=True)
+class FenceParameters:
+    """How the autopilot treats its fence.
+
+    Parameters
+    ----------
+    enabled : bool
+        FENCE_ENABLE; on PX4 whether GF_ACTION does anything.
+    type_bits : int
+        FENCE_TYPE: 2 the circle about home, 4 polygons and circles.
+    margin_m : float
+        FENCE_MARGIN: ArduPilot's avoidance stops a rover this far from an enabled fence.
+    radius_m : float
+        FENCE_RADIUS, of the circle about home (PX4: GF_MAX_HOR_DIST, 0 where there is none).
+    union : bool
+        FENCE_OPTIONS bit 1: inside any inclusion zone is inside; otherwise it must be inside all.
+    action : int
+        FENCE_ACTION (PX4: GF_ACTION).
+    """
+
+    enabled: bool = False
+    type_bits: int = 6
+    margin_m: float = 2.0
+    radius_m: float = 300.0
+    union: bool = False
+    action: int = 1
+
+    @property
+    def enforces_zones(self) -> bool:
+        """Whether the autopilot acts on polygons and circles of the fence."""
+        return self.enabled and bool(self.type_bits & 4)
+
+    @property
+    def enforces_home_circle(self) -> bool:
+        """Whether the autopilot acts on the circle of `radius_m` about home."""
+        return self.enabled and bool(self.type_bits & 2) and self.radius_m > 0
+
+
+@dataclass(frozen=True, slots=True)
+class Assumed:
+    """A parameter that was not known, and the value taken in its place."""
+
+    parameter: str
+    value: float
+
+    def __str__(self) -> str:
+        return f"{self.parameter} is not known; taken as {self.value:g}"
+
+
+@dataclass(frozen=True, slots=True)
+class Vehicle:
+    """A rover as its parameters describe it; the defaults are those of ArduPilot Rover.
+
+    Parameters
+    ----------
+    waypoint_radius_m : float
+        WP_RADIUS (PX4: the larger of NAV_ACC_RAD and RA_ACC_RAD_MAX).
+    speed_mps : float
+        WP_SPEED, CRUISE_SPEED where that is 0.
+    turn_radius_m : float
+        TURN_RADIUS (PX4: from wheel base and largest steering angle; 0 on skid steer).
+    turn_max_g : float
+        ATC_TURN_MAX_G, in units of gravity.
+    accel_max_mps2, jerk_mps3 : float
+        The limits along a leg: WP_ACCEL within ATC_ACCEL_MAX and ATC_DECEL_MAX, and WP_JERK, each with ArduPilot's
+        meaning of 0.
+    position_gain_per_s : float
+        PSC_POS_P: a lateral error dies away with the time constant ``1 / position_gain_per_s``.
+    pivot_angle_deg : float
+        WP_PIVOT_ANGLE: on skid steer, corners sharper than this are turned on the spot; 0 never.
+    pivot_rate_dps : float
+        WP_PIVOT_RATE.
+    steering : Steering
+        From SERVOn_FUNCTION: throttle left and right (73, 74) is skid steer.
+    avoid_bits : int
+        AVOID_ENABLE: 1 keeps off fences.
+    oa_type : int
+        OA_TYPE: 0 none, 1 BendyRuler, 2 Dijkstra, 3 both.
+    assumed : tuple of Assumed
+        What was not known, with the value taken.
+    mav_type : int or None
+        MAV_TYPE of its heartbeat, where one was heard.
+    """
+
+    waypoint_radius_m: float = 2.0
+    speed_mps: float = 2.0
+    turn_radius_m: float = 0.9
+    turn_max_g: float = 0.6
+    accel_max_mps2: float = 1.0
+    jerk_mps3: float = 1.0
+    position_gain_per_s: float = 0.2
+    pivot_angle_deg: float = 60.0
+    pivot_rate_dps: float = 60.0
+    steering: Steering = Steering.ACKERMANN
+    autopilot: Autopilot = Autopilot.ARDUPILOT
+    fence: FenceParameters = field(default_factory=FenceParameters)
+    avoid_bits: int = 3
+    oa_type: int = 0
+    assumed: tuple[Assumed, ...] = ()
+    mav_type: int | None = None
+
+    @property
+    def is_rover(self) -> bool:
+        """Whether its heartbeat, where one was heard, is that of a rover or a boat."""
+        return self.mav_type in {None, MAV_TYPE_GROUND_ROVER, MAV_TYPE_SURFACE_BOAT}
+
+    @property
+    def can_pivot(self) -> bool:
+        """Whether it turns on the spot at sharp corners."""
+        return self.steering is Steering.SKID and self.pivot_angle_deg > 0
+
+    @property
+    def avoids_fence(self) -> bool:
+        """Whether its own avoidance stops it in AUTO, for good, nearer than FENCE_MARGIN to a fence."""
+        return (
+            self.autopilot is Autopilot.ARDUPILOT and self.fence.enforces_zones and bool(self.avoid_bits & 1)
+        )
+
+    @property
+    def stops_within_m(self) -> float:
+        """How near to a fence it stops in AUTO for good; 0 where its avoidance is off."""
+        return self.fence.margin_m if self.avoids_fence else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Footprint:
+    """The rectangle a vehicle covers, and where in it the point sits whose position is known.
+
+    Parameters
+    ----------
+    length_m, width_m : float
+        The whole vehicle, bumpers and tools included; 0 and 0 is a point.
+    gps_forward_m, gps_right_m : float
+        The GPS antenna from the middle of the rectangle.
+    """
+
+    length_m: float = 0.0
+    width_m: float = 0.0
+    gps_forward_m: float = 0.0
+    gps_right_m: float = 0.0
+
+    def __post_init__(self) -> None:
+        sizes = (self.length_m, self.width_m, abs(self.gps_forward_m), abs(self.gps_right_m))
+        if not all(math.isfinite(size) and size >= 0 for size in sizes):
+            raise VehicleError(
+                f"a footprint of {self.length_m:g} x {self.width_m:g} m with the GPS at "
+                f"{self.gps_forward_m:g}, {self.gps_right_m:g} m is none",
+                length_m=self.length_m,
+                width_m=self.width_m,
+            )
+
+    @property
+    def half_width_m(self) -> float:
+        """How far it reaches to the side of its track when driving straight on."""
+        return self.width_m / 2 + abs(self.gps_right_m)
+
+    @property
+    def swept_radius_m(self) -> float:
+        """How far it reaches to any side of its track when it turns: its farthest corner from the GPS."""
+        return math.hypot(self.length_m / 2 + abs(self.gps_forward_m), self.half_width_m)

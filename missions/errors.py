@@ -9,6 +9,7 @@
     ├── MissionFormatError       a file that cannot be read: file, line, what was expected
     ├── VehicleError             a parameter or a footprint that no vehicle can have
     ├── SituationError           position, home or target is not known
+    ├── PlanCheckError           a finished route failed its own check: a defect, never to be driven
     └── RouteError               no route
         ├── StartBlockedError    the vehicle stands where it must not be
         ├── TargetBlockedError   the target lies where the vehicle must not be
@@ -64,3 +65,7 @@ class TargetBlockedError(RouteError):
 
 class NoRouteError(RouteError):
     """Start and target are not connected; says which fences part them."""
+
+
+class PlanCheckError(MissionError):
+    """A finished route failed its check against the fence: a defect of this program."""

@@ -86,8 +86,8 @@ class Situation:
 
     Parameters
     ----------
-    system : int or None
-        The vehicle's MAVLink system id.
+    system, component : int or None
+        The vehicle's MAVLink ids.
     ardupilot : bool or None
         Whether the autopilot is ArduPilot.
     mode : int or None
@@ -103,6 +103,7 @@ class Situation:
     """
 
     system: int | None = None
+    component: int | None = None
     ardupilot: bool | None = None
     vehicle_type: int | None = None
     mode: int | None = None

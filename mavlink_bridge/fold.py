@@ -1,0 +1,344 @@
+"""Messages folded into a situation: the one way in which a live link, a log and the simulator tell what is known.
+
+`fold` is pure: a situation and a frame give the next situation. It believes the vehicle's own words (its acknowledgements, its
+read-backs) and takes what others send to it as requests.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from mavlink_bridge import messages as m
+from mavlink_bridge.protocol.wire import item_from_message
+from missions.errors import FenceError, InvalidPositionError
+from missions.fence import fence_from_items
+from missions.geo import LatLon, checked_lat_lon, from_e7
+from missions.items import Command, CoordinateFrame, MissionItem, without_home
+from missions.situation import Known, ListKind, ListTransfer, Mission, Pose, Situation
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from mavlink_bridge.messages import Frame, Message
+
+KINDS: dict[int, ListKind] = {
+    m.MissionType.MISSION: ListKind.MISSION,
+    m.MissionType.FENCE: ListKind.FENCE,
+    m.MissionType.RALLY: ListKind.RALLY,
+}
+"""The list that a mission_type stands for."""
+
+_GLOBAL_FRAMES = frozenset(
+    {
+        CoordinateFrame.GLOBAL,
+        CoordinateFrame.GLOBAL_RELATIVE_ALT,
+        CoordinateFrame.GLOBAL_INT,
+        CoordinateFrame.GLOBAL_RELATIVE_ALT_INT,
+        CoordinateFrame.GLOBAL_TERRAIN_ALT,
+        CoordinateFrame.GLOBAL_TERRAIN_ALT_INT,
+    }
+)
+_IGNORE_X_OR_Y = 0b11
+_GUIDED_TARGET = 2
+_HEADING_UNKNOWN = 65535
+
+
+class Vehicle(NamedTuple):
+    """A vehicle heard on a stream: its ids and its MAV_TYPE."""
+
+    system: int
+    component: int
+    type: int
+
+    @property
+    def is_rover(self) -> bool:
+        """Whether it is a ground rover or a boat."""
+        return self.type in (m.MavType.GROUND_ROVER, m.MavType.SURFACE_BOAT)
+
+
+def vehicles_heard(frames: Iterable[Frame]) -> list[Vehicle]:
+    """Give the vehicles (not ground stations, companions or other components) that sent a HEARTBEAT, in order of system id."""
+    return sorted(
+        {
+            Vehicle(frame.system, frame.component, frame.message.type)
+            for frame in frames
+            if isinstance(frame.message, m.Heartbeat) and is_vehicle(frame.message)
+        }
+    )
+
+
+def is_vehicle(heartbeat: m.Heartbeat) -> bool:
+    """Tell whether a HEARTBEAT is an autopilot's."""
+    return heartbeat.autopilot != m.Autopilot.INVALID and heartbeat.type != m.MavType.GCS
+
+
+def fold(situation: Situation, frame: Frame, time_s: float) -> Situation:
+    """Give the situation after a frame.
+
+    Parameters
+    ----------
+    situation : Situation
+        What is known so far, with the ``system`` of the vehicle that it is about.
+    frame : Frame
+        What was heard; frames of and to other vehicles change nothing.
+    time_s : float
+        When.
+    """
+    if frame.system == situation.system:
+        told = _TOLD.get(type(frame.message))
+        return told(situation, frame, time_s) if told else situation
+    asked = _ASKED.get(type(frame.message))
+    if asked is None or getattr(frame.message, "target_system", 0) not in (0, situation.system):
+        return situation
+    return asked(situation, frame.message, time_s)
+
+
+# What the vehicle says.
+
+
+def _heartbeat(situation: Situation, frame: Frame, _time_s: float) -> Situation:
+    heartbeat = frame.message
+    assert isinstance(heartbeat, m.Heartbeat)
+    if not is_vehicle(heartbeat):
+        return situation
+    return replace(
+        situation,
+        component=frame.component,
+        vehicle_type=heartbeat.type,
+        ardupilot=heartbeat.autopilot == m.Autopilot.ARDUPILOTMEGA,
+        mode=heartbeat.custom_mode,
+        armed=bool(heartbeat.base_mode & m.ModeFlag.SAFETY_ARMED),
+    )
+
+
+def _param_value(situation: Situation, frame: Frame, _time_s: float) -> Situation:
+    """Take a parameter; ground stations write those they fetched by MAVFTP under components of their own."""
+    message = frame.message
+    assert isinstance(message, m.ParamValue)
+    if situation.parameters.get(message.param_id) == message.param_value:
+        return situation
+    parameters = {**situation.parameters, message.param_id: message.param_value}
+    return replace(situation, parameters=MappingProxyType(parameters))
+
+
+def _global_position(situation: Situation, frame: Frame, time_s: float) -> Situation:
+    message = frame.message
+    assert isinstance(message, m.GlobalPositionInt)
+    position = _place(message.lat, message.lon)
+    if position is None or situation.component not in (None, frame.component):
+        return situation
+    heading_deg = None if message.hdg == _HEADING_UNKNOWN else message.hdg / 100
+    return replace(situation, pose=Known(Pose(position, heading_deg), time_s, "GLOBAL_POSITION_INT"))
+
+
+def _home_position(situation: Situation, frame: Frame, time_s: float) -> Situation:
+    message = frame.message
+    assert isinstance(message, m.HomePosition)
+    home = _place(message.latitude, message.longitude)
+    return replace(situation, home=Known(home, time_s, "HOME_POSITION")) if home else situation
+
+
+def _read_back_count(situation: Situation, frame: Frame, time_s: float) -> Situation:
+    message = frame.message
+    assert isinstance(message, m.MissionCount)
+    return _begin(situation, message, time_s, to_vehicle=False)
+
+
+def _read_back_item(situation: Situation, frame: Frame, time_s: float) -> Situation:
+    return _add_item(situation, frame.message, time_s, to_vehicle=False)
+
+
+def _acknowledged(situation: Situation, frame: Frame, time_s: float) -> Situation:
+    """Close an upload: taken over if the vehicle accepted it and every item was seen."""
+    message = frame.message
+    assert isinstance(message, m.MissionAck)
+    kinds = _kinds(message)
+    for kind in kinds:
+        transfer = situation.transfers.get((kind, True))
+        if transfer is None or message.type == m.MissionResult.INVALID_SEQUENCE:
+            continue
+        if message.type != m.MissionResult.ACCEPTED:
+            situation = _without_transfer(situation, kind, to_vehicle=True)
+        elif transfer.is_complete:
+            situation = _take_over(situation, kind, transfer, time_s)
+        elif kind is ListKind.MISSION:  # accepted without our having seen it all: what we knew is stale
+            situation = replace(situation, mission=None)
+    return situation
+
+
+# What others ask of the vehicle.
+
+
+def _upload_count(situation: Situation, message: Message, time_s: float) -> Situation:
+    assert isinstance(message, m.MissionCount)
+    return _begin(situation, message, time_s, to_vehicle=True)
+
+
+def _upload_item(situation: Situation, message: Message, time_s: float) -> Situation:
+    assert isinstance(message, (m.MissionItem, m.MissionItemInt))
+    if message.current == _GUIDED_TARGET:
+        item = item_from_message(message)
+        return _targeted(situation, _place(item.lat_e7, item.lon_e7), time_s, "MISSION_ITEM with current 2")
+    return _add_item(situation, message, time_s, to_vehicle=True)
+
+
+def _clear(situation: Situation, message: Message, _time_s: float) -> Situation:
+    assert isinstance(message, m.MissionClearAll)
+    kinds = _kinds(message)
+    for kind in kinds:
+        situation = _with_transfer(situation, kind, ListTransfer(to_vehicle=True, count=0, items={}))
+    return situation
+
+
+def _partial_write(situation: Situation, message: Message, _time_s: float) -> Situation:
+    kind = _kind(message)
+    return _with_transfer(situation, kind, ListTransfer(True, None, {})) if kind else situation
+
+
+def _command_int(situation: Situation, message: Message, time_s: float) -> Situation:
+    assert isinstance(message, m.CommandInt)
+    if message.command != Command.DO_REPOSITION or message.frame not in _GLOBAL_FRAMES:
+        return situation
+    return _targeted(situation, _place(message.x, message.y), time_s, "DO_REPOSITION")
+
+
+def _command_long(situation: Situation, message: Message, time_s: float) -> Situation:
+    assert isinstance(message, m.CommandLong)
+    if message.command != Command.DO_REPOSITION:
+        return situation
+    try:
+        position = checked_lat_lon(message.param5, message.param6)
+    except InvalidPositionError:
+        return situation
+    return _targeted(situation, position if position != (0, 0) else None, time_s, "DO_REPOSITION")
+
+
+def _position_target(situation: Situation, message: Message, time_s: float) -> Situation:
+    assert isinstance(message, m.SetPositionTargetGlobalInt)
+    if message.type_mask & _IGNORE_X_OR_Y or message.coordinate_frame not in _GLOBAL_FRAMES:
+        return situation
+    position = _place(message.lat_int, message.lon_int)
+    return _targeted(situation, position, time_s, "SET_POSITION_TARGET_GLOBAL_INT")
+
+
+_TOLD: dict[type[Message], Callable[[Situation, Frame, float], Situation]] = {
+    m.Heartbeat: _heartbeat,
+    m.ParamValue: _param_value,
+    m.GlobalPositionInt: _global_position,
+    m.HomePosition: _home_position,
+    m.MissionCount: _read_back_count,
+    m.MissionItem: _read_back_item,
+    m.MissionItemInt: _read_back_item,
+    m.MissionAck: _acknowledged,
+}
+_ASKED: dict[type[Message], Callable[[Situation, Message, float], Situation]] = {
+    m.MissionCount: _upload_count,
+    m.MissionItem: _upload_item,
+    m.MissionItemInt: _upload_item,
+    m.MissionClearAll: _clear,
+    m.MissionWritePartialList: _partial_write,
+    m.CommandInt: _command_int,
+    m.CommandLong: _command_long,
+    m.SetPositionTargetGlobalInt: _position_target,
+}
+FOLDED = frozenset({*_TOLD, *_ASKED})
+"""The message types that `fold` looks at."""
+
+
+# Lists on their way.
+
+
+def _begin(situation: Situation, message: m.MissionCount, time_s: float, *, to_vehicle: bool) -> Situation:
+    kind = _kind(message)
+    if kind is None:
+        return situation
+    transfer = ListTransfer(to_vehicle, message.count, {})
+    if transfer.is_complete and not to_vehicle:  # an empty list needs no items
+        return _take_over(situation, kind, transfer, time_s)
+    return _with_transfer(situation, kind, transfer)
+
+
+def _add_item(situation: Situation, message: Any, time_s: float, *, to_vehicle: bool) -> Situation:  # noqa: ANN401 - either item message
+    kind = _kind(message)
+    if kind is None:
+        return situation
+    known = situation.transfers.get((kind, to_vehicle), ListTransfer(to_vehicle, None, {}))
+    transfer = replace(known, items={**known.items, message.seq: item_from_message(message)})
+    if transfer.is_complete and not to_vehicle:
+        return _take_over(situation, kind, transfer, time_s)
+    return _with_transfer(situation, kind, transfer)
+
+
+def _with_transfer(situation: Situation, kind: ListKind, transfer: ListTransfer) -> Situation:
+    transfers = {**situation.transfers, (kind, transfer.to_vehicle): transfer}
+    return replace(situation, transfers=MappingProxyType(transfers))
+
+
+def _without_transfer(situation: Situation, kind: ListKind, *, to_vehicle: bool) -> Situation:
+    transfers = {key: value for key, value in situation.transfers.items() if key != (kind, to_vehicle)}
+    return replace(situation, transfers=MappingProxyType(transfers))
+
+
+def _take_over(situation: Situation, kind: ListKind, transfer: ListTransfer, time_s: float) -> Situation:
+    """Make a complete list what the vehicle holds."""
+    items = transfer.in_order()
+    source = f"{kind} {'upload' if transfer.to_vehicle else 'read-back'}"
+    situation = _without_transfer(situation, kind, to_vehicle=transfer.to_vehicle)
+    if kind is ListKind.FENCE:
+        return _take_over_fence(situation, items, time_s, source)
+    if kind is ListKind.RALLY:
+        return replace(situation, rally=Known(tuple(item.position for item in items), time_s, source))
+    return _take_over_mission(situation, items, transfer, time_s, source)
+
+
+def _take_over_fence(
+    situation: Situation, items: tuple[MissionItem, ...], time_s: float, source: str
+) -> Situation:
+    # A finished transfer settles what half-seen ones before it left open.
+    for to_vehicle in (True, False):
+        situation = _without_transfer(situation, ListKind.FENCE, to_vehicle=to_vehicle)
+    try:
+        fence = fence_from_items(items)
+    except FenceError as error:
+        return replace(situation, fence_trouble=f"{source}: {error}")
+    return replace(situation, fence=Known(fence, time_s, source), fence_trouble=None)
+
+
+def _take_over_mission(
+    situation: Situation, items: tuple[MissionItem, ...], transfer: ListTransfer, time_s: float, source: str
+) -> Situation:
+    if situation.ardupilot is False:
+        return replace(situation, mission=Known(Mission(items), time_s, source))
+    mission = Mission(without_home(items))
+    if not transfer.to_vehicle and items and (home := _place(items[0].lat_e7, items[0].lon_e7)):
+        mission = replace(mission, home=home)
+        situation = replace(situation, home=Known(home, time_s, f"{source}, item 0"))
+    return replace(situation, mission=Known(mission, time_s, source))
+
+
+def _targeted(situation: Situation, position: LatLon | None, time_s: float, source: str) -> Situation:
+    return replace(situation, target=Known(position, time_s, source)) if position else situation
+
+
+def _place(lat_e7: int, lon_e7: int) -> LatLon | None:
+    """Give a position; None for (0, 0), which says "no fix" or "here", and for what is none."""
+    if (lat_e7, lon_e7) == (0, 0):
+        return None
+    try:
+        return checked_lat_lon(*from_e7(lat_e7, lon_e7))
+    except InvalidPositionError:
+        return None
+
+
+def _kind(message: Any) -> ListKind | None:  # noqa: ANN401 - any message of the mission protocol
+    return KINDS.get(message.mission_type)
+
+
+def _kinds(message: m.MissionAck | m.MissionClearAll) -> list[ListKind]:
+    if message.mission_type == m.MissionType.ALL:
+        return list(ListKind)
+    kind = _kind(message)
+    return [kind] if kind else []

@@ -1,0 +1,250 @@
+"""A fence laid out in the plane: where the vehicle may be, and which zone stands near.
+
+Everything errs to the safe side: exclusion circles become polygons drawn around them, inclusion circles polygons drawn inside, each at
+the worse of the true metre and the autopilot's. Rings that cross themselves are read by the even-odd rule, as the autopilot tests them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+from shapely import LinearRing, Point, Polygon
+from shapely.geometry.base import BaseGeometry
+from shapely.ops import nearest_points
+
+from missions.errors import FenceError, SituationError
+from missions.fence import CircleZone, PolygonZone, Zone, ZoneKind
+from missions.local_frame import LocalFrame, autopilot_scale
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from missions.fence import Fence
+    from missions.geo import LatLon
+
+CIRCLE_TOLERANCE_M = 0.05
+"""How far a circle's polygon may stand off the circle."""
+
+_WALL_M = 1e-3
+_OPEN_GROUND_M = 500.0
+
+
+@dataclass(frozen=True, eq=False)
+class Barrier:
+    """A fence zone in the plane: its name as people count it, and its area in local metres."""
+
+    name: str
+    kind: ZoneKind
+    area: BaseGeometry
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """The field in the plane.
+
+    Parameters
+    ----------
+    frame : LocalFrame
+        The plane.
+    barriers : tuple of Barrier
+        Every zone, the home circle included.
+    union : bool
+        Whether one inclusion is enough (else all inclusions at once).
+    bounds : Polygon
+        A box around everything, the stand-in for an inclusion where the fence has none.
+    warnings : tuple of str
+        What was found odd in the fence.
+    """
+
+    frame: LocalFrame
+    barriers: tuple[Barrier, ...]
+    union: bool
+    bounds: Polygon
+    warnings: tuple[str, ...]
+
+    def areas(self, kind: ZoneKind) -> list[BaseGeometry]:
+        """Give the areas of one kind; the bounds where there is no inclusion."""
+        found = [barrier.area for barrier in self.barriers if barrier.kind is kind]
+        return found or ([self.bounds] if kind is ZoneKind.INCLUSION else [])
+
+    @cached_property
+    def keep_in(self) -> BaseGeometry:
+        """The inclusions, met or joined."""
+        inclusions = self.areas(ZoneKind.INCLUSION)
+        if self.union:
+            return shapely.union_all(inclusions)
+        area = inclusions[0]
+        for inclusion in inclusions[1:]:
+            area = area.intersection(inclusion)
+        return area
+
+    @cached_property
+    def allowed(self) -> BaseGeometry:
+        """Where the fence lets the vehicle be."""
+        return self.keep_in.difference(shapely.union_all(self.areas(ZoneKind.EXCLUSION)))
+
+    @cached_property
+    def edge(self) -> BaseGeometry:
+        """The line the vehicle must keep off; the bounds are none of it."""
+        return self.allowed.boundary.difference(self.bounds.boundary.buffer(_WALL_M))
+
+    def clearance_m(self, shape: BaseGeometry) -> float:
+        """Give a shape's least distance to forbidden ground; 0 where it touches it, infinite where there is none."""
+        if not self.allowed.covers(shape):
+            return 0.0
+        return math.inf if self.edge.is_empty else float(shape.distance(self.edge))
+
+    def nearest(self, shape: BaseGeometry) -> tuple[Barrier | None, float]:
+        """Give the barrier nearest to a shape and its distance in metres."""
+        distances = [(self.distance_m(barrier, shape), i) for i, barrier in enumerate(self.barriers)]
+        if not distances:
+            return None, math.inf
+        distance_m, index = min(distances)
+        return self.barriers[index], distance_m
+
+    def distance_m(self, barrier: Barrier, shape: BaseGeometry) -> float:
+        """Give a shape's distance to a barrier: to an exclusion's area, to an inclusion's edge."""
+        if barrier.kind is ZoneKind.EXCLUSION:
+            return float(barrier.area.distance(shape))
+        if self.union:  # an inclusion's edge inside another one is no edge
+            edge = barrier.area.boundary.intersection(self.keep_in.boundary.buffer(_WALL_M))
+            return math.inf if edge.is_empty else float(edge.distance(shape))
+        return float(barrier.area.boundary.distance(shape))
+
+    def forbidding(self, point: Point) -> list[Barrier]:
+        """Give the barriers that forbid a point: exclusions around it, inclusions it is outside of."""
+        outside = [b for b in self.barriers if b.kind is ZoneKind.INCLUSION and not b.area.covers(point)]
+        inclusions = sum(barrier.kind is ZoneKind.INCLUSION for barrier in self.barriers)
+        if self.union and len(outside) < inclusions:
+            outside = []
+        return [b for b in self.barriers if b.kind is ZoneKind.EXCLUSION and b.area.covers(point)] + outside
+
+    def nearest_point(self, area: BaseGeometry, point: Point) -> Point:
+        """Give the point of an area nearest to a point."""
+        return nearest_points(area, point)[0]
+
+
+def lay_out(
+    fence: Fence,
+    frame: LocalFrame,
+    *,
+    union: bool = False,
+    home: LatLon | None = None,
+    home_radius_m: float | None = None,
+    around: Sequence[LatLon] = (),
+) -> Ground:
+    """Lay a fence out in the plane.
+
+    Parameters
+    ----------
+    fence : Fence
+        The zones.
+    frame : LocalFrame
+        The plane.
+    union : bool
+        FENCE_OPTIONS bit 1 (value 2): inside one inclusion is enough.
+    home : LatLon, optional
+        The centre of the home circle.
+    home_radius_m : float, optional
+        FENCE_RADIUS where the autopilot enforces it; it holds whatever ``union`` says.
+    around : sequence of LatLon
+        Places that must lie within the bounds where the fence has no inclusion.
+
+    Raises
+    ------
+    SituationError
+        The home circle is enforced and home is not known.
+    FenceError
+        An inclusion without area.
+    """
+    warnings: list[str] = []
+    barriers = [
+        Barrier(name, zone.kind, _area(zone, name, frame, warnings))
+        for name, zone in zip(fence.zone_names(), fence.zones, strict=True)
+    ]
+    if home_radius_m is not None:
+        circle = _home_circle(home, home_radius_m)
+        name = f"home circle (FENCE_RADIUS {home_radius_m:g} m)"
+        area = _area(circle, name, frame, warnings)
+        if union:  # the home circle limits even the union
+            barriers = [
+                Barrier(b.name, b.kind, b.area.intersection(area)) if b.kind is ZoneKind.INCLUSION else b
+                for b in barriers
+            ]
+        if not (union and any(b.kind is ZoneKind.INCLUSION for b in barriers)):
+            barriers.append(Barrier(name, ZoneKind.INCLUSION, area))
+    points = frame.to_local_array(around)
+    extent = shapely.union_all([*(b.area.envelope for b in barriers), shapely.MultiPoint(points)])
+    bounds = extent.envelope.buffer(_OPEN_GROUND_M, join_style="mitre")
+    return Ground(frame, tuple(barriers), union, bounds, tuple(warnings))
+
+
+def _home_circle(home: LatLon | None, radius_m: float) -> CircleZone:
+    if home is None:
+        raise SituationError(
+            f"the autopilot enforces a circle of FENCE_RADIUS {radius_m:g} m around home, and home is not known",
+            fence_radius_m=radius_m,
+        )
+    return CircleZone(ZoneKind.INCLUSION, home, radius_m)
+
+
+def _area(zone: Zone, name: str, frame: LocalFrame, warnings: list[str]) -> BaseGeometry:
+    if isinstance(zone, CircleZone):
+        return _circle(zone, frame)
+    return _polygon(zone, name, frame, warnings)
+
+
+def _polygon(zone: PolygonZone, name: str, frame: LocalFrame, warnings: list[str]) -> BaseGeometry:
+    ring = frame.to_local_array(zone.vertices)
+    plain = Polygon(ring)
+    if plain.is_valid and plain.area > 0:
+        return plain
+    area = _even_odd(ring)
+    warnings.append(
+        f"{name} crosses or touches itself; it is read by the even-odd rule, as the autopilot tests it"
+        if area.area > 0
+        else f"{name} has no area"
+    )
+    if zone.kind is ZoneKind.EXCLUSION:  # its lines were drawn to keep something out: they stay walls
+        return area.union(LinearRing(ring).buffer(_WALL_M, join_style="mitre"))
+    if area.is_empty:
+        raise FenceError(f"{name} has no area: the vehicle could be nowhere", zone=name)
+    return area
+
+
+def _even_odd(ring: NDArray[np.float64]) -> BaseGeometry:
+    """Give the area of a self-crossing ring that a ray from a point crosses an odd number of times to leave."""
+    lines = shapely.union_all([LinearRing(ring)])
+    faces = shapely.get_parts(shapely.polygonize([lines]))
+    inside = [face for face in faces if _crossings(ring, face.representative_point()) % 2]
+    return shapely.union_all(inside)
+
+
+def _crossings(ring: NDArray[np.float64], point: Point) -> int:
+    """Count the ring's edges that a ray from a point to the east crosses."""
+    a, b = ring, np.roll(ring, -1, axis=0)
+    spans = (a[:, 1] > point.y) != (b[:, 1] > point.y)
+    a, b = a[spans], b[spans]
+    crossing_east_m = a[:, 0] + (point.y - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
+    return int((crossing_east_m > point.x).sum())
+
+
+def _circle(zone: CircleZone, frame: LocalFrame) -> Polygon:
+    """Give a polygon around an exclusion circle, or inside an inclusion circle."""
+    scale = autopilot_scale(zone.centre.lat_deg)
+    corners = max(16, math.ceil(math.pi / math.acos(1 - CIRCLE_TOLERANCE_M / max(zone.radius_m, 1.0))))
+    if zone.kind is ZoneKind.EXCLUSION:
+        radius_m = zone.radius_m * max(1.0, scale.east, scale.north) / math.cos(math.pi / corners)
+    else:
+        radius_m = zone.radius_m * min(1.0, scale.east, scale.north)
+    angles_rad = (np.arange(corners) + 0.5) * (2 * math.pi / corners)
+    centre = frame.to_local(zone.centre)
+    ring = np.column_stack((np.cos(angles_rad), np.sin(angles_rad))) * radius_m + centre
+    return Polygon(ring)

@@ -1,0 +1,300 @@
+"""From a situation and a request to a plan: the one function that the command line, the bridge and replays call."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from shapely import LineString, Point
+
+from missions.errors import FenceMissingError, PlanCheckError, SituationError
+from missions.fence import PolygonZone
+from missions.geo import distance_m, rounded
+from missions.ground import Ground, lay_out
+from missions.items import MissionItem, last_place, waypoint
+from missions.local_frame import autopilot_line, bow_m, frame_around
+from missions.route import Route, find_route
+from missions.situation import ListKind, Situation
+from missions.vehicle import vehicle_from_parameters
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from missions.fence import Fence
+    from missions.geo import LatLon
+    from missions.request import Request
+    from missions.vehicle import Vehicle
+
+MAX_LEG_M = 1000.0
+"""Longer legs are split: the autopilot's straight line bows off ours with the square of the length."""
+
+ROUNDING_RESERVE_M = 0.01
+"""Rounding to degE7 moves a waypoint by 8 mm at most."""
+
+MAX_FIELD_M = 100_000.0
+
+_SAMPLE_M = 50.0
+_FENCE_ADVICE = (
+    "Let the ground station read the fence from the vehicle (MAVProxy: fence list; Mission Planner, QGroundControl: "
+    "download in the plan view) while the stream is recorded, or give a fence file (--fence)"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A mission and what it promises.
+
+    Parameters
+    ----------
+    items : tuple of MissionItem
+        Waypoints for the autopilot, without the home item and without the start.
+    path : tuple of LatLon
+        The drawn lines as rounded into the items, start first.
+    clearance_m : float or None
+        Promised for the rover as it drives; None where only drawn lines were asked for.
+    drawn_clearance_m : float
+        The least distance of the drawn lines, as rounded and as the autopilot draws them, to any fence (infinite without a fence near).
+    driven_clearance_m : float or None
+        The predicted least distance of the driven track.
+    blocks : int
+        Blocks of the partition that was searched.
+    fence, ground : Fence, Ground
+        What was planned around.
+    vehicle : Vehicle
+        What was known of the vehicle.
+    home : LatLon or None
+        For the mission's home item.
+    """
+
+    items: tuple[MissionItem, ...]
+    path: tuple[LatLon, ...]
+    start: LatLon
+    targets: tuple[LatLon, ...]
+    method: str
+    length_m: float
+    straight_line_m: float
+    duration_s: float
+    clearance_m: float | None
+    drawn_clearance_m: float
+    driven_clearance_m: float | None
+    blocks: int
+    fence: Fence
+    ground: Ground
+    vehicle: Vehicle
+    home: LatLon | None
+    warnings: tuple[str, ...]
+
+
+def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bool] | None = None) -> Plan:
+    """Plan a mission around the situation's fence.
+
+    Raises
+    ------
+    FenceMissingError
+        No fence is known.
+    SituationError
+        Start or target is not known, or home where FENCE_RADIUS is enforced around it.
+    FenceError, VehicleError, InvalidPositionError
+        The fence, a parameter or a position cannot be used.
+    StartBlockedError, TargetBlockedError, NoRouteError
+        No route; with the fences to blame.
+    PlanCheckError
+        The finished route failed its check: a defect of this program, never to be driven.
+    """
+    fence = _fence(situation)
+    vehicle = vehicle_from_parameters(situation.parameters, mav_type=situation.vehicle_type)
+    start, targets = _ends(situation, request)
+    home = situation.home.value if situation.home else None
+    ground = _ground(fence, vehicle, home, (start, *targets))
+    promised_m, allowance_m, warnings = _clearance(request, vehicle)
+    drawn_m = promised_m + allowance_m
+    warnings = [*_fence_warnings(vehicle, situation), *ground.warnings, *warnings]
+
+    local = [ground.frame.to_local(position) for position in (start, *targets)]
+    route = find_route(
+        ground,
+        local[0],
+        local[1:],
+        drawn_m + _reserve_m(ground),
+        method=request.method,
+        snap_m=request.snap_m,
+        should_stop=should_stop,
+    )
+    if route.lead_away:
+        warnings.append(
+            f"the start stands {route.start_clearance_m:.2f} m from a fence, nearer than {drawn_m:.2f} m: "
+            "the route first leads away, never nearer than that"
+        )
+    path = _rounded_path(ground, route)
+    clearance_m = _check(ground, path, route, drawn_m)
+    return Plan(
+        items=tuple(waypoint(position) for position in path[1:]),
+        path=path,
+        start=start,
+        targets=tuple(ground.frame.to_lat_lons(route.points[list(route.target_indices)])),
+        method=request.method,
+        length_m=_length_m(path),
+        straight_line_m=_length_m((start, *targets)),
+        duration_s=_length_m(path) / vehicle.speed_mps,
+        clearance_m=promised_m if allowance_m else None,
+        drawn_clearance_m=clearance_m,
+        driven_clearance_m=None,
+        blocks=route.blocks,
+        fence=fence,
+        ground=ground,
+        vehicle=vehicle,
+        home=home,
+        warnings=tuple(dict.fromkeys(warnings)),
+    )
+
+
+def _fence(situation: Situation) -> Fence:
+    known = situation.fence
+    trouble = fence_trouble(situation)
+    if known is None:
+        raise FenceMissingError(
+            f"{trouble or 'no fence was transferred'}: there is nothing to plan around. {_FENCE_ADVICE}"
+        )
+    if not known.value.zones:
+        raise FenceMissingError(f"the fence from {known.source} is empty: there is nothing to plan around")
+    return known.value
+
+
+def fence_trouble(situation: Situation) -> str | None:
+    """Say why the newest fence that was seen cannot be used; None where there is no such trouble."""
+    if situation.fence_trouble:
+        return f"a fence was transferred but is unusable ({situation.fence_trouble})"
+    for to_vehicle in (True, False):
+        transfer = situation.transfers.get((ListKind.FENCE, to_vehicle))
+        if transfer is None:
+            continue
+        what = "upload" if to_vehicle else "read-back"
+        if transfer.is_complete:
+            return f"a fence upload of {transfer.count} items was seen, but not that the vehicle accepted it"
+        of = "an unknown number of" if transfer.count is None else transfer.count
+        return f"a fence {what} was seen only in part ({len(transfer.items)} of {of} items)"
+    return None
+
+
+def _ends(situation: Situation, request: Request) -> tuple[LatLon, tuple[LatLon, ...]]:
+    start = request.start
+    if start is None and situation.pose is not None:
+        start = situation.pose.value.position
+    if start is None and situation.home is not None:
+        start = situation.home.value
+    if start is None:
+        raise SituationError("the start is not known: no position and no home; give one (--start LAT,LON)")
+    targets = request.targets
+    if not targets and situation.target is not None:
+        targets = (situation.target.value,)
+    if not targets and situation.mission is not None:
+        place = last_place(situation.mission.value.items)
+        targets = (place,) if place else ()
+    if not targets:
+        raise SituationError(
+            "the target is not known: none was sent and no mission holds one; give one (--target LAT,LON)"
+        )
+    return start, targets
+
+
+def _ground(fence: Fence, vehicle: Vehicle, home: LatLon | None, ends: Sequence[LatLon]) -> Ground:
+    positions = [
+        position
+        for zone in fence.zones
+        for position in (zone.vertices if isinstance(zone, PolygonZone) else (zone.centre,))
+    ]
+    frame = frame_around(positions)
+    for position in (*positions, *ends):
+        if (away_m := distance_m(frame.origin, position)) > MAX_FIELD_M:
+            raise SituationError(
+                f"{position} is {away_m / 1000:.0f} km from the fence's centre {frame.origin}; "
+                f"at most {MAX_FIELD_M / 1000:.0f} km can be planned",
+                distance_m=away_m,
+            )
+    return lay_out(
+        fence,
+        frame,
+        union=vehicle.fence.union,
+        home=home,
+        home_radius_m=vehicle.fence.radius_m if vehicle.fence.enforces_home_circle else None,
+        around=ends,
+    )
+
+
+def _clearance(request: Request, vehicle: Vehicle) -> tuple[float, float, list[str]]:
+    """Give the clearance promised, the allowance on top, and what to say about them."""
+    warnings = []
+    promised_m = request.clearance_m
+    if promised_m is None:
+        promised_m = max(vehicle.fence.margin_m + 0.5, 1.0)
+    elif vehicle.stops_within_m > promised_m:
+        warnings.append(
+            f"nearer than FENCE_MARGIN {vehicle.stops_within_m:g} m to the fence the vehicle stops in AUTO for good "
+            f"(AVOID_ENABLE); the clearance of {promised_m:g} m is less"
+        )
+    allowance_m = request.corner_allowance_m
+    if allowance_m is None:
+        allowance_m = vehicle.waypoint_radius_m
+        warnings.append(
+            f"{allowance_m:g} m (WP_RADIUS) are kept on top of the clearance everywhere for cut corners: a rule of thumb"
+        )
+    named = {"FENCE_MARGIN": request.clearance_m is None, "WP_RADIUS": request.corner_allowance_m is None}
+    warnings += [str(assumed) for assumed in vehicle.assumed if named.get(assumed.parameter)]
+    return promised_m, allowance_m, warnings
+
+
+def _fence_warnings(vehicle: Vehicle, situation: Situation) -> list[str]:
+    if situation.fence_trouble:
+        return [
+            f"a newer fence was seen but could not be used, so an older one counts: {situation.fence_trouble}"
+        ]
+    if vehicle.fence.enforces_zones or not situation.parameters:
+        return []
+    reason = "FENCE_TYPE has no bit 2 (value 4)" if vehicle.fence.enabled else "FENCE_ENABLE is 0"
+    return [f"the autopilot does not enforce this fence ({reason}); the route honours it all the same"]
+
+
+def _reserve_m(ground: Ground) -> float:
+    east_min_m, north_min_m, east_max_m, north_max_m = ground.allowed.bounds
+    diagonal_m = math.hypot(east_max_m - east_min_m, north_max_m - north_min_m)
+    return ROUNDING_RESERVE_M + bow_m(min(diagonal_m, MAX_LEG_M), ground.frame.origin.lat_deg)
+
+
+def _rounded_path(ground: Ground, route: Route) -> tuple[LatLon, ...]:
+    """Split long legs, round to degE7, drop waypoints that fall together."""
+    points = [route.points[:1]]
+    for a, b in pairwise(route.points):
+        pieces = max(1, math.ceil(math.dist(a, b) / MAX_LEG_M))
+        points.append(a + (b - a) * (np.arange(1, pieces + 1) / pieces)[:, None])
+    positions = [rounded(position) for position in ground.frame.to_lat_lons(np.concatenate(points))]
+    kept = positions[:1]
+    kept += [b for a, b in pairwise(positions) if a != b]
+    return tuple(kept) if len(kept) > 1 else (kept[0], kept[0])
+
+
+def _length_m(path: Sequence[LatLon]) -> float:
+    return sum(distance_m(a, b) for a, b in pairwise(path))
+
+
+def _check(ground: Ground, path: Sequence[LatLon], route: Route, drawn_m: float) -> float:
+    """Measure the finished lines, as the autopilot draws them, and give their least clearance."""
+    clearances_m = [ground.clearance_m(_drawn_leg(ground, a, b)) for a, b in pairwise(path)]
+    lead_away = clearances_m[: route.lead_away]
+    rest = clearances_m[route.lead_away :]
+    asked_m = {"lead-away": route.start_clearance_m - ROUNDING_RESERVE_M, "route": drawn_m}
+    for name, found in (("lead-away", lead_away), ("route", rest)):
+        if found and min(found) < asked_m[name] - 1e-6:
+            raise PlanCheckError(
+                f"the {name} comes {min(found):.4f} m near a fence; at least {asked_m[name]:.4f} m was asked. This is a defect",
+                clearance_m=min(found),
+                asked_m=asked_m[name],
+            )
+    return min(clearances_m)
+
+
+def _drawn_leg(ground: Ground, a: LatLon, b: LatLon) -> LineString | Point:
+    line = ground.frame.to_local_array(autopilot_line(a, b, _SAMPLE_M, distance_m(a, b)))
+    return Point(line[0]) if a == b else LineString(line)

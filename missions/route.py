@@ -1,0 +1,263 @@
+"""A drawn route in the plane: from start over targets, keeping the clearance, leading away first where the start is nearer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+from shapely import LineString, Point
+
+import pbpp
+from missions.errors import NoRouteError, RouteError, StartBlockedError, TargetBlockedError
+from missions.fence import ZoneKind
+from missions.geo import bearing_deg, distance_m
+from missions.local_frame import LocalPoint
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from numpy.typing import NDArray
+    from shapely.geometry.base import BaseGeometry
+
+    from missions.geo import LatLon
+    from missions.ground import Ground
+
+_INSIDE_M = 0.005
+"""Points put on the edge of free space stand this far inside it, so that rounding leaves them there."""
+
+_EXITS_TRIED = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Route:
+    """Straight lines through local points.
+
+    Parameters
+    ----------
+    points : (n, 2) array
+        East and north in metres, start first.
+    lead_away : int
+        How many of the first legs lead away from a fence that the start stands nearer to than the clearance.
+    start_clearance_m : float
+        The start's distance to the nearest fence.
+    target_indices : tuple of int
+        Which points are the targets, in order.
+    blocks : int
+        Blocks of the partition the planner searched.
+    """
+
+    points: NDArray[np.float64]
+    lead_away: int
+    start_clearance_m: float
+    target_indices: tuple[int, ...]
+    blocks: int
+
+
+def find_route(
+    ground: Ground,
+    start: LocalPoint,
+    targets: list[LocalPoint],
+    clearance_m: float,
+    *,
+    method: str = "optimal",
+    snap_m: float = 0.0,
+    should_stop: Callable[[], bool] | None = None,
+) -> Route:
+    """Find the shortest route over the targets in the order given.
+
+    Parameters
+    ----------
+    ground : Ground
+        The field.
+    start, targets : LocalPoint
+        Where from, and where to.
+    clearance_m : float
+        What the drawn lines keep to any fence; where the start is nearer, the route first leads away, never nearer than the start is.
+    method : str
+        ``optimal``, ``pbpp-taut`` or ``pbpp``.
+    snap_m : float
+        A blocked target is moved to free ground within this distance.
+    should_stop : callable, optional
+        Asked now and then; True ends the search.
+
+    Raises
+    ------
+    StartBlockedError, TargetBlockedError, NoRouteError
+        With the fences that are to blame and the distances in metres.
+    """
+    planner = pbpp.Planner(
+        ground.areas(ZoneKind.INCLUSION),
+        ground.areas(ZoneKind.EXCLUSION),
+        clearance_m=clearance_m,
+        union=ground.union,
+    )
+    search = _Search(ground, planner, clearance_m, method, should_stop)
+    start_clearance_m = search.check_start(start)
+    goals = [search.free_target(target, snap_m) for target in targets]
+    lead: list[LocalPoint] = [start]
+    if start_clearance_m < clearance_m and not search.is_free(start):
+        lead = search.lead_away(start, start_clearance_m, goals[0])
+    points = [np.array(lead)]
+    target_indices = []
+    blocks = 0
+    here = lead[-1]
+    for goal in goals:
+        path = search.path(here, goal)
+        points.append(path.points[1:])
+        target_indices.append(sum(map(len, points)) - 1)
+        blocks = max(blocks, path.blocks)
+        here = goal
+    return Route(np.concatenate(points), len(lead) - 1, start_clearance_m, tuple(target_indices), blocks)
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """One planner and the field it plans in."""
+
+    ground: Ground
+    planner: pbpp.Planner
+    clearance_m: float
+    method: str
+    should_stop: Callable[[], bool] | None
+
+    def is_free(self, point: LocalPoint) -> bool:
+        return bool(self.planner.free_space.covers(Point(point)))
+
+    def check_start(self, start: LocalPoint) -> float:
+        """Give the start's clearance.
+
+        Raises
+        ------
+        StartBlockedError
+            The start is on forbidden ground.
+        """
+        point = Point(start)
+        forbidding = self.ground.forbidding(point)
+        if not forbidding and self.ground.allowed.covers(point):
+            return self.ground.clearance_m(point)
+        if self.ground.allowed.is_empty:
+            raise StartBlockedError("the fences leave no ground at all to drive on")
+        free = self.ground.nearest_point(self.ground.allowed, point)
+        distance, bearing, position = self._way(start, free)
+        names = _names([barrier.name for barrier in forbidding])
+        raise StartBlockedError(
+            f"the start is on forbidden ground ({self._position(start)}): {names}; "
+            f"free ground is {distance:.2f} m away, bearing {bearing:.0f}°, at {position}",
+            fences=[barrier.name for barrier in forbidding],
+            distance_m=round(distance, 3),
+            bearing_deg=round(bearing, 1),
+            nearest_free=list(position),
+        )
+
+    def free_target(self, target: LocalPoint, snap_m: float) -> LocalPoint:
+        """Give the target, or the nearest free point within ``snap_m``."""
+        if self.is_free(target):
+            return target
+        free_space = self.planner.free_space
+        if free_space.is_empty:
+            raise NoRouteError(
+                f"nowhere in the field is {self.clearance_m:.2f} m away from every fence",
+                clearance_m=self.clearance_m,
+            )
+        point = Point(target)
+        inner = free_space.buffer(-_INSIDE_M, join_style="mitre")
+        free = self.ground.nearest_point(inner if not inner.is_empty else free_space, point)
+        distance, bearing, position = self._way(target, free)
+        if distance <= snap_m:
+            return LocalPoint(free.x, free.y)
+        forbidding = self.ground.forbidding(point)
+        nearest, gap_m = self.ground.nearest(point)
+        if forbidding:
+            names = [barrier.name for barrier in forbidding]
+            problem = f"the target is on forbidden ground ({self._position(target)}): {_names(names)}"
+        else:
+            names = [nearest.name] if nearest else []
+            problem = (
+                f"the target is {gap_m:.2f} m from {_names(names)}, nearer than {self.clearance_m:.2f} m"
+            )
+        raise TargetBlockedError(
+            f"{problem}; the nearest free point is {distance:.2f} m away, bearing {bearing:.0f}°, at {position}",
+            fences=names,
+            clearance_m=round(self.clearance_m, 3),
+            distance_m=round(distance, 3),
+            bearing_deg=round(bearing, 1),
+            nearest_free=list(position),
+        )
+
+    def path(self, start: LocalPoint, goal: LocalPoint) -> pbpp.PlannedPath:
+        """Plan between two free points."""
+        try:
+            return self.planner.plan(start, goal, method=self.method, should_stop=self.should_stop)
+        except pbpp.NoPathError:
+            raise self._no_route(start, goal) from None
+
+    def lead_away(self, start: LocalPoint, start_clearance_m: float, goal: LocalPoint) -> list[LocalPoint]:
+        """Give the first points of a route that leaves a fence's neighbourhood without ever coming nearer to one.
+
+        Of the points where free space can be entered straight, the one that makes the whole route shortest.
+        """
+        free = self._component(goal)
+        best: tuple[float, LocalPoint] | None = None
+        for tried, exit_point in enumerate(self._exits(start, free, start_clearance_m, goal)):
+            if tried == _EXITS_TRIED:
+                break
+            length_m = Point(start).distance(Point(exit_point)) + self.path(exit_point, goal).length_m
+            best = min(best, (length_m, exit_point)) if best else (length_m, exit_point)
+        if best is not None:
+            return [start, best[1]]
+        nearest = self.ground.nearest_point(free, Point(start))
+        raise self._no_route(start, LocalPoint(nearest.x, nearest.y))
+
+    def _exits(
+        self, start: LocalPoint, free: BaseGeometry, start_clearance_m: float, goal: LocalPoint
+    ) -> Iterator[LocalPoint]:
+        """Give points on free space's edge that can be reached straight, most promising first."""
+        origin = Point(start)
+        inner = free.buffer(-_INSIDE_M, join_style="mitre")
+        if inner.is_empty:
+            return
+        nearest = self.ground.nearest_point(inner, origin)
+        reach_m = 3 * origin.distance(nearest) + 5.0
+        near_edge = inner.boundary.intersection(origin.buffer(reach_m)).segmentize(0.5)
+        candidates = [nearest, *(Point(xy) for xy in shapely.get_coordinates(near_edge))]
+        target = Point(goal)
+        for candidate in sorted(candidates, key=lambda p: origin.distance(p) + p.distance(target)):
+            leg = LineString([origin, candidate])
+            if self.ground.clearance_m(leg) >= start_clearance_m - 1e-9:
+                yield LocalPoint(candidate.x, candidate.y)
+
+    def _component(self, point: LocalPoint) -> BaseGeometry:
+        parts: list[BaseGeometry] = list(shapely.get_parts(self.planner.free_space))
+        return min(parts, key=lambda part: float(part.distance(Point(point))))
+
+    def _no_route(self, start: LocalPoint, goal: LocalPoint) -> RouteError:
+        """Name the fences that part start and target: those along the edge of the smaller of their two areas."""
+        areas = {"start": self._component(start), "target": self._component(goal)}
+        walled = min(areas, key=lambda end: areas[end].area)
+        outline = shapely.get_exterior_ring(areas[walled])
+        reach_m = self.clearance_m * 1.01 + 2 * _INSIDE_M + 0.01
+        names = [b.name for b in self.ground.barriers if self.ground.distance_m(b, outline) <= reach_m]
+        return NoRouteError(
+            f"no route keeps {self.clearance_m:.2f} m: the {walled} is walled in by {_names(names)}",
+            clearance_m=round(self.clearance_m, 3),
+            walled_in=walled,
+            fences=names,
+        )
+
+    def _way(self, point: LocalPoint, to: Point) -> tuple[float, float, LatLon]:
+        """Give distance, bearing and position of another point, on Earth."""
+        here = self._position(point)
+        there = self.ground.frame.to_lat_lon(LocalPoint(to.x, to.y))
+        return distance_m(here, there), bearing_deg(here, there), there
+
+    def _position(self, point: LocalPoint) -> LatLon:
+        return self.ground.frame.to_lat_lon(point)
+
+
+def _names(names: list[str]) -> str:
+    """Join names as a sentence does."""
+    if len(names) < 2:
+        return "".join(names) or "no fence in particular"
+    return f"{', '.join(names[:-1])} and {names[-1]}"

@@ -44,15 +44,17 @@ class Codec:
 
     def decode(self, data: bytes) -> list[Frame]:
         """Take received bytes; give the complete frames of known types in them, damaged ones left out."""
-        frames = []
+        return [frame for _, frame in self.decode_with_bytes(data) if frame is not None]
+
+    def decode_with_bytes(self, data: bytes) -> list[tuple[bytes, Frame | None]]:
+        """Take received bytes; give each sound frame's bytes and, where its type is known, the frame."""
+        decoded = []
         for raw in self._mavlink.parse_buffer(data) or []:
             if raw.get_type() == "BAD_DATA":
                 self.bad_bytes += len(raw.data)
                 continue
-            frame = to_frame(raw)
-            if frame is not None:
-                frames.append(frame)
-        return frames
+            decoded.append((bytes(raw.get_msgbuf()), to_frame(raw)))
+        return decoded
 
 
 def to_frame(raw: Any) -> Frame | None:  # noqa: ANN401 - pymavlink ships no types

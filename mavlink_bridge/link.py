@@ -1,0 +1,354 @@
+"""Live links: sockets and serial ports, the codec at their end, and the loop that runs a machine."""
+
+from __future__ import annotations
+
+import contextlib
+import select
+import socket
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol, Self
+
+from mavlink_bridge.codec import Codec
+from mavlink_bridge.errors import IdentityTakenError, LinkError
+from mavlink_bridge.messages import Autopilot, Heartbeat, MavType
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import TracebackType
+
+    from mavlink_bridge.messages import Frame, Message
+    from mavlink_bridge.protocol.machine import Machine
+    from mavlink_bridge.tlog import TlogWriter
+
+ONE_SHOT_IDENTITY = (245, 190)
+"""System and component id of one-shot commands: nobody else's by custom."""
+
+DEFAULT_BAUD = 57600
+_HEARTBEAT_EVERY_S = 1.0
+_RECEIVE_BYTES = 65536
+_LINK_SENT = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Address:
+    """A parsed connection string: ``kind`` is udpin, udpout, tcp, tcpin or serial."""
+
+    kind: str
+    host: str
+    port: int
+
+    def __str__(self) -> str:
+        return f"{self.host},{self.port}" if self.kind == "serial" else f"{self.kind}:{self.host}:{self.port}"
+
+
+def parse_connection(text: str) -> Address:
+    """Read a connection string in pymavlink's forms.
+
+    ``udpin:HOST:PORT``, ``udpout:HOST:PORT``, ``tcp:HOST:PORT``, ``tcpin:HOST:PORT``, ``udp:…`` and a bare ``HOST:PORT`` (as udpin), and serial
+    devices with MAVProxy's ``,BAUD``.
+
+    Raises
+    ------
+    LinkError
+        The string is none of these.
+    """
+    kind, _, rest = text.partition(":")
+    if kind in ("udpin", "udpout", "udp", "tcp", "tcpin"):
+        host, _, port = rest.rpartition(":")
+        if not host or not port.isdigit() or int(port) > 65535:
+            raise LinkError(f"connection {text!r}: expected {kind}:HOST:PORT")
+        return Address("udpin" if kind == "udp" else kind, host.strip("[]"), int(port))
+    if text.startswith("/dev/") or text.upper().startswith("COM"):
+        device, _, baud = text.partition(",")
+        if baud and not baud.isdigit():
+            raise LinkError(f"connection {text!r}: expected DEVICE,BAUD")
+        return Address("serial", device, int(baud or DEFAULT_BAUD))
+    host, _, port = text.rpartition(":")
+    if host and port.isdigit():
+        return Address("udpin", host, int(port))
+    raise LinkError(
+        f"connection {text!r}: expected udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:HOST:PORT or a serial device"
+    )
+
+
+class Transport(Protocol):
+    """Bytes out and in."""
+
+    echoes: bool
+    """Whether what is sent may come back (half-duplex radios)."""
+
+    def send(self, data: bytes) -> None:
+        """Send, or do nothing while nobody is there to send to."""
+        ...
+
+    def receive(self, timeout_s: float) -> bytes:
+        """Wait for bytes, at most so long; empty when none came."""
+        ...
+
+    def close(self) -> None:
+        """Let go of the device."""
+        ...
+
+
+class Link:
+    """One MAVLink link: frames in, messages out, our own heartbeat, and a record of both directions.
+
+    Parameters
+    ----------
+    transport : Transport
+        The open device.
+    identity : tuple of int
+        System and component id to speak as.
+    recorder : TlogWriter, optional
+        Everything that comes and goes is written there.
+
+    Raises
+    ------
+    IdentityTakenError
+        From `receive`: somebody else on the link speaks with our ids.
+    LinkError
+        From `receive` and `send`: the other end is gone.
+    """
+
+    def __init__(
+        self,
+        transport: Transport,
+        identity: tuple[int, int] = ONE_SHOT_IDENTITY,
+        recorder: TlogWriter | None = None,
+    ) -> None:
+        self._transport = transport
+        self._codec = Codec(*identity)
+        self._recorder = recorder
+        self._heartbeat_due_s = 0.0
+        self._has_spoken = False
+
+    @property
+    def identity(self) -> tuple[int, int]:
+        """The ids we speak as."""
+        return self._codec.identity
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the device."""
+        self._transport.close()
+
+    def send(self, message: Message) -> None:
+        """Send one message."""
+        data = self._codec.encode(message)
+        self._transport.send(data)
+        self._has_spoken = True
+        if self._recorder:
+            self._recorder.write(time.time(), data, _LINK_SENT)
+
+    def receive(self, timeout_s: float) -> list[Frame]:
+        """Give the frames that come within a time, as soon as there are any; our heartbeat goes out when it is due."""
+        now_s = time.monotonic()
+        if now_s >= self._heartbeat_due_s:
+            self._heartbeat_due_s = now_s + _HEARTBEAT_EVERY_S
+            self.send(Heartbeat(MavType.ONBOARD_CONTROLLER, Autopilot.INVALID))
+        until_heartbeat_s = self._heartbeat_due_s - now_s
+        data = self._transport.receive(max(0.0, min(timeout_s, until_heartbeat_s)))
+        if not data:
+            return []
+        decoded = self._codec.decode_with_bytes(data)
+        if self._recorder:
+            for frame_bytes, _ in decoded:
+                self._recorder.write(time.time(), frame_bytes)
+        frames = [frame for _, frame in decoded if frame is not None]
+        ours = [frame for frame in frames if (frame.system, frame.component) == self.identity]
+        if ours and not (self._transport.echoes and self._has_spoken):
+            raise IdentityTakenError(
+                f"somebody on the link already speaks as system {self.identity[0]} component {self.identity[1]}; "
+                "choose others with --source-system and --source-component"
+            )
+        return frames
+
+    def run(
+        self,
+        machine: Machine,
+        *,
+        timeout_s: float | None = None,
+        on_frames: Callable[[list[Frame]], None] | None = None,
+        on_step: Callable[[], None] | None = None,
+    ) -> None:
+        """Run a machine to its outcome.
+
+        Parameters
+        ----------
+        machine : Machine
+            Not yet started.
+        timeout_s : float, optional
+            The longest it may take.
+        on_frames : callable, optional
+            Sees every batch of frames before the machine does.
+        on_step : callable, optional
+            Called after each step, for progress bars and for what the machine hands out.
+
+        Raises
+        ------
+        LinkError
+            The time is over, or the link is gone.
+        """
+        begun_s = time.monotonic()
+        machine.start(begun_s)
+        while True:
+            for message in machine.messages_to_send():
+                self.send(message)
+            if on_step:
+                on_step()
+            if machine.is_done:
+                return
+            now_s = time.monotonic()
+            if timeout_s is not None and now_s - begun_s > timeout_s:
+                raise LinkError(f"no outcome within {timeout_s:g} s")
+            deadline_s = machine.deadline_s
+            wait_s = 0.5 if deadline_s is None else min(0.5, max(0.0, deadline_s - now_s))
+            frames = self.receive(wait_s)
+            if frames and on_frames:
+                on_frames(frames)
+            for frame in frames:
+                machine.receive(frame, time.monotonic())
+            machine.handle_timer(time.monotonic())
+
+
+def open_link(
+    connection: str,
+    identity: tuple[int, int] = ONE_SHOT_IDENTITY,
+    *,
+    recorder: TlogWriter | None = None,
+    timeout_s: float = 10.0,
+) -> Link:
+    """Open a link by its connection string.
+
+    Raises
+    ------
+    LinkError
+        The string is none, or the device cannot be opened; says why.
+    """
+    address = parse_connection(connection)
+    try:
+        transport = _OPENERS[address.kind](address, timeout_s)
+    except OSError as error:
+        raise LinkError(
+            f"{address} cannot be opened: {error.strerror or error}", connection=str(address)
+        ) from None
+    return Link(transport, identity, recorder)
+
+
+class _Udp:
+    """UDP: ``udpout`` speaks first to one address, ``udpin`` answers everybody it has heard."""
+
+    echoes = False
+
+    def __init__(self, address: Address, _timeout_s: float) -> None:
+        family, _, _, _, target = socket.getaddrinfo(address.host, address.port, type=socket.SOCK_DGRAM)[0]
+        self._socket = socket.socket(family, socket.SOCK_DGRAM)
+        self._peers: dict[object, None] = {}
+        if address.kind == "udpin":
+            self._socket.bind(target)
+        else:
+            self._peers[target] = None
+        self._socket.setblocking(False)
+
+    def send(self, data: bytes) -> None:
+        for peer in self._peers:
+            with contextlib.suppress(
+                OSError
+            ):  # a peer that is not there yet refuses; datagrams may be lost anyway
+                self._socket.sendto(data, peer)  # type: ignore[arg-type]
+
+    def receive(self, timeout_s: float) -> bytes:
+        if not select.select([self._socket], [], [], timeout_s)[0]:
+            return b""
+        received = []
+        with contextlib.suppress(BlockingIOError, ConnectionRefusedError):
+            while True:
+                data, peer = self._socket.recvfrom(_RECEIVE_BYTES)
+                self._peers.setdefault(peer)
+                received.append(data)
+        return b"".join(received)
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+class _Tcp:
+    """TCP: ``tcp`` connects, ``tcpin`` waits for one to connect."""
+
+    echoes = False
+
+    def __init__(self, address: Address, timeout_s: float) -> None:
+        if address.kind == "tcp":
+            self._socket = socket.create_connection((address.host, address.port), timeout_s)
+        else:
+            with socket.create_server((address.host, address.port)) as server:
+                server.settimeout(timeout_s)
+                self._socket = server.accept()[0]
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._socket.settimeout(timeout_s)
+
+    def send(self, data: bytes) -> None:
+        try:
+            self._socket.sendall(data)
+        except OSError as error:
+            raise LinkError(f"the link broke while sending: {error.strerror or error}") from None
+
+    def receive(self, timeout_s: float) -> bytes:
+        if not select.select([self._socket], [], [], timeout_s)[0]:
+            return b""
+        try:
+            data = self._socket.recv(_RECEIVE_BYTES)
+        except OSError as error:
+            raise LinkError(f"the link broke: {error.strerror or error}") from None
+        if not data:
+            raise LinkError("the other end closed the link")
+        return data
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+class _Serial:
+    """A serial port, by pyserial."""
+
+    echoes = True
+
+    def __init__(self, address: Address, _timeout_s: float) -> None:
+        import serial  # noqa: PLC0415 - only where there is a serial port
+
+        self._port = serial.Serial(address.host, address.port, timeout=0)
+
+    def send(self, data: bytes) -> None:
+        try:
+            self._port.write(data)
+        except OSError as error:
+            raise LinkError(f"the serial port broke: {error}") from None
+
+    def receive(self, timeout_s: float) -> bytes:
+        try:
+            self._port.timeout = timeout_s
+            first = self._port.read(1)
+            self._port.timeout = 0
+            return first + self._port.read(_RECEIVE_BYTES) if first else b""
+        except OSError as error:
+            raise LinkError(f"the serial port broke: {error}") from None
+
+    def close(self) -> None:
+        self._port.close()
+
+
+_OPENERS: dict[str, Callable[[Address, float], Transport]] = {
+    "udpin": _Udp,
+    "udpout": _Udp,
+    "tcp": _Tcp,
+    "tcpin": _Tcp,
+    "serial": _Serial,
+}

@@ -1,0 +1,29 @@
+"""Shortest safe paths in the plane: partitioning-based path planning (PBPP), made exact.
+
+Everything is in metres, east then north. See `plan_path` for one query and `Planner` for many on the same fence.
+"""
+
+from .errors import (
+    GoalBlockedError,
+    InvalidGeometryError,
+    NoPathError,
+    PlanningError,
+    StartBlockedError,
+    TooManyBlocksError,
+)
+from .geometry import circle_ring
+from .planned_path import PlannedPath
+from .planner import Planner, plan_path
+
+__all__ = [
+    "GoalBlockedError",
+    "InvalidGeometryError",
+    "NoPathError",
+    "PlannedPath",
+    "Planner",
+    "PlanningError",
+    "StartBlockedError",
+    "TooManyBlocksError",
+    "circle_ring",
+    "plan_path",
+]

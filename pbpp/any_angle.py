@@ -1,0 +1,336 @@
+"""Exact any-angle search over slabs: the globally shortest path, with a certificate.
+
+The search is Polyanya (Cui, Harabor, Grastien: "Compromise-free pathfinding on a navigation mesh", IJCAI 2017) made for slabs. A search
+node is a *root*, the last turning point, with a *cone* of directions under which it sees the portal just passed; its f-value is the length to
+the root plus the shortest way from there through the seen part of the portal to the goal, as if nothing stood behind. Cones that
+move on are Polyanya's observable successors; where a cone meets a corner of an obstacle, a *turn* is queued that makes the corner the
+next root: the non-observable successors.
+
+All portals are vertical, so a cone is two slopes, north over distance eastwards (or westwards), and clipping it is one comparison.
+The rules that keep it exact in floating point:
+
+- A cone is bounded by vertices, whose own coordinates give the slopes, never by a point interpolated on an edge. An edge that crosses a
+  portal's end does not clip the cone at all: what hides behind the edge lies behind its far vertex, and that one clips.
+- A path turns only at tangent vertices, those with both boundary neighbours on the turning side, and only towards that side.
+- The same turn (vertex and side) reached again at no smaller length is dropped: of two equally long ways to a corner, what the wider cone
+  sees in addition has a shortcut past the corner.
+- The goal is queued like any other node, and only when it is taken from the queue is the path final.
+- A vertex where obstacles touch is split into its free fans by the partition, so no path squeezes through.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from heapq import heappop, heappush
+from math import inf, sqrt
+
+from .geometry import Point
+from .partition.base import TOLERANCE_M
+from .partition.slabs import Slabs
+
+__all__ = ["SearchResult", "shortest_path"]
+
+_GOAL = -1
+_TURN = -2
+_SLACK_M = 1e-10  # a vertex this near to a cone's edge counts as seen: rounding must not hide what lies on one line
+_EAST, _WEST = 1, 0
+_LEFT, _RIGHT = 1, 0
+
+Cone = tuple[int, int, float, float]
+"""(block, direction, low slope, high slope)"""
+
+Node = tuple[float, int, int, int, int, float, float]
+"""(f, tie break, block or _GOAL or _TURN, direction, root, low slope, high slope)"""
+
+
+@dataclass(frozen=True)
+class SearchResult:
+    """What the search found.
+
+    Parameters
+    ----------
+    vertices : tuple of int or None
+        The vertices that the path turns at, in order; None if no path was found.
+    lower_bound_m : float
+        No path is shorter than this.
+    expanded : int
+        Number of search nodes taken from the queue.
+    stopped : bool
+        Whether the caller stopped the search.
+    """
+
+    vertices: tuple[int, ...] | None
+    lower_bound_m: float
+    expanded: int
+    stopped: bool
+
+
+def shortest_path(
+    slabs: Slabs,
+    start: Point,
+    goal: Point,
+    should_stop: Callable[[], bool] | None = None,
+) -> SearchResult:
+    """Return the shortest path between two points of free space.
+
+    Parameters
+    ----------
+    slabs : Slabs
+        The partition of free space.
+    start, goal : (east, north)
+        Metres from the scene's origin, in free space or on its boundary.
+    should_stop : callable, optional
+        Asked now and then; when it returns True the search ends with the bound reached so far.
+
+    Returns
+    -------
+    SearchResult
+        The path with its certificate.
+    """
+    return _Search(slabs, start, goal).run(should_stop)
+
+
+class _Search:
+    """One query."""
+
+    def __init__(self, slabs: Slabs, start: Point, goal: Point) -> None:
+        self._slabs = slabs
+        vertices = slabs.vertices
+        self._x, self._y = vertices.x_list, vertices.y_list
+        self._prev, self._next = vertices.prev_list, vertices.next_list
+        self._start_blocks = slabs.locate(start)
+        self._goal_blocks = frozenset(slabs.locate(goal))
+        self._goal = goal
+        # One entry for each root: where it is, the length up to it, the root before, its vertex and turning side.
+        self._root_x = [start[0]]
+        self._root_y = [start[1]]
+        self._root_g = [0.0]
+        self._root_before = [-1]
+        self._root_turn = [-1]
+        self._best: dict[int, float] = {}  # 2 * vertex + side: the least length known up to this turn
+        self._queue: list[Node] = []
+        self._ties = 0
+
+    def run(self, should_stop: Callable[[], bool] | None) -> SearchResult:
+        """Search until the goal is taken from the queue, the queue is empty or the caller stops."""
+        queue = self._queue
+        self._begin()
+        expanded = 0
+        while queue:
+            if should_stop is not None and expanded % 16 == 0 and should_stop():
+                ends = [node for node in queue if node[2] == _GOAL]
+                path = self._trace(min(ends)[4]) if ends else None
+                return SearchResult(path, min(queue)[0], expanded, stopped=True)
+            f_m, _, block, direction, root, low, high = heappop(queue)
+            expanded += 1
+            if block == _GOAL:
+                return SearchResult(self._trace(root), f_m, expanded, stopped=False)
+            if self._root_g[root] > self._best.get(self._root_turn[root], inf):
+                continue  # the corner has been reached on a shorter way since
+            if block == _TURN:
+                for cone in self._turn_cones(root):
+                    self._follow(root, cone)
+            else:
+                self._follow(root, (block, direction, low, high))
+        return SearchResult(None, inf, expanded, stopped=False)
+
+    def _trace(self, root: int) -> tuple[int, ...]:
+        turns: list[int] = []
+        while root > 0:
+            turns.append(self._root_turn[root] >> 1)
+            root = self._root_before[root]
+        return tuple(reversed(turns))
+
+    def _push(self, f_m: float, block: int, direction: int, root: int, low: float, high: float) -> None:
+        self._ties += 1
+        heappush(self._queue, (f_m, self._ties, block, direction, root, low, high))
+
+    def _push_goal(self, root: int) -> None:
+        east, north = self._goal[0] - self._root_x[root], self._goal[1] - self._root_y[root]
+        self._push(self._root_g[root] + sqrt(east * east + north * north), _GOAL, 0, root, 0.0, 0.0)
+
+    def _begin(self) -> None:
+        """Queue what the start sees."""
+        x, y = self._root_x[0], self._root_y[0]
+        for block in self._start_blocks:
+            if block in self._goal_blocks:
+                self._push_goal(0)
+                return
+        for block in self._start_blocks:
+            for vertex, _ in self._slabs.line_neighbours((x, y), block):
+                self._reach(0, vertex, _LEFT)
+                self._reach(0, vertex, _RIGHT)
+        for block in self._start_blocks:
+            self._follow(0, (block, _EAST, -inf, inf))
+            self._follow(0, (block, _WEST, -inf, inf))
+
+    def _reach(self, root: int, vertex: int, side: int) -> None:
+        """Queue a turn around a vertex that a root sees, if the vertex is tangent on that side."""
+        x, y = self._x[vertex], self._y[vertex]
+        east, north = x - self._root_x[root], y - self._root_y[root]
+        before, after = self._prev[vertex], self._next[vertex]
+        slack = _SLACK_M * (abs(east) + abs(north))
+        first = east * (self._y[before] - y) - north * (self._x[before] - x)
+        second = east * (self._y[after] - y) - north * (self._x[after] - x)
+        if side == _LEFT:
+            if first < -slack or second < -slack:
+                return
+        elif first > slack or second > slack:
+            return
+        g_m = self._root_g[root] + sqrt(east * east + north * north)
+        turn = 2 * vertex + side
+        if g_m >= self._best.get(turn, inf):
+            return
+        self._best[turn] = g_m
+        number = len(self._root_x)
+        self._root_x.append(x)
+        self._root_y.append(y)
+        self._root_g.append(g_m)
+        self._root_before.append(root)
+        self._root_turn.append(turn)
+        east, north = self._goal[0] - x, self._goal[1] - y
+        self._push(g_m + sqrt(east * east + north * north), _TURN, 0, number, 0.0, 0.0)
+
+    def _turn_cones(self, root: int) -> list[Cone]:
+        """Return the cones between the way a path came to a corner and the boundary it turns towards.
+
+        A turn to the right is a turn to the left with north and south exchanged, so one order of steps serves both.
+        """
+        turn = self._root_turn[root]
+        vertex, side = turn >> 1, turn & 1
+        mirror = 1.0 if side == _LEFT else -1.0
+        x, y = self._x[vertex], self._y[vertex]
+        before = self._root_before[root]
+        east, north = x - self._root_x[before], mirror * (y - self._root_y[before])
+        edge = self._prev[vertex] if side == _LEFT else self._next[vertex]
+        edge_east, edge_north = self._x[edge] - x, mirror * (self._y[edge] - y)
+        west_above, west_below, east_above, east_below = self._slabs.beside
+        if side == _LEFT:  # turning left one faces what lies below an obstacle eastwards, above it westwards
+            east_block, west_block = east_below[vertex], west_above[vertex]
+        else:
+            east_block, west_block = east_above[vertex], west_below[vertex]
+        cones: list[Cone] = []
+
+        def add(block: int, direction: int, low: float, high: float) -> None:
+            if block >= 0:
+                cones.append((block, direction, low, high) if side == _LEFT else (block, direction, -high, -low))
+
+        # Directions in the order of a left turn: east, up, west, down, east again.
+        if east * edge_north <= north * edge_east and east * edge_east + north * edge_north > 0.0:
+            east, north = edge_east, edge_north  # the boundary goes straight on, or bends away within rounding
+        quarter = _quarter(east, north)
+        last = _quarter(edge_east, edge_north)
+        for _ in range(3):
+            done = quarter == last
+            if quarter == 0:
+                low = north / east if east > 0.0 else -inf
+                high = edge_north / edge_east if done else inf
+                add(east_block, _EAST, min(low, high), high)
+            elif quarter == 2:
+                high = north / -east if east < 0.0 else inf
+                low = edge_north / -edge_east if done else -inf
+                add(west_block, _WEST, low, max(low, high))
+            else:
+                self._straight(root, vertex, upwards=(quarter == 1) == (side == _LEFT))
+            if done:
+                break
+            quarter = (quarter + 1) % 4
+            east = 0.0
+        return cones
+
+    def _straight(self, root: int, vertex: int, *, upwards: bool) -> None:
+        """Reach what stands on the line of a vertex, straight above or below it."""
+        x, y = self._root_x[root], self._root_y[root]
+        goal_x, goal_y = self._goal
+        west_above, west_below, east_above, east_below = self._slabs.beside
+        if upwards:
+            neighbour, sides, rise = self._slabs.above[vertex], (west_above, east_above), goal_y - y
+        else:
+            neighbour, sides, rise = self._slabs.below[vertex], (west_below, east_below), y - goal_y
+        if abs(goal_x - x) <= TOLERANCE_M and rise >= 0.0 and any(side[vertex] in self._goal_blocks for side in sides):
+            self._push_goal(root)
+        if neighbour >= 0:
+            self._reach(root, neighbour, _LEFT)
+            self._reach(root, neighbour, _RIGHT)
+
+    def _follow(self, root: int, cone: Cone) -> None:
+        """Follow a cone through blocks as long as there is one way on; queue the cones where it divides."""
+        root_x, root_y = self._root_x[root], self._root_y[root]
+        goal_x, goal_y = self._goal
+        block, direction, low, high = cone
+        portals = self._slabs.ways[direction]
+        # Looking east the turn around a portal's low end is to the right; looking west it is to the left.
+        low_side, high_side = (_RIGHT, _LEFT) if direction == _EAST else (_LEFT, _RIGHT)
+        ways: list[tuple[float, float, float, float, float, int]] = []
+        while True:
+            if block in self._goal_blocks:
+                run = abs(goal_x - root_x)
+                rise = goal_y - root_y
+                if run <= 0.0:
+                    seen = high == inf if rise >= 0.0 else low == -inf
+                else:
+                    seen = low * run - _SLACK_M <= rise <= high * run + _SLACK_M
+                if seen:
+                    self._push_goal(root)
+            ways.clear()
+            for x, portal_low, portal_high, low_end, high_end, behind in portals[block]:
+                run = x - root_x if direction else root_x - x
+                if run <= 0.0:
+                    continue
+                ray_low, ray_high = low * run, high * run
+                rise_low, rise_high = portal_low - root_y, portal_high - root_y
+                if ray_low > rise_high + _SLACK_M or ray_high < rise_low - _SLACK_M:
+                    continue
+                new_low, new_high = low, high
+                if low_end != -1 and rise_low >= ray_low - _SLACK_M:
+                    if low_end >= 0:
+                        self._reach(root, low_end, low_side)
+                    new_low = max(low, rise_low / run)
+                if high_end != -1 and rise_high <= ray_high + _SLACK_M:
+                    if high_end >= 0:
+                        self._reach(root, high_end, high_side)
+                    new_high = min(high, rise_high / run)
+                if new_low <= new_high:
+                    ways.append((x, portal_low, portal_high, new_low, new_high, behind))
+            if len(ways) != 1:
+                break
+            _, _, _, low, high, block = ways[0]
+        for x, portal_low, portal_high, new_low, new_high, behind in ways:
+            run = abs(x - root_x)
+            seen_low = max(portal_low, root_y + new_low * run)
+            seen_high = min(portal_high, root_y + new_high * run)
+            f_m = self._root_g[root] + _least_detour(root_x, root_y, goal_x, goal_y, x, seen_low, seen_high)
+            self._push(f_m, behind, direction, root, new_low, new_high)
+
+
+def _quarter(east: float, north: float) -> int:
+    """Return 0 for east, 1 for straight up, 2 for west, 3 for straight down."""
+    if east > 0.0:
+        return 0
+    if east < 0.0:
+        return 2
+    return 1 if north > 0.0 else 3
+
+
+def _least_detour(
+    root_x: float, root_y: float, goal_x: float, goal_y: float, x: float, low: float, high: float
+) -> float:
+    """Return the length of the shortest way from a root through a vertical portal to the goal.
+
+    A goal on the root's side of the portal is mirrored: the way there and back is as long as to the mirror image.
+    """
+    to_portal = abs(x - root_x)
+    beyond = abs(goal_x - x)
+    # Where the straight line crosses the portal's line, in proportion to the distances.
+    total = to_portal + beyond
+    cross = root_y + (goal_y - root_y) * to_portal / total if total > 0.0 else root_y
+    if cross < low:
+        cross = low
+    elif cross > high:
+        cross = high
+    else:
+        rise = goal_y - root_y
+        return sqrt(total * total + rise * rise)
+    first, second = cross - root_y, goal_y - cross
+    return sqrt(to_portal * to_portal + first * first) + sqrt(beyond * beyond + second * second)

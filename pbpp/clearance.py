@@ -1,0 +1,102 @@
+"""Growing obstacles by the clearance, never by less than asked.
+
+GEOS offsets a polygon with mitred corners, cut off where the mitre would reach further than a limit times the clearance. Its cut
+keeps the distance, but its simplifications of the input can come nearer than asked (by up to 8 parts in 100,000 in a search over
+20,000 random polygons), so the distance of every offset is measured and the short ones are offset again by what they lack.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+__all__ = ["MITRE_LIMIT", "ROUND_SEGMENTS", "grow", "shrink"]
+
+Geometries = npt.NDArray[np.object_]
+
+MITRE_LIMIT = 2.0
+"""How far a mitred corner may reach, in clearances: corners of 60 degrees and more stay whole, sharper ones are cut."""
+
+ROUND_SEGMENTS = 16
+"""Chords in a quarter turn of a round offset."""
+
+_PAD_M = 4e-9
+"""Added to every offset, so that rounding at map coordinates of some thousand kilometres takes nothing away."""
+
+_ROUND_EXCESS = 1.0 / np.cos(np.pi / (4 * ROUND_SEGMENTS))
+_ATTEMPTS = 8
+
+
+def grow(geometries: Geometries, clearance_m: float, *, rounded: bool = False) -> Geometries:
+    """Return each geometry grown by at least the clearance.
+
+    Parameters
+    ----------
+    geometries : (n,) array of shapely geometry
+        Obstacles.
+    clearance_m : float
+        Clearance in metres, above 0.
+    rounded : bool, default False
+        Round corners (many short edges, at most 0.12 % more than the clearance everywhere) in place of mitred ones.
+
+    Returns
+    -------
+    (n,) array of shapely geometry
+        The grown obstacles.
+    """
+    reach_m = np.full(len(geometries), clearance_m + _PAD_M)
+    if rounded:
+        reach_m *= _ROUND_EXCESS
+    grown = _offset(geometries, reach_m, rounded=rounded)
+    for _ in range(_ATTEMPTS):
+        lack_m = clearance_m + 0.5 * _PAD_M - shapely.distance(shapely.boundary(grown), geometries)
+        short = lack_m > 0.0
+        if not short.any():
+            break
+        reach_m[short] += 1.5 * lack_m[short]
+        grown[short] = _offset(geometries[short], reach_m[short], rounded=rounded)
+    return grown
+
+
+def shrink(area: BaseGeometry, clearance_m: float, *, rounded: bool = False) -> BaseGeometry:
+    """Return the part of an area that keeps at least the clearance from its boundary.
+
+    Parameters
+    ----------
+    area : shapely geometry
+        A polygon or multipolygon.
+    clearance_m : float
+        Clearance in metres, above 0.
+    rounded : bool, default False
+        Round corners in place of mitred ones.
+
+    Returns
+    -------
+    shapely geometry
+        The part, maybe empty.
+    """
+    boundary = shapely.boundary(area)
+    reach_m = np.array([clearance_m + _PAD_M])
+    if rounded:
+        reach_m *= _ROUND_EXCESS
+    for _ in range(_ATTEMPTS):
+        shrunk = _offset(np.array([area], dtype=object), -reach_m, rounded=rounded)[0]
+        lack_m = clearance_m + 0.5 * _PAD_M - shapely.distance(shrunk, boundary)
+        if shrunk.is_empty or lack_m <= 0.0:
+            break
+        reach_m += 1.5 * lack_m
+    return shrunk
+
+
+def _offset(geometries: Geometries, reach_m: npt.NDArray[np.float64], *, rounded: bool) -> Geometries:
+    grown: Geometries = shapely.buffer(
+        geometries,
+        reach_m,
+        quad_segs=ROUND_SEGMENTS,
+        cap_style="square",
+        join_style="round" if rounded else "mitre",
+        mitre_limit=MITRE_LIMIT,
+    )
+    return grown

@@ -1,0 +1,204 @@
+"""Free space: where the robot's centre may be.
+
+The inclusions are intersected or united, shrunk by the clearance, and the grown exclusions are taken away. All of it happens about a
+local origin, so that map coordinates of thousands of kilometres cost no precision.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+import shapely
+from shapely.geometry import GeometryCollection, MultiPolygon, Polygon, box
+from shapely.geometry.base import BaseGeometry
+
+from .clearance import grow, shrink
+from .errors import InvalidGeometryError
+from .geometry import Floats, Point, Ring, parse_rings, polygons_only
+
+__all__ = ["FreeSpace", "Scene", "build_free_space", "parse_scene"]
+
+GeometryT = TypeVar("GeometryT", bound=BaseGeometry)
+
+_OPEN_MARGIN_M = 100.0
+
+
+@dataclass(frozen=True)
+class Scene:
+    """The fence as given, valid and about a local origin.
+
+    Parameters
+    ----------
+    inclusions, exclusions : (n,) array of shapely geometry
+        Valid geometries, metres from ``origin_m``.
+    union : bool
+        True: free space lies in any inclusion. False: in all of them.
+    origin_m : (2,) array
+        East and north of the local origin in metres.
+    """
+
+    inclusions: np.ndarray
+    exclusions: np.ndarray
+    union: bool
+    origin_m: Floats
+
+    def to_local(self, point: Point) -> Point:
+        """Return a point of the map, metres from the scene's origin."""
+        return point[0] - float(self.origin_m[0]), point[1] - float(self.origin_m[1])
+
+    def from_local(self, point: Point) -> Point:
+        """Return a point given from the scene's origin as a point of the map."""
+        return point[0] + float(self.origin_m[0]), point[1] + float(self.origin_m[1])
+
+    def to_map(self, geometry: GeometryT) -> GeometryT:
+        """Return a geometry given from the scene's origin as one of the map."""
+        if not self.origin_m.any():
+            return geometry
+        return shapely.transform(geometry, lambda points: points + self.origin_m)
+
+    @cached_property
+    def included(self) -> BaseGeometry | None:
+        """What the inclusions leave at no clearance; None if there is no inclusion: the open plane."""
+        if not len(self.inclusions):
+            return None
+        areas = np.array([MultiPolygon(polygons_only(one)) for one in self.inclusions], dtype=object)
+        together = shapely.union_all(areas) if self.union else shapely.intersection_all(areas)
+        return MultiPolygon(polygons_only(together))
+
+    @cached_property
+    def fence_lines(self) -> np.ndarray:
+        """Boundary line of each part, (inclusions + exclusions,) array of shapely geometry."""
+        parts = np.concatenate((self.inclusions, self.exclusions))
+        return np.array([_line_of(part) for part in parts], dtype=object)
+
+    def part(self, index: int) -> tuple[str, int]:
+        """Return what stands at a place of `fence_lines`: ("inclusion" or "exclusion", its index)."""
+        count = len(self.inclusions)
+        return ("inclusion", index) if index < count else ("exclusion", index - count)
+
+
+@dataclass(frozen=True)
+class FreeSpace:
+    """Where the robot's centre may be, as disjoint polygons about the scene's origin.
+
+    Parameters
+    ----------
+    polygons : tuple of shapely.Polygon
+        One for each connected component, metres from the scene's origin.
+    clearance_m : float
+        The distance in metres that it keeps from the fence.
+    """
+
+    polygons: tuple[Polygon, ...]
+    clearance_m: float
+
+    @cached_property
+    def geometry(self) -> MultiPolygon:
+        """All components as one geometry."""
+        return MultiPolygon(self.polygons)
+
+    def components_at(self, point: Point, tolerance_m: float) -> frozenset[int]:
+        """Return the components that a point lies in or within the tolerance of."""
+        if not self.polygons:
+            return frozenset()
+        near = shapely.dwithin(np.array(self.polygons, dtype=object), shapely.Point(point), tolerance_m)
+        return frozenset(np.flatnonzero(near).tolist())
+
+
+def parse_scene(inclusions: Sequence[Ring], exclusions: Sequence[Ring], *, union: bool) -> Scene:
+    """Return the fence made valid and moved to a local origin.
+
+    Parameters
+    ----------
+    inclusions, exclusions : sequence of (n, 2) array-like or shapely polygon
+        East and north in metres. No inclusion at all means the open plane.
+    union : bool
+        Whether free space lies in any inclusion or in all of them.
+
+    Returns
+    -------
+    Scene
+        The fence.
+
+    Raises
+    ------
+    InvalidGeometryError
+        If a ring cannot be used, or an inclusion that counts encloses no area.
+    """
+    parts = [parse_rings(inclusions, "inclusion"), parse_rings(exclusions, "exclusion")]
+    for index, one in enumerate(parts[0]):
+        if not polygons_only(one) and not (union and len(parts[0]) > 1):
+            raise InvalidGeometryError(f"inclusion {index} encloses no area", ("inclusion", index))
+    everything = np.array([*parts[0], *parts[1]], dtype=object)
+    origin_m = np.zeros(2)
+    if len(everything):
+        bounds = shapely.total_bounds(everything)
+        middle = 0.5 * (bounds[:2] + bounds[2:])
+        # Near maps stay as they are: a shift would only add rounding. Whole metres keep far ones tidy.
+        if np.abs(middle).max() > 4.0 * (bounds[2:] - bounds[:2]).max():
+            origin_m = np.round(middle)
+            everything = shapely.transform(everything, lambda points: points - origin_m)
+    count = len(parts[0])
+    return Scene(everything[:count], everything[count:], union, origin_m)
+
+
+def build_free_space(
+    scene: Scene, clearance_m: float, *, rounded: bool = False, reach: Sequence[Point] = ()
+) -> FreeSpace:
+    """Return where the robot's centre may be.
+
+    Parameters
+    ----------
+    scene : Scene
+        The fence.
+    clearance_m : float
+        Clearance in metres, at least 0.
+    rounded : bool, default False
+        Offset corners round in place of mitred: nearer to the truth, many more vertices.
+    reach : sequence of (east, north)
+        Without inclusions, points in metres from the scene's origin that the bounded part of the plane must hold.
+
+    Returns
+    -------
+    FreeSpace
+        The polygons; none if nothing is free.
+    """
+    ground = _ground(scene, clearance_m, rounded=rounded, reach=reach)
+    obstacles = scene.exclusions
+    if clearance_m > 0.0:
+        obstacles = np.array([*obstacles, *_loose_lines(scene.inclusions)], dtype=object)
+        if len(obstacles):
+            obstacles = grow(obstacles, clearance_m, rounded=rounded)
+    areas = [one if isinstance(one, Polygon) else MultiPolygon(polygons_only(one)) for one in obstacles]
+    free = shapely.difference(ground, shapely.disjoint_subset_union_all(areas)) if areas else ground
+    return FreeSpace(tuple(polygons_only(free)), clearance_m)
+
+
+def _loose_lines(inclusions: np.ndarray) -> list[BaseGeometry]:
+    """Return the lines of self-crossing inclusions: a slit cut into one has no area, yet it is part of the fence."""
+    parts = shapely.get_parts(inclusions[shapely.get_type_id(inclusions) == shapely.GeometryType.GEOMETRYCOLLECTION])
+    return list(parts[shapely.get_dimensions(parts) == 1])
+
+
+def _ground(scene: Scene, clearance_m: float, *, rounded: bool, reach: Sequence[Point]) -> BaseGeometry:
+    if scene.included is not None:
+        return shrink(scene.included, clearance_m, rounded=rounded) if clearance_m > 0.0 else scene.included
+    corners = [np.asarray(reach, dtype=np.float64).reshape(-1, 2)]
+    if len(scene.exclusions):
+        corners.append(shapely.total_bounds(scene.exclusions).reshape(2, 2))
+    points = np.concatenate(corners)
+    if not len(points):
+        points = np.zeros((1, 2))
+    # A shortest path stays in the convex hull of its ends and of what it turns around.
+    margin_m = _OPEN_MARGIN_M + 4.0 * clearance_m
+    return box(*(points.min(axis=0) - margin_m), *(points.max(axis=0) + margin_m))
+
+
+def _line_of(part: BaseGeometry) -> BaseGeometry:
+    if isinstance(part, GeometryCollection):
+        return shapely.union_all([_line_of(one) for one in part.geoms])
+    return shapely.boundary(part) if isinstance(part, Polygon | MultiPolygon) else part

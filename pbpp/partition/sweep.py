@@ -1,0 +1,265 @@
+"""The sweep that makes slabs: from west to east over the lines that carry vertices."""
+
+from __future__ import annotations
+
+from pbpp.errors import InvalidGeometryError
+
+from .base import TOLERANCE_M
+from .vertices import Vertices
+
+__all__ = ["DULL_END", "OPEN_END", "PortalView", "Sweep"]
+
+PortalView = tuple[float, float, float, int, int, int]
+"""(east, low north, high north, low vertex, high vertex, block behind): how the search sees a portal."""
+
+OPEN_END = -1
+"""In place of a vertex: the portal ends on an edge."""
+
+DULL_END = -2
+"""In place of a vertex: the portal ends at one around which no shortest path turns."""
+
+_Slot = list[int]
+"""An open block: [floor edge, ceiling edge, block]. Edges are numbered by the vertex they start at."""
+
+_Side = tuple[float, int, float, int, int]
+"""A block's side on the line: (low north, low vertex, high north, high vertex, block); vertex -1 for none."""
+
+
+class Sweep:
+    """One sweep over free space.
+
+    Parameters
+    ----------
+    vertices : Vertices
+        Of free space.
+    """
+
+    def __init__(self, vertices: Vertices) -> None:
+        v = vertices
+        count = len(v.x)
+        self._vertices = v
+        east = v.x[v.next] - v.x
+        self._x: list[float] = v.x.tolist()
+        self._y: list[float] = v.y.tolist()
+        self._next: list[int] = v.next.tolist()
+        self._prev: list[int] = v.prev.tolist()
+        # The left end and the slope of the edge that starts at each vertex; vertical edges never open a block.
+        forward = east > 0.0
+        run = abs(east)
+        run[run == 0.0] = 1.0
+        rise = v.y[v.next] - v.y
+        rise[~forward] *= -1.0
+        self._slope: list[float] = (rise / run).tolist()
+        left = v.next.copy()
+        left[forward] = (forward.nonzero())[0]
+        self._left_x: list[float] = v.x[left].tolist()
+        self._left_y: list[float] = v.y[left].tolist()
+        # +1: the edge leaves the vertex eastwards (a floor), -1: westwards (a ceiling), 0: vertical.
+        self._out: list[int] = ((east > 0.0).astype(int) - (east < 0.0)).tolist()
+        self._end: list[int] = [i if ok else DULL_END for i, ok in enumerate(v.corner.tolist())]
+        self._active: list[_Slot] = []
+        self._by_floor: dict[int, _Slot] = {}
+        self._by_ceiling: dict[int, _Slot] = {}
+
+        self.floor: list[int] = []
+        self.ceiling: list[int] = []
+        self.west: list[float] = []
+        self.east: list[float] = []
+        self.portals: list[tuple[float, float, float, int, int]] = []
+        self.ways: tuple[list[list[PortalView]], list[list[PortalView]]] = ([], [])
+        self.west_above = [-1] * count
+        self.west_below = [-1] * count
+        self.east_above = [-1] * count
+        self.east_below = [-1] * count
+        self.above = [-1] * count
+        self.below = [-1] * count
+
+    def run(self) -> None:
+        """Sweep all lines."""
+        starts = self._vertices.line_start.tolist()
+        order = self._vertices.order.tolist()
+        for x, first, last in zip(self._vertices.line_x.tolist(), starts, starts[1:], strict=False):
+            self._line(x, order[first:last])
+        if self._active:
+            raise InvalidGeometryError("free space is not closed: its rings do not fit together")
+
+    def _line(self, x: float, there: list[int]) -> None:
+        """Close the blocks that end on a line, open those that begin, and join them by portals."""
+        closing = self._touched(x, there)
+        ends_here = set(there)
+        left = [self._close(slot, x, ends_here) for slot in closing]
+        floors: list[tuple[float, float, int, int]] = []
+        ceilings: list[tuple[float, float, int, int]] = []
+        for slot in closing:
+            floor, ceiling, _ = slot
+            if self._next[floor] not in ends_here:
+                floors.append((self._north(floor, x), self._slope[floor], floor, -1))
+            if ceiling not in ends_here:
+                ceilings.append((self._north(ceiling, x), self._slope[ceiling], ceiling, -1))
+        out, prev, y = self._out, self._prev, self._y
+        for vertex in there:
+            if out[vertex] > 0:
+                floors.append((y[vertex], self._slope[vertex], vertex, vertex))
+            edge = prev[vertex]
+            if out[edge] < 0:
+                ceilings.append((y[vertex], self._slope[edge], edge, vertex))
+            elif out[edge] == 0:
+                self._link(edge, vertex)
+        right = self._open(x, floors, ceilings)
+        self._join(x, left, right)
+        self._place(there, left, right)
+
+    def _touched(self, x: float, there: list[int]) -> list[_Slot]:
+        """Take the open blocks that end at or are met by the vertices of a line out of the order, and return them."""
+        found: dict[int, _Slot] = {}
+        out, prev, y = self._out, self._prev, self._y
+        for vertex in there:
+            known = False
+            if out[vertex] < 0:
+                slot = self._by_ceiling[vertex]
+                found[id(slot)] = slot
+                known = True
+            if out[prev[vertex]] > 0:
+                slot = self._by_floor[prev[vertex]]
+                found[id(slot)] = slot
+                known = True
+            if not known:
+                place = self._find(x, y[vertex])
+                if place < len(self._active):
+                    slot = self._active[place]
+                    if self._north(slot[0], x) < y[vertex]:
+                        found[id(slot)] = slot
+        if len(found) == len(self._active):
+            closing = self._active
+            self._active = []
+            return closing
+        places = sorted(self._index(slot, x) for slot in found.values())
+        closing = [self._active[place] for place in places]
+        for place in reversed(places):
+            del self._active[place]
+        return closing
+
+    def _north(self, edge: int, x: float) -> float:
+        return self._left_y[edge] + self._slope[edge] * (x - self._left_x[edge])
+
+    def _find(self, x: float, y: float) -> int:
+        """Return the place of the lowest open block whose ceiling lies above a point."""
+        low, high = 0, len(self._active)
+        while low < high:
+            middle = (low + high) // 2
+            if self._north(self._active[middle][1], x) > y:
+                high = middle
+            else:
+                low = middle + 1
+        return low
+
+    def _index(self, slot: _Slot, x: float) -> int:
+        place = self._find(x, 0.5 * (self._north(slot[0], x) + self._north(slot[1], x)))
+        if place < len(self._active) and self._active[place] is slot:
+            return place
+        # Neighbours that meet within rounding: look from one end to the other.
+        for place, one in enumerate(self._active):
+            if one is slot:
+                return place
+        raise InvalidGeometryError("free space is not closed: its rings do not fit together")
+
+    def _close(self, slot: _Slot, x: float, ends_here: set[int]) -> _Side:
+        floor, ceiling, block = slot
+        self.east[block] = x
+        low_vertex, high_vertex = self._next[floor], ceiling
+        if low_vertex in ends_here:
+            low = self._y[low_vertex]
+        else:
+            low, low_vertex = self._north(floor, x), -1
+        if high_vertex in ends_here:
+            high = self._y[high_vertex]
+        else:
+            high, high_vertex = self._north(ceiling, x), -1
+        return low, low_vertex, high, high_vertex, block
+
+    def _open(
+        self,
+        x: float,
+        floors: list[tuple[float, float, int, int]],
+        ceilings: list[tuple[float, float, int, int]],
+    ) -> list[_Side]:
+        floors.sort()
+        ceilings.sort()
+        if len(floors) != len(ceilings):
+            raise InvalidGeometryError("free space is not closed: its rings do not fit together")
+        sides: list[_Side] = []
+        for (low, _, floor, low_vertex), (high, _, ceiling, high_vertex) in zip(floors, ceilings, strict=True):
+            block = len(self.west)
+            self.west.append(x)
+            self.east.append(x)
+            self.floor.append(floor)
+            self.ceiling.append(ceiling)
+            self.ways[0].append([])
+            self.ways[1].append([])
+            slot = [floor, ceiling, block]
+            self._by_floor[floor] = slot
+            self._by_ceiling[ceiling] = slot
+            sides.append((low, low_vertex, high, high_vertex, block))
+            self._active.insert(self._slot_place(x, low, high), slot)
+        return sides
+
+    def _slot_place(self, x: float, low: float, high: float) -> int:
+        # Open blocks do not overlap, so the first one whose middle lies above this one's is its upper neighbour.
+        target = low + high
+        first, last = 0, len(self._active)
+        while first < last:
+            middle = (first + last) // 2
+            floor, ceiling, _ = self._active[middle]
+            if self._north(floor, x) + self._north(ceiling, x) > target:
+                last = middle
+            else:
+                first = middle + 1
+        return first
+
+    def _link(self, edge: int, vertex: int) -> None:
+        """Note a vertical edge of the boundary: a path may run along it."""
+        if self._y[edge] < self._y[vertex]:
+            self.above[edge], self.below[vertex] = vertex, edge
+        else:
+            self.above[vertex], self.below[edge] = edge, vertex
+
+    def _join(self, x: float, left: list[_Side], right: list[_Side]) -> None:
+        """Make a portal wherever a closed and an opened block share a piece of the line."""
+        i = j = 0
+        while i < len(left) and j < len(right):
+            left_low, left_low_vertex, left_high, left_high_vertex, west = left[i]
+            right_low, right_low_vertex, right_high, right_high_vertex, east = right[j]
+            low, low_vertex = (left_low, left_low_vertex) if left_low > right_low else (right_low, right_low_vertex)
+            if left_low == right_low and low_vertex < 0:
+                low_vertex = left_low_vertex
+            high, high_vertex = (
+                (left_high, left_high_vertex) if left_high < right_high else (right_high, right_high_vertex)
+            )
+            if left_high == right_high and high_vertex < 0:
+                high_vertex = left_high_vertex
+            if high - low > TOLERANCE_M:
+                if low_vertex >= 0 and high_vertex >= 0:
+                    self.above[low_vertex], self.below[high_vertex] = high_vertex, low_vertex
+                low_end = self._end[low_vertex] if low_vertex >= 0 else OPEN_END
+                high_end = self._end[high_vertex] if high_vertex >= 0 else OPEN_END
+                self.portals.append((x, low, high, west, east))
+                self.ways[1][west].append((x, low, high, low_end, high_end, east))
+                self.ways[0][east].append((x, low, high, low_end, high_end, west))
+            if left_high < right_high:
+                i += 1
+            else:
+                j += 1
+
+    def _place(self, there: list[int], left: list[_Side], right: list[_Side]) -> None:
+        """Note which blocks lie beside each vertex of a line."""
+        for sides, above, below in (
+            (left, self.west_above, self.west_below),
+            (right, self.east_above, self.east_below),
+        ):
+            for vertex in there:
+                y = self._y[vertex]
+                for low, _, high, _, block in sides:
+                    if low <= y < high:
+                        above[vertex] = block
+                    if low < y <= high:
+                        below[vertex] = block

@@ -1,0 +1,71 @@
+"""What the planner returns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .geometry import Floats
+
+if TYPE_CHECKING:
+    from .planner import Planner
+
+__all__ = ["PlannedPath"]
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedPath:
+    """A path from start to goal in free space, with its certificate.
+
+    Parameters
+    ----------
+    points : (n, 2) array
+        East and north of the start, the turning points and the goal in metres.
+    length_m : float
+        Its length in metres.
+    lower_bound_m : float
+        No path in this free space is shorter, in metres: equal to `length_m` when ``method="optimal"`` ran to its end.
+    method : str
+        The method that found it.
+    blocks : int
+        Number of blocks of the partition that was searched.
+    expanded : int
+        Number of search nodes taken from the queue.
+    sequence : tuple of int
+        The blocks passed, for the methods that search blocks; empty otherwise.
+    """
+
+    points: Floats
+    length_m: float
+    lower_bound_m: float
+    method: str
+    blocks: int
+    expanded: int
+    sequence: tuple[int, ...] = ()
+    planner: Planner | None = field(default=None, repr=False)
+
+    def plot(self, ax: Any = None, *, show_blocks: bool = True) -> Any:  # noqa: ANN401 - matplotlib is an extra
+        """Draw free space, the blocks, the sequence of blocks, and the path with its turning points.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; a new figure if left out.
+        show_blocks : bool, default True
+            Whether to draw the blocks.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            The axes.
+        """
+        from .plotting import plot_path  # noqa: PLC0415 - matplotlib is loaded only when asked for
+
+        return plot_path(self, ax, show_blocks=show_blocks)
+
+
+def length_of(points: Floats) -> float:
+    """Return the length of a polyline, (n, 2) array, in the unit of its coordinates."""
+    return float(np.sqrt((np.diff(points, axis=0) ** 2).sum(axis=1)).sum())

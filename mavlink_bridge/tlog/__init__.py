@@ -1,0 +1,10 @@
+"""Telemetry logs: reading them fast and forgivingly, and writing them.
+
+`TlogReader` gives a log's frames as the same messages a live link gives; `read_columns` gives one message type as arrays.
+"""
+
+from mavlink_bridge.tlog.damage import Damage
+from mavlink_bridge.tlog.reader import LogEntry, TlogReader, read_columns
+from mavlink_bridge.tlog.writer import SENT_LINK, TlogWriter
+
+__all__ = ["SENT_LINK", "Damage", "LogEntry", "TlogReader", "TlogWriter", "read_columns"]

@@ -1,0 +1,96 @@
+"""Whole blocks of frames to messages: each message type's fields as columns, in one go."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mavlink_bridge.tlog.wire import CLASS_OF_ID, ID_LIMIT, Layout, layout_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from numpy.typing import NDArray
+
+    from mavlink_bridge.messages import Message
+    from mavlink_bridge.tlog.scan import Scan
+    from mavlink_bridge.tlog.walk import Block
+
+
+def wanted_ids(wanted: Iterable[type[Message]]) -> NDArray[np.bool_]:
+    """Make the table, by message id, of which types are wanted.
+
+    Raises
+    ------
+    ValueError
+        One of the classes is not a message on the wire.
+    """
+    is_wanted = np.zeros(ID_LIMIT + 1, bool)
+    is_wanted[[layout_of(message_class).message_id for message_class in wanted]] = True
+    return is_wanted
+
+
+def select(block: Block, is_wanted: NDArray[np.bool_]) -> tuple[NDArray[np.int64], int]:
+    """Give the places in a block of the wanted frames whose checksum is right, and how many had a wrong one."""
+    ids = block.scan.ids[block.which]
+    places = np.flatnonzero(is_wanted[np.minimum(ids, ID_LIMIT)])
+    good = block.scan.intact(block.which[places])
+    return places[good], len(places) - int(good.sum())
+
+
+def decode(scan: Scan, which: NDArray[np.int64]) -> list[Message]:
+    """Decode frames of our message types.
+
+    Parameters
+    ----------
+    scan : Scan
+    which : (n,) array of int
+        Indices among the scan's candidates.
+
+    Returns
+    -------
+    list of Message
+        In the order of ``which``.
+    """
+    messages: list[Any] = [None] * len(which)
+    for message_id, places in _by_id(scan.ids[which]):
+        message_class = CLASS_OF_ID[message_id]
+        layout = layout_of(message_class)
+        decoded = map(message_class, *_values(layout, payloads(scan, which[places], layout)))
+        for place, message in zip(places.tolist(), decoded, strict=True):
+            messages[place] = message
+    return messages
+
+
+def payloads(scan: Scan, which: NDArray[np.int64], layout: Layout) -> NDArray[np.void]:
+    """Give the payloads of frames of one message type as a structured array, what MAVLink 2 left off filled with zeros."""
+    width = layout.dtype.itemsize
+    every = np.ndarray((len(scan.view) - width + 1,), f"V{width}", scan.view.data, strides=(1,))
+    rows = every[scan.payload_at(which)].view(np.uint8).reshape(len(which), width)
+    lengths = scan.payload_bytes[which]
+    for row in np.flatnonzero(lengths < width).tolist():
+        rows[row, lengths[row] :] = 0
+    structured: NDArray[np.void] = rows.reshape(-1).view(layout.dtype)
+    return structured
+
+
+def texts(column: NDArray[np.bytes_]) -> list[str]:
+    """Give NUL-terminated texts as strings, what is not ASCII replaced, as pymavlink does."""
+    return [text.split(b"\0", 1)[0].decode("ascii", "replace") for text in column.tolist()]
+
+
+def _values(layout: Layout, rows: NDArray[np.void]) -> list[list[Any]]:
+    names = layout.dtype.names or ()
+    return [
+        texts(rows[name]) if is_text else rows[name].tolist()
+        for name, is_text in zip(names, layout.texts, strict=True)
+    ]
+
+
+def _by_id(ids: NDArray[np.int32]) -> Iterator[tuple[int, NDArray[np.int64]]]:
+    order = np.argsort(ids, kind="stable")
+    if len(order):
+        cuts = np.flatnonzero(np.diff(ids[order])) + 1
+        for places in np.split(order, cuts):
+            yield int(ids[places[0]]), places

@@ -3,6 +3,7 @@
 ::
 
     BridgeError
+    ├── UsageError               options that do not fit together
     ├── LogError                 a log cannot be used
     ├── LinkError                no connection, no heartbeat, silence
     ├── IdentityTakenError       our system and component id is already heard on the link
@@ -20,6 +21,10 @@ class BridgeError(Exception):
     def __init__(self, message: str, **details: object) -> None:
         super().__init__(message)
         self.details = details
+
+
+class UsageError(BridgeError):
+    """Options that do not fit together."""
 
 
 class LogError(BridgeError):

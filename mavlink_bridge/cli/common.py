@@ -1,0 +1,118 @@
+"""What every command shares: exit codes, errors for people and scripts, options of links."""
+
+from __future__ import annotations
+
+import functools
+import json
+import sys
+from enum import IntEnum
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from mavlink_bridge import errors as bridge_errors
+from missions import errors as mission_errors
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+
+
+class ExitCode(IntEnum):
+    """What the exit codes mean."""
+
+    DONE = 0
+    INTERNAL = 1
+    USAGE = 2
+    INPUT = 3
+    NO_ROUTE = 4
+    LINK = 5
+    REFUSED = 6
+    OUTCOME = 7
+    CHECK = 8
+    INTERRUPTED = 130
+
+
+_EXIT_CODES: tuple[tuple[type[Exception], ExitCode], ...] = (
+    (mission_errors.PlanCheckError, ExitCode.INTERNAL),
+    (mission_errors.RouteError, ExitCode.NO_ROUTE),
+    (mission_errors.MissionError, ExitCode.INPUT),
+    (bridge_errors.UsageError, ExitCode.USAGE),
+    (bridge_errors.LogError, ExitCode.INPUT),
+    (bridge_errors.LinkError, ExitCode.LINK),
+    (bridge_errors.RefusedError, ExitCode.REFUSED),
+    (bridge_errors.OutcomeError, ExitCode.OUTCOME),
+    (bridge_errors.BridgeError, ExitCode.INTERNAL),
+)
+
+ConnectOption = Annotated[
+    str | None,
+    typer.Option(
+        "--connect",
+        metavar="CONNECTION",
+        help="A live link: udpin:0.0.0.0:14550, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:…, /dev/ttyACM0[,BAUD].",
+    ),
+]
+SystemOption = Annotated[
+    int | None, typer.Option("--system", metavar="N", min=1, max=255, help="Which vehicle, when several are heard.")
+]
+SourceSystemOption = Annotated[int, typer.Option(min=1, max=255, help="The system id we speak as.")]
+SourceComponentOption = Annotated[int, typer.Option(min=1, max=255, help="The component id we speak as.")]
+TimeoutOption = Annotated[float, typer.Option(metavar="S", min=0.1, help="How long to wait for the vehicle.")]
+AnyVehicleOption = Annotated[
+    bool, typer.Option("--any-vehicle", help="Take vehicles that are neither rover nor boat too.")
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="One JSON document on stdout.")]
+QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no report.")]
+
+
+def exit_code_of(error: Exception) -> ExitCode:
+    """Give the exit code of an error."""
+    return next(code for kind, code in _EXIT_CODES if isinstance(error, kind))
+
+
+def guarded(command: Callable[..., None]) -> Callable[..., None]:
+    """Wrap a command so that its errors end in one clear line (with ``--json`` one document) and the right exit code."""
+
+    @functools.wraps(command)
+    def run(**options: Any) -> None:  # noqa: ANN401 - any command's options
+        wants_json = bool(options.get("json_output"))
+        try:
+            command(**options)
+        except (mission_errors.MissionError, bridge_errors.BridgeError) as error:
+            code = exit_code_of(error)
+            _report(command.__name__, type(error).__name__, str(error), code, error.details, wants_json=wants_json)
+            raise typer.Exit(code) from None
+        except KeyboardInterrupt:
+            message = "interrupted; the vehicle was left as it was"
+            _report(command.__name__, "Interrupted", message, ExitCode.INTERRUPTED, {}, wants_json=wants_json)
+            raise typer.Exit(ExitCode.INTERRUPTED) from None
+
+    return run
+
+
+def print_json(document: Mapping[str, object]) -> None:
+    """Put a JSON document on stdout."""
+    sys.stdout.write(json.dumps(document, allow_nan=False) + "\n")
+
+
+def warn(texts: Iterable[str]) -> None:
+    """Put warnings on stderr, one a line."""
+    for text in texts:
+        typer.secho(f"warning: {text}", err=True, fg=typer.colors.YELLOW)
+
+
+def _report(
+    command: str, name: str, message: str, code: ExitCode, details: Mapping[str, object], *, wants_json: bool
+) -> None:
+    if wants_json:
+        print_json(
+            {
+                "status": "error",
+                "command": command,
+                "error": name,
+                "message": message,
+                "exit_code": int(code),
+                "details": dict(details),
+            }
+        )
+    typer.secho(f"error: {message}", err=True, fg=typer.colors.RED)

@@ -1,0 +1,3 @@
+"""Placeholder."""
+def demo() -> None:
+    """x."""

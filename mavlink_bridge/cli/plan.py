@@ -1,0 +1,271 @@
+"""``pbpp plan``: plan a mission from a fence file, a log or a live vehicle; write it, draw it, upload it."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mavlink_bridge.cli.common import (
+    AnyVehicleOption,
+    ConnectOption,
+    JsonOption,
+    QuietOption,
+    SourceComponentOption,
+    SourceSystemOption,
+    SystemOption,
+    TimeoutOption,
+    print_json,
+    warn,
+)
+from mavlink_bridge.errors import UsageError
+
+if TYPE_CHECKING:
+    from missions.plan import Plan
+    from missions.request import Request
+    from missions.situation import Situation
+
+_METHODS = ("optimal", "pbpp-taut", "pbpp")
+
+
+def plan(  # noqa: PLR0913 - a command's options
+    fence: Annotated[Path | None, typer.Option(metavar="FILE", help="Fence file: .waypoints, .plan, …")] = None,
+    log: Annotated[Path | None, typer.Option(metavar="FILE.tlog", help="Recorded telemetry log.")] = None,
+    connect: ConnectOption = None,
+    start: Annotated[
+        str | None, typer.Option(metavar="LAT,LON", help="Default: the vehicle's position; for a file its home.")
+    ] = None,
+    target: Annotated[
+        list[str] | None,
+        typer.Option(metavar="LAT,LON", help="Several are visited in order. Default: the newest in the stream."),
+    ] = None,
+    clearance: Annotated[
+        float | None, typer.Option(metavar="M", min=0.0, help="Promised while driving. Default: from FENCE_MARGIN.")
+    ] = None,
+    corner_allowance: Annotated[
+        str, typer.Option(metavar="M|auto", help="Room for cut corners on top; 0 plans the drawn lines only.")
+    ] = "auto",
+    vehicle: Annotated[
+        Path | None, typer.Option(metavar="FILE.parm", help="Parameters that the source does not tell.")
+    ] = None,
+    snap: Annotated[
+        float, typer.Option(metavar="M", min=0.0, help="Move a blocked target to free ground within M metres.")
+    ] = 0.0,
+    method: Annotated[str, typer.Option(metavar="|".join(_METHODS), help="How to search.")] = "optimal",
+    output: Annotated[
+        list[Path] | None, typer.Option("-o", "--output", metavar="FILE", help="Write the mission: .waypoints, .plan.")
+    ] = None,
+    plot: Annotated[list[Path] | None, typer.Option(metavar="FILE", help="Draw the plan: .png, .svg, .pdf.")] = None,
+    upload: Annotated[bool, typer.Option("--upload", help="Upload to the vehicle and verify.")] = False,
+    drive: Annotated[bool, typer.Option("--drive", help="Then switch to AUTO; arms nothing.")] = False,
+    system: SystemOption = None,
+    any_vehicle: AnyVehicleOption = False,
+    source_system: SourceSystemOption = 245,
+    source_component: SourceComponentOption = 190,
+    timeout: TimeoutOption = 30.0,
+    json_output: JsonOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Plan a mission around the fences of a SOURCE: `--fence FILE`, `--log FILE.tlog` or `--connect CONNECTION`.
+
+    Examples:
+
+    `pbpp plan --log field.tlog -o mission.waypoints --plot mission.png`
+
+    `pbpp plan --fence field.plan --start 40.0713,-105.2299 --target 40.0726,-105.2290 -o mission.plan`
+
+    `pbpp plan --connect udpin:0.0.0.0:14550 --target 40.0726,-105.2290 --upload`
+    """
+    outputs, plots = output or [], plot or []
+    request = _request(start, target or [], clearance, corner_allowance, snap, method)
+    _check_options(fence, log, connect, upload=upload or drive, outputs=outputs, plots=plots)
+    if connect is not None:
+        from mavlink_bridge.cli.live import plan_live  # noqa: PLC0415 - only with a link
+
+        result = plan_live(
+            connect,
+            request,
+            vehicle_file=vehicle,
+            identity=(source_system, source_component),
+            system=system,
+            any_vehicle=any_vehicle,
+            timeout_s=timeout,
+            upload=upload or drive,
+            drive=drive,
+            quiet=quiet or json_output,
+        )
+        planned, planning_s, situation = result.plan, result.planning_s, result.situation
+        uploaded, verified = result.uploaded, result.verified
+    else:
+        situation = with_parameter_file(_offline_situation(fence, log, system, any_vehicle=any_vehicle), vehicle)
+        planned, planning_s = timed_plan(situation, request)
+        uploaded = verified = False
+    warn(planned.warnings)
+    written = write_outputs(planned, situation, outputs, plots)
+    document = {
+        **plan_document(planned),
+        "source": Path(str(fence or log)).name if connect is None else connect,
+        "system": situation.system,
+        "planning_s": round(planning_s, 6),
+        "outputs": [str(path) for path in written],
+        "uploaded": uploaded,
+        "verified": verified,
+    }
+    if json_output:
+        print_json(document)
+    elif not quiet:
+        _report(planned, written, verified=verified)
+
+
+def timed_plan(situation: Situation, request: Request) -> tuple[Plan, float]:
+    """Plan, and tell how long it took."""
+    from missions.plan import plan as plan_mission  # noqa: PLC0415 - quick help
+
+    begun_s = time.perf_counter()
+    planned = plan_mission(situation, request)
+    return planned, time.perf_counter() - begun_s
+
+
+def with_parameter_file(situation: Situation, vehicle: Path | None) -> Situation:
+    """Add the parameters of a file to those that the vehicle itself told."""
+    if vehicle is None:
+        return situation
+    from missions.formats import read_parameters  # noqa: PLC0415 - quick help
+
+    return replace(situation, parameters={**read_parameters(vehicle), **situation.parameters})
+
+
+def write_outputs(planned: Plan, situation: Situation, outputs: list[Path], plots: list[Path]) -> list[Path]:
+    """Write the mission and draw the plan; give the files."""
+    from missions.formats import write_mission  # noqa: PLC0415 - quick help
+    from missions.situation import Known, Mission  # noqa: PLC0415
+
+    mission = Mission(planned.items, planned.home or planned.start)
+    to_write = replace(
+        situation, mission=Known(mission, None, "pbpp plan"), fence=Known(planned.fence, None, "pbpp plan")
+    )
+    for path in outputs:
+        write_mission(to_write, path)
+    if plots:
+        from missions.picture import draw_plan  # noqa: PLC0415 - matplotlib is slow to come
+
+        for path in plots:
+            draw_plan(planned, path)
+    return [*outputs, *plots]
+
+
+def plan_document(planned: Plan) -> dict[str, object]:
+    """Give what the JSON document tells of a plan."""
+    from missions.fence import CircleZone, PolygonZone, ZoneKind  # noqa: PLC0415 - quick help
+
+    fence = planned.fence
+    return {
+        "status": "ok",
+        "command": "plan",
+        "method": planned.method,
+        "start": list(planned.start),
+        "targets": [list(target) for target in planned.targets],
+        "path": [list(position) for position in planned.path],
+        "length_m": round(planned.length_m, 3),
+        "straight_line_m": round(planned.straight_line_m, 3),
+        "duration_s": round(planned.duration_s, 1),
+        "clearance_m": planned.clearance_m,
+        "drawn_clearance_m": _finite(planned.drawn_clearance_m),
+        "driven_clearance_m": _finite(planned.driven_clearance_m),
+        "fence": {
+            "inclusion_polygons": fence.count(ZoneKind.INCLUSION, PolygonZone),
+            "exclusion_polygons": fence.count(ZoneKind.EXCLUSION, PolygonZone),
+            "inclusion_circles": fence.count(ZoneKind.INCLUSION, CircleZone),
+            "exclusion_circles": fence.count(ZoneKind.EXCLUSION, CircleZone),
+            "vertices": fence.vertex_count,
+            "union": planned.ground.union,
+        },
+        "blocks": planned.blocks,
+        "mission_items": len(planned.items) + 1,
+        "warnings": list(planned.warnings),
+    }
+
+
+def _finite(value_m: float | None) -> float | None:
+    return None if value_m is None or value_m == float("inf") else round(value_m, 4)
+
+
+def _request(
+    start: str | None, targets: list[str], clearance: float | None, allowance: str, snap: float, method: str
+) -> Request:
+    from missions.geo import parse_lat_lon  # noqa: PLC0415 - quick help
+    from missions.request import Request  # noqa: PLC0415
+
+    if method not in _METHODS:
+        raise UsageError(f"--method {method!r}: expected one of {', '.join(_METHODS)}")
+    try:
+        corner_allowance_m = None if allowance == "auto" else float(allowance)
+    except ValueError:
+        raise UsageError(f"--corner-allowance {allowance!r}: expected metres or auto") from None
+    if corner_allowance_m is not None and not 0 <= corner_allowance_m < float("inf"):
+        raise UsageError(f"--corner-allowance {allowance}: expected 0 or more metres")
+    return Request(
+        start=parse_lat_lon(start) if start else None,
+        targets=tuple(parse_lat_lon(target) for target in targets),
+        clearance_m=clearance,
+        corner_allowance_m=corner_allowance_m,
+        snap_m=snap,
+        method=method,
+    )
+
+
+def _check_options(
+    fence: Path | None, log: Path | None, connect: str | None, *, upload: bool, outputs: list[Path], plots: list[Path]
+) -> None:
+    """Find what cannot work before any work is done."""
+    from missions.formats import check_writable_format  # noqa: PLC0415 - quick help
+
+    if [fence, log, connect].count(None) != 2:
+        raise UsageError("give one SOURCE: --fence FILE, --log FILE.tlog or --connect CONNECTION")
+    if upload and connect is None:
+        raise UsageError("--upload and --drive need a live link: --connect CONNECTION")
+    for path in outputs:
+        check_writable_format(path)
+    if plots:
+        from missions.picture import check_picture_format  # noqa: PLC0415 - quick help
+
+        for path in plots:
+            check_picture_format(path)
+
+
+def _offline_situation(
+    fence: Path | None, log: Path | None, system: int | None, *, any_vehicle: bool
+) -> Situation:
+    if log is not None:
+        from mavlink_bridge.recorded import situation_from_log  # noqa: PLC0415 - pymavlink only where needed
+
+        return situation_from_log(log, system, any_vehicle=any_vehicle)
+    from missions.errors import FenceMissingError  # noqa: PLC0415 - quick help
+    from missions.formats import read_situation  # noqa: PLC0415
+
+    assert fence is not None
+    situation = read_situation(fence)
+    if situation.fence is None:
+        raise FenceMissingError(f"{fence} holds no fence", file=str(fence))
+    return situation
+
+
+def _report(planned: Plan, written: list[Path], *, verified: bool) -> None:
+    promise = (
+        f"{planned.clearance_m:g} m promised while driving"
+        if planned.clearance_m is not None
+        else "nothing promised for the driven track"
+    )
+    turns = len(planned.items) - len(planned.targets)
+    typer.echo(
+        f"Route: {planned.length_m:.1f} m ({planned.straight_line_m:.1f} m as the crow flies), "
+        f"about {planned.duration_s:.0f} s, {len(planned.items)} waypoints ({turns} turns)"
+    )
+    typer.echo(f"Clearance: {planned.drawn_clearance_m:.2f} m drawn, {promise}")
+    for path in written:
+        typer.echo(f"Wrote {path}")
+    if verified:
+        typer.echo("Uploaded and verified")

@@ -1,0 +1,3 @@
+"""Placeholder."""
+def sim() -> None:
+    """x."""

@@ -25,6 +25,7 @@ __all__ = ["FreeSpace", "Scene", "build_free_space", "parse_scene"]
 GeometryT = TypeVar("GeometryT", bound=BaseGeometry)
 
 _OPEN_MARGIN_M = 100.0
+_TINY_EDGE_M = 2e-9
 
 
 @dataclass(frozen=True)
@@ -175,7 +176,9 @@ def build_free_space(
             obstacles = grow(obstacles, clearance_m, rounded=rounded)
     areas = [one if isinstance(one, Polygon) else MultiPolygon(polygons_only(one)) for one in obstacles]
     free = shapely.difference(ground, shapely.disjoint_subset_union_all(areas)) if areas else ground
-    return FreeSpace(tuple(polygons_only(free)), clearance_m)
+    # Overlays leave vertices some 1e-10 m apart, which say nothing and make edges without direction.
+    tidy = shapely.remove_repeated_points(free, _TINY_EDGE_M)
+    return FreeSpace(tuple(polygons_only(tidy)), clearance_m)
 
 
 def _loose_lines(inclusions: np.ndarray) -> list[BaseGeometry]:

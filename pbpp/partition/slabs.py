@@ -47,7 +47,7 @@ class Slabs:
         For each vertex the blocks west above, west below, east above and east below; -1 for none. A block that passes a vertex whole is
         both above and below.
     above, below : list of int
-        The vertex reached from each one straight up and down along its line, -1 for none.
+        The corner reached from each vertex straight up and down along its line; negative for none.
     """
 
     name = "slabs"
@@ -138,7 +138,7 @@ class Slabs:
         Returns
         -------
         list of (vertex, upwards)
-            All vertices at the nearest place above and at the nearest place below; none if the point stands on neither side line.
+            The corners at the nearest place above and at the nearest place below; none if the point stands on neither side line.
         """
         v = self.vertices
         east, north = point
@@ -152,7 +152,7 @@ class Slabs:
                 continue
             line = int(np.searchsorted(v.line_x, side))
             there = v.order[v.line_start[line] : v.line_start[line + 1]]
-            there = there[(v.y[there] >= low) & (v.y[there] <= high)]
+            there = there[v.corner[there] & (v.y[there] >= low) & (v.y[there] <= high)]
             up = there[v.y[there] > north + TOLERANCE_M]
             down = there[v.y[there] < north - TOLERANCE_M]
             found += [(int(one), True) for one in up[v.y[up] == v.y[up].min()]] if len(up) else []

@@ -218,10 +218,8 @@ class Sweep:
 
     def _link(self, edge: int, vertex: int) -> None:
         """Note a vertical edge of the boundary: a path may run along it."""
-        if self._y[edge] < self._y[vertex]:
-            self.above[edge], self.below[vertex] = vertex, edge
-        else:
-            self.above[vertex], self.below[edge] = edge, vertex
+        low, high = (edge, vertex) if self._y[edge] < self._y[vertex] else (vertex, edge)
+        self.above[low], self.below[high] = self._end[high], self._end[low]
 
     def _join(self, x: float, left: list[_Side], right: list[_Side]) -> None:
         """Make a portal wherever a closed and an opened block share a piece of the line."""
@@ -238,10 +236,10 @@ class Sweep:
             if left_high == right_high and high_vertex < 0:
                 high_vertex = left_high_vertex
             if high - low > TOLERANCE_M:
-                if low_vertex >= 0 and high_vertex >= 0:
-                    self.above[low_vertex], self.below[high_vertex] = high_vertex, low_vertex
                 low_end = self._end[low_vertex] if low_vertex >= 0 else OPEN_END
                 high_end = self._end[high_vertex] if high_vertex >= 0 else OPEN_END
+                if low_end != OPEN_END and high_end != OPEN_END:
+                    self.above[low_vertex], self.below[high_vertex] = high_end, low_end
                 self.portals.append((x, low, high, west, east))
                 self.ways[1][west].append((x, low, high, low_end, high_end, east))
                 self.ways[0][east].append((x, low, high, low_end, high_end, west))

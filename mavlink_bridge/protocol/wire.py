@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from mavlink_bridge import messages
+from mavlink_bridge.messages import MissionResult
 from missions.items import CoordinateFrame, MissionItem
 
 if TYPE_CHECKING:
@@ -63,6 +64,14 @@ def item_from_message(message: messages.MissionItemInt | messages.MissionItem) -
         current=bool(message.current),
         autocontinue=bool(message.autocontinue),
     )
+
+
+_RESULTS = {int(result): result for result in MissionResult}
+
+
+def mission_result(value: int) -> MissionResult | None:
+    """Give the MAV_MISSION_RESULT of a number off the wire; None for one that is none."""
+    return _RESULTS.get(value)
 
 
 def _to_int32(value: float) -> int:

@@ -1,0 +1,313 @@
+"""Reading a list of items from the vehicle, several requests in flight."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from mavlink_bridge import messages
+from mavlink_bridge.messages import MissionResult
+from mavlink_bridge.protocol.round_trip import RoundTrip
+from mavlink_bridge.protocol.table_machine import TableMachine
+from mavlink_bridge.protocol.transitions import DOWNLOAD, DownloadEvent, DownloadState
+from mavlink_bridge.protocol.wire import item_from_message, mission_result
+
+if TYPE_CHECKING:
+    from mavlink_bridge.messages import Frame, MissionType
+    from mavlink_bridge.protocol.peer import Peer
+    from missions.items import MissionItem
+
+FIRST_WINDOW = 50
+WINDOW = 100
+"""Requests in flight: ArduPilot is fastest with 50 to 100 and loses requests at 500."""
+
+PATIENCE_S = 10.0
+RIVAL_PATIENCE_S = 30.0
+_ASK_AGAIN_S = 1.0
+_REFUSALS_BELIEVED = 3
+_OVERTAKEN_BY = 3
+_FLOAT_FORM_AFTER_S = 4.0
+_LEAST_OVERDUE_S = 0.15
+_MOST_OVERDUE_S = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class DownloadOutcome:
+    """How a download ended.
+
+    Parameters
+    ----------
+    state : DownloadState
+        COMPLETE, REFUSED, BUSY (another ground station kept writing) or SILENT.
+    items : tuple of MissionItem
+        The list as the vehicle holds it, for missions with the home item at 0; empty unless complete.
+    result : MissionResult, optional
+        What the vehicle refused with.
+    is_coarse : bool
+        The vehicle gave positions as 32-bit floats (MISSION_ITEM), up to 1 m off.
+    """
+
+    state: DownloadState
+    items: tuple[MissionItem, ...] = ()
+    result: MissionResult | None = None
+    is_coarse: bool = False
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether the whole list arrived."""
+        return self.state is DownloadState.COMPLETE
+
+
+@dataclass(slots=True)
+class _Request:
+    order: int
+    sent_s: float
+    is_repeat: bool
+
+
+class Download(TableMachine[DownloadState, DownloadEvent]):
+    """Reads one list; the outcome is None until `is_done`.
+
+    Parameters
+    ----------
+    peer : Peer
+        The vehicle and our identity.
+    mission_type : MissionType
+        Which list.
+    window : int
+        Most requests in flight; 1 for vehicles that want them one by one.
+    rival_patience_s : float
+        How long another ground station may keep the list busy.
+    """
+
+    def __init__(
+        self,
+        peer: Peer,
+        mission_type: MissionType,
+        *,
+        window: int = WINDOW,
+        rival_patience_s: float = RIVAL_PATIENCE_S,
+    ) -> None:
+        super().__init__(DOWNLOAD, DownloadState.IDLE)
+        self._peer = peer
+        self._mission_type = mission_type
+        self._most_in_flight = window
+        self._window = float(min(window, FIRST_WINDOW))
+        self._rival_patience_s = rival_patience_s
+        self._round_trip = RoundTrip()
+        self._count = 0
+        self._items: dict[int, MissionItem] = {}
+        self._in_flight: dict[int, _Request] = {}  # in order of sending
+        self._next = 0
+        self._orders = 0
+        self._newest_answered = 0
+        self._refusals = 0
+        self._refusal_counts = False
+        self._result: MissionResult | None = None
+        self._float_form = False
+        self._coarse_items = 0
+        self._heard_s = 0.0
+        self._fetching_since_s = 0.0
+        self._act_at_s = 0.0
+        self._rival_since_s: float | None = None
+        self._limit_s = 0.0
+
+    @property
+    def outcome(self) -> DownloadOutcome | None:
+        """How it ended; None while it runs."""
+        if not self.is_done:
+            return None
+        items = (
+            tuple(self._items[seq] for seq in range(self._count))
+            if self.state is DownloadState.COMPLETE
+            else ()
+        )
+        result = self._result if self.state is DownloadState.REFUSED else None
+        return DownloadOutcome(self.state, items, result, self._coarse_items > 0)
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        """Items read and items in all."""
+        return len(self._items), self._count
+
+    @property
+    def bound_s(self) -> float:
+        """Longest time from the start to the end, whatever the link does (it grows when the count is known)."""
+        return 40.0 + self._rival_patience_s + 0.5 * self._count
+
+    @property
+    def deadline_s(self) -> float | None:
+        """When `handle_timer` wants to be called."""
+        if self.is_done or self.state is DownloadState.IDLE:
+            return None
+        if self.state is DownloadState.FETCHING:
+            return min(self._overdue_at_s(), self._heard_s + PATIENCE_S, self._limit_s)
+        return min(self._act_at_s, self._limit_s)
+
+    def start(self, now_s: float) -> None:
+        """Ask how many items there are."""
+        if self._move(DownloadEvent.START):
+            self._heard_s = now_s
+            self._limit_s = now_s + self.bound_s
+            self._ask_count(now_s)
+
+    def receive(self, frame: Frame, now_s: float) -> None:
+        """Take a frame; what is not for this machine is ignored."""
+        if self.is_done or not self._peer.accepts(frame, self._mission_type):
+            return
+        message = frame.message
+        if isinstance(message, messages.MissionItemInt | messages.MissionItem):
+            self._take_item(message, now_s)
+        elif isinstance(message, messages.MissionCount):
+            self._take_count(message.count, now_s)
+        elif isinstance(message, messages.MissionAck):
+            self._take_ack(message.type, now_s)
+
+    def handle_timer(self, now_s: float) -> None:
+        """Take notice that time has passed."""
+        if self.is_done or self.state is DownloadState.IDLE:
+            return
+        is_waiting = self.state is DownloadState.WAITING
+        if now_s >= self._limit_s or (not is_waiting and now_s >= self._heard_s + PATIENCE_S):
+            self._give_up()
+        elif self.state is DownloadState.FETCHING:
+            self._repeat_overdue(now_s)
+        elif now_s >= self._act_at_s:
+            if is_waiting and not self._rival_may_go_on(now_s):
+                self._move(DownloadEvent.RIVAL_STAYS)
+                return
+            if self._move(DownloadEvent.RETRY):
+                self._heard_s = now_s
+            self._ask_count(now_s)
+
+    def _give_up(self) -> None:
+        if not self._move(DownloadEvent.SILENCE):
+            self._move(DownloadEvent.RIVAL_STAYS)
+
+    def _rival_may_go_on(self, now_s: float) -> bool:
+        return self._rival_since_s is None or now_s < self._rival_since_s + self._rival_patience_s
+
+    def _ask_count(self, now_s: float) -> None:
+        self._act_at_s = now_s + _ASK_AGAIN_S
+        self._refusal_counts = True
+        self._send(
+            messages.MissionRequestList(
+                self._peer.system, self._peer.component, mission_type=int(self._mission_type)
+            )
+        )
+
+    def _take_count(self, count: int, now_s: float) -> None:
+        if self.state is DownloadState.FETCHING and count == self._count:
+            return
+        event = DownloadEvent.COUNT if count else DownloadEvent.COUNT_ZERO
+        if not self._move(event):
+            return
+        self._heard_s = self._fetching_since_s = now_s
+        self._rival_since_s = None
+        self._limit_s += 0.5 * max(0, count - self._count)
+        self._count = count
+        self._forget_items()
+        if self.is_done:
+            self._thank()
+        else:
+            self._fill_window(now_s)
+
+    def _forget_items(self) -> None:
+        self._items.clear()
+        self._in_flight.clear()
+        self._next = 0
+
+    def _take_item(self, message: messages.MissionItemInt | messages.MissionItem, now_s: float) -> None:
+        if self.state is not DownloadState.FETCHING or not 0 <= message.seq < self._count:
+            return
+        self._heard_s = now_s
+        request = self._in_flight.pop(message.seq, None)
+        if request is not None:
+            self._newest_answered = max(self._newest_answered, request.order)
+            if not request.is_repeat:
+                self._round_trip.observe(now_s - request.sent_s)
+        if message.seq in self._items:
+            return
+        self._items[message.seq] = item_from_message(message)
+        self._coarse_items += isinstance(message, messages.MissionItem)
+        self._window = min(self._window + 1.0, self._most_in_flight)
+        if len(self._items) == self._count:
+            self._move(DownloadEvent.ALL_ITEMS)
+            self._thank()
+            return
+        self._repeat_overtaken(now_s)
+        self._fill_window(now_s)
+
+    def _take_ack(self, result_number: int, now_s: float) -> None:
+        result = mission_result(result_number)
+        if result is MissionResult.DENIED:
+            if self._move(DownloadEvent.DENIED):
+                self._rival_since_s = now_s if self._rival_since_s is None else self._rival_since_s
+                self._act_at_s = now_s + _ASK_AGAIN_S
+        elif self.state is DownloadState.COUNTING and result not in (None, MissionResult.ACCEPTED):
+            # An answer to items pushed just before may still be under way: a refusal counts once for each time we asked.
+            if self._refusal_counts:
+                self._refusal_counts = False
+                self._refusals += 1
+                self._result = result
+                if self._refusals >= _REFUSALS_BELIEVED:
+                    self._move(DownloadEvent.REFUSAL)
+        elif self.state is DownloadState.FETCHING and result in (
+            MissionResult.ERROR,
+            MissionResult.INVALID_SEQUENCE,
+        ):
+            self._refusals += 1
+            if self._refusals >= _REFUSALS_BELIEVED:
+                self._most_in_flight, self._window = 1, 1.0  # PX4 answers so to requests out of order
+            self._forget_items()
+            self._move(DownloadEvent.LIST_CHANGED)
+            self._ask_count(now_s)
+
+    def _fill_window(self, now_s: float) -> None:
+        while self._next < self._count and len(self._in_flight) < int(self._window):
+            self._request(self._next, now_s, is_repeat=False)
+            self._next += 1
+
+    def _request(self, seq: int, now_s: float, *, is_repeat: bool) -> None:
+        self._orders += 1
+        self._in_flight[seq] = _Request(self._orders, now_s, is_repeat)
+        message_class = messages.MissionRequest if self._float_form else messages.MissionRequestInt
+        self._send(message_class(self._peer.system, self._peer.component, seq, int(self._mission_type)))
+
+    def _repeat(self, seqs: list[int], now_s: float) -> None:
+        for seq in seqs:
+            del self._in_flight[seq]
+            self._request(seq, now_s, is_repeat=True)
+
+    def _repeat_overtaken(self, now_s: float) -> None:
+        """Ask again for items whose later-asked neighbours have come."""
+        overtaken = []
+        for seq, request in self._in_flight.items():
+            if request.order > self._newest_answered - _OVERTAKEN_BY:
+                break
+            if now_s - request.sent_s >= self._round_trip.mean_s:
+                overtaken.append(seq)
+        self._repeat(overtaken, now_s)
+
+    def _overdue_at_s(self) -> float:
+        """Give the time at which the oldest request counts as lost: long after it and after anything that came since."""
+        overdue_s = self._round_trip.timeout_s(_LEAST_OVERDUE_S, _MOST_OVERDUE_S)
+        oldest = next(iter(self._in_flight.values()))
+        return max(oldest.sent_s, self._heard_s) + overdue_s
+
+    def _repeat_overdue(self, now_s: float) -> None:
+        if now_s < self._overdue_at_s():
+            return
+        if not self._items and now_s >= self._fetching_since_s + _FLOAT_FORM_AFTER_S:
+            self._float_form = True  # old vehicles answer only the old request
+        self._window = max(self._window / 2, min(5.0, self._most_in_flight))
+        overdue_s = self._round_trip.timeout_s(_LEAST_OVERDUE_S, _MOST_OVERDUE_S)
+        overdue = [seq for seq, request in self._in_flight.items() if now_s >= request.sent_s + overdue_s]
+        self._repeat(overdue, now_s)
+
+    def _thank(self) -> None:
+        self._send(
+            messages.MissionAck(
+                self._peer.system, self._peer.component, MissionResult.ACCEPTED, int(self._mission_type)
+            )
+        )

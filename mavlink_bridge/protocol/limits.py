@@ -1,0 +1,77 @@
+"""How much a vehicle can hold, asked before anything is sent."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from mavlink_bridge.messages import MissionType
+from missions.items import Command
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from missions.items import MissionItem
+
+_SD_MISSION_BYTES_PER_ITEM = 15
+_SD_FENCE_ITEMS = 4096
+_POLYGON = frozenset({Command.FENCE_POLYGON_VERTEX_INCLUSION, Command.FENCE_POLYGON_VERTEX_EXCLUSION})
+_CIRCLE = frozenset({Command.FENCE_CIRCLE_INCLUSION, Command.FENCE_CIRCLE_EXCLUSION})
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What fits on a vehicle; the defaults are ArduPilot Rover's with 16 KB of storage, as measured.
+
+    Parameters
+    ----------
+    mission_items, fence_items : int
+        Most items in a list; the home item of a mission counts. (Rally points are left to the vehicle's own answer.)
+    fence_bytes : int
+        Storage for the fence: 4, 2 + 8 n for a polygon of n vertices, 13 for a circle, 9 for the return point.
+    """
+
+    mission_items: int = 655
+    fence_items: int = 84
+    fence_bytes: int = 672
+
+    @classmethod
+    def from_parameters(cls, parameters: Mapping[str, float]) -> Limits:
+        """Give a vehicle's limits from its parameters: BRD_SD_MISSION and BRD_SD_FENCE are storage on the SD card, in KB."""
+        limits = cls()
+        mission_bytes = int(parameters.get("BRD_SD_MISSION", 0)) * 1024
+        fence_bytes = int(parameters.get("BRD_SD_FENCE", 0)) * 1024
+        if mission_bytes > 0:
+            limits = replace(limits, mission_items=(mission_bytes - 4) // _SD_MISSION_BYTES_PER_ITEM)
+        if fence_bytes > 0:
+            limits = replace(
+                limits, fence_items=min(fence_bytes // 8, _SD_FENCE_ITEMS), fence_bytes=fence_bytes
+            )
+        return limits
+
+    def problem(self, items: Sequence[MissionItem], mission_type: MissionType) -> str | None:
+        """Say why a list does not fit; None if it does."""
+        most = {MissionType.MISSION: self.mission_items, MissionType.FENCE: self.fence_items}.get(
+            mission_type
+        )
+        if most is not None and len(items) > most:
+            return f"{len(items)} {mission_type.name.lower()} items; the vehicle holds {most}"
+        if mission_type is MissionType.FENCE and (needed := fence_bytes(items)) > self.fence_bytes:
+            return f"the fence needs {needed} bytes of storage; the vehicle has {self.fence_bytes}"
+        return None
+
+
+def fence_bytes(items: Sequence[MissionItem]) -> int:
+    """Give the storage a fence needs on ArduPilot, in bytes."""
+    vertices = [item for item in items if item.command in _POLYGON]
+    polygons = sum(1 / item.params[0] for item in vertices if item.params[0] >= 1)
+    circles = sum(item.command in _CIRCLE for item in items)
+    return_points = sum(item.command == Command.FENCE_RETURN_POINT for item in items)
+    return 4 + 2 * round(polygons) + 8 * len(vertices) + 13 * circles + 9 * return_points
+
+
+def limit_in_text(text: str) -> int | None:
+    """Read the item limit from ArduPilot's STATUSTEXT "Only 655 items are supported"; None if it says nothing of it."""
+    found = re.search(r"Only (\d+) items are supported", text)
+    return int(found[1]) if found else None

@@ -1,0 +1,198 @@
+"""What ArduPilot makes of a list when it stores it, in one place; so that what is read back can be compared with what was sent.
+
+From ArduPilot's ``AP_Mission::mavlink_int_to_mission_cmd`` and from measurement: item 0 of a mission is the vehicle's own home;
+frames 5, 6 and 11 read back as 0, 3 and 10; each command keeps some parameters, some of them as whole numbers; altitudes are
+stored in whole centimetres; ``current`` and ``autocontinue`` are not stored. A fence keeps ``param1`` and the place, a rally
+point the place and whole metres. Positions are degE7 and must be equal to the last digit.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from mavlink_bridge.messages import MissionType
+from missions.items import Command, CoordinateFrame, MissionItem
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+_FRAMES = {
+    int(CoordinateFrame.MISSION): int(CoordinateFrame.GLOBAL),
+    int(CoordinateFrame.GLOBAL_INT): int(CoordinateFrame.GLOBAL),
+    int(CoordinateFrame.GLOBAL_RELATIVE_ALT_INT): int(CoordinateFrame.GLOBAL_RELATIVE_ALT),
+    int(CoordinateFrame.GLOBAL_TERRAIN_ALT_INT): int(CoordinateFrame.GLOBAL_TERRAIN_ALT),
+}
+
+_Stored = float | str | None
+
+
+def _float32(value: float) -> _Stored:
+    if math.isnan(value):
+        return "nan"
+    try:
+        return float(struct.unpack("<f", struct.pack("<f", value))[0])
+    except OverflowError:
+        return math.copysign(math.inf, value)
+
+
+def _whole(value: float) -> _Stored:
+    return float(math.trunc(value)) if math.isfinite(value) else str(value)
+
+
+def _sign(value: float) -> _Stored:
+    return -1.0 if value < 0 else 1.0
+
+
+def _flag(value: float) -> _Stored:
+    return 1.0 if value > 0 else 0.0
+
+
+def _dropped(value: float) -> _Stored:  # noqa: ARG001 - one of a family
+    return None
+
+
+_KEEPS_ALL = (_float32, _float32, _float32, _float32)
+_KEPT_PARAMS: dict[int, tuple[Callable[[float], _Stored], ...]] = {
+    Command.NAV_WAYPOINT: (_whole, _dropped, _dropped, _dropped),
+    Command.NAV_LOITER_UNLIM: (_dropped, _dropped, _whole, _dropped),
+    Command.NAV_LOITER_TURNS: (_whole, _dropped, _whole, _flag),
+    Command.NAV_LOITER_TIME: (_whole, _dropped, _sign, _flag),
+    Command.NAV_RETURN_TO_LAUNCH: (_dropped, _dropped, _dropped, _dropped),
+    Command.NAV_LAND: (_whole, _dropped, _dropped, _dropped),
+    Command.NAV_TAKEOFF: (_whole, _dropped, _dropped, _dropped),
+    Command.NAV_GUIDED_ENABLE: (_whole, _dropped, _dropped, _dropped),
+    Command.NAV_DELAY: (_float32, _whole, _whole, _whole),
+    Command.CONDITION_DELAY: (_float32, _dropped, _dropped, _dropped),
+    Command.CONDITION_DISTANCE: (_float32, _dropped, _dropped, _dropped),
+    Command.DO_SET_MODE: (_whole, _dropped, _dropped, _dropped),
+    Command.DO_JUMP: (_whole, _whole, _dropped, _dropped),
+    Command.DO_CHANGE_SPEED: (_whole, _float32, _float32, _dropped),
+    Command.DO_SET_HOME: (_whole, _dropped, _dropped, _dropped),
+    Command.DO_SET_REVERSE: (_whole, _dropped, _dropped, _dropped),
+    Command.DO_FENCE_ENABLE: (_whole, _dropped, _dropped, _dropped),
+    Command.NAV_SET_YAW_SPEED: (_float32, _float32, _float32, _dropped),
+}
+_WITHOUT_PLACE = frozenset(
+    {
+        Command.NAV_RETURN_TO_LAUNCH,
+        Command.NAV_DELAY,
+        Command.CONDITION_DELAY,
+        Command.CONDITION_DISTANCE,
+        Command.DO_SET_MODE,
+        Command.DO_JUMP,
+        Command.DO_CHANGE_SPEED,
+        Command.DO_SET_REVERSE,
+        Command.DO_FENCE_ENABLE,
+        Command.NAV_SET_YAW_SPEED,
+    }
+)
+_POLYGON_VERTICES = frozenset(
+    {Command.FENCE_POLYGON_VERTEX_INCLUSION, Command.FENCE_POLYGON_VERTEX_EXCLUSION}
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """One item that is not what was wanted.
+
+    Parameters
+    ----------
+    seq : int
+        Its place in the list, for missions with home at 0.
+    wanted, found : MissionItem, optional
+        None where a list ends before the other.
+    """
+
+    seq: int
+    wanted: MissionItem | None
+    found: MissionItem | None
+
+
+def is_same_item(a: MissionItem, b: MissionItem, mission_type: MissionType, *, coarse: bool = False) -> bool:
+    """Tell whether two items are the same once stored; ``coarse`` compares positions as 32-bit floats carry them."""
+    if a == b:
+        return True
+    stored_a, stored_b = _stored(a, mission_type), _stored(b, mission_type)
+    if stored_a.fixed != stored_b.fixed or not _is_near(stored_a.alt_m, stored_b.alt_m):
+        return False
+    if not coarse:
+        return stored_a.place == stored_b.place
+    return all(
+        _float32(x / 1e7) == _float32(y / 1e7) for x, y in zip(stored_a.place, stored_b.place, strict=True)
+    )
+
+
+def differences(
+    wanted: Sequence[MissionItem],
+    found: Sequence[MissionItem],
+    mission_type: MissionType,
+    *,
+    coarse: bool = False,
+) -> tuple[Difference, ...]:
+    """Give the items in which a list as read back differs from the one wanted, home left out.
+
+    A mission of only the home item is an empty mission.
+    """
+    first = 1 if mission_type is MissionType.MISSION else 0
+    longest = max(len(wanted), len(found))
+    result = []
+    for seq in range(first, longest):
+        a = wanted[seq] if seq < len(wanted) else None
+        b = found[seq] if seq < len(found) else None
+        if a is None or b is None or not is_same_item(a, b, mission_type, coarse=coarse):
+            result.append(Difference(seq, a, b))
+    return tuple(result)
+
+
+def is_unfinished_write(
+    found: Sequence[MissionItem],
+    old: Sequence[MissionItem],
+    new: Sequence[MissionItem],
+    mission_type: MissionType,
+    *,
+    coarse: bool = False,
+) -> bool:
+    """Tell whether a list can be what an abandoned upload of ``new`` over ``old`` leaves: the old cut short, overwritten from the front.
+
+    ArduPilot cuts a mission to the shorter length at MISSION_COUNT and then writes each item as it comes.
+    """
+    if not min(len(old), len(new)) <= len(found) <= max(len(old), len(new)):
+        return False
+
+    def holds(seq: int, items: Sequence[MissionItem]) -> bool:
+        return seq < len(items) and is_same_item(found[seq], items[seq], mission_type, coarse=coarse)
+
+    first = 1 if mission_type is MissionType.MISSION else 0
+    return all(holds(seq, new) or holds(seq, old) for seq in range(first, len(found)))
+
+
+@dataclass(frozen=True, slots=True)
+class _StoredItem:
+    fixed: tuple[object, ...]
+    place: tuple[int, int]
+    alt_m: float
+
+
+def _stored(item: MissionItem, mission_type: MissionType) -> _StoredItem:
+    command = int(item.command)
+    place = (item.lat_e7, item.lon_e7)
+    if mission_type is MissionType.FENCE:
+        keep = _whole if command in _POLYGON_VERTICES else _float32
+        param1 = None if command == Command.FENCE_RETURN_POINT else keep(item.params[0])
+        return _StoredItem((command, param1), place, 0.0)
+    if mission_type is MissionType.RALLY:
+        return _StoredItem((command, _whole(item.alt_m)), place, 0.0)
+    keepers = _KEPT_PARAMS.get(command, _KEEPS_ALL)
+    params = tuple(keep(value) for keep, value in zip(keepers, item.params, strict=True))
+    if command in _WITHOUT_PLACE:
+        return _StoredItem((command, params), (0, 0), 0.0)
+    frame = _FRAMES.get(int(item.frame), int(item.frame))
+    return _StoredItem((command, frame, params), place, item.alt_m)
+
+
+def _is_near(a_m: float, b_m: float) -> bool:
+    """Tell whether two altitudes can be the same whole number of centimetres, cut or rounded."""
+    return abs(a_m - b_m) < 0.0151 + 1e-6 * abs(a_m) or (math.isnan(a_m) and math.isnan(b_m))

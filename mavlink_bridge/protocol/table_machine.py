@@ -1,0 +1,52 @@
+"""What all protocol machines share: a state moved by a table, and messages waiting to be sent."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Generic, TypeVar
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from enum import StrEnum
+
+    from mavlink_bridge.messages import Message
+
+StateT = TypeVar("StateT", bound="StrEnum")
+EventT = TypeVar("EventT", bound="StrEnum")
+
+
+class TableMachine(Generic[StateT, EventT]):
+    """A state that moves only as its table says.
+
+    Parameters
+    ----------
+    table : mapping
+        For each state the events it heeds and where they lead; a state that heeds none is an end.
+    state : StateT
+        Where the machine begins.
+    """
+
+    def __init__(self, table: Mapping[StateT, Mapping[EventT, StateT]], state: StateT) -> None:
+        self._table = table
+        self.state = state
+        self._outgoing: list[Message] = []
+
+    @property
+    def is_done(self) -> bool:
+        """Whether the machine has come to its outcome and wants no more calls."""
+        return not self._table[self.state]
+
+    def messages_to_send(self) -> list[Message]:
+        """Give and forget what is to be sent now, in order."""
+        outgoing, self._outgoing = self._outgoing, []
+        return outgoing
+
+    def _move(self, event: EventT) -> bool:
+        """Go where the table says; False if the state does not heed the event."""
+        following = self._table[self.state].get(event)
+        if following is None:
+            return False
+        self.state = following
+        return True
+
+    def _send(self, message: Message) -> None:
+        self._outgoing.append(message)

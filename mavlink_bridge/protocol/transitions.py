@@ -1,0 +1,315 @@
+"""Every transition of every protocol machine, in tables.
+
+Two rules: all transitions live here, and this file knows nothing of messages or time. A machine turns what it receives, and the
+passing of time, into an event; the table of its states says where that leads. An event that a state does not list is ignored
+there. The machines run by these tables and the state diagrams in the documentation are drawn from them.
+
+How a transfer goes wrong, and the event that says so: the vehicle is silent for longer than our patience (SILENCE), it is busy with
+another ground station (DENIED) for longer than our patience (RIVAL_STAYS), or it says no (REFUSAL).
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum, auto
+
+
+class DownloadState(StrEnum):
+    """Where a download is."""
+
+    IDLE = auto()
+    COUNTING = auto()  # asked how many items there are
+    FETCHING = auto()  # several item requests in flight
+    WAITING = auto()  # another ground station writes this list
+    COMPLETE = auto()
+    REFUSED = auto()
+    BUSY = auto()
+    SILENT = auto()
+
+
+class DownloadEvent(StrEnum):
+    """What moves a download."""
+
+    START = auto()
+    COUNT = auto()
+    COUNT_ZERO = auto()
+    ALL_ITEMS = auto()
+    LIST_CHANGED = auto()  # an item past the end, or another count: ask again
+    DENIED = auto()
+    RETRY = auto()
+    REFUSAL = auto()
+    RIVAL_STAYS = auto()
+    SILENCE = auto()
+
+
+DOWNLOAD = {
+    DownloadState.IDLE: {
+        DownloadEvent.START: DownloadState.COUNTING,
+    },
+    DownloadState.COUNTING: {
+        DownloadEvent.COUNT: DownloadState.FETCHING,
+        DownloadEvent.COUNT_ZERO: DownloadState.COMPLETE,
+        DownloadEvent.DENIED: DownloadState.WAITING,
+        DownloadEvent.REFUSAL: DownloadState.REFUSED,
+        DownloadEvent.SILENCE: DownloadState.SILENT,
+    },
+    DownloadState.FETCHING: {
+        DownloadEvent.COUNT: DownloadState.FETCHING,
+        DownloadEvent.COUNT_ZERO: DownloadState.COMPLETE,
+        DownloadEvent.ALL_ITEMS: DownloadState.COMPLETE,
+        DownloadEvent.LIST_CHANGED: DownloadState.COUNTING,
+        DownloadEvent.DENIED: DownloadState.WAITING,
+        DownloadEvent.SILENCE: DownloadState.SILENT,
+    },
+    DownloadState.WAITING: {
+        DownloadEvent.RETRY: DownloadState.COUNTING,
+        DownloadEvent.RIVAL_STAYS: DownloadState.BUSY,
+    },
+    DownloadState.COMPLETE: {},
+    DownloadState.REFUSED: {},
+    DownloadState.BUSY: {},
+    DownloadState.SILENT: {},
+}
+
+
+class UploadState(StrEnum):
+    """Where one push of a list is."""
+
+    IDLE = auto()
+    ANNOUNCED = auto()  # MISSION_COUNT sent, no request yet
+    SENDING = auto()  # the vehicle asks, we push ahead of it
+    WAITING = auto()  # another ground station writes this list
+    ACCEPTED = auto()
+    REFUSED = auto()
+    BUSY = auto()
+    UNCONFIRMED = auto()  # over, and only a read-back tells how
+
+
+class UploadEvent(StrEnum):
+    """What moves a push."""
+
+    START = auto()
+    REQUEST = auto()
+    OUT_OF_SEQUENCE = auto()
+    ACCEPTED = auto()
+    DENIED = auto()
+    RETRY = auto()
+    REFUSAL = auto()
+    CANCELLED = auto()
+    COUNT = auto()  # answers our list request: the vehicle takes no items any more
+    RIVAL_STAYS = auto()
+    SILENCE = auto()
+
+
+UPLOAD = {
+    UploadState.IDLE: {
+        UploadEvent.START: UploadState.ANNOUNCED,
+    },
+    UploadState.ANNOUNCED: {
+        UploadEvent.REQUEST: UploadState.SENDING,
+        UploadEvent.ACCEPTED: UploadState.ACCEPTED,
+        UploadEvent.DENIED: UploadState.WAITING,
+        UploadEvent.REFUSAL: UploadState.REFUSED,
+        UploadEvent.SILENCE: UploadState.UNCONFIRMED,
+    },
+    UploadState.SENDING: {
+        UploadEvent.REQUEST: UploadState.SENDING,
+        UploadEvent.OUT_OF_SEQUENCE: UploadState.SENDING,
+        UploadEvent.DENIED: UploadState.SENDING,
+        UploadEvent.ACCEPTED: UploadState.ACCEPTED,
+        UploadEvent.REFUSAL: UploadState.REFUSED,
+        UploadEvent.CANCELLED: UploadState.UNCONFIRMED,
+        UploadEvent.COUNT: UploadState.UNCONFIRMED,
+        UploadEvent.SILENCE: UploadState.UNCONFIRMED,
+    },
+    UploadState.WAITING: {
+        UploadEvent.RETRY: UploadState.ANNOUNCED,
+        UploadEvent.RIVAL_STAYS: UploadState.BUSY,
+    },
+    UploadState.ACCEPTED: {},
+    UploadState.REFUSED: {},
+    UploadState.BUSY: {},
+    UploadState.UNCONFIRMED: {},
+}
+
+
+class VerifiedUploadState(StrEnum):
+    """Where a safe upload is."""
+
+    IDLE = auto()
+    READING_OLD = auto()
+    STORING_BACKUP = auto()  # waiting for the shell to have stored the old list
+    CHECKING_VEHICLE = auto()  # waiting to know that it does not drive the list
+    PUSHING = auto()
+    READING_BACK = auto()
+    RESTORING = auto()
+    READING_RESTORED = auto()
+    VERIFIED = auto()
+    UNCHANGED = auto()  # the old list, never replaced
+    RESTORED = auto()  # the old list, put back
+    DIFFERENT = auto()
+    UNKNOWN = auto()
+    NOT_STARTED = auto()  # nothing was written
+
+
+class VerifiedUploadEvent(StrEnum):
+    """What moves a safe upload."""
+
+    START = auto()
+    TOO_LARGE = auto()
+    READ_OLD = auto()  # what is read is the old list
+    READ_WANTED = auto()  # what is read is the list to be uploaded
+    READ_UNFINISHED = auto()  # part old, part new: our own unfinished write
+    READ_FOREIGN = auto()  # neither: somebody else's list
+    READ_AGAIN = auto()  # not the wanted list: believed only when a second read says the same
+    READ_FAILED = auto()
+    BACKUP_STORED = auto()
+    CLEAR_TO_WRITE = auto()
+    NOT_CLEAR = auto()
+    PUSH_ENDED = auto()
+    PUSH_AGAIN = auto()
+
+
+VERIFIED_UPLOAD = {
+    VerifiedUploadState.IDLE: {
+        VerifiedUploadEvent.START: VerifiedUploadState.READING_OLD,
+        VerifiedUploadEvent.TOO_LARGE: VerifiedUploadState.NOT_STARTED,
+    },
+    VerifiedUploadState.READING_OLD: {
+        VerifiedUploadEvent.READ_WANTED: VerifiedUploadState.VERIFIED,
+        VerifiedUploadEvent.READ_OLD: VerifiedUploadState.STORING_BACKUP,
+        VerifiedUploadEvent.READ_FAILED: VerifiedUploadState.NOT_STARTED,
+    },
+    VerifiedUploadState.STORING_BACKUP: {
+        VerifiedUploadEvent.BACKUP_STORED: VerifiedUploadState.CHECKING_VEHICLE,
+    },
+    VerifiedUploadState.CHECKING_VEHICLE: {
+        VerifiedUploadEvent.CLEAR_TO_WRITE: VerifiedUploadState.PUSHING,
+        VerifiedUploadEvent.NOT_CLEAR: VerifiedUploadState.NOT_STARTED,
+    },
+    VerifiedUploadState.PUSHING: {
+        VerifiedUploadEvent.PUSH_ENDED: VerifiedUploadState.READING_BACK,
+    },
+    VerifiedUploadState.READING_BACK: {
+        VerifiedUploadEvent.READ_WANTED: VerifiedUploadState.VERIFIED,
+        VerifiedUploadEvent.READ_AGAIN: VerifiedUploadState.READING_BACK,
+        VerifiedUploadEvent.PUSH_AGAIN: VerifiedUploadState.PUSHING,
+        VerifiedUploadEvent.READ_OLD: VerifiedUploadState.UNCHANGED,
+        VerifiedUploadEvent.READ_UNFINISHED: VerifiedUploadState.RESTORING,
+        VerifiedUploadEvent.READ_FOREIGN: VerifiedUploadState.DIFFERENT,
+        VerifiedUploadEvent.READ_FAILED: VerifiedUploadState.UNKNOWN,
+    },
+    VerifiedUploadState.RESTORING: {
+        VerifiedUploadEvent.PUSH_ENDED: VerifiedUploadState.READING_RESTORED,
+    },
+    VerifiedUploadState.READING_RESTORED: {
+        VerifiedUploadEvent.READ_OLD: VerifiedUploadState.RESTORED,
+        VerifiedUploadEvent.READ_AGAIN: VerifiedUploadState.READING_RESTORED,
+        VerifiedUploadEvent.PUSH_AGAIN: VerifiedUploadState.RESTORING,
+        VerifiedUploadEvent.READ_UNFINISHED: VerifiedUploadState.DIFFERENT,
+        VerifiedUploadEvent.READ_FOREIGN: VerifiedUploadState.DIFFERENT,
+        VerifiedUploadEvent.READ_FAILED: VerifiedUploadState.UNKNOWN,
+    },
+    VerifiedUploadState.VERIFIED: {},
+    VerifiedUploadState.UNCHANGED: {},
+    VerifiedUploadState.RESTORED: {},
+    VerifiedUploadState.DIFFERENT: {},
+    VerifiedUploadState.UNKNOWN: {},
+    VerifiedUploadState.NOT_STARTED: {},
+}
+
+
+class ParameterState(StrEnum):
+    """Where a parameter transfer is."""
+
+    IDLE = auto()
+    LISTING = auto()  # all were asked for, they stream in
+    ASKING = auto()  # single ones are asked for
+    SETTING = auto()
+    DONE = auto()
+    SILENT = auto()
+
+
+class ParameterEvent(StrEnum):
+    """What moves a parameter transfer."""
+
+    START_ALL = auto()
+    START_SOME = auto()
+    START_SET = auto()
+    GAPS = auto()  # the stream has ended and some are missing
+    ALL_HERE = auto()
+    CONFIRMED = auto()
+    GIVEN_UP = auto()  # the vehicle answers, but not with what is missing
+    SILENCE = auto()
+
+
+PARAMETERS = {
+    ParameterState.IDLE: {
+        ParameterEvent.START_ALL: ParameterState.LISTING,
+        ParameterEvent.START_SOME: ParameterState.ASKING,
+        ParameterEvent.START_SET: ParameterState.SETTING,
+    },
+    ParameterState.LISTING: {
+        ParameterEvent.GAPS: ParameterState.ASKING,
+        ParameterEvent.ALL_HERE: ParameterState.DONE,
+        ParameterEvent.SILENCE: ParameterState.SILENT,
+    },
+    ParameterState.ASKING: {
+        ParameterEvent.ALL_HERE: ParameterState.DONE,
+        ParameterEvent.GIVEN_UP: ParameterState.DONE,
+        ParameterEvent.SILENCE: ParameterState.SILENT,
+    },
+    ParameterState.SETTING: {
+        ParameterEvent.CONFIRMED: ParameterState.DONE,
+        ParameterEvent.GIVEN_UP: ParameterState.DONE,
+        ParameterEvent.SILENCE: ParameterState.SILENT,
+    },
+    ParameterState.DONE: {},
+    ParameterState.SILENT: {},
+}
+
+
+class CommandState(StrEnum):
+    """Where a command is."""
+
+    IDLE = auto()
+    SENT = auto()
+    IN_PROGRESS = auto()
+    DONE = auto()
+    SILENT = auto()
+
+
+class CommandEvent(StrEnum):
+    """What moves a command."""
+
+    START = auto()
+    PROGRESS = auto()
+    RESULT = auto()
+    SILENCE = auto()
+
+
+COMMAND = {
+    CommandState.IDLE: {
+        CommandEvent.START: CommandState.SENT,
+    },
+    CommandState.SENT: {
+        CommandEvent.PROGRESS: CommandState.IN_PROGRESS,
+        CommandEvent.RESULT: CommandState.DONE,
+        CommandEvent.SILENCE: CommandState.SILENT,
+    },
+    CommandState.IN_PROGRESS: {
+        CommandEvent.PROGRESS: CommandState.IN_PROGRESS,
+        CommandEvent.RESULT: CommandState.DONE,
+        CommandEvent.SILENCE: CommandState.SILENT,
+    },
+    CommandState.DONE: {},
+    CommandState.SILENT: {},
+}
+
+TABLES = {
+    "download": DOWNLOAD,
+    "upload": UPLOAD,
+    "verified_upload": VERIFIED_UPLOAD,
+    "parameters": PARAMETERS,
+    "command": COMMAND,
+}
+"""All tables by name, for the documentation and the tests."""

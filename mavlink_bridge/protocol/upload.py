@@ -1,0 +1,286 @@
+"""Pushing a list of items to the vehicle once, ahead of its requests.
+
+An upload ends with the vehicle's word, not with the truth: `VerifiedUpload` reads back what is really there.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from mavlink_bridge import messages
+from mavlink_bridge.messages import MissionResult
+from mavlink_bridge.protocol.download import PATIENCE_S, RIVAL_PATIENCE_S
+from mavlink_bridge.protocol.round_trip import RoundTrip
+from mavlink_bridge.protocol.table_machine import TableMachine
+from mavlink_bridge.protocol.transitions import UPLOAD, UploadEvent, UploadState
+from mavlink_bridge.protocol.wire import item_to_message, mission_result
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from mavlink_bridge.messages import Frame, MissionType
+    from mavlink_bridge.protocol.peer import Peer
+    from missions.items import MissionItem
+
+FIRST_WINDOW = 10
+WINDOW = 100
+
+_ANNOUNCE_AGAIN_S = 1.0
+_ECHO_S = 0.25  # a request repeated sooner than this is the same frame arriving twice
+_ASKED_AGAIN_S = 0.9  # ArduPilot asks again after 1 s
+_PROBE_AFTER_S = 2.0  # it would have asked again by now
+_LEAST_SETTLE_S = 0.03
+_MOST_SETTLE_S = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class UploadOutcome:
+    """How one push ended.
+
+    Parameters
+    ----------
+    state : UploadState
+        ACCEPTED, REFUSED, BUSY (another ground station kept writing) or UNCONFIRMED (no final word came).
+    result : MissionResult, optional
+        What the vehicle refused or cancelled with.
+    item : int, optional
+        The item it refused: the last it had asked for; None if it refused the list as a whole.
+    item_is_certain : bool
+        No other item was under way when the refusal came.
+    """
+
+    state: UploadState
+    result: MissionResult | None = None
+    item: int | None = None
+    item_is_certain: bool = True
+
+
+class Upload(TableMachine[UploadState, UploadEvent]):
+    """Pushes one list; the outcome is None until `is_done`.
+
+    The items go out in order ahead of the requests, in a window that grows while requests keep up. When the vehicle reports
+    INVALID_SEQUENCE and then stops asking for new items, one is missing: the push goes on from the item it asked for, with a window
+    of one. Every repeated request is answered. Only MISSION_COUNT and list requests are repeated on our own timer.
+
+    Parameters
+    ----------
+    peer : Peer
+        The vehicle and our identity.
+    mission_type : MissionType
+        Which list.
+    items : sequence of MissionItem
+        The list as it goes over the wire, for missions with the home item at 0.
+    window : int
+        Most items ahead of the requests; 1 serves the vehicle one by one.
+    rival_patience_s : float
+        How long another ground station may keep the list busy.
+    """
+
+    def __init__(
+        self,
+        peer: Peer,
+        mission_type: MissionType,
+        items: Sequence[MissionItem],
+        *,
+        window: int = WINDOW,
+        rival_patience_s: float = RIVAL_PATIENCE_S,
+    ) -> None:
+        super().__init__(UPLOAD, UploadState.IDLE)
+        self._peer = peer
+        self._mission_type = mission_type
+        self._messages = [item_to_message(item, seq, peer, mission_type) for seq, item in enumerate(items)]
+        self._most_ahead = window
+        self._window = float(min(window, FIRST_WINDOW))
+        self._threshold = float(window)
+        self._rival_patience_s = rival_patience_s
+        self._round_trip = RoundTrip()
+        self._wanted = -1  # the item the vehicle asked for last
+        self._next = 0  # the item to push next
+        self._most_sent = 0
+        self._sent_s: dict[int, float] = {}
+        self._repeated: set[int] = set()
+        self._result: MissionResult | None = None
+        self._heard_s = 0.0
+        self._act_at_s = 0.0
+        self._gap_at_s: float | None = None
+        self._rival_since_s: float | None = None
+        self._limit_s = 0.0
+
+    @property
+    def outcome(self) -> UploadOutcome | None:
+        """How it ended; None while it runs."""
+        if not self.is_done:
+            return None
+        if self.state is not UploadState.REFUSED:
+            return UploadOutcome(self.state, self._result)
+        item = self._wanted if self._wanted >= 0 else None
+        is_certain = item is None or self._most_ahead == 1 or self._next <= item + 1
+        return UploadOutcome(self.state, self._result, item, is_certain)
+
+    @property
+    def was_heeded(self) -> bool:
+        """Whether the vehicle asked for an item: it has begun to write."""
+        return self._wanted >= 0
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        """Items asked for and items in all."""
+        count = len(self._messages)
+        return (count if self.state is UploadState.ACCEPTED else max(self._wanted, 0)), count
+
+    @property
+    def bound_s(self) -> float:
+        """Longest time from the start to the end, whatever the link does."""
+        return 60.0 + self._rival_patience_s + 1.5 * len(self._messages)
+
+    @property
+    def deadline_s(self) -> float | None:
+        """When `handle_timer` wants to be called."""
+        if self.is_done or self.state is UploadState.IDLE:
+            return None
+        if self.state is UploadState.WAITING:
+            return min(self._act_at_s, self._limit_s)
+        due_s = min(self._act_at_s, self._heard_s + PATIENCE_S, self._limit_s)
+        return due_s if self._gap_at_s is None else min(due_s, self._gap_at_s)
+
+    def start(self, now_s: float) -> None:
+        """Announce the list."""
+        if self._move(UploadEvent.START):
+            self._heard_s = now_s
+            self._limit_s = now_s + self.bound_s
+            self._announce(now_s)
+
+    def receive(self, frame: Frame, now_s: float) -> None:
+        """Take a frame; what is not for this machine is ignored."""
+        if self.is_done or not self._peer.accepts(frame, self._mission_type):
+            return
+        message = frame.message
+        if isinstance(message, messages.MissionRequest | messages.MissionRequestInt):
+            self._take_request(message.seq, now_s)
+        elif isinstance(message, messages.MissionAck):
+            self._take_ack(message.type, now_s)
+        elif isinstance(message, messages.MissionCount):
+            self._move(UploadEvent.COUNT)
+
+    def handle_timer(self, now_s: float) -> None:
+        """Take notice that time has passed."""
+        if self.is_done or self.state is UploadState.IDLE:
+            return
+        is_waiting = self.state is UploadState.WAITING
+        if now_s >= self._limit_s or (not is_waiting and now_s >= self._heard_s + PATIENCE_S):
+            if not self._move(UploadEvent.SILENCE):
+                self._move(UploadEvent.RIVAL_STAYS)
+            return
+        if self._gap_at_s is not None and now_s >= self._gap_at_s:
+            self._fill_gap(now_s)
+        if now_s < self._act_at_s:
+            return
+        if self.state is UploadState.SENDING:
+            self._probe(now_s)
+        elif is_waiting and self._rival_stays(now_s):
+            self._move(UploadEvent.RIVAL_STAYS)
+        else:
+            if self._move(UploadEvent.RETRY):
+                self._heard_s = now_s
+            self._announce(now_s)
+
+    def _rival_stays(self, now_s: float) -> bool:
+        return self._rival_since_s is not None and now_s >= self._rival_since_s + self._rival_patience_s
+
+    def _announce(self, now_s: float) -> None:
+        self._act_at_s = now_s + _ANNOUNCE_AGAIN_S
+        self._send(
+            messages.MissionCount(
+                self._peer.system, self._peer.component, len(self._messages), int(self._mission_type)
+            )
+        )
+
+    def _probe(self, now_s: float) -> None:
+        """Ask for the list: a vehicle that still takes items denies it, one that does not gives its count."""
+        self._act_at_s = now_s + _PROBE_AFTER_S
+        self._send(
+            messages.MissionRequestList(self._peer.system, self._peer.component, int(self._mission_type))
+        )
+
+    def _take_request(self, seq: int, now_s: float) -> None:
+        if not 0 <= seq < len(self._messages) or not self._move(UploadEvent.REQUEST):
+            return
+        self._heard_s = now_s
+        self._act_at_s = now_s + _PROBE_AFTER_S
+        self._rival_since_s = None
+        if seq > self._wanted:
+            self._keep_up(seq, now_s)
+        elif now_s - self._sent_s.get(seq, -math.inf) >= _ECHO_S:
+            # Asked again, or from the front after a second MISSION_COUNT: this one is wanted, whatever came before.
+            self._wanted = seq
+            self._narrow_window()
+            self._push_item(seq, now_s)
+        self._push(now_s)
+
+    def _keep_up(self, seq: int, now_s: float) -> None:
+        """Follow the vehicle to a later item."""
+        before = seq - 1
+        if before in self._sent_s and before not in self._repeated:
+            self._round_trip.observe(now_s - self._sent_s[before])
+        steps = seq - self._wanted
+        self._window += steps if self._window < self._threshold else steps / self._window
+        self._window = min(self._window, self._most_ahead)
+        self._wanted = seq
+        self._gap_at_s = None
+        if seq < self._next and now_s - self._sent_s.get(seq, now_s) >= _ASKED_AGAIN_S:
+            self._narrow_window()
+            self._next = seq
+        self._next = max(self._next, seq)
+
+    def _push(self, now_s: float) -> None:
+        end = min(self._wanted + int(self._window), len(self._messages))
+        while self._next < end:
+            self._push_item(self._next, now_s)
+            self._next += 1
+
+    def _push_item(self, seq: int, now_s: float) -> None:
+        if seq in self._sent_s:
+            self._repeated.add(seq)
+        self._sent_s[seq] = now_s
+        self._most_sent = max(self._most_sent, seq + 1)
+        self._send(self._messages[seq])
+
+    def _narrow_window(self) -> None:
+        self._threshold = max(self._window / 2, 2.0)
+        self._window = 1.0
+
+    def _take_ack(self, result_number: int, now_s: float) -> None:
+        result = mission_result(result_number)
+        if result is None:
+            return
+        if result is MissionResult.ACCEPTED:
+            if self._most_sent == len(self._messages):  # else it is not about this list
+                self._move(UploadEvent.ACCEPTED)
+        elif result is MissionResult.INVALID_SEQUENCE:
+            if self._move(UploadEvent.OUT_OF_SEQUENCE):
+                self._heard_s = now_s
+                self._suspect_gap(now_s)
+        elif result is MissionResult.DENIED:
+            if self._move(UploadEvent.DENIED) and self.state is UploadState.WAITING:
+                self._rival_since_s = now_s if self._rival_since_s is None else self._rival_since_s
+                self._act_at_s = now_s + _ANNOUNCE_AGAIN_S
+        else:
+            event = (
+                UploadEvent.CANCELLED if result is MissionResult.OPERATION_CANCELLED else UploadEvent.REFUSAL
+            )
+            if self._move(event):
+                self._result = result
+
+    def _suspect_gap(self, now_s: float) -> None:
+        """Wait until it is clear whether an item is missing, or a frame only came twice or late."""
+        if self._gap_at_s is None and self._next > self._wanted + 1:
+            settle_s = 4 * self._round_trip.variation_s
+            self._gap_at_s = now_s + min(max(settle_s, _LEAST_SETTLE_S), _MOST_SETTLE_S)
+
+    def _fill_gap(self, now_s: float) -> None:
+        self._gap_at_s = None
+        self._narrow_window()
+        self._next = self._wanted
+        self._push(now_s)

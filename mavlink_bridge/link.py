@@ -7,7 +7,7 @@ import select
 import socket
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol, Self
+from typing import TYPE_CHECKING, Any, Protocol, Self
 
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import IdentityTakenError, LinkError
@@ -251,7 +251,7 @@ class _Udp:
     def __init__(self, address: Address, _timeout_s: float) -> None:
         family, _, _, _, target = socket.getaddrinfo(address.host, address.port, type=socket.SOCK_DGRAM)[0]
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
-        self._peers: dict[object, None] = {}
+        self._peers: dict[Any, None] = {}
         if address.kind == "udpin":
             self._socket.bind(target)
         else:
@@ -263,7 +263,7 @@ class _Udp:
             with contextlib.suppress(
                 OSError
             ):  # a peer that is not there yet refuses; datagrams may be lost anyway
-                self._socket.sendto(data, peer)  # type: ignore[arg-type]
+                self._socket.sendto(data, peer)
 
     def receive(self, timeout_s: float) -> bytes:
         if not select.select([self._socket], [], [], timeout_s)[0]:

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
-from shapely import LinearRing, Point, Polygon
-from shapely.geometry.base import BaseGeometry
+from shapely import LinearRing, MultiPolygon, Point, Polygon
 from shapely.ops import nearest_points
 
 from missions.errors import FenceError, SituationError
@@ -25,9 +24,12 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
+    from shapely.geometry.base import BaseGeometry
 
     from missions.fence import Fence
     from missions.geo import LatLon
+
+Area = Polygon | MultiPolygon
 
 CIRCLE_TOLERANCE_M = 0.05
 """How far a circle's polygon may stand off the circle."""
@@ -42,7 +44,7 @@ class Barrier:
 
     name: str
     kind: ZoneKind
-    area: BaseGeometry
+    area: Area
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +71,7 @@ class Ground:
     bounds: Polygon
     warnings: tuple[str, ...]
 
-    def areas(self, kind: ZoneKind) -> list[BaseGeometry]:
+    def areas(self, kind: ZoneKind) -> list[Area]:
         """Give the areas of one kind; the bounds where there is no inclusion."""
         found = [barrier.area for barrier in self.barriers if barrier.kind is kind]
         return found or ([self.bounds] if kind is ZoneKind.INCLUSION else [])
@@ -80,7 +82,7 @@ class Ground:
         inclusions = self.areas(ZoneKind.INCLUSION)
         if self.union:
             return shapely.union_all(inclusions)
-        area = inclusions[0]
+        area: BaseGeometry = inclusions[0]
         for inclusion in inclusions[1:]:
             area = area.intersection(inclusion)
         return area
@@ -175,7 +177,9 @@ def lay_out(
         area = _area(circle, name, frame, warnings)
         if union:  # the home circle limits even the union
             barriers = [
-                Barrier(b.name, b.kind, b.area.intersection(area)) if b.kind is ZoneKind.INCLUSION else b
+                Barrier(b.name, b.kind, _polygons(b.area.intersection(area)))
+                if b.kind is ZoneKind.INCLUSION
+                else b
                 for b in barriers
             ]
         if not (union and any(b.kind is ZoneKind.INCLUSION for b in barriers)):
@@ -195,13 +199,13 @@ def _home_circle(home: LatLon | None, radius_m: float) -> CircleZone:
     return CircleZone(ZoneKind.INCLUSION, home, radius_m)
 
 
-def _area(zone: Zone, name: str, frame: LocalFrame, warnings: list[str]) -> BaseGeometry:
+def _area(zone: Zone, name: str, frame: LocalFrame, warnings: list[str]) -> Area:
     if isinstance(zone, CircleZone):
         return _circle(zone, frame)
     return _polygon(zone, name, frame, warnings)
 
 
-def _polygon(zone: PolygonZone, name: str, frame: LocalFrame, warnings: list[str]) -> BaseGeometry:
+def _polygon(zone: PolygonZone, name: str, frame: LocalFrame, warnings: list[str]) -> Area:
     ring = frame.to_local_array(zone.vertices)
     plain = Polygon(ring)
     if plain.is_valid and plain.area > 0:
@@ -213,18 +217,23 @@ def _polygon(zone: PolygonZone, name: str, frame: LocalFrame, warnings: list[str
         else f"{name} has no area"
     )
     if zone.kind is ZoneKind.EXCLUSION:  # its lines were drawn to keep something out: they stay walls
-        return area.union(LinearRing(ring).buffer(_WALL_M, join_style="mitre"))
+        return _polygons(area.union(LinearRing(ring).buffer(_WALL_M, join_style="mitre")))
     if area.is_empty:
         raise FenceError(f"{name} has no area: the vehicle could be nowhere", zone=name)
     return area
 
 
-def _even_odd(ring: NDArray[np.float64]) -> BaseGeometry:
+def _even_odd(ring: NDArray[np.float64]) -> Area:
     """Give the area of a self-crossing ring that a ray from a point crosses an odd number of times to leave."""
     lines = shapely.union_all([LinearRing(ring)])
     faces = shapely.get_parts(shapely.polygonize([lines]))
     inside = [face for face in faces if _crossings(ring, face.representative_point()) % 2]
-    return shapely.union_all(inside)
+    return _polygons(shapely.union_all(inside))
+
+
+def _polygons(shape: BaseGeometry) -> Area:
+    """Leave of a shape what has an area."""
+    return MultiPolygon([part for part in shapely.get_parts(shape) if isinstance(part, Polygon)])
 
 
 def _crossings(ring: NDArray[np.float64], point: Point) -> int:

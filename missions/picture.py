@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from shapely.geometry.base import BaseGeometry
+
     from missions.geo import LatLon
     from missions.plan import Plan
 
@@ -73,7 +75,9 @@ def draw_plan(plan: Plan, path: Path, *, track: Sequence[LatLon] = (), title: st
 
     view = _view(plan)
     width_m, height_m = view[1] - view[0], view[3] - view[2]
-    figure = Figure(figsize=(_SIZE_IN, _SIZE_IN * min(1.6, max(0.5, height_m / width_m)) + 1.1), layout="constrained")
+    figure = Figure(
+        figsize=(_SIZE_IN, _SIZE_IN * min(1.6, max(0.5, height_m / width_m)) + 1.1), layout="constrained"
+    )
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     axes.set(xlim=view[:2], ylim=view[2:], aspect="equal", xlabel="east (m)", ylabel="north (m)")
@@ -102,7 +106,7 @@ def _view(plan: Plan) -> tuple[float, float, float, float]:
     return west - border_m, east + border_m, south - border_m, north + border_m
 
 
-def _is_vast(plan: Plan, area: shapely.Geometry) -> bool:
+def _is_vast(plan: Plan, area: BaseGeometry) -> bool:
     """Tell a home circle far larger than the rest, which would shrink the picture."""
     others = [b.area for b in plan.ground.barriers if b.area is not area]
     return bool(others) and area.area > 20 * shapely.union_all(others).envelope.area
@@ -116,22 +120,47 @@ def _draw_ground(axes: Any, plan: Plan, view: tuple[float, float, float, float])
     if math.isfinite(plan.drawn_clearance_m) and plan.drawn_clearance_m > 0:
         margin = ground.edge.buffer(plan.drawn_clearance_m).intersection(ground.allowed)
         _fill(
-            axes, margin, facecolor=_MARGIN, alpha=0.25, edgecolor="none", zorder=2, label="nearer than the drawn clearance"
+            axes,
+            margin,
+            facecolor=_MARGIN,
+            alpha=0.25,
+            edgecolor="none",
+            zorder=2,
+            label="nearer than the drawn clearance",
         )
     exclusions = shapely.union_all(ground.areas(ZoneKind.EXCLUSION))
-    _fill(axes, exclusions, facecolor="#F7D9C4", edgecolor=_EXCLUSION, hatch="///", linewidth=1.2, zorder=3, label="exclusion")
+    _fill(
+        axes,
+        exclusions,
+        facecolor="#F7D9C4",
+        edgecolor=_EXCLUSION,
+        hatch="///",
+        linewidth=1.2,
+        zorder=3,
+        label="exclusion",
+    )
     if any(barrier.kind is ZoneKind.INCLUSION for barrier in ground.barriers):
-        _fill(axes, ground.keep_in, facecolor="none", edgecolor=_INCLUSION, linewidth=2.0, zorder=4, label="inclusion")
+        _fill(
+            axes,
+            ground.keep_in,
+            facecolor="none",
+            edgecolor=_INCLUSION,
+            linewidth=2.0,
+            zorder=4,
+            label="inclusion",
+        )
 
 
-def _fill(axes: Any, area: shapely.Geometry, *, label: str | None = None, **style: Any) -> None:  # noqa: ANN401
+def _fill(axes: Any, area: BaseGeometry, *, label: str | None = None, **style: Any) -> None:  # noqa: ANN401
     from matplotlib.patches import PathPatch  # noqa: PLC0415
     from matplotlib.path import Path as Outline  # noqa: PLC0415
 
     parts = [part for part in shapely.get_parts(area) if isinstance(part, Polygon) and not part.is_empty]
     for part in parts:
         rings = [part.exterior, *part.interiors]
-        outline = Outline.make_compound_path(*(Outline(np.asarray(ring.coords), closed=True) for ring in rings))
+        outline = Outline.make_compound_path(
+            *(Outline(np.asarray(ring.coords), closed=True) for ring in rings)
+        )
         axes.add_patch(PathPatch(outline, label=label, **style))
         label = None
 
@@ -140,13 +169,17 @@ def _draw_lines(axes: Any, plan: Plan, track: Sequence[LatLon]) -> None:  # noqa
     frame = plan.ground.frame
     route = frame.to_local_array(plan.path)
     axes.plot(*route.T, "-", color=_ROUTE, linewidth=2.2, zorder=6, label="route")
-    axes.plot(*route[1:-1].T, "o", color="white", markeredgecolor=_ROUTE, markersize=5, zorder=7, label="waypoint")
+    axes.plot(
+        *route[1:-1].T, "o", color="white", markeredgecolor=_ROUTE, markersize=5, zorder=7, label="waypoint"
+    )
     if track:
         driven = frame.to_local_array(track)
         axes.plot(*driven.T, "--", color=_TRACK, linewidth=1.2, zorder=8, label="driven")
     start, targets = route[0], frame.to_local_array(plan.targets)
     axes.plot(*start, "s", color=_ROUTE, markeredgecolor="black", markersize=9, zorder=9, label="start")
-    axes.plot(*targets.T, "*", color="#F0E442", markeredgecolor="black", markersize=15, zorder=9, label="target")
+    axes.plot(
+        *targets.T, "*", color="#F0E442", markeredgecolor="black", markersize=15, zorder=9, label="target"
+    )
 
 
 def _draw_scale(axes: Any, view: tuple[float, float, float, float]) -> None:  # noqa: ANN401
@@ -159,6 +192,13 @@ def _draw_scale(axes: Any, view: tuple[float, float, float, float]) -> None:  # 
     axes.plot([left, right], [1.02, 1.02], color="black", linewidth=3, **style)
     axes.text(right + 0.01, 1.02, f"{length_m} m", va="center", fontsize=9, transform=axes.transAxes)
     axes.annotate(
-        "N", (0.97, 1.07), (0.97, 1.0), xycoords="axes fraction", ha="center", va="bottom", fontsize=9,
-        annotation_clip=False, arrowprops={"arrowstyle": "<-", "linewidth": 1.5},
-    )  # fmt: skip
+        "N",
+        xy=(0.97, 1.06),
+        xytext=(0.97, 1.005),
+        xycoords="axes fraction",
+        ha="center",
+        va="bottom",
+        fontsize=9,
+        annotation_clip=False,
+        arrowprops={"arrowstyle": "-|>", "linewidth": 1.5, "color": "black"},
+    )

@@ -134,7 +134,7 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
         items=tuple(waypoint(position) for position in path[1:]),
         path=path,
         start=start,
-        targets=tuple(ground.frame.to_lat_lons(route.points[list(route.target_indices)])),
+        targets=tuple(map(rounded, ground.frame.to_lat_lons(route.points[list(route.target_indices)]))),
         method=request.method,
         length_m=_length_m(path),
         straight_line_m=_length_m((start, *targets)),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
-from shapely import LineString, Point
+from shapely import LineString, Point, Polygon
 
 import pbpp
 from missions.errors import NoRouteError, RouteError, StartBlockedError, TargetBlockedError
@@ -144,7 +144,7 @@ class _Search:
         names = _names([barrier.name for barrier in forbidding])
         raise StartBlockedError(
             f"the start is on forbidden ground ({self._position(start)}): {names}; "
-            f"free ground is {distance:.2f} m away, bearing {bearing:.0f}°, at {position}",
+            f"free ground is {distance:.2f} m away, bearing {round(bearing) % 360}°, at {position}",
             fences=[barrier.name for barrier in forbidding],
             distance_m=round(distance, 3),
             bearing_deg=round(bearing, 1),
@@ -178,7 +178,7 @@ class _Search:
                 f"the target is {gap_m:.2f} m from {_names(names)}, nearer than {self.clearance_m:.2f} m"
             )
         raise TargetBlockedError(
-            f"{problem}; the nearest free point is {distance:.2f} m away, bearing {bearing:.0f}°, at {position}",
+            f"{problem}; the nearest free point is {distance:.2f} m away, bearing {round(bearing) % 360}°, at {position}",
             fences=names,
             clearance_m=round(self.clearance_m, 3),
             distance_m=round(distance, 3),
@@ -228,15 +228,15 @@ class _Search:
             if self.ground.clearance_m(leg) >= start_clearance_m - 1e-9:
                 yield LocalPoint(candidate.x, candidate.y)
 
-    def _component(self, point: LocalPoint) -> BaseGeometry:
-        parts: list[BaseGeometry] = list(shapely.get_parts(self.planner.free_space))
+    def _component(self, point: LocalPoint) -> Polygon:
+        parts: list[Polygon] = list(shapely.get_parts(self.planner.free_space))
         return min(parts, key=lambda part: float(part.distance(Point(point))))
 
     def _no_route(self, start: LocalPoint, goal: LocalPoint) -> RouteError:
         """Name the fences that part start and target: those along the edge of the smaller of their two areas."""
         areas = {"start": self._component(start), "target": self._component(goal)}
         walled = min(areas, key=lambda end: areas[end].area)
-        outline = shapely.get_exterior_ring(areas[walled])
+        outline = areas[walled].exterior
         reach_m = self.clearance_m * 1.01 + 2 * _INSIDE_M + 0.01
         names = [b.name for b in self.ground.barriers if self.ground.distance_m(b, outline) <= reach_m]
         return NoRouteError(

@@ -53,7 +53,8 @@ ConnectOption = Annotated[
     ),
 ]
 SystemOption = Annotated[
-    int | None, typer.Option("--system", metavar="N", min=1, max=255, help="Which vehicle, when several are heard.")
+    int | None,
+    typer.Option("--system", metavar="N", min=1, max=255, help="Which vehicle, when several are heard."),
 ]
 SourceSystemOption = Annotated[int, typer.Option(min=1, max=255, help="The system id we speak as.")]
 SourceComponentOption = Annotated[int, typer.Option(min=1, max=255, help="The component id we speak as.")]
@@ -80,7 +81,9 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
             command(**options)
         except (mission_errors.MissionError, bridge_errors.BridgeError) as error:
             code = exit_code_of(error)
-            _report(command.__name__, type(error).__name__, str(error), code, error.details, wants_json=wants_json)
+            _report(
+                command.__name__, type(error).__name__, str(error), code, error.details, wants_json=wants_json
+            )
             raise typer.Exit(code) from None
         except KeyboardInterrupt:
             message = "interrupted; the vehicle was left as it was"

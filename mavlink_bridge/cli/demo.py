@@ -1,3 +1,5 @@
 """Placeholder."""
+
+
 def demo() -> None:
-    """x."""
+    """X."""

@@ -31,19 +31,25 @@ if TYPE_CHECKING:
 _METHODS = ("optimal", "pbpp-taut", "pbpp")
 
 
-def plan(  # noqa: PLR0913 - a command's options
-    fence: Annotated[Path | None, typer.Option(metavar="FILE", help="Fence file: .waypoints, .plan, …")] = None,
+def plan(
+    fence: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Fence file: .waypoints, .plan, …")
+    ] = None,
     log: Annotated[Path | None, typer.Option(metavar="FILE.tlog", help="Recorded telemetry log.")] = None,
     connect: ConnectOption = None,
     start: Annotated[
-        str | None, typer.Option(metavar="LAT,LON", help="Default: the vehicle's position; for a file its home.")
+        str | None,
+        typer.Option(metavar="LAT,LON", help="Default: the vehicle's position; for a file its home."),
     ] = None,
     target: Annotated[
         list[str] | None,
-        typer.Option(metavar="LAT,LON", help="Several are visited in order. Default: the newest in the stream."),
+        typer.Option(
+            metavar="LAT,LON", help="Several are visited in order. Default: the newest in the stream."
+        ),
     ] = None,
     clearance: Annotated[
-        float | None, typer.Option(metavar="M", min=0.0, help="Promised while driving. Default: from FENCE_MARGIN.")
+        float | None,
+        typer.Option(metavar="M", min=0.0, help="Promised while driving. Default: from FENCE_MARGIN."),
     ] = None,
     corner_allowance: Annotated[
         str, typer.Option(metavar="M|auto", help="Room for cut corners on top; 0 plans the drawn lines only.")
@@ -52,13 +58,17 @@ def plan(  # noqa: PLR0913 - a command's options
         Path | None, typer.Option(metavar="FILE.parm", help="Parameters that the source does not tell.")
     ] = None,
     snap: Annotated[
-        float, typer.Option(metavar="M", min=0.0, help="Move a blocked target to free ground within M metres.")
+        float,
+        typer.Option(metavar="M", min=0.0, help="Move a blocked target to free ground within M metres."),
     ] = 0.0,
     method: Annotated[str, typer.Option(metavar="|".join(_METHODS), help="How to search.")] = "optimal",
     output: Annotated[
-        list[Path] | None, typer.Option("-o", "--output", metavar="FILE", help="Write the mission: .waypoints, .plan.")
+        list[Path] | None,
+        typer.Option("-o", "--output", metavar="FILE", help="Write the mission: .waypoints, .plan."),
     ] = None,
-    plot: Annotated[list[Path] | None, typer.Option(metavar="FILE", help="Draw the plan: .png, .svg, .pdf.")] = None,
+    plot: Annotated[
+        list[Path] | None, typer.Option(metavar="FILE", help="Draw the plan: .png, .svg, .pdf.")
+    ] = None,
     upload: Annotated[bool, typer.Option("--upload", help="Upload to the vehicle and verify.")] = False,
     drive: Annotated[bool, typer.Option("--drive", help="Then switch to AUTO; arms nothing.")] = False,
     system: SystemOption = None,
@@ -72,7 +82,6 @@ def plan(  # noqa: PLR0913 - a command's options
     """Plan a mission around the fences of a SOURCE: `--fence FILE`, `--log FILE.tlog` or `--connect CONNECTION`.
 
     Examples:
-
     `pbpp plan --log field.tlog -o mission.waypoints --plot mission.png`
 
     `pbpp plan --fence field.plan --start 40.0713,-105.2299 --target 40.0726,-105.2290 -o mission.plan`
@@ -100,7 +109,9 @@ def plan(  # noqa: PLR0913 - a command's options
         planned, planning_s, situation = result.plan, result.planning_s, result.situation
         uploaded, verified = result.uploaded, result.verified
     else:
-        situation = with_parameter_file(_offline_situation(fence, log, system, any_vehicle=any_vehicle), vehicle)
+        situation = with_parameter_file(
+            _offline_situation(fence, log, system, any_vehicle=any_vehicle), vehicle
+        )
         planned, planning_s = timed_plan(situation, request)
         uploaded = verified = False
     warn(planned.warnings)
@@ -218,7 +229,13 @@ def _request(
 
 
 def _check_options(
-    fence: Path | None, log: Path | None, connect: str | None, *, upload: bool, outputs: list[Path], plots: list[Path]
+    fence: Path | None,
+    log: Path | None,
+    connect: str | None,
+    *,
+    upload: bool,
+    outputs: list[Path],
+    plots: list[Path],
 ) -> None:
     """Find what cannot work before any work is done."""
     from missions.formats import check_writable_format  # noqa: PLC0415 - quick help

@@ -1,3 +1,5 @@
 """Placeholder."""
+
+
 def sim() -> None:
-    """x."""
+    """X."""

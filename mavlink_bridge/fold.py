@@ -6,7 +6,6 @@ read-backs) and takes what others send to it as requests.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -20,7 +19,7 @@ from missions.items import Command, CoordinateFrame, MissionItem, without_home
 from missions.situation import Known, ListKind, ListTransfer, Mission, Pose, Situation
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
     from mavlink_bridge.messages import Frame, Message
 

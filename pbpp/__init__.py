@@ -14,6 +14,7 @@ from .errors import (
 from .geometry import circle_ring
 from .planned_path import PlannedPath
 from .planner import Planner, plan_path
+from .widest import WidestWay, widest
 
 __all__ = [
     "GoalBlockedError",
@@ -24,6 +25,8 @@ __all__ = [
     "PlanningError",
     "StartBlockedError",
     "TooManyBlocksError",
+    "WidestWay",
     "circle_ring",
     "plan_path",
+    "widest",
 ]

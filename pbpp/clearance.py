@@ -12,20 +12,19 @@ import numpy.typing as npt
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-__all__ = ["MITRE_LIMIT", "ROUND_SEGMENTS", "grow", "shrink"]
+__all__ = ["MITRE_LIMIT", "ROUND_EXCESS_M", "grow", "shrink"]
 
 Geometries = npt.NDArray[np.object_]
 
 MITRE_LIMIT = 2.0
 """How far a mitred corner may reach, in clearances: corners of 60 degrees and more stay whole, sharper ones are cut."""
 
-ROUND_SEGMENTS = 16
-"""Chords in a quarter turn of a round offset."""
+ROUND_EXCESS_M = 0.0025
+"""How much more than the clearance a round offset may keep, in metres."""
 
 _PAD_M = 4e-9
 """Added to every offset, so that rounding at map coordinates of some thousand kilometres takes nothing away."""
 
-_ROUND_EXCESS = 1.0 / np.cos(np.pi / (4 * ROUND_SEGMENTS))
 _ATTEMPTS = 8
 
 
@@ -39,24 +38,23 @@ def grow(geometries: Geometries, clearance_m: float, *, rounded: bool = False) -
     clearance_m : float
         Clearance in metres, above 0.
     rounded : bool, default False
-        Round corners (many short edges, at most 0.12 % more than the clearance everywhere) in place of mitred ones.
+        Round corners (many short edges, everywhere up to `ROUND_EXCESS_M` too far) in place of mitred ones.
 
     Returns
     -------
     (n,) array of shapely geometry
         The grown obstacles.
     """
-    reach_m = np.full(len(geometries), clearance_m + _PAD_M)
-    if rounded:
-        reach_m *= _ROUND_EXCESS
-    grown = _offset(geometries, reach_m, rounded=rounded)
+    segments, excess = _rounding(clearance_m) if rounded else (0, 1.0)
+    reach_m = np.full(len(geometries), clearance_m * excess + _PAD_M)
+    grown = _offset(geometries, reach_m, segments)
     for _ in range(_ATTEMPTS):
         lack_m = clearance_m + 0.5 * _PAD_M - shapely.distance(shapely.boundary(grown), geometries)
         short = lack_m > 0.0
         if not short.any():
             break
         reach_m[short] += 1.5 * lack_m[short]
-        grown[short] = _offset(geometries[short], reach_m[short], rounded=rounded)
+        grown[short] = _offset(geometries[short], reach_m[short], segments)
     return grown
 
 
@@ -78,11 +76,10 @@ def shrink(area: BaseGeometry, clearance_m: float, *, rounded: bool = False) -> 
         The part, maybe empty.
     """
     boundary = shapely.boundary(area)
-    reach_m = np.array([clearance_m + _PAD_M])
-    if rounded:
-        reach_m *= _ROUND_EXCESS
+    segments, excess = _rounding(clearance_m) if rounded else (0, 1.0)
+    reach_m = np.array([clearance_m * excess + _PAD_M])
     for _ in range(_ATTEMPTS):
-        shrunk = _offset(np.array([area], dtype=object), -reach_m, rounded=rounded)[0]
+        shrunk = _offset(np.array([area], dtype=object), -reach_m, segments)[0]
         lack_m = clearance_m + 0.5 * _PAD_M - shapely.distance(shrunk, boundary)
         if shrunk.is_empty or lack_m <= 0.0:
             break
@@ -90,13 +87,21 @@ def shrink(area: BaseGeometry, clearance_m: float, *, rounded: bool = False) -> 
     return shrunk
 
 
-def _offset(geometries: Geometries, reach_m: npt.NDArray[np.float64], *, rounded: bool) -> Geometries:
+def _rounding(clearance_m: float) -> tuple[int, float]:
+    """Return the chords in a quarter turn, and the factor by which an arc must grow for its chords to keep the clearance."""
+    share = min(ROUND_EXCESS_M / clearance_m, 0.05)
+    segments = int(np.ceil(np.pi / 4.0 / np.arccos(1.0 / (1.0 + share))))
+    return segments, float(1.0 / np.cos(np.pi / (4 * segments)))
+
+
+def _offset(geometries: Geometries, reach_m: npt.NDArray[np.float64], segments: int) -> Geometries:
+    """Return geometries offset by a distance each, round with that many chords in a quarter turn, or mitred if 0."""
     grown: Geometries = shapely.buffer(
         geometries,
         reach_m,
-        quad_segs=ROUND_SEGMENTS,
+        quad_segs=max(segments, 1),
         cap_style="square",
-        join_style="round" if rounded else "mitre",
+        join_style="round" if segments else "mitre",
         mitre_limit=MITRE_LIMIT,
     )
     return grown

@@ -26,6 +26,7 @@ GeometryT = TypeVar("GeometryT", bound=BaseGeometry)
 
 _OPEN_MARGIN_M = 100.0
 _TINY_EDGE_M = 2e-9
+_INSIDE_M = 1e-6
 
 
 @dataclass(frozen=True)
@@ -73,8 +74,12 @@ class Scene:
     @cached_property
     def fence_lines(self) -> np.ndarray:
         """Boundary line of each part, (inclusions + exclusions,) array of shapely geometry."""
-        parts = np.concatenate((self.inclusions, self.exclusions))
-        return np.array([_line_of(part) for part in parts], dtype=object)
+        inclusions = np.array([_line_of(part) for part in self.inclusions], dtype=object)
+        if self.union and self.included is not None:
+            # What lies inside the union bounds nothing.
+            inclusions = shapely.difference(inclusions, shapely.buffer(self.included, -_INSIDE_M, join_style="mitre"))
+        exclusions = np.array([_line_of(part) for part in self.exclusions], dtype=object)
+        return np.concatenate((inclusions, exclusions))
 
     def part(self, index: int) -> tuple[str, int]:
         """Return what stands at a place of `fence_lines`: ("inclusion" or "exclusion", its index)."""

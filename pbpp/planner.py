@@ -4,24 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from math import inf, isfinite
+from math import isfinite
 
 import numpy as np
 import numpy.typing as npt
-import shapely
 from shapely.geometry import MultiPolygon
 
 from .any_angle import shortest_path
 from .errors import GoalBlockedError, InvalidGeometryError, NoPathError, StartBlockedError
-from .free_space import Scene, build_free_space, parse_scene
+from .field import Field
+from .free_space import parse_scene
 from .geometry import Point, Ring, parse_point
-from .partition.slabs import Slabs
 from .planned_path import PlannedPath, length_of
+from .widest import WidestWay, widest_in
 
 __all__ = ["Planner", "plan_path"]
-
-BOUNDARY_TOLERANCE_M = 1e-7
-"""A start or goal this near to free space counts as on its boundary."""
 
 ShouldStop = Callable[[], bool]
 
@@ -164,6 +161,33 @@ class Planner:
                 raise
         return self._plan_in(self._rounded, ends, method, should_stop)
 
+    def widest(
+        self, start: npt.ArrayLike, goal: npt.ArrayLike, *, tolerance_m: float = 0.01, should_stop: ShouldStop | None = None
+    ) -> WidestWay:
+        """Return the greatest clearance at which start and goal are still connected, whatever clearance was asked for.
+
+        Parameters
+        ----------
+        start, goal : pair of float
+            (east, north) in metres.
+        tolerance_m : float, default 0.01
+            How exact the clearance must be, in metres.
+        should_stop : callable, optional
+            Asked before each step; when it returns True, the clearance is what has been proven so far.
+
+        Returns
+        -------
+        WidestWay
+            The clearance with its narrowest place.
+
+        Raises
+        ------
+        InvalidGeometryError, StartBlockedError, GoalBlockedError, NoPathError
+            As `widest` does.
+        """
+        ends = parse_point(start, "start"), parse_point(goal, "goal")
+        return widest_in(self._scene, ends, tolerance_m, should_stop)
+
     def _widen(self, ends: tuple[Point, Point]) -> None:
         """Without inclusions, let the bounded part of the plane hold both ends."""
         local = [self._scene.to_local(end) for end in ends]
@@ -175,10 +199,9 @@ class Planner:
     def _plan_in(
         self, field: Field, ends: tuple[Point, Point], method: str, should_stop: ShouldStop | None
     ) -> PlannedPath:
-        start, start_parts = self._enter(field, ends[0], StartBlockedError)
-        goal, goal_parts = self._enter(field, ends[1], GoalBlockedError)
-        if not start_parts & goal_parts:
+        if not field.require(ends[0], StartBlockedError) & field.require(ends[1], GoalBlockedError):
             raise NoPathError(self._clearance_m)
+        start, goal = (field.onto(self._scene.to_local(end)) for end in ends)
         result = shortest_path(field.slabs, start, goal, should_stop)
         if result.vertices is None:
             raise NoPathError(self._clearance_m)
@@ -187,57 +210,3 @@ class Planner:
         length_m = length_of(points)
         bound_m = min(result.lower_bound_m, length_m) if result.stopped else length_m
         return PlannedPath(points, length_m, bound_m, method, len(field.slabs), result.expanded, planner=self)
-
-    def _enter(
-        self, field: Field, point: Point, error: type[StartBlockedError | GoalBlockedError]
-    ) -> tuple[Point, frozenset[int]]:
-        """Return a point and its components, the point moved onto free space if rounding put it beside."""
-        local = self._scene.to_local(point)
-        components = field.free.components_at(local, BOUNDARY_TOLERANCE_M)
-        if not components:
-            if not field.free.polygons:
-                raise error(point, self._clearance_m, inf, None)
-            nearest, distance_m = field.nearest(local)
-            raise error(point, self._clearance_m, distance_m, self._scene.from_local(nearest))
-        if not field.slabs.locate(local):
-            local, _ = field.nearest(local)
-        return local, components
-
-
-class Field:
-    """Free space at one clearance with its slabs.
-
-    Parameters
-    ----------
-    scene : Scene
-        The fence.
-    clearance_m : float
-        Clearance in metres.
-    rounded : bool, default False
-        Whether corners are offset round.
-    reach : sequence of (east, north)
-        Points that the bounded part of the open plane must hold, metres from the scene's origin.
-    """
-
-    def __init__(
-        self, scene: Scene, clearance_m: float, *, rounded: bool = False, reach: Sequence[Point] = ()
-    ) -> None:
-        self.free = build_free_space(scene, clearance_m, rounded=rounded, reach=reach)
-
-    @cached_property
-    def slabs(self) -> Slabs:
-        """The slab partition."""
-        return Slabs(self.free.polygons)
-
-    def holds(self, point: Point) -> bool:
-        """Return whether a point lies in the bounds of free space."""
-        if not self.free.polygons:
-            return False
-        west, south, east, north = self.free.geometry.bounds
-        return west <= point[0] <= east and south <= point[1] <= north
-
-    def nearest(self, point: Point) -> tuple[Point, float]:
-        """Return the nearest point of free space and how far it is in metres."""
-        line = shapely.shortest_line(self.free.geometry, shapely.Point(point))
-        east, north = shapely.get_coordinates(line)[0].tolist()
-        return (east, north), float(shapely.length(line))

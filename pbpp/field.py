@@ -1,0 +1,74 @@
+"""Free space at one clearance together with its slabs: what a query is answered from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from math import inf
+
+import shapely
+
+from .errors import GoalBlockedError, StartBlockedError
+from .free_space import Scene, build_free_space
+from .geometry import Point
+from .partition.slabs import Slabs
+
+__all__ = ["BOUNDARY_TOLERANCE_M", "Field"]
+
+BOUNDARY_TOLERANCE_M = 1e-7
+"""A start or goal this near to free space counts as on its boundary."""
+
+
+class Field:
+    """Free space at one clearance with its slabs.
+
+    Parameters
+    ----------
+    scene : Scene
+        The fence.
+    clearance_m : float
+        Clearance in metres.
+    rounded : bool, default False
+        Whether corners are offset round.
+    reach : sequence of (east, north)
+        Points that the bounded part of the open plane must hold, metres from the scene's origin.
+    """
+
+    def __init__(
+        self, scene: Scene, clearance_m: float, *, rounded: bool = False, reach: Sequence[Point] = ()
+    ) -> None:
+        self.scene = scene
+        self.free = build_free_space(scene, clearance_m, rounded=rounded, reach=reach)
+
+    @cached_property
+    def slabs(self) -> Slabs:
+        """The slab partition."""
+        return Slabs(self.free.polygons)
+
+    def holds(self, point: Point) -> bool:
+        """Return whether a point lies in the bounds of free space."""
+        if not self.free.polygons:
+            return False
+        west, south, east, north = self.free.geometry.bounds
+        return west <= point[0] <= east and south <= point[1] <= north
+
+    def nearest(self, point: Point) -> tuple[Point, float]:
+        """Return the nearest point of free space and how far it is in metres."""
+        line = shapely.shortest_line(self.free.geometry, shapely.Point(point))
+        east, north = shapely.get_coordinates(line)[0].tolist()
+        return (east, north), float(shapely.length(line))
+
+    def require(self, point: Point, error: type[StartBlockedError | GoalBlockedError]) -> frozenset[int]:
+        """Return the components that a point of the map lies in; raise the error with the nearest free point if in none."""
+        local = self.scene.to_local(point)
+        components = self.free.components_at(local, BOUNDARY_TOLERANCE_M)
+        if components:
+            return components
+        if not self.free.polygons:
+            raise error(point, self.free.clearance_m, inf, None)
+        nearest, distance_m = self.nearest(local)
+        raise error(point, self.free.clearance_m, distance_m, self.scene.from_local(nearest))
+
+    def onto(self, point: Point) -> Point:
+        """Return a point of free space, moved onto a block if rounding put it just beside."""
+        return point if self.slabs.locate(point) else self.nearest(point)[0]

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from mavlink_bridge import messages as m
 from mavlink_bridge.protocol.wire import item_from_message
+from mavlink_bridge.vehicles import is_vehicle
 from missions.errors import FenceError, InvalidPositionError
 from missions.fence import fence_from_items
 from missions.geo import LatLon, checked_lat_lon, from_e7
@@ -19,7 +20,7 @@ from missions.items import Command, CoordinateFrame, MissionItem, without_home
 from missions.situation import Known, ListKind, ListTransfer, Mission, Pose, Situation
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable
 
     from mavlink_bridge.messages import Frame, Message
 
@@ -43,35 +44,6 @@ _GLOBAL_FRAMES = frozenset(
 _IGNORE_X_OR_Y = 0b11
 _GUIDED_TARGET = 2
 _HEADING_UNKNOWN = 65535
-
-
-class Vehicle(NamedTuple):
-    """A vehicle heard on a stream: its ids and its MAV_TYPE."""
-
-    system: int
-    component: int
-    type: int
-
-    @property
-    def is_rover(self) -> bool:
-        """Whether it is a ground rover or a boat."""
-        return self.type in (m.MavType.GROUND_ROVER, m.MavType.SURFACE_BOAT)
-
-
-def vehicles_heard(frames: Iterable[Frame]) -> list[Vehicle]:
-    """Give the vehicles (not ground stations, companions or other components) that sent a HEARTBEAT, in order of system id."""
-    return sorted(
-        {
-            Vehicle(frame.system, frame.component, frame.message.type)
-            for frame in frames
-            if isinstance(frame.message, m.Heartbeat) and is_vehicle(frame.message)
-        }
-    )
-
-
-def is_vehicle(heartbeat: m.Heartbeat) -> bool:
-    """Tell whether a HEARTBEAT is an autopilot's."""
-    return heartbeat.autopilot != m.Autopilot.INVALID and heartbeat.type != m.MavType.GCS
 
 
 def fold(situation: Situation, frame: Frame, time_s: float) -> Situation:
@@ -282,23 +254,47 @@ def _without_transfer(situation: Situation, kind: ListKind, *, to_vehicle: bool)
 
 
 def _take_over(situation: Situation, kind: ListKind, transfer: ListTransfer, time_s: float) -> Situation:
-    """Make a complete list what the vehicle holds."""
-    items = transfer.in_order()
     source = f"{kind} {'upload' if transfer.to_vehicle else 'read-back'}"
-    situation = _without_transfer(situation, kind, to_vehicle=transfer.to_vehicle)
-    if kind is ListKind.FENCE:
-        return _take_over_fence(situation, items, time_s, source)
-    if kind is ListKind.RALLY:
-        return replace(situation, rally=Known(tuple(item.position for item in items), time_s, source))
-    return _take_over_mission(situation, items, transfer, time_s, source)
+    return with_list(situation, kind, transfer.in_order(), time_s, source, tells_home=not transfer.to_vehicle)
 
 
-def _take_over_fence(
-    situation: Situation, items: tuple[MissionItem, ...], time_s: float, source: str
+def with_list(
+    situation: Situation,
+    kind: ListKind,
+    items: tuple[MissionItem, ...],
+    time_s: float,
+    source: str,
+    *,
+    tells_home: bool = True,
 ) -> Situation:
+    """Make a complete list what the vehicle holds.
+
+    Parameters
+    ----------
+    situation : Situation
+        What is known so far.
+    kind : ListKind
+        Which list.
+    items : tuple of MissionItem
+        The list as it goes over the wire, for an ArduPilot mission with home at 0.
+    time_s, source
+        When and from what it is known.
+    tells_home : bool
+        Whether item 0 of a mission is the vehicle's word on its home (not in an upload: what is sent there is not stored).
+    """
     # A finished transfer settles what half-seen ones before it left open.
     for to_vehicle in (True, False):
-        situation = _without_transfer(situation, ListKind.FENCE, to_vehicle=to_vehicle)
+        situation = _without_transfer(situation, kind, to_vehicle=to_vehicle)
+    if kind is ListKind.FENCE:
+        return _with_fence(situation, items, time_s, source)
+    if kind is ListKind.RALLY:
+        return replace(situation, rally=Known(tuple(item.position for item in items), time_s, source))
+    return _with_mission(situation, items, time_s, source, tells_home=tells_home)
+
+
+def _with_fence(
+    situation: Situation, items: tuple[MissionItem, ...], time_s: float, source: str
+) -> Situation:
     try:
         fence = fence_from_items(items)
     except FenceError as error:
@@ -306,13 +302,13 @@ def _take_over_fence(
     return replace(situation, fence=Known(fence, time_s, source), fence_trouble=None)
 
 
-def _take_over_mission(
-    situation: Situation, items: tuple[MissionItem, ...], transfer: ListTransfer, time_s: float, source: str
+def _with_mission(
+    situation: Situation, items: tuple[MissionItem, ...], time_s: float, source: str, *, tells_home: bool
 ) -> Situation:
     if situation.ardupilot is False:
         return replace(situation, mission=Known(Mission(items), time_s, source))
     mission = Mission(without_home(items))
-    if not transfer.to_vehicle and items and (home := _place(items[0].lat_e7, items[0].lon_e7)):
+    if tells_home and items and (home := _place(items[0].lat_e7, items[0].lon_e7)):
         mission = replace(mission, home=home)
         situation = replace(situation, home=Known(home, time_s, f"{source}, item 0"))
     return replace(situation, mission=Known(mission, time_s, source))

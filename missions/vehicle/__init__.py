@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from missions.vehicle.ardupilot import ardupilot_vehicle
+from missions.vehicle.ardupilot import PARAMETER_NAMES, ardupilot_vehicle
 from missions.vehicle.model import Assumed, Autopilot, FenceParameters, Footprint, Steering, Vehicle
 from missions.vehicle.px4 import px4_vehicle
 from missions.vehicle.reader import ParameterReader
@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 __all__ = [
+    "PARAMETER_NAMES",
     "Assumed",
     "Autopilot",
     "FenceParameters",

@@ -11,6 +11,34 @@ from missions.vehicle.reader import UNLIMITED_ACCEL_MPS2
 if TYPE_CHECKING:
     from missions.vehicle.reader import ParameterReader
 
+PARAMETER_NAMES = (
+    "WP_RADIUS",
+    "WP_SPEED",
+    "CRUISE_SPEED",
+    "TURN_RADIUS",
+    "ATC_TURN_MAX_G",
+    "ATC_ACCEL_MAX",
+    "ATC_DECEL_MAX",
+    "WP_ACCEL",
+    "WP_JERK",
+    "PSC_POS_P",
+    "WP_PIVOT_ANGLE",
+    "WP_PIVOT_RATE",
+    "SERVO1_FUNCTION",
+    "SERVO2_FUNCTION",
+    "SERVO3_FUNCTION",
+    "SERVO4_FUNCTION",
+    "FENCE_ENABLE",
+    "FENCE_TYPE",
+    "FENCE_MARGIN",
+    "FENCE_RADIUS",
+    "FENCE_OPTIONS",
+    "FENCE_ACTION",
+    "AVOID_ENABLE",
+    "OA_TYPE",
+)
+"""The parameters that matter here, for asking a vehicle; steering servos are looked for on the first four outputs."""
+
 _GROUND_STEERING, _THROTTLE, _THROTTLE_LEFT, _THROTTLE_RIGHT = 26.0, 70.0, 73.0, 74.0
 
 

@@ -178,6 +178,7 @@ class Link:
         timeout_s: float | None = None,
         on_frames: Callable[[list[Frame]], None] | None = None,
         on_step: Callable[[], None] | None = None,
+        until: Callable[[], bool] = lambda: False,
     ) -> None:
         """Run a machine to its outcome.
 
@@ -190,7 +191,9 @@ class Link:
         on_frames : callable, optional
             Sees every batch of frames before the machine does.
         on_step : callable, optional
-            Called after each step, for progress bars and for what the machine hands out.
+            Called before each step's messages are sent, for progress bars and for what the machine hands out.
+        until : callable, optional
+            Ends the run early when it gives True.
 
         Raises
         ------
@@ -200,11 +203,11 @@ class Link:
         begun_s = time.monotonic()
         machine.start(begun_s)
         while True:
-            for message in machine.messages_to_send():
-                self.send(message)
             if on_step:
                 on_step()
-            if machine.is_done:
+            for message in machine.messages_to_send():
+                self.send(message)
+            if machine.is_done or until():
                 return
             now_s = time.monotonic()
             if timeout_s is not None and now_s - begun_s > timeout_s:

@@ -93,17 +93,21 @@ def plan(
     _check_options(fence, log, connect, upload=upload or drive, outputs=outputs, plots=plots)
     if connect is not None:
         from mavlink_bridge.cli.live import plan_live  # noqa: PLC0415 - only with a link
+        from mavlink_bridge.director import Orders  # noqa: PLC0415
 
+        orders = Orders(
+            (source_system, source_component),
+            system=system,
+            any_vehicle=any_vehicle,
+            drive=drive,
+            patience_s=timeout,
+        )
         result = plan_live(
             connect,
             request,
+            orders=orders,
             vehicle_file=vehicle,
-            identity=(source_system, source_component),
-            system=system,
-            any_vehicle=any_vehicle,
-            timeout_s=timeout,
             upload=upload or drive,
-            drive=drive,
             quiet=quiet or json_output,
         )
         planned, planning_s, situation = result.plan, result.planning_s, result.situation

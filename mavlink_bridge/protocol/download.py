@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -23,8 +24,10 @@ WINDOW = 100
 
 PATIENCE_S = 10.0
 RIVAL_PATIENCE_S = 30.0
-_ASK_AGAIN_S = 1.0
+_ASK_AGAIN_S = 0.5
+_RIVAL_AGAIN_S = 1.0
 _REFUSALS_BELIEVED = 3
+_OUT_OF_ORDER = (MissionResult.ERROR, MissionResult.INVALID_SEQUENCE)
 _OVERTAKEN_BY = 3
 _FLOAT_FORM_AFTER_S = 4.0
 _LEAST_OVERDUE_S = 0.15
@@ -78,6 +81,8 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         Most requests in flight; 1 for vehicles that want them one by one.
     rival_patience_s : float
         How long another ground station may keep the list busy.
+    round_trip : RoundTrip, optional
+        What is known of the link from transfers before.
     """
 
     def __init__(
@@ -87,6 +92,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         *,
         window: int = WINDOW,
         rival_patience_s: float = RIVAL_PATIENCE_S,
+        round_trip: RoundTrip | None = None,
     ) -> None:
         super().__init__(DOWNLOAD, DownloadState.IDLE)
         self._peer = peer
@@ -94,7 +100,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         self._most_in_flight = window
         self._window = float(min(window, FIRST_WINDOW))
         self._rival_patience_s = rival_patience_s
-        self._round_trip = RoundTrip()
+        self._round_trip = round_trip or RoundTrip()
         self._count = 0
         self._items: dict[int, MissionItem] = {}
         self._in_flight: dict[int, _Request] = {}  # in order of sending
@@ -103,6 +109,8 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         self._newest_answered = 0
         self._refusals = 0
         self._refusal_counts = False
+        self._checks = 0
+        self._checked_s = -math.inf
         self._result: MissionResult | None = None
         self._float_form = False
         self._coarse_items = 0
@@ -204,6 +212,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
             return
         self._heard_s = self._fetching_since_s = now_s
         self._rival_since_s = None
+        self._refusals = 0
         self._limit_s += 0.5 * max(0, count - self._count)
         self._count = count
         self._forget_items()
@@ -243,7 +252,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         if result is MissionResult.DENIED:
             if self._move(DownloadEvent.DENIED):
                 self._rival_since_s = now_s if self._rival_since_s is None else self._rival_since_s
-                self._act_at_s = now_s + _ASK_AGAIN_S
+                self._act_at_s = now_s + _RIVAL_AGAIN_S
         elif self.state is DownloadState.COUNTING and result not in (None, MissionResult.ACCEPTED):
             # An answer to items pushed just before may still be under way: a refusal counts once for each time we asked.
             if self._refusal_counts:
@@ -252,16 +261,20 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
                 self._result = result
                 if self._refusals >= _REFUSALS_BELIEVED:
                     self._move(DownloadEvent.REFUSAL)
-        elif self.state is DownloadState.FETCHING and result in (
-            MissionResult.ERROR,
-            MissionResult.INVALID_SEQUENCE,
-        ):
-            self._refusals += 1
-            if self._refusals >= _REFUSALS_BELIEVED:
-                self._most_in_flight, self._window = 1, 1.0  # PX4 answers so to requests out of order
+        elif self.state is DownloadState.FETCHING and result in _OUT_OF_ORDER:
+            self._check_list(now_s)
+
+    def _check_list(self, now_s: float) -> None:
+        """Find out what an error meant: a shorter list, an answer to items pushed before, or a vehicle that wants requests in order."""
+        if now_s < self._checked_s + _ASK_AGAIN_S:
+            return
+        self._checked_s = now_s
+        self._checks += 1
+        if self._checks >= _REFUSALS_BELIEVED and self._most_in_flight > 1:
+            self._most_in_flight, self._window = 1, 1.0  # PX4 serves requests in order only
             self._forget_items()
             self._move(DownloadEvent.LIST_CHANGED)
-            self._ask_count(now_s)
+        self._ask_count(now_s)
 
     def _fill_window(self, now_s: float) -> None:
         while self._next < self._count and len(self._in_flight) < int(self._window):

@@ -31,6 +31,7 @@ _ANNOUNCE_AGAIN_S = 1.0
 _ECHO_S = 0.25  # a request repeated sooner than this is the same frame arriving twice
 _ASKED_AGAIN_S = 0.9  # ArduPilot asks again after 1 s
 _PROBE_AFTER_S = 2.0  # it would have asked again by now
+_PROBE_END_AFTER_S = 1.2
 _LEAST_SETTLE_S = 0.03
 _MOST_SETTLE_S = 1.0
 
@@ -76,6 +77,8 @@ class Upload(TableMachine[UploadState, UploadEvent]):
         Most items ahead of the requests; 1 serves the vehicle one by one.
     rival_patience_s : float
         How long another ground station may keep the list busy.
+    round_trip : RoundTrip, optional
+        What is known of the link from transfers before.
     """
 
     def __init__(
@@ -86,6 +89,7 @@ class Upload(TableMachine[UploadState, UploadEvent]):
         *,
         window: int = WINDOW,
         rival_patience_s: float = RIVAL_PATIENCE_S,
+        round_trip: RoundTrip | None = None,
     ) -> None:
         super().__init__(UPLOAD, UploadState.IDLE)
         self._peer = peer
@@ -94,8 +98,10 @@ class Upload(TableMachine[UploadState, UploadEvent]):
         self._most_ahead = window
         self._window = float(min(window, FIRST_WINDOW))
         self._threshold = float(window)
+        self._is_recovering = False
+        self._run_from = 0
         self._rival_patience_s = rival_patience_s
-        self._round_trip = RoundTrip()
+        self._round_trip = round_trip or RoundTrip()
         self._wanted = -1  # the item the vehicle asked for last
         self._next = 0  # the item to push next
         self._most_sent = 0
@@ -190,7 +196,7 @@ class Upload(TableMachine[UploadState, UploadEvent]):
         return self._rival_since_s is not None and now_s >= self._rival_since_s + self._rival_patience_s
 
     def _announce(self, now_s: float) -> None:
-        self._act_at_s = now_s + _ANNOUNCE_AGAIN_S
+        self._act_at_s = now_s + self._round_trip.timeout_s(_ANNOUNCE_AGAIN_S, 2 * _ANNOUNCE_AGAIN_S)
         self._send(
             messages.MissionCount(
                 self._peer.system, self._peer.component, len(self._messages), int(self._mission_type)
@@ -199,7 +205,7 @@ class Upload(TableMachine[UploadState, UploadEvent]):
 
     def _probe(self, now_s: float) -> None:
         """Ask for the list: a vehicle that still takes items denies it, one that does not gives its count."""
-        self._act_at_s = now_s + _PROBE_AFTER_S
+        self._act_at_s = now_s + self._probe_after_s()
         self._send(
             messages.MissionRequestList(self._peer.system, self._peer.component, int(self._mission_type))
         )
@@ -208,7 +214,6 @@ class Upload(TableMachine[UploadState, UploadEvent]):
         if not 0 <= seq < len(self._messages) or not self._move(UploadEvent.REQUEST):
             return
         self._heard_s = now_s
-        self._act_at_s = now_s + _PROBE_AFTER_S
         self._rival_since_s = None
         if seq > self._wanted:
             self._keep_up(seq, now_s)
@@ -218,6 +223,12 @@ class Upload(TableMachine[UploadState, UploadEvent]):
             self._narrow_window()
             self._push_item(seq, now_s)
         self._push(now_s)
+        self._act_at_s = now_s + self._probe_after_s()
+
+    def _probe_after_s(self) -> float:
+        """Give the silence that is worth a question: sooner when only the final word is missing."""
+        at_end = self._wanted == len(self._messages) - 1
+        return max(_PROBE_END_AFTER_S, 2 * self._round_trip.mean_s) if at_end else _PROBE_AFTER_S
 
     def _keep_up(self, seq: int, now_s: float) -> None:
         """Follow the vehicle to a later item."""
@@ -225,8 +236,12 @@ class Upload(TableMachine[UploadState, UploadEvent]):
         if before in self._sent_s and before not in self._repeated:
             self._round_trip.observe(now_s - self._sent_s[before])
         steps = seq - self._wanted
-        self._window += steps if self._window < self._threshold else steps / self._window
+        if self._window < self._threshold:
+            self._window = self._threshold if self._is_recovering else self._window + steps
+        else:
+            self._window += steps / self._window
         self._window = min(self._window, self._most_ahead)
+        self._is_recovering = False
         self._wanted = seq
         self._gap_at_s = None
         if seq < self._next and now_s - self._sent_s.get(seq, now_s) >= _ASKED_AGAIN_S:
@@ -248,8 +263,12 @@ class Upload(TableMachine[UploadState, UploadEvent]):
         self._send(self._messages[seq])
 
     def _narrow_window(self) -> None:
-        self._threshold = max(self._window / 2, 2.0)
+        if not self._is_recovering:
+            run = self._wanted - self._run_from  # what got through at a stretch is what the link bears
+            self._threshold = max(self._window / 2, min(run, self._most_ahead), 1.0)
+            self._run_from = self._wanted
         self._window = 1.0
+        self._is_recovering = True
 
     def _take_ack(self, result_number: int, now_s: float) -> None:
         result = mission_result(result_number)

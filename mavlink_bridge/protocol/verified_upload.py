@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from mavlink_bridge.messages import Heartbeat, MissionResult, ModeFlag, Statustext
 from mavlink_bridge.protocol.download import RIVAL_PATIENCE_S, Download, DownloadOutcome
 from mavlink_bridge.protocol.limits import Limits
+from mavlink_bridge.protocol.round_trip import RoundTrip
 from mavlink_bridge.protocol.stored_form import Difference, differences, is_unfinished_write
 from mavlink_bridge.protocol.table_machine import TableMachine
 from mavlink_bridge.protocol.transitions import (
@@ -149,6 +150,7 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         self._replace_active = replace_active
         self._window = window
         self._rival_patience_s = rival_patience_s
+        self._round_trip = RoundTrip()
         self._download: Download | None = None
         self._upload: Upload | None = None
         self._old: tuple[MissionItem, ...] | None = None
@@ -156,6 +158,7 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         self._is_coarse = False
         self._read_before: tuple[MissionItem, ...] | None = None
         self._pushed: UploadOutcome | None = None
+        self._pushed_before: UploadOutcome | None = None
         self._refusal: UploadOutcome | None = None
         self._was_heeded = False
         self._pushes = 0
@@ -290,14 +293,24 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
             self._take_push(pushed, now_s)
 
     def _start_reading(self, now_s: float) -> None:
-        self._download = Download(self._peer, self._mission_type, rival_patience_s=self._rival_patience_s)
+        self._download = Download(
+            self._peer,
+            self._mission_type,
+            rival_patience_s=self._rival_patience_s,
+            round_trip=self._round_trip,
+        )
         self._download.start(now_s)
         self._advance(now_s)
 
     def _start_pushing(self, items: tuple[MissionItem, ...], window: int, now_s: float) -> None:
         self._read_before = None
         self._upload = Upload(
-            self._peer, self._mission_type, items, window=window, rival_patience_s=self._rival_patience_s
+            self._peer,
+            self._mission_type,
+            items,
+            window=window,
+            rival_patience_s=self._rival_patience_s,
+            round_trip=self._round_trip,
         )
         self._upload.start(now_s)
         self._advance(now_s)
@@ -317,9 +330,7 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         self._start_pushing(self._wanted, window, now_s)
 
     def _take_push(self, pushed: UploadOutcome, now_s: float) -> None:
-        self._pushed = pushed
-        if self.state is VerifiedUploadState.PUSHING and pushed.state is UploadState.REFUSED:
-            self._refusal = pushed
+        self._pushed_before, self._pushed = self._pushed, pushed
         if self._move(VerifiedUploadEvent.PUSH_ENDED):
             self._start_reading(now_s)
 
@@ -434,6 +445,10 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
 
     def _never_wrote(self) -> bool:
         return self._pushed_to_busy() and not self._was_heeded
+
+
+def _is_same_refusal(a: UploadOutcome, b: UploadOutcome | None) -> bool:
+    return b is not None and (a.state, a.result, a.item) == (b.state, b.result, b.item)
 
 
 def _is_armed_in_auto(heartbeat: Heartbeat) -> bool:

@@ -14,6 +14,7 @@ from missions.errors import NoRouteError, RouteError, StartBlockedError, TargetB
 from missions.fence import ZoneKind
 from missions.geo import bearing_deg, distance_m
 from missions.local_frame import LocalPoint
+from missions.narrow import narrowest_place
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -233,14 +234,23 @@ class _Search:
         return min(parts, key=lambda part: float(part.distance(Point(point))))
 
     def _no_route(self, start: LocalPoint, goal: LocalPoint) -> RouteError:
-        """Name the fences that part start and target: those along the edge of the smaller of their two areas."""
+        """Say how wide a route there is, or which fences part start and target: those along the edge of the smaller area."""
+        place = narrowest_place(self.ground, start, goal, self.should_stop)
+        if place is not None:
+            return NoRouteError(
+                f"no route keeps {self.clearance_m:.2f} m; {place}",
+                clearance_m=round(self.clearance_m, 3),
+                widest_m=round(place.clearance_m, 3),
+                fences=list(place.between),
+                narrowest_at=list(place.at) if place.at else None,
+            )
         areas = {"start": self._component(start), "target": self._component(goal)}
         walled = min(areas, key=lambda end: areas[end].area)
         outline = areas[walled].exterior
         reach_m = self.clearance_m * 1.01 + 2 * _INSIDE_M + 0.01
         names = [b.name for b in self.ground.barriers if self.ground.distance_m(b, outline) <= reach_m]
         return NoRouteError(
-            f"no route keeps {self.clearance_m:.2f} m: the {walled} is walled in by {_names(names)}",
+            f"no route exists, at any clearance: the {walled} is walled in by {_names(names)}",
             clearance_m=round(self.clearance_m, 3),
             walled_in=walled,
             fences=names,

@@ -8,7 +8,7 @@ PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; 
 BIN := .venv/bin
 OUT ?= demo-out
 
-.PHONY: demo test lint format types walls check docs lock clean
+.PHONY: demo test lint format types walls check lock clean
 
 demo: .venv/run.stamp
 	$(BIN)/pbpp demo --out $(OUT)
@@ -44,6 +44,13 @@ walls: .venv/dev.stamp
 	$(BIN)/lint-imports
 
 check: lint types walls test
+
+lock: .venv/run.stamp
+	$(BIN)/python -m pip install --quiet uv
+	$(BIN)/uv pip compile pyproject.toml requirements/build.in --extra plot --universal --python-version 3.11 \
+		--generate-hashes --no-header --quiet -o requirements/run.lock
+	$(BIN)/uv pip compile pyproject.toml requirements/build.in --extra plot --extra test --extra docs --extra dev --universal \
+		--python-version 3.11 --generate-hashes --no-header --quiet -c requirements/run.lock -o requirements/dev.lock
 
 clean:
 	rm -rf .venv demo-out dist build .coverage* .hypothesis .mypy_cache .ruff_cache .pytest_cache

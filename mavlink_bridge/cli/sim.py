@@ -1,5 +1,106 @@
-"""Placeholder."""
+"""``pbpp sim``: the embedded rover on a link of its own."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from mavlink_bridge.simulator.config import SimulatorConfig
+    from missions.geo import LatLon
 
 
-def sim() -> None:
-    """X."""
+def sim(
+    listen: Annotated[
+        str,
+        typer.Option(
+            metavar="CONNECTION", help="tcpin:, udpin: or udpout:HOST:PORT; port 0 is any free one."
+        ),
+    ] = "tcpin:127.0.0.1:5760",
+    home: Annotated[
+        str, typer.Option(metavar="LAT,LON[,HEADING]", help="Where the rover stands and looks at first.")
+    ] = "40.071374,-105.229930,0",
+    fence: Annotated[Path | None, typer.Option(help="Fence file stored in the rover.")] = None,
+    mission: Annotated[
+        Path | None,
+        typer.Option(help="Mission file stored in the rover; its home, if it has one, is not used."),
+    ] = None,
+    param: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=VALUE", help="A parameter that differs; repeatable.")
+    ] = None,
+    speedup: Annotated[
+        float, typer.Option(min=0.01, max=1000, help="How many times faster than real.")
+    ] = 1.0,
+    loss: Annotated[float, typer.Option(min=0, max=1, help="Share of frames lost, each way.")] = 0.0,
+    duplicate: Annotated[float, typer.Option(min=0, max=1, help="Share of frames that come twice.")] = 0.0,
+    latency: Annotated[float, typer.Option(min=0, help="Seconds each frame is late, each way.")] = 0.0,
+    jitter: Annotated[float, typer.Option(min=0, help="Up to so many seconds more, at random.")] = 0.0,
+    seed: Annotated[int, typer.Option(help="Seed of the link's faults.")] = 0,
+    system: Annotated[int, typer.Option(min=1, max=255, help="MAVLink system id.")] = 1,
+) -> None:
+    """Run a simulated rover until Ctrl-C.
+
+    It answers MAVLink 2 as ArduPilot Rover does: missions, fences, rally points, parameters, modes, arming; it drives AUTO and GUIDED.
+    Prints the connection string to open as soon as it listens.
+    """
+    import signal  # noqa: PLC0415 - with the other imports below: a usage error need not wait for them
+    import threading  # noqa: PLC0415
+
+    from mavlink_bridge.simulator.faults import Faults  # noqa: PLC0415
+    from mavlink_bridge.simulator.shell import Simulator  # noqa: PLC0415
+
+    config = _config(home, fence, mission, param or [], system)
+    faults = Faults(loss=loss, duplicate=duplicate, latency_s=latency, jitter_s=jitter)
+    stop = threading.Event()
+    with Simulator(config, listen, faults, speedup, seed) as simulator:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, lambda *_: stop.set())
+        typer.echo(simulator.connection)
+        while not stop.wait(0.5) and simulator.is_running:
+            pass
+
+
+def _config(
+    home: str, fence: Path | None, mission: Path | None, params: list[str], system: int
+) -> SimulatorConfig:
+    from mavlink_bridge.simulator.config import SimulatorConfig  # noqa: PLC0415
+    from missions.fence import fence_to_items  # noqa: PLC0415
+    from missions.formats import read_fence, read_mission  # noqa: PLC0415
+
+    position, heading_deg = _parse_home(home)
+    return SimulatorConfig(
+        system=system,
+        home=position,
+        heading_deg=heading_deg,
+        fence=fence_to_items(read_fence(fence)) if fence else (),
+        mission=tuple(read_mission(mission).items) if mission else (),
+        parameters=dict(_parse_parameter(text) for text in params),
+    )
+
+
+def _parse_home(text: str) -> tuple[LatLon, float]:
+    from missions.geo import parse_lat_lon  # noqa: PLC0415
+
+    lat, _, rest = text.partition(",")
+    lon, _, heading = rest.partition(",")
+    try:
+        heading_deg = float(heading or 0.0)
+    except ValueError:
+        raise typer.BadParameter(f"{heading!r} is not a heading in degrees", param_hint="--home") from None
+    if not -360.0 <= heading_deg <= 360.0:
+        raise typer.BadParameter(f"heading {heading_deg:g}° is beyond ±360°", param_hint="--home")
+    return parse_lat_lon(f"{lat},{lon}"), heading_deg
+
+
+def _parse_parameter(text: str) -> tuple[str, float]:
+    name, equals, value = text.partition("=")
+    try:
+        number = float(value)
+    except ValueError:
+        number = math.nan
+    if not equals or not math.isfinite(number):
+        raise typer.BadParameter(f"{text!r} is not NAME=VALUE", param_hint="--param")
+    return name.strip().upper(), number

@@ -1,1 +1,6 @@
-"""Placeholder."""
+"""The embedded rover: a simulated ArduRover behind a MAVLink 2 link."""
+
+from mavlink_bridge.simulator.config import SimulatorConfig
+from mavlink_bridge.simulator.vehicle import SimulatedVehicle
+
+__all__ = ["SimulatedVehicle", "SimulatorConfig"]

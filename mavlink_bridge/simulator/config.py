@@ -1,0 +1,64 @@
+"""What a simulated rover starts with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import TYPE_CHECKING
+
+from missions.geo import LatLon
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from missions.items import MissionItem
+
+
+class Mode(IntEnum):
+    """The modes of ArduRover that the simulated rover knows."""
+
+    MANUAL = 0
+    HOLD = 4
+    LOITER = 5
+    AUTO = 10
+    RTL = 11
+    GUIDED = 15
+    INITIALISING = 16
+
+
+DEFAULT_HOME = LatLon(40.071374, -105.229930)
+"""Where the rover stands unless told otherwise: the home of the recorded logs."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimulatorConfig:
+    """What a simulated rover starts with.
+
+    Parameters
+    ----------
+    system, component : int
+        Its MAVLink identity.
+    home : LatLon
+        Where it stands at first.
+    heading_deg : float
+        Where it looks at first, clockwise from north.
+    mission, fence, rally : tuple of MissionItem
+        What is stored in it; the mission without the home item.
+    parameters : mapping of str to float
+        Parameters that differ from ArduRover's defaults.
+    ready_after_s : float
+        When after boot it can be armed (35 s on the measured autopilot).
+    streams : bool
+        Whether telemetry flows unasked; without it only HEARTBEAT does.
+    """
+
+    system: int = 1
+    component: int = 1
+    home: LatLon = DEFAULT_HOME
+    heading_deg: float = 0.0
+    mission: tuple[MissionItem, ...] = ()
+    fence: tuple[MissionItem, ...] = ()
+    rally: tuple[MissionItem, ...] = ()
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    ready_after_s: float = 0.0
+    streams: bool = True

@@ -1,0 +1,116 @@
+"""The fence as the rover sees it: where forbidden ground begins, and how far ahead it lies."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Protocol
+
+import shapely
+from shapely.geometry import LineString, Point, Polygon, box
+
+from missions.fence import CircleZone, Fence, Zone, ZoneKind, fence_from_items
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from shapely.geometry.base import BaseGeometry
+
+    from missions.geo import LatLon
+    from missions.items import MissionItem
+
+_FAR_M = 1e6
+_CIRCLE_SEGMENTS = 64
+
+
+class Plane(Protocol):
+    """A flat frame."""
+
+    def to_flat(self, position: LatLon) -> complex:
+        """Give a position in metres, north + east·j."""
+        ...
+
+
+class FenceArea:
+    """The ground a fence forbids, in a flat frame.
+
+    Parameters
+    ----------
+    items : sequence of MissionItem
+        The fence as the vehicle holds it.
+    plane : Plane
+        The frame; points below are in it.
+    union : bool
+        Whether one inclusion is enough (FENCE_OPTIONS value 2); otherwise all must hold.
+    home_circle : tuple of complex and float, optional
+        Centre and radius of the circle round home that must not be left.
+    """
+
+    def __init__(
+        self,
+        items: Sequence[MissionItem],
+        plane: Plane,
+        *,
+        union: bool = False,
+        home_circle: tuple[complex, float] | None = None,
+    ) -> None:
+        fence = fence_from_items([_bounded(item) for item in items])
+        self._forbidden = _forbidden(fence, plane, union=union, home_circle=home_circle)
+        self._edge = self._forbidden.boundary
+        shapely.prepare(self._forbidden)
+        shapely.prepare(self._edge)
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing is forbidden."""
+        return bool(self._forbidden.is_empty)
+
+    def clearance_m(self, point_m: complex) -> float:
+        """Give the distance to forbidden ground; inside it, the distance to its edge with a minus; infinite without a fence."""
+        if self.is_empty:
+            return math.inf
+        point = Point(point_m.real, point_m.imag)
+        distance_m = float(shapely.distance(self._edge, point))
+        return -distance_m if self._forbidden.contains(point) else distance_m
+
+    def ahead_m(self, point_m: complex, direction: complex, reach_m: float) -> float:
+        """Give how far the first edge lies in a direction; infinite if beyond ``reach_m``."""
+        end_m = point_m + direction * reach_m
+        ray = LineString([(point_m.real, point_m.imag), (end_m.real, end_m.imag)])
+        if not self._edge.intersects(ray):
+            return math.inf
+        crossing = shapely.intersection(self._edge, ray)
+        return float(shapely.distance(crossing, Point(point_m.real, point_m.imag)))
+
+
+def _bounded(item: MissionItem) -> MissionItem:
+    # ArduPilot takes an infinite circle; shapely does not.
+    return replace(item, params=(min(item.params[0], _FAR_M), *item.params[1:]))
+
+
+def _forbidden(
+    fence: Fence, plane: Plane, *, union: bool, home_circle: tuple[complex, float] | None
+) -> BaseGeometry:
+    exclusions: list[BaseGeometry] = []
+    inclusions: list[BaseGeometry] = []
+    for zone in fence.zones:
+        shape = _shape(zone, plane)
+        (inclusions if zone.kind is ZoneKind.INCLUSION else exclusions).append(shape)
+    allowed: list[BaseGeometry] = []
+    if inclusions:
+        allowed = [shapely.union_all(inclusions)] if union else inclusions
+    if home_circle is not None:
+        centre_m, radius_m = home_circle
+        allowed = [*allowed, Point(centre_m.real, centre_m.imag).buffer(radius_m, _CIRCLE_SEGMENTS)]
+    everywhere = box(-_FAR_M, -_FAR_M, _FAR_M, _FAR_M)
+    outside = [everywhere.difference(area) for area in allowed]
+    return shapely.union_all([*outside, *exclusions])
+
+
+def _shape(zone: Zone, plane: Plane) -> BaseGeometry:
+    if isinstance(zone, CircleZone):
+        centre_m = plane.to_flat(zone.centre)
+        return Point(centre_m.real, centre_m.imag).buffer(zone.radius_m, _CIRCLE_SEGMENTS)
+    points_m = [plane.to_flat(vertex) for vertex in zone.vertices]
+    # make_valid on the ring's lines is the even-odd rule, by which ArduPilot tests self-crossing polygons.
+    return shapely.make_valid(Polygon([(point_m.real, point_m.imag) for point_m in points_m]))

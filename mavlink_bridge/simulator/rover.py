@@ -1,0 +1,276 @@
+"""The rover without its link: modes, arming, fence and driving, 50 times a second."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from mavlink_bridge.simulator.body import Body
+from mavlink_bridge.simulator.config import Mode
+from mavlink_bridge.simulator.controllers import Settings, sqrt_controlled
+from mavlink_bridge.simulator.drive import Drive
+from mavlink_bridge.simulator.fence_watch import FenceArea
+from mavlink_bridge.simulator.flat import FlatFrame, TrueFrame
+from mavlink_bridge.simulator.route import Route
+from missions.geo import from_e7, to_e7
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from mavlink_bridge.simulator.parameters import ParameterStore
+    from missions.geo import LatLon
+    from missions.items import MissionItem
+
+TICK_S = 0.02
+"""The main loop's period (SCHED_LOOP_RATE 50)."""
+
+GIVE_UP_M = 100.0
+"""Further outside a fence than this the rover stops instead of driving home."""
+
+_CIRCLE, _POLYGON = 2, 4
+_UNION = 2
+_AVOID_FENCE = 1
+_DRIVING = (Mode.AUTO, Mode.GUIDED, Mode.RTL)
+
+
+class Rover:
+    """Modes, arming, fence and driving.
+
+    Parameters
+    ----------
+    parameters : ParameterStore
+        Read on every change.
+    home : LatLon
+        Where it stands.
+    heading_deg : float
+        Where it looks, clockwise from north.
+    mission, fence : callable
+        Give the lists as they are stored.
+
+    Attributes
+    ----------
+    texts : list of tuple of int and str
+        What it says: severity and text; the caller empties it.
+    reached : list of int
+        The numbers of items reached; the caller empties it.
+    least_clearance_m : float
+        The least distance of the true track to any fence, in true metres; negative on forbidden ground, infinite without fence.
+    breaches : int
+        How often the vehicle saw itself leave allowed ground with the fence enabled.
+    """
+
+    def __init__(
+        self,
+        parameters: ParameterStore,
+        home: LatLon,
+        heading_deg: float,
+        mission: Callable[[], Sequence[MissionItem]],
+        fence: Callable[[], Sequence[MissionItem]],
+    ) -> None:
+        self.parameters = parameters
+        self.home = from_e7(*to_e7(home))
+        self.frame = FlatFrame(self.home)
+        self._true_frame = TrueFrame(self.home)
+        self._fence = fence
+        self._mission = mission
+        self.mode = Mode.INITIALISING
+        self.is_armed = False
+        self.texts: list[tuple[int, str]] = []
+        self.reached: list[int] = []
+        self.least_clearance_m = math.inf
+        self.breaches = 0
+        self.breached = False
+        self.breach_time_s = 0.0
+        settings = Settings.from_parameters(parameters)
+        self.body = Body(0j, math.radians(heading_deg), settings.is_skid)
+        self.drive = Drive(settings, self.body)
+        self.route = Route(mission, self.drive, self.frame)
+        self._current_before_auto = False
+        self.renew_fence()
+
+    @property
+    def position(self) -> LatLon:
+        """Where it is."""
+        return self.frame.to_lat_lon(self.body.position_m)
+
+    @property
+    def heading_deg(self) -> float:
+        """Where it looks, 0 to 360 clockwise from north."""
+        return math.degrees(self.body.heading_rad) % 360.0
+
+    @property
+    def destination(self) -> LatLon | None:
+        """Where it drives, None while it stops."""
+        point_m = self.drive.destination_m
+        return None if point_m is None else self.frame.to_lat_lon(point_m)
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether a tick would change nothing."""
+        if not self.is_armed:
+            return abs(self.body.speed_mps) < 1e-3
+        return self.drive.is_still and (self.mode not in _DRIVING or self._rests())
+
+    @property
+    def is_running_mission(self) -> bool:
+        """Whether it is armed in AUTO."""
+        return self.is_armed and self.mode == Mode.AUTO
+
+    def reboot(self) -> None:
+        """Begin anew where it stands; home is there now."""
+        position, heading_deg = self.position, self.heading_deg
+        least_clearance_m, breaches = self.least_clearance_m, self.breaches
+        self.__init__(self.parameters, position, heading_deg, self._mission, self._fence)  # type: ignore[misc]
+        self.least_clearance_m = min(least_clearance_m, self.least_clearance_m)
+        self.breaches = breaches
+
+    def renew_settings(self) -> None:
+        """Take changed parameters."""
+        settings = Settings.from_parameters(self.parameters)
+        self.body.is_skid = settings.is_skid
+        self.drive.change_settings(settings)
+        self.renew_fence()
+
+    def renew_fence(self) -> None:
+        """Take a changed fence."""
+        parameters = self.parameters
+        self._enforced = int(parameters["FENCE_TYPE"]) if parameters["FENCE_ENABLE"] else 0
+        union = parameters.flag("FENCE_OPTIONS", _UNION)
+        circle = (0j, parameters["FENCE_RADIUS"]) if self._enforced & _CIRCLE else None
+        items = self._fence()
+        own = items if self._enforced & _POLYGON else ()
+        self._area = FenceArea(own, self.frame, union=union, home_circle=circle)
+        self._true_area = FenceArea(items, self._true_frame, union=union, home_circle=circle)
+        self._measure_clearance()
+
+    def set_mode(self, number: int, now_s: float) -> bool:
+        """Change the mode; tell whether that was possible."""
+        try:
+            mode = Mode(number)
+        except ValueError:
+            return False
+        if mode == Mode.INITIALISING:
+            return False
+        if mode == self.mode:
+            return True
+        if mode == Mode.AUTO and self.route.is_empty:
+            self.texts.append((3, "No Mission. Can't set AUTO."))
+            return False
+        self.mode = mode
+        self.drive.stop()
+        if mode == Mode.AUTO:
+            if self._current_before_auto:
+                self.texts.append((2, "Internal Errors 0x20000000"))
+            self.route.start(now_s)
+        elif mode == Mode.RTL:
+            self.drive.go_to(self.frame.to_flat(self.home), None)
+        self._current_before_auto = False
+        self._pass_on()
+        return True
+
+    def set_current_item(self, seq: int, *, restart: bool, now_s: float) -> bool:
+        """Go to a mission item; tell whether there is one."""
+        if restart:
+            self.route.restart()
+        driving = self.mode == Mode.AUTO
+        known = self.route.set_current(seq, now_s=now_s, driving=driving)
+        self._current_before_auto = known and self.mode == Mode.HOLD
+        self._pass_on()
+        return known
+
+    def arm(self) -> None:
+        """Let the motors run."""
+        if not self.is_armed:
+            self.is_armed = True
+            self.drive.motors_off()
+            self.texts.append((6, "Throttle armed"))
+
+    def disarm(self) -> None:
+        """Let the motors stop."""
+        if self.is_armed:
+            self.is_armed = False
+            self.texts.append((6, "Throttle disarmed"))
+
+    def go_to(self, target: LatLon) -> bool:
+        """Drive to a place; only GUIDED does."""
+        if self.mode != Mode.GUIDED:
+            return False
+        self.drive.stop()
+        self.drive.go_to(self.frame.to_flat(target), None)
+        return True
+
+    def step(self, now_s: float) -> None:
+        """Let one tick pass."""
+        if self.is_armed:
+            self._follow(now_s)
+            self.drive.step(TICK_S, self._keep_off if self._is_avoiding() else None)
+        else:
+            self.drive.coast(TICK_S)
+        self._measure_clearance()
+        self._check_fence(now_s)
+
+    def _follow(self, now_s: float) -> None:
+        if self.mode == Mode.AUTO:
+            self.route.step(now_s)
+            self._pass_on()
+        elif self.mode in _DRIVING and self.drive.has_arrived:
+            self.drive.stop()
+            if self.mode == Mode.GUIDED:
+                self.reached.append(0)
+
+    def _rests(self) -> bool:
+        return self.mode != Mode.AUTO or self.route.is_complete
+
+    def _pass_on(self) -> None:
+        self.texts += [(6, text) for text in self.route.texts]
+        self.reached += self.route.reached
+        self.route.texts.clear()
+        self.route.reached.clear()
+
+    def _is_avoiding(self) -> bool:
+        return self.parameters.flag("AVOID_ENABLE", _AVOID_FENCE) and not self._area.is_empty
+
+    def _keep_off(self, velocity_mps: complex) -> complex:
+        """Slow down before a fence so as to stand FENCE_MARGIN short of it (AC_Avoid, behaviour "stop")."""
+        speed_mps = abs(velocity_mps)
+        if not speed_mps:
+            return velocity_mps
+        margin_m = self.parameters["FENCE_MARGIN"]
+        p = self.parameters["PSC_POS_P"]
+        accel = min(self.parameters["ATC_ACCEL_MAX"] or 1.0, self.parameters["AVOID_ACCEL_MAX"])
+        linear_mps = accel / p
+        stopping_m = speed_mps / p
+        if speed_mps > linear_mps:
+            stopping_m = accel / (2 * p * p) + speed_mps * speed_mps / (2 * accel)
+        direction = velocity_mps / speed_mps
+        ahead_m = self._area.ahead_m(self.body.position_m, direction, 2.0 + margin_m + stopping_m)
+        if ahead_m <= margin_m:
+            return 0j
+        if math.isinf(ahead_m):
+            return velocity_mps
+        return min(speed_mps, abs(sqrt_controlled(complex(ahead_m - margin_m), p, accel))) * direction
+
+    def _measure_clearance(self) -> None:
+        clearance_m = self._true_area.clearance_m(self._true_frame.to_flat(self.position))
+        self.least_clearance_m = min(self.least_clearance_m, clearance_m)
+
+    def _check_fence(self, now_s: float) -> None:
+        if self._area.is_empty:
+            self.breached = False
+            return
+        clearance_m = self._area.clearance_m(self.body.position_m)
+        was_breached, self.breached = self.breached, clearance_m < 0
+        if was_breached and not self.breached:
+            self.texts.append((6, "Fence breach cleared"))
+        if not self.breached or was_breached:
+            return
+        self.breaches += 1
+        self.breach_time_s = now_s
+        if not self.is_armed:
+            return
+        self.texts.append((2, "Fence breached"))
+        action = int(self.parameters["FENCE_ACTION"])
+        if action == 0:
+            return
+        home_wanted = action in (1, 3) and -clearance_m < GIVE_UP_M
+        self.set_mode(Mode.RTL if home_wanted else Mode.HOLD, now_s)

@@ -1,0 +1,191 @@
+"""What the rover tells about itself, message by message."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from mavlink_bridge import messages as m
+from mavlink_bridge.simulator import streams
+from mavlink_bridge.simulator.config import Mode
+from missions.geo import to_e7
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from mavlink_bridge.simulator.rover import Rover
+
+_SENSORS = 322_011_183
+_SENSORS_PRESENT = 322_034_735
+_FENCE_SENSOR = 1 << 20
+_GPS_SENSOR = 1 << 5
+_PREARM_OK = 1 << 28
+_EKF_GOOD, _EKF_UNINITIALISED = 831, 1024
+_POSITION_ONLY = 65_016
+_CAPABILITIES = (
+    m.Capability.MISSION_FLOAT
+    | m.Capability.PARAM_FLOAT
+    | m.Capability.MISSION_INT
+    | m.Capability.COMMAND_INT
+    | m.Capability.SET_POSITION_TARGET_GLOBAL_INT
+    | m.Capability.MAVLINK2
+    | m.Capability.MISSION_FENCE
+    | m.Capability.MISSION_RALLY
+)
+_VERSION_4_7_0_DEV = 4 << 24 | 7 << 16
+_STANDBY, _ACTIVE, _CALIBRATING = 3, 4, 2
+_NO_MISSION, _NOT_STARTED, _ACTIVE_MISSION, _PAUSED, _COMPLETE = 1, 2, 3, 4, 5
+_BOUNDARY = 3
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """What telemetry is about: the rover, the items in its mission (home included), its time since boot, whether it has a position."""
+
+    rover: Rover
+    mission_count: int
+    boot_s: float
+    is_ready: bool
+
+
+def telemetry(message_id: int, state: State) -> m.Message | None:
+    """Give a message by its id, None where there is nothing to tell."""
+    build = _BUILDERS.get(message_id)
+    return build(state) if build else None
+
+
+def _heartbeat(state: State) -> m.Message:
+    base_mode = m.ModeFlag.CUSTOM_MODE_ENABLED
+    if state.rover.mode in (Mode.MANUAL, Mode.INITIALISING):
+        base_mode |= 64
+    elif state.rover.mode != Mode.HOLD:
+        base_mode |= 8
+    if state.rover.is_armed:
+        base_mode |= m.ModeFlag.SAFETY_ARMED
+    status = {Mode.HOLD: _STANDBY, Mode.INITIALISING: _CALIBRATING}.get(state.rover.mode, _ACTIVE)
+    return m.Heartbeat(
+        m.MavType.GROUND_ROVER, m.Autopilot.ARDUPILOTMEGA, int(base_mode), state.rover.mode, status
+    )
+
+
+def _sys_status(state: State) -> m.Message:
+    enabled = _SENSORS if state.rover.parameters["FENCE_ENABLE"] else _SENSORS & ~_FENCE_SENSOR
+    health = _SENSORS | (_PREARM_OK if state.is_ready else 0)
+    if not state.is_ready:
+        health &= ~(_PREARM_OK | _GPS_SENSOR)
+    if state.rover.breached:
+        health &= ~_FENCE_SENSOR
+    return m.SysStatus(_SENSORS_PRESENT, enabled, health)
+
+
+def _global_position(state: State) -> m.Message:
+    lat_e7, lon_e7 = to_e7(state.rover.position) if state.is_ready else (0, 0)
+    velocity_mps = state.rover.body.velocity_mps
+    return m.GlobalPositionInt(
+        _boot_ms(state.boot_s),
+        lat_e7,
+        lon_e7,
+        vx=round(velocity_mps.real * 100),
+        vy=round(velocity_mps.imag * 100),
+        hdg=round(state.rover.heading_deg * 100) % 36_000,
+    )
+
+
+def _gps_raw(state: State) -> m.Message:
+    time_usec = round(state.boot_s * 1e6)
+    if not state.is_ready:
+        return m.GpsRawInt(time_usec, 0, 0, 0, 0, satellites_visible=0)
+    return m.GpsRawInt(
+        time_usec, 6, *to_e7(state.rover.position), 0, eph=121, satellites_visible=10, h_acc=300
+    )
+
+
+def _mission_current(state: State) -> m.Message:
+    if state.mission_count <= 1:
+        progress = _NO_MISSION
+    elif state.rover.route.is_complete:
+        progress = _COMPLETE
+    elif state.rover.route.seq == 0:
+        progress = _NOT_STARTED
+    else:
+        progress = _ACTIVE_MISSION if state.rover.mode == Mode.AUTO else _PAUSED
+    return m.MissionCurrent(
+        state.rover.route.seq, max(0, state.mission_count - 1), progress, int(state.rover.mode == Mode.AUTO)
+    )
+
+
+def _nav_controller(state: State) -> m.Message | None:
+    target_m = state.rover.drive.destination_m
+    if target_m is None:
+        return None
+    away_m = target_m - state.rover.body.position_m
+    bearing_deg = round(math.degrees(math.atan2(away_m.imag, away_m.real))) % 360
+    return m.NavControllerOutput(
+        0, bearing_deg, min(65_535, int(abs(away_m))), state.rover.drive.cross_track_m
+    )
+
+
+def _vfr_hud(state: State) -> m.Message:
+    speed_mps = abs(state.rover.body.speed_mps)
+    throttle = round(abs(state.rover.drive.throttle) * 100)
+    return m.VfrHud(
+        speed_mps, speed_mps, int(state.rover.heading_deg), throttle if state.rover.is_armed else 0
+    )
+
+
+def _position_target(state: State) -> m.Message | None:
+    target = state.rover.destination
+    if target is None:
+        return None
+    return m.PositionTargetGlobalInt(_boot_ms(state.boot_s), 0, _POSITION_ONLY, *to_e7(target), 0.0)
+
+
+def _fence_status(state: State) -> m.Message | None:
+    if not state.rover.parameters["FENCE_ENABLE"]:
+        return None
+    breached = state.rover.breached
+    return m.FenceStatus(
+        int(breached),
+        min(state.rover.breaches, 65_535),
+        _BOUNDARY if breached else 0,
+        _boot_ms(state.rover.breach_time_s),
+        1,
+    )
+
+
+def _simstate(state: State) -> m.Message:
+    return m.Simstate(state.rover.body.heading_rad, *to_e7(state.rover.position))
+
+
+def _ekf(state: State) -> m.Message:
+    return m.EkfStatusReport(_EKF_GOOD if state.is_ready else _EKF_UNINITIALISED)
+
+
+def _home(state: State) -> m.Message | None:
+    return m.HomePosition(*to_e7(state.rover.home)) if state.is_ready else None
+
+
+def _version(_state: State) -> m.Message:
+    return m.AutopilotVersion(int(_CAPABILITIES), _VERSION_4_7_0_DEV)
+
+
+def _boot_ms(boot_s: float) -> int:
+    return round(boot_s * 1000) % 2**32
+
+
+_BUILDERS: dict[int, Callable[[State], m.Message | None]] = {
+    streams.HEARTBEAT: _heartbeat,
+    streams.SYS_STATUS: _sys_status,
+    streams.GPS_RAW_INT: _gps_raw,
+    streams.GLOBAL_POSITION_INT: _global_position,
+    streams.MISSION_CURRENT: _mission_current,
+    streams.NAV_CONTROLLER_OUTPUT: _nav_controller,
+    streams.VFR_HUD: _vfr_hud,
+    streams.POSITION_TARGET_GLOBAL_INT: _position_target,
+    streams.AUTOPILOT_VERSION: _version,
+    streams.FENCE_STATUS: _fence_status,
+    streams.SIMSTATE: _simstate,
+    streams.EKF_STATUS_REPORT: _ekf,
+    streams.HOME_POSITION: _home,
+}

@@ -1,0 +1,8 @@
+"""How a rover really drives a list of waypoints: a band it stays in, and a time (docs/drive-model.md)."""
+
+from __future__ import annotations
+
+from missions.drive_model.build import corner_forecast, envelope
+from missions.drive_model.envelope import Corner, Envelope, Leg
+
+__all__ = ["Corner", "Envelope", "Leg", "corner_forecast", "envelope"]

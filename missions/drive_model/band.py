@@ -1,0 +1,170 @@
+"""The band itself: convex pieces about legs, blends and swings."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+
+from missions.drive_model import corner as at_corner
+from missions.drive_model.route import Stray
+from missions.vehicle import Autopilot
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from numpy.typing import NDArray
+
+    from missions.drive_model.route import Route, Vector
+
+BLEND_SAMPLES = 6
+NEGLIGIBLE_M = 0.03
+TAIL_TIMES_S = (2.0, 4.5, 8.0, 14.0)
+"""Where a leg's band is cut, in seconds since its corner; between them a tail is taken as straight, which is never too narrow."""
+
+
+class Pieces:
+    """Collects the corner points of convex pieces."""
+
+    def __init__(self) -> None:
+        self.vertices: list[Vector] = []
+        self.owners: list[int] = []
+        self.bands_m: list[float] = []
+        self.waypoints: list[int] = []
+
+    def add(self, vertices: Iterable[Vector], band_m: float, waypoint: int) -> None:
+        """Add the hull of some places, to be grown by a band."""
+        before = len(self.vertices)
+        self.vertices.extend(vertices)
+        self.owners.extend([len(self.bands_m)] * (len(self.vertices) - before))
+        self.bands_m.append(band_m)
+        self.waypoints.append(waypoint)
+
+    def cores(self) -> NDArray[np.object_]:
+        """Give all hulls."""
+        places = shapely.multipoints(np.asarray(self.vertices), indices=self.owners)
+        return np.asarray(shapely.convex_hull(places), dtype=np.object_)
+
+
+def _beside(place: Vector, direction: Vector, stray: Stray) -> list[Vector]:
+    """Give the place, or the two ends of the strip about it."""
+    if stray.widest_m < NEGLIGIBLE_M:
+        return [place]
+    (east_m, north_m), (ahead_east, ahead_north) = place, direction
+    return [
+        (east_m - ahead_north * stray.left_m, north_m + ahead_east * stray.left_m),
+        (east_m + ahead_north * stray.right_m, north_m - ahead_east * stray.right_m),
+    ]
+
+
+def _shifted(place: Vector, direction: Vector, along_m: float) -> Vector:
+    return (place[0] + direction[0] * along_m, place[1] + direction[1] * along_m)
+
+
+def add_start(pieces: Pieces, route: Route, array: NDArray[np.float64], behind_m: float) -> None:
+    """Add the place it starts from, with its swing to the side and behind it."""
+    place = (float(array[0, 0]), float(array[0, 1]))
+    if not route.legs:
+        pieces.add(
+            [(float(east_m), float(north_m)) for east_m, north_m in array], at_corner.BAND_AT_REST_M, 0
+        )
+        return
+    leg, stray = route.legs[0], route.strays[0]
+    back = _shifted(place, leg.direction, -behind_m)
+    pieces.add(
+        [place, *_beside(place, leg.direction, stray), *_beside(back, leg.direction, stray)], leg.band_m, 0
+    )
+
+
+def add_leg(pieces: Pieces, route: Route, number: int) -> None:
+    """Add a leg from one blend to the next, as wide as the tails of earlier swings make it."""
+    leg = route.legs[number]
+    begin_s, end_s = route.span_s(number)
+    times_s = [begin_s]
+    if route.stray_at(number, begin_s).widest_m >= NEGLIGIBLE_M:
+        times_s += [begin_s + time_s for time_s in TAIL_TIMES_S if begin_s + time_s < end_s]
+    times_s.append(end_s)
+    rungs = [_beside(leg.at(time_s), leg.direction, route.stray_at(number, time_s)) for time_s in times_s]
+    waypoint = waypoint_after(route, number)
+    for rung, following in itertools.pairwise(rungs):
+        pieces.add([*rung, *following], leg.band_m, waypoint)
+
+
+def waypoint_after(route: Route, leg: int) -> int:
+    """Give the number of the waypoint that a leg leads to."""
+    return route.corners[leg].waypoint if leg < len(route.corners) else route.legs[leg].first + 1
+
+
+def add_corner(pieces: Pieces, route: Route, number: int) -> None:
+    """Add the blend of two legs, and the area of a swing that does not follow it."""
+    corner, before, after = route.corners[number], route.legs[number], route.legs[number + 1]
+    band_m = max(before.band_m, after.band_m)
+    path = _blend_path(route, number)
+    left = route.stray_at(number, before.profile.duration_s - corner.blend.duration_s).widest_m
+    # The band about a blend is narrower on its inside: the same strip, moved outwards.
+    outwards_m = (band_m - min(band_m, at_corner.INSIDE_BAND_M)) / 2
+    side = Stray(outwards_m, -outwards_m) if corner.turn_deg >= 0 else Stray(-outwards_m, outwards_m)
+    strip = Stray(left + side.left_m, left + side.right_m)
+    rungs = [_beside(place, direction, strip) for place, direction in path]
+    for rung, following in itertools.pairwise(rungs):
+        pieces.add([*rung, *following], band_m - outwards_m, corner.waypoint)
+    if (
+        corner.swing_m >= NEGLIGIBLE_M
+        or corner.doubtful
+        or len(path) == 1
+        or route.vehicle.autopilot is Autopilot.PX4
+    ):
+        pieces.add(_swing_hull(route, number, path), band_m, corner.waypoint)
+
+
+def _blend_path(route: Route, number: int) -> list[tuple[Vector, Vector]]:
+    """Give places and directions along the blend of two legs; one place where the rover stops."""
+    corner, before, after = route.corners[number], route.legs[number], route.legs[number + 1]
+    duration_s = corner.blend.duration_s
+    if duration_s == 0:
+        return [(corner.places[0], before.direction)]
+    path = []
+    for sample in range(BLEND_SAMPLES + 1):
+        share = sample / BLEND_SAMPLES
+        from_leg = before.at(before.profile.duration_s - duration_s * (1 - share))
+        onto_leg = after.profile.travelled_m(duration_s * share)
+        heading = (
+            before.direction[0] * (1 - share) + after.direction[0] * share,
+            before.direction[1] * (1 - share) + after.direction[1] * share,
+        )
+        length = math.hypot(*heading)
+        direction = (heading[0] / length, heading[1] / length) if length > 0.01 else after.direction
+        path.append((_shifted(from_leg, after.direction, onto_leg), direction))
+    return path
+
+
+def _swing_hull(route: Route, number: int, path: list[tuple[Vector, Vector]]) -> list[Vector]:
+    """Give the corners of the area a rover may need for a turn that it cannot follow."""
+    corner, after = route.corners[number], route.legs[number + 1]
+    stray = route.strays[number + 1]
+    begin_s, _ = route.span_s(number + 1)
+    hull = [*corner.places, path[0][0], path[-1][0]]
+    if route.vehicle.autopilot is Autopilot.PX4 and not corner.stops:
+        # It turns towards the next leg within the acceptance radius, along a path that was not measured.
+        radius_m = route.vehicle.waypoint_radius_m
+        hull.append(_shifted(corner.places[0], route.legs[number].direction, -radius_m))
+        hull.append(_shifted(corner.places[-1], after.direction, 2 * radius_m))
+    for along_m in (-corner.behind_m, after.profile.travelled_m(begin_s)):
+        hull += _beside(_shifted(after.start, after.direction, along_m), after.direction, stray)
+    return hull
+
+
+def add_end(pieces: Pieces, route: Route) -> None:
+    """Add the last place, and how far a rover runs past it."""
+    if not route.legs:
+        return
+    leg = route.legs[-1]
+    stray = route.stray_at(len(route.legs) - 1, leg.profile.duration_s)
+    past = _shifted(leg.end, leg.direction, max(at_corner.END_OVERRUN_M - leg.band_m, 0.0))
+    waypoint = waypoint_after(route, len(route.legs) - 1)
+    pieces.add(
+        [*_beside(leg.end, leg.direction, stray), *_beside(past, leg.direction, stray)], leg.band_m, waypoint
+    )

@@ -1,0 +1,167 @@
+"""What a rover does at a corner: how it cuts it, how far it swings out, what time it loses.
+
+The blend of two legs follows from the vehicle's parameters (SCurve.cpp, AR_WPNav.cpp); how far the rover strays from it was measured
+on ArduPilot Rover 4.7 (docs/drive-model.md) and stands in the constants here.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from missions.vehicle import Steering
+
+if TYPE_CHECKING:
+    from missions.drive_model.profile import LegProfile
+    from missions.vehicle import Vehicle
+
+GRAVITY_MPS2 = 9.80665
+
+BAND_AT_REST_M = 0.20
+BAND_HEADING_ERROR = 0.01
+"""A heading known wrong by this angle (rad) holds a rover off its line by ``speed * angle / position gain``."""
+
+INSIDE_BAND_M = 0.30
+"""On the inside of a cut a rover strays no farther than this: at speed it runs wide of the blend, not inside it."""
+
+DELAY_STRAY_M = 0.1
+"""More than the band, to either side, where it stops for a delay."""
+
+SAME_PLACE_STRAY_M = 0.35
+"""More than the band, to either side, where two waypoints lie on one another."""
+
+SWING_PER_TURN_RADIUS = 2.45
+"""How far a rover with steered wheels swings out where it turns right round, in turning radii (2.2 m at 0.9 m)."""
+
+SHORT_LEG_M = 5.0
+PIVOT_SWING_M = 0.7
+"""How swings grow on short legs: by e^(-leg / 5 m) of 150 %, and of 0.7 m where it pivots."""
+
+START_SWING_M = ((0.0, 0.0), (90.0, 0.9), (135.0, 1.5), (150.0, 1.75), (165.0, 2.3), (180.0, 2.7))
+START_BEHIND_M = ((0.0, 0.0), (90.0, 0.0), (135.0, 0.3), (170.0, 1.4), (180.0, 3.6))
+"""Heading error in degrees at a start or after a stop; how far off the line, and how far behind the point, at a turning radius of 0.9 m."""
+
+MEASURED_TURN_RADIUS_M = 0.9
+"""Swings grow with the turning radius beyond this; below it they are taken as measured."""
+
+END_OVERRUN_M = 0.5
+STOP_LAG_S = 2.0
+"""Past the last waypoint; time to settle at a stop."""
+
+UNBOUNDED_TURN_DEG = 115.0
+UNBOUNDED_LEG_M = 15.0
+PIVOT_DOUBT_DEG = 2.0
+"""Corners this near to the pivot angle may be cut or pivoted: rounding of coordinates decides."""
+
+
+@dataclass(frozen=True, slots=True)
+class Blend:
+    """How the motions of two legs overlap at a corner.
+
+    Parameters
+    ----------
+    duration_s : float
+        How long both run at once; 0 where the rover stops at the waypoint.
+    reach_m : float
+        How far before (and after) the waypoint its middle lies along each leg.
+    """
+
+    duration_s: float
+    reach_m: float
+
+
+STANDSTILL = Blend(0.0, 0.0)
+
+
+def band_m(vehicle: Vehicle, speed_mps: float) -> float:
+    """Give how far a rover strays to either side of the path its autopilot means to drive."""
+    return BAND_AT_REST_M + BAND_HEADING_ERROR * speed_mps / vehicle.position_gain_per_s
+
+
+def blend(vehicle: Vehicle, before: LegProfile, after: LegProfile, turn_deg: float) -> Blend:
+    """Give the overlap of two legs' motions at a corner.
+
+    The next leg starts as early as the middle of the turn lies within the waypoint radius and its acceleration within
+    ATC_TURN_MAX_G, at the earliest when the present leg begins to brake (SCurve::advance_target_along_track).
+    """
+    ramp = before.ramp if before.ramp.duration_s <= after.ramp.duration_s else after.ramp
+    half_s = ramp.duration_s / 2
+    sine = math.sin(math.radians(abs(turn_deg)) / 2)
+    lateral_mps2 = vehicle.turn_max_g * GRAVITY_MPS2
+    if 2 * ramp.accel_at_mps2(half_s) * sine > lateral_mps2 > 0:
+        half_s = lateral_mps2 / (2 * ramp.jerk_mps3 * sine)
+    reach_m = ramp.travelled_m(half_s)
+    # On skid steer the turning radius does not count (AR_WPNav::set_turn_params).
+    radius_m = vehicle.waypoint_radius_m
+    if not vehicle.can_pivot:
+        radius_m = max(radius_m, vehicle.turn_radius_m)
+    if 2 * reach_m * sine > radius_m:
+        reach_m = radius_m / (2 * sine)
+        half_s = ramp.time_s(reach_m)
+    return Blend(2 * half_s, reach_m)
+
+
+def corner_swing_m(vehicle: Vehicle, turn_deg: float, reach_m: float, shorter_leg_m: float) -> float:
+    """Give how far a rover is carried out beyond its band after a corner that it does not stop at.
+
+    Steered wheels cannot follow a sharp blend; a blend that starts early gives room back. On short legs a rover is still swinging from
+    one corner when the next begins.
+    """
+    if vehicle.steering is Steering.SKID:
+        return 0.0
+    radius_m = max(vehicle.turn_radius_m, MEASURED_TURN_RADIUS_M)
+    short = math.exp(-shorter_leg_m / SHORT_LEG_M)
+    early = np.interp(reach_m, (0.2 * radius_m, 0.6 * radius_m), (0.0, 1.0))
+    half_turn = math.sin(math.radians(abs(turn_deg)) / 2) ** 2
+    exponent = 2.5 + 3.5 * float(early) * max(1 - 3 * short, 0.0)
+    return float(SWING_PER_TURN_RADIUS * radius_m * half_turn**exponent * (1 + 1.5 * short))
+
+
+def pivot_swing_m(shorter_leg_m: float) -> float:
+    """Give how far beyond its band a rover strays that pivots between short legs."""
+    return PIVOT_SWING_M * math.exp(-shorter_leg_m / SHORT_LEG_M)
+
+
+def start_swing_m(vehicle: Vehicle, error_deg: float) -> float:
+    """Give how far off its line, beyond its band, a rover swings that starts with its heading wrong."""
+    return _start(vehicle, error_deg, START_SWING_M)
+
+
+def start_behind_m(vehicle: Vehicle, error_deg: float) -> float:
+    """Give how far behind its start a rover comes that starts with its heading wrong."""
+    return _start(vehicle, error_deg, START_BEHIND_M)
+
+
+def pivots(vehicle: Vehicle, turn_deg: float) -> bool:
+    """Whether the vehicle stops at such a corner and turns on the spot."""
+    return vehicle.can_pivot and abs(turn_deg) > vehicle.pivot_angle_deg
+
+
+def is_bounded(vehicle: Vehicle, turn_deg: float, shorter_leg_m: float) -> bool:
+    """Whether corners like this kept within the model when measured; steered wheels between sharp turns on short legs did not."""
+    sharp = abs(turn_deg) > UNBOUNDED_TURN_DEG and shorter_leg_m < UNBOUNDED_LEG_M
+    return vehicle.steering is Steering.SKID or not sharp
+
+
+def may_pivot_or_cut(vehicle: Vehicle, turn_deg: float) -> bool:
+    """Whether the corner is so near to the pivot angle that either may happen."""
+    return vehicle.can_pivot and abs(abs(turn_deg) - vehicle.pivot_angle_deg) < PIVOT_DOUBT_DEG
+
+
+def swing_time_s(swing_m: float, speed_mps: float) -> float:
+    """Give the time lost on the way out and back, beyond that of the motion."""
+    return swing_m * (0.7 + 0.4 / max(speed_mps, 0.5))
+
+
+def _start(vehicle: Vehicle, error_deg: float, table: tuple[tuple[float, float], ...]) -> float:
+    if vehicle.steering is Steering.SKID:
+        return 0.0  # it pivots, or strays no farther than its band
+    errors_deg, distances_m = zip(*table, strict=True)
+    return (
+        float(np.interp(abs(error_deg), errors_deg, distances_m))
+        * max(vehicle.turn_radius_m, MEASURED_TURN_RADIUS_M)
+        / MEASURED_TURN_RADIUS_M
+    )

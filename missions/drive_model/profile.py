@@ -1,0 +1,117 @@
+"""How a rover speeds up and slows down on one leg: ArduPilot's S-curve from rest to rest.
+
+Every leg is a motion of its own, with limited speed, acceleration and jerk; corners are driven by starting the next motion before the
+last one has ended (SCurve.cpp). The short smoothing of the jerk itself (a snap of 15 m/s⁴) is left out: it lasts a tenth of a second.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+
+@dataclass(frozen=True)
+class Ramp:
+    """Speeding up from rest to a speed, with limited acceleration and jerk; slowing down is the same run backwards.
+
+    Parameters
+    ----------
+    speed_mps : float
+        The speed reached, 0 or more.
+    accel_mps2, jerk_mps3 : float
+        The limits, above 0.
+    """
+
+    speed_mps: float
+    accel_mps2: float
+    jerk_mps3: float
+
+    @cached_property
+    def jerk_s(self) -> float:
+        """How long the acceleration grows, and again how long it falls."""
+        return min(self.accel_mps2 / self.jerk_mps3, math.sqrt(self.speed_mps / self.jerk_mps3))
+
+    @cached_property
+    def duration_s(self) -> float:
+        """How long the whole ramp takes."""
+        if self.jerk_s == 0:
+            return 0.0
+        return self.jerk_s + self.speed_mps / (self.jerk_mps3 * self.jerk_s)
+
+    @property
+    def length_m(self) -> float:
+        """How far it goes meanwhile."""
+        return self.speed_mps * self.duration_s / 2
+
+    def travelled_m(self, time_s: float) -> float:
+        """Give the distance from the point of rest after a time; beyond the ramp the speed stays."""
+        if time_s > self.duration_s / 2:
+            # The ramp is symmetric: its second half mirrors the first about the half speed.
+            rest_s = max(self.duration_s - time_s, 0.0)
+            return self.speed_mps * (time_s - self.duration_s / 2) + self._first_half_m(rest_s)
+        return self._first_half_m(time_s)
+
+    def accel_at_mps2(self, time_s: float) -> float:
+        """Give the acceleration in the first half of the ramp."""
+        return self.jerk_mps3 * min(time_s, self.jerk_s)
+
+    def time_s(self, distance_m: float) -> float:
+        """Give the time to a distance within the first half of the ramp."""
+        jerk_m = self.jerk_mps3 * self.jerk_s**3 / 6
+        if distance_m <= jerk_m or self.jerk_s == 0:
+            return math.cbrt(6 * distance_m / self.jerk_mps3)
+        half_s = self.jerk_s / 2
+        accel_mps2 = self.jerk_mps3 * self.jerk_s
+        return self.jerk_s - half_s + math.sqrt(half_s**2 + 2 * (distance_m - jerk_m) / accel_mps2)
+
+    def _first_half_m(self, time_s: float) -> float:
+        jerk_s = self.jerk_s
+        if time_s <= jerk_s:
+            return self.jerk_mps3 * time_s**3 / 6
+        more_s = time_s - jerk_s
+        return self.jerk_mps3 * jerk_s * (jerk_s**2 / 6 + jerk_s * more_s / 2 + more_s**2 / 2)
+
+
+@dataclass(frozen=True)
+class LegProfile:
+    """One leg driven from rest to rest.
+
+    Parameters
+    ----------
+    length_m : float
+        Its length, 0 or more.
+    ramp : Ramp
+        Its start; the end is the same backwards.
+    """
+
+    length_m: float
+    ramp: Ramp
+
+    @property
+    def top_speed_mps(self) -> float:
+        """The highest speed on this leg; short legs do not reach the speed asked for."""
+        return self.ramp.speed_mps
+
+    @cached_property
+    def duration_s(self) -> float:
+        """How long it takes from rest to rest."""
+        if self.top_speed_mps == 0:
+            return 0.0
+        return self.length_m / self.top_speed_mps + self.ramp.duration_s
+
+    def travelled_m(self, time_s: float) -> float:
+        """Give the distance from the leg's start after a time since its start."""
+        if time_s > self.duration_s / 2:
+            return self.length_m - self.ramp.travelled_m(self.duration_s - time_s)
+        return self.ramp.travelled_m(time_s)
+
+
+def leg_profile(length_m: float, speed_mps: float, accel_mps2: float, jerk_mps3: float) -> LegProfile:
+    """Give the motion along a leg: to the speed asked for, or as fast as half its length allows."""
+    lag_s = accel_mps2 / jerk_mps3
+    # Length of both ramps = leg: v²/a + v·a/j = L where the acceleration is reached, else 2·v·√(v/j) = L.
+    reachable_mps = accel_mps2 / 2 * (math.sqrt(lag_s**2 + 4 * length_m / accel_mps2) - lag_s)
+    if reachable_mps < accel_mps2 * lag_s:
+        reachable_mps = math.cbrt(length_m**2 * jerk_mps3 / 4)
+    return LegProfile(length_m, Ramp(min(speed_mps, reachable_mps), accel_mps2, jerk_mps3))

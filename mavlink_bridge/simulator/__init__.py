@@ -1,6 +1,7 @@
 """The embedded rover: a simulated ArduRover behind a MAVLink 2 link."""
 
 from mavlink_bridge.simulator.config import SimulatorConfig
+from mavlink_bridge.simulator.shell import Simulator
 from mavlink_bridge.simulator.vehicle import SimulatedVehicle
 
-__all__ = ["SimulatedVehicle", "SimulatorConfig"]
+__all__ = ["SimulatedVehicle", "Simulator", "SimulatorConfig"]

@@ -70,9 +70,7 @@ def widest_clearance_m(
     ground: Ground, points: Sequence[LocalPoint], should_stop: Callable[[], bool] | None = None
 ) -> float:
     """Give the most clearance a route over all points keeps; 0 where there is no route."""
-    places = [
-        narrowest_place(ground, a, b, should_stop) for a, b in itertools.pairwise(points)
-    ]
+    places = [narrowest_place(ground, a, b, should_stop) for a, b in itertools.pairwise(points)]
     return min((place.clearance_m if place else 0.0 for place in places), default=0.0)
 
 

@@ -107,9 +107,9 @@ def _view(plan: Plan) -> tuple[float, float, float, float]:
 
 
 def _is_vast(plan: Plan, area: BaseGeometry) -> bool:
-    """Tell a home circle far larger than the rest, which would shrink the picture."""
+    """Tell a home circle larger than the rest, which would shrink the picture."""
     others = [b.area for b in plan.ground.barriers if b.area is not area]
-    return bool(others) and area.area > 20 * shapely.union_all(others).envelope.area
+    return bool(others) and area.area > 3 * shapely.union_all(others).envelope.area
 
 
 def _draw_ground(axes: Any, plan: Plan, view: tuple[float, float, float, float]) -> None:  # noqa: ANN401 - matplotlib is untyped

@@ -4,19 +4,27 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 from shapely import LineString, Point
 
-from missions.errors import FenceMissingError, PlanCheckError, SituationError
+from missions.errors import (
+    FenceMissingError,
+    NoRouteError,
+    PlanCheckError,
+    SituationError,
+    TargetBlockedError,
+)
 from missions.fence import PolygonZone
 from missions.geo import distance_m, rounded
 from missions.ground import Ground, lay_out
 from missions.items import MissionItem, last_place, waypoint
 from missions.local_frame import autopilot_line, bow_m, frame_around
-from missions.route import Route, find_route
+from missions.narrow import widest_clearance_m
+from missions.route import Route, find_route, simplified
 from missions.situation import ListKind, Situation
 from missions.vehicle import vehicle_from_parameters
 
@@ -37,6 +45,10 @@ ROUNDING_RESERVE_M = 0.01
 MAX_FIELD_M = 100_000.0
 
 _SAMPLE_M = 50.0
+_WIDEST_TRIES = 40
+_WIDEST_SHARE = 0.97
+"""What of the widest clearance a route keeps: round corners of the last millimetre would need a waypoint every half metre."""
+
 _FENCE_ADVICE = (
     "Let the ground station read the fence from the vehicle (MAVProxy: fence list; Mission Planner, QGroundControl: "
     "download in the plan view) while the stream is recorded, or give a fence file (--fence)"
@@ -110,19 +122,27 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
     home = situation.home.value if situation.home else None
     ground = _ground(fence, vehicle, home, (start, *targets))
     promised_m, allowance_m, warnings = _clearance(request, vehicle)
-    drawn_m = promised_m + allowance_m
     warnings = [*_fence_warnings(vehicle, situation), *ground.warnings, *warnings]
 
     local = [ground.frame.to_local(position) for position in (start, *targets)]
-    route = find_route(
+    reserve_m = _reserve_m(ground)
+    find = partial(
+        find_route,
         ground,
         local[0],
         local[1:],
-        drawn_m + _reserve_m(ground),
-        method=request.method,
         snap_m=request.snap_m,
+        method=request.method,
         should_stop=should_stop,
     )
+    if request.widest:
+        route, kept_m = _widest_route(find, widest_clearance_m(ground, local, should_stop))
+        route = simplified(ground, route, _WIDEST_SHARE * kept_m)
+        drawn_m = _WIDEST_SHARE * kept_m - reserve_m
+        promised_m = max(0.0, drawn_m - allowance_m)
+    else:
+        drawn_m = promised_m + allowance_m
+        route = find(clearance_m=drawn_m + reserve_m)
     if route.lead_away:
         warnings.append(
             f"the start stands {route.start_clearance_m:.2f} m from a fence, nearer than {drawn_m:.2f} m: "
@@ -244,6 +264,16 @@ def _clearance(request: Request, vehicle: Vehicle) -> tuple[float, float, list[s
     named = {"FENCE_MARGIN": request.clearance_m is None, "WP_RADIUS": request.corner_allowance_m is None}
     warnings += [str(assumed) for assumed in vehicle.assumed if named.get(assumed.parameter)]
     return promised_m, allowance_m, warnings
+
+
+def _widest_route(find: Callable[..., Route], clearance_m: float) -> tuple[Route, float]:
+    """Give the route at the widest clearance, and that clearance: a little less where corners are mitred in the narrowest place."""
+    for _ in range(_WIDEST_TRIES):
+        try:
+            return find(clearance_m=clearance_m), clearance_m
+        except (NoRouteError, TargetBlockedError):
+            clearance_m *= 0.98
+    return find(clearance_m=clearance_m), clearance_m
 
 
 def _fence_warnings(vehicle: Vehicle, situation: Situation) -> list[str]:

@@ -21,6 +21,8 @@ class Request:
         Visited in this order. Default: the newest target, else the last navigation item of the mission.
     clearance_m : float, optional
         Promised for the rover as it drives. Default: from FENCE_MARGIN.
+    widest : bool
+        Take the widest route there is; `clearance_m` then says nothing.
     corner_allowance_m : float, optional
         Room for cut corners and tracking error on top of the clearance. Default: from the vehicle; 0 plans the drawn lines only.
     snap_m : float
@@ -32,6 +34,7 @@ class Request:
     start: LatLon | None = None
     targets: tuple[LatLon, ...] = ()
     clearance_m: float | None = None
+    widest: bool = False
     corner_allowance_m: float | None = None
     snap_m: float = 0.0
     method: str = "optimal"

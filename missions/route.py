@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -111,6 +111,26 @@ def find_route(
         blocks = max(blocks, path.blocks)
         here = goal
     return Route(np.concatenate(points), len(lead) - 1, start_clearance_m, tuple(target_indices), blocks)
+
+
+def simplified(ground: Ground, route: Route, clearance_m: float) -> Route:
+    """Give the route with fewer points: those left out whose neighbours a straight line joins at the clearance."""
+    fixed = {*range(route.lead_away + 1), *route.target_indices}
+    kept = [0]
+    while kept[-1] < len(route.points) - 1:
+        here = kept[-1]
+        last = min(index for index in fixed | {len(route.points) - 1} if index > here)
+        reachable = (
+            index
+            for index in range(last, here + 1, -1)
+            if ground.clearance_m(LineString(route.points[[here, index]])) >= clearance_m
+        )
+        kept.append(next(reachable, here + 1))
+    return replace(
+        route,
+        points=route.points[kept],
+        target_indices=tuple(kept.index(index) for index in route.target_indices),
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,10 +34,12 @@ class _Drive:
 
 
 def demo(
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Where the picture, the mission and the log go.")] = Path(
-        "demo-out"
-    ),
-    speedup: Annotated[float, typer.Option(metavar="X", min=1.0, max=20.0, help="Simulated time runs so much faster.")] = 4.0,
+    out: Annotated[
+        Path, typer.Option(metavar="DIR", help="Where the picture, the mission and the log go.")
+    ] = Path("demo-out"),
+    speedup: Annotated[
+        float, typer.Option(metavar="X", min=1.0, max=20.0, help="Simulated time runs so much faster.")
+    ] = 4.0,
     json_output: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
@@ -69,7 +71,9 @@ def demo(
             on_frames=lambda frames: _observe(drive, frames),
         )
     warn(result.plan.warnings)
-    written = write_outputs(result.plan, result.situation, [out / "mission.waypoints", out / "mission.plan"], [])
+    written = write_outputs(
+        result.plan, result.situation, [out / "mission.waypoints", out / "mission.plan"], []
+    )
     draw_plan(result.plan, out / "plan.png", track=drive.track)
     driven_m, length_m = _driven(result.plan, drive.track)
     document = {
@@ -99,7 +103,9 @@ def _simulator(speedup: float):
     from missions.geo import LatLon  # noqa: PLC0415
 
     config = SimulatorConfig(
-        home=LatLon(*_HOME), fence=fence_to_items(_maze()), parameters={"FENCE_ENABLE": 1.0, "WP_RADIUS": 2.0, "WP_SPEED": 4.0}
+        home=LatLon(*_HOME),
+        fence=fence_to_items(_maze()),
+        parameters={"FENCE_ENABLE": 1.0, "WP_RADIUS": 2.0, "WP_SPEED": 4.0},
     )
     return Simulator(config, listen="tcpin:127.0.0.1:0", speedup=speedup)
 
@@ -132,7 +138,9 @@ def _driven(plan: Plan, track: list[LatLon]) -> tuple[float, float]:
 
 
 def _report(document: dict[str, object], plan: Plan) -> None:
-    typer.echo(f"Arrived after {document['driven_length_m']} m (drawn {document['length_m']} m, {len(plan.items)} waypoints)")
+    typer.echo(
+        f"Arrived after {document['driven_length_m']} m (drawn {document['length_m']} m, {len(plan.items)} waypoints)"
+    )
     typer.echo(
         f"Clearance: {document['clearance_m']} m promised, {document['driven_clearance_m']} m driven; "
         f"breaches {document['breaches']}"

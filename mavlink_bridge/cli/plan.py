@@ -48,8 +48,10 @@ def plan(
         ),
     ] = None,
     clearance: Annotated[
-        float | None,
-        typer.Option(metavar="M", min=0.0, help="Promised while driving. Default: from FENCE_MARGIN."),
+        str | None,
+        typer.Option(
+            metavar="M|max", help="Promised while driving; max: the widest route. Default: from FENCE_MARGIN."
+        ),
     ] = None,
     corner_allowance: Annotated[
         str, typer.Option(metavar="M|auto", help="Room for cut corners on top; 0 plans the drawn lines only.")
@@ -209,27 +211,35 @@ def _finite(value_m: float | None) -> float | None:
 
 
 def _request(
-    start: str | None, targets: list[str], clearance: float | None, allowance: str, snap: float, method: str
+    start: str | None, targets: list[str], clearance: str | None, allowance: str, snap: float, method: str
 ) -> Request:
     from missions.geo import parse_lat_lon  # noqa: PLC0415 - quick help
     from missions.request import Request  # noqa: PLC0415
 
     if method not in _METHODS:
         raise UsageError(f"--method {method!r}: expected one of {', '.join(_METHODS)}")
-    try:
-        corner_allowance_m = None if allowance == "auto" else float(allowance)
-    except ValueError:
-        raise UsageError(f"--corner-allowance {allowance!r}: expected metres or auto") from None
-    if corner_allowance_m is not None and not 0 <= corner_allowance_m < float("inf"):
-        raise UsageError(f"--corner-allowance {allowance}: expected 0 or more metres")
     return Request(
         start=parse_lat_lon(start) if start else None,
         targets=tuple(parse_lat_lon(target) for target in targets),
-        clearance_m=clearance,
-        corner_allowance_m=corner_allowance_m,
+        clearance_m=None if clearance == "max" else _metres("--clearance", clearance, "max"),
+        widest=clearance == "max",
+        corner_allowance_m=None if allowance == "auto" else _metres("--corner-allowance", allowance, "auto"),
         snap_m=snap,
         method=method,
     )
+
+
+def _metres(option: str, text: str | None, word: str) -> float | None:
+    """Read an option that is metres, 0 or more, or one word."""
+    if text is None:
+        return None
+    try:
+        value_m = float(text)
+    except ValueError:
+        value_m = -1.0
+    if not 0 <= value_m < float("inf"):
+        raise UsageError(f"{option} {text!r}: expected metres (0 or more) or {word}")
+    return value_m
 
 
 def _check_options(

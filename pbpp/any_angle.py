@@ -20,20 +20,25 @@ The rules that keep it exact in floating point:
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from heapq import heappop, heappush
 from math import inf, sqrt
 
-from .geometry import Point
 from .partition.base import TOLERANCE_M
-from .partition.slabs import Slabs
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .partition.slabs import Slabs
+    from .geometry import Point
+    from collections.abc import Callable
 
 __all__ = ["SearchResult", "shortest_path"]
 
 _GOAL = -1
 _TURN = -2
-_SLACK_M = 1e-10  # a vertex this near to a cone's edge counts as seen: rounding must not hide what lies on one line
+_SLACK_M = (
+    1e-10  # a vertex this near to a cone's edge counts as seen: rounding must not hide what lies on one line
+)
 _EAST, _WEST = 1, 0
 _LEFT, _RIGHT = 1, 0
 
@@ -214,11 +219,16 @@ class _Search:
 
         def add(block: int, direction: int, low: float, high: float) -> None:
             if block >= 0:
-                cones.append((block, direction, low, high) if side == _LEFT else (block, direction, -high, -low))
+                cones.append(
+                    (block, direction, low, high) if side == _LEFT else (block, direction, -high, -low)
+                )
 
         # Directions in the order of a left turn: east, up, west, down, east again.
         if east * edge_north <= north * edge_east and east * edge_east + north * edge_north > 0.0:
-            east, north = edge_east, edge_north  # the boundary goes straight on, or bends away within rounding
+            east, north = (
+                edge_east,
+                edge_north,
+            )  # the boundary goes straight on, or bends away within rounding
         quarter = _quarter(east, north)
         last = _quarter(edge_east, edge_north)
         for _ in range(3):
@@ -248,7 +258,11 @@ class _Search:
             neighbour, sides, rise = self._slabs.above[vertex], (west_above, east_above), goal_y - y
         else:
             neighbour, sides, rise = self._slabs.below[vertex], (west_below, east_below), y - goal_y
-        if abs(goal_x - x) <= TOLERANCE_M and rise >= 0.0 and any(side[vertex] in self._goal_blocks for side in sides):
+        if (
+            abs(goal_x - x) <= TOLERANCE_M
+            and rise >= 0.0
+            and any(side[vertex] in self._goal_blocks for side in sides)
+        ):
             self._push_goal(root)
         if neighbour >= 0:
             self._reach(root, neighbour, _LEFT)

@@ -7,6 +7,7 @@
     ├── NoPathError             start and goal lie in free space, but no path joins them
     ├── StartBlockedError       the start lies outside free space
     ├── GoalBlockedError        the goal lies outside free space
+    ├── SearchStoppedError      the caller stopped the search before it had any path
     └── TooManyBlocksError      the block partition would be larger than its limit
 """
 
@@ -17,6 +18,7 @@ __all__ = [
     "InvalidGeometryError",
     "NoPathError",
     "PlanningError",
+    "SearchStoppedError",
     "StartBlockedError",
     "TooManyBlocksError",
 ]
@@ -117,6 +119,13 @@ class GoalBlockedError(_BlockedError):
     """
 
     end = "goal"
+
+
+class SearchStoppedError(PlanningError):
+    """The caller stopped the search before it had any path."""
+
+    def __init__(self) -> None:
+        super().__init__("the search was stopped before it had found any path")
 
 
 class TooManyBlocksError(PlanningError):

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cached_property
 from math import inf
 
 import shapely
 
-from .errors import GoalBlockedError, StartBlockedError
+from .block_search import BlockGraph
 from .free_space import Scene, build_free_space
-from .geometry import Point
+from .partition.blocks import Blocks
 from .partition.slabs import Slabs
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .geometry import Point
+    from .errors import GoalBlockedError, StartBlockedError
+    from .clearance import Geometries
+    from collections.abc import Sequence
 
 __all__ = ["BOUNDARY_TOLERANCE_M", "Field"]
 
@@ -32,18 +38,38 @@ class Field:
         Whether corners are offset round.
     reach : sequence of (east, north)
         Points that the bounded part of the open plane must hold, metres from the scene's origin.
+    grown : (n,) array of shapely geometry, optional
+        The exclusions grown by the clearance, if they are known already.
     """
 
     def __init__(
-        self, scene: Scene, clearance_m: float, *, rounded: bool = False, reach: Sequence[Point] = ()
+        self,
+        scene: Scene,
+        clearance_m: float,
+        *,
+        rounded: bool = False,
+        reach: Sequence[Point] = (),
+        grown: Geometries | None = None,
     ) -> None:
         self.scene = scene
-        self.free = build_free_space(scene, clearance_m, rounded=rounded, reach=reach)
+        self.free = build_free_space(scene, clearance_m, rounded=rounded, reach=reach, grown=grown)
+        self._graphs: dict[str, BlockGraph] = {}
 
     @cached_property
     def slabs(self) -> Slabs:
         """The slab partition."""
         return Slabs(self.free.polygons)
+
+    @cached_property
+    def blocks(self) -> Blocks:
+        """The paper's block partition."""
+        return Blocks(self.free.polygons, self.slabs)
+
+    def graph(self, partition: str) -> BlockGraph:
+        """Return the blocks of a partition with their neighbours, made once."""
+        if partition not in self._graphs:
+            self._graphs[partition] = BlockGraph(self.slabs if partition == "slabs" else self.blocks)
+        return self._graphs[partition]
 
     def holds(self, point: Point) -> bool:
         """Return whether a point lies in the bounds of free space."""

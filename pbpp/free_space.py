@@ -6,19 +6,21 @@ local origin, so that map coordinates of thousands of kilometres cost no precisi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TypeVar
+from typing import TypeVar, TYPE_CHECKING
 
 import numpy as np
 import shapely
 from shapely.geometry import GeometryCollection, MultiPolygon, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
-from .clearance import grow, shrink
+from .clearance import Geometries, grow, shrink
 from .errors import InvalidGeometryError
 from .geometry import Floats, Point, Ring, parse_rings, polygons_only
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 __all__ = ["FreeSpace", "Scene", "build_free_space", "parse_scene"]
 
@@ -43,8 +45,8 @@ class Scene:
         East and north of the local origin in metres.
     """
 
-    inclusions: np.ndarray
-    exclusions: np.ndarray
+    inclusions: Geometries
+    exclusions: Geometries
     union: bool
     origin_m: Floats
 
@@ -62,6 +64,17 @@ class Scene:
             return geometry
         return shapely.transform(geometry, lambda points: points + self.origin_m)
 
+    def with_exclusion(self, ring: Ring) -> Scene:
+        """Return the same fence with one exclusion more, as the last one."""
+        part = parse_rings([ring], "exclusion")[0]
+        if self.origin_m.any():
+            part = shapely.transform(part, lambda points: points - self.origin_m)
+        return replace(self, exclusions=np.array([*self.exclusions, part], dtype=object))
+
+    def without_exclusion(self, index: int) -> Scene:
+        """Return the same fence without one of its exclusions."""
+        return replace(self, exclusions=np.delete(self.exclusions, index))
+
     @cached_property
     def included(self) -> BaseGeometry | None:
         """What the inclusions leave at no clearance; None if there is no inclusion: the open plane."""
@@ -72,12 +85,14 @@ class Scene:
         return MultiPolygon(polygons_only(together))
 
     @cached_property
-    def fence_lines(self) -> np.ndarray:
+    def fence_lines(self) -> Geometries:
         """Boundary line of each part, (inclusions + exclusions,) array of shapely geometry."""
         inclusions = np.array([_line_of(part) for part in self.inclusions], dtype=object)
         if self.union and self.included is not None:
             # What lies inside the union bounds nothing.
-            inclusions = shapely.difference(inclusions, shapely.buffer(self.included, -_INSIDE_M, join_style="mitre"))
+            inclusions = shapely.difference(
+                inclusions, shapely.buffer(self.included, -_INSIDE_M, join_style="mitre")
+            )
         exclusions = np.array([_line_of(part) for part in self.exclusions], dtype=object)
         return np.concatenate((inclusions, exclusions))
 
@@ -97,10 +112,13 @@ class FreeSpace:
         One for each connected component, metres from the scene's origin.
     clearance_m : float
         The distance in metres that it keeps from the fence.
+    grown : (n,) array of shapely geometry
+        The area that each exclusion takes away.
     """
 
     polygons: tuple[Polygon, ...]
     clearance_m: float
+    grown: Geometries
 
     @cached_property
     def geometry(self) -> MultiPolygon:
@@ -153,7 +171,12 @@ def parse_scene(inclusions: Sequence[Ring], exclusions: Sequence[Ring], *, union
 
 
 def build_free_space(
-    scene: Scene, clearance_m: float, *, rounded: bool = False, reach: Sequence[Point] = ()
+    scene: Scene,
+    clearance_m: float,
+    *,
+    rounded: bool = False,
+    reach: Sequence[Point] = (),
+    grown: Geometries | None = None,
 ) -> FreeSpace:
     """Return where the robot's centre may be.
 
@@ -167,28 +190,41 @@ def build_free_space(
         Offset corners round in place of mitred: nearer to the truth, many more vertices.
     reach : sequence of (east, north)
         Without inclusions, points in metres from the scene's origin that the bounded part of the plane must hold.
+    grown : (n,) array of shapely geometry, optional
+        What `grow_exclusions` returns for this scene, if it is known already.
 
     Returns
     -------
     FreeSpace
         The polygons; none if nothing is free.
     """
+    if grown is None:
+        grown = grow_exclusions(scene, clearance_m, rounded=rounded)
     ground = _ground(scene, clearance_m, rounded=rounded, reach=reach)
-    obstacles = scene.exclusions
+    obstacles = list(grown)
     if clearance_m > 0.0:
-        obstacles = np.array([*obstacles, *_loose_lines(scene.inclusions)], dtype=object)
-        if len(obstacles):
-            obstacles = grow(obstacles, clearance_m, rounded=rounded)
-    areas = [one if isinstance(one, Polygon) else MultiPolygon(polygons_only(one)) for one in obstacles]
-    free = shapely.difference(ground, shapely.disjoint_subset_union_all(areas)) if areas else ground
+        lines = np.array(_loose_lines(scene.inclusions), dtype=object)
+        obstacles += list(grow(lines, clearance_m, rounded=rounded)) if len(lines) else []
+    free = shapely.difference(ground, shapely.disjoint_subset_union_all(obstacles)) if obstacles else ground
     # Overlays leave vertices some 1e-10 m apart, which say nothing and make edges without direction.
     tidy = shapely.remove_repeated_points(free, _TINY_EDGE_M)
-    return FreeSpace(tuple(polygons_only(tidy)), clearance_m)
+    return FreeSpace(tuple(polygons_only(tidy)), clearance_m, grown)
 
 
-def _loose_lines(inclusions: np.ndarray) -> list[BaseGeometry]:
+def grow_exclusions(scene: Scene, clearance_m: float, *, rounded: bool = False) -> Geometries:
+    """Return the area that each exclusion keeps the robot's centre out of, (n,) array of polygons and multipolygons."""
+    grown = scene.exclusions
+    if clearance_m > 0.0 and len(grown):
+        grown = grow(grown, clearance_m, rounded=rounded)
+    areas = [one if isinstance(one, Polygon) else MultiPolygon(polygons_only(one)) for one in grown]
+    return np.array(areas, dtype=object)
+
+
+def _loose_lines(inclusions: Geometries) -> list[BaseGeometry]:
     """Return the lines of self-crossing inclusions: a slit cut into one has no area, yet it is part of the fence."""
-    parts = shapely.get_parts(inclusions[shapely.get_type_id(inclusions) == shapely.GeometryType.GEOMETRYCOLLECTION])
+    parts = shapely.get_parts(
+        inclusions[shapely.get_type_id(inclusions) == shapely.GeometryType.GEOMETRYCOLLECTION]
+    )
     return list(parts[shapely.get_dimensions(parts) == 1])
 
 

@@ -7,16 +7,18 @@ encloses. A ring without area is a wall: it matters as soon as there is a cleara
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 import shapely
 from shapely.geometry import GeometryCollection, MultiPolygon, Polygon
-from shapely.geometry.base import BaseGeometry
 
 from .errors import InvalidGeometryError
+
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
+    from collections.abc import Sequence
 
 __all__ = ["Floats", "Point", "Ring", "circle_ring", "parse_point", "parse_rings", "polygons_only"]
 
@@ -25,7 +27,9 @@ Point = tuple[float, float]
 Ring = npt.ArrayLike | Polygon | MultiPolygon
 
 
-def circle_ring(center: Sequence[float], radius_m: float, *, outer: bool = True, segments: int = 32) -> Floats:
+def circle_ring(
+    center: Sequence[float], radius_m: float, *, outer: bool = True, segments: int = 32
+) -> Floats:
     """Return a regular polygon about or within a circle.
 
     Parameters
@@ -118,7 +122,9 @@ def parse_rings(rings: Sequence[Ring], kind: str) -> list[BaseGeometry]:
         bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
         if len(bad):
             index = places[owner[bad[0]]]
-            raise InvalidGeometryError(f"{kind} {index} has a coordinate that is not a finite number", (kind, index))
+            raise InvalidGeometryError(
+                f"{kind} {index} has a coordinate that is not a finite number", (kind, index)
+            )
         polygons = shapely.polygons(shapely.linearrings(points, indices=owner))
         for place, polygon in zip(places, polygons, strict=True):
             found[place] = polygon
@@ -156,10 +162,13 @@ def _ring_array(ring: npt.ArrayLike, kind: str, index: int) -> Floats:
     try:
         array = np.asarray(ring, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise InvalidGeometryError(f"{kind} {index} is not a list of pairs of numbers", (kind, index)) from error
+        raise InvalidGeometryError(
+            f"{kind} {index} is not a list of pairs of numbers", (kind, index)
+        ) from error
     if array.ndim != 2 or array.shape[1] != 2 or len(array) < 3:
         raise InvalidGeometryError(
-            f"{kind} {index} needs at least three (east, north) pairs, its shape is {array.shape}", (kind, index)
+            f"{kind} {index} needs at least three (east, north) pairs, its shape is {array.shape}",
+            (kind, index),
         )
     return array
 

@@ -6,13 +6,35 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import itertools
 
-from .geometry import Floats
 
 if TYPE_CHECKING:
-    from .planner import Planner
+    from .geometry import Floats
+    from .field import Field
 
-__all__ = ["PlannedPath"]
+__all__ = ["Drawing", "PlannedPath", "length_of", "straightened"]
+
+_STRAIGHT_M = 1e-9
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """What `PlannedPath.plot` draws besides the path.
+
+    Parameters
+    ----------
+    field : Field
+        Free space with its partitions.
+    partition : str
+        ``"slabs"`` or ``"blocks"``.
+    crossings_m : (n, 2) array
+        The points at which the path was fixed, before points on a straight line were left out; east and north in metres.
+    """
+
+    field: Field
+    partition: str
+    crossings_m: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +66,7 @@ class PlannedPath:
     blocks: int
     expanded: int
     sequence: tuple[int, ...] = ()
-    planner: Planner | None = field(default=None, repr=False)
+    drawing: Drawing = field(repr=False, kw_only=True)
 
     def plot(self, ax: Any = None, *, show_blocks: bool = True) -> Any:  # noqa: ANN401 - matplotlib is an extra
         """Draw free space, the blocks, the sequence of blocks, and the path with its turning points.
@@ -69,3 +91,18 @@ class PlannedPath:
 def length_of(points: Floats) -> float:
     """Return the length of a polyline, (n, 2) array, in the unit of its coordinates."""
     return float(np.sqrt((np.diff(points, axis=0) ** 2).sum(axis=1)).sum())
+
+
+def straightened(points: Floats) -> Floats:
+    """Return a polyline, (n, 2) array in metres, without repeated points and without those on the straight way between their neighbours."""
+    kept = [points[0]]
+    for point, after in itertools.pairwise(points):
+        before = kept[-1]
+        way, rest = point - before, after - point
+        length_m = np.hypot(*(after - before))
+        aside_m = abs(way[0] * rest[1] - way[1] * rest[0])
+        if not way.any() or (aside_m <= _STRAIGHT_M * length_m and np.dot(way, rest) >= 0.0):
+            continue
+        kept.append(point)
+    kept.append(points[-1])
+    return np.array(kept)

@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
-from math import isfinite
+from math import dist, isfinite
 
 import numpy as np
 import numpy.typing as npt
-from shapely.geometry import MultiPolygon
 
 from .any_angle import shortest_path
+from .block_search import BlockGraph, block_sequence
 from .errors import GoalBlockedError, InvalidGeometryError, NoPathError, StartBlockedError
 from .field import Field
-from .free_space import parse_scene
+from .free_space import Scene, grow_exclusions, parse_scene
+from .funnel import taut_path
 from .geometry import Point, Ring, parse_point
-from .planned_path import PlannedPath, length_of
+from .planned_path import Drawing, PlannedPath, length_of, straightened
+from .three_cases import crossing_point
 from .widest import WidestWay, widest_in
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .clearance import Geometries
+    from shapely.geometry import MultiPolygon
 
 __all__ = ["Planner", "plan_path"]
 
@@ -80,6 +88,9 @@ class Planner:
         Distance in metres that paths keep from every exclusion and from the edge of what is included.
     union : bool, default False
         True: paths may lie in any inclusion. False: they lie in all of them.
+    partition : {"slabs", "blocks"}, optional
+        What the block methods search: the paper's blocks if left out, or their merged form, which is much smaller. The exact search
+        uses slabs whatever is said here; its answer depends on neither.
 
     Raises
     ------
@@ -98,10 +109,66 @@ class Planner:
     ) -> None:
         if not (isfinite(clearance_m) and clearance_m >= 0.0):
             raise InvalidGeometryError(f"the clearance must be a length of at least 0 m, not {clearance_m!r}")
-        del partition
-        self._scene = parse_scene(inclusions, exclusions, union=union)
-        self._clearance_m = float(clearance_m)
-        self._mitred = Field(self._scene, self._clearance_m)
+        if partition not in {None, "slabs", "blocks"}:
+            raise ValueError(f'partition must be "slabs", "blocks" or None, not {partition!r}')
+        scene = parse_scene(inclusions, exclusions, union=union)
+        self._setup(scene, float(clearance_m), partition, Field(scene, float(clearance_m)))
+
+    def _setup(self, scene: Scene, clearance_m: float, partition: str | None, field: Field) -> None:
+        self._scene = scene
+        self._clearance_m = clearance_m
+        self._partition = partition
+        self._mitred = field
+        # Searches need slabs: better here than in the first query.
+        _ = field.slabs
+
+    def with_exclusion(self, ring: Ring) -> Planner:
+        """Return a planner for the same fence with one exclusion more, faster than from scratch.
+
+        Parameters
+        ----------
+        ring : (n, 2) array-like or shapely polygon
+            East and north in metres. It becomes the last exclusion.
+
+        Returns
+        -------
+        Planner
+            A new planner; this one stays as it is.
+
+        Raises
+        ------
+        InvalidGeometryError
+            If the ring cannot be used.
+        """
+        scene = self._scene.with_exclusion(ring)
+        added = grow_exclusions(replace(scene, exclusions=scene.exclusions[-1:]), self._clearance_m)
+        return self._changed(scene, np.concatenate((self._mitred.free.grown, added)))
+
+    def without_exclusion(self, index: int) -> Planner:
+        """Return a planner for the same fence without one of its exclusions, faster than from scratch.
+
+        Parameters
+        ----------
+        index : int
+            Which exclusion; those after it move up by one.
+
+        Returns
+        -------
+        Planner
+            A new planner; this one stays as it is.
+
+        Raises
+        ------
+        IndexError
+            If there is no such exclusion.
+        """
+        return self._changed(self._scene.without_exclusion(index), np.delete(self._mitred.free.grown, index))
+
+    def _changed(self, scene: Scene, grown: Geometries) -> Planner:
+        changed = Planner.__new__(Planner)
+        field = Field(scene, self._clearance_m, grown=grown)
+        changed._setup(scene, self._clearance_m, self._partition, field)
+        return changed
 
     @property
     def clearance_m(self) -> float:
@@ -154,6 +221,8 @@ class Planner:
         ends = parse_point(start, "start"), parse_point(goal, "goal")
         if not len(self._scene.inclusions):
             self._widen(ends)
+        if method not in {"optimal", "pbpp-taut", "pbpp"}:
+            raise ValueError(f'method must be "optimal", "pbpp-taut" or "pbpp", not {method!r}')
         try:
             return self._plan_in(self._mitred, ends, method, should_stop)
         except (NoPathError, StartBlockedError, GoalBlockedError):
@@ -162,7 +231,12 @@ class Planner:
         return self._plan_in(self._rounded, ends, method, should_stop)
 
     def widest(
-        self, start: npt.ArrayLike, goal: npt.ArrayLike, *, tolerance_m: float = 0.01, should_stop: ShouldStop | None = None
+        self,
+        start: npt.ArrayLike,
+        goal: npt.ArrayLike,
+        *,
+        tolerance_m: float = 0.01,
+        should_stop: ShouldStop | None = None,
     ) -> WidestWay:
         """Return the greatest clearance at which start and goal are still connected, whatever clearance was asked for.
 
@@ -202,11 +276,66 @@ class Planner:
         if not field.require(ends[0], StartBlockedError) & field.require(ends[1], GoalBlockedError):
             raise NoPathError(self._clearance_m)
         start, goal = (field.onto(self._scene.to_local(end)) for end in ends)
-        result = shortest_path(field.slabs, start, goal, should_stop)
-        if result.vertices is None:
+        if method == "optimal":
+            found = _optimal(field, start, goal, should_stop)
+        else:
+            partition = self._partition or "blocks"
+            found = _over_blocks(
+                field.graph(partition), start, goal, taut=method == "pbpp-taut", should_stop=should_stop
+            )
+        if found is None:
             raise NoPathError(self._clearance_m)
-        turns = field.slabs.vertices.points[list(result.vertices)] + self._scene.origin_m
-        points = np.array([ends[0], *turns, ends[1]])
+        inner = np.array(found.turns, dtype=np.float64).reshape(-1, 2) + self._scene.origin_m
+        points = straightened(np.array([ends[0], *inner, ends[1]]))
         length_m = length_of(points)
-        bound_m = min(result.lower_bound_m, length_m) if result.stopped else length_m
-        return PlannedPath(points, length_m, bound_m, method, len(field.slabs), result.expanded, planner=self)
+        return PlannedPath(
+            points=points,
+            length_m=length_m,
+            lower_bound_m=length_m if found.lower_bound_m is None else min(found.lower_bound_m, length_m),
+            method=method,
+            blocks=found.blocks,
+            expanded=found.expanded,
+            sequence=tuple(found.sequence),
+            drawing=Drawing(field, self._partition or ("slabs" if method == "optimal" else "blocks"), inner),
+        )
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A path as a method finds it: what lies between start and goal, metres from the scene's origin."""
+
+    turns: Sequence[Point]
+    lower_bound_m: float | None  # None: the path is the shortest
+    blocks: int
+    expanded: int
+    sequence: Sequence[int] = ()
+
+
+def _optimal(field: Field, start: Point, goal: Point, should_stop: ShouldStop | None) -> _Found | None:
+    result = shortest_path(field.slabs, start, goal, should_stop)
+    blocks = len(field.slabs)
+    if result.vertices is not None:
+        turns = field.slabs.vertices.points[list(result.vertices)].tolist()
+        bound_m = result.lower_bound_m if result.stopped else None
+        return _Found([(east, north) for east, north in turns], bound_m, blocks, result.expanded)
+    if not result.stopped:
+        return None
+    # Stopped before the goal was reached: the taut path through the best sequence of slabs is there in little time.
+    quick = _over_blocks(field.graph("slabs"), start, goal, taut=True, should_stop=None)
+    return None if quick is None else replace(quick, lower_bound_m=result.lower_bound_m)
+
+
+def _over_blocks(
+    graph: BlockGraph, start: Point, goal: Point, *, taut: bool, should_stop: ShouldStop | None
+) -> _Found | None:
+    found = block_sequence(graph, start, goal, should_stop=should_stop)
+    if found is None:
+        return None
+    sequence, crossings, expanded = found
+    if taut:
+        turns = taut_path(start, goal, crossings, [graph.centers[block] for block in sequence])[1:-1]
+    else:
+        # Free space is shrunk by the robot's radius already, so the paper's range is spent.
+        turns = [crossing_point(crossing, goal) for crossing in crossings]
+    straight_m = dist(start, goal)
+    return _Found(turns, straight_m, len(graph.centers), expanded, sequence)

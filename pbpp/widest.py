@@ -6,7 +6,6 @@ corners, so where it says "not connected" the round one is asked: the answer is 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,13 +13,17 @@ import numpy.typing as npt
 import shapely
 from shapely.geometry import LineString, Polygon
 from shapely.geometry import Point as ShapelyPoint
-from shapely.geometry.base import BaseGeometry
 
 from .any_angle import shortest_path
 from .errors import GoalBlockedError, NoPathError, StartBlockedError
 from .field import BOUNDARY_TOLERANCE_M, Field
 from .free_space import Scene, parse_scene
 from .geometry import Floats, Point, Ring, parse_point
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
+    from collections.abc import Callable, Sequence
 
 __all__ = ["WidestWay", "widest"]
 
@@ -128,7 +131,9 @@ def widest_in(
     return _limited_by_gap(scene, local, joined, parted)
 
 
-def _connected(scene: Scene, ends: Sequence[Point], reach: Sequence[Point], clearance_m: float) -> Field | None:
+def _connected(
+    scene: Scene, ends: Sequence[Point], reach: Sequence[Point], clearance_m: float
+) -> Field | None:
     """Return the field in which two ends are connected at a clearance, None if there is none."""
     for rounded in (False, True) if clearance_m > 0.0 else (False,):
         field = Field(scene, clearance_m, rounded=rounded, reach=reach)
@@ -138,7 +143,9 @@ def _connected(scene: Scene, ends: Sequence[Point], reach: Sequence[Point], clea
     return None
 
 
-def _limited_by_end(scene: Scene, ends: Sequence[Point], room_m: list[float], clearance_m: float) -> WidestWay:
+def _limited_by_end(
+    scene: Scene, ends: Sequence[Point], room_m: list[float], clearance_m: float
+) -> WidestWay:
     which = int(room_m[1] < room_m[0])
     lines = scene.fence_lines
     index = int(np.argmin(shapely.distance(lines, ShapelyPoint(ends[which]))))
@@ -191,7 +198,9 @@ def _facing_points(lines: npt.NDArray[np.object_], piece: LineString) -> _Facing
     best: tuple[float, float, _Facing] | None = None
     for _ in range(_ZOOMS):
         for share in np.linspace(low, high, _SAMPLES).tolist():
-            found = _look_both_ways(lines, shapely.get_coordinates(piece.interpolate(share, normalized=True))[0])
+            found = _look_both_ways(
+                lines, shapely.get_coordinates(piece.interpolate(share, normalized=True))[0]
+            )
             if found is not None and (best is None or found[0] < best[0]):
                 best = (found[0], share, found[1])
         if best is None:
@@ -215,7 +224,9 @@ def _look_both_ways(lines: npt.NDArray[np.object_], place: Floats) -> tuple[floa
     bounds = shapely.total_bounds(lines)
     reach_m = float(np.hypot(bounds[2] - bounds[0], bounds[3] - bounds[1])) + size_m
     # What faces the first point lies within 60 degrees of straight ahead.
-    wedge = Polygon([place, place + reach_m * (ahead + 1.75 * aside), place + reach_m * (ahead - 1.75 * aside)])
+    wedge = Polygon(
+        [place, place + reach_m * (ahead + 1.75 * aside), place + reach_m * (ahead - 1.75 * aside)]
+    )
     there = shapely.intersection(lines, wedge)
     opposite = shapely.distance(there, point)
     if np.isnan(opposite).all():

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TYPE_CHECKING
 
-import numpy as np
-import numpy.typing as npt
 
-from pbpp.geometry import Floats, Point
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+    from pbpp.geometry import Floats, Point
 
-__all__ = ["Partition", "Portals", "TOLERANCE_M"]
+__all__ = ["TOLERANCE_M", "Partition", "Portals"]
 
 TOLERANCE_M = 1e-9
 """Lengths up to this are taken as none: gaps so narrow are closed, vertices so near to one line stand on it."""
@@ -48,6 +49,10 @@ class Partition(Protocol):
     @property
     def portals(self) -> Portals:
         """The portals between blocks."""
+
+    @property
+    def centers(self) -> Floats:
+        """The middle of each block, (b, 2) array, metres from the scene's origin."""
 
     def outline(self, block: int) -> Floats:
         """Return the corners of a block, (k, 2) array, counter-clockwise, metres from the scene's origin."""

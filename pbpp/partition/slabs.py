@@ -11,22 +11,22 @@ linked anew, so that each of its free fans is a vertex of its own.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
-from shapely.geometry import Polygon
 
-from pbpp.geometry import Floats, Point
 
 from .base import TOLERANCE_M, Portals
 from .sweep import Sweep
 from .vertices import Ints, Vertices
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from shapely.geometry import Polygon
+    from pbpp.geometry import Floats, Point
+    from collections.abc import Sequence
 
 __all__ = ["Slabs"]
-
-
 
 
 class Slabs:
@@ -94,6 +94,34 @@ class Slabs:
         floor_west, floor_east, ceiling_west, ceiling_east = self._sides
         heights = (ceiling_west - floor_west) + (ceiling_east - floor_east)
         return float(0.5 * np.dot(heights, self._east - self._west))
+
+    @property
+    def north_range(self) -> tuple[Floats, Floats]:
+        """Lowest and highest north of each block."""
+        floor_west, floor_east, ceiling_west, ceiling_east = self._sides
+        return np.minimum(floor_west, floor_east), np.maximum(ceiling_west, ceiling_east)
+
+    @cached_property
+    def centers(self) -> Floats:
+        """CP, (b, 2) array: the middle of each block."""
+        floor_west, floor_east, ceiling_west, ceiling_east = self._sides
+        north = 0.25 * (floor_west + floor_east + ceiling_west + ceiling_east)
+        return np.column_stack((0.5 * (self._west + self._east), north))
+
+    def chord(self, block: Ints, north: Floats) -> tuple[Floats, Floats]:
+        """Return the west and east ends of blocks' horizontal chords at given norths."""
+        west, east = self._west[block].copy(), self._east[block].copy()
+        floor_west, floor_east, ceiling_west, ceiling_east = (side[block] for side in self._sides)
+        for at_west, at_east, above in ((floor_west, floor_east, True), (ceiling_west, ceiling_east, False)):
+            rise = at_east - at_west
+            slanted = rise != 0.0
+            share = np.divide(north - at_west, rise, out=np.zeros_like(north), where=slanted)
+            cross = self._west[block] + np.clip(share, 0.0, 1.0) * (self._east[block] - self._west[block])
+            # Above a rising floor, and below a falling ceiling, lies the west; else the east.
+            ends_east = slanted & ((rise > 0.0) == above)
+            east = np.where(ends_east, np.minimum(east, cross), east)
+            west = np.where(slanted & ~ends_east, np.maximum(west, cross), west)
+        return west, east
 
     @cached_property
     def portals(self) -> Portals:

@@ -5,7 +5,10 @@ from __future__ import annotations
 from pbpp.errors import InvalidGeometryError
 
 from .base import TOLERANCE_M
-from .vertices import Vertices
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .vertices import Vertices
 
 __all__ = ["DULL_END", "OPEN_END", "PortalView", "Sweep"]
 
@@ -188,7 +191,9 @@ class Sweep:
         if len(floors) != len(ceilings):
             raise InvalidGeometryError("free space is not closed: its rings do not fit together")
         sides: list[_Side] = []
-        for (low, _, floor, low_vertex), (high, _, ceiling, high_vertex) in zip(floors, ceilings, strict=True):
+        for (low, _, floor, low_vertex), (high, _, ceiling, high_vertex) in zip(
+            floors, ceilings, strict=True
+        ):
             block = len(self.west)
             self.west.append(x)
             self.east.append(x)
@@ -227,7 +232,9 @@ class Sweep:
         while i < len(left) and j < len(right):
             left_low, left_low_vertex, left_high, left_high_vertex, west = left[i]
             right_low, right_low_vertex, right_high, right_high_vertex, east = right[j]
-            low, low_vertex = (left_low, left_low_vertex) if left_low > right_low else (right_low, right_low_vertex)
+            low, low_vertex = (
+                (left_low, left_low_vertex) if left_low > right_low else (right_low, right_low_vertex)
+            )
             if left_low == right_low and low_vertex < 0:
                 low_vertex = left_low_vertex
             high, high_vertex = (
@@ -238,7 +245,7 @@ class Sweep:
             if high - low > TOLERANCE_M:
                 low_end = self._end[low_vertex] if low_vertex >= 0 else OPEN_END
                 high_end = self._end[high_vertex] if high_vertex >= 0 else OPEN_END
-                if low_end != OPEN_END and high_end != OPEN_END:
+                if OPEN_END not in (low_end, high_end):
                     self.above[low_vertex], self.below[high_vertex] = high_end, low_end
                 self.portals.append((x, low, high, west, east))
                 self.ways[1][west].append((x, low, high, low_end, high_end, east))

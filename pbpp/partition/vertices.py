@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 import shapely
-from shapely.geometry import Polygon
 
-from pbpp.geometry import Floats
 
 from .base import TOLERANCE_M
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pbpp.geometry import Floats
+    from shapely.geometry import Polygon
+    from collections.abc import Sequence
 
 __all__ = ["Ints", "Vertices"]
 
@@ -41,7 +44,7 @@ class Vertices:
         count = len(self.points)
         place = np.arange(count)
         starts = np.flatnonzero(np.diff(ring_of, prepend=-1))
-        ends = np.append(starts[1:], count) - 1
+        ends = np.append(starts, count)[1:] - 1
         after = place + 1
         after[ends] = starts
         before = place - 1
@@ -66,22 +69,26 @@ class Vertices:
     @cached_property
     def x_list(self) -> list[float]:
         """East of each vertex in metres, that of its line."""
-        return self.x.tolist()
+        values: list[float] = self.x.tolist()
+        return values
 
     @cached_property
     def y_list(self) -> list[float]:
         """North of each vertex in metres."""
-        return self.y.tolist()
+        values: list[float] = self.y.tolist()
+        return values
 
     @cached_property
     def prev_list(self) -> list[int]:
         """The vertex before each one."""
-        return self.prev.tolist()
+        values: list[int] = self.prev.tolist()
+        return values
 
     @cached_property
     def next_list(self) -> list[int]:
         """The vertex after each one."""
-        return self.next.tolist()
+        values: list[int] = self.next.tolist()
+        return values
 
     def _split_pinches(self) -> None:
         """Link the edges at a point shared by several rings so that each free fan there is one vertex."""

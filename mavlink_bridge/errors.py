@@ -10,6 +10,7 @@
     ├── VehicleNotFoundError     nobody there is the vehicle asked for
     ├── RefusedError             the vehicle said no
     └── OutcomeError             what is on the vehicle is not what was wanted, or unknown
+        └── BackupError          the old list cannot be kept or read back: nothing is written
 """
 
 from __future__ import annotations
@@ -49,3 +50,7 @@ class RefusedError(BridgeError):
 
 class OutcomeError(BridgeError):
     """What is on the vehicle is not what was wanted, or it is unknown."""
+
+
+class BackupError(OutcomeError):
+    """The vehicle's old list cannot be kept, or a kept one cannot be read."""

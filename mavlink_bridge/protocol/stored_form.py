@@ -110,6 +110,18 @@ class Difference:
     wanted: MissionItem | None
     found: MissionItem | None
 
+    def __str__(self) -> str:
+        if self.wanted is None:
+            return f"item {self.seq} should not be there"
+        if self.found is None:
+            return f"item {self.seq} is missing"
+        return f"item {self.seq} is {_brief(self.found)} instead of {_brief(self.wanted)}"
+
+
+def _brief(item: MissionItem) -> str:
+    params = ", ".join(f"{value:g}" for value in item.params)
+    return f"command {int(item.command)} ({params}) at {item.position}, {item.alt_m:g} m in frame {int(item.frame)}"
+
 
 def is_same_item(a: MissionItem, b: MissionItem, mission_type: MissionType, *, coarse: bool = False) -> bool:
     """Tell whether two items are the same once stored; ``coarse`` compares positions as 32-bit floats carry them."""

@@ -1,0 +1,357 @@
+"""Reading parameters, some or all, and setting one with confirmation.
+
+ArduPilot sends every parameter as a 32-bit float, whole numbers too. It does not answer when asked for a parameter it does not have:
+a name counts as missing when it was asked for so often that, as the link loses messages, an answer would have come.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from mavlink_bridge.messages import ParamRequestList, ParamRequestRead, ParamSet, ParamValue
+from mavlink_bridge.protocol.round_trip import RoundTrip
+from mavlink_bridge.protocol.table_machine import TableMachine
+from mavlink_bridge.protocol.transitions import PARAMETERS, ParameterEvent, ParameterState
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from mavlink_bridge.messages import Frame
+    from mavlink_bridge.protocol.peer import Peer
+
+WINDOW = 20
+PATIENCE_S = 10.0
+REAL32 = 9
+"""MAV_PARAM_TYPE_REAL32."""
+
+_LIST_AGAIN_S = 1.5
+_QUIET_S = 1.0
+_SET_AGAIN_S = 0.7
+_ANSWERS_BELIEVED = 3
+_LEAST_OVERDUE_S, _MOST_OVERDUE_S = 0.2, 2.0
+_LEAST_TRIES, _MOST_TRIES = 3, 14
+_WRONGLY_MISSING = 1e-3  # how likely a parameter may be called missing that is there
+_NO_INDEX = 65535
+
+
+@dataclass(frozen=True, slots=True)
+class ParametersOutcome:
+    """What was read.
+
+    Parameters
+    ----------
+    values : mapping of str to float
+        Parameters by name.
+    missing : tuple of str
+        Names the vehicle did not answer to; numbers of parameters of the list that never came.
+    is_silent : bool
+        The vehicle did not answer at all, or stopped answering.
+    """
+
+    values: Mapping[str, float] = field(default_factory=dict)
+    missing: tuple[str, ...] = ()
+    is_silent: bool = False
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether everything asked for is here."""
+        return not self.is_silent and not self.missing
+
+
+@dataclass(slots=True)
+class _Ask:
+    sent_s: float
+    tries: int
+
+
+class ReadParameters(TableMachine[ParameterState, ParameterEvent]):
+    """Reads parameters by name, or all of them; the outcome is None until `is_done`.
+
+    Parameters
+    ----------
+    peer : Peer
+        The vehicle and our identity.
+    names : iterable of str, optional
+        Which ones; None for all.
+    """
+
+    def __init__(self, peer: Peer, names: Iterable[str] | None = None) -> None:
+        super().__init__(PARAMETERS, ParameterState.IDLE)
+        self._peer = peer
+        self._names = None if names is None else tuple(dict.fromkeys(names))
+        self._values: dict[str, float] = {}
+        self._seen_indices: set[int] = set()
+        self._count = 0
+        self._waiting: list[str | int] = []  # in reverse order
+        self._asks: dict[str | int, _Ask] = {}  # in order of sending
+        self._missing: list[str | int] = []
+        self._round_trip = RoundTrip(0.3)
+        self._answered = 0
+        self._answered_tries = 0
+        self._heard_s = 0.0
+        self._list_at_s = 0.0
+
+    @property
+    def outcome(self) -> ParametersOutcome | None:
+        """What was read; None while it runs."""
+        if not self.is_done:
+            return None
+        is_silent = self.state is ParameterState.SILENT
+        open_asks = [*self._missing, *self._asks, *reversed(self._waiting)]
+        return ParametersOutcome(dict(self._values), tuple(map(str, open_asks)), is_silent)
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        """Parameters settled and parameters in all."""
+        if self._names is None:
+            return len(self._seen_indices), self._count
+        return len(self._names) - len(self._waiting) - len(self._asks), len(self._names)
+
+    @property
+    def bound_s(self) -> float:
+        """Longest time from the start to the end for parameters by name, whatever the link does."""
+        return PATIENCE_S + _MOST_TRIES * _MOST_OVERDUE_S * (1 + len(self._names or ()) / WINDOW)
+
+    @property
+    def deadline_s(self) -> float | None:
+        """When `handle_timer` wants to be called."""
+        silence_s = self._heard_s + PATIENCE_S
+        if self.state is ParameterState.LISTING:
+            return min(self._list_at_s, silence_s)
+        if self.state is ParameterState.ASKING:
+            return min(next(iter(self._asks.values())).sent_s + self._overdue_s(), silence_s)
+        return None
+
+    def start(self, now_s: float) -> None:
+        """Ask."""
+        self._heard_s = now_s
+        if self._names is None:
+            if self._move(ParameterEvent.START_ALL):
+                self._ask_list(now_s)
+        elif self._move(ParameterEvent.START_SOME):
+            self._waiting = list(reversed(self._names))
+            self._go_on(now_s)
+
+    def receive(self, frame: Frame, now_s: float) -> None:
+        """Take a frame; what is not for this machine is ignored."""
+        message = frame.message
+        if self.is_done or not isinstance(message, ParamValue) or not self._peer.accepts(frame):
+            return
+        if self.state is ParameterState.IDLE:
+            return
+        if self._names is None:
+            self._values[message.param_id] = message.param_value
+            if 0 <= message.param_index < message.param_count and message.param_index != _NO_INDEX:
+                self._count = message.param_count
+                self._seen_indices.add(message.param_index)
+                self._heard_s = now_s
+                self._list_at_s = now_s + _QUIET_S
+            self._settle(message.param_index, now_s)
+        elif message.param_id in self._names:
+            self._heard_s = now_s
+            self._values[message.param_id] = message.param_value
+            self._settle(message.param_id, now_s)
+        self._go_on(now_s)
+
+    def handle_timer(self, now_s: float) -> None:
+        """Take notice that time has passed."""
+        if self.is_done or self.state is ParameterState.IDLE:
+            return
+        if self.state is ParameterState.LISTING:
+            if now_s >= self._heard_s + PATIENCE_S:
+                self._move(ParameterEvent.SILENCE)
+            elif now_s >= self._list_at_s:
+                self._end_list(now_s)
+        else:
+            self._repeat_overdue(now_s)
+            self._go_on(now_s)
+
+    def _ask_list(self, now_s: float) -> None:
+        self._list_at_s = now_s + _LIST_AGAIN_S
+        self._send(ParamRequestList(self._peer.system, self._peer.component))
+
+    def _end_list(self, now_s: float) -> None:
+        """Go on with single requests for what the stream has left out; ask once more if there was no stream."""
+        if not self._count:
+            self._ask_list(now_s)
+            return
+        gaps = sorted(set(range(self._count)) - self._seen_indices, reverse=True)
+        if gaps and self._move(ParameterEvent.GAPS):
+            self._waiting = list(gaps)
+            self._go_on(now_s)
+
+    def _go_on(self, now_s: float) -> None:
+        if self.state is ParameterState.LISTING:
+            if self._count and len(self._seen_indices) >= self._count:
+                self._move(ParameterEvent.ALL_HERE)
+            return
+        if self.state is not ParameterState.ASKING:
+            return
+        while self._waiting and len(self._asks) < WINDOW:
+            self._ask(self._waiting.pop(), 1, now_s)
+        if not self._asks:
+            self._move(ParameterEvent.GIVEN_UP if self._missing else ParameterEvent.ALL_HERE)
+
+    def _ask(self, key: str | int, tries: int, now_s: float) -> None:
+        self._asks.pop(key, None)
+        self._asks[key] = _Ask(now_s, tries)
+        name, index = ("", key) if isinstance(key, int) else (key, -1)
+        self._send(ParamRequestRead(self._peer.system, self._peer.component, name, index))
+
+    def _settle(self, key: str | int, now_s: float) -> None:
+        ask = self._asks.pop(key, None)
+        if ask is None:
+            if key in self._waiting:
+                self._waiting.remove(key)
+            return
+        if ask.tries == 1:
+            self._round_trip.observe(now_s - ask.sent_s)
+        self._answered += 1
+        self._answered_tries += ask.tries
+
+    def _overdue_s(self) -> float:
+        return self._round_trip.timeout_s(_LEAST_OVERDUE_S, _MOST_OVERDUE_S)
+
+    def _repeat_overdue(self, now_s: float) -> None:
+        if now_s >= self._heard_s + PATIENCE_S:
+            # Names that are all unknown look like silence; only an answer to something tells them apart.
+            if self._answered or self._values:
+                self._missing += self._asks
+                self._asks.clear()
+                self._missing += reversed(self._waiting)
+                self._waiting.clear()
+            else:
+                self._move(ParameterEvent.SILENCE)
+            return
+        overdue_s = self._overdue_s()
+        enough = self._tries_enough()
+        for key, ask in list(self._asks.items()):
+            if now_s < ask.sent_s + overdue_s:
+                break
+            if ask.tries >= enough:
+                del self._asks[key]
+                self._missing.append(key)
+            else:
+                self._ask(key, ask.tries + 1, now_s)
+
+    def _tries_enough(self) -> int:
+        """Give how often one must ask until an unanswered name is a missing one, judged by what others needed."""
+        if not self._answered:
+            return _MOST_TRIES
+        failures = (self._answered_tries - self._answered + 1) / (self._answered_tries + 4)
+        return min(max(math.ceil(math.log(_WRONGLY_MISSING) / math.log(failures)), _LEAST_TRIES), _MOST_TRIES)
+
+
+@dataclass(frozen=True, slots=True)
+class SetParameterOutcome:
+    """How setting a parameter ended.
+
+    Parameters
+    ----------
+    name : str
+        Which one.
+    value : float, optional
+        What the vehicle holds now, by its own word; None if it never answered (unknown name, or silence).
+    is_confirmed : bool
+        Whether that is what was wanted.
+    """
+
+    name: str
+    value: float | None
+    is_confirmed: bool
+
+
+class SetParameter(TableMachine[ParameterState, ParameterEvent]):
+    """Sets one parameter and waits for the vehicle to say so; the outcome is None until `is_done`.
+
+    Parameters
+    ----------
+    peer : Peer
+        The vehicle and our identity.
+    name : str
+        Which one.
+    value : float
+        The value wanted.
+    """
+
+    def __init__(self, peer: Peer, name: str, value: float) -> None:
+        super().__init__(PARAMETERS, ParameterState.IDLE)
+        self._peer = peer
+        self._name = name
+        self._wanted = value
+        self._value: float | None = None
+        self._is_confirmed = False
+        self._other_answers = 0
+        self._answer_counts = False
+        self._send_at_s = 0.0
+        self._give_up_s = 0.0
+
+    @property
+    def outcome(self) -> SetParameterOutcome | None:
+        """How it ended; None while it runs."""
+        return SetParameterOutcome(self._name, self._value, self._is_confirmed) if self.is_done else None
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        """Whether it is done, as steps."""
+        return int(self.is_done), 1
+
+    @property
+    def bound_s(self) -> float:
+        """Longest time from the start to the end, whatever the link does."""
+        return PATIENCE_S
+
+    @property
+    def deadline_s(self) -> float | None:
+        """When `handle_timer` wants to be called."""
+        return min(self._send_at_s, self._give_up_s) if self.state is ParameterState.SETTING else None
+
+    def start(self, now_s: float) -> None:
+        """Send the value."""
+        if self._move(ParameterEvent.START_SET):
+            self._give_up_s = now_s + PATIENCE_S
+            self._send_value(now_s)
+
+    def receive(self, frame: Frame, now_s: float) -> None:  # noqa: ARG002 - the contract's
+        """Take a frame; what is not for this machine is ignored."""
+        message = frame.message
+        if self.state is not ParameterState.SETTING or not self._peer.accepts(frame):
+            return
+        if not isinstance(message, ParamValue) or message.param_id != self._name:
+            return
+        self._value = message.param_value
+        if message.param_value == _float32(self._wanted):
+            self._is_confirmed = True
+            self._move(ParameterEvent.CONFIRMED)
+        elif self._answer_counts:
+            # An answer to somebody else's question may come before ours was heard: one other value is not the last word.
+            self._answer_counts = False
+            self._other_answers += 1
+            if self._other_answers >= _ANSWERS_BELIEVED:
+                self._move(ParameterEvent.GIVEN_UP)
+
+    def handle_timer(self, now_s: float) -> None:
+        """Take notice that time has passed."""
+        if self.state is not ParameterState.SETTING:
+            return
+        if now_s >= self._give_up_s:
+            self._move(ParameterEvent.SILENCE if self._value is None else ParameterEvent.GIVEN_UP)
+        elif now_s >= self._send_at_s:
+            self._send_value(now_s)
+            self._send(ParamRequestRead(self._peer.system, self._peer.component, self._name))
+
+    def _send_value(self, now_s: float) -> None:
+        self._send_at_s = now_s + _SET_AGAIN_S
+        self._answer_counts = True
+        self._send(ParamSet(self._peer.system, self._peer.component, self._name, self._wanted, REAL32))
+
+
+def _float32(value: float) -> float:
+    """Give the value as it goes over the wire."""
+    try:
+        return float(struct.unpack("<f", struct.pack("<f", value))[0])
+    except OverflowError:
+        return math.copysign(math.inf, value)

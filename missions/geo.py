@@ -49,6 +49,8 @@ def parse_lat_lon(text: str) -> LatLon:
     """
     parts = text.split(",")
     try:
+        if "_" in text:  # which Python would read as a number's grouping
+            raise ValueError
         lat_deg, lon_deg = (float(part) for part in parts)
     except ValueError:
         raise InvalidPositionError(

@@ -1,0 +1,31 @@
+"""What all tests share: settings of hypothesis and the places of recorded data."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, settings
+
+_ROOT = Path(__file__).parents[1]
+
+# A fixed seed and no database: a run says the same today and tomorrow. `--hypothesis-profile=search` looks further.
+settings.register_profile(
+    "default", derandomize=True, database=None, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.register_profile(
+    "search", max_examples=2000, database=None, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile("default")
+
+
+@pytest.fixture(scope="session")
+def logs() -> Path:
+    """The recorded telemetry logs."""
+    return _ROOT / "sitl_logs"
+
+
+@pytest.fixture(scope="session")
+def fields() -> Path:
+    """The fence and mission files that the recordings were made with."""
+    return Path(__file__).parent / "fields"

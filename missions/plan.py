@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from shapely import LineString, Point
 
+from missions.drive_model import Envelope, envelope
 from missions.errors import (
     FenceMissingError,
     NoRouteError,
@@ -45,6 +46,8 @@ ROUNDING_RESERVE_M = 0.01
 MAX_FIELD_M = 100_000.0
 
 _SAMPLE_M = 50.0
+_TINY_LEG_M = 1.5
+_WIDER_M = (0.3, 0.1, 0.03)
 _WIDEST_TRIES = 40
 _WIDEST_SHARE = 0.97
 """What of the widest clearance a route keeps: round corners of the last millimetre would need a waypoint every half metre."""
@@ -69,7 +72,7 @@ class Plan:
         Promised for the rover as it drives; None where only drawn lines were asked for.
     drawn_clearance_m : float
         The least distance of the drawn lines, as rounded and as the autopilot draws them, to any fence (infinite without a fence near).
-    driven_clearance_m : float or None
+    driven_clearance_m : float
         The predicted least distance of the driven track.
     blocks : int
         Blocks of the partition that was searched.
@@ -77,6 +80,8 @@ class Plan:
         What was planned around.
     vehicle : Vehicle
         What was known of the vehicle.
+    envelope : Envelope
+        The band that the vehicle is foreseen to stay in, and its times.
     home : LatLon or None
         For the mission's home item.
     """
@@ -91,11 +96,12 @@ class Plan:
     duration_s: float
     clearance_m: float | None
     drawn_clearance_m: float
-    driven_clearance_m: float | None
+    driven_clearance_m: float
     blocks: int
     fence: Fence
     ground: Ground
     vehicle: Vehicle
+    envelope: Envelope
     home: LatLon | None
     warnings: tuple[str, ...]
 
@@ -142,7 +148,7 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
         promised_m = max(0.0, drawn_m - allowance_m)
     else:
         drawn_m = promised_m + allowance_m
-        route = find(clearance_m=drawn_m + reserve_m)
+        route = _sparse_route(ground, find, drawn_m + reserve_m)
     if route.lead_away:
         warnings.append(
             f"the start stands {route.start_clearance_m:.2f} m from a fence, nearer than {drawn_m:.2f} m: "
@@ -150,6 +156,14 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
         )
     path = _rounded_path(ground, route)
     clearance_m = _check(ground, path, route, drawn_m)
+    forecast = envelope(
+        ground.frame.to_local_array(path), vehicle, heading_deg=_heading_deg(situation, start)
+    )
+    driven_m = max(0.0, forecast.clearance_m(ground.edge))
+    if allowance_m and driven_m < promised_m - 0.005 and not route.lead_away:
+        warnings.append(
+            f"the drive model foresees {driven_m:.2f} m at the nearest while driving, less than the {promised_m:.2f} m promised by the rule of thumb"
+        )
     return Plan(
         items=tuple(waypoint(position) for position in path[1:]),
         path=path,
@@ -158,10 +172,11 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
         method=request.method,
         length_m=_length_m(path),
         straight_line_m=_length_m((start, *targets)),
-        duration_s=_length_m(path) / vehicle.speed_mps,
+        duration_s=forecast.duration_s,
         clearance_m=promised_m if allowance_m else None,
         drawn_clearance_m=clearance_m,
-        driven_clearance_m=None,
+        driven_clearance_m=driven_m,
+        envelope=forecast,
         blocks=route.blocks,
         fence=fence,
         ground=ground,
@@ -220,6 +235,12 @@ def _ends(situation: Situation, request: Request) -> tuple[LatLon, tuple[LatLon,
     return start, targets
 
 
+def _heading_deg(situation: Situation, start: LatLon) -> float | None:
+    """Give the vehicle's heading where the route starts from where it stands."""
+    pose = situation.pose
+    return pose.value.heading_deg if pose is not None and pose.value.position == start else None
+
+
 def _ground(fence: Fence, vehicle: Vehicle, home: LatLon | None, ends: Sequence[LatLon]) -> Ground:
     positions = [
         position
@@ -264,6 +285,26 @@ def _clearance(request: Request, vehicle: Vehicle) -> tuple[float, float, list[s
     named = {"FENCE_MARGIN": request.clearance_m is None, "WP_RADIUS": request.corner_allowance_m is None}
     warnings += [str(assumed) for assumed in vehicle.assumed if named.get(assumed.parameter)]
     return promised_m, allowance_m, warnings
+
+
+def _sparse_route(ground: Ground, find: Callable[..., Route], clearance_m: float) -> Route:
+    """Give the route at a clearance; where it winds round corners in tiny legs, one a little wider off with fewer waypoints."""
+    route = find(clearance_m=clearance_m)
+    for wider_m in _WIDER_M:
+        if not _has_tiny_legs(route):
+            break
+        try:
+            wider = find(clearance_m=clearance_m + wider_m)
+        except (NoRouteError, TargetBlockedError):
+            continue
+        if wider.lead_away == route.lead_away:
+            return simplified(ground, wider, clearance_m)
+    return route
+
+
+def _has_tiny_legs(route: Route) -> bool:
+    legs_m = np.hypot(*np.diff(route.points, axis=0).T)
+    return bool((legs_m[route.lead_away :] < _TINY_LEG_M).sum() > 1)
 
 
 def _widest_route(find: Callable[..., Route], clearance_m: float) -> tuple[Route, float]:

@@ -81,7 +81,7 @@ def draw_plan(plan: Plan, path: Path, *, track: Sequence[LatLon] = (), title: st
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     axes.set(xlim=view[:2], ylim=view[2:], aspect="equal", xlabel="east (m)", ylabel="north (m)")
-    axes.set_title(title or _title(plan), fontsize=11)
+    axes.set_title(title or _title(plan), fontsize=11, pad=26)
     _draw_ground(axes, plan, view)
     _draw_lines(axes, plan, track)
     _draw_scale(axes, view)

@@ -4,5 +4,6 @@ from __future__ import annotations
 
 from missions.drive_model.build import corner_forecast, envelope
 from missions.drive_model.envelope import Corner, Envelope, Leg
+from missions.drive_model.measured import beyond_measured
 
-__all__ = ["Corner", "Envelope", "Leg", "corner_forecast", "envelope"]
+__all__ = ["Corner", "Envelope", "Leg", "beyond_measured", "corner_forecast", "envelope"]

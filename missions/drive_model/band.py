@@ -73,10 +73,11 @@ def add_start(pieces: Pieces, route: Route, array: NDArray[np.float64], behind_m
         )
         return
     leg, stray = route.legs[0], route.strays[0]
-    back = _shifted(place, leg.direction, -behind_m)
-    pieces.add(
-        [place, *_beside(place, leg.direction, stray), *_beside(back, leg.direction, stray)], leg.band_m, 0
-    )
+    vertices = [place]
+    ahead_m = at_corner.swing_length_m(route.vehicle) if stray.widest_m >= NEGLIGIBLE_M else 0.0
+    for along_m in (-behind_m, ahead_m):
+        vertices += _beside(_shifted(place, leg.direction, along_m), leg.direction, stray)
+    pieces.add(vertices, leg.band_m, 0)
 
 
 def add_leg(pieces: Pieces, route: Route, number: int) -> None:
@@ -152,7 +153,10 @@ def _swing_hull(route: Route, number: int, path: list[tuple[Vector, Vector]]) ->
         radius_m = route.vehicle.waypoint_radius_m
         hull.append(_shifted(corner.places[0], route.legs[number].direction, -radius_m))
         hull.append(_shifted(corner.places[-1], after.direction, 2 * radius_m))
-    for along_m in (-corner.behind_m, after.profile.travelled_m(begin_s)):
+    ahead_m = after.profile.travelled_m(begin_s)
+    if corner.swing_m >= NEGLIGIBLE_M and not corner.pivots:
+        ahead_m = max(ahead_m, at_corner.swing_length_m(route.vehicle))
+    for along_m in (-corner.behind_m, ahead_m):
         hull += _beside(_shifted(after.start, after.direction, along_m), after.direction, stray)
     return hull
 

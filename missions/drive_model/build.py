@@ -10,8 +10,8 @@ import numpy as np
 from missions.drive_model import corner as at_corner
 from missions.drive_model.band import Pieces, add_corner, add_end, add_leg, add_start
 from missions.drive_model.envelope import Corner, Envelope, Leg
-from missions.drive_model.route import Route, Stray, plan_route
-from missions.errors import InvalidPositionError
+from missions.drive_model.route import SAME_PLACE_M, Route, Stray, plan_route
+from missions.errors import InvalidPositionError, VehicleError
 from missions.vehicle import Autopilot
 
 if TYPE_CHECKING:
@@ -57,8 +57,11 @@ def envelope(
     ------
     InvalidPositionError
         No points, or one that is not a pair of numbers.
+    VehicleError
+        A speed that is not positive, or not one for each leg.
     """
     array = _checked(points)
+    _check_speeds(speeds, len(array) - 1)
     start, behind_m = _start(array, vehicle, heading_deg)
     route = plan_route(array, vehicle, speeds, stops or {}, start)
     pieces = Pieces()
@@ -124,10 +127,20 @@ def _checked(points: ArrayLike) -> NDArray[np.float64]:
     return array
 
 
+def _check_speeds(speeds: Sequence[float | None] | None, legs: int) -> None:
+    if speeds is None:
+        return
+    if len(speeds) != legs:
+        raise VehicleError(f"a drive of {legs} legs needs as many speeds, not {len(speeds)}", legs=legs)
+    for number, speed_mps in enumerate(speeds):
+        if speed_mps is not None and not 0 < speed_mps < math.inf:
+            raise VehicleError(f"a speed of {speed_mps:g} m/s on leg {number} is none", leg=number)
+
+
 def _start(array: NDArray[np.float64], vehicle: Vehicle, heading_deg: float | None) -> tuple[Stray, float]:
     """Give the swing at the start, and how far behind its place it takes the rover."""
     steps = array - array[0]
-    far = np.flatnonzero(np.hypot(steps[:, 0], steps[:, 1]) > 0)
+    far = np.flatnonzero(np.hypot(steps[:, 0], steps[:, 1]) >= SAME_PLACE_M)
     if not len(far):
         return Stray(), 0.0
     if heading_deg is None:

@@ -36,6 +36,12 @@ SAME_PLACE_STRAY_M = 0.35
 SWING_PER_TURN_RADIUS = 2.45
 """How far a rover with steered wheels swings out where it turns right round, in turning radii (2.2 m at 0.9 m)."""
 
+SWING_LENGTHS = 2.5
+"""A swing is widest within so many turning radii along the next leg; only then it dies away."""
+
+NEAR_M = 3.0
+"""Corners nearer to one another than this are one turn to steered wheels."""
+
 SHORT_LEG_M = 5.0
 PIVOT_SWING_M = 0.7
 """How swings grow on short legs: by e^(-leg / 5 m) of 150 %, and of 0.7 m where it pivots."""
@@ -46,6 +52,9 @@ START_BEHIND_M = ((0.0, 0.0), (90.0, 0.0), (135.0, 0.3), (170.0, 1.4), (180.0, 3
 
 MEASURED_TURN_RADIUS_M = 0.9
 """Swings grow with the turning radius beyond this; below it they are taken as measured."""
+
+START_HOLD_S = 1.5
+"""A swing at the start begins to die away only then."""
 
 END_OVERRUN_M = 0.5
 STOP_LAG_S = 2.0
@@ -96,7 +105,7 @@ def blend(vehicle: Vehicle, before: LegProfile, after: LegProfile, turn_deg: flo
     reach_m = ramp.travelled_m(half_s)
     # On skid steer the turning radius does not count (AR_WPNav::set_turn_params).
     radius_m = vehicle.waypoint_radius_m
-    if not vehicle.can_pivot:
+    if vehicle.steering is Steering.ACKERMANN:
         radius_m = max(radius_m, vehicle.turn_radius_m)
     if 2 * reach_m * sine > radius_m:
         reach_m = radius_m / (2 * sine)
@@ -110,7 +119,7 @@ def corner_swing_m(vehicle: Vehicle, turn_deg: float, reach_m: float, shorter_le
     Steered wheels cannot follow a sharp blend; a blend that starts early gives room back. On short legs a rover is still swinging from
     one corner when the next begins.
     """
-    if vehicle.steering is Steering.SKID:
+    if vehicle.can_pivot:
         return 0.0
     radius_m = max(vehicle.turn_radius_m, MEASURED_TURN_RADIUS_M)
     short = math.exp(-shorter_leg_m / SHORT_LEG_M)
@@ -118,6 +127,11 @@ def corner_swing_m(vehicle: Vehicle, turn_deg: float, reach_m: float, shorter_le
     half_turn = math.sin(math.radians(abs(turn_deg)) / 2) ** 2
     exponent = 2.5 + 3.5 * float(early) * max(1 - 3 * short, 0.0)
     return float(SWING_PER_TURN_RADIUS * radius_m * half_turn**exponent * (1 + 1.5 * short))
+
+
+def swing_length_m(vehicle: Vehicle) -> float:
+    """Give how far along its next leg a rover comes before a swing is at its widest."""
+    return SWING_LENGTHS * max(vehicle.turn_radius_m, MEASURED_TURN_RADIUS_M)
 
 
 def pivot_swing_m(shorter_leg_m: float) -> float:
@@ -146,6 +160,11 @@ def is_bounded(vehicle: Vehicle, turn_deg: float, shorter_leg_m: float) -> bool:
     return vehicle.steering is Steering.SKID or not sharp
 
 
+def pivot_time_s(vehicle: Vehicle, turn_deg: float) -> float:
+    """Give how long a turn on the spot takes; a rate of 0 is no limit."""
+    return abs(turn_deg) / vehicle.pivot_rate_dps if vehicle.pivot_rate_dps > 0 else 0.0
+
+
 def may_pivot_or_cut(vehicle: Vehicle, turn_deg: float) -> bool:
     """Whether the corner is so near to the pivot angle that either may happen."""
     return vehicle.can_pivot and abs(abs(turn_deg) - vehicle.pivot_angle_deg) < PIVOT_DOUBT_DEG
@@ -157,7 +176,7 @@ def swing_time_s(swing_m: float, speed_mps: float) -> float:
 
 
 def _start(vehicle: Vehicle, error_deg: float, table: tuple[tuple[float, float], ...]) -> float:
-    if vehicle.steering is Steering.SKID:
+    if vehicle.can_pivot:
         return 0.0  # it pivots, or strays no farther than its band
     errors_deg, distances_m = zip(*table, strict=True)
     return (

@@ -154,7 +154,7 @@ class Route:
 
     def stray_at(self, leg: int, time_s: float) -> Stray:
         """Give what is left of earlier swings at a time since the leg's own start."""
-        middle_s = self.corners[leg - 1].blend.duration_s / 2 if leg else 0.0
+        middle_s = self.corners[leg - 1].blend.duration_s / 2 if leg else at_corner.START_HOLD_S
         return self.strays[leg].after(time_s - middle_s, self.vehicle.position_gain_per_s)
 
 
@@ -171,19 +171,22 @@ def plan_route(
         _leg(vehicle, before, after, None if speeds is None else speeds[after[0][0] - 1])
         for before, after in itertools.pairwise(groups)
     )
-    corners = tuple(
-        _corner(vehicle, group, before, after, stops)
-        for group, before, after in zip(groups[1:], legs, legs[1:], strict=False)
-    )
+    corners = []
+    turned_deg = 0.0
+    for group, before, after in zip(groups[1:], legs, legs[1:], strict=False):
+        turn_deg = _turn_deg(before.direction, after.direction)
+        near = before.profile.length_m < at_corner.NEAR_M
+        turned_deg = turned_deg + turn_deg if near else turn_deg
+        corners.append(_corner(vehicle, group, (before, after), (turn_deg, turned_deg), stops))
     strays = [start]
-    middle_s = 0.0
+    middle_s = at_corner.START_HOLD_S
     for leg, corner in zip(legs, corners, strict=False):
         passed_s = leg.profile.duration_s - middle_s - corner.blend.duration_s / 2
         middle_s = corner.blend.duration_s / 2
         left = strays[-1].after(passed_s, vehicle.position_gain_per_s)
         stray = left.turned(corner.turn_deg).swung(corner.turn_deg, corner.swing_m)
         strays.append(stray.widened(corner.stray_m))
-    return Route(vehicle, legs, corners, tuple(strays))
+    return Route(vehicle, legs, tuple(corners), tuple(strays))
 
 
 def _grouped(points: NDArray[np.float64]) -> list[list[tuple[int, Vector]]]:
@@ -214,11 +217,13 @@ def _leg(
 def _corner(
     vehicle: Vehicle,
     group: list[tuple[int, Vector]],
-    before: LegPlan,
-    after: LegPlan,
+    legs: tuple[LegPlan, LegPlan],
+    turns_deg: tuple[float, float],
     stops: Mapping[int, float],
 ) -> CornerPlan:
-    turn_deg = _turn_deg(before.direction, after.direction)
+    """Plan one corner; its turns are its own and that of all corners near before it together."""
+    before, after = legs
+    turn_deg = turns_deg[0]
     pivots = at_corner.pivots(vehicle, turn_deg)
     delay_s = sum(stops.get(number, 0.0) for number, _ in group)
     stopped = len(group) > 1 or any(number in stops for number, _ in group)
@@ -234,7 +239,9 @@ def _corner(
         behind_m = at_corner.start_behind_m(vehicle, turn_deg)
     else:
         blend = at_corner.blend(vehicle, before.profile, after.profile, turn_deg)
-        swing_m = at_corner.corner_swing_m(vehicle, turn_deg, blend.reach_m, shorter_m)
+        whole_deg = turns_deg[1] if turns_deg[1] * turn_deg > 0 else turn_deg
+        wider_deg = min(max(abs(turn_deg), abs(whole_deg)), 180.0)
+        swing_m = at_corner.corner_swing_m(vehicle, wider_deg, blend.reach_m, shorter_m)
         behind_m = swing_m / 4
     top_mps = min(before.profile.top_speed_mps, after.profile.top_speed_mps)
     ramps_s = (before.profile.ramp.duration_s + after.profile.ramp.duration_s) / 2
@@ -242,7 +249,7 @@ def _corner(
     if stopped or pivots:
         lost_s += at_corner.STOP_LAG_S
     if pivots:
-        lost_s += abs(turn_deg) / vehicle.pivot_rate_dps
+        lost_s += at_corner.pivot_time_s(vehicle, turn_deg)
     return CornerPlan(
         waypoint=group[-1][0],
         places=tuple(place for _, place in group),

@@ -52,7 +52,7 @@ def ardupilot_vehicle(read: ParameterReader, mav_type: int | None) -> Vehicle:
         turn_max_g=read.value("ATC_TURN_MAX_G", 0.6),
         accel_max_mps2=accel_max_mps2,
         jerk_mps3=read.value("WP_JERK", 0.0) or accel_max_mps2,
-        position_gain_per_s=read.value("PSC_POS_P", 0.2),
+        position_gain_per_s=read.value("PSC_POS_P", 0.2, least=0.01),
         pivot_angle_deg=read.value("WP_PIVOT_ANGLE", 60.0),
         pivot_rate_dps=read.value("WP_PIVOT_RATE", 60.0),
         steering=_steering(read),

@@ -23,14 +23,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from heapq import heappop, heappush
 from math import inf, sqrt
-
-from .partition.base import TOLERANCE_M
 from typing import TYPE_CHECKING
 
+from .partition.base import TOLERANCE_M
+
 if TYPE_CHECKING:
-    from .partition.slabs import Slabs
-    from .geometry import Point
     from collections.abc import Callable
+
+    from .geometry import Point
+    from .partition.slabs import Slabs
 
 __all__ = ["SearchResult", "shortest_path"]
 
@@ -101,12 +102,10 @@ class _Search:
 
     def __init__(self, slabs: Slabs, start: Point, goal: Point) -> None:
         self._slabs = slabs
-        vertices = slabs.vertices
-        self._x, self._y = vertices.x_list, vertices.y_list
-        self._prev, self._next = vertices.prev_list, vertices.next_list
+        self._fans = slabs.vertices.fans
         self._start_blocks = slabs.locate(start)
         self._goal_blocks = frozenset(slabs.locate(goal))
-        self._goal = goal
+        self._goal_x, self._goal_y = goal
         # One entry for each root: where it is, the length up to it, the root before, its vertex and turning side.
         self._root_x = [start[0]]
         self._root_y = [start[1]]
@@ -152,7 +151,7 @@ class _Search:
         heappush(self._queue, (f_m, self._ties, block, direction, root, low, high))
 
     def _push_goal(self, root: int) -> None:
-        east, north = self._goal[0] - self._root_x[root], self._goal[1] - self._root_y[root]
+        east, north = self._goal_x - self._root_x[root], self._goal_y - self._root_y[root]
         self._push(self._root_g[root] + sqrt(east * east + north * north), _GOAL, 0, root, 0.0, 0.0)
 
     def _begin(self) -> None:
@@ -172,29 +171,33 @@ class _Search:
 
     def _reach(self, root: int, vertex: int, side: int) -> None:
         """Queue a turn around a vertex that a root sees, if the vertex is tangent on that side."""
-        x, y = self._x[vertex], self._y[vertex]
+        x, y, before_east, before_north, after_east, after_north = self._fans[vertex]
         east, north = x - self._root_x[root], y - self._root_y[root]
-        before, after = self._prev[vertex], self._next[vertex]
         slack = _SLACK_M * (abs(east) + abs(north))
-        first = east * (self._y[before] - y) - north * (self._x[before] - x)
-        second = east * (self._y[after] - y) - north * (self._x[after] - x)
-        if side == _LEFT:
-            if first < -slack or second < -slack:
+        if side:  # to the left: both boundary neighbours must lie there
+            if (
+                east * before_north - north * before_east < -slack
+                or east * after_north - north * after_east < -slack
+            ):
                 return
-        elif first > slack or second > slack:
+        elif (
+            east * before_north - north * before_east > slack
+            or east * after_north - north * after_east > slack
+        ):
             return
         g_m = self._root_g[root] + sqrt(east * east + north * north)
         turn = 2 * vertex + side
-        if g_m >= self._best.get(turn, inf):
+        best = self._best
+        if g_m >= best.get(turn, inf) or g_m > best.get(turn ^ 1, inf) + _SLACK_M:
             return
-        self._best[turn] = g_m
+        best[turn] = g_m
         number = len(self._root_x)
         self._root_x.append(x)
         self._root_y.append(y)
         self._root_g.append(g_m)
         self._root_before.append(root)
         self._root_turn.append(turn)
-        east, north = self._goal[0] - x, self._goal[1] - y
+        east, north = self._goal_x - x, self._goal_y - y
         self._push(g_m + sqrt(east * east + north * north), _TURN, 0, number, 0.0, 0.0)
 
     def _turn_cones(self, root: int) -> list[Cone]:
@@ -205,11 +208,11 @@ class _Search:
         turn = self._root_turn[root]
         vertex, side = turn >> 1, turn & 1
         mirror = 1.0 if side == _LEFT else -1.0
-        x, y = self._x[vertex], self._y[vertex]
+        x, y, *neighbours = self._fans[vertex]
         before = self._root_before[root]
         east, north = x - self._root_x[before], mirror * (y - self._root_y[before])
-        edge = self._prev[vertex] if side == _LEFT else self._next[vertex]
-        edge_east, edge_north = self._x[edge] - x, mirror * (self._y[edge] - y)
+        edge_east, edge_north = neighbours[:2] if side == _LEFT else neighbours[2:]
+        edge_north *= mirror
         west_above, west_below, east_above, east_below = self._slabs.beside
         if side == _LEFT:  # turning left one faces what lies below an obstacle eastwards, above it westwards
             east_block, west_block = east_below[vertex], west_above[vertex]
@@ -225,10 +228,8 @@ class _Search:
 
         # Directions in the order of a left turn: east, up, west, down, east again.
         if east * edge_north <= north * edge_east and east * edge_east + north * edge_north > 0.0:
-            east, north = (
-                edge_east,
-                edge_north,
-            )  # the boundary goes straight on, or bends away within rounding
+            # The boundary goes straight on, or bends away within rounding.
+            east, north = edge_east, edge_north
         quarter = _quarter(east, north)
         last = _quarter(edge_east, edge_north)
         for _ in range(3):
@@ -252,7 +253,7 @@ class _Search:
     def _straight(self, root: int, vertex: int, *, upwards: bool) -> None:
         """Reach what stands on the line of a vertex, straight above or below it."""
         x, y = self._root_x[root], self._root_y[root]
-        goal_x, goal_y = self._goal
+        goal_x, goal_y = self._goal_x, self._goal_y
         west_above, west_below, east_above, east_below = self._slabs.beside
         if upwards:
             neighbour, sides, rise = self._slabs.above[vertex], (west_above, east_above), goal_y - y
@@ -268,15 +269,17 @@ class _Search:
             self._reach(root, neighbour, _LEFT)
             self._reach(root, neighbour, _RIGHT)
 
-    def _follow(self, root: int, cone: Cone) -> None:
+    def _follow(self, root: int, cone: Cone) -> None:  # noqa: C901, PLR0912 - the inner loop: calls would double its time
         """Follow a cone through blocks as long as there is one way on; queue the cones where it divides."""
         root_x, root_y = self._root_x[root], self._root_y[root]
-        goal_x, goal_y = self._goal
+        goal_x, goal_y = self._goal_x, self._goal_y
         block, direction, low, high = cone
         portals = self._slabs.ways[direction]
         # Looking east the turn around a portal's low end is to the right; looking west it is to the left.
         low_side, high_side = (_RIGHT, _LEFT) if direction == _EAST else (_LEFT, _RIGHT)
-        ways: list[tuple[float, float, float, float, float, int]] = []
+        ways: list[tuple[PortalView, float, float]] = []
+        steps = 0
+        queue = self._queue
         while True:
             if block in self._goal_blocks:
                 run = abs(goal_x - root_x)
@@ -288,34 +291,62 @@ class _Search:
                 if seen:
                     self._push_goal(root)
             ways.clear()
-            for x, portal_low, portal_high, low_end, high_end, behind in portals[block]:
+            for way in portals[block]:
+                x, portal_low, portal_high, low_end, high_end, behind = way
                 run = x - root_x if direction else root_x - x
                 if run <= 0.0:
                     continue
-                ray_low, ray_high = low * run, high * run
                 rise_low, rise_high = portal_low - root_y, portal_high - root_y
-                if ray_low > rise_high + _SLACK_M or ray_high < rise_low - _SLACK_M:
+                ray_low, ray_high = low * run - _SLACK_M, high * run + _SLACK_M
+                if ray_low > rise_high or ray_high < rise_low:
                     continue
                 new_low, new_high = low, high
-                if low_end != -1 and rise_low >= ray_low - _SLACK_M:
+                if low_end != -1 and rise_low >= ray_low:
                     if low_end >= 0:
                         self._reach(root, low_end, low_side)
-                    new_low = max(low, rise_low / run)
-                if high_end != -1 and rise_high <= ray_high + _SLACK_M:
+                    slope = rise_low / run
+                    if slope > low:
+                        new_low = slope
+                if high_end != -1 and rise_high <= ray_high:
                     if high_end >= 0:
                         self._reach(root, high_end, high_side)
-                    new_high = min(high, rise_high / run)
+                    slope = rise_high / run
+                    if slope < high:
+                        new_high = slope
                 if new_low <= new_high:
-                    ways.append((x, portal_low, portal_high, new_low, new_high, behind))
+                    ways.append((way, new_low, new_high))
             if len(ways) != 1:
                 break
-            _, _, _, low, high, block = ways[0]
-        for x, portal_low, portal_high, new_low, new_high, behind in ways:
-            run = abs(x - root_x)
-            seen_low = max(portal_low, root_y + new_low * run)
-            seen_high = min(portal_high, root_y + new_high * run)
-            f_m = self._root_g[root] + _least_detour(root_x, root_y, goal_x, goal_y, x, seen_low, seen_high)
-            self._push(f_m, behind, direction, root, new_low, new_high)
+            way, low, high = ways[0]
+            block = way[5]
+            steps += 1
+            # Looking at the bound now and then keeps a cone from running far ahead of better ones.
+            if steps % 8 == 0 and queue and self._bound(root, way, low, high) > queue[0][0]:
+                break
+        for way, new_low, new_high in ways:
+            self._push(self._bound(root, way, new_low, new_high), way[5], direction, root, new_low, new_high)
+
+    def _bound(self, root: int, way: PortalView, low: float, high: float) -> float:
+        """Return the f-value of a cone on a portal: no path by way of both is shorter.
+
+        A goal on the root's side of the portal is mirrored: the way there and back is as long as to the mirror image.
+        """
+        x, portal_low, portal_high, *_ = way
+        root_x, root_y = self._root_x[root], self._root_y[root]
+        run, beyond = abs(x - root_x), abs(self._goal_x - x)
+        rise = self._goal_y - root_y
+        total = run + beyond
+        # Where the straight line crosses the portal's line, in proportion to the distances.
+        cross = rise * run / total
+        seen_low, seen_high = max(portal_low - root_y, low * run), min(portal_high - root_y, high * run)
+        if cross < seen_low:
+            cross = seen_low
+        elif cross > seen_high:
+            cross = seen_high
+        else:
+            return self._root_g[root] + sqrt(total * total + rise * rise)
+        rest = rise - cross
+        return self._root_g[root] + sqrt(run * run + cross * cross) + sqrt(beyond * beyond + rest * rest)
 
 
 def _quarter(east: float, north: float) -> int:
@@ -325,26 +356,3 @@ def _quarter(east: float, north: float) -> int:
     if east < 0.0:
         return 2
     return 1 if north > 0.0 else 3
-
-
-def _least_detour(
-    root_x: float, root_y: float, goal_x: float, goal_y: float, x: float, low: float, high: float
-) -> float:
-    """Return the length of the shortest way from a root through a vertical portal to the goal.
-
-    A goal on the root's side of the portal is mirrored: the way there and back is as long as to the mirror image.
-    """
-    to_portal = abs(x - root_x)
-    beyond = abs(goal_x - x)
-    # Where the straight line crosses the portal's line, in proportion to the distances.
-    total = to_portal + beyond
-    cross = root_y + (goal_y - root_y) * to_portal / total if total > 0.0 else root_y
-    if cross < low:
-        cross = low
-    elif cross > high:
-        cross = high
-    else:
-        rise = goal_y - root_y
-        return sqrt(total * total + rise * rise)
-    first, second = cross - root_y, goal_y - cross
-    return sqrt(to_portal * to_portal + first * first) + sqrt(beyond * beyond + second * second)

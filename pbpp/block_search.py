@@ -10,14 +10,15 @@ from __future__ import annotations
 
 from heapq import heappop, heappush
 from math import inf, sqrt
-from typing import Literal, TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from .errors import SearchStoppedError
 from .geometry import Point
 
 if TYPE_CHECKING:
-    from .partition.base import Partition
     from collections.abc import Callable
+
+    from .partition.base import Partition
 
 __all__ = ["BlockGraph", "Crossing", "block_sequence"]
 

@@ -7,10 +7,13 @@ keeps the distance, but its simplifications of the input can come nearer than as
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import numpy.typing as npt
 import shapely
-from typing import TYPE_CHECKING
+
+from .errors import InvalidGeometryError
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
@@ -47,6 +50,11 @@ def grow(geometries: Geometries, clearance_m: float, *, rounded: bool = False) -
     -------
     (n,) array of shapely geometry
         The grown obstacles.
+
+    Raises
+    ------
+    InvalidGeometryError
+        If an offset stays too near after several attempts.
     """
     segments, excess = _rounding(clearance_m) if rounded else (0, 1.0)
     reach_m = np.full(len(geometries), clearance_m * excess + _PAD_M)
@@ -58,6 +66,10 @@ def grow(geometries: Geometries, clearance_m: float, *, rounded: bool = False) -
             break
         reach_m[short] += 1.5 * lack_m[short]
         grown[short] = _offset(geometries[short], reach_m[short], segments)
+    else:
+        raise InvalidGeometryError(
+            f"an obstacle cannot be grown by {clearance_m:g} m: its offset stays too near"
+        )
     return grown
 
 
@@ -77,17 +89,24 @@ def shrink(area: BaseGeometry, clearance_m: float, *, rounded: bool = False) -> 
     -------
     shapely geometry
         The part, maybe empty.
+
+    Raises
+    ------
+    InvalidGeometryError
+        If the offset stays too near after several attempts.
     """
     boundary = shapely.boundary(area)
     segments, excess = _rounding(clearance_m) if rounded else (0, 1.0)
     reach_m = np.array([clearance_m * excess + _PAD_M])
     for _ in range(_ATTEMPTS):
-        shrunk = _offset(np.array([area], dtype=object), -reach_m, segments)[0]
+        shrunk: BaseGeometry = _offset(np.array([area], dtype=object), -reach_m, segments)[0]
         lack_m = clearance_m + 0.5 * _PAD_M - shapely.distance(shrunk, boundary)
         if shrunk.is_empty or lack_m <= 0.0:
-            break
+            return shrunk
         reach_m += 1.5 * lack_m
-    return shrunk
+    raise InvalidGeometryError(
+        f"an inclusion cannot be shrunk by {clearance_m:g} m: its offset stays too near"
+    )
 
 
 def _rounding(clearance_m: float) -> tuple[int, float]:

@@ -4,22 +4,27 @@ from __future__ import annotations
 
 from functools import cached_property
 from math import inf
+from typing import TYPE_CHECKING
 
 import shapely
 
 from .block_search import BlockGraph
+from .errors import InvalidGeometryError
 from .free_space import Scene, build_free_space
 from .partition.blocks import Blocks
 from .partition.slabs import Slabs
-from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .geometry import Point
-    from .errors import GoalBlockedError, StartBlockedError
-    from .clearance import Geometries
     from collections.abc import Sequence
 
+    from .clearance import Geometries
+    from .errors import GoalBlockedError, StartBlockedError
+    from .geometry import Point
+
 __all__ = ["BOUNDARY_TOLERANCE_M", "Field"]
+
+_AREA_SLACK = 1e-9
+_AREA_SLACK_M = 1e-8
 
 BOUNDARY_TOLERANCE_M = 1e-7
 """A start or goal this near to free space counts as on its boundary."""
@@ -57,8 +62,21 @@ class Field:
 
     @cached_property
     def slabs(self) -> Slabs:
-        """The slab partition."""
-        return Slabs(self.free.polygons)
+        """The slab partition, its area checked against that of free space.
+
+        Raises
+        ------
+        InvalidGeometryError
+            If the two differ by more than rounding.
+        """
+        slabs = Slabs(self.free.polygons)
+        area_m2 = float(shapely.area(self.free.geometry))
+        slack_m2 = _AREA_SLACK * area_m2 + _AREA_SLACK_M * float(shapely.length(self.free.geometry))
+        if abs(slabs.area_m2 - area_m2) > slack_m2:
+            raise InvalidGeometryError(
+                f"the blocks cover {slabs.area_m2!r} m² of {area_m2!r} m² of free space"
+            )
+        return slabs
 
     @cached_property
     def blocks(self) -> Blocks:

@@ -7,13 +7,13 @@ form with two scalars for the sides by Mononen).
 
 from __future__ import annotations
 
-
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .geometry import Point
-    from .block_search import Crossing
     from collections.abc import Sequence
+
+    from .block_search import Crossing
+    from .geometry import Point
 
 __all__ = ["taut_path"]
 

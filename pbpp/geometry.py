@@ -7,7 +7,7 @@ encloses. A ring without area is a wall: it matters as soon as there is a cleara
 
 from __future__ import annotations
 
-from typing import Any, TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,8 +17,9 @@ from shapely.geometry import GeometryCollection, MultiPolygon, Polygon
 from .errors import InvalidGeometryError
 
 if TYPE_CHECKING:
-    from shapely.geometry.base import BaseGeometry
     from collections.abc import Sequence
+
+    from shapely.geometry.base import BaseGeometry
 
 __all__ = ["Floats", "Point", "Ring", "circle_ring", "parse_point", "parse_rings", "polygons_only"]
 
@@ -125,10 +126,10 @@ def parse_rings(rings: Sequence[Ring], kind: str) -> list[BaseGeometry]:
             raise InvalidGeometryError(
                 f"{kind} {index} has a coordinate that is not a finite number", (kind, index)
             )
-        polygons = shapely.polygons(shapely.linearrings(points, indices=owner))
-        for place, polygon in zip(places, polygons, strict=True):
+        polygons = np.asarray(shapely.polygons(shapely.linearrings(points, indices=owner)), dtype=object)
+        for place, polygon in zip(places, polygons.tolist(), strict=True):
             found[place] = polygon
-    for index in np.flatnonzero(~shapely.is_valid(found)):
+    for index in np.flatnonzero(~shapely.is_valid(found)).tolist():
         found[index] = _repaired(found[index], kind)
     return found
 

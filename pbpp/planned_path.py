@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import itertools
-
 
 if TYPE_CHECKING:
-    from .geometry import Floats
     from .field import Field
+    from .geometry import Floats
 
 __all__ = ["Drawing", "PlannedPath", "length_of", "straightened"]
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import dist, isfinite
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -20,11 +21,11 @@ from .geometry import Point, Ring, parse_point
 from .planned_path import Drawing, PlannedPath, length_of, straightened
 from .three_cases import crossing_point
 from .widest import WidestWay, widest_in
-from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .clearance import Geometries
     from shapely.geometry import MultiPolygon
+
+    from .clearance import Geometries
 
 __all__ = ["Planner", "plan_path"]
 
@@ -167,7 +168,9 @@ class Planner:
     def _changed(self, scene: Scene, grown: Geometries) -> Planner:
         changed = Planner.__new__(Planner)
         field = Field(scene, self._clearance_m, grown=grown)
-        changed._setup(scene, self._clearance_m, self._partition, field)
+        changed._setup(  # noqa: SLF001 - one of our own
+            scene, self._clearance_m, self._partition, field
+        )
         return changed
 
     @property

@@ -15,12 +15,11 @@ edge shorter than two radii has no such point; it is crossed in its middle, and 
 from __future__ import annotations
 
 from math import sqrt
-
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .geometry import Point
     from .block_search import Crossing
+    from .geometry import Point
 
 __all__ = ["crossing_point", "passable"]
 

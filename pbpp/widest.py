@@ -7,6 +7,7 @@ corners, so where it says "not connected" the round one is asked: the answer is 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -19,11 +20,11 @@ from .errors import GoalBlockedError, NoPathError, StartBlockedError
 from .field import BOUNDARY_TOLERANCE_M, Field
 from .free_space import Scene, parse_scene
 from .geometry import Floats, Point, Ring, parse_point
-from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from shapely.geometry.base import BaseGeometry
     from collections.abc import Callable, Sequence
+
+    from shapely.geometry.base import BaseGeometry
 
 __all__ = ["WidestWay", "widest"]
 
@@ -171,13 +172,15 @@ def _closed_piece(path: LineString, parted: Field) -> LineString:
     """Return the piece of a path that leads from one component to another where they have come apart."""
     outside = shapely.difference(path, shapely.buffer(parted.free.geometry, _SAME_PLACE_M))
     pieces = sorted(shapely.get_parts(outside), key=shapely.length, reverse=True)
+    piece: LineString
     for piece in pieces:
         first, last = (
-            parted.free.components_at(tuple(piece.coords[end]), 10.0 * _SAME_PLACE_M) for end in (0, -1)
+            parted.free.components_at((east, north), 10.0 * _SAME_PLACE_M)
+            for east, north in shapely.get_coordinates(piece)[[0, -1]].tolist()
         )
         if not first & last:
             return piece
-    return pieces[0] if pieces else path
+    return path
 
 
 @dataclass(frozen=True)
@@ -203,10 +206,9 @@ def _facing_points(lines: npt.NDArray[np.object_], piece: LineString) -> _Facing
             )
             if found is not None and (best is None or found[0] < best[0]):
                 best = (found[0], share, found[1])
-        if best is None:
-            raise NoPathError(0.0)
-        step = (high - low) / (_SAMPLES - 1)
-        low, high = max(best[1] - step, 0.0), min(best[1] + step, 1.0)
+        step, middle = (high - low) / (_SAMPLES - 1), best[1] if best is not None else 0.5
+        low, high = max(middle - step, 0.0), min(middle + step, 1.0)
+    assert best is not None, "a closed gap has two sides"
     return best[2]
 
 

@@ -14,6 +14,7 @@ So the blocks of one slab are what the horizontal lines HL that cross it leave, 
 from __future__ import annotations
 
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
@@ -22,13 +23,15 @@ from pbpp.errors import TooManyBlocksError
 
 from .base import TOLERANCE_M, Portals
 from .slabs import Slabs
-from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .vertices import Ints
-    from pbpp.geometry import Floats, Point
-    from shapely.geometry import Polygon
     from collections.abc import Sequence
+
+    from shapely.geometry import Polygon
+
+    from pbpp.geometry import Floats, Point
+
+    from .vertices import Ints
 
 __all__ = ["MAX_BLOCKS", "Blocks"]
 

@@ -12,19 +12,20 @@ linked anew, so that each of its free fans is a vertex of its own.
 from __future__ import annotations
 
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
-
 
 from .base import TOLERANCE_M, Portals
 from .sweep import Sweep
 from .vertices import Ints, Vertices
-from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from shapely.geometry import Polygon
-    from pbpp.geometry import Floats, Point
     from collections.abc import Sequence
+
+    from shapely.geometry import Polygon
+
+    from pbpp.geometry import Floats, Point
 
 __all__ = ["Slabs"]
 

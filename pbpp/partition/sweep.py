@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from pbpp.errors import InvalidGeometryError
 
 from .base import TOLERANCE_M
-from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .vertices import Vertices
@@ -61,8 +62,8 @@ class Sweep:
         self._out: list[int] = ((east > 0.0).astype(int) - (east < 0.0)).tolist()
         self._end: list[int] = [i if ok else DULL_END for i, ok in enumerate(v.corner.tolist())]
         self._active: list[_Slot] = []
-        self._by_floor: dict[int, _Slot] = {}
-        self._by_ceiling: dict[int, _Slot] = {}
+        self._by_floor: list[_Slot] = [[]] * count
+        self._by_ceiling: list[_Slot] = [[]] * count
 
         self.floor: list[int] = []
         self.ceiling: list[int] = []
@@ -82,9 +83,105 @@ class Sweep:
         starts = self._vertices.line_start.tolist()
         order = self._vertices.order.tolist()
         for x, first, last in zip(self._vertices.line_x.tolist(), starts, starts[1:], strict=False):
-            self._line(x, order[first:last])
+            if last - first == 1:
+                self._vertex(x, order[first])
+            else:
+                self._line(x, order[first:last])
         if self._active:
             raise InvalidGeometryError("free space is not closed: its rings do not fit together")
+
+    def _new_block(self, x: float, floor: int, ceiling: int) -> int:
+        block = len(self.west)
+        self.west.append(x)
+        self.east.append(x)
+        self.floor.append(floor)
+        self.ceiling.append(ceiling)
+        self.ways[0].append([])
+        self.ways[1].append([])
+        return block
+
+    def _new_portal(
+        self, portal: tuple[float, float, float], ends: tuple[int, int], west: int, east: int
+    ) -> None:
+        x, low, high = portal
+        if high - low > TOLERANCE_M:
+            self.portals.append((x, low, high, west, east))
+            self.ways[1][west].append((x, low, high, ends[0], ends[1], east))
+            self.ways[0][east].append((x, low, high, ends[0], ends[1], west))
+
+    def _vertex(self, x: float, vertex: int) -> None:
+        """Do what `_line` does for a line with one vertex, by far the most frequent one."""
+        before = self._prev[vertex]
+        leaves, arrives = self._out[vertex], self._out[before]
+        if leaves == arrives:
+            self._bend(x, vertex, before, floor=leaves > 0)
+        elif leaves > 0:
+            if self._slope[vertex] > self._slope[before]:
+                self._divide(x, vertex, before)
+            else:
+                slot = [vertex, before, self._new_block(x, vertex, before)]
+                self._by_floor[vertex] = self._by_ceiling[before] = slot
+                self._active.insert(self._find(x, self._y[vertex]), slot)
+        elif self._by_ceiling[vertex] is self._by_floor[before]:
+            slot = self._by_ceiling[vertex]
+            self.east[slot[2]] = x
+            del self._active[self._index(slot, x)]
+        else:
+            self._unite(x, vertex, before)
+
+    def _bend(self, x: float, vertex: int, before: int, *, floor: bool) -> None:
+        """Go on where a floor or a ceiling bends."""
+        y, end = self._y[vertex], self._end[vertex]
+        slot = self._by_floor[before] if floor else self._by_ceiling[vertex]
+        west = slot[2]
+        self.east[west] = x
+        if floor:
+            slot[0] = vertex
+            self._by_floor[vertex] = slot
+        else:
+            slot[1] = before
+            self._by_ceiling[before] = slot
+        slot[2] = east = self._new_block(x, slot[0], slot[1])
+        if floor:
+            self._new_portal((x, y, self._north(slot[1], x)), (end, OPEN_END), west, east)
+            self.west_above[vertex], self.east_above[vertex] = west, east
+        else:
+            self._new_portal((x, self._north(slot[0], x), y), (OPEN_END, end), west, east)
+            self.west_below[vertex], self.east_below[vertex] = west, east
+
+    def _divide(self, x: float, vertex: int, before: int) -> None:
+        """Split a block where an obstacle begins."""
+        y, end = self._y[vertex], self._end[vertex]
+        place = self._find(x, y)
+        slot = self._active[place]
+        floor, ceiling, west = slot
+        self.east[west] = x
+        lower, upper = self._new_block(x, floor, before), self._new_block(x, vertex, ceiling)
+        slot[1:] = before, lower
+        self._by_ceiling[before] = slot
+        above = [vertex, ceiling, upper]
+        self._by_floor[vertex] = self._by_ceiling[ceiling] = above
+        self._active.insert(place + 1, above)
+        self._new_portal((x, self._north(floor, x), y), (OPEN_END, end), west, lower)
+        self._new_portal((x, y, self._north(ceiling, x)), (end, OPEN_END), west, upper)
+        self.west_above[vertex] = self.west_below[vertex] = west
+        self.east_above[vertex], self.east_below[vertex] = upper, lower
+
+    def _unite(self, x: float, vertex: int, before: int) -> None:
+        """Join two blocks where the obstacle between them ends."""
+        y, end = self._y[vertex], self._end[vertex]
+        below, above = self._by_ceiling[vertex], self._by_floor[before]
+        floor, _, lower = below
+        _, ceiling, upper = above
+        self.east[lower] = self.east[upper] = x
+        del self._active[self._index(above, x)]
+        east = self._new_block(x, floor, ceiling)
+        below[1:] = ceiling, east
+        self._by_ceiling[ceiling] = below
+        self._new_portal((x, self._north(floor, x), y), (OPEN_END, end), lower, east)
+        self._new_portal((x, y, self._north(ceiling, x)), (end, OPEN_END), upper, east)
+        self.west_above[vertex], self.west_below[vertex] = upper, lower
+        self.east_above[vertex] = self.east_below[vertex] = east
 
     def _line(self, x: float, there: list[int]) -> None:
         """Close the blocks that end on a line, open those that begin, and join them by portals."""
@@ -194,13 +291,7 @@ class Sweep:
         for (low, _, floor, low_vertex), (high, _, ceiling, high_vertex) in zip(
             floors, ceilings, strict=True
         ):
-            block = len(self.west)
-            self.west.append(x)
-            self.east.append(x)
-            self.floor.append(floor)
-            self.ceiling.append(ceiling)
-            self.ways[0].append([])
-            self.ways[1].append([])
+            block = self._new_block(x, floor, ceiling)
             slot = [floor, ceiling, block]
             self._by_floor[floor] = slot
             self._by_ceiling[ceiling] = slot
@@ -242,14 +333,11 @@ class Sweep:
             )
             if left_high == right_high and high_vertex < 0:
                 high_vertex = left_high_vertex
-            if high - low > TOLERANCE_M:
-                low_end = self._end[low_vertex] if low_vertex >= 0 else OPEN_END
-                high_end = self._end[high_vertex] if high_vertex >= 0 else OPEN_END
-                if OPEN_END not in (low_end, high_end):
-                    self.above[low_vertex], self.below[high_vertex] = high_end, low_end
-                self.portals.append((x, low, high, west, east))
-                self.ways[1][west].append((x, low, high, low_end, high_end, east))
-                self.ways[0][east].append((x, low, high, low_end, high_end, west))
+            low_end = self._end[low_vertex] if low_vertex >= 0 else OPEN_END
+            high_end = self._end[high_vertex] if high_vertex >= 0 else OPEN_END
+            self._new_portal((x, low, high), (low_end, high_end), west, east)
+            if high - low > TOLERANCE_M and OPEN_END not in {low_end, high_end}:
+                self.above[low_vertex], self.below[high_vertex] = high_end, low_end
             if left_high < right_high:
                 i += 1
             else:

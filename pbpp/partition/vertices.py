@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 import shapely
 
-
 from .base import TOLERANCE_M
-from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from pbpp.geometry import Floats
-    from shapely.geometry import Polygon
     from collections.abc import Sequence
+
+    from shapely.geometry import Polygon
+
+    from pbpp.geometry import Floats
 
 __all__ = ["Ints", "Vertices"]
 
@@ -67,28 +68,11 @@ class Vertices:
         self.corner = self._corners()
 
     @cached_property
-    def x_list(self) -> list[float]:
-        """East of each vertex in metres, that of its line."""
-        values: list[float] = self.x.tolist()
-        return values
-
-    @cached_property
-    def y_list(self) -> list[float]:
-        """North of each vertex in metres."""
-        values: list[float] = self.y.tolist()
-        return values
-
-    @cached_property
-    def prev_list(self) -> list[int]:
-        """The vertex before each one."""
-        values: list[int] = self.prev.tolist()
-        return values
-
-    @cached_property
-    def next_list(self) -> list[int]:
-        """The vertex after each one."""
-        values: list[int] = self.next.tolist()
-        return values
+    def fans(self) -> list[tuple[float, float, float, float, float, float]]:
+        """Of each vertex east and north, and the way to the vertex before it and to the one after it, in metres."""
+        x, y, before, after = self.x, self.y, self.prev, self.next
+        columns = (x, y, x[before] - x, y[before] - y, x[after] - x, y[after] - y)
+        return list(zip(*(column.tolist() for column in columns), strict=True))
 
     def _split_pinches(self) -> None:
         """Link the edges at a point shared by several rings so that each free fan there is one vertex."""

@@ -25,6 +25,15 @@ _FENCE_FRAMES = (*_RELATIVE_FRAMES, *_TERRAIN_FRAMES, CoordinateFrame.GLOBAL, Co
 _NAN_IN_PARAM4 = (Command.NAV_WAYPOINT, Command.NAV_LAND, Command.NAV_TAKEOFF)
 _FENCE_VERTICES = (Command.FENCE_POLYGON_VERTEX_INCLUSION, Command.FENCE_POLYGON_VERTEX_EXCLUSION)
 _FENCE_CIRCLES = (Command.FENCE_CIRCLE_INCLUSION, Command.FENCE_CIRCLE_EXCLUSION)
+_STORED_AS: dict[int, int] = {
+    Command.FENCE_POLYGON_VERTEX_INCLUSION: 98,
+    Command.FENCE_POLYGON_VERTEX_EXCLUSION: 97,
+    Command.FENCE_RETURN_POINT: 95,
+    Command.FENCE_CIRCLE_EXCLUSION: 93,
+    Command.FENCE_CIRCLE_INCLUSION: 92,
+}
+"""The numbers by which ArduPilot's texts name fence items (AC_PolyFence_loader; not measured)."""
+
 _RESULT_OF_PARAM = (
     MissionResult.INVALID_PARAM1,
     MissionResult.INVALID_PARAM2,
@@ -162,12 +171,12 @@ def fence_problem(items: list[MissionItem]) -> str | None:
             if expected == 0:
                 expected, of_count, of_command = count, count, item.command
             elif item.command != of_command:
-                return f"Received incorrect vertex type (want={of_command} got={item.command})"
+                return f"Received incorrect vertex type (want={_STORED_AS[of_command]} got={_STORED_AS[item.command]})"
             elif count != of_count:
                 return f"Unexpected vertex count want={of_count} got={count}"
             expected -= 1
         elif expected:
-            return f"Received incorrect type (want={of_command} got={item.command})"
+            return f"Received incorrect type (want={_STORED_AS[of_command]} got={_STORED_AS[item.command]})"
         elif item.command in _FENCE_CIRCLES:
             if not item.params[0] > 0:
                 return "Non-positive circle radius"

@@ -29,7 +29,7 @@ _RIVAL_AGAIN_S = 1.0
 _REFUSALS_BELIEVED = 3
 _OUT_OF_ORDER = (MissionResult.ERROR, MissionResult.INVALID_SEQUENCE)
 _OVERTAKEN_BY = 3
-_FLOAT_FORM_AFTER_S = 4.0
+_FLOAT_FORM_AFTER_S = 6.0
 _LEAST_OVERDUE_S = 0.15
 _MOST_OVERDUE_S = 2.0
 
@@ -83,6 +83,8 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         How long another ground station may keep the list busy.
     round_trip : RoundTrip, optional
         What is known of the link from transfers before.
+    float_form : bool
+        Whether a vehicle that answers no MISSION_REQUEST_INT is asked by the old MISSION_REQUEST, which gives coarse positions.
     """
 
     def __init__(
@@ -93,6 +95,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         window: int = WINDOW,
         rival_patience_s: float = RIVAL_PATIENCE_S,
         round_trip: RoundTrip | None = None,
+        float_form: bool = True,
     ) -> None:
         super().__init__(DOWNLOAD, DownloadState.IDLE)
         self._peer = peer
@@ -112,8 +115,9 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         self._checks = 0
         self._checked_s = -math.inf
         self._result: MissionResult | None = None
+        self._may_use_floats = float_form
         self._float_form = False
-        self._coarse_items = 0
+        self._coarse_seqs: set[int] = set()
         self._heard_s = 0.0
         self._fetching_since_s = 0.0
         self._act_at_s = 0.0
@@ -131,7 +135,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
             else ()
         )
         result = self._result if self.state is DownloadState.REFUSED else None
-        return DownloadOutcome(self.state, items, result, self._coarse_items > 0)
+        return DownloadOutcome(self.state, items, result, bool(self._coarse_seqs))
 
     @property
     def progress(self) -> tuple[int, int]:
@@ -224,6 +228,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
     def _forget_items(self) -> None:
         self._items.clear()
         self._in_flight.clear()
+        self._coarse_seqs.clear()
         self._next = 0
 
     def _take_item(self, message: messages.MissionItemInt | messages.MissionItem, now_s: float) -> None:
@@ -235,10 +240,15 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
             self._newest_answered = max(self._newest_answered, request.order)
             if not request.is_repeat:
                 self._round_trip.observe(now_s - request.sent_s)
+        if isinstance(message, messages.MissionItemInt):
+            self._forget_coarse(now_s)
+        elif not self._may_use_floats:
+            return
         if message.seq in self._items:
             return
         self._items[message.seq] = item_from_message(message)
-        self._coarse_items += isinstance(message, messages.MissionItem)
+        if isinstance(message, messages.MissionItem):
+            self._coarse_seqs.add(message.seq)
         self._window = min(self._window + 1.0, self._most_in_flight)
         if len(self._items) == self._count:
             self._move(DownloadEvent.ALL_ITEMS)
@@ -246,6 +256,14 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
             return
         self._repeat_overtaken(now_s)
         self._fill_window(now_s)
+
+    def _forget_coarse(self, now_s: float) -> None:
+        """Use the exact form from now on: the vehicle knows it."""
+        self._may_use_floats = self._float_form = False
+        coarse, self._coarse_seqs = sorted(self._coarse_seqs), set()
+        for seq in coarse:
+            del self._items[seq]
+            self._request(seq, now_s, is_repeat=True)
 
     def _take_ack(self, result_number: int, now_s: float) -> None:
         result = mission_result(result_number)
@@ -311,8 +329,8 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
     def _repeat_overdue(self, now_s: float) -> None:
         if now_s < self._overdue_at_s():
             return
-        if not self._items and now_s >= self._fetching_since_s + _FLOAT_FORM_AFTER_S:
-            self._float_form = True  # old vehicles answer only the old request
+        if self._may_use_floats and not self._items and now_s >= self._fetching_since_s + _FLOAT_FORM_AFTER_S:
+            self._float_form = not self._float_form  # old vehicles answer only the old request
         self._window = max(self._window / 2, min(5.0, self._most_in_flight))
         overdue_s = self._round_trip.timeout_s(_LEAST_OVERDUE_S, _MOST_OVERDUE_S)
         overdue = [seq for seq, request in self._in_flight.items() if now_s >= request.sent_s + overdue_s]

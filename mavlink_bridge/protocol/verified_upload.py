@@ -85,6 +85,8 @@ class VerifiedUploadOutcome:
         The list as last read; None if nothing was read after the upload began.
     pushes : int
         How often the list was sent; 0: it was there already, or nothing was written.
+    is_coarse : bool
+        The vehicle gives positions as 32-bit floats only: what is there is known to about 1 m.
     """
 
     kind: OutcomeKind
@@ -97,6 +99,7 @@ class VerifiedUploadOutcome:
     backup: tuple[MissionItem, ...] | None = None
     found: tuple[MissionItem, ...] | None = None
     pushes: int = 0
+    is_coarse: bool = False
 
     @property
     def is_verified(self) -> bool:
@@ -156,6 +159,7 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         self._old: tuple[MissionItem, ...] | None = None
         self._found: tuple[MissionItem, ...] | None = None
         self._is_coarse = False
+        self._may_be_coarse = True
         self._read_before: tuple[MissionItem, ...] | None = None
         self._pushed: UploadOutcome | None = None
         self._pushed_before: UploadOutcome | None = None
@@ -202,6 +206,7 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
             backup=self._old,
             found=found,
             pushes=self._pushes,
+            is_coarse=self._is_coarse,
         )
 
     @property
@@ -298,6 +303,7 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
             self._mission_type,
             rival_patience_s=self._rival_patience_s,
             round_trip=self._round_trip,
+            float_form=self._may_be_coarse,
         )
         self._download.start(now_s)
         self._advance(now_s)
@@ -341,9 +347,10 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
             self._move(VerifiedUploadEvent.READ_FAILED)
         elif self.state is VerifiedUploadState.READING_OLD:
             self._is_coarse = read.is_coarse
+            self._may_be_coarse = read.is_coarse or not read.items
             self._take_old(read.items)
         else:
-            self._is_coarse |= read.is_coarse
+            self._is_coarse = read.is_coarse
             self._found = read.items
             self._judge(read.items, now_s)
 

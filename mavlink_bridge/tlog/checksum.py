@@ -1,7 +1,7 @@
 """MAVLink's checksum (CRC-16/MCRF4XX with the message's seed byte at the end) over many frames of one buffer.
 
-The standard library has a fast CRC of the same polynomial, `binascii.crc_hqx`, but taken from the other end of each byte. A buffer with
-the bits of each byte reversed, made once, gives MAVLink's CRC with its bits reversed.
+The standard library has a fast CRC of the same polynomial, `binascii.crc_hqx`, but taken from the other end of each byte. Fed with the
+bits of each byte reversed it gives MAVLink's CRC with its bits reversed.
 """
 
 from __future__ import annotations
@@ -17,31 +17,27 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _REVERSED = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
-_REVERSED_SEED = np.frombuffer(_REVERSED, np.uint8)[CRC_SEED].astype(np.uint16)
+_REVERSED_BITS = np.frombuffer(_REVERSED, np.uint8)
+_REVERSED_SEED = _REVERSED_BITS[CRC_SEED].astype(np.uint16)
 _STEP = np.array([crc_hqx(bytes([byte]), 0) for byte in range(256)], np.uint16)
 
 
-def reverse_bits(data: bytes) -> bytes:
-    """Give the buffer with the bits of each byte reversed."""
-    return data.translate(_REVERSED)
-
-
-def crc_match(flipped: bytes, frame_at: int, crc_at: int, message_id: int) -> bool:
+def crc_match(data: bytes, frame_at: int, crc_at: int, message_id: int) -> bool:
     """Say for one frame whether its checksum is right; the arguments are those of `crc_matches`."""
-    crc = crc_hqx(flipped[frame_at + 1 : crc_at], 0xFFFF)
-    crc = crc_hqx(_REVERSED[CRC_SEED[message_id] :][:1], crc)
-    return crc == int.from_bytes(flipped[crc_at : crc_at + 2], "big")
+    covered = data[frame_at + 1 : crc_at] + bytes([CRC_SEED[message_id]])
+    crc = crc_hqx(covered.translate(_REVERSED), 0xFFFF)
+    return crc == int.from_bytes(data[crc_at : crc_at + 2].translate(_REVERSED), "big")
 
 
 def crc_matches(
-    flipped: bytes, frame_at: NDArray[np.int64], crc_at: NDArray[np.int64], ids: NDArray[np.int32]
+    data: bytes, frame_at: NDArray[np.int64], crc_at: NDArray[np.int64], ids: NDArray[np.uint32]
 ) -> NDArray[np.bool_]:
     """Say for each frame whether its checksum is right.
 
     Parameters
     ----------
-    flipped : bytes
-        The buffer after `reverse_bits`.
+    data : bytes
+        The buffer.
     frame_at, crc_at : (n,) array
         Where each frame's magic byte and its checksum stand in the buffer.
     ids : (n,) array
@@ -52,10 +48,10 @@ def crc_matches(
     (n,) array of bool
     """
     spans = zip((frame_at + 1).tolist(), crc_at.tolist(), strict=True)
-    crc = np.array([crc_hqx(flipped[begin:end], 0xFFFF) for begin, end in spans], np.uint16)
+    crc = np.array([crc_hqx(data[begin:end].translate(_REVERSED), 0xFFFF) for begin, end in spans], np.uint16)
     seeds = _REVERSED_SEED[np.minimum(ids, ID_LIMIT)]
     crc = (crc << np.uint16(8)) ^ _STEP[(crc >> np.uint16(8)) ^ seeds]
-    view = np.frombuffer(flipped, np.uint8)
-    stored = (view[crc_at].astype(np.uint16) << np.uint16(8)) | view[crc_at + 1]
-    matches: NDArray[np.bool_] = crc == stored
+    view = np.frombuffer(data, np.uint8)
+    high, low = _REVERSED_BITS[view[crc_at]], _REVERSED_BITS[view[crc_at + 1]]
+    matches: NDArray[np.bool_] = crc == (high.astype(np.uint16) << np.uint16(8) | low)
     return matches

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mavlink_bridge.tlog.build import build
 from mavlink_bridge.tlog.wire import CLASS_OF_ID, ID_LIMIT, Layout, layout_of
 
 if TYPE_CHECKING:
@@ -57,7 +59,7 @@ def decode(scan: Scan, which: NDArray[np.int64]) -> list[Message]:
     for message_id, places in _by_id(scan.ids[which]):
         message_class = CLASS_OF_ID[message_id]
         layout = layout_of(message_class)
-        decoded = map(message_class, *_values(layout, payloads(scan, which[places], layout)))
+        decoded = build(message_class, _values(layout, payloads(scan, which[places], layout)))
         for place, message in zip(places.tolist(), decoded, strict=True):
             messages[place] = message
     return messages
@@ -66,8 +68,7 @@ def decode(scan: Scan, which: NDArray[np.int64]) -> list[Message]:
 def payloads(scan: Scan, which: NDArray[np.int64], layout: Layout) -> NDArray[np.void]:
     """Give the payloads of frames of one message type as a structured array, what MAVLink 2 left off filled with zeros."""
     width = layout.dtype.itemsize
-    every = np.ndarray((len(scan.view) - width + 1,), f"V{width}", scan.view.data, strides=(1,))
-    rows = every[scan.payload_at(which)].view(np.uint8).reshape(len(which), width)
+    rows = scan.words(f"V{width}")[scan.payload_at(which)].view(np.uint8).reshape(len(which), width)
     lengths = scan.payload_bytes[which]
     for row in np.flatnonzero(lengths < width).tolist():
         rows[row, lengths[row] :] = 0
@@ -77,7 +78,12 @@ def payloads(scan: Scan, which: NDArray[np.int64], layout: Layout) -> NDArray[np
 
 def texts(column: NDArray[np.bytes_]) -> list[str]:
     """Give NUL-terminated texts as strings, what is not ASCII replaced, as pymavlink does."""
-    return [text.split(b"\0", 1)[0].decode("ascii", "replace") for text in column.tolist()]
+    return [_text(text) for text in column.tolist()]
+
+
+@lru_cache(maxsize=8192)
+def _text(text: bytes) -> str:
+    return text.split(b"\0", 1)[0].decode("ascii", "replace")
 
 
 def _values(layout: Layout, rows: NDArray[np.void]) -> list[list[Any]]:
@@ -88,7 +94,7 @@ def _values(layout: Layout, rows: NDArray[np.void]) -> list[list[Any]]:
     ]
 
 
-def _by_id(ids: NDArray[np.int32]) -> Iterator[tuple[int, NDArray[np.int64]]]:
+def _by_id(ids: NDArray[np.uint32]) -> Iterator[tuple[int, NDArray[np.int64]]]:
     order = np.argsort(ids, kind="stable")
     if len(order):
         cuts = np.flatnonzero(np.diff(ids[order])) + 1

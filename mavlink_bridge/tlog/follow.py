@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mavlink_bridge.tlog.scan import LATER, NEAR_US, NOWHERE, Scan, near
+from mavlink_bridge.tlog.scan import NEAR_US, NOWHERE, Scan, near
 from mavlink_bridge.tlog.wire import MAGIC_V1, MAGIC_V2, TIMESTAMP_BYTES
 
 if TYPE_CHECKING:
@@ -29,10 +29,6 @@ class Follower:
     tally : Counter of str
         Counted up: the fields of `Damage` that the walk finds.
 
-    Attributes
-    ----------
-    chain : list of int
-        Indices of the frames found, among the scan's candidates.
     """
 
     def __init__(self, scan: Scan, time_us: int | None, tally: Counter[str]) -> None:
@@ -41,9 +37,8 @@ class Follower:
         self._time_before_us = time_us
         self._time_us = time_us
         self._tally = tally
-        self._steps = scan.step.tolist()
         self._untimed: list[int] = []
-        self.chain: list[int] = []
+        self._runs: list[NDArray[np.int64]] = []
 
     def follow(self, search_at: int, loose: int) -> tuple[int, int]:
         """Follow the chain as far as the window goes.
@@ -64,7 +59,11 @@ class Follower:
         index = self._next(search_at, loose, loose)
         while index is not None:
             self._open_run(index, loose)
-            last, is_cut = self._run(index)
+            run, is_cut = self._scan.run(index)
+            self._runs.append(run)
+            last = int(run[-1])
+            if last not in self._untimed[-1:]:
+                self._time_us = int(self._scan.time_us[last])
             end = int(self._scan.end[last])
             search_at = loose = end
             if is_cut:
@@ -77,12 +76,17 @@ class Follower:
                 loose = self._settle(last, index)
         return search_at, loose
 
+    def chain(self) -> NDArray[np.int64]:
+        """Give the indices of the frames found, among the scan's candidates."""
+        return np.concatenate([np.zeros(0, np.int64), *self._runs])
+
     def times(self) -> NDArray[np.uint64]:
         """Give the timestamp of each frame of the chain, mended where it is missing or stands alone far off."""
-        times = self._scan.time_us[self.chain]
-        if not len(times) or not self._gap_bytes:
-            return times
-        is_missing = np.isin(self.chain, self._untimed)
+        chain = self.chain()
+        times = self._scan.time_us[chain]
+        if not self._gap_bytes or (len(self._runs) == 1 and not self._untimed):
+            return times  # within a run all timestamps are near
+        is_missing = np.isin(chain, self._untimed)
         known = np.flatnonzero(~is_missing)
         first = times[known[0]] if len(known) else np.uint64(0)
         before_us = first if self._time_before_us is None else np.uint64(self._time_before_us)
@@ -104,22 +108,12 @@ class Follower:
         else:
             self._count_skipped(rest_bytes)
 
-    def _run(self, index: int) -> tuple[int, bool]:
-        steps, append = self._steps, self.chain.append
-        last = index
-        while index >= 0:
-            append(index)
-            last, index = index, steps[index]
-        if last not in self._untimed[-1:]:
-            self._time_us = int(self._scan.time_us[last])
-        return last, index == LATER
-
     def _open_run(self, index: int, loose: int) -> None:
         # Count what lies before a frame that does not simply follow, and say whether the 8 bytes before it are its timestamp.
         scan = self._scan
         begin = int(scan.at[index]) - self._gap_bytes
         has_time = begin == loose or (
-            begin > loose and (self._is_near(index) or self._steps[index] != NOWHERE)
+            begin > loose and (self._is_near(index) or self._scan.step[index] != NOWHERE)
         )
         if self._gap_bytes and not has_time:
             begin += self._gap_bytes
@@ -136,7 +130,7 @@ class Follower:
         begin = len(scan.data) if index is None else int(scan.at[index]) - self._gap_bytes
         if not scan.is_known[last] and begin >= end:
             return end
-        self.chain.pop()
+        self._runs[-1] = self._runs[-1][:-1]
         if begin == end or end == len(scan.data):
             self._tally["bad_crcs"] += 1
             return end
@@ -159,7 +153,7 @@ class Follower:
     def _is_believed(self, index: int, expected: int, loose: int) -> bool:
         scan = self._scan
         begin = int(scan.at[index]) - self._gap_bytes
-        has_successor = self._steps[index] != NOWHERE
+        has_successor = self._scan.step[index] != NOWHERE
         if begin == expected and has_successor:
             return True
         if scan.is_known[index]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mavlink_bridge.messages import Frame, Message
+from mavlink_bridge.tlog.build import build
 from mavlink_bridge.tlog.damage import Damage
 from mavlink_bridge.tlog.decode import decode, payloads, select, texts, wanted_ids
 from mavlink_bridge.tlog.raw_time import RawClock
@@ -79,12 +80,15 @@ class TlogReader:
         return self._damage
 
     def __iter__(self) -> Iterator[LogEntry]:
-        for block, places in self._selected():
-            time_s, link = _times(block, places)
-            frames = _frames(block, places)
-            yield from map(LogEntry, time_s.tolist(), link.tolist(), frames)
+        for block, places in self.blocks():
+            time_s, link = block.times(places)
+            system, component = block.senders(places)
+            messages = decode(block.scan, block.which[places])
+            frames = build(Frame, (system.tolist(), component.tolist(), messages))
+            yield from build(LogEntry, (time_s.tolist(), link.tolist(), frames))
 
-    def _selected(self) -> Iterator[tuple[Block, NDArray[np.int64]]]:
+    def blocks(self) -> Iterator[tuple[Block, NDArray[np.int64]]]:
+        """Walk through the log without decoding: each window's frames, and the places among them of the wanted good ones."""
         bad_crcs = 0
         clock = RawClock()
         with self._file.open() as source:
@@ -120,10 +124,10 @@ def read_columns(path: Path, message_class: type[Message]) -> dict[str, NDArray[
     layout = layout_of(message_class)
     reader = TlogReader(path, [message_class])
     parts: dict[str, list[NDArray[Any]]] = {}
-    for block, places in reader._selected():  # noqa: SLF001 - the same module
+    for block, places in reader.blocks():
         rows = payloads(block.scan, block.which[places], layout)
-        time_s, link = _times(block, places)
-        system, component = _senders(block, places)
+        time_s, link = block.times(places)
+        system, component = block.senders(places)
         columns: dict[str, NDArray[Any]] = {
             "time_s": time_s,
             "link": link,
@@ -137,23 +141,8 @@ def read_columns(path: Path, message_class: type[Message]) -> dict[str, NDArray[
     return {name: np.concatenate(columns) for name, columns in parts.items()}
 
 
-def _times(block: Block, places: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
-    time_us = block.time_us[places]
-    return time_us / 1e6, (time_us & np.uint64(3)).astype(np.uint8)
-
-
-def _senders(block: Block, places: NDArray[np.int64]) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    scan, which = block.scan, block.which[places]
-    system_at = scan.at[which] + np.where(scan.is_v2[which], 5, 3)
-    return scan.view[system_at], scan.view[system_at + 1]
-
-
-def _frames(block: Block, places: NDArray[np.int64]) -> Iterator[Frame]:
-    system, component = _senders(block, places)
-    return map(Frame, system.tolist(), component.tolist(), decode(block.scan, block.which[places]))
-
-
 def _damage(tally: Counter[str], bad_crcs: int) -> Damage:
-    counts = dict(tally)
-    counts["bad_crcs"] = counts.get("bad_crcs", 0) + bad_crcs
+    counts = tally.copy()
+    counts["frames"] -= bad_crcs
+    counts["bad_crcs"] += bad_crcs
     return Damage(**counts)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from mavlink_bridge.tlog.checksum import crc_match, crc_matches, reverse_bits
+from mavlink_bridge.tlog.checksum import crc_match, crc_matches
 from mavlink_bridge.tlog.wire import (
     BASE_BYTES,
     FULL_BYTES,
@@ -60,7 +62,6 @@ class Scan:
 
     def __init__(self, data: bytes, gap_bytes: int, horizon: int) -> None:
         self.data = data
-        self.flipped = reverse_bits(data)
         self.view: NDArray[np.uint8] = np.frombuffer(data + bytes(MAX_FRAME_BYTES), np.uint8)
         self.gap_bytes = gap_bytes
         self._find()
@@ -71,9 +72,14 @@ class Scan:
     def intact(self, which: NDArray[Any]) -> NDArray[np.bool_]:
         """Say for each of these candidates (by index) whether its id is known and its checksum right."""
         at = self.at[which]
-        good = crc_matches(self.flipped, at, self.crc_at(which), self.ids[which])
+        good = crc_matches(self.data, at, self.crc_at(which), self.ids[which])
         sound: NDArray[np.bool_] = good & self.is_known[which]
         return sound
+
+    def words(self, kind: str) -> NDArray[Any]:
+        """Give a view of the window with a value of this dtype beginning at every byte."""
+        dtype = np.dtype(kind)
+        return np.ndarray((len(self.view) - dtype.itemsize + 1,), dtype, self.view.data, strides=(1,))
 
     def is_intact(self, index: int) -> bool:
         """Say whether this candidate's id is known and its checksum right."""
@@ -81,7 +87,33 @@ class Scan:
             return False
         at = int(self.at[index])
         crc_at = at + (10 if self.is_v2[index] else 6) + int(self.payload_bytes[index])
-        return crc_match(self.flipped, at, crc_at, int(self.ids[index]))
+        return crc_match(self.data, at, crc_at, int(self.ids[index]))
+
+    @cached_property
+    def _links(self) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], list[int]]:
+        # The candidates that have a successor or are one, each one's place among them, its successor's place, and the places
+        # whose successor is not simply the next: noise that looks like a frame start is seldom linked, so these are few.
+        step = self.step
+        is_linked = step != NOWHERE
+        is_linked[step[step >= 0]] = True
+        linked = np.flatnonzero(is_linked)
+        place_of = np.cumsum(is_linked) - 1
+        following = step[linked]
+        following = np.where(following >= 0, place_of[following], following)
+        ends = np.flatnonzero(following != np.arange(1, len(linked) + 1))
+        return linked, place_of, following, ends.tolist()
+
+    def run(self, index: int) -> tuple[NDArray[np.int64], bool]:
+        """Give the candidates from this one on that follow one another, and whether the run goes on in the next window."""
+        linked, place_of, following, ends = self._links
+        if self.step[index] == NOWHERE:
+            return np.array([index]), False
+        parts, place = [], int(place_of[index])
+        while place >= 0:
+            end = ends[bisect_left(ends, place)]
+            parts.append(linked[place : end + 1])
+            place = int(following[end])
+        return np.concatenate(parts), place == LATER
 
     def crc_at(self, which: NDArray[Any]) -> NDArray[np.int64]:
         """Give the offset of each of these candidates' checksum."""
@@ -94,33 +126,31 @@ class Scan:
         return offsets
 
     def _find(self) -> None:
-        size = len(self.data)
-        view = self.view
+        size, view = len(self.data), self.view
         # Unsigned bytes wrap round, so one comparison finds both magic bytes.
         at = np.flatnonzero((view[:size] - np.uint8(MAGIC_V2)) < 2)
         is_v2 = view[at] == MAGIC_V2
         payload = view[at + 1].astype(np.int64)
         flags = view[at + 2]
-        id_v2 = (
-            view[at + 7].astype(np.int32)
-            | view[at + 8].astype(np.int32) << 8
-            | view[at + 9].astype(np.int32) << 16
+        ids = self.words("<u4")[at + 7] & np.uint32(0xFFFFFF)
+        end = at + payload + 12 + SIGNATURE_BYTES * (flags & np.uint8(SIGNED_FLAG))
+        sane = flags <= SIGNED_FLAG
+        v1 = np.flatnonzero(~is_v2)
+        ids[v1] = view[at[v1] + 5]
+        end[v1] = at[v1] + payload[v1] + 8
+        sane[v1] = (
+            ~IS_KNOWN[ids[v1]] | (payload[v1] == BASE_BYTES[ids[v1]]) | (payload[v1] == FULL_BYTES[ids[v1]])
         )
-        ids = np.where(is_v2, id_v2, view[at + 5])
-        row = np.minimum(ids, ID_LIMIT)
-        is_known = IS_KNOWN[row]
-        end = at + payload + np.where(is_v2, 12 + SIGNATURE_BYTES * (flags & SIGNED_FLAG), 8)
-        v1_fits = ~is_known | (payload == BASE_BYTES[row]) | (payload == FULL_BYTES[row])
-        sane = (end <= size) & np.where(is_v2, flags <= SIGNED_FLAG, v1_fits)
-        self.at, self.end, self.ids = at[sane], end[sane], ids[sane]
-        self.payload_bytes, self.is_v2, self.is_known = payload[sane], is_v2[sane], is_known[sane]
+        keep = np.flatnonzero(sane & (end <= size))
+        self.at, self.end, self.ids = at[keep], end[keep], ids[keep]
+        self.payload_bytes, self.is_v2 = payload[keep], is_v2[keep]
+        self.is_known = IS_KNOWN[np.minimum(self.ids, ID_LIMIT)]
 
     def _times(self) -> NDArray[np.uint64]:
         times = np.zeros(len(self.at), np.uint64)
         if self.gap_bytes:
             first = int(np.searchsorted(self.at, TIMESTAMP_BYTES))
-            every = np.ndarray((len(self.view) - 7,), ">u8", self.view.data, strides=(1,))
-            times[first:] = every[self.at[first:] - TIMESTAMP_BYTES]
+            times[first:] = self.words(">u8")[self.at[first:] - TIMESTAMP_BYTES]
         return times
 
     def _steps(self) -> NDArray[np.int32]:
@@ -135,7 +165,8 @@ class Scan:
     def _sound(self, step: NDArray[np.int32]) -> NDArray[np.bool_]:
         # Without timestamps nothing but the checksum tells a frame from noise.
         good = self.intact(np.arange(len(self.at)))
-        return good | (~self.is_known & (step >= 0) & good[step])
+        sound: NDArray[np.bool_] = good | (~self.is_known & (step >= 0) & good[step])
+        return sound
 
 
 def near(time_us: NDArray[np.uint64], other_us: NDArray[np.uint64]) -> NDArray[np.bool_]:

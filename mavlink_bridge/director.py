@@ -7,6 +7,7 @@ is told to drive, switches to AUTO and watches until arrival. What it wants from
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from enum import StrEnum, auto
 from typing import TYPE_CHECKING, Any
@@ -38,6 +39,8 @@ if TYPE_CHECKING:
 _POSITION_STREAM, _STATUS_STREAM = 6, 2
 _STREAM_HZ = 4
 _ASK_STREAMS_EVERY_S = 3.0
+_FRESH_S = 1.5
+"""How old a heartbeat may be to tell whether the vehicle drives its mission now."""
 
 
 class State(StrEnum):
@@ -130,13 +133,15 @@ class Director(TableMachine[State, Event]):
         self.upload_outcome: VerifiedUploadOutcome | None = None
         self.current_item = 0
         self._orders = orders
-        self._heard: dict[int, Vehicle] = {}
+        self._heard: dict[int, tuple[Vehicle, Frame]] = {}
+        self._heartbeat_s = -math.inf
         self._peer: Peer | None = None
         self._steps: list[tuple[Machine, Callable[[Any, float], None]]] = []
         self._step_until_s = 0.0
         self._streams_due_s = 0.0
         self._plan: Plan | None = None
         self._auto_seen = False
+        self._driving_since_s = 0.0
 
     @property
     def is_done(self) -> bool:
@@ -181,11 +186,13 @@ class Director(TableMachine[State, Event]):
             self._listen(frame, now_s)
         if self.situation.system is not None:
             self.situation = fold(self.situation, frame, now_s)
+            if isinstance(frame.message, m.Heartbeat) and self._is_from_vehicle(frame):
+                self._heartbeat_s = now_s
         if self._steps:
             self._steps[0][0].receive(frame, now_s)
             self._advance(now_s)
         if self.state is State.DRIVING:
-            self._watch(frame)
+            self._watch(frame, now_s)
 
     def handle_timer(self, now_s: float) -> None:
         """Take notice that time has passed."""
@@ -208,11 +215,12 @@ class Director(TableMachine[State, Event]):
             return
         self._plan = plan
         is_active = bool(self.situation.armed) and self.situation.mode == AUTO_MODE
+        is_fresh = now_s - self._heartbeat_s <= _FRESH_S
         upload = VerifiedUpload(
             self._peer,
             m.MissionType.MISSION,
             with_home(plan.items, plan.home or plan.start),
-            is_active=is_active,
+            is_active=is_active if is_fresh else None,
         )
         self._run([(upload, self._uploaded)], now_s)
 
@@ -229,7 +237,7 @@ class Director(TableMachine[State, Event]):
             return
         if not self._heard:
             self._step_until_s = now_s + self._orders.listen_s
-        self._heard[frame.system] = Vehicle(frame.system, frame.component, heartbeat.type)
+        self._heard[frame.system] = Vehicle(frame.system, frame.component, heartbeat.type), frame
         if frame.system == self._orders.system:
             self._choose(now_s)
 
@@ -237,7 +245,9 @@ class Director(TableMachine[State, Event]):
         orders = self._orders
         try:
             vehicle = choose_vehicle(
-                list(self._heard.values()), orders.system, any_vehicle=orders.any_vehicle
+                [vehicle for vehicle, _ in self._heard.values()],
+                orders.system,
+                any_vehicle=orders.any_vehicle,
             )
         except VehicleNotFoundError as error:
             self._fail(error)
@@ -246,6 +256,7 @@ class Director(TableMachine[State, Event]):
         self.situation = replace(
             self.situation, system=vehicle.system, component=vehicle.component, vehicle_type=vehicle.type
         )
+        self.situation = fold(self.situation, self._heard[vehicle.system][1], now_s)
         self._move(Event.FOUND)
         self._streams_due_s = now_s
         self._ask_streams(now_s)
@@ -349,11 +360,12 @@ class Director(TableMachine[State, Event]):
         steps.append(command(Command.DO_SET_MISSION_CURRENT, 1.0, 1.0))
         self._run(steps, now_s)
 
-    def _commanded(self, machine: SendCommand, _now_s: float) -> None:
+    def _commanded(self, machine: SendCommand, now_s: float) -> None:
         outcome = machine.outcome
         assert outcome is not None
         if outcome.is_accepted:
             if not self._steps:
+                self._driving_since_s = now_s
                 self._move(Event.STARTED)
             return
         name = Command(outcome.command).name
@@ -367,11 +379,10 @@ class Director(TableMachine[State, Event]):
                 )
             )
 
-    def _watch(self, frame: Frame) -> None:
+    def _watch(self, frame: Frame, now_s: float) -> None:
         """Follow the drive by what the vehicle says of it."""
-        if self._peer is None or self._plan is None:
-            return
-        if (frame.system, frame.component) != (self._peer.system, self._peer.component):
+        assert self._plan is not None
+        if not self._is_from_vehicle(frame):
             return
         message = frame.message
         if isinstance(message, m.MissionCurrent):
@@ -381,17 +392,27 @@ class Director(TableMachine[State, Event]):
             if message.seq >= len(self._plan.items):
                 self._move(Event.REACHED)
         elif isinstance(message, m.Heartbeat):
-            self._watch_mode(message)
+            self._watch_mode(message, now_s)
 
-    def _watch_mode(self, heartbeat: m.Heartbeat) -> None:
+    def _watch_mode(self, heartbeat: m.Heartbeat, now_s: float) -> None:
         self._auto_seen = self._auto_seen or heartbeat.custom_mode == AUTO_MODE
-        if self._auto_seen and heartbeat.custom_mode != AUTO_MODE:
+        # A heartbeat from before the mode change may still be under way.
+        is_settled = self._auto_seen or now_s - self._driving_since_s > _FRESH_S
+        if heartbeat.custom_mode != AUTO_MODE:
+            if not is_settled:
+                return
             name = MODE_NAMES.get(heartbeat.custom_mode, str(heartbeat.custom_mode))
             self._fail(OutcomeError(f"the vehicle left AUTO for {name} before it arrived", mode=name))
         elif not heartbeat.base_mode & m.ModeFlag.SAFETY_ARMED:
             self._fail(
                 OutcomeError("the mission is on the vehicle in AUTO, but it is not armed and does not drive")
             )
+
+    def _is_from_vehicle(self, frame: Frame) -> bool:
+        return self._peer is not None and (frame.system, frame.component) == (
+            self._peer.system,
+            self._peer.component,
+        )
 
     # Steps, one machine after the other
 

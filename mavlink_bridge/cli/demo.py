@@ -15,6 +15,7 @@ from mavlink_bridge.cli.common import JsonOption, QuietOption, print_json, warn
 
 if TYPE_CHECKING:
     from mavlink_bridge.messages import Frame
+    from mavlink_bridge.simulator import Simulator
     from missions.fence import Fence
     from missions.geo import LatLon
     from missions.plan import Plan
@@ -97,7 +98,7 @@ def demo(
         raise typer.Exit(8)
 
 
-def _simulator(speedup: float):
+def _simulator(speedup: float) -> Simulator:
     from mavlink_bridge.simulator import Simulator, SimulatorConfig  # noqa: PLC0415 - quick help
     from missions.fence import fence_to_items  # noqa: PLC0415
     from missions.geo import LatLon  # noqa: PLC0415

@@ -1,0 +1,173 @@
+"""``pbpp plan`` on a live link, ``pbpp sim`` and ``pbpp demo``, over real sockets on the loopback."""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+
+import pytest
+from typer.testing import CliRunner
+
+from mavlink_bridge.cli.app import app
+from mavlink_bridge.messages import CommandLong
+from mavlink_bridge.rover import AUTO_MODE
+from mavlink_bridge.simulator import Simulator, SimulatorConfig
+from missions.fence import fence_to_items
+from missions.formats import read_fence, read_situation
+from missions.geo import LatLon, distance_m
+from missions.items import Command, waypoint
+
+TARGET = "40.0720926,-105.2286152"
+HOME = LatLon(40.071374, -105.229930)
+
+
+@pytest.fixture
+def config(fields):
+    fence = fence_to_items(read_fence(fields / "yard-fence.waypoints"))
+    mission = (waypoint(LatLon(40.0714, -105.2299)), waypoint(LatLon(40.0715, -105.2299)))
+    return SimulatorConfig(home=HOME, fence=fence, mission=mission, parameters={"FENCE_ENABLE": 1.0})
+
+
+@pytest.fixture(autouse=True)
+def state_folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    return tmp_path / "state"
+
+
+def run(*arguments: str):
+    return CliRunner().invoke(app, list(arguments))
+
+
+def test_plans_without_writing(config):
+    with Simulator(config, "tcpin:127.0.0.1:0") as simulator:
+        before = simulator.vehicle.mission
+        result = run(
+            "plan", "--connect", simulator.connection, "--target", TARGET, "--clearance", "2", "--json"
+        )
+        assert simulator.vehicle.mission == before
+    document = json.loads(result.stdout)
+    assert result.exit_code == 0
+    assert (document["uploaded"], document["verified"]) == (False, False)
+    assert document["fence"]["exclusion_polygons"] == 2
+    assert document["system"] == 1
+
+
+def test_uploads_and_verifies(config, state_folder):
+    with Simulator(config, "tcpin:127.0.0.1:0") as simulator:
+        old = simulator.vehicle.mission
+        result = run("plan", "--connect", simulator.connection, "--target", TARGET, "--upload", "--json")
+        held = simulator.vehicle.mission
+    document = json.loads(result.stdout)
+    assert result.exit_code == 0
+    assert (document["uploaded"], document["verified"]) == (True, True)
+    assert [list(item.position) for item in held[1:]] == document["path"][1:]
+    assert len(held) == document["mission_items"]
+    backups = list(state_folder.rglob("*mission*.json"))
+    assert len(backups) == 1
+    stored = json.loads(backups[0].read_text())["items"]
+    assert len(stored) == len(old)
+
+
+def test_a_vehicle_armed_in_auto_is_left_alone(config):
+    far = replace(config, mission=tuple(waypoint(LatLon(40.0722, -105.2300 + 0.0002 * i)) for i in range(4)))
+    with Simulator(far, "tcpin:127.0.0.1:0") as simulator:
+        before = simulator.vehicle.mission
+        _command(simulator, Command.COMPONENT_ARM_DISARM, 1.0)
+        _command(simulator, Command.DO_SET_MODE, 1.0, AUTO_MODE)
+        result = run("plan", "--connect", simulator.connection, "--target", TARGET, "--upload", "--json")
+        assert simulator.vehicle.mission == before
+    document = json.loads(result.stdout)
+    assert (result.exit_code, document["error"]) == (6, "RefusedError")
+    assert "AUTO" in document["message"]
+
+
+def test_udp_both_ways_round(config):
+    with Simulator(config, "udpin:127.0.0.1:0") as simulator:
+        result = run("plan", "--connect", simulator.connection, "--target", TARGET, "--upload", "--json")
+    assert json.loads(result.stdout)["verified"] is True
+
+
+def test_an_identity_that_is_taken_is_refused(config):
+    with Simulator(config, "tcpin:127.0.0.1:0") as simulator:
+        identity = ["--source-system", "1", "--source-component", "1"]
+        result = run("plan", "--connect", simulator.connection, "--target", TARGET, *identity, "--json")
+    document = json.loads(result.stdout)
+    assert (result.exit_code, document["error"]) == (5, "IdentityTakenError")
+
+
+def test_nobody_there():
+    result = run("plan", "--connect", "tcp:127.0.0.1:9", "--target", TARGET, "--json")
+    assert (result.exit_code, json.loads(result.stdout)["error"]) == (5, "LinkError")
+
+
+def test_nobody_speaks():
+    result = run("plan", "--connect", "udpin:127.0.0.1:0", "--target", TARGET, "--timeout", "0.3", "--json")
+    assert (result.exit_code, json.loads(result.stdout)["error"]) == (5, "VehicleNotFoundError")
+
+
+def test_drives_only_a_vehicle_that_is_armed(config):
+    with Simulator(config, "tcpin:127.0.0.1:0") as simulator:
+        result = run("plan", "--connect", simulator.connection, "--target", TARGET, "--drive", "--json")
+        assert not simulator.vehicle.is_armed
+    document = json.loads(result.stdout)
+    assert (result.exit_code, document["error"]) == (7, "OutcomeError")
+    assert "not armed" in document["message"]
+
+
+def test_sim_says_where_it_listens_and_ends_on_sigterm(fields):
+    arguments = ["sim", "--listen", "tcpin:127.0.0.1:0", "--fence", str(fields / "maze-fence.waypoints")]
+    with subprocess.Popen(
+        [sys.executable, "-m", "mavlink_bridge.cli", *arguments], stdout=subprocess.PIPE, text=True
+    ) as process:
+        try:
+            line = process.stdout.readline()
+            assert re.fullmatch(r"tcp:127\.0\.0\.1:\d+\n", line)
+            goal = "40.0726316,-105.2290497"
+            result = run(
+                "plan", "--connect", line.strip(), "--target", goal, "--clearance", "2", "--upload", "--json"
+            )
+            assert json.loads(result.stdout)["verified"] is True
+        finally:
+            process.send_signal(signal.SIGTERM)
+        assert process.wait(10) == 0
+
+
+def test_demo_arrives_without_a_breach(tmp_path):
+    result = run("demo", "--out", str(tmp_path / "out"), "--speedup", "10", "--json")
+    document = json.loads(result.stdout)
+    assert result.exit_code == 0
+    assert (document["arrived"], document["verified"], document["breaches"]) == (True, True, 0)
+    assert document["driven_clearance_m"] >= document["clearance_m"]
+    assert document["time_s"] < 60
+    names = {"plan.png", "mission.waypoints", "mission.plan", "demo.tlog"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == names
+    assert (tmp_path / "out" / "plan.png").read_bytes().startswith(b"\x89PNG")
+    mission = read_situation(tmp_path / "out" / "mission.plan")
+    assert mission.mission.value.items[-1].position == LatLon(40.0726316, -105.2290497)
+    assert len(mission.fence.value.zones) == 9
+
+
+def test_the_log_of_a_demo_can_be_planned_from(tmp_path):
+    run("demo", "--out", str(tmp_path), "--speedup", "10", "--quiet")
+    start = f"{HOME.lat_deg},{HOME.lon_deg}"
+    result = run("plan", "--log", str(tmp_path / "demo.tlog"), "--start", start, "--clearance", "2", "--json")
+    document = json.loads(result.stdout)
+    assert result.exit_code == 0
+    assert document["fence"]["exclusion_circles"] == 2
+    assert distance_m(LatLon(*document["targets"][0]), LatLon(40.0726316, -105.2290497)) < 0.01
+
+
+def _command(simulator: Simulator, number: Command, *params: float) -> None:
+    from mavlink_bridge.link import open_link
+    from mavlink_bridge.protocol.command import SendCommand
+    from mavlink_bridge.protocol.peer import Peer
+
+    named = {f"param{index}": value for index, value in enumerate(params, start=1)}
+    with open_link(simulator.connection, (255, 190)) as link:
+        machine = SendCommand(Peer(1, 1, 255, 190), CommandLong(1, 1, number, **named))
+        link.run(machine, timeout_s=10)
+        assert machine.outcome.is_accepted

@@ -136,6 +136,8 @@ def _item(command: Command, position: LatLon, param1: float) -> MissionItem:
 def _polygon(items: Sequence[MissionItem], first: int) -> PolygonZone:
     command, param1 = items[first].command, items[first].params[0]
     kind = _VERTEX_KINDS[Command(command)]
+    if math.isfinite(param1) and param1 != int(param1):
+        raise FenceError(f"fence item {first}: a vertex count of {param1:g}", item=first)
     count = int(param1) if math.isfinite(param1) else 0
     if count < 3:
         raise FenceError(
@@ -143,7 +145,7 @@ def _polygon(items: Sequence[MissionItem], first: int) -> PolygonZone:
         )
     run = items[first : first + count]
     for offset, item in enumerate(run):
-        if item.command != command or int(item.params[0]) != count:
+        if item.command != command or item.params[0] != count:
             run = run[:offset]
             break
     if len(run) < count:

@@ -49,9 +49,7 @@ def parse_lat_lon(text: str) -> LatLon:
     """
     parts = text.split(",")
     try:
-        if "_" in text:  # which Python would read as a number's grouping
-            raise ValueError
-        lat_deg, lon_deg = (float(part) for part in parts)
+        lat_deg, lon_deg = (float(part.replace("_", "?")) for part in parts)  # 4_0 is 40 to Python
     except ValueError:
         raise InvalidPositionError(
             f"{text!r} is not a position: expected LAT,LON in decimal degrees, like 40.0713,-105.2299"

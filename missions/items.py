@@ -72,6 +72,8 @@ PLACED_COMMANDS = frozenset(
 )
 """Navigation commands that send a rover to a place."""
 
+_FRAMES_WITHOUT_PLACES = frozenset({CoordinateFrame.LOCAL_NED, CoordinateFrame.MISSION})
+
 
 @dataclass(frozen=True, slots=True)
 class MissionItem:
@@ -107,8 +109,14 @@ class MissionItem:
 
     @property
     def is_placed(self) -> bool:
-        """Whether the item sends a rover to a place; (0, 0) means "here" in MAVLink and is none."""
-        return self.command in PLACED_COMMANDS and (self.lat_e7, self.lon_e7) != (0, 0)
+        """Whether the item sends a rover to a place on Earth; (0, 0) means "here" in MAVLink and is none."""
+        return (
+            self.command in PLACED_COMMANDS
+            and self.frame not in _FRAMES_WITHOUT_PLACES
+            and (self.lat_e7, self.lon_e7) != (0, 0)
+            and abs(self.lat_e7) <= 900_000_000
+            and abs(self.lon_e7) <= 1_800_000_000
+        )
 
 
 def waypoint(position: LatLon) -> MissionItem:
@@ -129,6 +137,18 @@ def with_home(items: Sequence[MissionItem], home: LatLon) -> tuple[MissionItem, 
 def without_home(items: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
     """Take the home item off a list as ArduPilot holds it."""
     return tuple(items[1:])
+
+
+def file_frame(frame: int) -> int:
+    """Give a MAV_FRAME as files name it: ground stations write no ``_INT`` frames."""
+    return _FILE_FRAMES.get(frame, frame)
+
+
+_FILE_FRAMES: dict[int, int] = {
+    CoordinateFrame.GLOBAL_INT: CoordinateFrame.GLOBAL,
+    CoordinateFrame.GLOBAL_RELATIVE_ALT_INT: CoordinateFrame.GLOBAL_RELATIVE_ALT,
+    CoordinateFrame.GLOBAL_TERRAIN_ALT_INT: CoordinateFrame.GLOBAL_TERRAIN_ALT,
+}
 
 
 def last_place(items: Sequence[MissionItem]) -> LatLon | None:

@@ -16,7 +16,7 @@ GEOD = Geod(ellps="WGS84")
 lats_deg = st.floats(-85, 85)
 lons_deg = st.floats(-180, 180)
 lat_lons = st.builds(LatLon, lats_deg, lons_deg)
-degE7_lat_lons = st.builds(
+wire_lat_lons = st.builds(
     lambda lat_e7, lon_e7: LatLon(lat_e7 / 1e7, lon_e7 / 1e7),
     st.integers(-850_000_000, 850_000_000),
     st.integers(-1_800_000_000, 1_800_000_000),
@@ -40,13 +40,11 @@ def zones(draw: st.DrawFn) -> Zone:
     """Any zone the autopilot could hold, of degE7 positions."""
     kind = draw(kinds)
     if draw(st.booleans()):
-        return PolygonZone(kind, tuple(draw(st.lists(degE7_lat_lons, min_size=3, max_size=8))))
-    return CircleZone(kind, draw(degE7_lat_lons), draw(st.floats(0.5, 5000, width=32)))
+        return PolygonZone(kind, tuple(draw(st.lists(wire_lat_lons, min_size=3, max_size=8))))
+    return CircleZone(kind, draw(wire_lat_lons), draw(st.floats(0.5, 5000, width=32)))
 
 
-fences = st.builds(
-    Fence, st.lists(zones(), max_size=6).map(tuple), st.none() | degE7_lat_lons
-)
+fences = st.builds(Fence, st.lists(zones(), max_size=6).map(tuple), st.none() | wire_lat_lons)
 
 
 @dataclass(frozen=True)
@@ -62,7 +60,12 @@ class RandomField:
 @st.composite
 def random_fields(draw: st.DrawFn) -> RandomField:
     """A field of inclusions and exclusions somewhere on Earth, with a start and a target on opposite sides."""
-    centre = rounded(LatLon(draw(st.sampled_from([0.0, 40.07, -33.4, 61.5, -77.0, 84.5])), draw(st.sampled_from([-105.23, 0.0, 179.9999, 24.8]))))
+    centre = rounded(
+        LatLon(
+            draw(st.sampled_from([0.0, 40.07, -33.4, 61.5, -77.0, 84.5])),
+            draw(st.sampled_from([-105.23, 0.0, 179.9999, 24.8])),
+        )
+    )
     size_m = draw(st.sampled_from([40.0, 120.0, 400.0, 3000.0]))
 
     def place(reach: float) -> LatLon:

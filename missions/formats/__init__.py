@@ -5,6 +5,7 @@ Each format is one module with ``read(text, source) -> Situation`` and, where it
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import TYPE_CHECKING, NamedTuple
 
 from missions.errors import FenceMissingError, MissionFormatError
@@ -88,9 +89,13 @@ def write_mission(situation: Situation, path: Path) -> None:
     """
     write = _format(path, "write").write
     assert write is not None
+    whole = path.with_name(f".{path.name}.part")  # so that nobody ever finds half a mission
     try:
-        path.write_text(write(situation), encoding="utf-8", newline="\n")
+        whole.write_text(write(situation), encoding="utf-8", newline="\n")
+        whole.replace(path)
     except OSError as error:
+        with suppress(OSError):
+            whole.unlink()
         raise MissionFormatError(f"{path} cannot be written: {error.strerror}", file=str(path)) from None
 
 

@@ -11,7 +11,7 @@ from missions.errors import MissionFormatError
 if TYPE_CHECKING:
     from pathlib import Path
 
-_LINE = re.compile(r"^([A-Za-z][A-Za-z0-9_]{0,15})[\s,=:]+(\S+)")
+_LINE = re.compile(r"^([A-Za-z][A-Za-z0-9_]{0,15})[\s,=:]+([^\s_]+)(?:\s|$)")
 
 
 def read_parameters(path: Path) -> dict[str, float]:

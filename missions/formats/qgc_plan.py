@@ -4,23 +4,17 @@ from __future__ import annotations
 
 import json
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from missions.errors import InvalidPositionError, MissionFormatError
 from missions.fence import CircleZone, Fence, PolygonZone, Zone, ZoneKind
-from missions.geo import LatLon, checked_lat_lon, to_e7
-from missions.items import CoordinateFrame, MissionItem
+from missions.formats.numbers import place_e7, whole
+from missions.geo import LatLon, checked_lat_lon
+from missions.items import MissionItem, file_frame
 from missions.situation import Known, Mission, Situation
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 _FIRMWARE_ARDUPILOT = 3
 _VEHICLE_ROVER = 10
-_WIRE_FRAMES = {
-    CoordinateFrame.GLOBAL_INT: CoordinateFrame.GLOBAL,
-    CoordinateFrame.GLOBAL_RELATIVE_ALT_INT: CoordinateFrame.GLOBAL_RELATIVE_ALT,
-}
 
 
 def read(text: str, source: str) -> Situation:
@@ -37,6 +31,9 @@ def read(text: str, source: str) -> Situation:
         raise MissionFormatError(
             f"{source}: line {error.lineno}: not JSON: {error.msg}", file=source
         ) from None
+    except (RecursionError, ValueError) as error:
+        reason = "nested too deeply" if isinstance(error, RecursionError) else error
+        raise MissionFormatError(f"{source}: not JSON: {reason}", file=source) from None
     node = _Node(document, source, "")
     if not isinstance(document, dict) or document.get("fileType") != "Plan":
         raise node.error('expected a QGroundControl plan ("fileType": "Plan")')
@@ -115,10 +112,19 @@ class _Node:
             raise node.error("expected a list")
         return [node[i] for i in range(len(node.value))]
 
-    def number(self, kind: Callable[[Any], float] = float) -> float:
+    def number(self) -> float:
         if isinstance(self.value, bool) or not isinstance(self.value, (int, float)):
             raise self.error("expected a number")
-        return kind(self.value)
+        try:
+            return float(self.value)
+        except OverflowError:
+            raise self.error("expected a number of less than 300 digits") from None
+
+    def whole(self, name: str, most: int) -> int:
+        try:
+            return whole(self.number(), name, most)
+        except ValueError as error:
+            raise self.error(str(error)) from None
 
 
 def _position(node: _Node) -> LatLon:
@@ -143,14 +149,15 @@ def _item(node: _Node) -> MissionItem:
     if len(params) != 7:
         raise node["params"].error(f"{len(params)} params; expected 7")
     values = [math.nan if param.value is None else param.number() for param in params]
+    command = node["command"].whole("command", 65535)
     lat_deg, lon_deg = (0.0 if math.isnan(value) else value for value in values[4:6])
     try:
-        lat_e7, lon_e7 = to_e7(checked_lat_lon(lat_deg, lon_deg))
+        lat_e7, lon_e7 = place_e7(command, lat_deg, lon_deg)
     except InvalidPositionError as error:
         raise node["params"].error(str(error)) from None
     return MissionItem(
-        int(node["command"].number()),
-        int(node["frame"].number()),
+        command,
+        node["frame"].whole("frame", 255),
         (values[0], values[1], values[2], values[3]),
         lat_e7,
         lon_e7,
@@ -194,15 +201,13 @@ def _pair(position: LatLon) -> list[float]:
 
 def _item_json(item: MissionItem, number: int) -> dict[str, Any]:
     places = [item.lat_e7 / 1e7, item.lon_e7 / 1e7, item.alt_m]
-    params = [None if math.isnan(value) else value for value in (*item.params, *places)]
+    params = [value if math.isfinite(value) else None for value in (*item.params, *places)]
     return {
         "type": "SimpleItem",
         "autoContinue": item.autocontinue,
         "command": item.command,
         "doJumpId": number,
-        "frame": _WIRE_FRAMES.get(CoordinateFrame(item.frame), item.frame)
-        if item.frame in list(CoordinateFrame)
-        else item.frame,
+        "frame": file_frame(item.frame),
         "params": params,
     }
 

@@ -10,14 +10,15 @@ from typing import TYPE_CHECKING
 
 from missions.errors import FenceError, InvalidPositionError, MissionFormatError
 from missions.fence import fence_from_items
-from missions.geo import LatLon, checked_lat_lon, to_e7
-from missions.items import Command, MissionItem, with_home, without_home
+from missions.formats.numbers import place_e7, whole
+from missions.geo import LatLon
+from missions.items import Command, MissionItem, file_frame, with_home
 from missions.situation import Known, Mission, Situation
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-_HEADER = "QGC WPL"
+_HEADER = "QGC WPL 110"
 _FENCE_COMMANDS = range(5000, 5005)
 
 
@@ -30,8 +31,8 @@ def read(text: str, source: str) -> Situation:
         With the line and what was expected there.
     """
     lines = text.splitlines()
-    if not lines or not lines[0].strip().startswith(_HEADER):
-        raise MissionFormatError(f"{source}: line 1: expected 'QGC WPL 110'", file=source, line=1)
+    if not lines or lines[0].split() != _HEADER.split():
+        raise MissionFormatError(f"{source}: line 1: expected {_HEADER!r}", file=source, line=1)
     numbered = [
         (number, line.strip())
         for number, line in enumerate(lines[1:], start=2)
@@ -55,8 +56,8 @@ def format_items(items: Sequence[MissionItem]) -> str:
     rows = [
         "\t".join(
             [
-                *(str(int(value)) for value in (seq, item.current, item.frame, item.command)),
-                *(f"{param:.8g}" for param in item.params),
+                *(str(int(value)) for value in (seq, item.current, file_frame(item.frame), item.command)),
+                *(f"{param:.9g}" for param in item.params),  # as exact as the wire's 32 bits
                 *(f"{value_e7 / 1e7:.8f}" for value_e7 in (item.lat_e7, item.lon_e7)),
                 f"{item.alt_m:.6f}",
                 str(int(item.autocontinue)),
@@ -64,7 +65,7 @@ def format_items(items: Sequence[MissionItem]) -> str:
         )
         for seq, item in enumerate(items)
     ]
-    return "\n".join([f"{_HEADER} 110", *rows]) + "\n"
+    return "\n".join([_HEADER, *rows]) + "\n"
 
 
 def _item(line: str, where: str) -> MissionItem:
@@ -72,37 +73,46 @@ def _item(line: str, where: str) -> MissionItem:
     if len(columns) != 12:
         raise MissionFormatError(f"{where}: {len(columns)} columns; expected 12", where=where)
     try:
-        frame, command = int(columns[2]), int(columns[3])
-        numbers = [float(column) for column in columns[4:11]]
-        current, autocontinue = (int(float(columns[i])) != 0 for i in (1, 11))
+        _, current, frame, command, *params, lat_deg, lon_deg, alt_m, autocontinue = map(float, columns)
     except ValueError as error:
         raise MissionFormatError(f"{where}: {error}; expected numbers", where=where) from None
-    lat_deg, lon_deg, alt_m = numbers[4:]
     try:
-        lat_e7, lon_e7 = to_e7(checked_lat_lon(lat_deg, lon_deg))
-    except InvalidPositionError as error:
+        seen = whole(command, "command", 65535)
+        return MissionItem(
+            seen,
+            whole(frame, "frame", 255),
+            (params[0], params[1], params[2], params[3]),
+            *place_e7(seen, lat_deg, lon_deg),
+            alt_m,
+            bool(whole(current, "current", 255)),
+            bool(whole(autocontinue, "autocontinue", 255)),
+        )
+    except (ValueError, InvalidPositionError) as error:
         raise MissionFormatError(f"{where}: {error}", where=where) from None
-    params = (numbers[0], numbers[1], numbers[2], numbers[3])
-    return MissionItem(command, frame, params, lat_e7, lon_e7, alt_m, current, autocontinue)
 
 
 def _situation(items: list[MissionItem], line_numbers: list[int], source: str) -> Situation:
     if not items:
         raise MissionFormatError(f"{source}: no items after the first line", file=source)
     home, rest = _split_home(items)
-    if rest and all(item.command in _FENCE_COMMANDS for item in rest):
+    home_known = Known(home, None, source) if home else None
+    if any(item.command in _FENCE_COMMANDS for item in rest):
         try:
             fence = fence_from_items(rest)
         except FenceError as error:
             seq = error.details.get("item")
             line = line_numbers[seq + len(items) - len(rest)] if isinstance(seq, int) else None
             raise MissionFormatError(f"{source}: line {line}: {error}", file=source, line=line) from None
-        return Situation(fence=Known(fence, None, source), home=home and Known(home, None, source))
+        return Situation(fence=Known(fence, None, source), home=home_known)
     if rest and all(item.command == Command.RALLY_POINT for item in rest):
-        return Situation(rally=Known(tuple(item.position for item in rest), None, source))
-    mission = Mission(without_home(items), items[0].position if _is_place(items[0]) else None)
-    home_known = Known(mission.home, None, source) if mission.home else None
-    return Situation(mission=Known(mission, None, source), home=home_known)
+        return Situation(rally=Known(tuple(item.position for item in rest), None, source), home=home_known)
+    if len(rest) == len(items):
+        raise MissionFormatError(
+            f"{source}: line {line_numbers[0]}: command {items[0].command}; a mission's first line is its home (command 16)",
+            file=source,
+            line=line_numbers[0],
+        )
+    return Situation(mission=Known(Mission(tuple(rest), home), None, source), home=home_known)
 
 
 def _split_home(items: list[MissionItem]) -> tuple[LatLon | None, list[MissionItem]]:

@@ -5,7 +5,7 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from strategies import GEOD, away, degE7_lat_lons, lat_lons
+from strategies import GEOD, away, lat_lons, wire_lat_lons
 
 from missions.errors import InvalidPositionError
 from missions.geo import (
@@ -22,7 +22,9 @@ from missions.geo import (
 
 
 @given(lat_lons, st.floats(0, 359.99), st.floats(0.01, 10_000))
-def test_distance_and_bearing_agree_with_the_direct_geodesic(a: LatLon, bearing: float, length_m: float) -> None:
+def test_distance_and_bearing_agree_with_the_direct_geodesic(
+    a: LatLon, bearing: float, length_m: float
+) -> None:
     b = away(a, bearing, length_m)
     assert distance_m(a, b) == pytest.approx(length_m, abs=1e-6)
     turn_deg = (bearing_deg(a, b) - bearing + 180) % 360 - 180
@@ -40,7 +42,7 @@ def test_bearing_never_comes_out_as_360() -> None:
     assert bearing_deg(LatLon(10, 20), LatLon(11, 20 - 1e-15)) < 360
 
 
-@given(degE7_lat_lons)
+@given(wire_lat_lons)
 def test_deg_e7_round_trip_is_exact(position: LatLon) -> None:
     assert from_e7(*to_e7(position)) == position
     assert rounded(position) == position
@@ -59,7 +61,8 @@ def test_rounding_does_not_cut() -> None:
 
 
 @pytest.mark.parametrize(
-    ("lon_deg", "wrapped_deg"), [(0, 0), (180, -180), (-180, -180), (181, -179), (-181, 179), (540, -180), (359, -1)]
+    ("lon_deg", "wrapped_deg"),
+    [(0, 0), (180, -180), (-180, -180), (181, -179), (-181, 179), (540, -180), (359, -1)],
 )
 def test_longitudes_wrap(lon_deg: float, wrapped_deg: float) -> None:
     assert wrap_lon_deg(lon_deg) == wrapped_deg

@@ -31,7 +31,9 @@ def test_plane_distances_agree_with_the_geodesic(
 
 
 @given(lat_lons, bearings, st.floats(0.01, 10_000))
-def test_bearings_from_the_origin_agree_with_the_geodesic(origin: LatLon, bearing: float, length_m: float) -> None:
+def test_bearings_from_the_origin_agree_with_the_geodesic(
+    origin: LatLon, bearing: float, length_m: float
+) -> None:
     east_m, north_m = LocalFrame(origin).to_local(away(origin, bearing, length_m))
     assert east_m == pytest.approx(length_m * math.sin(math.radians(bearing)), abs=1e-3)
     assert north_m == pytest.approx(length_m * math.cos(math.radians(bearing)), abs=1e-3)
@@ -67,7 +69,9 @@ def test_the_frame_takes_the_short_way_across_the_antimeridian() -> None:
 
 @pytest.mark.parametrize("lat_deg", [85.0001, -85.5, 90, -90])
 def test_near_a_pole_is_refused(lat_deg: float) -> None:
-    with pytest.raises(InvalidPositionError, match=r"latitude .*° is beyond ±85°: the autopilot's flat frame"):
+    with pytest.raises(
+        InvalidPositionError, match=r"latitude .*° is beyond ±85°: the autopilot's flat frame"
+    ):
         LocalFrame(LatLon(lat_deg, 0))
     with pytest.raises(InvalidPositionError, match=r"is beyond ±85°"):
         frame_around([LatLon(math.copysign(84, lat_deg), 5), LatLon(lat_deg, 5)])
@@ -96,7 +100,9 @@ def test_the_autopilots_metre(lat_deg: int) -> None:
 @example(85.0, 90.0, 1000.0)
 @example(-85.0, 270.0, 1000.0)
 @example(45.0, 45.0, 1000.0)
-def test_the_bow_bounds_how_far_the_autopilots_line_leaves_ours(lat_deg: float, bearing: float, leg_m: float) -> None:
+def test_the_bow_bounds_how_far_the_autopilots_line_leaves_ours(
+    lat_deg: float, bearing: float, leg_m: float
+) -> None:
     a = LatLon(lat_deg, 179.999)
     b = away(a, bearing, leg_m)
     frame = frame_around([LatLon(max(-85, min(85, lat_deg)), 180)])

@@ -1,0 +1,76 @@
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from missions.errors import MissionFormatError
+from missions.formats import read_parameters
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+MISSION_PLANNER = """#NOTE: 12/2/2025 10:00:00 Frame : rover
+FENCE_ENABLE,1
+FENCE_MARGIN,2.5
+WP_SPEED,2
+BRD_OPTIONS,-1
+"""
+MAVPROXY = """FENCE_ENABLE     1.000000
+FENCE_MARGIN     2.500000
+WP_SPEED         2.000000 # metres a second
+BRD_OPTIONS      -1
+"""
+QGROUNDCONTROL = """# Onboard parameters for Vehicle 1
+#
+# Vehicle-Id Component-Id Name Value Type
+1\t1\tFENCE_ENABLE\t1\t2
+1\t1\tFENCE_MARGIN\t2.500000000000000000\t9
+1\t1\tWP_SPEED\t2.0\t9
+1\t1\tBRD_OPTIONS\t-1\t6
+"""
+
+
+@pytest.mark.parametrize(
+    "text", [MISSION_PLANNER, MAVPROXY, QGROUNDCONTROL], ids=["Mission Planner", "MAVProxy", "QGC"]
+)
+@pytest.mark.parametrize("bom", ["", "\ufeff"])
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_the_files_of_three_tools(tmp_path: Path, text: str, bom: str, end: str) -> None:
+    path = tmp_path / "rover.parm"
+    path.write_bytes((bom + text).replace("\n", end).encode())
+    assert read_parameters(path) == {"FENCE_ENABLE": 1, "FENCE_MARGIN": 2.5, "WP_SPEED": 2, "BRD_OPTIONS": -1}
+
+
+@pytest.mark.parametrize("line", ["wp_speed = 3", "WP_SPEED:3", "WP_SPEED\t3", " WP_SPEED , 3e0 "])
+def test_other_ways_to_part_name_and_value(tmp_path: Path, line: str) -> None:
+    path = tmp_path / "rover.param"
+    path.write_text(line)
+    assert read_parameters(path) == {"WP_SPEED": 3}
+
+
+def test_the_last_of_two_values_counts(tmp_path: Path) -> None:
+    path = tmp_path / "rover.parm"
+    path.write_text("WP_SPEED 1\n\nWP_SPEED 2\n")
+    assert read_parameters(path) == {"WP_SPEED": 2}
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["WP_SPEED", "WP_SPEED fast", "WP_SPEED nan", "WP_SPEED inf", "2 WP_SPEED", "A_NAME_OF_MORE_THAN_16 1", "1\t1\tX\tfast\t9", "WP_SPEED 1_0"],
+)  # fmt: skip
+def test_lines_that_are_none_are_named(tmp_path: Path, line: str) -> None:
+    path = tmp_path / "rover.parm"
+    path.write_text(f"WP_RADIUS 2\n{line}\n")
+    with pytest.raises(
+        MissionFormatError, match=r"rover\.parm: line 2: expected a parameter's name and a number, found"
+    ):
+        read_parameters(path)
+
+
+def test_files_that_cannot_be_read(tmp_path: Path) -> None:
+    with pytest.raises(MissionFormatError, match=r"none\.parm cannot be read: No such file"):
+        read_parameters(tmp_path / "none.parm")
+    (tmp_path / "x.parm").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(MissionFormatError, match=r"x\.parm is not a text file"):
+        read_parameters(tmp_path / "x.parm")

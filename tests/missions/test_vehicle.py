@@ -1,0 +1,231 @@
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from missions.errors import VehicleError
+from missions.vehicle import Autopilot, FenceParameters, Footprint, Steering, Vehicle, vehicle_from_parameters
+
+SKID = {"SERVO1_FUNCTION": 73, "SERVO3_FUNCTION": 74}
+ACKERMANN = {"SERVO1_FUNCTION": 26, "SERVO3_FUNCTION": 70}
+KNOWN = {
+    "WP_RADIUS": 3.0,
+    "WP_SPEED": 5.0,
+    "WP_ACCEL": 0.8,
+    "WP_JERK": 0.5,
+    "WP_PIVOT_ANGLE": 45.0,
+    "WP_PIVOT_RATE": 30.0,
+    "CRUISE_SPEED": 4.0,
+    "TURN_RADIUS": 1.5,
+    "ATC_TURN_MAX_G": 0.3,
+    "ATC_ACCEL_MAX": 2.0,
+    "PSC_POS_P": 0.4,
+    "FENCE_ENABLE": 1,
+    "FENCE_TYPE": 4,
+    "FENCE_MARGIN": 1.0,
+    "FENCE_RADIUS": 150.0,
+    "FENCE_OPTIONS": 3,
+    "FENCE_ACTION": 2,
+    "AVOID_ENABLE": 1,
+    "OA_TYPE": 2,
+    **ACKERMANN,
+}
+
+
+def test_a_vehicle_whose_parameters_are_all_known() -> None:
+    assert vehicle_from_parameters({**KNOWN, "BATT_MONITOR": 4.0}, mav_type=10) == Vehicle(
+        waypoint_radius_m=3.0,
+        speed_mps=5.0,
+        turn_radius_m=1.5,
+        turn_max_g=0.3,
+        accel_max_mps2=0.8,
+        jerk_mps3=0.5,
+        position_gain_per_s=0.4,
+        pivot_angle_deg=45.0,
+        pivot_rate_dps=30.0,
+        steering=Steering.ACKERMANN,
+        autopilot=Autopilot.ARDUPILOT,
+        fence=FenceParameters(enabled=True, type_bits=4, margin_m=1.0, radius_m=150.0, union=True, action=2),
+        avoid_bits=1,
+        oa_type=2,
+        assumed=(),
+        mav_type=10,
+    )
+
+
+def test_what_is_not_known_is_told_with_the_default_used() -> None:
+    vehicle = vehicle_from_parameters({})
+    assert {str(one) for one in vehicle.assumed} >= {
+        "WP_RADIUS is not known; taken as 2",
+        "WP_SPEED is not known; taken as 2",
+        "TURN_RADIUS is not known; taken as 0.9",
+        "SERVO1_FUNCTION is not known; taken as 26",
+        "FENCE_ENABLE is not known; taken as 0",
+    }
+    assert vehicle == Vehicle(assumed=vehicle.assumed)
+
+
+@given(st.sets(st.sampled_from(sorted(KNOWN))))
+def test_exactly_the_missing_ones_are_assumed(missing: set[str]) -> None:
+    parameters = {name: value for name, value in KNOWN.items() if name not in missing}
+    assumed = {one.parameter for one in vehicle_from_parameters(parameters).assumed}
+    silent = {"CRUISE_SPEED", *ACKERMANN}  # matter only where WP_SPEED, or the other output, is not there
+    assert assumed - silent == missing - silent
+
+
+@pytest.mark.parametrize(
+    ("parameters", "speed_mps", "accel_mps2", "jerk_mps3"),
+    [
+        ({"WP_SPEED": 0, "CRUISE_SPEED": 3}, 3, 1, 1),
+        ({"CRUISE_SPEED": 3}, 3, 1, 1),
+        ({"WP_SPEED": 0}, 2, 1, 1),
+        ({"WP_SPEED": 1.5, "CRUISE_SPEED": 3}, 1.5, 1, 1),
+        ({"WP_ACCEL": 0, "ATC_ACCEL_MAX": 0.7}, 2, 0.7, 0.7),
+        ({"WP_ACCEL": 2, "ATC_ACCEL_MAX": 0.7}, 2, 0.7, 0.7),
+        ({"ATC_ACCEL_MAX": 1.5, "ATC_DECEL_MAX": 0.5}, 2, 0.5, 0.5),
+        ({"ATC_ACCEL_MAX": 0}, 2, 20, 20),
+        ({"WP_JERK": 0.4}, 2, 1, 0.4),
+    ],
+)
+def test_zero_means_what_it_means_to_ardupilot(
+    parameters: dict[str, float], speed_mps: float, accel_mps2: float, jerk_mps3: float
+) -> None:
+    vehicle = vehicle_from_parameters(parameters)
+    assert (vehicle.speed_mps, vehicle.accel_max_mps2, vehicle.jerk_mps3) == (
+        speed_mps,
+        accel_mps2,
+        jerk_mps3,
+    )
+
+
+@pytest.mark.parametrize(
+    ("functions", "steering"),
+    [
+        (SKID, Steering.SKID),
+        ({"SERVO16_FUNCTION": 73, "SERVO32_FUNCTION": 74}, Steering.SKID),
+        (ACKERMANN, Steering.ACKERMANN),
+        ({"SERVO1_FUNCTION": 73}, Steering.ACKERMANN),
+        ({}, Steering.ACKERMANN),
+    ],
+)
+def test_steering_from_the_outputs(functions: dict[str, float], steering: Steering) -> None:
+    vehicle = vehicle_from_parameters(functions)
+    assert vehicle.steering is steering
+    assert vehicle.can_pivot is (steering is Steering.SKID)
+
+
+def test_no_pivot_angle_no_pivots() -> None:
+    assert not vehicle_from_parameters({**SKID, "WP_PIVOT_ANGLE": 0}).can_pivot
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"WP_RADIUS": -1.0}, "WP_RADIUS is -1; it cannot be below 0"),
+        ({"WP_SPEED": math.nan}, "WP_SPEED is nan, which is no number"),
+        ({"PSC_POS_P": 0.0}, "PSC_POS_P is 0; it cannot be below 0.01"),
+        ({"WP_SPEED": 0.0, "CRUISE_SPEED": 0.0}, "would not move"),
+        ({"RA_MAX_STR_ANG": 1.6}, "RA_MAX_STR_ANG is 1.6 rad"),
+        ({"RA_MAX_STR_ANG": math.inf}, "RA_MAX_STR_ANG is inf"),
+    ],
+)
+def test_impossible_values_are_refused_by_name(parameters: dict[str, float], message: str) -> None:
+    with pytest.raises(VehicleError, match=message):
+        vehicle_from_parameters(parameters)
+
+
+@pytest.mark.parametrize(
+    ("changes", "stops_within_m"),
+    [
+        ({}, 1.0),
+        ({"FENCE_ENABLE": 0}, 0.0),
+        ({"FENCE_TYPE": 2}, 0.0),
+        ({"AVOID_ENABLE": 2}, 0.0),
+    ],
+)
+def test_it_stops_within_the_margin_of_a_fence_that_it_avoids(
+    changes: dict[str, float], stops_within_m: float
+) -> None:
+    assert vehicle_from_parameters({**KNOWN, **changes}).stops_within_m == stops_within_m
+
+
+def test_the_circle_about_home() -> None:
+    assert FenceParameters(enabled=True).enforces_home_circle
+    assert not FenceParameters(enabled=True, type_bits=4).enforces_home_circle
+    assert not FenceParameters(enabled=True, radius_m=0.0).enforces_home_circle
+
+
+@pytest.mark.parametrize(("mav_type", "is_rover"), [(None, True), (10, True), (11, True), (2, False)])
+def test_rovers_and_boats(mav_type: int | None, is_rover: bool) -> None:
+    assert vehicle_from_parameters({}, mav_type=mav_type).is_rover is is_rover
+
+
+def test_px4_with_steered_wheels() -> None:
+    vehicle = vehicle_from_parameters(
+        {
+            "NAV_ACC_RAD": 0.5,
+            "RA_ACC_RAD_MAX": 3.0,
+            "RA_WHEEL_BASE": 0.321,
+            "RA_MAX_STR_ANG": 0.5236,
+            "RO_SPEED_LIM": 3.0,
+            "RO_ACCEL_LIM": 3.0,
+            "RO_DECEL_LIM": 6.0,
+            "RO_JERK_LIM": -1.0,
+            "GF_ACTION": 0,
+            "GF_MAX_HOR_DIST": 100.0,
+        }
+    )
+    assert vehicle.autopilot is Autopilot.PX4
+    assert vehicle.steering is Steering.ACKERMANN
+    assert vehicle.waypoint_radius_m == 3.0
+    assert vehicle.turn_radius_m == pytest.approx(0.321 / math.tan(0.5236))
+    assert (vehicle.speed_mps, vehicle.accel_max_mps2, vehicle.jerk_mps3) == (3.0, 3.0, 20.0)
+    assert not vehicle.fence.enabled
+    assert vehicle.fence.radius_m == 100.0
+    assert vehicle.stops_within_m == 0.0
+    assert vehicle.assumed == ()
+
+
+@pytest.mark.parametrize(
+    ("parameters", "steering", "assumed"),
+    [
+        ({"RD_WHEEL_TRACK": 0.3}, Steering.SKID, False),
+        ({"RD_WHEEL_TRACK": 0.3, "RA_WHEEL_BASE": 0.3}, Steering.ACKERMANN, True),
+        ({"RD_WHEEL_TRACK": 0.3, "RA_WHEEL_BASE": 0.3, "CA_AIRFRAME": 6}, Steering.SKID, False),
+        ({"RD_WHEEL_TRACK": 0.3, "RA_WHEEL_BASE": 0.3, "CA_AIRFRAME": 5}, Steering.ACKERMANN, False),
+        ({"NAV_ACC_RAD": 0.5}, Steering.ACKERMANN, True),
+    ],
+)
+def test_px4_steering(parameters: dict[str, float], steering: Steering, assumed: bool) -> None:
+    vehicle = vehicle_from_parameters(parameters)
+    assert vehicle.steering is steering
+    assert any(one.parameter == "CA_AIRFRAME" for one in vehicle.assumed) is assumed
+
+
+def test_px4_differential() -> None:
+    vehicle = vehicle_from_parameters(
+        {"RD_TRANS_DRV_TRN": math.radians(10), "RD_MISS_SPD_DEF": 1.5, "NAV_ACC_RAD": 0.5}
+    )
+    assert (vehicle.waypoint_radius_m, vehicle.turn_radius_m, vehicle.speed_mps) == (0.5, 0.0, 1.5)
+    assert vehicle.pivot_angle_deg == pytest.approx(10)
+    assert vehicle.can_pivot
+
+
+def test_ardupilot_wins_where_names_of_both_are_there() -> None:
+    assert vehicle_from_parameters({"WP_RADIUS": 1.0, "RA_WHEEL_BASE": 1.0}).autopilot is Autopilot.ARDUPILOT
+
+
+def test_footprint() -> None:
+    footprint = Footprint(length_m=2.0, width_m=1.0, gps_forward_m=0.5, gps_right_m=-0.1)
+    assert footprint.half_width_m == pytest.approx(0.6)
+    assert footprint.swept_radius_m == pytest.approx(math.hypot(1.5, 0.6))
+    assert Footprint().swept_radius_m == 0.0
+
+
+@pytest.mark.parametrize("sizes", [(-1.0, 1.0), (1.0, math.nan), (math.inf, 1.0)])
+def test_a_footprint_that_is_none(sizes: tuple[float, float]) -> None:
+    with pytest.raises(VehicleError, match="footprint"):
+        Footprint(*sizes)

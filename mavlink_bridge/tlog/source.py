@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 WINDOW_BYTES: Final = 1 << 18
-_GZIP_MAGIC: Final = b"\x1f\x8b"
+_GZIP: Final = 31
+"""What zlib calls a stream with gzip's header and checksum."""
 _PACKED_BYTES: Final = 1 << 10
 
 
@@ -45,10 +46,10 @@ class LogFile:
     def __init__(self, path: Path) -> None:
         self.path = path
         with self._opened() as file:
-            head = file.read(len(_GZIP_MAGIC))
+            head = file.read(_PACKED_BYTES)
         if not head:
             raise LogError(f"{path}: the file is empty", path=str(path))
-        self._is_gzip = head == _GZIP_MAGIC
+        self._is_gzip = _unpacks(head)
 
     def open(self) -> AbstractContextManager[Source]:
         """Open the log from its begin."""
@@ -119,7 +120,7 @@ class _GzipSource:
         # A small part at a time, as all of the part in which the packing breaks is lost.
         while part := self._file.read(_PACKED_BYTES):
             while part:
-                unpacker = unpacker or zlib.decompressobj(wbits=31)
+                unpacker = unpacker or zlib.decompressobj(wbits=_GZIP)
                 try:
                     yield unpacker.decompress(part, WINDOW_BYTES)
                 except zlib.error:
@@ -131,3 +132,12 @@ class _GzipSource:
         if unpacker is not None:
             self.cut_short = True
             yield unpacker.flush()
+
+
+def _unpacks(head: bytes) -> bool:
+    # Two magic bytes are too few: a damaged log may begin with them.
+    try:
+        zlib.decompressobj(wbits=_GZIP).decompress(head)
+    except zlib.error:
+        return False
+    return True

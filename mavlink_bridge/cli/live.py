@@ -106,5 +106,3 @@ def conduct(
         raise director.trouble
     planned, planning_s = made[0]
     return LiveResult(planned, planning_s, director.situation, upload, upload)
-
-

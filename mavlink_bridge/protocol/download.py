@@ -105,6 +105,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         self._rival_patience_s = rival_patience_s
         self._round_trip = round_trip or RoundTrip()
         self._count = 0
+        self._most_count = 0
         self._items: dict[int, MissionItem] = {}
         self._in_flight: dict[int, _Request] = {}  # in order of sending
         self._next = 0
@@ -122,6 +123,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         self._fetching_since_s = 0.0
         self._act_at_s = 0.0
         self._rival_since_s: float | None = None
+        self._begun_s = 0.0
         self._limit_s = 0.0
 
     @property
@@ -145,7 +147,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
     @property
     def bound_s(self) -> float:
         """Longest time from the start to the end, whatever the link does (it grows when the count is known)."""
-        return 40.0 + self._rival_patience_s + 0.5 * self._count
+        return 40.0 + self._rival_patience_s + 0.5 * self._most_count
 
     @property
     def deadline_s(self) -> float | None:
@@ -159,7 +161,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
     def start(self, now_s: float) -> None:
         """Ask how many items there are."""
         if self._move(DownloadEvent.START):
-            self._heard_s = now_s
+            self._heard_s = self._begun_s = now_s
             self._limit_s = now_s + self.bound_s
             self._ask_count(now_s)
 
@@ -217,8 +219,9 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         self._heard_s = self._fetching_since_s = now_s
         self._rival_since_s = None
         self._refusals = 0
-        self._limit_s += 0.5 * max(0, count - self._count)
         self._count = count
+        self._most_count = max(self._most_count, count)
+        self._limit_s = self._begun_s + self.bound_s
         self._forget_items()
         if self.is_done:
             self._thank()
@@ -232,7 +235,10 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         self._next = 0
 
     def _take_item(self, message: messages.MissionItemInt | messages.MissionItem, now_s: float) -> None:
+        is_coarse = isinstance(message, messages.MissionItem)
         if self.state is not DownloadState.FETCHING or not 0 <= message.seq < self._count:
+            return
+        if is_coarse and not self._may_use_floats:
             return
         self._heard_s = now_s
         request = self._in_flight.pop(message.seq, None)
@@ -240,14 +246,12 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
             self._newest_answered = max(self._newest_answered, request.order)
             if not request.is_repeat:
                 self._round_trip.observe(now_s - request.sent_s)
-        if isinstance(message, messages.MissionItemInt):
+        if not is_coarse:
             self._forget_coarse(now_s)
-        elif not self._may_use_floats:
-            return
         if message.seq in self._items:
             return
         self._items[message.seq] = item_from_message(message)
-        if isinstance(message, messages.MissionItem):
+        if is_coarse:
             self._coarse_seqs.add(message.seq)
         self._window = min(self._window + 1.0, self._most_in_flight)
         if len(self._items) == self._count:

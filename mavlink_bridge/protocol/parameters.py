@@ -231,7 +231,8 @@ class ReadParameters(TableMachine[ParameterState, ParameterEvent]):
         for key, ask in list(self._asks.items()):
             if now_s < ask.sent_s + overdue_s:
                 break
-            if ask.tries >= enough:
+            # What is asked by number is in the list: only names can be unknown.
+            if ask.tries >= (_MOST_TRIES if isinstance(key, int) else enough):
                 del self._asks[key]
                 self._missing.append(key)
             else:

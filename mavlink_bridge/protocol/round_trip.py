@@ -6,7 +6,7 @@ from __future__ import annotations
 class RoundTrip:
     """Smoothed round-trip time and its variation; samples of repeated messages must be left out (Karn)."""
 
-    def __init__(self, first_guess_s: float = 0.5) -> None:
+    def __init__(self, first_guess_s: float = 0.25) -> None:
         self._mean_s = first_guess_s
         self._variation_s = first_guess_s / 2
         self._is_guess = True

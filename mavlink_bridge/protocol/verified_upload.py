@@ -398,13 +398,15 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         pushed = self._pushed
         assert pushed is not None
         refused = pushed.state is UploadState.REFUSED
-        # ERROR also answers an item that nobody waits for (after a reboot, say); and with several items under way the
-        # refused one is not certain. Serving the items one by one settles both.
+        # ERROR also answers an item that nobody waits for (after a reboot, say): it must come twice. And with several items
+        # under way the refused one is not certain. Serving the items one by one settles both.
         settled = (
             refused
             and pushed.item_is_certain
-            and (pushed.result is not MissionResult.ERROR or self._pushes > 1)
+            and (pushed.result is not MissionResult.ERROR or _is_same_refusal(pushed, self._pushed_before))
         )
+        if settled:
+            self._refusal = pushed
         if not settled and self._pushes < MOST_PUSHES and self._move(VerifiedUploadEvent.PUSH_AGAIN):
             self._push_wanted(1 if refused else self._window, now_s)
         elif self._held is Held.OLD:

@@ -102,7 +102,9 @@ def test_an_abandoned_upload_is_restored():
 def test_a_rival_that_keeps_the_list_is_reported():
     vehicle = Vehicle()
     rival = Client(_Forever(), RIVAL)
-    client = Client(VerifiedUpload(PEER, MISSION, plain_mission(5), is_active=False, rival_patience_s=5.0), PEER, 1.0)
+    client = Client(
+        VerifiedUpload(PEER, MISSION, plain_mission(5), is_active=False, rival_patience_s=5.0), PEER, 1.0
+    )
     twin = Twin(vehicle, [rival, client])
     twin.run_until_ended(client, 100.0)
     assert client.machine.outcome.kind is OutcomeKind.BUSY

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mavlink_bridge.tlog.scan import NEAR_US, NOWHERE, Scan, near
-from mavlink_bridge.tlog.wire import MAGIC_V1, MAGIC_V2, TIMESTAMP_BYTES
+from mavlink_bridge.tlog.wire import MAGIC_V1, MAGIC_V2, MAX_FRAME_BYTES, TIMESTAMP_BYTES
 
 if TYPE_CHECKING:
     from collections import Counter
@@ -101,12 +101,15 @@ class Follower:
         """Count what stands after the log's last record."""
         data = self._scan.data
         loose = self._count_orphans(loose, len(data), self._time_us)
-        rest_bytes = len(data) - loose
-        head = data[max(loose, 0) :][self._gap_bytes : self._gap_bytes + 1]
-        if rest_bytes and (not head or head[0] in {MAGIC_V1, MAGIC_V2}):
-            self._tally["truncated_bytes"] += rest_bytes
+        rest = data[max(loose, 0) :]
+        head = rest[self._gap_bytes : self._gap_bytes + 1]
+        is_record = len(rest) < self._gap_bytes + MAX_FRAME_BYTES and (
+            not head or head[0] in {MAGIC_V1, MAGIC_V2}
+        )
+        if rest and is_record:
+            self._tally["truncated_bytes"] += len(rest)
         else:
-            self._count_skipped(rest_bytes)
+            self._count_skipped(len(data) - loose)
 
     def _open_run(self, index: int, loose: int) -> None:
         # Count what lies before a frame that does not simply follow, and say whether the 8 bytes before it are its timestamp.

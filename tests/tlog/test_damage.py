@@ -96,6 +96,20 @@ class TestCounts:
         assert rows(reader) == whole
         assert reader.damage == Damage(frames=len(PARTS), gaps=1, skipped_bytes=20)
 
+    def test_a_long_tail_of_magic_bytes_is_no_cut_record(self, log):
+        reader = TlogReader(log(record(heartbeat()) + b"\xfd" * 900_000))
+        assert len(list(reader)) == 1
+        assert reader.damage == Damage(frames=1, gaps=1, skipped_bytes=900_000)
+
+    def test_a_log_that_shrinks_while_it_is_read(self, log, small_windows, whole):
+        path = log(YARD.read_bytes())
+        reader = TlogReader(path)
+        entries = iter(reader)
+        first = [next(entries) for _ in range(100)]
+        path.write_bytes(YARD.read_bytes()[:20])
+        assert rows(first) == whole[:100]
+        assert len(list(entries)) < 500
+
     def test_a_cut_at_any_byte_of_the_last_record(self, log, whole):
         keep = b"".join(PARTS[:-1])
         last = PARTS[-1]

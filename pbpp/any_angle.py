@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
     from .geometry import Point
     from .partition.slabs import Slabs
+    from .partition.sweep import PortalView
 
 __all__ = ["SearchResult", "shortest_path"]
 
@@ -269,7 +270,7 @@ class _Search:
             self._reach(root, neighbour, _LEFT)
             self._reach(root, neighbour, _RIGHT)
 
-    def _follow(self, root: int, cone: Cone) -> None:  # noqa: C901, PLR0912 - the inner loop: calls would double its time
+    def _follow(self, root: int, cone: Cone) -> None:  # noqa: C901, PLR0912, PLR0915 - the inner loop: calls would double its time
         """Follow a cone through blocks as long as there is one way on; queue the cones where it divides."""
         root_x, root_y = self._root_x[root], self._root_y[root]
         goal_x, goal_y = self._goal_x, self._goal_y
@@ -292,7 +293,7 @@ class _Search:
                     self._push_goal(root)
             ways.clear()
             for way in portals[block]:
-                x, portal_low, portal_high, low_end, high_end, behind = way
+                x, portal_low, portal_high, low_end, high_end, _ = way
                 run = x - root_x if direction else root_x - x
                 if run <= 0.0:
                     continue

@@ -32,6 +32,7 @@ _PAD_M = 4e-9
 """Added to every offset, so that rounding at map coordinates of some thousand kilometres takes nothing away."""
 
 _ATTEMPTS = 8
+_AREAL = (shapely.GeometryType.POLYGON, shapely.GeometryType.MULTIPOLYGON)
 
 
 def grow(geometries: Geometries, clearance_m: float, *, rounded: bool = False) -> Geometries:
@@ -40,7 +41,7 @@ def grow(geometries: Geometries, clearance_m: float, *, rounded: bool = False) -
     Parameters
     ----------
     geometries : (n,) array of shapely geometry
-        Obstacles.
+        Obstacles: areas, lines, or both.
     clearance_m : float
         Clearance in metres, above 0.
     rounded : bool, default False
@@ -56,6 +57,13 @@ def grow(geometries: Geometries, clearance_m: float, *, rounded: bool = False) -
     InvalidGeometryError
         If an offset stays too near after several attempts.
     """
+    areal = np.isin(shapely.get_type_id(geometries), _AREAL)
+    if not rounded and not areal.all():
+        # The ends of a line have no corner to mitre.
+        grown = np.empty(len(geometries), dtype=object)
+        grown[areal] = grow(geometries[areal], clearance_m)
+        grown[~areal] = grow(geometries[~areal], clearance_m, rounded=True)
+        return grown
     segments, excess = _rounding(clearance_m) if rounded else (0, 1.0)
     reach_m = np.full(len(geometries), clearance_m * excess + _PAD_M)
     grown = _offset(geometries, reach_m, segments)
@@ -122,7 +130,6 @@ def _offset(geometries: Geometries, reach_m: npt.NDArray[np.float64], segments: 
         geometries,
         reach_m,
         quad_segs=max(segments, 1),
-        cap_style="square",
         join_style="round" if segments else "mitre",
         mitre_limit=MITRE_LIMIT,
     )

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from missions.errors import InvalidPositionError
-from missions.geo import LatLon, wrap_lon_deg
+from missions.geo import LatLon, rounded, wrap_lon_deg
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,6 +28,7 @@ MAX_LATITUDE_DEG = 85.0
 
 _WGS84_A_M = 6378137.0
 _WGS84_E2 = 6.69437999014e-3
+_AUTOPILOT_M_PER_DEG = 1.113195e5  # AP_Math's LATLON_TO_M
 
 
 class LocalPoint(NamedTuple):
@@ -111,13 +112,14 @@ def frame_around(positions: Sequence[LatLon]) -> LocalFrame:
     if abs(farthest) > MAX_LATITUDE_DEG:
         LocalFrame(LatLon(farthest, first_lon_deg))
     centre = LatLon((min(lats_deg) + max(lats_deg)) / 2, wrap_lon_deg((min(lons_deg) + max(lons_deg)) / 2))
-    return LocalFrame(centre)
+    return LocalFrame(rounded(centre))  # PROJ takes 0.6 mm from an origin, or from the equator, for 0
 
 
 def autopilot_scale(lat_deg: float) -> AutopilotScale:
     """Tell how many true metres a metre of ArduPilot's flat frame is, at a latitude (0.9933 to 1.0034)."""
     w2 = 1 - _WGS84_E2 * math.sin(math.radians(lat_deg)) ** 2
-    return AutopilotScale(east=1 / math.sqrt(w2), north=(1 - _WGS84_E2) / w2**1.5)
+    equatorial = math.radians(_WGS84_A_M) / _AUTOPILOT_M_PER_DEG
+    return AutopilotScale(east=equatorial / math.sqrt(w2), north=equatorial * (1 - _WGS84_E2) / w2**1.5)
 
 
 def bow_m(leg_m: float, lat_deg: float) -> float:
@@ -129,9 +131,8 @@ def bow_m(leg_m: float, lat_deg: float) -> float:
     return 1.09 * leg_m**2 * math.tan(math.radians(abs(lat_deg))) / (8 * 6.35e6)
 
 
-def autopilot_line(a: LatLon, b: LatLon, step_m: float, leg_m: float) -> list[LatLon]:
-    """Sample the autopilot's straight line from ``a`` to ``b``, both included, about every ``step_m``."""
-    pieces = max(1, math.ceil(leg_m / step_m))
+def autopilot_line(a: LatLon, b: LatLon, pieces: int) -> list[LatLon]:
+    """Give the autopilot's straight line from ``a`` to ``b``, both included, cut into equal pieces."""
     delta_lon_deg = wrap_lon_deg(b.lon_deg - a.lon_deg)
     return [
         LatLon(

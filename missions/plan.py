@@ -70,6 +70,8 @@ class Plan:
         The drawn lines as rounded into the items, start first.
     clearance_m : float or None
         Promised for the rover as it drives; None where only drawn lines were asked for.
+    asked_m : float
+        What the drawn lines have to keep (less where the first ones lead away from a fence nearby).
     drawn_clearance_m : float
         The least distance of the drawn lines, as rounded and as the autopilot draws them, to any fence (infinite without a fence near).
     driven_clearance_m : float
@@ -95,6 +97,7 @@ class Plan:
     straight_line_m: float
     duration_s: float
     clearance_m: float | None
+    asked_m: float
     drawn_clearance_m: float
     driven_clearance_m: float
     blocks: int
@@ -126,7 +129,7 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
     vehicle = vehicle_from_parameters(situation.parameters, mav_type=situation.vehicle_type)
     start, targets = _ends(situation, request)
     home = situation.home.value if situation.home else None
-    ground = _ground(fence, vehicle, home, (start, *targets))
+    ground = ground_for(situation, vehicle, (start, *targets))
     promised_m, allowance_m, warnings = _clearance(request, vehicle)
     warnings = [*_fence_warnings(vehicle, situation), *ground.warnings, *warnings]
 
@@ -174,6 +177,7 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
         straight_line_m=_length_m((start, *targets)),
         duration_s=forecast.duration_s,
         clearance_m=promised_m if allowance_m else None,
+        asked_m=drawn_m,
         drawn_clearance_m=clearance_m,
         driven_clearance_m=driven_m,
         envelope=forecast,
@@ -241,7 +245,15 @@ def _heading_deg(situation: Situation, start: LatLon) -> float | None:
     return pose.value.heading_deg if pose is not None and pose.value.position == start else None
 
 
-def _ground(fence: Fence, vehicle: Vehicle, home: LatLon | None, ends: Sequence[LatLon]) -> Ground:
+def ground_for(situation: Situation, vehicle: Vehicle, ends: Sequence[LatLon]) -> Ground:
+    """Lay the situation's fence out in the plane as the vehicle's parameters say.
+
+    Raises
+    ------
+    FenceMissingError, FenceError, InvalidPositionError, SituationError
+        As `plan`.
+    """
+    fence = _fence(situation)
     positions = [
         position
         for zone in fence.zones
@@ -259,10 +271,16 @@ def _ground(fence: Fence, vehicle: Vehicle, home: LatLon | None, ends: Sequence[
         fence,
         frame,
         union=vehicle.fence.union,
-        home=home,
+        home=situation.home.value if situation.home else None,
         home_radius_m=vehicle.fence.radius_m if vehicle.fence.enforces_home_circle else None,
         around=ends,
     )
+
+
+def asked_clearance(situation: Situation, request: Request) -> tuple[Vehicle, float]:
+    """Give the situation's vehicle and the clearance that a plan would promise."""
+    vehicle = vehicle_from_parameters(situation.parameters, mav_type=situation.vehicle_type)
+    return vehicle, _clearance(request, vehicle)[0]
 
 
 def _clearance(request: Request, vehicle: Vehicle) -> tuple[float, float, list[str]]:
@@ -352,7 +370,7 @@ def _length_m(path: Sequence[LatLon]) -> float:
 
 def _check(ground: Ground, path: Sequence[LatLon], route: Route, drawn_m: float) -> float:
     """Measure the finished lines, as the autopilot draws them, and give their least clearance."""
-    clearances_m = [ground.clearance_m(_drawn_leg(ground, a, b)) for a, b in pairwise(path)]
+    clearances_m = [ground.clearance_m(drawn_leg(ground, a, b)) for a, b in pairwise(path)]
     lead_away = clearances_m[: route.lead_away]
     rest = clearances_m[route.lead_away :]
     asked_m = {"lead-away": route.start_clearance_m - ROUNDING_RESERVE_M, "route": drawn_m}
@@ -366,6 +384,8 @@ def _check(ground: Ground, path: Sequence[LatLon], route: Route, drawn_m: float)
     return min(clearances_m)
 
 
-def _drawn_leg(ground: Ground, a: LatLon, b: LatLon) -> LineString | Point:
-    line = ground.frame.to_local_array(autopilot_line(a, b, _SAMPLE_M, distance_m(a, b)))
+def drawn_leg(ground: Ground, a: LatLon, b: LatLon) -> LineString | Point:
+    """Give the autopilot's straight line between two positions, in the plane."""
+    pieces = max(1, math.ceil(distance_m(a, b) / _SAMPLE_M))
+    line = ground.frame.to_local_array(autopilot_line(a, b, pieces))
     return Point(line[0]) if a == b else LineString(line)

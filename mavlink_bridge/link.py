@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from mavlink_bridge.messages import Frame, Message
     from mavlink_bridge.protocol.machine import Machine
+    from mavlink_bridge.signing import Signing
     from mavlink_bridge.tlog import TlogWriter
 
 ONE_SHOT_IDENTITY = (245, 190)
@@ -102,6 +103,8 @@ class Link:
         System and component id to speak as.
     recorder : TlogWriter, optional
         Everything that comes and goes is written there.
+    signing : Signing, optional
+        Sends signed frames and believes no others.
 
     Raises
     ------
@@ -116,9 +119,10 @@ class Link:
         transport: Transport,
         identity: tuple[int, int] = ONE_SHOT_IDENTITY,
         recorder: TlogWriter | None = None,
+        signing: Signing | None = None,
     ) -> None:
         self._transport = transport
-        self._codec = Codec(*identity)
+        self._codec = Codec(*identity, signing)
         self._recorder = recorder
         self._heartbeat_due_s = 0.0
         self._has_spoken = False
@@ -127,6 +131,11 @@ class Link:
     def identity(self) -> tuple[int, int]:
         """The ids we speak as."""
         return self._codec.identity
+
+    @property
+    def untrusted_frames(self) -> int:
+        """How many frames were left out because they were not signed with our key."""
+        return self._codec.untrusted_frames
 
     def __enter__(self) -> Self:
         return self
@@ -227,6 +236,7 @@ def open_link(
     identity: tuple[int, int] = ONE_SHOT_IDENTITY,
     *,
     recorder: TlogWriter | None = None,
+    signing: Signing | None = None,
     timeout_s: float = 10.0,
 ) -> Link:
     """Open a link by its connection string.
@@ -243,7 +253,7 @@ def open_link(
         raise LinkError(
             f"{address} cannot be opened: {error.strerror or error}", connection=str(address)
         ) from None
-    return Link(transport, identity, recorder)
+    return Link(transport, identity, recorder, signing)
 
 
 class _Udp:

@@ -86,8 +86,8 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
                 command.__name__, type(error).__name__, str(error), code, error.details, wants_json=wants_json
             )
             raise typer.Exit(code) from None
-        except KeyboardInterrupt:
-            message = "interrupted; the vehicle was left as it was"
+        except KeyboardInterrupt as interrupt:
+            message = str(interrupt) or "interrupted; the vehicle was left as it was"
             _report(command.__name__, "Interrupted", message, ExitCode.INTERRUPTED, {}, wants_json=wants_json)
             raise typer.Exit(ExitCode.INTERRUPTED) from None
 

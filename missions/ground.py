@@ -6,6 +6,7 @@ the worse of the true metre and the autopilot's. Rings that cross themselves are
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,7 +19,8 @@ from shapely.ops import nearest_points
 
 from missions.errors import FenceError, SituationError
 from missions.fence import CircleZone, PolygonZone, Zone, ZoneKind
-from missions.local_frame import LocalFrame, autopilot_scale
+from missions.geo import distance_m
+from missions.local_frame import LocalFrame, autopilot_line, autopilot_scale, bow_m
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,7 +36,11 @@ Area = Polygon | MultiPolygon
 CIRCLE_TOLERANCE_M = 0.05
 """How far a circle's polygon may stand off the circle."""
 
+EDGE_BOW_M = 1e-3
+"""How far a fence's line may stand off the autopilot's."""
+
 _WALL_M = 1e-3
+_CIRCLE_PAD_M = 1e-4  # what the autopilot's flat metres lose on a circle of kilometres
 _OPEN_GROUND_M = 500.0
 
 
@@ -84,7 +90,7 @@ class Ground:
             return shapely.union_all(inclusions)
         area: BaseGeometry = inclusions[0]
         for inclusion in inclusions[1:]:
-            area = area.intersection(inclusion)
+            area = _polygons(area.intersection(inclusion))
         return area
 
     @cached_property
@@ -176,18 +182,21 @@ def lay_out(
         name = f"home circle (FENCE_RADIUS {home_radius_m:g} m)"
         area = _area(circle, name, frame, warnings)
         if union:  # the home circle limits even the union
-            barriers = [
-                Barrier(b.name, b.kind, _polygons(b.area.intersection(area)))
-                if b.kind is ZoneKind.INCLUSION
-                else b
-                for b in barriers
-            ]
+            barriers = [_within(barrier, area, name) for barrier in barriers]
         if not (union and any(b.kind is ZoneKind.INCLUSION for b in barriers)):
             barriers.append(Barrier(name, ZoneKind.INCLUSION, area))
     points = frame.to_local_array(around)
     extent = shapely.union_all([*(b.area.envelope for b in barriers), shapely.MultiPoint(points)])
     bounds = extent.envelope.buffer(_OPEN_GROUND_M, join_style="mitre")
     return Ground(frame, tuple(barriers), union, bounds, tuple(warnings))
+
+
+def _within(barrier: Barrier, circle: Area, name: str) -> Barrier:
+    if barrier.kind is ZoneKind.EXCLUSION:
+        return barrier
+    return Barrier(
+        f"{barrier.name} within the {name}", barrier.kind, _polygons(barrier.area.intersection(circle))
+    )
 
 
 def _home_circle(home: LatLon | None, radius_m: float) -> CircleZone:
@@ -206,7 +215,7 @@ def _area(zone: Zone, name: str, frame: LocalFrame, warnings: list[str]) -> Area
 
 
 def _polygon(zone: PolygonZone, name: str, frame: LocalFrame, warnings: list[str]) -> Area:
-    ring = frame.to_local_array(zone.vertices)
+    ring = frame.to_local_array(_autopilot_ring(zone.vertices))
     plain = Polygon(ring)
     if plain.is_valid and plain.area > 0:
         return plain
@@ -221,6 +230,19 @@ def _polygon(zone: PolygonZone, name: str, frame: LocalFrame, warnings: list[str
     if area.is_empty:
         raise FenceError(f"{name} has no area: the vehicle could be nowhere", zone=name)
     return area
+
+
+def _autopilot_ring(vertices: Sequence[LatLon]) -> list[LatLon]:
+    """Put points on long edges, so that they bow as the autopilot's do: straight in latitude and longitude."""
+    ring: list[LatLon] = []
+    for a, b in itertools.pairwise([*vertices, vertices[0]]):
+        edge_m = distance_m(a, b)
+        bowed_m = bow_m(edge_m, max(abs(a.lat_deg), abs(b.lat_deg)))
+        pieces = max(
+            1, math.ceil(math.sqrt(bowed_m / EDGE_BOW_M))
+        )  # a bow shrinks with the square of the length
+        ring += autopilot_line(a, b, pieces)[:-1]
+    return ring
 
 
 def _even_odd(ring: NDArray[np.float64]) -> Area:
@@ -247,12 +269,19 @@ def _crossings(ring: NDArray[np.float64], point: Point) -> int:
 
 def _circle(zone: CircleZone, frame: LocalFrame) -> Polygon:
     """Give a polygon around an exclusion circle, or inside an inclusion circle."""
-    scale = autopilot_scale(zone.centre.lat_deg)
+    half_deg = zone.radius_m / 1.1e5
+    south_deg, north_deg = zone.centre.lat_deg - half_deg, zone.centre.lat_deg + half_deg
+    # The autopilot's metre grows towards the poles: it is least and most at the circle's ends, or on the equator.
+    scales = [
+        *autopilot_scale(south_deg),
+        *autopilot_scale(north_deg),
+        *autopilot_scale(max(south_deg, min(0.0, north_deg))),
+    ]
     corners = max(16, math.ceil(math.pi / math.acos(1 - CIRCLE_TOLERANCE_M / max(zone.radius_m, 1.0))))
     if zone.kind is ZoneKind.EXCLUSION:
-        radius_m = zone.radius_m * max(1.0, scale.east, scale.north) / math.cos(math.pi / corners)
+        radius_m = zone.radius_m * max(1.0, *scales) / math.cos(math.pi / corners) + _CIRCLE_PAD_M
     else:
-        radius_m = zone.radius_m * min(1.0, scale.east, scale.north)
+        radius_m = max(zone.radius_m * min(1.0, *scales) - _CIRCLE_PAD_M, _WALL_M)
     angles_rad = (np.arange(corners) + 0.5) * (2 * math.pi / corners)
     centre = frame.to_local(zone.centre)
     ring = np.column_stack((np.cos(angles_rad), np.sin(angles_rad))) * radius_m + centre

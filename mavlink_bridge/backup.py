@@ -91,7 +91,9 @@ class BackupStore:
         return path
 
     def begin(self, system: int, mission_type: MissionType, items: Sequence[MissionItem]) -> Path:
-        """Keep a backup and note that an upload begins; give the backup's path.
+        """Keep a backup and note that an upload begins; give the path of the backup that is to be restored if it fails.
+
+        If an earlier upload was interrupted, what is on the vehicle now is its remains: the note goes on naming the older backup.
 
         Raises
         ------
@@ -99,6 +101,8 @@ class BackupStore:
             It cannot be written; nothing should be uploaded then.
         """
         path = self.keep(system, mission_type, items)
+        if earlier := self._noted(system, mission_type):
+            path = earlier
         note = {"time": datetime.now(UTC).isoformat(), "backup": path.name, "process": os.getpid()}
         self._write(self._note(system, mission_type), note)
         return path
@@ -115,14 +119,8 @@ class BackupStore:
         BackupError
             There is a note, but its backup cannot be read.
         """
-        note = self._note(system, mission_type)
-        if not note.exists():
-            return None
-        try:
-            name = str(json.loads(note.read_text(encoding="utf-8"))["backup"])
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise BackupError(f"{note}: the note of an interrupted upload cannot be read: {error}") from None
-        return read_backup(self.folder / name)
+        path = self._noted(system, mission_type)
+        return read_backup(path) if path else None
 
     def newest(self, system: int, mission_type: MissionType) -> Backup | None:
         """Give the newest backup of a vehicle's list; None if there is none.
@@ -134,6 +132,15 @@ class BackupStore:
         """
         paths = self._paths(system, mission_type)
         return read_backup(paths[-1]) if paths else None
+
+    def _noted(self, system: int, mission_type: MissionType) -> Path | None:
+        note = self._note(system, mission_type)
+        try:
+            return self.folder / Path(json.loads(note.read_text(encoding="utf-8"))["backup"]).name
+        except FileNotFoundError:
+            return None
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise BackupError(f"{note}: the note of an interrupted upload cannot be read: {error}") from None
 
     def _paths(self, system: int, mission_type: MissionType) -> list[Path]:
         prefix = f"system-{system}-{mission_type.name.lower()}-"

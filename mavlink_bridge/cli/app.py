@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from mavlink_bridge.cli import demo, plan, sim
+from mavlink_bridge.cli import demo, download, plan, sim, upload
 from mavlink_bridge.cli.common import guarded
 
 app = typer.Typer(
@@ -18,6 +18,8 @@ app = typer.Typer(
 )
 
 app.command("plan")(guarded(plan.plan))
+app.command("upload")(guarded(upload.upload))
+app.command("download")(guarded(download.download))
 app.command("sim")(guarded(sim.sim))
 app.command("demo")(guarded(demo.demo))
 

@@ -305,7 +305,48 @@ COMMAND = {
     CommandState.SILENT: {},
 }
 
+
+class FindState(StrEnum):
+    """Where the search for the vehicle is."""
+
+    IDLE = auto()
+    LISTENING = auto()  # no autopilot heard yet
+    COMPARING = auto()  # one was heard; others may follow
+    FOUND = auto()
+    NOT_FOUND = auto()
+
+
+class FindEvent(StrEnum):
+    """What moves the search for the vehicle."""
+
+    START = auto()
+    HEARD = auto()
+    NAMED_ONE_HEARD = auto()
+    TIME_IS_UP = auto()
+    CHOICE_FAILED = auto()
+
+
+FIND = {
+    FindState.IDLE: {
+        FindEvent.START: FindState.LISTENING,
+    },
+    FindState.LISTENING: {
+        FindEvent.HEARD: FindState.COMPARING,
+        FindEvent.NAMED_ONE_HEARD: FindState.FOUND,
+        FindEvent.CHOICE_FAILED: FindState.NOT_FOUND,
+    },
+    FindState.COMPARING: {
+        FindEvent.HEARD: FindState.COMPARING,
+        FindEvent.NAMED_ONE_HEARD: FindState.FOUND,
+        FindEvent.TIME_IS_UP: FindState.FOUND,
+        FindEvent.CHOICE_FAILED: FindState.NOT_FOUND,
+    },
+    FindState.FOUND: {},
+    FindState.NOT_FOUND: {},
+}
+
 TABLES = {
+    "find": FIND,
     "download": DOWNLOAD,
     "upload": UPLOAD,
     "verified_upload": VERIFIED_UPLOAD,

@@ -249,6 +249,7 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         if self.state is not VerifiedUploadState.IDLE:
             return
         self._problem = self._limits.problem(self._wanted, self._mission_type)
+        self._held = Held.OLD  # whatever it is: nothing was written yet
         if self._problem:
             self._move(VerifiedUploadEvent.TOO_LARGE)
         elif self._move(VerifiedUploadEvent.START):
@@ -277,7 +278,6 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
     def handle_timer(self, now_s: float) -> None:
         """Take notice that time has passed."""
         if self.state is VerifiedUploadState.CHECKING_VEHICLE and now_s >= self._check_until_s:
-            self._held = Held.OLD
             self._move(VerifiedUploadEvent.NOT_CLEAR)
         elif part := self._download or self._upload:
             part.handle_timer(now_s)
@@ -325,7 +325,6 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         if self.state is not VerifiedUploadState.CHECKING_VEHICLE or self._is_active is None:
             return
         if self._is_active and not self._replace_active:
-            self._held = Held.OLD
             self._move(VerifiedUploadEvent.NOT_CLEAR)
         elif self._move(VerifiedUploadEvent.CLEAR_TO_WRITE):
             self._push_wanted(self._window, now_s)
@@ -343,7 +342,8 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
     def _take_read(self, read: DownloadOutcome, now_s: float) -> None:
         if not read.is_complete:
             self._failed_read = read
-            self._held = Held.UNKNOWN
+            if self._pushes:
+                self._held = Held.UNKNOWN
             self._move(VerifiedUploadEvent.READ_FAILED)
         elif self.state is VerifiedUploadState.READING_OLD:
             self._is_coarse = read.is_coarse
@@ -361,7 +361,6 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
             self._held = Held.WANTED
             self._move(VerifiedUploadEvent.READ_WANTED)
         else:
-            self._held = Held.OLD
             self._move(VerifiedUploadEvent.READ_OLD)
 
     def _judge(self, found: tuple[MissionItem, ...], now_s: float) -> None:

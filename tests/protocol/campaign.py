@@ -110,6 +110,10 @@ def _lies(scenario, client, outcome, stored, timeline):
     reads = [time_s for time_s, message in client.sent if isinstance(message, MissionRequestList)]
     last_read_s = reads[-1] if reads else 0.0
     claim = CLAIMS.get(outcome.held)
+    if outcome.pushes == 0 and outcome.held is Held.OLD:
+        claim = None  # "as it was", whatever that is
+        if any(isinstance(message, WRITES) for _, message in client.sent):
+            lies.append("it says nothing was written, but something was")
     if claim and not _held_between(timeline, last_read_s, client.ended_s, stored[claim]):
         lies.append(f"it says the {claim} list is there, but it never was during the last read-back")
     if outcome.kind is OutcomeKind.VERIFIED:

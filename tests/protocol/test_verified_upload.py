@@ -163,7 +163,7 @@ def test_a_silent_vehicle_was_not_written_to():
     script = Script(VerifiedUpload(PEER, MISSION, plain_mission(3)))
     script.pass_time(60.0)
     outcome = script.machine.outcome
-    assert (outcome.kind, outcome.held, outcome.backup) == (OutcomeKind.NO_ANSWER, Held.UNKNOWN, None)
+    assert (outcome.kind, outcome.held, outcome.backup) == (OutcomeKind.NO_ANSWER, Held.OLD, None)
 
 
 def test_a_vehicle_that_gives_no_list_is_not_written_to():

@@ -1,0 +1,201 @@
+"""``pbpp download``: missions, fences, rally points and parameters from the vehicle."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from mavlink_bridge.cli.common import (
+    AnyVehicleOption,
+    JsonOption,
+    QuietOption,
+    SourceComponentOption,
+    SourceSystemOption,
+    SystemOption,
+    TimeoutOption,
+    print_json,
+    progress_bar,
+    warn,
+)
+from mavlink_bridge.cli.upload import RequiredConnectOption, SigningKeyOption, interrupted_warnings
+from mavlink_bridge.errors import LinkError, RefusedError, UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from mavlink_bridge.cli.session import Session
+    from missions.items import MissionItem
+
+_KINDS = ("mission", "fence", "rally", "parameters")
+_ITEM_SUFFIXES = (".waypoints", ".txt")
+_PARAMETER_SUFFIXES = (".parm", ".param", ".params")
+
+
+def download(
+    what: Annotated[str, typer.Argument(metavar="|".join(_KINDS), help="What to read.")],
+    connect: RequiredConnectOption = "",
+    output: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "-o", "--output", metavar="FILE", help="Where to: .waypoints, .plan; parameters .parm, .param."
+        ),
+    ] = None,
+    signing_key: SigningKeyOption = None,
+    system: SystemOption = None,
+    any_vehicle: AnyVehicleOption = False,
+    source_system: SourceSystemOption = 245,
+    source_component: SourceComponentOption = 190,
+    timeout: TimeoutOption = 30.0,
+    json_output: JsonOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Download a mission, fence, rally points or all parameters; nothing is written to the vehicle.
+
+    Examples:
+    `pbpp download fence --connect udpin:0.0.0.0:14550 -o field.waypoints`
+
+    `pbpp download parameters --connect /dev/ttyACM0 -o rover.parm`
+    """
+    outputs = output or []
+    _check(what, connect, outputs)
+
+    from mavlink_bridge.backup import BackupStore  # noqa: PLC0415 - usage errors need not wait for it
+    from mavlink_bridge.cli.session import Address, open_session  # noqa: PLC0415
+
+    address = Address(connect, (source_system, source_component), system, any_vehicle, timeout, signing_key)
+    with progress_bar(quiet=quiet or json_output) as show, open_session(address, show) as session:
+        warn(interrupted_warnings(BackupStore(), session.vehicle.system))
+        if what == "parameters":
+            parameters = _read_parameters(session)
+            items: tuple[MissionItem, ...] = ()
+        else:
+            parameters = {}
+            items = _read_list(session, what)
+    for path in outputs:
+        _write(path, what, items, parameters)
+    document: dict[str, Any] = {
+        "status": "ok",
+        "command": "download",
+        "system": session.vehicle.system,
+        "what": what,
+        "outputs": [str(path) for path in outputs],
+    }
+    if json_output:
+        print_json({**document, **_details(what, items, parameters)})
+    elif not quiet:
+        number = f"{len(parameters)} parameters" if what == "parameters" else f"{what}: {len(items)} items"
+        typer.echo(number + "".join(f"; written to {path}" for path in outputs))
+
+
+def _check(what: str, connect: str, outputs: list[Path]) -> None:
+    if what not in _KINDS:
+        raise UsageError(f"download {what!r}: expected one of {', '.join(_KINDS)}")
+    if not connect:
+        raise UsageError("download needs --connect CONNECTION")
+    suffixes = _PARAMETER_SUFFIXES if what == "parameters" else (*_ITEM_SUFFIXES, ".plan")
+    for path in outputs:
+        if path.suffix.lower() not in suffixes:
+            raise UsageError(
+                f"{path}: {what} cannot be written as {path.suffix!r}; known are {', '.join(suffixes)}"
+            )
+
+
+def _read_list(session: Session, what: str) -> tuple[MissionItem, ...]:
+    from mavlink_bridge.messages import MissionType  # noqa: PLC0415
+    from mavlink_bridge.protocol.download import Download  # noqa: PLC0415
+    from mavlink_bridge.protocol.transitions import DownloadState  # noqa: PLC0415
+
+    machine = Download(session.vehicle, MissionType[what.upper()])
+    session.run(machine, f"reading the {what}")
+    outcome = machine.outcome
+    assert outcome is not None
+    if outcome.is_complete:
+        if outcome.is_coarse:
+            warn([f"the vehicle gives positions as 32-bit floats: the {what} is known to about 1 m only"])
+        return outcome.items
+    if outcome.state is DownloadState.BUSY:
+        raise RefusedError(f"another ground station keeps the {what} busy (DENIED)", result="DENIED")
+    if outcome.result is not None:
+        raise RefusedError(
+            f"the vehicle refused to give its {what}: {outcome.result.name}", result=outcome.result.name
+        )
+    raise LinkError(f"the {what} could not be read: the vehicle fell silent")
+
+
+def _read_parameters(session: Session) -> dict[str, float]:
+    from mavlink_bridge.protocol.parameters import ReadParameters  # noqa: PLC0415
+
+    machine = ReadParameters(session.vehicle)
+    session.run(machine, "reading parameters")
+    outcome = machine.outcome
+    assert outcome is not None
+    if not outcome.is_complete:
+        raise LinkError(
+            f"only {len(outcome.values)} parameters came, {len(outcome.missing)} did not; nothing was written",
+            received=len(outcome.values),
+            missing=len(outcome.missing),
+        )
+    return dict(sorted(outcome.values.items()))
+
+
+def _write(path: Path, what: str, items: tuple[MissionItem, ...], parameters: Mapping[str, float]) -> None:
+    if path.suffix.lower() == ".plan":
+        _write_plan(path, what, items)
+        return
+    if what == "parameters":
+        separator = " " if path.suffix.lower() == ".parm" else ","
+        text = "".join(f"{name}{separator}{value:.9g}\n" for name, value in parameters.items())
+    else:
+        from missions.formats.waypoints import format_items  # noqa: PLC0415
+
+        text = format_items(items)
+    whole = path.with_name(f".{path.name}.part")  # so that nobody ever finds half a file
+    try:
+        whole.write_text(text, encoding="utf-8", newline="\n")
+        whole.replace(path)
+    except OSError as error:
+        raise UsageError(f"{path} cannot be written: {error.strerror or error}") from None
+
+
+def _write_plan(path: Path, what: str, items: tuple[MissionItem, ...]) -> None:
+    from missions.fence import fence_from_items  # noqa: PLC0415
+    from missions.formats import write_mission  # noqa: PLC0415
+    from missions.items import without_home  # noqa: PLC0415
+    from missions.situation import Known, Mission, Situation  # noqa: PLC0415
+
+    source = "read from the vehicle"
+    if what == "mission":
+        home = items[0].position if items else None
+        situation = Situation(mission=Known(Mission(without_home(items), home), None, source))
+    elif what == "fence":
+        situation = Situation(fence=Known(fence_from_items(items), None, source))
+    else:
+        situation = Situation(rally=Known(tuple(item.position for item in items), None, source))
+    write_mission(situation, path)
+
+
+def _details(what: str, items: tuple[MissionItem, ...], parameters: Mapping[str, float]) -> dict[str, Any]:
+    if what == "parameters":
+        return {"parameters": dict(parameters)}
+    return {
+        "items": [
+            {
+                "seq": seq,
+                "command": int(item.command),
+                "frame": int(item.frame),
+                "params": [_number(value) for value in item.params],
+                "lat": item.lat_e7 / 1e7,
+                "lon": item.lon_e7 / 1e7,
+                "alt_m": _number(item.alt_m),
+            }
+            for seq, item in enumerate(items)
+        ]
+    }
+
+
+def _number(value: float) -> float | None:
+    """Give a number JSON can hold."""
+    return value if math.isfinite(value) else None

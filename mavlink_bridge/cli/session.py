@@ -1,0 +1,213 @@
+"""One vehicle on one open link, for the commands that transfer something."""
+
+from __future__ import annotations
+
+import time
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from mavlink_bridge.errors import LinkError, OutcomeError, RefusedError
+from mavlink_bridge.link import open_link
+from mavlink_bridge.messages import Autopilot, CommandLong, Heartbeat, ModeFlag
+from mavlink_bridge.protocol.command import SendCommand
+from mavlink_bridge.protocol.find import FindVehicle
+from mavlink_bridge.protocol.peer import Peer
+from mavlink_bridge.rover import AUTO_MODE, MODE_NAMES
+from missions.items import Command
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+    from mavlink_bridge.link import Link
+    from mavlink_bridge.messages import Frame
+    from mavlink_bridge.protocol.machine import Machine
+
+_MODE_PATIENCE_S = 5.0
+_FRESH_S = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class Address:
+    """Where the vehicle is and as whom we speak.
+
+    Parameters
+    ----------
+    connection : str
+        The connection string.
+    identity : tuple of int
+        Our system and component id.
+    system : int, optional
+        The vehicle's system id.
+    any_vehicle : bool
+        Take vehicles that are neither rover nor boat.
+    timeout_s : float
+        How long to wait for the vehicle.
+    key_file : Path, optional
+        The signing key.
+    """
+
+    connection: str
+    identity: tuple[int, int]
+    system: int | None = None
+    any_vehicle: bool = False
+    timeout_s: float = 30.0
+    key_file: Path | None = None
+
+
+class Session:
+    """A vehicle on a link: runs machines and knows the newest heartbeat.
+
+    Parameters
+    ----------
+    link : Link
+        The open link.
+    address : Address
+        Which vehicle.
+    show : callable
+        Moves the progress bar: text, steps done, steps in all.
+
+    Raises
+    ------
+    LinkError
+        The vehicle is not there.
+    """
+
+    def __init__(self, link: Link, address: Address, show: Callable[[str, int, int], None]) -> None:
+        self._link = link
+        self._show = show
+        finder = FindVehicle(address.system, any_vehicle=address.any_vehicle, patience_s=address.timeout_s)
+        self._heartbeat: Heartbeat | None = None
+        self._heartbeat_s = 0.0
+        self.peer: Peer | None = None
+        self.run(finder, "listening for the vehicle")
+        if finder.vehicle is None:
+            assert finder.trouble is not None
+            raise self._with_signing_hint(finder.trouble)
+        self.peer = Peer(finder.vehicle.system, finder.vehicle.component, *link.identity)
+        self._heartbeat, self._heartbeat_s = finder.heartbeat, time.monotonic()
+
+    @property
+    def vehicle(self) -> Peer:
+        """The vehicle that was found."""
+        assert self.peer is not None
+        return self.peer
+
+    @property
+    def is_ardupilot(self) -> bool:
+        """Whether its autopilot is ArduPilot."""
+        return self._heartbeat is not None and self._heartbeat.autopilot == Autopilot.ARDUPILOTMEGA
+
+    @property
+    def is_active(self) -> bool | None:
+        """Whether it is armed in AUTO; None if its last heartbeat is too old to tell."""
+        if self._heartbeat is None or time.monotonic() - self._heartbeat_s > _FRESH_S:
+            return None
+        is_armed = bool(self._heartbeat.base_mode & ModeFlag.SAFETY_ARMED)
+        return is_armed and self._heartbeat.custom_mode == AUTO_MODE
+
+    def run(self, machine: Machine, text: str, on_step: Callable[[], None] | None = None) -> None:
+        """Run a machine to its outcome, with progress."""
+
+        def step() -> None:
+            self._show(text, *machine.progress)
+            if on_step:
+                on_step()
+
+        self._link.run(machine, on_frames=self._listen, on_step=step)
+
+    def change_mode(self, mode: int) -> None:
+        """Switch the vehicle's mode and wait until its heartbeat says so.
+
+        Raises
+        ------
+        RefusedError
+            The vehicle refused.
+        OutcomeError
+            It accepted but does not show the mode, or did not answer.
+        """
+        name = MODE_NAMES[mode]
+        peer = self.vehicle
+        flags = float(ModeFlag.CUSTOM_MODE_ENABLED)
+        message = CommandLong(
+            peer.system, peer.component, Command.DO_SET_MODE, param1=flags, param2=float(mode)
+        )
+        command = SendCommand(peer, message)
+        self.run(command, f"switching to {name}")
+        outcome = command.outcome
+        assert outcome is not None
+        if outcome.result is not None and not outcome.is_accepted:
+            texts = "".join(f"; {text}" for text in outcome.texts)
+            raise RefusedError(
+                f"the vehicle refused mode {name}: {outcome.result.name}{texts}", result=outcome.result.name
+            )
+        self._link.run(_Listen(_MODE_PATIENCE_S), on_frames=self._listen, until=lambda: self._is_in(mode))
+        if not self._is_in(mode):
+            raise OutcomeError(f"the vehicle does not show mode {name}", mode=name)
+
+    def _is_in(self, mode: int) -> bool:
+        return self._heartbeat is not None and self._heartbeat.custom_mode == mode
+
+    def _listen(self, frames: list[Frame]) -> None:
+        for frame in frames:
+            if (
+                self.peer is not None
+                and isinstance(frame.message, Heartbeat)
+                and (frame.system, frame.component) == (self.peer.system, self.peer.component)
+            ):
+                self._heartbeat, self._heartbeat_s = frame.message, time.monotonic()
+
+    def _with_signing_hint(self, trouble: LinkError) -> LinkError:
+        if not self._link.untrusted_frames:
+            return trouble
+        return type(trouble)(
+            f"{trouble}; {self._link.untrusted_frames} frames were left out: not signed with this key",
+            **trouble.details,
+            untrusted_frames=self._link.untrusted_frames,
+        )
+
+
+@contextmanager
+def open_session(address: Address, show: Callable[[str, int, int], None]) -> Iterator[Session]:
+    """Open the link, find the vehicle, and close the link at the end.
+
+    Raises
+    ------
+    LinkError
+        No link, or no vehicle.
+    UsageError
+        The signing key cannot be used.
+    """
+    signing = None
+    if address.key_file is not None:
+        from mavlink_bridge.signing import Signing, SigningKey  # noqa: PLC0415 - only where a key is given
+
+        signing = Signing(SigningKey.read(address.key_file), time.time)
+    with open_link(
+        address.connection, address.identity, signing=signing, timeout_s=address.timeout_s
+    ) as link:
+        yield Session(link, address, show)
+
+
+class _Listen:
+    """A machine that sends nothing and ends after a while."""
+
+    progress = (0, 0)
+
+    def __init__(self, for_s: float) -> None:
+        self._for_s = for_s
+        self.deadline_s: float | None = None
+        self.is_done = False
+
+    def start(self, now_s: float) -> None:
+        self.deadline_s = now_s + self._for_s
+
+    def receive(self, frame: Frame, now_s: float) -> None:
+        pass
+
+    def handle_timer(self, now_s: float) -> None:
+        self.is_done = self.deadline_s is not None and now_s >= self.deadline_s
+
+    def messages_to_send(self) -> list[Any]:
+        return []

@@ -1,0 +1,100 @@
+"""Finding the vehicle that is meant among those heard on a link."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from mavlink_bridge.errors import VehicleNotFoundError
+from mavlink_bridge.messages import Heartbeat
+from mavlink_bridge.protocol.table_machine import TableMachine
+from mavlink_bridge.protocol.transitions import FIND, FindEvent, FindState
+from mavlink_bridge.vehicles import Vehicle, choose_vehicle, is_vehicle
+
+if TYPE_CHECKING:
+    from mavlink_bridge.messages import Frame
+
+LISTEN_S = 1.2
+"""How long further vehicles are listened for: a heartbeat comes every second."""
+
+
+class FindVehicle(TableMachine[FindState, FindEvent]):
+    """Listens for heartbeats; `vehicle` or `trouble` is set when `is_done`.
+
+    Parameters
+    ----------
+    system : int, optional
+        The system id meant; without it there must be only one vehicle.
+    any_vehicle : bool
+        Take vehicles that are neither rover nor boat.
+    patience_s : float
+        How long to wait for the first heartbeat.
+    """
+
+    def __init__(
+        self, system: int | None = None, *, any_vehicle: bool = False, patience_s: float = 30.0
+    ) -> None:
+        super().__init__(FIND, FindState.IDLE)
+        self._system = system
+        self._any_vehicle = any_vehicle
+        self._patience_s = patience_s
+        self._until_s = 0.0
+        self._heard: dict[tuple[int, int], tuple[Vehicle, Heartbeat]] = {}
+        self.vehicle: Vehicle | None = None
+        self.heartbeat: Heartbeat | None = None
+        self.trouble: VehicleNotFoundError | None = None
+
+    @property
+    def outcome(self) -> Vehicle | VehicleNotFoundError | None:
+        """The vehicle, or why there is none; None while it runs."""
+        return self.vehicle or self.trouble
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        """Whether it is done, as steps."""
+        return int(self.is_done), 1
+
+    @property
+    def bound_s(self) -> float:
+        """Longest time from the start to the end."""
+        return self._patience_s + LISTEN_S
+
+    @property
+    def deadline_s(self) -> float | None:
+        """When `handle_timer` wants to be called."""
+        return None if self.is_done or self.state is FindState.IDLE else self._until_s
+
+    def start(self, now_s: float) -> None:
+        """Begin to listen."""
+        if self._move(FindEvent.START):
+            self._until_s = now_s + self._patience_s
+
+    def receive(self, frame: Frame, now_s: float) -> None:
+        """Take a frame; only autopilots' heartbeats count."""
+        heartbeat = frame.message
+        if not isinstance(heartbeat, Heartbeat) or not is_vehicle(heartbeat) or self.is_done:
+            return
+        was_listening = self.state is FindState.LISTENING
+        self._heard[frame.system, frame.component] = (
+            Vehicle(frame.system, frame.component, heartbeat.type),
+            heartbeat,
+        )
+        if frame.system == self._system:
+            self._choose(FindEvent.NAMED_ONE_HEARD)
+        elif self._move(FindEvent.HEARD) and was_listening and self._system is None:
+            self._until_s = now_s + LISTEN_S
+
+    def handle_timer(self, now_s: float) -> None:
+        """Take notice that time has passed."""
+        if not self.is_done and self.state is not FindState.IDLE and now_s >= self._until_s:
+            self._choose(FindEvent.TIME_IS_UP)
+
+    def _choose(self, event: FindEvent) -> None:
+        heard = sorted(vehicle for vehicle, _ in self._heard.values())
+        try:
+            chosen = choose_vehicle(heard, self._system, any_vehicle=self._any_vehicle)
+        except VehicleNotFoundError as error:
+            self.trouble = error
+            self._move(FindEvent.CHOICE_FAILED)
+            return
+        self.vehicle, self.heartbeat = self._heard[chosen.system, chosen.component]
+        self._move(event)

@@ -127,6 +127,11 @@ class Link:
         self._heartbeat_due_s = 0.0
         self._has_spoken = False
 
+    @staticmethod
+    def now_s() -> float:
+        """Give the time that machines on this link run by."""
+        return time.monotonic()
+
     @property
     def identity(self) -> tuple[int, int]:
         """The ids we speak as."""

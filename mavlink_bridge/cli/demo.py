@@ -47,7 +47,7 @@ def demo(
     """Show the whole loop: simulated rover, fence, target, plan, upload, verify, drive, picture, report."""
     from mavlink_bridge.cli.live import LiveResult, conduct  # noqa: PLC0415 - quick help
     from mavlink_bridge.cli.plan import write_outputs  # noqa: PLC0415
-    from mavlink_bridge.director import Director, Orders  # noqa: PLC0415
+    from mavlink_bridge.director import Orders  # noqa: PLC0415
     from mavlink_bridge.link import open_link  # noqa: PLC0415
     from mavlink_bridge.tlog import TlogWriter  # noqa: PLC0415
     from missions.geo import LatLon  # noqa: PLC0415
@@ -61,15 +61,10 @@ def demo(
         simulator = stack.enter_context(_simulator(speedup))
         recorder = stack.enter_context(TlogWriter(out / "demo.tlog"))
         link = stack.enter_context(open_link(simulator.connection, _IDENTITY, recorder=recorder))
-        director = Director(Orders(_IDENTITY, drive=True, arm=True))
         request = Request(targets=(LatLon(*_TARGET),), clearance_m=_CLEARANCE_M)
+        orders = Orders(identity=_IDENTITY, request=request, upload=True, drive=True, arm=True)
         result: LiveResult = conduct(
-            link,
-            director,
-            request,
-            upload=True,
-            quiet=quiet or json_output,
-            on_frames=lambda frames: _observe(drive, frames),
+            link, orders, quiet=quiet or json_output, on_frames=lambda frames: _observe(drive, frames)
         )
     warn(result.plan.warnings)
     written = write_outputs(

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.backup import BackupStore
 from mavlink_bridge.cli.common import progress_bar
 from mavlink_bridge.cli.plan import timed_plan
 from mavlink_bridge.director import Director, Orders, State
-from mavlink_bridge.link import open_link
+from mavlink_bridge.errors import LinkError
+from mavlink_bridge.link import ONE_SHOT_IDENTITY, open_link
 from mavlink_bridge.messages import MissionType
+from mavlink_bridge.protocol.verified_upload import Held
 from missions.formats import read_parameters
 from missions.situation import Situation
 
@@ -27,12 +28,18 @@ if TYPE_CHECKING:
 _STATE_TEXTS = {
     State.LISTENING: "listening for the vehicle",
     State.LEARNING: "reading parameters, fence and mission",
-    State.READY: "planning",
+    State.READY: "ready",
+    State.HOLDING: "stopping",
+    State.PLANNING: "planning",
+    State.PROPOSED: "planned",
     State.UPLOADING: "uploading and reading back",
     State.VERIFIED: "verified",
     State.STARTING: "switching to AUTO",
     State.DRIVING: "driving",
     State.ARRIVED: "arrived",
+    State.LET_GO: "let go",
+    State.LOST: "no heartbeat",
+    State.DONE: "done",
     State.FAILED: "failed",
 }
 
@@ -44,20 +51,11 @@ class LiveResult:
     plan: Plan
     planning_s: float
     situation: Situation
-    uploaded: bool
     verified: bool
 
 
-def plan_live(
-    connection: str,
-    request: Request,
-    *,
-    orders: Orders,
-    vehicle_file: Path | None,
-    upload: bool,
-    quiet: bool,
-) -> LiveResult:
-    """Open a link and take a mission as far as the orders go.
+def plan_live(connection: str, orders: Orders, *, vehicle_file: Path | None, quiet: bool) -> LiveResult:
+    """Open a link and take one mission as far as the orders go.
 
     Raises
     ------
@@ -65,44 +63,59 @@ def plan_live(
         What went wrong, on the link or in planning.
     """
     parameters = read_parameters(vehicle_file) if vehicle_file else {}
-    director = Director(orders, Situation(parameters=parameters))
-    with open_link(connection, orders.identity) as link:
-        return conduct(link, director, request, upload=upload, quiet=quiet)
+    with open_link(connection, orders.identity or ONE_SHOT_IDENTITY) as link:
+        return conduct(link, orders, Situation(parameters=parameters), quiet=quiet)
 
 
 def conduct(
     link: Link,
-    director: Director,
-    request: Request,
+    orders: Orders,
+    situation: Situation | None = None,
     *,
-    upload: bool,
     quiet: bool,
     on_frames: Callable[[list[Frame]], None] | None = None,
 ) -> LiveResult:
-    """Run the director on a link; plan and keep backups for it.
+    """Run a director on a link until its single job is done, and keep backups for it.
 
     Raises
     ------
     BridgeError, MissionError
-        The director's trouble, or the plan's.
+        The director's trouble.
     """
-    made: list[tuple[Plan, float]] = []
+    planning_s: list[float] = []
 
+    def timed(situation: Situation, request: Request) -> Plan:
+        planned, seconds = timed_plan(situation, request)
+        planning_s.append(seconds)
+        return planned
+
+    director = Director(replace(orders, once=True), situation, timed)
+    store = BackupStore()
     with progress_bar(quiet=quiet) as show:
 
         def step() -> None:
             show(_STATE_TEXTS[director.state], *director.progress)
-            if director.state is State.READY and not made:
-                planned, planning_s = timed_plan(director.situation, request)
-                made.append((planned, planning_s))
-                if upload:
-                    director.take_plan(planned, time.monotonic())
-            if (old := director.pending_backup) is not None and director.peer is not None:
-                BackupStore().keep(director.peer.system, MissionType.MISSION, old)
-                director.backup_stored(time.monotonic())
+            keep_backup(director, store, link.now_s())
 
-        link.run(director, on_frames=on_frames, on_step=step, until=lambda: bool(made) and not upload)
-    if director.trouble is not None:
-        raise director.trouble
-    planned, planning_s = made[0]
-    return LiveResult(planned, planning_s, director.situation, upload, upload)
+        link.run(director, on_frames=on_frames, on_step=step)
+    if director.trouble is not None or director.plan is None:
+        raise director.trouble or LinkError("the director ended without a plan")
+    outcome = director.upload_outcome
+    return LiveResult(
+        director.plan,
+        planning_s[-1],
+        director.situation,
+        verified=outcome is not None and outcome.is_verified,
+    )
+
+
+def keep_backup(director: Director, store: BackupStore, now_s: float) -> None:
+    """Store the vehicle's old mission when the director wants it stored; take the note away when the outcome is known."""
+    peer = director.peer
+    if peer is None:
+        return
+    if (old := director.pending_backup) is not None:
+        store.begin(peer.system, MissionType.MISSION, old)
+        director.backup_stored(now_s)
+    elif director.upload_outcome is not None and director.upload_outcome.held in (Held.WANTED, Held.OLD):
+        store.end(peer.system, MissionType.MISSION)

@@ -98,22 +98,17 @@ def plan(
         from mavlink_bridge.director import Orders  # noqa: PLC0415
 
         orders = Orders(
-            (source_system, source_component),
+            identity=(source_system, source_component),
             system=system,
             any_vehicle=any_vehicle,
+            request=request,
+            upload=upload or drive,
             drive=drive,
             patience_s=timeout,
         )
-        result = plan_live(
-            connect,
-            request,
-            orders=orders,
-            vehicle_file=vehicle,
-            upload=upload or drive,
-            quiet=quiet or json_output,
-        )
+        result = plan_live(connect, orders, vehicle_file=vehicle, quiet=quiet or json_output)
         planned, planning_s, situation = result.plan, result.planning_s, result.situation
-        uploaded, verified = result.uploaded, result.verified
+        uploaded = verified = result.verified
     else:
         situation = with_parameter_file(
             _offline_situation(fence, log, system, any_vehicle=any_vehicle), vehicle

@@ -1,0 +1,19 @@
+"""The director: decisions between the vehicle's messages and ours, sans-IO (see `states` for its table)."""
+
+from mavlink_bridge.director.director import Director
+from mavlink_bridge.director.events import SCHEMA, Event, EventName, Severity
+from mavlink_bridge.director.orders import Orders, TargetSource
+from mavlink_bridge.director.states import TRANSITIONS, Cue, State
+
+__all__ = [
+    "SCHEMA",
+    "TRANSITIONS",
+    "Cue",
+    "Director",
+    "Event",
+    "EventName",
+    "Orders",
+    "Severity",
+    "State",
+    "TargetSource",
+]

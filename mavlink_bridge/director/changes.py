@@ -1,0 +1,93 @@
+"""Noticing what others change on the vehicle: its fence, its mission; and that it was switched off and on."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from mavlink_bridge import messages as m
+from mavlink_bridge.fold import KINDS
+from missions.situation import ListKind
+
+if TYPE_CHECKING:
+    from mavlink_bridge.messages import Frame
+
+_TEXTS = {
+    "fence indexed": ListKind.FENCE,
+    "fence upload": ListKind.FENCE,
+    "flight plan received": ListKind.MISSION,
+    "mission upload timeout": ListKind.MISSION,
+}
+_FENCE_TOTAL, _MISSION_TOTAL = "FENCE_TOTAL", "MIS_TOTAL"
+_REBOOT_MS = 5000
+
+POLL_EVERY_S = 60.0
+"""How often lists are read again without any sign of change."""
+
+
+class ChangeWatch:
+    """Looks at the vehicle's frames for signs of change, and suspects every list now and then.
+
+    Parameters
+    ----------
+    identity : tuple of int
+        Our ids; what is acknowledged to us we did ourselves.
+    """
+
+    def __init__(self, identity: tuple[int, int]) -> None:
+        self.suspects: set[ListKind] = set()
+        self._poll_due_s = math.inf
+        self._identity = identity
+        self._boot_ms = 0
+        self._totals: dict[str, float] = {}
+
+    @property
+    def deadline_s(self) -> float:
+        """When lists are to be read again."""
+        return -math.inf if self.suspects else self._poll_due_s
+
+    def settle(self, now_s: float) -> None:
+        """Take notice that all lists were just read."""
+        self.suspects.clear()
+        self._poll_due_s = now_s + POLL_EVERY_S
+
+    def due(self, now_s: float) -> set[ListKind]:
+        """Give and forget the lists that are to be read again."""
+        if now_s >= self._poll_due_s:
+            self._poll_due_s = now_s + POLL_EVERY_S
+            self.suspects |= {ListKind.FENCE, ListKind.MISSION}
+        suspects, self.suspects = self.suspects, set()
+        return suspects
+
+    def look(self, frame: Frame) -> None:
+        """Suspect the lists that a frame says may have changed."""
+        self.suspects |= self._signs(frame)
+
+    def _signs(self, frame: Frame) -> set[ListKind]:
+        message = frame.message
+        if isinstance(message, m.MissionAck):
+            is_ours = (message.target_system, message.target_component) == self._identity
+            kind = KINDS.get(message.mission_type)
+            return {kind} if kind and not is_ours and message.type == m.MissionResult.ACCEPTED else set()
+        if isinstance(message, m.Statustext):
+            text = message.text.lower()
+            return {kind for start, kind in _TEXTS.items() if text.startswith(start)}
+        if isinstance(message, m.MissionCurrent):
+            return {ListKind.MISSION} if self._changed("MISSION_CURRENT.total", message.total) else set()
+        if isinstance(message, m.ParamValue) and message.param_id in (_FENCE_TOTAL, _MISSION_TOTAL):
+            kind = ListKind.FENCE if message.param_id == _FENCE_TOTAL else ListKind.MISSION
+            return {kind} if self._changed(message.param_id, message.param_value) else set()
+        return set()
+
+    def is_reboot(self, frame: Frame) -> bool:
+        """Tell whether the vehicle's clock has started anew."""
+        message = frame.message
+        if not isinstance(message, m.GlobalPositionInt):
+            return False
+        before, self._boot_ms = self._boot_ms, message.time_boot_ms
+        return message.time_boot_ms < before - _REBOOT_MS
+
+    def _changed(self, name: str, value: float) -> bool:
+        before = self._totals.get(name)
+        self._totals[name] = value
+        return before is not None and before != value

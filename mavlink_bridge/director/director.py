@@ -1,0 +1,634 @@
+"""The director: turns messages and time into decisions, as one state machine without sockets and clocks.
+
+It listens for the vehicle, learns it, and makes of each target a plan; uploads the plan verified, drives it in AUTO and watches, as far as its
+orders go. It notices what others do: a changed fence, a changed mission, a changed mode. The operator's word always counts more than its own.
+The same object runs live, in a replay, against the simulator and in tests.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from mavlink_bridge import messages as m
+from mavlink_bridge.director.changes import ChangeWatch
+from mavlink_bridge.director.drive_watch import DriveWatch
+from mavlink_bridge.director.events import Event, EventName
+from mavlink_bridge.director.learning import MISSION_TYPES, Learning, list_of
+from mavlink_bridge.director.listening import Listener
+from mavlink_bridge.director.orders import PATH_PLANNER_COMPONENT, Orders, TargetSource
+from mavlink_bridge.director.states import TRANSITIONS, Cue, State
+from mavlink_bridge.director.steps import Step, Steps
+from mavlink_bridge.director.targets import Target, TargetWatch
+from mavlink_bridge.director.voice import Voice
+from mavlink_bridge.errors import BridgeError, LinkError, OutcomeError, RefusedError, VehicleNotFoundError
+from mavlink_bridge.fold import fold, with_list
+from mavlink_bridge.outcomes import upload_trouble
+from mavlink_bridge.protocol.command import SendCommand
+from mavlink_bridge.protocol.download import Download
+from mavlink_bridge.protocol.limits import Limits
+from mavlink_bridge.protocol.peer import Peer
+from mavlink_bridge.protocol.table_machine import TableMachine
+from mavlink_bridge.protocol.verified_upload import VerifiedUpload, VerifiedUploadOutcome
+from mavlink_bridge.rover import AUTO_MODE, GUIDED_MODE, HOLD_MODE
+from missions.errors import MissionError
+from missions.items import Command, last_place, with_home
+from missions.plan import plan as make_plan
+from missions.recheck import recheck, straight_line
+from missions.situation import Known, ListKind, Situation
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from mavlink_bridge.messages import Frame, Message
+    from missions.fence import Fence
+    from missions.geo import LatLon
+    from missions.items import MissionItem
+    from missions.plan import Plan
+    from missions.request import Request
+
+_FRESH_S = 1.5
+"""How old a heartbeat may be to tell what the vehicle does now."""
+
+_SILENCE_S = 5.0
+_STILL_MPS = 0.3
+_STOP_AT_LEAST_S = 0.25
+_STOP_PATIENCE_S = 8.0
+_MOVED_M = 1.0
+_AT_REST = frozenset(
+    {State.READY, State.PROPOSED, State.VERIFIED, State.DRIVING, State.ARRIVED, State.LET_GO}
+)
+_MAY_FALL_SILENT = frozenset(
+    set(State) - {State.LISTENING, State.UPLOADING, State.LOST, State.DONE, State.FAILED}
+)
+
+
+class Director(TableMachine[State, Cue]):
+    """Takes targets to verified missions, and missions to arrival.
+
+    Parameters
+    ----------
+    orders : Orders
+        What it may do.
+    situation : Situation, optional
+        What is known beforehand (parameters of a file).
+    planner : callable, optional
+        Makes the plans; `missions.plan.plan` unless a test says otherwise.
+    """
+
+    def __init__(
+        self,
+        orders: Orders,
+        situation: Situation | None = None,
+        planner: Callable[[Situation, Request], Plan] = make_plan,
+    ) -> None:
+        super().__init__(TRANSITIONS, State.LISTENING)
+        self.orders = orders
+        self.situation = situation or Situation()
+        self.trouble: BridgeError | MissionError | None = None
+        self.upload_outcome: VerifiedUploadOutcome | None = None
+        self.plan: Plan | None = None
+        self.drive: DriveWatch | None = None
+        self._planner = planner
+        self._listener = Listener(orders)
+        self._peer: Peer | None = None
+        self._steps = Steps()
+        self._voice = Voice(announce=orders.announce)
+        self._targets = TargetWatch(orders.target_sources)
+        self._changes: ChangeWatch | None = None
+        self._fence_known: Known[Fence] | None = None
+        self._target: Target | None = None
+        self._waiting_target: Target | None = None
+        self._ours: tuple[MissionItem, ...] | None = None  # the mission that is on the vehicle by us
+        self._standstill_due_s = math.inf
+        self._heartbeat_s = -math.inf
+        self._confirmed = False
+        self._speed_mps = 0.0
+        self._held_at_s: float | None = None
+
+    # What the shell sees
+
+    @property
+    def identity(self) -> tuple[int, int] | None:
+        """The ids we speak with; None until they are known."""
+        return (self._peer.own_system, self._peer.own_component) if self._peer else self.orders.identity
+
+    @property
+    def peer(self) -> Peer | None:
+        """The vehicle, once it was found."""
+        return self._peer
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        """Progress of the transfer under way, or of the drive by items."""
+        if self.state is State.DRIVING and self.drive and self.plan:
+            return self.drive.item - 1, len(self.plan.items)
+        progress: tuple[int, int] = self._steps.current.progress if self._steps else (0, 0)
+        return progress
+
+    @property
+    def pending_backup(self) -> tuple[MissionItem, ...] | None:
+        """The vehicle's old mission, while it waits to be stored; nothing is written before `backup_stored`."""
+        upload = self._steps.current
+        return upload.pending_backup if isinstance(upload, VerifiedUpload) else None
+
+    @property
+    def deadline_s(self) -> float | None:
+        """When `handle_timer` wants to be called."""
+        times = [self._steps.deadline_s, self._voice.deadline_s]
+        if self.state is State.LISTENING:
+            times.append(self._listener.until_s)
+        if self.state is State.HOLDING:
+            times.append(self._standstill_due_s)
+        if self.state is State.PLANNING:
+            times.append(-math.inf)
+        if self.state in _MAY_FALL_SILENT:
+            times.append(self._heartbeat_s + _SILENCE_S)
+        if self.drive is not None:
+            times.append(self.drive.progress_due_s)
+        if self._may_reread and self._changes is not None:
+            times.append(self._changes.deadline_s)
+        return min((time_s for time_s in times if time_s is not None and time_s < math.inf), default=None)
+
+    def take_events(self) -> list[Event]:
+        """Give and forget what happened."""
+        return self._voice.take_events()
+
+    # What the shell does
+
+    def start(self, now_s: float) -> None:
+        """Begin to listen."""
+        self._listener.start(now_s)
+
+    def receive(self, frame: Frame, now_s: float) -> None:
+        """Take a frame."""
+        if self.state is State.LISTENING:
+            self._listener.receive(frame, now_s)
+            return
+        before = self.situation
+        self.situation = fold(before, frame, now_s)
+        if self._is_from_vehicle(frame):
+            self._take_vehicle_frame(frame, now_s)
+        self._notice_fence(now_s)
+        if self.identity and (
+            target := self._targets.look(frame, before, self.situation, now_s, self.identity)
+        ):
+            self._take_target(target, now_s)
+        self._steps.receive(frame, now_s)
+
+    def handle_timer(self, now_s: float) -> None:
+        """Take notice that time has passed."""
+        self._outgoing += self._voice.due(now_s)
+        self._steps.handle_timer(now_s)
+        if self.state is State.LISTENING and now_s >= self._listener.until_s:
+            self._choose(now_s)
+        elif self.state is State.HOLDING:
+            self._await_standstill(now_s)
+        elif self.state is State.PLANNING and not self._steps:
+            self._plan_route(now_s)
+        elif self.drive is not None and now_s >= self.drive.progress_due_s:
+            self.drive.tell_progress(now_s)
+        if self.state in _MAY_FALL_SILENT and now_s >= self._heartbeat_s + _SILENCE_S:
+            self._fall_silent(now_s)
+        if self._may_reread:
+            self._reread(now_s)
+
+    def messages_to_send(self) -> list[Message]:
+        """Give and forget what is to be sent now."""
+        return super().messages_to_send() + self._steps.messages_to_send()
+
+    def take_target(self, position: LatLon, now_s: float) -> None:
+        """Take a target that was typed."""
+        self._targets.take(position, now_s)
+        self._take_target(Target(position, TargetSource.TYPED), now_s)
+
+    def confirm(self, now_s: float) -> None:
+        """Take the operator's yes to the plan that stands."""
+        self._confirmed = True
+        self._go_on(now_s)
+
+    def backup_stored(self, now_s: float) -> None:
+        """Take notice that the old mission is safe."""
+        upload = self._steps.current
+        if isinstance(upload, VerifiedUpload):
+            upload.backup_stored(now_s)
+
+    # Listening and learning
+
+    def _choose(self, now_s: float) -> None:
+        try:
+            heard = self._listener.choose()
+        except VehicleNotFoundError as error:
+            self._voice.error(now_s, EventName.TROUBLE, error, dict(error.details))
+            self.trouble = error
+            self._move(Cue.GIVE_UP)
+            return
+        vehicle = heard.vehicle
+        identity = self.orders.identity or (vehicle.system, PATH_PLANNER_COMPONENT)
+        self._peer = Peer(vehicle.system, vehicle.component, *identity)
+        self._changes = ChangeWatch(identity)
+        self._move(Cue.FOUND)
+        self._voice.tell(now_s, EventName.VEHICLE_FOUND, f"vehicle found: system {vehicle.system}", *vehicle)
+        known = replace(
+            self.situation, system=vehicle.system, component=vehicle.component, vehicle_type=vehicle.type
+        )
+        self.situation = fold(known, heard.heartbeat, heard.time_s)
+        self._heartbeat_s = heard.time_s
+        self._learn(now_s)
+
+    def _learn(self, now_s: float) -> None:
+        assert self._peer is not None
+        self._steps.clear()
+        self._steps.run([(Learning(self._peer, self.orders.patience_s), self._learnt)], now_s)
+
+    def _learnt(self, machine: Learning, now_s: float) -> None:
+        if machine.trouble is not None:
+            self._despair(machine.trouble, now_s)
+            if not self.orders.once:
+                self._learn(now_s)
+            return
+        self.situation = machine.merged(self.situation, now_s)
+        if self._changes is not None:
+            self._changes.settle(now_s)
+        self._move(Cue.LEARNT)
+        self._fence_known = self.situation.fence
+        self._voice.learnt(now_s, self.situation)
+        self._want_first_target(now_s)
+
+    def _want_first_target(self, now_s: float) -> None:
+        """Begin with the targets of the orders; a single job also with the newest of the stream or the mission's last place."""
+        targets = self.orders.request.targets
+        if self._target is not None:
+            self._take_target(self._target, now_s)
+        elif targets:
+            self._take_target(Target(targets[-1], TargetSource.TYPED), now_s)
+        elif self.orders.once:
+            self._cue_target(now_s)
+        elif TargetSource.MISSION in self.orders.target_sources:
+            self._take_mission_target(now_s)
+
+    # Targets and plans
+
+    def _take_target(self, target: Target, now_s: float) -> None:
+        if self.state is State.UPLOADING:
+            self._waiting_target = target
+            return
+        if self.state in (State.LEARNING, State.LOST):
+            self._target = target
+            return
+        self._target = target
+        self._voice.tell(
+            now_s,
+            EventName.TARGET,
+            f"target {target.position} by {target.source}",
+            list(target.position),
+            str(target.source),
+        )
+        if target.command is not None:
+            self._answer(target, m.MavResult.IN_PROGRESS)
+        self._warn_of_straight_line(target, now_s)
+        self._cue_target(now_s)
+
+    def _cue_target(self, now_s: float) -> None:
+        if self._may_stop_it and self._move(Cue.TARGET_WHILE_MOVING):
+            self._hold("a new route is wanted", now_s)
+        elif self._move(Cue.TARGET):
+            self._confirmed = False
+            self.drive = None
+
+    @property
+    def _may_stop_it(self) -> bool:
+        orders, situation = self.orders, self.situation
+        is_ours = not orders.once or self.state is State.DRIVING
+        return (
+            orders.drive and is_ours and bool(situation.armed) and situation.mode in (AUTO_MODE, GUIDED_MODE)
+        )
+
+    def _warn_of_straight_line(self, target: Target, now_s: float) -> None:
+        """Warn at once: a go-to click makes the vehicle drive straight, before any plan exists."""
+        if self.situation.mode != GUIDED_MODE or not self.situation.armed or self.situation.pose is None:
+            return
+        found = straight_line(self.situation, self.orders.request, target.position)
+        if found is not None and not found.holds:
+            self._voice.rechecked(
+                now_s, EventName.STRAIGHT_LINE_UNSAFE, "the straight line to the target", found
+            )
+
+    def _hold(self, reason: str, now_s: float) -> None:
+        self._confirmed = False
+        self.drive = None
+        self._held_at_s = None
+        self._standstill_due_s = math.inf
+        self._voice.tell(now_s, EventName.HOLDING, f"HOLD: {reason}", reason)
+        self._steps.clear()
+        self._steps.run(
+            [self._command(Command.DO_SET_MODE, m.ModeFlag.CUSTOM_MODE_ENABLED, HOLD_MODE)], now_s
+        )
+
+    def _await_standstill(self, now_s: float) -> None:
+        """Plan from where the vehicle has come to rest."""
+        if self._held_at_s is None or now_s < self._held_at_s + _STOP_AT_LEAST_S:
+            return
+        if self._speed_mps <= _STILL_MPS or now_s >= self._held_at_s + _STOP_PATIENCE_S:
+            self._move(Cue.HELD)
+        else:
+            self._standstill_due_s = now_s + _STOP_AT_LEAST_S
+
+    def _plan_route(self, now_s: float) -> None:
+        request = self._route_request()
+        try:
+            self.plan = self._planner(self.situation, request)
+        except MissionError as error:
+            self.plan = None
+            self._answer_owed(m.MavResult.DENIED)
+            self._move(Cue.NO_PLAN)
+            self._voice.no_plan(now_s, error)
+            self._give_up(error)
+            return
+        self._move(Cue.PLANNED)
+        self._answer_owed(m.MavResult.ACCEPTED)
+        self._voice.planned(now_s, self.plan)
+        self._go_on(now_s)
+
+    def _route_request(self) -> Request:
+        """Give what is asked of the next plan: the orders' request, for the newest target, from where the vehicle is."""
+        request = self.orders.request
+        if self._target is not None and self._target.position not in request.targets:
+            request = replace(request, targets=(self._target.position,))
+        return request if self.orders.once else replace(request, start=None)
+
+    def _go_on(self, now_s: float) -> None:
+        """Do with the plan what the orders allow."""
+        if self.state is not State.PROPOSED or self.plan is None or self._peer is None:
+            return
+        if not self.orders.upload:
+            self._end()
+            return
+        if (self.orders.confirm and not self._confirmed) or not self._move(Cue.UPLOAD):
+            return
+        items = with_home(self.plan.items, self.plan.home or self.plan.start)
+        is_active = bool(self.situation.armed) and self.situation.mode == AUTO_MODE
+        upload = VerifiedUpload(
+            self._peer,
+            m.MissionType.MISSION,
+            items,
+            limits=Limits.from_parameters(self.situation.parameters),
+            is_active=is_active if now_s - self._heartbeat_s <= _FRESH_S else None,
+        )
+        self._voice.tell(now_s, EventName.UPLOADING, f"uploading {len(items)} items", len(items))
+        self._steps.run([(upload, self._uploaded)], now_s)
+
+    def _uploaded(self, machine: VerifiedUpload, now_s: float) -> None:
+        outcome = self.upload_outcome = machine.outcome
+        assert outcome is not None
+        if (trouble := upload_trouble(outcome)) is not None:
+            self._ours = None
+            self._fail_step(trouble, EventName.UPLOAD_FAILED, now_s)
+            return
+        self._ours = outcome.found if outcome.found is not None else outcome.backup
+        self._move(Cue.UPLOAD_VERIFIED)
+        assert self.plan is not None
+        count = len(self.plan.items) + 1
+        self._voice.tell(
+            now_s,
+            EventName.VERIFIED,
+            f"mission of {count} items verified on the vehicle",
+            count,
+            outcome.pushes,
+        )
+        if self._waiting_target is not None:
+            target, self._waiting_target = self._waiting_target, None
+            self._take_target(target, now_s)
+        elif self.orders.drive:
+            self._start_driving(now_s)
+        else:
+            self._end()
+
+    # Driving
+
+    def _start_driving(self, now_s: float) -> None:
+        assert self.plan is not None
+        first_leg = recheck(self.plan, self.situation, 1)
+        if not first_leg.holds and first_leg.moved_m > _MOVED_M:
+            self._voice.rechecked(
+                now_s, EventName.ROUTE_BROKEN, "the way to the first waypoint from here", first_leg
+            )
+            self._cue_target(now_s)
+            return
+        self._move(Cue.DRIVE)
+        steps = [self._command(Command.COMPONENT_ARM_DISARM, 1.0)] if self.orders.arm else []
+        steps.append(self._command(Command.DO_SET_MODE, m.ModeFlag.CUSTOM_MODE_ENABLED, AUTO_MODE))
+        # Only after the mode change: before it, in HOLD, ArduPilot reports internal errors.
+        steps.append(self._command(Command.DO_SET_MISSION_CURRENT, 1.0, 1.0))
+        self._steps.run(steps, now_s)
+
+    def _command(self, number: Command, param1: float, param2: float = 0.0) -> Step:
+        assert self._peer is not None
+        message = m.CommandLong(self._peer.system, self._peer.component, number, param1=param1, param2=param2)
+        return SendCommand(self._peer, message), self._commanded
+
+    def _commanded(self, machine: SendCommand, now_s: float) -> None:
+        outcome = machine.outcome
+        assert outcome is not None
+        if not outcome.is_accepted:
+            name = Command(outcome.command).name
+            result = outcome.result.name if outcome.result is not None else "no answer"
+            self._steps.clear()
+            self._voice.tell(now_s, EventName.COMMAND_FAILED, f"{name}: {result}", name, result)
+            kind = OutcomeError if outcome.result is None else RefusedError
+            texts = "".join(f"; {text}" for text in outcome.texts)
+            self._fail_step(kind(f"{self._on_vehicle}, but it refused {name}: {result}{texts}"), None, now_s)
+        elif self.state is State.HOLDING:
+            self._held_at_s = now_s
+            self._standstill_due_s = now_s + _STOP_AT_LEAST_S
+        elif not self._steps and self._move(Cue.STARTED):
+            assert self.plan is not None
+            self.drive = DriveWatch(self.plan, self._voice, now_s)
+            self._voice.tell(now_s, EventName.DRIVING, "AUTO", len(self.plan.items))
+
+    @property
+    def _on_vehicle(self) -> str:
+        return "the mission is on the vehicle" if self._ours is not None else "nothing was written"
+
+    def _watch_drive(self, frame: Frame, now_s: float) -> None:
+        drive = self.drive
+        if drive is None:
+            return
+        drive.receive(frame, now_s)
+        if isinstance(frame.message, m.Heartbeat):
+            self._watch_mode(frame.message, drive, now_s)
+        if drive.has_arrived and self._move(Cue.REACHED):
+            drive.tell_progress(now_s)
+            self._voice.arrived(now_s, drive)
+            self.drive = None
+            self._end()
+
+    def _watch_mode(self, heartbeat: m.Heartbeat, drive: DriveWatch, now_s: float) -> None:
+        name = drive.left_auto_for(heartbeat, now_s)
+        is_armed = heartbeat.base_mode & m.ModeFlag.SAFETY_ARMED
+        if name is not None and self._move(Cue.TAKEN_OVER):
+            self.drive = None
+            text = f"somebody switched to {name}; waiting for a new target"
+            self._voice.tell(now_s, EventName.TAKEN_OVER, text, name)
+            self._give_up(OutcomeError(f"the vehicle left AUTO for {name} before it arrived", mode=name))
+        elif self.orders.once and not is_armed:
+            self._give_up(
+                OutcomeError("the mission is on the vehicle in AUTO, but it is not armed and does not drive")
+            )
+
+    # What the vehicle and others do
+
+    def _take_vehicle_frame(self, frame: Frame, now_s: float) -> None:
+        message = frame.message
+        assert self._changes is not None
+        if isinstance(message, m.Heartbeat):
+            self._take_heartbeat(now_s)
+        elif isinstance(message, m.GlobalPositionInt):
+            self._speed_mps = math.hypot(message.vx, message.vy) / 100
+        if self._changes.is_reboot(frame) and self._move(Cue.REBOOTED):
+            self._voice.tell(
+                now_s, EventName.REBOOTED, "the vehicle was switched off and on; all is read anew"
+            )
+            self._ours = None
+            self.drive = None
+            self._learn(now_s)
+        self._changes.look(frame)
+        if self.state is State.UPLOADING:
+            self._changes.suspects.discard(ListKind.MISSION)
+        if self.state is State.DRIVING:
+            self._watch_drive(frame, now_s)
+
+    def _take_heartbeat(self, now_s: float) -> None:
+        self._heartbeat_s = now_s
+        if self.state is State.LOST and self._move(Cue.HEARD):
+            self._voice.tell(now_s, EventName.LINK_BACK, "the vehicle is heard again; all is read anew")
+            self._learn(now_s)
+
+    def _fall_silent(self, now_s: float) -> None:
+        if self._move(Cue.SILENCE):
+            self._steps.clear()
+            self.drive = None
+            self._voice.tell(now_s, EventName.LINK_LOST, f"no heartbeat for {_SILENCE_S:g} s", _SILENCE_S)
+            self._give_up(LinkError(f"the vehicle fell silent: no heartbeat for {_SILENCE_S:g} s"))
+
+    @property
+    def _may_reread(self) -> bool:
+        return not self.orders.once and self.state in _AT_REST and not self._steps
+
+    def _reread(self, now_s: float) -> None:
+        """Read again what somebody may have changed."""
+        assert self._changes is not None
+        assert self._peer is not None
+        suspects = self._changes.due(now_s)
+        takers = {ListKind.FENCE: self._fence_reread, ListKind.MISSION: self._mission_reread}
+        steps: list[Step] = [
+            (Download(self._peer, MISSION_TYPES[kind]), taker)
+            for kind, taker in takers.items()
+            if kind in suspects
+        ]
+        self._steps.run(steps, now_s)
+
+    def _fence_reread(self, machine: Download, now_s: float) -> None:
+        items = list_of(machine, ListKind.FENCE)
+        if isinstance(items, BridgeError):
+            return  # the next poll asks again
+        self.situation = with_list(
+            self.situation, ListKind.FENCE, items, now_s, "fence read from the vehicle"
+        )
+        self._notice_fence(now_s)
+
+    def _notice_fence(self, now_s: float) -> None:
+        """Compare the fence with the one that was last acted upon."""
+        fence, known = self.situation.fence, self._fence_known
+        if fence is known or self.state is State.LEARNING:
+            return
+        self._fence_known = fence
+        if fence is None or (known is not None and fence.value == known.value):
+            return
+        self._voice.tell(
+            now_s,
+            EventName.FENCE_CHANGED,
+            f"the fence changed: {len(fence.value.zones)} zones",
+            len(fence.value.zones),
+            fence.value.vertex_count,
+        )
+        self._recheck_route(now_s)
+
+    def _recheck_route(self, now_s: float) -> None:
+        if self.plan is None or self.state in (State.READY, State.LET_GO, State.ARRIVED):
+            if self.state is State.READY and self._target is not None:
+                self._cue_target(now_s)
+            return
+        item = self.drive.item if self.drive is not None else 1
+        found = recheck(self.plan, self.situation, item)
+        if found.holds:
+            return
+        self._voice.rechecked(now_s, EventName.ROUTE_BROKEN, "the rest of the route", found)
+        if self.state is not State.DRIVING or self.orders.drive:
+            self._cue_target(now_s)
+
+    def _mission_reread(self, machine: Download, now_s: float) -> None:
+        items = list_of(machine, ListKind.MISSION)
+        if isinstance(items, BridgeError):
+            return  # the next poll asks again
+        self.situation = with_list(
+            self.situation, ListKind.MISSION, items, now_s, "mission read from the vehicle"
+        )
+        if self._ours is None or items[1:] == self._ours[1:]:
+            if self._ours is None:
+                self._take_mission_target(now_s)
+            return
+        self._ours = None
+        self._voice.tell(
+            now_s, EventName.MISSION_CHANGED, f"somebody changed the mission: {len(items)} items", len(items)
+        )
+        if self.state is State.DRIVING and self._move(Cue.TAKEN_OVER):
+            self.drive = None
+        self._take_mission_target(now_s)
+
+    def _take_mission_target(self, now_s: float) -> None:
+        mission = self.situation.mission
+        place = last_place(mission.value.items) if mission else None
+        is_new = self._target is None or place != self._target.position
+        if place is not None and is_new and TargetSource.MISSION in self.orders.target_sources:
+            self._take_target(Target(place, TargetSource.MISSION), now_s)
+
+    # Answers
+
+    def _answer(self, target: Target, result: m.MavResult) -> None:
+        assert target.command is not None
+        asker = target.asker or (0, 0)
+        self._send(m.CommandAck(target.command, result, target_system=asker[0], target_component=asker[1]))
+
+    def _answer_owed(self, result: m.MavResult) -> None:
+        if self._target is not None and self._target.command is not None:
+            self._answer(self._target, result)
+            self._target = replace(self._target, command=None)
+
+    # Ends
+
+    def _end(self) -> None:
+        if self.orders.once:
+            self._move(Cue.END)
+
+    def _give_up(self, trouble: BridgeError | MissionError) -> None:
+        """End a single job with its trouble; the bridge goes on."""
+        self.trouble = trouble
+        if self.orders.once:
+            self._steps.clear()
+            self.state = State.FAILED
+
+    def _despair(self, trouble: BridgeError, now_s: float) -> None:
+        self._voice.error(now_s, EventName.TROUBLE, trouble, dict(trouble.details))
+        self._give_up(trouble)
+
+    def _fail_step(self, trouble: BridgeError, name: EventName | None, now_s: float) -> None:
+        if name is not None:
+            self._voice.error(now_s, name, trouble, dict(trouble.details))
+        self._move(Cue.TROUBLE)
+        self._give_up(trouble)
+
+    def _is_from_vehicle(self, frame: Frame) -> bool:
+        peer = self._peer
+        return peer is not None and (frame.system, frame.component) == (peer.system, peer.component)

@@ -1,0 +1,142 @@
+"""Watching a drive: how far, how near to the fence, within the band that was foreseen or not, still in AUTO or not."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from shapely import LineString, Point, prepare
+
+from mavlink_bridge import messages as m
+from mavlink_bridge.director.events import EventName
+from mavlink_bridge.rover import AUTO_MODE, MODE_NAMES
+from missions.geo import from_e7
+
+if TYPE_CHECKING:
+    from mavlink_bridge.director.voice import Voice
+    from mavlink_bridge.messages import Frame
+    from missions.geo import LatLon
+    from missions.plan import Plan
+
+OUTSIDE_M = 0.25
+"""How far outside the foreseen band counts: the vehicle's own estimate of its place is off by as much."""
+
+PROGRESS_EVERY_S = 1.0
+_FRESH_S = 1.5
+_STANDING_MPS = 0.15
+_STANDING_S = 3.0
+
+
+class DriveWatch:
+    """What a drive on a plan looks like, position by position; tells what is worth telling.
+
+    Parameters
+    ----------
+    plan : Plan
+        What is driven.
+    voice : Voice
+        Whom to tell.
+    now_s : float
+        When the drive began.
+    """
+
+    def __init__(self, plan: Plan, voice: Voice, now_s: float) -> None:
+        self.begun_s = now_s
+        self.progress_due_s = now_s + PROGRESS_EVERY_S
+        self.item = 1
+        self.least_clearance_m = math.inf
+        self.driven_m = 0.0
+        self.deviation_m = 0.0
+        self.has_arrived = False
+        self.breaches = 0
+        self._breaches_before: int | None = None
+        self._plan = plan
+        self._voice = voice
+        self._points = plan.ground.frame.to_local_array(plan.path)
+        self._line = LineString(self._points)
+        self._band = plan.envelope.area
+        prepare(self._band)
+        self._here: Point | None = None
+        self._place: LatLon | None = None
+        self._is_outside = False
+        self._auto_seen = False
+        self._standing_since_s: float | None = None
+
+    @property
+    def distance_left_m(self) -> float:
+        """What is left of the drawn lines."""
+        rest = self._points[min(self.item, len(self._points) - 1) :]
+        legs_m = float(np.hypot(*np.diff(rest, axis=0).T).sum()) if len(rest) > 1 else 0.0
+        return legs_m + (self._here.distance(Point(rest[0])) if self._here else 0.0)
+
+    @property
+    def time_left_s(self) -> float:
+        """What the drive model foresees for it."""
+        whole_m = self._line.length or 1.0
+        return self._plan.envelope.duration_s * min(1.0, self.distance_left_m / whole_m)
+
+    def receive(self, frame: Frame, now_s: float) -> None:
+        """Take a frame of the vehicle."""
+        message = frame.message
+        last = len(self._plan.items)
+        if isinstance(message, m.GlobalPositionInt) and (message.lat, message.lon) != (0, 0):
+            self._move(message, now_s)
+        elif isinstance(message, m.MissionCurrent) and message.seq:
+            self.item = message.seq
+        elif isinstance(message, m.MissionItemReached):
+            self.item = min(message.seq + 1, last)
+            self.has_arrived = self.has_arrived or message.seq >= last
+        elif isinstance(message, m.FenceStatus):
+            self._count_breaches(message, now_s)
+
+    def left_auto_for(self, heartbeat: m.Heartbeat, now_s: float) -> str | None:
+        """Give the mode that somebody else switched to; None while it is AUTO."""
+        mode = heartbeat.custom_mode
+        self._auto_seen = self._auto_seen or mode == AUTO_MODE
+        # A heartbeat from before our own mode change may still be under way.
+        is_settled = self._auto_seen or now_s - self.begun_s > _FRESH_S
+        return MODE_NAMES.get(mode, str(mode)) if mode != AUTO_MODE and is_settled else None
+
+    def tell_progress(self, now_s: float) -> None:
+        """Tell how far the drive is."""
+        self.progress_due_s = now_s + PROGRESS_EVERY_S
+        if self._place is not None:
+            self._voice.progress(now_s, self, self._place)
+
+    def _move(self, message: m.GlobalPositionInt, now_s: float) -> None:
+        self._place = from_e7(message.lat, message.lon)
+        here = Point(self._plan.ground.frame.to_local(self._place))
+        if self._here is not None:
+            self.driven_m += here.distance(self._here)
+        self._here = here
+        self.least_clearance_m = min(self.least_clearance_m, self._plan.ground.clearance_m(here))
+        self.deviation_m = here.distance(self._line)
+        self._notice_leaving(here, self._place, now_s)
+        self._notice_standing(here, math.hypot(message.vx, message.vy) / 100, now_s)
+
+    def _notice_leaving(self, here: Point, place: LatLon, now_s: float) -> None:
+        outside_m = here.distance(self._band)
+        if outside_m > OUTSIDE_M and not self._is_outside:
+            text = f"{outside_m:.1f} m outside the band that was foreseen"
+            self._voice.tell(now_s, EventName.LEFT_ENVELOPE, text, round(outside_m, 2), list(place))
+        self._is_outside = outside_m > OUTSIDE_M
+
+    def _notice_standing(self, here: Point, speed_mps: float, now_s: float) -> None:
+        """Take standing at the last waypoint for arrival: the message that says so may be lost."""
+        reach_m = self._plan.vehicle.waypoint_radius_m + 1.0
+        is_there = self.item >= len(self._plan.items) and here.distance(Point(self._points[-1])) <= reach_m
+        if not is_there or speed_mps > _STANDING_MPS:
+            self._standing_since_s = None
+        elif self._standing_since_s is None:
+            self._standing_since_s = now_s
+        elif now_s - self._standing_since_s >= _STANDING_S:
+            self.has_arrived = True
+
+    def _count_breaches(self, status: m.FenceStatus, now_s: float) -> None:
+        if self._breaches_before is None:
+            self._breaches_before = status.breach_count
+        breaches = status.breach_count - self._breaches_before
+        if breaches > self.breaches:
+            self._voice.tell(now_s, EventName.BREACH, f"fence breach {breaches}", breaches)
+        self.breaches = max(self.breaches, breaches)

@@ -1,0 +1,169 @@
+"""Learning a vehicle: its parameters, fence, mission, home and position, asked for in that order."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from mavlink_bridge import messages as m
+from mavlink_bridge.director.steps import Steps
+from mavlink_bridge.errors import BridgeError, LinkError, RefusedError
+from mavlink_bridge.fold import with_list
+from mavlink_bridge.protocol.command import SendCommand
+from mavlink_bridge.protocol.download import Download
+from mavlink_bridge.protocol.parameters import ReadParameters
+from missions.items import Command
+from missions.situation import ListKind
+from missions.vehicle import PARAMETER_NAMES
+
+if TYPE_CHECKING:
+    from mavlink_bridge.messages import Frame, Message
+    from mavlink_bridge.protocol.peer import Peer
+    from missions.items import MissionItem
+    from missions.situation import Situation
+
+MISSION_TYPES = {
+    ListKind.MISSION: m.MissionType.MISSION,
+    ListKind.FENCE: m.MissionType.FENCE,
+    ListKind.RALLY: m.MissionType.RALLY,
+}
+
+_POSITION_STREAM, _STATUS_STREAM = 6, 2
+_STREAM_HZ = 4
+_ASK_STREAMS_EVERY_S = 3.0
+_STORAGE_NAMES = ("BRD_SD_MISSION", "BRD_SD_FENCE")
+
+
+class Learning:
+    """Learns a vehicle; a machine as all others, its outcome in `trouble` and `merged`.
+
+    Parameters
+    ----------
+    peer : Peer
+        The vehicle and our identity.
+    patience_s : float
+        How long to wait for a position.
+    """
+
+    def __init__(self, peer: Peer, patience_s: float) -> None:
+        self.trouble: BridgeError | None = None
+        self._peer = peer
+        self._patience_s = patience_s
+        self._steps = Steps()
+        self._outgoing: list[Message] = []
+        self._parameters: dict[str, float] = {}
+        self._lists: dict[ListKind, tuple[MissionItem, ...]] = {}
+        self._has_position = False
+        self._streams_due_s = 0.0
+        self._position_until_s = 0.0
+
+    @property
+    def is_done(self) -> bool:
+        """Whether all is learnt, or something cannot be."""
+        return self.trouble is not None or (not self._steps and self._has_position)
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        """That of the transfer under way."""
+        current = self._steps.current
+        progress: tuple[int, int] = current.progress if current else (0, 0)
+        return progress
+
+    @property
+    def deadline_s(self) -> float | None:
+        """When `handle_timer` wants to be called."""
+        times = [self._streams_due_s] if not self._has_position else []
+        if not self._steps:
+            times.append(self._position_until_s)
+        elif self._steps.deadline_s is not None:
+            times.append(self._steps.deadline_s)
+        return min(times, default=None)
+
+    def start(self, now_s: float) -> None:
+        """Begin to ask."""
+        peer = self._peer
+        self._streams_due_s = now_s
+        self._ask_streams(now_s)
+        home = m.CommandLong(peer.system, peer.component, Command.GET_HOME_POSITION)
+        self._steps.run(
+            [
+                (ReadParameters(peer, PARAMETER_NAMES), self._take_parameters),
+                (Download(peer, m.MissionType.FENCE), self._take_fence),
+                (Download(peer, m.MissionType.MISSION), self._take_mission),
+                (SendCommand(peer, home), self._take_home),
+            ],
+            now_s,
+        )
+
+    def receive(self, frame: Frame, now_s: float) -> None:
+        """Take a frame."""
+        message = frame.message
+        if isinstance(message, m.GlobalPositionInt) and self._peer.accepts(frame):
+            self._has_position = self._has_position or (message.lat, message.lon) != (0, 0)
+        self._steps.receive(frame, now_s)
+
+    def handle_timer(self, now_s: float) -> None:
+        """Take notice that time has passed."""
+        self._steps.handle_timer(now_s)
+        if not self._has_position:
+            self._ask_streams(now_s)
+            if not self._steps and now_s >= self._position_until_s:
+                self._fail(
+                    LinkError(f"the vehicle told no position within {self._patience_s:g} s (no GPS fix?)")
+                )
+
+    def messages_to_send(self) -> list[Message]:
+        """Give and forget what is to be sent now."""
+        outgoing, self._outgoing = self._outgoing, []
+        return outgoing + self._steps.messages_to_send()
+
+    def merged(self, situation: Situation, now_s: float) -> Situation:
+        """Give a situation with what was learnt."""
+        situation = replace(situation, parameters={**situation.parameters, **self._parameters})
+        for kind, items in self._lists.items():
+            situation = with_list(situation, kind, items, now_s, f"{kind} read from the vehicle")
+        return situation
+
+    def _ask_streams(self, now_s: float) -> None:
+        if now_s >= self._streams_due_s:
+            self._streams_due_s = now_s + _ASK_STREAMS_EVERY_S
+            peer = self._peer
+            for stream in (_POSITION_STREAM, _STATUS_STREAM):
+                self._outgoing.append(m.RequestDataStream(peer.system, peer.component, stream, _STREAM_HZ, 1))
+
+    def _take_parameters(self, machine: ReadParameters, _now_s: float) -> None:
+        outcome = machine.outcome
+        if outcome is None or outcome.is_silent:
+            self._fail(LinkError("the vehicle does not answer when asked for its parameters"))
+            return
+        self._parameters = dict(outcome.values)
+
+    def _take_fence(self, machine: Download, _now_s: float) -> None:
+        self._take_list(machine, ListKind.FENCE)
+
+    def _take_mission(self, machine: Download, _now_s: float) -> None:
+        self._take_list(machine, ListKind.MISSION)
+
+    def _take_list(self, machine: Download, kind: ListKind) -> None:
+        items = list_of(machine, kind)
+        if isinstance(items, BridgeError):
+            self._fail(items)
+        else:
+            self._lists[kind] = items
+
+    def _take_home(self, _machine: SendCommand, now_s: float) -> None:
+        self._position_until_s = now_s + self._patience_s
+
+    def _fail(self, trouble: BridgeError) -> None:
+        self._steps.clear()
+        self.trouble = trouble
+
+
+def list_of(machine: Download, kind: ListKind) -> tuple[MissionItem, ...] | BridgeError:
+    """Give what a finished download brought, or the error that it is."""
+    outcome = machine.outcome
+    if outcome is not None and outcome.is_complete:
+        return outcome.items
+    if outcome is not None and outcome.result is not None:
+        return RefusedError(f"the vehicle refused to give its {kind}: {outcome.result.name}")
+    return LinkError(f"the vehicle's {kind} could not be read ({outcome.state if outcome else 'no outcome'})")

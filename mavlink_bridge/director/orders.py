@@ -1,0 +1,77 @@
+"""What the director may do and whom it looks for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from missions.request import Request
+
+
+class TargetSource(StrEnum):
+    """Where targets may come from (``--target-from``)."""
+
+    TYPED = "typed"
+    REPOSITION = "reposition"
+    POSITION_TARGET = "position-target"
+    GUIDED_ITEM = "guided-item"
+    MISSION = "mission"
+    RALLY = "rally"
+    ECHO = "echo"
+
+
+DEFAULT_SOURCES = frozenset(
+    {TargetSource.TYPED, TargetSource.REPOSITION, TargetSource.POSITION_TARGET, TargetSource.GUIDED_ITEM}
+)
+
+PATH_PLANNER_COMPONENT = 195
+"""MAV_COMP_ID_PATHPLANNER, which the bridge speaks as, with the vehicle's own system id."""
+
+
+@dataclass(frozen=True, slots=True)
+class Orders:
+    """What the director may do and whom it looks for.
+
+    Parameters
+    ----------
+    identity : tuple of int, optional
+        Our system and component id. Default: the vehicle's system id and 195.
+    system : int, optional
+        The vehicle's system id; needed where several vehicles are heard.
+    any_vehicle : bool
+        Take vehicles that are neither rover nor boat.
+    request : Request
+        What is asked of every plan; its targets are the first ones.
+    upload : bool
+        Write missions to the vehicle.
+    drive : bool
+        Switch modes: HOLD before a new route, AUTO for a verified one.
+    arm : bool
+        Arm before AUTO.
+    confirm : bool
+        Upload a plan only after `Director.confirm`.
+    once : bool
+        End after one job: plan, upload, drive, as far as the orders go.
+    announce : bool
+        Tell decisions to the ground stations as STATUSTEXT.
+    target_sources : frozenset of TargetSource
+        Where targets may come from.
+    patience_s : float
+        How long a single job waits for the first heartbeat, and anybody for the position.
+    listen_s : float
+        How long to listen for further vehicles before one is chosen.
+    """
+
+    identity: tuple[int, int] | None = None
+    system: int | None = None
+    any_vehicle: bool = False
+    request: Request = field(default_factory=Request)
+    upload: bool = False
+    drive: bool = False
+    arm: bool = False
+    confirm: bool = False
+    once: bool = False
+    announce: bool = False
+    target_sources: frozenset[TargetSource] = DEFAULT_SOURCES
+    patience_s: float = 30.0
+    listen_s: float = 1.2

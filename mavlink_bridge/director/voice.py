@@ -1,0 +1,130 @@
+"""The director's words: events for the shell, and STATUSTEXTs for the ground stations."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from mavlink_bridge.director.announcer import Announcer
+from mavlink_bridge.director.events import Event, EventName
+
+if TYPE_CHECKING:
+    from mavlink_bridge.director.drive_watch import DriveWatch
+    from mavlink_bridge.messages import Statustext
+    from missions.errors import MissionError
+    from missions.geo import LatLon
+    from missions.plan import Plan
+    from missions.recheck import Recheck
+    from missions.situation import Situation
+
+
+class Voice:
+    """Collects events, and the texts that follow from them.
+
+    Parameters
+    ----------
+    announce : bool
+        Whether ground stations are told.
+    """
+
+    def __init__(self, *, announce: bool) -> None:
+        self._announce = announce
+        self._announcer = Announcer()
+        self._events: list[Event] = []
+
+    @property
+    def deadline_s(self) -> float | None:
+        """When the next text may go."""
+        return self._announcer.deadline_s
+
+    def take_events(self) -> list[Event]:
+        """Give and forget what was told."""
+        events, self._events = self._events, []
+        return events
+
+    def due(self, now_s: float) -> list[Statustext]:
+        """Give the texts that may go now."""
+        return self._announcer.due(now_s)
+
+    def tell(self, now_s: float, name: EventName, text: str, *values: object) -> None:
+        """Tell an event; the values are those of its schema, in order."""
+        event = Event.of(now_s, name, text, values)
+        self._events.append(event)
+        if self._announce and name is not EventName.PROGRESS:
+            self._announcer.say(event.severity, text)
+
+    def error(self, now_s: float, name: EventName, error: Exception, details: object) -> None:
+        """Tell an error."""
+        self.tell(now_s, name, str(error), type(error).__name__, details)
+
+    def learnt(self, now_s: float, situation: Situation) -> None:
+        """Tell what is known of the vehicle."""
+        fence, mission, pose = situation.fence, situation.mission, situation.pose
+        zones = len(fence.value.zones) if fence else 0
+        items = len(mission.value.items) if mission else 0
+        self.tell(
+            now_s,
+            EventName.LEARNT,
+            f"fence of {zones} zones, mission of {items} items",
+            zones,
+            fence.value.vertex_count if fence else 0,
+            items,
+            len(situation.parameters),
+            list(pose.value.position) if pose else None,
+        )
+
+    def planned(self, now_s: float, plan: Plan) -> None:
+        """Tell a plan."""
+        self.tell(
+            now_s,
+            EventName.PLANNED,
+            f"route {plan.length_m:.0f} m, {plan.drawn_clearance_m:.1f} m drawn clearance",
+            round(plan.length_m, 2),
+            metres(plan.drawn_clearance_m),
+            plan.clearance_m,
+            round(plan.duration_s, 1),
+            len(plan.items),
+            [list(position) for position in plan.path],
+            list(plan.warnings),
+        )
+
+    def no_plan(self, now_s: float, error: MissionError) -> None:
+        """Tell why there is no plan."""
+        self.error(now_s, EventName.NO_PLAN, error, dict(error.details))
+
+    def rechecked(self, now_s: float, name: EventName, what: str, found: Recheck) -> None:
+        """Tell that lines do not keep what they have to."""
+        text = f"{what} keeps {found.clearance_m:.2f} m of {found.asked_m:.2f} m ({found.fence})"
+        self.tell(now_s, name, text, metres(found.clearance_m), round(found.asked_m, 3), found.fence)
+
+    def progress(self, now_s: float, drive: DriveWatch, position: LatLon) -> None:
+        """Tell how far a drive is."""
+        self.tell(
+            now_s,
+            EventName.PROGRESS,
+            f"{drive.distance_left_m:.0f} m left",
+            drive.item,
+            round(drive.distance_left_m, 1),
+            round(drive.time_left_s, 1),
+            metres(drive.least_clearance_m),
+            round(drive.deviation_m, 2),
+            list(position),
+        )
+
+    def arrived(self, now_s: float, drive: DriveWatch) -> None:
+        """Tell the end of a drive."""
+        time_s = now_s - drive.begun_s
+        self.tell(
+            now_s,
+            EventName.ARRIVED,
+            f"arrived after {drive.driven_m:.0f} m in {time_s:.0f} s",
+            round(drive.driven_m, 2),
+            round(time_s, 1),
+            metres(drive.least_clearance_m),
+            drive.breaches,
+        )
+
+
+def metres(value_m: float) -> float | None:
+    """Give a length for JSON, to the millimetre; None for an infinite one."""
+    return round(value_m, 3) if math.isfinite(value_m) else None

@@ -114,6 +114,7 @@ class Attitude:
         self._speed_pid = _Pid(settings.speed_gains)
         self._turn_rate_radps = 0.0
         self.speed_mps = 0.0
+        self._steering_asked = 0.0
         self.steering = 0.0
         self.throttle = 0.0
 
@@ -145,9 +146,9 @@ class Attitude:
         most = min(limits.steering_rate_radps, lateral)
         self._turn_rate_radps = max(-most, min(most, rate))
         slow = abs(body.speed_mps) <= limits.speed_scale_base_mps
-        limited = abs(self.steering) >= 1.0 or (slow and not limits.is_skid)
+        limited = abs(self._steering_asked) >= 1.0 or (slow and not limits.is_skid)
         steering = self._rate_pid.update(self._turn_rate_radps, body.turn_rate_radps, dt_s, limited=limited)
-        steering = max(-1.0, min(1.0, steering))
+        steering = self._steering_asked = max(-1.0, min(1.0, steering))
         if limits.is_skid:
             return steering
         if body.speed_mps < 0:
@@ -173,18 +174,18 @@ class Position:
         self.speed_mps = settings.speed_mps
         self._body = body
         self._attitude = attitude
-        self.target_m = body.position_m
+        self.target_m = body.estimate_m
         self.target_velocity_mps = 0j
         self._velocity_error: complex | None = None
 
     @property
     def error_m(self) -> complex:
-        """From where it is to the target point."""
-        return self.target_m - self._body.position_m
+        """From where it believes it is to the target point."""
+        return self.target_m - self._body.estimate_m
 
     def reset(self) -> None:
         """Aim at where the rover is."""
-        self.target_m = self._body.position_m
+        self.target_m = self._body.estimate_m
         self.target_velocity_mps = 0j
         self._velocity_error = None
 

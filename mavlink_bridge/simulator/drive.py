@@ -57,7 +57,7 @@ class Drive:
     @property
     def distance_m(self) -> float:
         """How far the destination is."""
-        return 0.0 if self._destination_m is None else abs(self._destination_m - self.body.position_m)
+        return 0.0 if self._destination_m is None else abs(self._destination_m - self.body.estimate_m)
 
     @property
     def has_arrived(self) -> bool:
@@ -81,7 +81,7 @@ class Drive:
         """How far right of the leg it is."""
         if not self._leg.length_m:
             return 0.0
-        return float(((self.body.position_m - self._leg.origin_m) * self._leg.direction.conjugate()).imag)
+        return float(((self.body.estimate_m - self._leg.origin_m) * self._leg.direction.conjugate()).imag)
 
     def motors_off(self) -> None:
         """Forget what the controllers hold; the motors do nothing."""
@@ -97,7 +97,7 @@ class Drive:
         self._pivot_since_s = 0.0
         self._time_scale = 1.0
         self._leg = self._last_leg = self._next_leg = Leg(
-            self.body.position_m, self.body.position_m, self._limits
+            self.body.estimate_m, self.body.estimate_m, self._limits
         )
         self._position.reset()
 
@@ -169,7 +169,7 @@ class Drive:
 
     def _stopping_point(self) -> complex:
         speed_mps = self.body.speed_mps
-        return self.body.position_m + self.body.direction * speed_mps * abs(speed_mps) / (
+        return self.body.estimate_m + self.body.direction * speed_mps * abs(speed_mps) / (
             2 * self._settings.decel_mps2
         )
 
@@ -230,7 +230,7 @@ class Drive:
             return self._leg.is_finished or self._may_turn()
         if not self._leg.is_finished:
             return False
-        past_m = (self.body.position_m - self._leg.destination_m) * self._leg.direction.conjugate()
+        past_m = (self.body.estimate_m - self._leg.destination_m) * self._leg.direction.conjugate()
         return self.distance_m <= self._settings.radius_m or past_m.real >= 0
 
     def _may_turn(self) -> bool:

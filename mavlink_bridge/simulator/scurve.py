@@ -1,9 +1,13 @@
-"""The speed along one leg: from rest to rest with limited acceleration and jerk (ArduPilot's SCurve, its snap limit left out)."""
+"""The speed along one leg: from rest to rest with limited acceleration and jerk (ArduPilot's SCurve)."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+
+SNAP_MPS4 = 15.0
+"""ArduPilot's limit of the jerk's own change (AR_WPNAV_SNAP_MAX)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +53,7 @@ class Leg:
         self.length_m = abs(destination_m - origin_m)
         self.direction = (destination_m - origin_m) / self.length_m if self.length_m else 0j
         self.elapsed_s = 0.0
-        self._limits = limits
+        self._limits = _softened(limits)
         self._plan(0.0, 0.0, 0.0)
 
     @property
@@ -82,7 +86,7 @@ class Leg:
 
     def change_speed(self, speed_mps: float) -> None:
         """Drive on with another top speed: from here if the leg has not begun or is at its top speed, else not at all."""
-        self._limits = Limits(speed_mps, self._limits.accel_mps2, self._limits.jerk_mps3)
+        self._limits = replace(self._limits, speed_mps=speed_mps)
         if not self.length_m or self.elapsed_s >= self.slowing_from_s:
             return
         if self.elapsed_s == 0.0:
@@ -146,3 +150,10 @@ class Leg:
                 (middle_mps, high_mps) if ramps_m(middle_mps) <= length_m else (low_mps, middle_mps)
             )
         return low_mps
+
+
+def _softened(limits: Limits) -> Limits:
+    """Give limits whose constant jerk takes as long as the real one, which rises and falls by the snap limit."""
+    rise_s = math.pi * limits.jerk_mps3 / (2 * SNAP_MPS4)
+    ramp_s = limits.accel_mps2 / limits.jerk_mps3 + rise_s
+    return replace(limits, jerk_mps3=limits.accel_mps2 / ramp_s)

@@ -1,52 +1,101 @@
-"""Files with fences, missions and parameters; the suffix chooses the format.
+"""Files with fences, missions, rally points and parameters; the suffix chooses the format (docs/files.md).
 
-Each format is one module with ``read(text, source) -> Situation`` and, where it can be written, ``write(situation) -> str``.
+Each format is one module with ``read(text, source) -> Situation``, ``write(situation) -> str`` or both.
 """
 
 from __future__ import annotations
 
-from contextlib import suppress
 from typing import TYPE_CHECKING, NamedTuple
 
 from missions.errors import FenceMissingError, MissionFormatError
-from missions.formats import qgc_plan, waypoints
+from missions.formats import fen, geojson, gpx, kml, parameters, poly, qgc_plan, waypoints
+from missions.formats.files import read_text, write_text
 from missions.formats.parameters import read_parameters
+from missions.formats.parts import Part, only, parts_of
+from missions.situation import Known, Situation
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
     from pathlib import Path
 
     from missions.fence import Fence
-    from missions.situation import Mission, Situation
+    from missions.situation import Mission
 
-__all__ = ["FORMATS", "read_fence", "read_mission", "read_parameters", "read_situation", "write_mission"]
+__all__ = [
+    "FORMATS",
+    "Format",
+    "Part",
+    "check_writable_format",
+    "format_of",
+    "parts_of",
+    "read_fence",
+    "read_mission",
+    "read_parameters",
+    "read_situation",
+    "write_fence",
+    "write_mission",
+    "write_parameters",
+    "write_situation",
+]
 
 
 class Format(NamedTuple):
-    """A file format's two directions; None where there is none."""
+    """A file format.
+
+    Parameters
+    ----------
+    read : callable or None
+        From a text and the name of its file to a situation; None where it is only written.
+    write : callable
+        From a situation to a text.
+    holds : tuple of Part
+        What can be written into a file.
+    together : bool
+        Whether a file can hold all of that at once; else one part, the first that is there.
+    """
 
     read: Callable[[str, str], Situation] | None
-    write: Callable[[Situation], str] | None
+    write: Callable[[Situation], str]
+    holds: tuple[Part, ...]
+    together: bool = True
 
+
+_LISTS = (Part.MISSION, Part.FENCE, Part.RALLY)
+_PLAN = Format(qgc_plan.read, qgc_plan.write, _LISTS)
+_WAYPOINTS = Format(waypoints.read, waypoints.write, _LISTS, together=False)
+_GEOJSON = Format(geojson.read, geojson.write, _LISTS)
+_PARAMETERS = Format(parameters.read, parameters.write, (Part.PARAMETERS,))
 
 FORMATS: dict[str, Format] = {
-    ".plan": Format(qgc_plan.read, qgc_plan.write),
-    ".waypoints": Format(waypoints.read, waypoints.write),
-    ".txt": Format(waypoints.read, waypoints.write),
+    ".plan": _PLAN,
+    ".waypoints": _WAYPOINTS,
+    ".txt": _WAYPOINTS,
+    ".fen": Format(fen.read, fen.write, (Part.FENCE,)),
+    ".poly": Format(poly.read, poly.write, (Part.FENCE,)),
+    ".geojson": _GEOJSON,
+    ".json": _GEOJSON,
+    ".kml": Format(kml.read, kml.write, _LISTS),
+    ".gpx": Format(None, gpx.write, (Part.MISSION,)),
+    ".parm": _PARAMETERS,
+    ".param": _PARAMETERS,
 }
 
 
 def read_situation(path: Path) -> Situation:
-    """Read what a file tells: fence, mission, rally points, home.
+    """Read what a file tells: fence, mission, rally points, home, parameters.
 
     Raises
     ------
     MissionFormatError
         The file is missing, its suffix is unknown, or it cannot be read as its format; says where.
     """
-    read = _format(path, "read").read
-    assert read is not None
-    return read(_text(path), str(path))
+    read = format_of(path).read
+    if read is None:
+        raise MissionFormatError(
+            f"{path}: {path.suffix} files are only written; to read, known are {_known(reading=True)}",
+            file=str(path),
+        )
+    return read(read_text(path), str(path))
 
 
 def read_fence(path: Path) -> Fence:
@@ -79,52 +128,121 @@ def read_mission(path: Path) -> Mission:
     return mission.value
 
 
+def write_situation(situation: Situation, path: Path, part: Part | None = None) -> tuple[Part, ...]:
+    """Write what is known and what the format holds, or one part of it; a file is written whole or not at all.
+
+    Parameters
+    ----------
+    situation : Situation
+        What is known.
+    path : Path
+        The suffix chooses the format.
+    part : Part, optional
+        Write this and nothing else. Default: all that the format holds.
+
+    Returns
+    -------
+    tuple of Part
+        What was written.
+
+    Raises
+    ------
+    MissionFormatError
+        The suffix is unknown, nothing that the format holds is known, it holds one part at a time and several are known, or the file
+        cannot be written.
+    """
+    format_ = format_of(path, "write", part)
+    wanted = [one for one in parts_of(situation) if one in format_.holds and part in (None, one)]
+    if not wanted:
+        held = " or ".join(format_.holds)
+        raise MissionFormatError(
+            f"{path}: there is no {part or held} to write" if part in (None, *format_.holds)
+            else f"{path}: a {path.suffix} file holds no {part}; it holds {held}",
+            file=str(path),
+        )  # fmt: skip
+    if len(wanted) > 1 and not format_.together:
+        raise MissionFormatError(
+            f"{path}: a {path.suffix} file holds one list, and there are {' and '.join(wanted)}; choose one",
+            file=str(path),
+        )
+    try:
+        text = format_.write(only(situation, part) if part else situation)
+    except MissionFormatError as error:
+        raise MissionFormatError(f"{path}: {error}", file=str(path), **error.details) from None
+    write_text(path, text)
+    return tuple(wanted)
+
+
 def write_mission(situation: Situation, path: Path) -> None:
     """Write the situation's mission, and in formats that hold them its fence, rally points and home.
 
     Raises
     ------
     MissionFormatError
-        The suffix is unknown, or the file cannot be written.
+        The suffix is unknown or its format holds no missions, or the file cannot be written.
     """
-    write = _format(path, "write").write
-    assert write is not None
-    whole = path.with_name(f".{path.name}.part")  # so that nobody ever finds half a mission
-    try:
-        whole.write_text(write(situation), encoding="utf-8", newline="\n")
-        whole.replace(path)
-    except OSError as error:
-        with suppress(OSError):
-            whole.unlink()
-        raise MissionFormatError(f"{path} cannot be written: {error.strerror}", file=str(path)) from None
+    check_writable_format(path)
+    write_situation(situation, path, None if format_of(path, "write").together else Part.MISSION)
 
 
-def check_writable_format(path: Path) -> None:
-    """Check, before any work is done, that a mission can be written to a path with this suffix.
+def write_fence(fence: Fence, path: Path) -> None:
+    """Write a fence.
 
     Raises
     ------
     MissionFormatError
-        The suffix is unknown or its format is only read.
+        The suffix is unknown, its format cannot hold the fence, or the file cannot be written.
     """
-    _format(path, "write")
+    write_situation(Situation(fence=Known(fence, None, str(path))), path, Part.FENCE)
 
 
-def _format(path: Path, verb: str) -> Format:
-    found = FORMATS.get(path.suffix.lower())
-    if found is None or getattr(found, verb) is None:
-        known = ", ".join(suffix for suffix, format_ in FORMATS.items() if getattr(format_, verb))
+def write_parameters(values: Mapping[str, float], path: Path) -> None:
+    """Write parameters.
+
+    Raises
+    ------
+    MissionFormatError
+        The suffix is not that of a parameter file, or the file cannot be written.
+    """
+    write_situation(Situation(parameters=values), path, Part.PARAMETERS)
+
+
+def check_writable_format(path: Path, part: Part = Part.MISSION) -> None:
+    """Check, before any work is done, that a mission (or another part) can be written to a path with this suffix.
+
+    Raises
+    ------
+    MissionFormatError
+        The suffix is unknown or its format does not hold that part.
+    """
+    if part not in format_of(path, "write", part).holds:
         raise MissionFormatError(
-            f"{path}: no format to {verb} for the suffix {path.suffix!r}; known are {known}",
+            f"{path}: a {path.suffix} file holds no {part}; known for it are {_known(part)}", file=str(path)
+        )
+
+
+def format_of(path: Path, verb: str = "read", part: Part | None = None) -> Format:
+    """Give the format of a path's suffix, wanted to ``read`` or to ``write`` a part.
+
+    Raises
+    ------
+    MissionFormatError
+        It has none.
+    """
+    found = FORMATS.get(path.suffix.lower())
+    if found is None:
+        raise MissionFormatError(
+            f"{path}: no format to {verb} for the suffix {path.suffix!r}; "
+            f"known are {_known(part, reading=verb == 'read')}",
             file=str(path),
         )
     return found
 
 
-def _text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise MissionFormatError(f"{path} cannot be read: {error.strerror}", file=str(path)) from None
-    except UnicodeDecodeError as error:
-        raise MissionFormatError(f"{path} is not a text file (byte {error.start})", file=str(path)) from None
+def _known(part: Part | None = None, *, reading: bool = False) -> str:
+    suffixes = (
+        suffix
+        for suffix, format_ in FORMATS.items()
+        if (format_.read or not reading) and (part is None or part in format_.holds)
+    )
+    return ", ".join(suffixes)

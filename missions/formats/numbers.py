@@ -32,6 +32,19 @@ def place_e7(command: int, lat_deg: float, lon_deg: float) -> tuple[int, int]:
     return to_e7(LatLon(lat_deg, lon_deg))
 
 
+def number(text: str) -> float:
+    """Read a number of a text file.
+
+    Raises
+    ------
+    ValueError
+        It is none.
+    """
+    if "_" in text:  # 4_0 is 40 to Python, and a slip of the pen to everybody else
+        raise ValueError(f"could not convert string to float: {text!r}")
+    return float(text)
+
+
 def whole(value: float, name: str, most: int) -> int:
     """Give a whole number from 0 to ``most``.
 

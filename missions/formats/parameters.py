@@ -7,6 +7,8 @@ import re
 from typing import TYPE_CHECKING
 
 from missions.errors import MissionFormatError
+from missions.formats.files import read_text
+from missions.situation import Situation
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -22,19 +24,30 @@ def read_parameters(path: Path) -> dict[str, float]:
     MissionFormatError
         The file is missing or a line is not a name and a number; says which.
     """
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except OSError as error:
-        raise MissionFormatError(f"{path} cannot be read: {error.strerror}", file=str(path)) from None
-    except UnicodeDecodeError:
-        raise MissionFormatError(f"{path} is not a text file", file=str(path)) from None
+    return dict(read(read_text(path), str(path)).parameters)
+
+
+def read(text: str, source: str) -> Situation:
+    """Read a file's text.
+
+    Raises
+    ------
+    MissionFormatError
+        With the line and what was expected there.
+    """
     parameters = {}
-    for number, line in enumerate(lines, start=1):
-        text = line.partition("#")[0].strip()
-        if text:
-            name, value = _parse(text, f"{path}: line {number}")
+    for number, line in enumerate(text.splitlines(), start=1):
+        content = line.partition("#")[0].strip()
+        if content:
+            name, value = _parse(content, f"{source}: line {number}")
             parameters[name] = value
-    return parameters
+    return Situation(parameters=parameters)
+
+
+def write(situation: Situation) -> str:
+    """Give the text of a file with the situation's parameters by name, as exact as the wire's 32 bits."""
+    rows = [f"{name:<16} {value:.9g}\n" for name, value in sorted(situation.parameters.items())]
+    return "".join(rows)
 
 
 def _parse(text: str, where: str) -> tuple[str, float]:

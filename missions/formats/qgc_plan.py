@@ -4,15 +4,22 @@ from __future__ import annotations
 
 import json
 import math
-from typing import Any
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
-from missions.errors import InvalidPositionError, MissionFormatError
+from missions.errors import InvalidPositionError
 from missions.fence import CircleZone, Fence, PolygonZone, Zone, ZoneKind
-from missions.formats.numbers import place_e7, whole
-from missions.geo import LatLon, checked_lat_lon
-from missions.items import MissionItem, file_frame
+from missions.formats.json_node import parse_json
+from missions.formats.numbers import place_e7
+from missions.geo import LatLon
+from missions.items import Command, MissionItem, file_frame
 from missions.situation import Known, Mission, Situation
 
+if TYPE_CHECKING:
+    from missions.formats.json_node import JsonNode
+
+_TRANSECTS = "TransectStyleComplexItem"
+_MOST_ITEMS = 65535
 _FIRMWARE_ARDUPILOT = 3
 _VEHICLE_ROVER = 10
 
@@ -25,25 +32,13 @@ def read(text: str, source: str) -> Situation:
     MissionFormatError
         With the JSON path and what was expected there.
     """
-    try:
-        document = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise MissionFormatError(
-            f"{source}: line {error.lineno}: not JSON: {error.msg}", file=source
-        ) from None
-    except (RecursionError, ValueError) as error:
-        reason = "nested too deeply" if isinstance(error, RecursionError) else error
-        raise MissionFormatError(f"{source}: not JSON: {reason}", file=source) from None
-    node = _Node(document, source, "")
-    if not isinstance(document, dict) or document.get("fileType") != "Plan":
+    node = parse_json(text, source)
+    if "fileType" not in node or node["fileType"].value != "Plan":
         raise node.error('expected a QGroundControl plan ("fileType": "Plan")')
-    mission = _mission(node["mission"]) if "mission" in document else None
-    fence = _fence(node["geoFence"]) if "geoFence" in document else None
-    rally = (
-        tuple(_position(point) for point in node["rallyPoints"].list("points"))
-        if "rallyPoints" in document
-        else ()
-    )
+    _check_version(node, 1)
+    mission = _mission(node["mission"]) if "mission" in node else None
+    fence = _fence(node["geoFence"]) if "geoFence" in node else None
+    rally = _rally(node["rallyPoints"]) if "rallyPoints" in node else ()
     return Situation(
         fence=Known(fence, None, source) if fence and fence.zones else None,
         mission=Known(mission, None, source) if mission and mission.items else None,
@@ -85,67 +80,63 @@ def write(situation: Situation) -> str:
     return json.dumps(document, indent=4) + "\n"
 
 
-class _Node:
-    """A JSON value that knows where it stands, so that errors can say it."""
-
-    def __init__(self, value: Any, source: str, where: str) -> None:  # noqa: ANN401 - JSON is anything
-        self.value, self.source, self.where = value, source, where
-
-    def error(self, problem: str) -> MissionFormatError:
-        where = self.where or "top level"
-        return MissionFormatError(f"{self.source}: {where}: {problem}", file=self.source, where=where)
-
-    def __contains__(self, key: str) -> bool:
-        return isinstance(self.value, dict) and key in self.value
-
-    def __getitem__(self, key: str | int) -> _Node:
-        step = f"[{key}]" if isinstance(key, int) else f".{key}" if self.where else key
-        where = f"{self.where}{step}"
-        try:
-            return _Node(self.value[key], self.source, where)
-        except (KeyError, IndexError, TypeError):
-            raise _Node(None, self.source, where).error("missing") from None
-
-    def list(self, key: str) -> list[_Node]:
-        node = self[key]
-        if not isinstance(node.value, list):
-            raise node.error("expected a list")
-        return [node[i] for i in range(len(node.value))]
-
-    def number(self) -> float:
-        if isinstance(self.value, bool) or not isinstance(self.value, (int, float)):
-            raise self.error("expected a number")
-        try:
-            return float(self.value)
-        except OverflowError:
-            raise self.error("expected a number of less than 300 digits") from None
-
-    def whole(self, name: str, most: int) -> int:
-        try:
-            return whole(self.number(), name, most)
-        except ValueError as error:
-            raise self.error(str(error)) from None
+def _check_version(node: JsonNode, expected: int) -> None:
+    if "version" in node and node["version"].value != expected:
+        raise node["version"].error(f"version {node['version'].value!r}; expected {expected}")
 
 
-def _position(node: _Node) -> LatLon:
-    if not isinstance(node.value, list) or len(node.value) < 2:
-        raise node.error("expected [latitude, longitude]")
-    try:
-        return checked_lat_lon(node[0].number(), node[1].number())
-    except InvalidPositionError as error:
-        raise node.error(str(error)) from None
+def _rally(node: JsonNode) -> tuple[LatLon, ...]:
+    _check_version(node, 2)
+    return tuple(point.lat_lon() for point in node["points"].members())
 
 
-def _mission(node: _Node) -> Mission:
-    items = tuple(_item(item) for item in node.list("items"))
-    home = _position(node["plannedHomePosition"]) if "plannedHomePosition" in node else None
+def _mission(node: JsonNode) -> Mission:
+    _check_version(node, 2)
+    nodes = [simple for item in node["items"].members() for simple in _simple_items(item)]
+    seq_of_id = _seq_of_id(nodes)
+    items = tuple(_jump_by_seq(item, _item(item), seq_of_id) for item in nodes)
+    home = node["plannedHomePosition"].lat_lon() if "plannedHomePosition" in node else None
     return Mission(items, home if home != (0.0, 0.0) else None)
 
 
-def _item(node: _Node) -> MissionItem:
-    if node["type"].value != "SimpleItem":
-        raise node["type"].error(f"{node['type'].value!r} items are not supported; only SimpleItem")
-    params = node.list("params")
+def _simple_items(node: JsonNode) -> list[JsonNode]:
+    """Give a simple item itself, of a survey or a corridor scan the simple items that it stands for."""
+    if node["type"].value == "SimpleItem":
+        return [node]
+    if _TRANSECTS in node and "Items" in node[_TRANSECTS]:
+        return node[_TRANSECTS]["Items"].members()
+    kind = node["complexItemType"].value if "complexItemType" in node else node["type"].value
+    raise node["type"].error(
+        f"{kind!r} items are not supported; only SimpleItem, and patterns saved with the simple items they stand for "
+        f"({_TRANSECTS}.Items: surveys and corridor scans)"
+    )
+
+
+def _seq_of_id(nodes: list[JsonNode]) -> dict[int, int | None]:
+    """Give the seq of each item by its doJumpId; None where two items have the same."""
+    seqs: dict[int, int | None] = {}
+    for seq, node in enumerate(nodes, start=1):
+        if "doJumpId" in node:
+            jump_id = node["doJumpId"].whole("doJumpId", _MOST_ITEMS)
+            seqs[jump_id] = None if jump_id in seqs else seq
+    return seqs
+
+
+def _jump_by_seq(node: JsonNode, item: MissionItem, seq_of_id: dict[int, int | None]) -> MissionItem:
+    """Let a DO_JUMP name its goal by seq, as on the wire: a plan names it by doJumpId."""
+    if item.command != Command.DO_JUMP:
+        return item
+    jump_id = node["params"][0].whole("the doJumpId to jump to", _MOST_ITEMS)
+    seq = seq_of_id.get(jump_id)
+    if seq is None:
+        raise node["params"][0].error(
+            f"expected the doJumpId of one item; {jump_id} is that of none or several"
+        )
+    return replace(item, params=(float(seq), *item.params[1:]))
+
+
+def _item(node: JsonNode) -> MissionItem:
+    params = node["params"].members()
     if len(params) != 7:
         raise node["params"].error(f"{len(params)} params; expected 7")
     values = [math.nan if param.value is None else param.number() for param in params]
@@ -166,30 +157,30 @@ def _item(node: _Node) -> MissionItem:
     )
 
 
-def _fence(node: _Node) -> Fence:
+def _fence(node: JsonNode) -> Fence:
     if node["version"].value != 2:
         raise node["version"].error(f"geoFence version {node['version'].value!r}; expected 2")
-    zones: list[Zone] = [_polygon(polygon) for polygon in node.list("polygons")]
-    zones += [_circle(circle) for circle in node.list("circles")]
-    return Fence(tuple(zones), _position(node["breachReturn"]) if "breachReturn" in node else None)
+    zones: list[Zone] = [_polygon(polygon) for polygon in node["polygons"].members()]
+    zones += [_circle(circle) for circle in node["circles"].members()]
+    return Fence(tuple(zones), node["breachReturn"].lat_lon() if "breachReturn" in node else None)
 
 
-def _polygon(node: _Node) -> PolygonZone:
-    vertices = tuple(_position(vertex) for vertex in node.list("polygon"))
+def _polygon(node: JsonNode) -> PolygonZone:
+    vertices = tuple(vertex.lat_lon() for vertex in node["polygon"].members())
     if len(vertices) < 3:
         raise node["polygon"].error(f"{len(vertices)} vertices; a polygon needs at least 3")
     return PolygonZone(_kind(node), vertices)
 
 
-def _circle(node: _Node) -> CircleZone:
+def _circle(node: JsonNode) -> CircleZone:
     circle = node["circle"]
     radius_m = circle["radius"].number()
     if not (math.isfinite(radius_m) and radius_m > 0):
         raise circle["radius"].error(f"{radius_m:g}; a circle's radius must be positive")
-    return CircleZone(_kind(node), _position(circle["center"]), radius_m)
+    return CircleZone(_kind(node), circle["center"].lat_lon(), radius_m)
 
 
-def _kind(node: _Node) -> ZoneKind:
+def _kind(node: JsonNode) -> ZoneKind:
     if not isinstance(node["inclusion"].value, bool):
         raise node["inclusion"].error("expected true or false")
     return ZoneKind.INCLUSION if node["inclusion"].value else ZoneKind.EXCLUSION

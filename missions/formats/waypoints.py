@@ -6,13 +6,14 @@ home; Mission Planner pads it with command 0.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from missions.errors import FenceError, InvalidPositionError, MissionFormatError
-from missions.fence import fence_from_items
-from missions.formats.numbers import place_e7, whole
+from missions.fence import fence_from_items, fence_to_items
+from missions.formats.numbers import number, place_e7, whole
 from missions.geo import LatLon
-from missions.items import Command, MissionItem, file_frame, with_home
+from missions.items import Command, MissionItem, file_frame, waypoint, with_home
 from missions.situation import Known, Mission, Situation
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ def read(text: str, source: str) -> Situation:
         With the line and what was expected there.
     """
     lines = text.splitlines()
-    if not lines or lines[0].split() != _HEADER.split():
+    if not is_waypoint_text(text):
         raise MissionFormatError(f"{source}: line 1: expected {_HEADER!r}", file=source, line=1)
     numbered = [
         (number, line.strip())
@@ -43,12 +44,21 @@ def read(text: str, source: str) -> Situation:
     return _situation(items, line_numbers, source)
 
 
+def is_waypoint_text(text: str) -> bool:
+    """Tell whether a text begins as this format does."""
+    return any(line.split() == _HEADER.split() for line in text[:100].splitlines()[:1])
+
+
 def write(situation: Situation) -> str:
-    """Give the text of a file with the situation's mission, home first."""
-    mission = situation.mission
-    assert mission is not None
-    home = mission.value.home or (situation.home and situation.home.value) or LatLon(0.0, 0.0)
-    return format_items(with_home(mission.value.items, home))
+    """Give the text of a file with the situation's mission, home first; without one its fence, else its rally points."""
+    mission, fence, rally = situation.mission, situation.fence, situation.rally
+    if mission is not None:
+        home = mission.value.home or (situation.home and situation.home.value) or LatLon(0.0, 0.0)
+        return format_items(with_home(mission.value.items, home))
+    if fence is not None:
+        return format_items(fence_to_items(fence.value))
+    assert rally is not None
+    return format_items([_rally_item(point) for point in rally.value])
 
 
 def format_items(items: Sequence[MissionItem]) -> str:
@@ -68,12 +78,16 @@ def format_items(items: Sequence[MissionItem]) -> str:
     return "\n".join([_HEADER, *rows]) + "\n"
 
 
+def _rally_item(point: LatLon) -> MissionItem:
+    return replace(waypoint(point), command=Command.RALLY_POINT)
+
+
 def _item(line: str, where: str) -> MissionItem:
     columns = line.split("\t") if "\t" in line else line.split()
     if len(columns) != 12:
         raise MissionFormatError(f"{where}: {len(columns)} columns; expected 12", where=where)
     try:
-        _, current, frame, command, *params, lat_deg, lon_deg, alt_m, autocontinue = map(float, columns)
+        _, current, frame, command, *params, lat_deg, lon_deg, alt_m, autocontinue = map(number, columns)
     except ValueError as error:
         raise MissionFormatError(f"{where}: {error}; expected numbers", where=where) from None
     try:

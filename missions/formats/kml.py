@@ -1,0 +1,207 @@
+"""KML (OGC 2.2): fences, missions, rally points and home as placemarks; positions are longitude first.
+
+Folders and names tell what a placemark is; so do ``Data`` and ``SimpleData`` of its ``ExtendedData``. KML has no circles: they are points
+with a radius, and for the eye a polygon beside each that reading leaves out.
+"""
+
+from __future__ import annotations
+
+import math
+from html import escape
+from typing import TYPE_CHECKING
+
+from missions.errors import InvalidPositionError
+from missions.formats.features import Feature, Role, Shape, features_of, situation_of
+from missions.formats.numbers import number
+from missions.formats.xml_tree import parse_xml
+from missions.geo import LatLon, checked_lat_lon
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from missions.formats.xml_tree import Element
+    from missions.situation import Situation
+
+_FOLDERS = ("kml", "Document", "Folder")
+_SHAPES = ("Point", "LineString", "LinearRing", "Polygon", "MultiGeometry")
+_OTHER_SHAPES = ("Model", "Track", "MultiTrack")
+_CIRCLE_CORNERS = 72
+_STYLES = {  # colours of the pictures, as KML writes them: opacity, blue, green, red
+    Role.INCLUSION: "<LineStyle><color>ff739e00</color><width>3</width></LineStyle><PolyStyle><fill>0</fill></PolyStyle>",
+    Role.EXCLUSION: "<LineStyle><color>ff005ed5</color><width>2</width></LineStyle><PolyStyle><color>66005ed5</color></PolyStyle>",
+    Role.ROUTE: "<LineStyle><color>ffb27200</color><width>3</width></LineStyle>",
+}
+
+
+def read(text: str, source: str) -> Situation:
+    """Read a file's text.
+
+    Raises
+    ------
+    MissionFormatError
+        With the line and what was expected there.
+    """
+    root = parse_xml(text, source)
+    if root.name != "kml":
+        raise root.error(f"<{root.name}>; expected <kml>")
+    return situation_of(_features(root, ()), source)
+
+
+def write(situation: Situation) -> str:
+    """Give the text of a file with the situation's fence, mission, rally points and home."""
+    zones, others = features_of(situation)
+    drawn = [_drawing(zone) for zone in zones if "radius_m" in zone.properties]
+    return "\n".join(
+        [
+            '<?xml version="1.0" encoding="UTF-8"?>',
+            '<kml xmlns="http://www.opengis.net/kml/2.2">',
+            "<Document>",
+            *(f'<Style id="{role}">{style}</Style>' for role, style in _STYLES.items()),
+            *_folder("fence", [*zones, *drawn]),
+            *_folder("mission", others),
+            "</Document>",
+            "</kml>",
+            "",
+        ]
+    )
+
+
+def _features(element: Element, names: tuple[str, ...]) -> Iterator[Feature]:
+    own = element.text_of("name")
+    names = (own, *names) if own else names
+    for child in element.children:
+        if child.name in _FOLDERS:
+            yield from _features(child, names)
+        elif child.name == "Placemark":
+            yield from _placemark(child, names)
+        elif child.name == "NetworkLink":
+            raise child.error("a NetworkLink; nothing is fetched from elsewhere: save what it leads to")
+
+
+def _placemark(element: Element, names: tuple[str, ...]) -> list[Feature]:
+    own = element.text_of("name")
+    names = (own, *names) if own else names
+    properties = dict(_properties(element))
+    shapes = list(_shapes(element))
+    if not shapes:
+        return [Feature(Shape.NOWHERE, (), properties, names, element.where)]
+    return [Feature(shape, lines, properties, names, where) for shape, lines, where in shapes]
+
+
+def _properties(element: Element) -> Iterator[tuple[str, str]]:
+    for extended in element.all("ExtendedData"):
+        for data in extended.all("Data"):
+            yield data.attributes.get("name", ""), data.text_of("value")
+        for schema in extended.all("SchemaData"):
+            for data in schema.all("SimpleData"):
+                yield data.attributes.get("name", ""), data.text.strip()
+
+
+def _shapes(element: Element) -> Iterator[tuple[Shape, tuple[tuple[LatLon, ...], ...], str]]:
+    for child in element.children:
+        if child.name in _OTHER_SHAPES:
+            raise child.error(f"a {child.name} is not supported; expected one of {', '.join(_SHAPES)}")
+        if child.name == "MultiGeometry":
+            yield from _shapes(child)
+        elif child.name == "Point":
+            position, *more = _positions(child, 1)
+            if more:
+                raise child.error(f"{len(more) + 1} positions; a point has one")
+            yield Shape.POINT, ((position,),), child.where
+        elif child.name == "LineString":
+            yield Shape.LINE, (_positions(child, 2),), child.where
+        elif child.name == "LinearRing":
+            yield Shape.POLYGON, (_ring(child),), child.where
+        elif child.name == "Polygon":
+            yield Shape.POLYGON, _polygon(child), child.where
+
+
+def _polygon(element: Element) -> tuple[tuple[LatLon, ...], ...]:
+    outer = [ring for side in element.all("outerBoundaryIs") for ring in side.all("LinearRing")]
+    if len(outer) != 1:
+        raise element.error(f"{len(outer)} outer rings; expected one <outerBoundaryIs><LinearRing>")
+    inner = [ring for side in element.all("innerBoundaryIs") for ring in side.all("LinearRing")]
+    return tuple(map(_ring, (*outer, *inner)))
+
+
+def _ring(element: Element) -> tuple[LatLon, ...]:
+    positions = _positions(element, 3)
+    open_ring = positions[:-1] if positions[0] == positions[-1] else positions
+    if len(open_ring) < 3:
+        raise element.error(f"{len(open_ring)} vertices; a polygon needs at least 3")
+    return open_ring
+
+
+def _positions(element: Element, least: int) -> tuple[LatLon, ...]:
+    coordinates = element.first("coordinates")
+    if coordinates is None:
+        raise element.error(f"a {element.name} without <coordinates>")
+    positions = tuple(_position(word, coordinates) for word in coordinates.text.split())
+    if len(positions) < least:
+        raise coordinates.error(f"{len(positions)} positions; expected at least {least}")
+    return positions
+
+
+def _position(word: str, element: Element) -> LatLon:
+    try:
+        lon_deg, lat_deg, *more = map(number, word.split(","))
+    except ValueError:
+        more = [math.nan] * 2
+    if len(more) > 1:
+        raise element.error(
+            f"{word!r}; expected longitude,latitude[,altitude] in decimal degrees, no spaces inside"
+        )
+    try:
+        return checked_lat_lon(lat_deg, lon_deg)
+    except InvalidPositionError as error:
+        raise element.error(str(error)) from None
+
+
+def _folder(name: str, features: Iterable[Feature]) -> list[str]:
+    rows = [_placemark_xml(feature) for feature in features]
+    return ["<Folder>", f"<name>{name}</name>", *rows, "</Folder>"] if rows else []
+
+
+def _placemark_xml(feature: Feature) -> str:
+    look = feature.properties.get("style", feature.properties["role"])
+    style = f"<styleUrl>#{look}</styleUrl>" if look in _STYLES else ""
+    data = "".join(
+        f'<Data name="{key}"><value>{escape(str(value))}</value></Data>'
+        for key, value in feature.properties.items()
+    )
+    return (
+        f"<Placemark><name>{escape(feature.names[0])}</name>{style}"
+        f"<ExtendedData>{data}</ExtendedData>{_shape_xml(feature)}</Placemark>"
+    )
+
+
+def _shape_xml(feature: Feature) -> str:
+    if feature.shape is Shape.NOWHERE:
+        return ""
+    line = feature.lines[0]
+    if feature.shape is Shape.POINT:
+        return f"<Point>{_coordinates(line)}</Point>"
+    if feature.shape is Shape.LINE:
+        return f"<LineString><tessellate>1</tessellate>{_coordinates(line)}</LineString>"
+    ring = f"<LinearRing>{_coordinates((*line, line[0]))}</LinearRing>"
+    return f"<Polygon><outerBoundaryIs>{ring}</outerBoundaryIs></Polygon>"
+
+
+def _coordinates(positions: Iterable[LatLon]) -> str:
+    words = " ".join(f"{position.lon_deg:.8f},{position.lat_deg:.8f}" for position in positions)
+    return f"<coordinates>{words}</coordinates>"
+
+
+def _drawing(zone: Feature) -> Feature:
+    """Give a polygon to see a circle by: around an exclusion, inside an inclusion."""
+    from pyproj import Geod  # noqa: PLC0415 - slow to come, only for circles
+
+    radius_m = float(str(zone.properties["radius_m"]))
+    if zone.properties["role"] == Role.EXCLUSION:
+        radius_m /= math.cos(math.pi / _CIRCLE_CORNERS)
+    geod, centre = Geod(ellps="WGS84"), zone.position
+    bearings_deg = [360 * corner / _CIRCLE_CORNERS for corner in range(_CIRCLE_CORNERS)]
+    ends = (geod.fwd(centre.lon_deg, centre.lat_deg, bearing, radius_m) for bearing in bearings_deg)
+    ring = tuple(LatLon(lat_deg, lon_deg) for lon_deg, lat_deg, _ in ends)
+    properties = {"role": Role.DRAWING.value, "style": zone.properties["role"]}
+    return Feature(Shape.POLYGON, (ring,), properties, (f"{zone.names[0]}, drawn",))

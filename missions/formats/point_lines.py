@@ -1,0 +1,74 @@
+"""Points as text, ``latitude longitude`` a line, # for remarks: what .fen and .poly files are made of."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from missions.errors import InvalidPositionError, MissionFormatError
+from missions.fence import CircleZone, PolygonZone, ZoneKind
+from missions.formats.numbers import number
+from missions.geo import checked_lat_lon
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from missions.fence import Fence
+    from missions.geo import LatLon
+
+
+def read_points(text: str, source: str) -> list[tuple[int, LatLon]]:
+    """Read points, each with the number of its line.
+
+    Raises
+    ------
+    MissionFormatError
+        With the line and what was expected there.
+    """
+    points = []
+    for count, line in enumerate(text.splitlines(), start=1):
+        content = line.partition("#")[0].strip()
+        if content:
+            points.append((count, _point(content, f"{source}: line {count}")))
+    return points
+
+
+def format_points(points: Sequence[LatLon]) -> str:
+    """Give the text of points, eight decimals each (1 mm)."""
+    return "".join(f"{point.lat_deg:.8f} {point.lon_deg:.8f}\n" for point in points)
+
+
+def lone_inclusion(fence: Fence, suffix: str) -> PolygonZone:
+    """Give the zone of a fence that is one inclusion polygon.
+
+    Raises
+    ------
+    MissionFormatError
+        The fence is anything else; says what it is.
+    """
+    zone = fence.zones[0] if len(fence.zones) == 1 else None
+    if isinstance(zone, PolygonZone) and zone.kind is ZoneKind.INCLUSION:
+        return zone
+    counts = [
+        f"{count} {kind} {name}{'s' * (count > 1)}"
+        for kind in ZoneKind
+        for shape, name in ((PolygonZone, "polygon"), (CircleZone, "circle"))
+        if (count := fence.count(kind, shape))
+    ]
+    raise MissionFormatError(
+        f"a {suffix} file holds one inclusion polygon and nothing else; the fence has {', '.join(counts) or 'no zone'}"
+    )
+
+
+def _point(content: str, where: str) -> LatLon:
+    columns = content.split()
+    try:
+        lat_deg, lon_deg = map(number, columns)
+    except ValueError:
+        raise MissionFormatError(
+            f"{where}: {content!r}; expected latitude and longitude in decimal degrees with a space between",
+            where=where,
+        ) from None
+    try:
+        return checked_lat_lon(lat_deg, lon_deg)
+    except InvalidPositionError as error:
+        raise MissionFormatError(f"{where}: {error}", where=where) from None

@@ -6,7 +6,9 @@ import json
 import math
 from typing import TYPE_CHECKING, Any
 
-from missions.formats.features import Feature, Shape, features_of, situation_of
+from missions.formats.feature_reading import situation_of
+from missions.formats.feature_writing import features_of
+from missions.formats.features import Feature, Shape
 from missions.formats.json_node import parse_json
 
 if TYPE_CHECKING:
@@ -61,8 +63,8 @@ def _feature(node: JsonNode) -> list[Feature]:
     properties = node["properties"].value if "properties" in node else None
     if not isinstance(properties, dict | None):
         raise node["properties"].error("expected an object or null")
-    name = (properties or {}).get("name")
-    names = (name,) if isinstance(name, str) else ()
+    said = [value for key, value in (properties or {}).items() if key.lower() == "name"]
+    names = tuple(name for name in said if isinstance(name, str))
     if "geometry" not in node or node["geometry"].value is None:
         return [Feature(Shape.NOWHERE, (), properties or {}, names, _place(node))]
     return _shapes(node["geometry"], properties or {}, names, node)

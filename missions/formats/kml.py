@@ -11,7 +11,9 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from missions.errors import InvalidPositionError
-from missions.formats.features import Feature, Role, Shape, features_of, situation_of
+from missions.formats.feature_reading import situation_of
+from missions.formats.feature_writing import features_of
+from missions.formats.features import Feature, Role, Shape
 from missions.formats.numbers import number
 from missions.formats.xml_tree import parse_xml
 from missions.geo import LatLon, checked_lat_lon

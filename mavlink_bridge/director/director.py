@@ -20,7 +20,7 @@ from mavlink_bridge.director.listening import Listener
 from mavlink_bridge.director.orders import PATH_PLANNER_COMPONENT, Orders, TargetSource
 from mavlink_bridge.director.states import TRANSITIONS, Cue, State
 from mavlink_bridge.director.steps import Step, Steps
-from mavlink_bridge.director.targets import Target, TargetWatch
+from mavlink_bridge.director.targets import CLICKS, Target, TargetWatch
 from mavlink_bridge.director.voice import Voice
 from mavlink_bridge.errors import BridgeError, LinkError, OutcomeError, RefusedError, VehicleNotFoundError
 from mavlink_bridge.fold import fold, with_list
@@ -299,11 +299,12 @@ class Director(TableMachine[State, Cue]):
 
     @property
     def _may_stop_it(self) -> bool:
+        """Whether the vehicle may be on its way and is ours to stop; a click sets it going before any heartbeat says so."""
         orders, situation = self.orders, self.situation
-        is_ours = not orders.once or self.state is State.DRIVING
-        return (
-            orders.drive and is_ours and bool(situation.armed) and situation.mode in (AUTO_MODE, GUIDED_MODE)
-        )
+        if not orders.drive or not situation.armed or (orders.once and self.state is not State.DRIVING):
+            return False
+        was_clicked = self._target is not None and self._target.source in CLICKS
+        return was_clicked or situation.mode in (AUTO_MODE, GUIDED_MODE)
 
     def _warn_of_straight_line(self, target: Target, now_s: float) -> None:
         """Warn at once: a go-to click makes the vehicle drive straight, before any plan exists."""

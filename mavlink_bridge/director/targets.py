@@ -20,6 +20,11 @@ _SOURCES = {
     "SET_POSITION_TARGET_GLOBAL_INT": TargetSource.POSITION_TARGET,
     "MISSION_ITEM with current 2": TargetSource.GUIDED_ITEM,
 }
+CLICKS = frozenset(
+    {TargetSource.REPOSITION, TargetSource.POSITION_TARGET, TargetSource.GUIDED_ITEM, TargetSource.ECHO}
+)
+"""Targets that may set the vehicle going, straight."""
+
 _SAME_M = 0.2
 _SAID_AGAIN_S = 3.0
 _ECHO_MOVED_M = 0.5

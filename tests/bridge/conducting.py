@@ -11,7 +11,8 @@ from mavlink_bridge.simulator.faults import Faults, FaultyLink
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from mavlink_bridge.director import Director, State
+    from mavlink_bridge.director import Director, Event, EventName, State
+    from mavlink_bridge.messages import Message
     from mavlink_bridge.simulator import SimulatedVehicle
 
 
@@ -26,6 +27,8 @@ class Conductor:
     backups: list = field(default_factory=list)
     sent: list = field(default_factory=list)
     events: list = field(default_factory=list)
+    is_cut: bool = False
+    is_started: bool = False
     meddle: Callable[[Conductor], None] | None = None
 
     def __post_init__(self) -> None:
@@ -33,31 +36,60 @@ class Conductor:
         self.down = FaultyLink(self.faults, 2)
 
     def run(self, until_s: float = 400.0) -> State:
-        self.director.start(self.now_s)
-        while not self.director.is_done and self.now_s < until_s:
-            self._shell()
-            for message in self.director.messages_to_send():
-                self.sent.append(message)
-                self.up.push(Frame(*self.director.identity, message), self.now_s)
-            for frame in self.up.due(self.now_s):
-                for vehicle in self.vehicles:
-                    vehicle.receive(frame, self.now_s)
-            for vehicle in self.vehicles:
-                vehicle.handle_timer(self.now_s)
-                for message in vehicle.messages_to_send():
-                    self.down.push(
-                        Frame(vehicle.config.system, vehicle.config.component, message), self.now_s
-                    )
-            for frame in self.down.due(self.now_s):
-                self.director.receive(frame, self.now_s)
-            self.director.handle_timer(self.now_s)
-            self.events += self.director.take_events()
-            if self.meddle:
-                self.meddle(self)
-            self.now_s += 0.02
+        """Run a single job to its end."""
+        self.run_until(lambda: self.director.is_done, until_s)
         return self.director.state
 
-    def _shell(self) -> None:
+    def run_until(self, condition: Callable[[], bool], within_s: float = 200.0) -> float:
+        """Run until something is so, and tell when; fails if it never is."""
+        if not self.is_started:
+            self.is_started = True
+            self.director.start(self.now_s)
+        limit_s = self.now_s + within_s
+        while not condition():
+            if self.now_s > limit_s or (self.director.is_done and self.now_s > limit_s - within_s + 1):
+                names = [str(event.name) for event in self.events]
+                raise AssertionError(f"not within {within_s} s; state {self.director.state}, events {names}")
+            self.step()
+        return self.now_s
+
+    def step(self) -> None:
+        """Let 20 ms pass."""
         if (old := self.director.pending_backup) is not None:
             self.backups.append(old)
             self.director.backup_stored(self.now_s)
+        for message in self.director.messages_to_send():
+            self.sent.append(message)
+            self.up.push(Frame(*(self.director.identity or (245, 190)), message), self.now_s)
+        for frame in self.up.due(self.now_s):
+            for vehicle in self.vehicles:
+                vehicle.receive(frame, self.now_s)
+        for vehicle in self.vehicles:
+            vehicle.handle_timer(self.now_s)
+            for message in vehicle.messages_to_send():
+                self.down.push(Frame(vehicle.config.system, vehicle.config.component, message), self.now_s)
+        if not self.is_cut:
+            for frame in self.down.due(self.now_s):
+                self.director.receive(frame, self.now_s)
+        deadline_s = self.director.deadline_s
+        if deadline_s is not None and deadline_s <= self.now_s:
+            self.director.handle_timer(self.now_s)
+        self.events += self.director.take_events()
+        if self.meddle:
+            self.meddle(self)
+        self.now_s += 0.02
+
+    def ground_station(self, message: Message) -> None:
+        """Let a ground station send to the vehicles; the director hears it too, as on a shared radio."""
+        frame = Frame(255, 190, message)
+        for vehicle in self.vehicles:
+            vehicle.receive(frame, self.now_s)
+        self.down.push(frame, self.now_s)
+
+    def happened(self, name: EventName, after: int = 0) -> Callable[[], bool]:
+        """Give a condition: an event came, after the first so many events."""
+        return lambda: any(event.name is name for event in self.events[after:])
+
+    def last(self, name: EventName) -> Event:
+        """Give the newest event of a name."""
+        return next(event for event in reversed(self.events) if event.name is name)

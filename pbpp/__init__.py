@@ -8,6 +8,7 @@ from .errors import (
     InvalidGeometryError,
     NoPathError,
     PlanningError,
+    SearchStoppedError,
     StartBlockedError,
     TooManyBlocksError,
 )
@@ -23,6 +24,7 @@ __all__ = [
     "PlannedPath",
     "Planner",
     "PlanningError",
+    "SearchStoppedError",
     "StartBlockedError",
     "TooManyBlocksError",
     "WidestWay",

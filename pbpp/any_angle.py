@@ -222,10 +222,7 @@ class _Search:
         cones: list[Cone] = []
 
         def add(block: int, direction: int, low: float, high: float) -> None:
-            if block >= 0:
-                cones.append(
-                    (block, direction, low, high) if side == _LEFT else (block, direction, -high, -low)
-                )
+            cones.append((block, direction, low, high) if side == _LEFT else (block, direction, -high, -low))
 
         # Directions in the order of a left turn: east, up, west, down, east again.
         if east * edge_north <= north * edge_east and east * edge_east + north * edge_north > 0.0:
@@ -233,7 +230,7 @@ class _Search:
             east, north = edge_east, edge_north
         quarter = _quarter(east, north)
         last = _quarter(edge_east, edge_north)
-        for _ in range(3):
+        while True:
             done = quarter == last
             if quarter == 0:
                 low = north / east if east > 0.0 else -inf
@@ -246,10 +243,10 @@ class _Search:
             else:
                 self._straight(root, vertex, upwards=(quarter == 1) == (side == _LEFT))
             if done:
-                break
+                # Where the obstacle fills a side there is no block, and nothing to see.
+                return [cone for cone in cones if cone[0] >= 0]
             quarter = (quarter + 1) % 4
             east = 0.0
-        return cones
 
     def _straight(self, root: int, vertex: int, *, upwards: bool) -> None:
         """Reach what stands on the line of a vertex, straight above or below it."""

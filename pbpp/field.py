@@ -25,6 +25,7 @@ __all__ = ["BOUNDARY_TOLERANCE_M", "Field"]
 
 _AREA_SLACK = 1e-9
 _AREA_SLACK_M = 1e-8
+_HEIGHT_SLACK_M = 1e-7
 
 BOUNDARY_TOLERANCE_M = 1e-7
 """A start or goal this near to free space counts as on its boundary."""
@@ -62,19 +63,23 @@ class Field:
 
     @cached_property
     def slabs(self) -> Slabs:
-        """The slab partition, its area checked against that of free space.
+        """The slab partition, checked: as large as free space, and no block turned inside out.
 
         Raises
         ------
         InvalidGeometryError
-            If the two differ by more than rounding.
+            If it is not.
         """
-        slabs = Slabs(self.free.polygons)
+        try:
+            slabs = Slabs(self.free.polygons)
+        except (IndexError, ValueError) as error:
+            raise InvalidGeometryError("the rings of free space do not fit together") from error
         area_m2 = float(shapely.area(self.free.geometry))
         slack_m2 = _AREA_SLACK * area_m2 + _AREA_SLACK_M * float(shapely.length(self.free.geometry))
-        if abs(slabs.area_m2 - area_m2) > slack_m2:
+        if abs(slabs.area_m2 - area_m2) > slack_m2 or slabs.least_height_m < -_HEIGHT_SLACK_M:
             raise InvalidGeometryError(
-                f"the blocks cover {slabs.area_m2!r} m² of {area_m2!r} m² of free space"
+                f"the blocks do not fill free space: they cover {slabs.area_m2!r} m² of {area_m2!r} m², "
+                f"the least of their heights is {slabs.least_height_m!r} m"
             )
         return slabs
 

@@ -172,15 +172,15 @@ def _closed_piece(path: LineString, parted: Field) -> LineString:
     """Return the piece of a path that leads from one component to another where they have come apart."""
     outside = shapely.difference(path, shapely.buffer(parted.free.geometry, _SAME_PLACE_M))
     pieces = sorted(shapely.get_parts(outside), key=shapely.length, reverse=True)
-    piece: LineString
-    for piece in pieces:
+
+    def leads_across(piece: LineString) -> bool:
         first, last = (
             parted.free.components_at((east, north), 10.0 * _SAME_PLACE_M)
             for east, north in shapely.get_coordinates(piece)[[0, -1]].tolist()
         )
-        if not first & last:
-            return piece
-    return path
+        return not first & last
+
+    return next(filter(leads_across, pieces), path)
 
 
 @dataclass(frozen=True)

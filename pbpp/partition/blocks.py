@@ -17,6 +17,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 import shapely
 
 from pbpp.errors import TooManyBlocksError
@@ -141,7 +142,7 @@ class Blocks:
         wide = east - west > TOLERANCE_M
         ends = np.stack((np.column_stack((west, height)), np.column_stack((east, height))), axis=1)[wide]
         pairs = np.column_stack((stacked, stacked + 1))[wide]
-        blocks_beside, ends_beside = self._beside
+        blocks_beside, ends_beside, _ = self._beside
         return Portals(np.concatenate((pairs, blocks_beside)), np.concatenate((ends, ends_beside)))
 
     @cached_property
@@ -150,25 +151,21 @@ class Blocks:
 
         The corner is a crossing of lines, so it is not in V_ob: the paper's rule for exploring a diagonal block (section 3.2).
         """
-        blocks, ends = self._beside
+        blocks, ends, follows = self._beside
         found: list[tuple[int, int, Point]] = []
-        rows = blocks.tolist()
-        for (west, east), (west_above, east_above), corner, upper in zip(
-            rows, rows[1:], ends[:-1, 1].tolist(), ends[1:, 0].tolist(), strict=False
-        ):
-            if corner == upper:
-                found += [
-                    (west, east_above, (corner[0], corner[1])),
-                    (west_above, east, (corner[0], corner[1])),
-                ]
+        for upper in np.flatnonzero(follows).tolist():
+            (west, east), (west_above, east_above) = blocks[upper - 1].tolist(), blocks[upper].tolist()
+            corner = (float(ends[upper, 0, 0]), float(ends[upper, 0, 1]))
+            found += [(west, east_above, corner), (west_above, east, corner)]
         return found
 
     @cached_property
-    def _beside(self) -> tuple[Ints, Floats]:
-        """Portals on vertical lines, those of one line from south to north one after the other."""
+    def _beside(self) -> tuple[Ints, Floats, npt.NDArray[np.bool_]]:
+        """Portals on vertical lines, and which of them begin where the one before ends, at a crossing with a horizontal line."""
         portals = self.slabs.portals
         pairs: list[Ints] = []
         ends: list[Floats] = []
+        follows: list[bool] = []
         for (west, east), (low, high) in zip(portals.blocks.tolist(), portals.ends_m, strict=True):
             cuts = self._north[self._first[west] : self._first[west + 1] - 1]
             inner = cuts[(cuts > low[1] + TOLERANCE_M) & (cuts < high[1] - TOLERANCE_M)]
@@ -181,9 +178,10 @@ class Blocks:
                     (np.column_stack((easts, norths[:-1])), np.column_stack((easts, norths[1:]))), axis=1
                 )
             )
+            follows += [False] + [True] * len(inner)
         if not pairs:
-            return np.empty((0, 2), dtype=np.intp), np.empty((0, 2, 2))
-        return np.concatenate(pairs), np.concatenate(ends)
+            return np.empty((0, 2), dtype=np.intp), np.empty((0, 2, 2)), np.empty(0, dtype=bool)
+        return np.concatenate(pairs), np.concatenate(ends), np.array(follows)
 
     def _within(self, slab: int, norths: Floats) -> Ints:
         first, last = int(self._first[slab]), int(self._first[slab + 1])

@@ -115,7 +115,7 @@ class Slabs:
         floor_west, floor_east, ceiling_west, ceiling_east = (side[block] for side in self._sides)
         for at_west, at_east, above in ((floor_west, floor_east, True), (ceiling_west, ceiling_east, False)):
             rise = at_east - at_west
-            slanted = rise != 0.0
+            slanted = np.abs(rise) > TOLERANCE_M
             share = np.divide(north - at_west, rise, out=np.zeros_like(north), where=slanted)
             cross = self._west[block] + np.clip(share, 0.0, 1.0) * (self._east[block] - self._west[block])
             # Above a rising floor, and below a falling ceiling, lies the west; else the east.
@@ -123,6 +123,13 @@ class Slabs:
             east = np.where(ends_east, np.minimum(east, cross), east)
             west = np.where(slanted & ~ends_east, np.maximum(west, cross), west)
         return west, east
+
+    @property
+    def least_height_m(self) -> float:
+        """The least height of any side of a block in metres: 0 but for rounding."""
+        floor_west, floor_east, ceiling_west, ceiling_east = self._sides
+        heights = np.concatenate((ceiling_west - floor_west, ceiling_east - floor_east))
+        return float(heights.min(initial=0.0))
 
     @cached_property
     def portals(self) -> Portals:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pbpp.errors import InvalidGeometryError
-
 from .base import TOLERANCE_M
 
 if TYPE_CHECKING:
@@ -79,7 +77,13 @@ class Sweep:
         self.below = [-1] * count
 
     def run(self) -> None:
-        """Sweep all lines."""
+        """Sweep all lines.
+
+        Raises
+        ------
+        IndexError, ValueError
+            If the rings do not fit together, as those of valid polygons do.
+        """
         starts = self._vertices.line_start.tolist()
         order = self._vertices.order.tolist()
         for x, first, last in zip(self._vertices.line_x.tolist(), starts, starts[1:], strict=False):
@@ -87,8 +91,6 @@ class Sweep:
                 self._vertex(x, order[first])
             else:
                 self._line(x, order[first:last])
-        if self._active:
-            raise InvalidGeometryError("free space is not closed: its rings do not fit together")
 
     def _new_block(self, x: float, floor: int, ceiling: int) -> int:
         block = len(self.west)
@@ -258,10 +260,7 @@ class Sweep:
         if place < len(self._active) and self._active[place] is slot:
             return place
         # Neighbours that meet within rounding: look from one end to the other.
-        for place, one in enumerate(self._active):
-            if one is slot:
-                return place
-        raise InvalidGeometryError("free space is not closed: its rings do not fit together")
+        return self._active.index(slot)
 
     def _close(self, slot: _Slot, x: float, ends_here: set[int]) -> _Side:
         floor, ceiling, block = slot
@@ -285,8 +284,6 @@ class Sweep:
     ) -> list[_Side]:
         floors.sort()
         ceilings.sort()
-        if len(floors) != len(ceilings):
-            raise InvalidGeometryError("free space is not closed: its rings do not fit together")
         sides: list[_Side] = []
         for (low, _, floor, low_vertex), (high, _, ceiling, high_vertex) in zip(
             floors, ceilings, strict=True

@@ -97,10 +97,14 @@ class Vertices:
         return float(np.arctan2(north, east))
 
     def _corners(self) -> npt.NDArray[np.bool_]:
-        """Mark the vertices that a shortest path may turn around: free space fills half a turn or more."""
+        """Mark the vertices that a shortest path may turn around: free space fills half a turn or more.
+
+        Where the boundary turns back on itself within rounding, only the sign tells a spike of an obstacle from a slit in it.
+        """
         x, y = self.x, self.y
         in_x, in_y = x - x[self.prev], y - y[self.prev]
         out_x, out_y = x[self.next] - x, y[self.next] - y
         turn = in_x * out_y - in_y * out_x
         slack = TOLERANCE_M * (np.abs(in_x) + np.abs(in_y) + np.abs(out_x) + np.abs(out_y))
-        return turn <= slack
+        onwards = in_x * out_x + in_y * out_y >= 0.0
+        return (turn < 0.0) | (onwards & (turn <= slack))

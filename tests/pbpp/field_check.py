@@ -3,9 +3,9 @@
 import numpy as np
 import shapely
 from shapely.geometry import LineString, Point, Polygon
+from visibility_graph import pinches, shortest_length
 
 import pbpp
-from visibility_graph import pinches, shortest_length
 
 RELATIVE = 1e-6
 TOUCH_M = 1e-7
@@ -25,7 +25,9 @@ def fence(field):
 
 def connected(included, excluded, clearance_m, start, goal):
     """Return whether start and goal share a component of what keeps the clearance, corners round to a part in a million."""
-    room = included.buffer(-clearance_m, quad_segs=256).difference(excluded.buffer(clearance_m, quad_segs=256))
+    room = included.buffer(-clearance_m, quad_segs=256).difference(
+        excluded.buffer(clearance_m, quad_segs=256)
+    )
     parts = [part for part in shapely.get_parts(room) if isinstance(part, Polygon)]
     return any(part.distance(Point(start)) == 0.0 and part.distance(Point(goal)) == 0.0 for part in parts)
 

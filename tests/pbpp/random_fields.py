@@ -38,7 +38,9 @@ def slanted(rng, size):
 
 
 def circle(rng, size):
-    return pbpp.circle_ring(rng.uniform(0.0, size, 2), rng.uniform(0.5, size / 6.0), segments=int(rng.integers(6, 17)))
+    return pbpp.circle_ring(
+        rng.uniform(0.0, size, 2), rng.uniform(0.5, size / 6.0), segments=int(rng.integers(6, 17))
+    )
 
 
 def concave(rng, size):
@@ -51,7 +53,9 @@ def wall(rng, size):
     """Return a long thin bar, often from side to side: these part the field."""
     along = rng.integers(1, size)
     first, last = sorted(rng.integers(-1, size + 2, 2))
-    ring = np.array([(first, along), (last + 1, along), (last + 1, along + 1), (first, along + 1)], dtype=float)
+    ring = np.array(
+        [(first, along), (last + 1, along), (last + 1, along + 1), (first, along + 1)], dtype=float
+    )
     return ring if rng.random() < 0.5 else ring[:, ::-1]
 
 
@@ -71,7 +75,9 @@ def random_field(seed, kind=None):
     if rng.random() < 0.3:
         inclusions.append([(0, 0), (size, 0), (size, size * 0.6), (size * 0.4, size), (0, size)])
     if rng.random() < 0.1:
-        inclusions.append([(size * 0.5, -5), (size + 15, -5), (size + 15, size * 0.7), (size * 0.5, size * 0.7)])
+        inclusions.append(
+            [(size * 0.5, -5), (size + 15, -5), (size + 15, size * 0.7), (size * 0.5, size * 0.7)]
+        )
     clearance_m = float(rng.choice([0.0, 0.0, 0.3, 1.0, rng.uniform(0.0, 2.0), rng.uniform(0.0, 5.0)]))
     union = bool(rng.random() < 0.3)
     start, goal = (_end(rng, size, exclusions, clearance_m) for _ in range(2))
@@ -80,7 +86,9 @@ def random_field(seed, kind=None):
 
 def _end(rng, size, exclusions, clearance_m):
     """Return a point of the square, most often one that is free, often one of whole metres."""
-    blocked = shapely.buffer(shapely.union_all([shapely.make_valid(shapely.Polygon(e)) for e in exclusions]), clearance_m)
+    blocked = shapely.buffer(
+        shapely.union_all([shapely.make_valid(shapely.Polygon(e)) for e in exclusions]), clearance_m
+    )
     whole = rng.random() < 0.5
     for _ in range(1 if rng.random() < 0.1 else 12):
         east, north = rng.integers(0, size + 1, 2).astype(float) if whole else rng.uniform(0.0, size, 2)

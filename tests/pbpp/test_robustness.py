@@ -43,7 +43,9 @@ def test_paths_turn_at_tangent_vertices_only(load_case):
         points = planner.plan(query[:2], query[2:]).points
         for before, here, after in zip(points, points[1:], points[2:], strict=False):
             back, on = before - here, after - here
-            inside = shapely.Polygon([here, here + 0.1 * back / np.hypot(*back), here + 0.1 * on / np.hypot(*on)])
+            inside = shapely.Polygon(
+                [here, here + 0.1 * back / np.hypot(*back), here + 0.1 * on / np.hypot(*on)]
+            )
             assert inside.difference(planner.free_space).area > 1e-6 * inside.area
 
 
@@ -53,14 +55,20 @@ def test_equal_ways_to_a_corner_are_followed_once():
     planner = pbpp.Planner([box(-10, -5.5, 410, 5.5)], diamonds)
     path = planner.plan((-5.0, 0.0), (405.0, 0.0))
     assert path.expanded < 40 * len(diamonds)
-    assert path.length_m == pytest.approx(shortest_length(planner.free_space, (-5.0, 0.0), (405.0, 0.0)), rel=1e-9)
+    assert path.length_m == pytest.approx(
+        shortest_length(planner.free_space, (-5.0, 0.0), (405.0, 0.0)), rel=1e-9
+    )
 
 
 def test_the_goal_is_final_only_when_it_is_taken_from_the_queue(square):
     # A corridor leads the first cone straight on to the goal by the long way round; the short way has more branches.
     walls = [box(10, 45, 90, 55), box(48, 0, 52, 38), box(60, 20, 100, 22), box(55, 30, 80, 32)]
     planner = pbpp.Planner([square], walls)
-    for start, goal in [((50.0, 44.0), (50.0, 56.0)), ((20.0, 44.0), (80.0, 56.0)), ((53.0, 10.0), (30.0, 60.0))]:
+    for start, goal in [
+        ((50.0, 44.0), (50.0, 56.0)),
+        ((20.0, 44.0), (80.0, 56.0)),
+        ((53.0, 10.0), (30.0, 60.0)),
+    ]:
         expected = shortest_length(planner.free_space, start, goal)
         assert planner.plan(start, goal).length_m == pytest.approx(expected, rel=1e-9)
 
@@ -80,6 +88,14 @@ def test_touching_corners_are_impassable(square, angle_deg):
         boxes[0][2] = boxes[1][0]
     with pytest.raises(pbpp.NoPathError):
         pbpp.plan_path(area, boxes, *ends)
+
+
+@pytest.mark.parametrize("method", ["pbpp", "pbpp-taut"])
+def test_no_diagonal_step_leads_through_touching_corners(square, method):
+    exclusions = [box(10, 30, 50, 50), box(50, 50, 90, 70)]
+    planner = pbpp.Planner([square], exclusions)
+    path = planner.plan((49.0, 52.0), (51.0, 48.0), method=method)
+    assert path.length_m >= planner.plan((49.0, 52.0), (51.0, 48.0)).length_m > 50.0
 
 
 def test_a_path_along_aligned_edges_does_not_slip_through_a_pinch():
@@ -127,7 +143,13 @@ def test_start_and_goal_may_be_the_same_point(square):
 def test_aligned_obstacles_are_passed_straight_along_their_edges():
     column = [box(3, n, 5, n + 1) for n in range(1, 20, 3)] + [box(5, n, 7, n + 1) for n in range(2, 20, 6)]
     planner = pbpp.Planner([box(0, 0, 10, 25)], column)
-    for start, goal in [((5, 0), (5, 24)), ((4, 0.5), (4, 22)), ((3, 0), (3, 25)), ((7, 25), (7, 0)), ((7, 8), (5, 24))]:
+    for start, goal in [
+        ((5, 0), (5, 24)),
+        ((4, 0.5), (4, 22)),
+        ((3, 0), (3, 25)),
+        ((7, 25), (7, 0)),
+        ((7, 8), (5, 24)),
+    ]:
         expected = shortest_length(planner.free_space, start, goal)
         assert planner.plan(start, goal).length_m == pytest.approx(expected, rel=1e-6)
 

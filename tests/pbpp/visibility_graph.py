@@ -24,10 +24,14 @@ def shortest_length(free, start, goal):
     """Return the length of the shortest path in closed free space that squeezes through no pinch; infinite if there is none."""
     touching = pinches(free)
     if touching:
-        free = free.difference(shapely.union_all(shapely.buffer(shapely.points(touching), PINCH_M, quad_segs=2)))
+        free = free.difference(
+            shapely.union_all(shapely.buffer(shapely.points(touching), PINCH_M, quad_segs=2))
+        )
     corners = np.unique(np.concatenate([shapely.get_coordinates(ring) for ring in rings_of(free)]), axis=0)
     # An end on the boundary may lie beside it by a rounding.
-    ends = [shapely.get_coordinates(shapely.shortest_line(free, shapely.Point(end)))[0] for end in (start, goal)]
+    ends = [
+        shapely.get_coordinates(shapely.shortest_line(free, shapely.Point(end)))[0] for end in (start, goal)
+    ]
     points = np.vstack([*ends, corners])
     one, two = np.triu_indices(len(points), 1)
     lines = shapely.linestrings(np.stack([points[one], points[two]], axis=1))

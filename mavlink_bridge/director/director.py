@@ -16,17 +16,18 @@ from mavlink_bridge.director.changes import ChangeWatch
 from mavlink_bridge.director.drive_watch import DriveWatch
 from mavlink_bridge.director.events import Event, EventName
 from mavlink_bridge.director.learning import MISSION_TYPES, Learning, list_of
-from mavlink_bridge.director.listening import Listener
 from mavlink_bridge.director.orders import PATH_PLANNER_COMPONENT, Orders, TargetSource
 from mavlink_bridge.director.states import TRANSITIONS, Cue, State
 from mavlink_bridge.director.steps import Step, Steps
 from mavlink_bridge.director.targets import CLICKS, Target, TargetWatch
 from mavlink_bridge.director.voice import Voice
-from mavlink_bridge.errors import BridgeError, LinkError, OutcomeError, RefusedError, VehicleNotFoundError
+from mavlink_bridge.errors import BridgeError, LinkError, OutcomeError, RefusedError
 from mavlink_bridge.fold import fold, with_list
+from mavlink_bridge.messages import Frame
 from mavlink_bridge.outcomes import upload_trouble
 from mavlink_bridge.protocol.command import SendCommand
 from mavlink_bridge.protocol.download import Download
+from mavlink_bridge.protocol.find import FindVehicle
 from mavlink_bridge.protocol.limits import Limits
 from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.protocol.table_machine import TableMachine
@@ -41,7 +42,7 @@ from missions.situation import Known, ListKind, Situation
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from mavlink_bridge.messages import Frame, Message
+    from mavlink_bridge.messages import Message
     from missions.fence import Fence
     from missions.geo import LatLon
     from missions.items import MissionItem
@@ -91,7 +92,8 @@ class Director(TableMachine[State, Cue]):
         self.plan: Plan | None = None
         self.drive: DriveWatch | None = None
         self._planner = planner
-        self._listener = Listener(orders)
+        patience_s = orders.patience_s if orders.once else math.inf
+        self._find = FindVehicle(orders.system, any_vehicle=orders.any_vehicle, patience_s=patience_s)
         self._peer: Peer | None = None
         self._steps = Steps()
         self._voice = Voice(announce=orders.announce)
@@ -138,7 +140,7 @@ class Director(TableMachine[State, Cue]):
         """When `handle_timer` wants to be called."""
         times = [self._steps.deadline_s, self._voice.deadline_s]
         if self.state is State.LISTENING:
-            times.append(self._listener.until_s)
+            times.append(self._find.deadline_s)
         if self.state is State.HOLDING:
             times.append(self._standstill_due_s)
         if self.state is State.PLANNING:
@@ -159,12 +161,13 @@ class Director(TableMachine[State, Cue]):
 
     def start(self, now_s: float) -> None:
         """Begin to listen."""
-        self._listener.start(now_s)
+        self._find.start(now_s)
 
     def receive(self, frame: Frame, now_s: float) -> None:
         """Take a frame."""
         if self.state is State.LISTENING:
-            self._listener.receive(frame, now_s)
+            self._find.receive(frame, now_s)
+            self._found(now_s)
             return
         before = self.situation
         self.situation = fold(before, frame, now_s)
@@ -181,8 +184,9 @@ class Director(TableMachine[State, Cue]):
         """Take notice that time has passed."""
         self._outgoing += self._voice.due(now_s)
         self._steps.handle_timer(now_s)
-        if self.state is State.LISTENING and now_s >= self._listener.until_s:
-            self._choose(now_s)
+        if self.state is State.LISTENING:
+            self._find.handle_timer(now_s)
+            self._found(now_s)
         elif self.state is State.HOLDING:
             self._await_standstill(now_s)
         elif self.state is State.PLANNING and not self._steps:
@@ -216,15 +220,16 @@ class Director(TableMachine[State, Cue]):
 
     # Listening and learning
 
-    def _choose(self, now_s: float) -> None:
-        try:
-            heard = self._listener.choose()
-        except VehicleNotFoundError as error:
-            self._voice.error(now_s, EventName.TROUBLE, error, dict(error.details))
-            self.trouble = error
+    def _found(self, now_s: float) -> None:
+        """Go on from listening, once it is clear who is meant."""
+        find = self._find
+        if find.trouble is not None:
+            self._voice.error(now_s, EventName.TROUBLE, find.trouble, dict(find.trouble.details))
+            self.trouble = find.trouble
             self._move(Cue.GIVE_UP)
+        if find.vehicle is None or find.heartbeat is None:
             return
-        vehicle = heard.vehicle
+        vehicle = find.vehicle
         identity = self.orders.identity or (vehicle.system, PATH_PLANNER_COMPONENT)
         self._peer = Peer(vehicle.system, vehicle.component, *identity)
         self._changes = ChangeWatch(identity)
@@ -233,8 +238,9 @@ class Director(TableMachine[State, Cue]):
         known = replace(
             self.situation, system=vehicle.system, component=vehicle.component, vehicle_type=vehicle.type
         )
-        self.situation = fold(known, heard.heartbeat, heard.time_s)
-        self._heartbeat_s = heard.time_s
+        heartbeat = Frame(vehicle.system, vehicle.component, find.heartbeat)
+        self.situation = fold(known, heartbeat, find.heard_s)
+        self._heartbeat_s = find.heard_s
         self._learn(now_s)
 
     def _learn(self, now_s: float) -> None:

@@ -58,8 +58,6 @@ class Orders:
         Where targets may come from.
     patience_s : float
         How long a single job waits for the first heartbeat, and anybody for the position.
-    listen_s : float
-        How long to listen for further vehicles before one is chosen.
     """
 
     identity: tuple[int, int] | None = None
@@ -74,4 +72,3 @@ class Orders:
     announce: bool = False
     target_sources: frozenset[TargetSource] = DEFAULT_SOURCES
     patience_s: float = 30.0
-    listen_s: float = 1.2

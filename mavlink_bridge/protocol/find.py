@@ -18,7 +18,7 @@ LISTEN_S = 1.2
 
 
 class FindVehicle(TableMachine[FindState, FindEvent]):
-    """Listens for heartbeats; `vehicle` or `trouble` is set when `is_done`.
+    """Listens for heartbeats; when `is_done`, `trouble` is set, or `vehicle`, its newest `heartbeat` and when it came, `heard_s`.
 
     Parameters
     ----------
@@ -38,9 +38,10 @@ class FindVehicle(TableMachine[FindState, FindEvent]):
         self._any_vehicle = any_vehicle
         self._patience_s = patience_s
         self._until_s = 0.0
-        self._heard: dict[tuple[int, int], tuple[Vehicle, Heartbeat]] = {}
+        self._heard: dict[tuple[int, int], tuple[Vehicle, Heartbeat, float]] = {}
         self.vehicle: Vehicle | None = None
         self.heartbeat: Heartbeat | None = None
+        self.heard_s = 0.0
         self.trouble: VehicleNotFoundError | None = None
 
     @property
@@ -77,6 +78,7 @@ class FindVehicle(TableMachine[FindState, FindEvent]):
         self._heard[frame.system, frame.component] = (
             Vehicle(frame.system, frame.component, heartbeat.type),
             heartbeat,
+            now_s,
         )
         if frame.system == self._system:
             self._choose(FindEvent.NAMED_ONE_HEARD)
@@ -89,12 +91,12 @@ class FindVehicle(TableMachine[FindState, FindEvent]):
             self._choose(FindEvent.TIME_IS_UP)
 
     def _choose(self, event: FindEvent) -> None:
-        heard = sorted(vehicle for vehicle, _ in self._heard.values())
+        heard = sorted(vehicle for vehicle, _, _ in self._heard.values())
         try:
             chosen = choose_vehicle(heard, self._system, any_vehicle=self._any_vehicle)
         except VehicleNotFoundError as error:
             self.trouble = error
             self._move(FindEvent.CHOICE_FAILED)
             return
-        self.vehicle, self.heartbeat = self._heard[chosen.system, chosen.component]
+        self.vehicle, self.heartbeat, self.heard_s = self._heard[chosen.system, chosen.component]
         self._move(event)

@@ -70,8 +70,8 @@ def payloads(scan: Scan, which: NDArray[np.int64], layout: Layout) -> NDArray[np
     width = layout.dtype.itemsize
     rows = scan.words(f"V{width}")[scan.payload_at(which)].view(np.uint8).reshape(len(which), width)
     lengths = scan.payload_bytes[which]
-    for row in np.flatnonzero(lengths < width).tolist():
-        rows[row, lengths[row] :] = 0
+    short = np.flatnonzero(lengths < width)
+    rows[short] *= np.arange(width) < lengths[short, None]
     structured: NDArray[np.void] = rows.reshape(-1).view(layout.dtype)
     return structured
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from contextlib import AbstractContextManager
     from pathlib import Path
 
-WINDOW_BYTES: Final = 1 << 18
+WINDOW_BYTES: Final = 1 << 19
 _GZIP: Final = 31
 """What zlib calls a stream with gzip's header and checksum."""
 _PACKED_BYTES: Final = 1 << 10

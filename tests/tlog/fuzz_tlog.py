@@ -22,7 +22,7 @@ from mavlink_bridge.tlog.wire import CLASS_OF_ID
 
 LOGS = sorted((Path(__file__).parents[2] / "sitl_logs").glob("*.tlog"))
 FAR_BYTES = 300
-PIECE_BYTES = 24_000
+PIECE_BYTES = 16_000
 KINDS = ("flips", "cuts", "insertions", "overwrites", "shuffles", "all")
 
 

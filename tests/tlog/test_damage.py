@@ -111,15 +111,17 @@ class TestCounts:
         assert len(list(entries)) < 500
 
     def test_a_cut_at_any_byte_of_the_last_record(self, log, whole):
-        keep = b"".join(PARTS[:-1])
+        before = PARTS[-100:-1]
+        keep = b"".join(before)
         last = PARTS[-1]
-        kept = whole[:-1] if last[15] in CLASS_OF_ID else whole
+        count = sum(part[15] in CLASS_OF_ID for part in before)
+        kept = whole[-count - 1 : -1] if last[15] in CLASS_OF_ID else whole[-count:]
         for size in range(1, len(last)):
             reader = TlogReader(log(keep + last[:size]))
             assert rows(reader) == kept
-            lost = Damage(frames=len(PARTS) - 1, truncated_bytes=size)
+            lost = Damage(frames=99, truncated_bytes=size)
             if size == 8:  # what may be cut off or an orphan
-                lost = Damage(frames=len(PARTS) - 1, orphan_timestamps=1)
+                lost = Damage(frames=99, orphan_timestamps=1)
             assert reader.damage == lost
 
     def test_a_damaged_length_is_skipped_with_its_record(self, log):
@@ -198,7 +200,7 @@ class TestFuzz:
         assert score.slowest_s < 5
 
     @given(data=st.binary(max_size=400))
-    @settings(max_examples=150)
+    @settings(max_examples=150, deadline=None)
     def test_any_bytes_are_read_or_refused(self, data, tmp_path_factory):
         path = tmp_path_factory.getbasetemp() / "any.tlog"
         path.write_bytes(data)
@@ -221,7 +223,7 @@ class TestFuzz:
         ),
         last=st.integers(0, 200),
     )
-    @settings(max_examples=150)
+    @settings(max_examples=150, deadline=None)
     def test_a_good_stretch_after_anything_is_found(self, pieces, last, tmp_path_factory):
         path = tmp_path_factory.getbasetemp() / "pieces.tlog"
         good = PARTS[last : last + 60]

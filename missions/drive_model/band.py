@@ -74,7 +74,8 @@ def add_start(pieces: Pieces, route: Route, array: NDArray[np.float64], behind_m
         return
     leg, stray = route.legs[0], route.strays[0]
     vertices = [place]
-    ahead_m = at_corner.swing_length_m(route.vehicle) if stray.widest_m >= NEGLIGIBLE_M else 0.0
+    swings = stray.widest_m >= NEGLIGIBLE_M
+    ahead_m = min(at_corner.swing_length_m(route.vehicle), leg.profile.length_m) if swings else 0.0
     for along_m in (-behind_m, ahead_m):
         vertices += _beside(_shifted(place, leg.direction, along_m), leg.direction, stray)
     pieces.add(vertices, leg.band_m, 0)
@@ -110,15 +111,16 @@ def add_corner(pieces: Pieces, route: Route, number: int) -> None:
     side = Stray(outwards_m, -outwards_m) if corner.turn_deg >= 0 else Stray(-outwards_m, outwards_m)
     strip = Stray(left + side.left_m, left + side.right_m)
     rungs = [_beside(place, direction, strip) for place, direction in path]
+    # Where it may not follow the blend, the ground between blend and waypoint belongs to the band.
+    wide = corner.swing_m >= NEGLIGIBLE_M or corner.doubtful
+    corner_places = corner.places if wide else ()
     for rung, following in itertools.pairwise(rungs):
-        pieces.add([*rung, *following], band_m - outwards_m, corner.waypoint)
-    if (
-        corner.swing_m >= NEGLIGIBLE_M
-        or corner.doubtful
-        or len(path) == 1
-        or route.vehicle.autopilot is Autopilot.PX4
-    ):
-        pieces.add(_swing_hull(route, number, path), band_m, corner.waypoint)
+        pieces.add([*rung, *following, *corner_places], band_m - outwards_m, corner.waypoint)
+    if wide or len(path) == 1:
+        pieces.add(_swing_hull(route, number), band_m, corner.waypoint)
+        pieces.add(_swing_strip(route, number), band_m, corner.waypoint)
+    if route.vehicle.autopilot is Autopilot.PX4 and not corner.stops:
+        pieces.add(_whole_corner(route, number), band_m, corner.waypoint)
 
 
 def _blend_path(route: Route, number: int) -> list[tuple[Vector, Vector]]:
@@ -142,23 +144,40 @@ def _blend_path(route: Route, number: int) -> list[tuple[Vector, Vector]]:
     return path
 
 
-def _swing_hull(route: Route, number: int, path: list[tuple[Vector, Vector]]) -> list[Vector]:
-    """Give the corners of the area a rover may need for a turn that it cannot follow."""
+def _swing_hull(route: Route, number: int) -> list[Vector]:
+    """Give the ground behind the waypoint that a turn needs which the rover cannot follow."""
     corner, after = route.corners[number], route.legs[number + 1]
-    stray = route.strays[number + 1]
-    begin_s, _ = route.span_s(number + 1)
-    hull = [*corner.places, path[0][0], path[-1][0]]
-    if route.vehicle.autopilot is Autopilot.PX4 and not corner.stops:
-        # It turns towards the next leg within the acceptance radius, along a path that was not measured.
-        radius_m = route.vehicle.waypoint_radius_m
-        hull.append(_shifted(corner.places[0], route.legs[number].direction, -radius_m))
-        hull.append(_shifted(corner.places[-1], after.direction, 2 * radius_m))
-    ahead_m = after.profile.travelled_m(begin_s)
-    if corner.swing_m >= NEGLIGIBLE_M and not corner.pivots:
-        ahead_m = max(ahead_m, at_corner.swing_length_m(route.vehicle))
-    for along_m in (-corner.behind_m, ahead_m):
-        hull += _beside(_shifted(after.start, after.direction, along_m), after.direction, stray)
+    hull = [*corner.places]
+    for along_m in (-corner.behind_m, 0.0):
+        place = _shifted(after.start, after.direction, along_m)
+        hull += _beside(place, after.direction, route.strays[number + 1])
     return hull
+
+
+def _swing_strip(route: Route, number: int) -> list[Vector]:
+    """Give the strip along the next leg in which a swing has not begun to die away."""
+    corner, after = route.corners[number], route.legs[number + 1]
+    ahead_m = after.profile.travelled_m(corner.blend.duration_s)
+    if corner.swing_m >= NEGLIGIBLE_M and not corner.pivots:
+        swing_length_m = at_corner.swing_length_m(route.vehicle)
+        ahead_m = max(ahead_m, min(swing_length_m, after.profile.length_m))
+    strip: list[Vector] = []
+    for along_m in (0.0, ahead_m):
+        strip += _beside(
+            _shifted(after.start, after.direction, along_m), after.direction, route.strays[number + 1]
+        )
+    return strip
+
+
+def _whole_corner(route: Route, number: int) -> list[Vector]:
+    """Give the ground of a corner that is turned within the acceptance radius along a path that was not measured."""
+    corner, before, after = route.corners[number], route.legs[number], route.legs[number + 1]
+    radius_m = route.vehicle.waypoint_radius_m
+    return [
+        *corner.places,
+        _shifted(before.end, before.direction, -radius_m),
+        _shifted(after.start, after.direction, 2 * radius_m),
+    ]
 
 
 def add_end(pieces: Pieces, route: Route) -> None:

@@ -10,7 +10,8 @@ import numpy as np
 from missions.drive_model import corner as at_corner
 from missions.drive_model.band import Pieces, add_corner, add_end, add_leg, add_start
 from missions.drive_model.envelope import Corner, Envelope, Leg
-from missions.drive_model.route import SAME_PLACE_M, Route, Stray, plan_route
+from missions.drive_model.plan import SAME_PLACE_M, plan_route
+from missions.drive_model.route import Route, Stray
 from missions.errors import InvalidPositionError, VehicleError
 from missions.vehicle import Autopilot
 

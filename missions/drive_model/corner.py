@@ -42,6 +42,9 @@ SWING_LENGTHS = 2.5
 NEAR_M = 3.0
 """Corners nearer to one another than this are one turn to steered wheels."""
 
+STRAIGHT_ON_DEG = 10.0
+"""Legs that turn less than this are one leg where short legs are asked for."""
+
 SHORT_LEG_M = 5.0
 PIVOT_SWING_M = 0.7
 """How swings grow on short legs: by e^(-leg / 5 m) of 150 %, and of 0.7 m where it pivots."""

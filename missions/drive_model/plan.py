@@ -1,0 +1,153 @@
+"""From a list of points to legs and corners."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import TYPE_CHECKING
+
+from missions.drive_model import corner as at_corner
+from missions.drive_model.profile import leg_profile
+from missions.drive_model.route import Bend, CornerPlan, LegPlan, Route, Stray, Vector
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from missions.vehicle import Vehicle
+
+SAME_PLACE_M = 0.3
+"""Points nearer to one another are one place for a rover: it can make nothing of a leg between them but a stop."""
+
+
+def plan_route(
+    points: NDArray[np.float64],
+    vehicle: Vehicle,
+    speeds: Sequence[float | None] | None,
+    stops: Mapping[int, float],
+    start: Stray,
+) -> Route:
+    """Give the legs and corners of a list of points; points that lie on one another are one place, and a stop."""
+    groups = _grouped(points)
+    legs = tuple(
+        _leg(vehicle, before, after, None if speeds is None else speeds[after[0][0] - 1])
+        for before, after in itertools.pairwise(groups)
+    )
+    turns_deg = [_turn_deg(before.direction, after.direction) for before, after in itertools.pairwise(legs)]
+    runs_m = _runs_m(legs, turns_deg)
+    corners = []
+    whole_deg = 0.0
+    for number, (group, (before, after)) in enumerate(
+        zip(groups[1:], itertools.pairwise(legs), strict=False)
+    ):
+        turn_deg = turns_deg[number]
+        whole_deg = turn_deg + (whole_deg if before.profile.length_m < at_corner.NEAR_M else 0.0)
+        bend = Bend(turn_deg, whole_deg, min(runs_m[number], runs_m[number + 1]))
+        corners.append(_corner(vehicle, group, (before, after), bend, stops))
+    strays = [start]
+    middle_s = at_corner.START_HOLD_S
+    for leg, corner in zip(legs, corners, strict=False):
+        passed_s = leg.profile.duration_s - middle_s - corner.blend.duration_s / 2
+        middle_s = corner.blend.duration_s / 2
+        left = strays[-1].after(passed_s, vehicle.position_gain_per_s)
+        stray = left.turned(corner.turn_deg).swung(corner.turn_deg, corner.swing_m)
+        strays.append(stray.widened(corner.stray_m))
+    return Route(vehicle, legs, tuple(corners), tuple(strays))
+
+
+def _grouped(points: NDArray[np.float64]) -> list[list[tuple[int, Vector]]]:
+    groups: list[list[tuple[int, Vector]]] = []
+    for number, (east_m, north_m) in enumerate(points.tolist()):
+        place = (east_m, north_m)
+        if groups and math.dist(place, groups[-1][0][1]) < SAME_PLACE_M:
+            groups[-1].append((number, place))
+        else:
+            groups.append([(number, place)])
+    return groups
+
+
+def _leg(
+    vehicle: Vehicle,
+    before: list[tuple[int, Vector]],
+    after: list[tuple[int, Vector]],
+    speed_mps: float | None,
+) -> LegPlan:
+    (first, start), (_, end) = before[-1], after[0]
+    length_m = math.dist(start, end)
+    speed_mps = vehicle.speed_mps if speed_mps is None else speed_mps
+    profile = leg_profile(length_m, speed_mps, vehicle.accel_max_mps2, vehicle.jerk_mps3)
+    direction = ((end[0] - start[0]) / length_m, (end[1] - start[1]) / length_m)
+    return LegPlan(first, start, end, direction, profile, at_corner.band_m(vehicle, profile.top_speed_mps))
+
+
+def _runs_m(legs: Sequence[LegPlan], turns_deg: Sequence[float]) -> list[float]:
+    """Give for each leg how far it goes nearly straight on, before and after it together."""
+    runs: list[list[LegPlan]] = []
+    for number, leg in enumerate(legs):
+        if runs and abs(turns_deg[number - 1]) < at_corner.STRAIGHT_ON_DEG:
+            runs[-1].append(leg)
+        else:
+            runs.append([leg])
+    return [sum(leg.profile.length_m for leg in run) for run in runs for _ in run]
+
+
+def _corner(
+    vehicle: Vehicle,
+    group: list[tuple[int, Vector]],
+    legs: tuple[LegPlan, LegPlan],
+    bend: Bend,
+    stops: Mapping[int, float],
+) -> CornerPlan:
+    before, after = legs
+    turn_deg = bend.turn_deg
+    pivots = at_corner.pivots(vehicle, turn_deg)
+    delay_s = sum(stops.get(number, 0.0) for number, _ in group)
+    stopped = len(group) > 1 or any(number in stops for number, _ in group)
+    doubtful = at_corner.may_pivot_or_cut(vehicle, turn_deg) and not stopped
+    if pivots and not doubtful:
+        blend = at_corner.STANDSTILL
+        swing_m = at_corner.pivot_swing_m(bend.shorter_run_m)
+        behind_m = 0.0
+    elif stopped:
+        blend = at_corner.STANDSTILL
+        swing_m = at_corner.start_swing_m(vehicle, turn_deg)
+        behind_m = at_corner.start_behind_m(vehicle, turn_deg)
+    else:
+        blend = at_corner.blend(vehicle, before.profile, after.profile, turn_deg)
+        swing_m = at_corner.corner_swing_m(vehicle, bend.widest_deg, blend.reach_m, bend.shorter_run_m)
+        behind_m = swing_m / 4
+    top_mps = min(before.profile.top_speed_mps, after.profile.top_speed_mps)
+    ramps_s = (before.profile.ramp.duration_s + after.profile.ramp.duration_s) / 2
+    lost_s = ramps_s - blend.duration_s + at_corner.swing_time_s(swing_m, top_mps) + delay_s
+    if stopped or pivots:
+        lost_s += at_corner.STOP_LAG_S
+    if pivots:
+        lost_s += at_corner.pivot_time_s(vehicle, turn_deg)
+    return CornerPlan(
+        waypoint=group[-1][0],
+        places=tuple(place for _, place in group),
+        turn_deg=turn_deg,
+        stops=stopped or pivots,
+        pivots=pivots,
+        doubtful=doubtful,
+        bounded=at_corner.is_bounded(vehicle, turn_deg, bend.shorter_run_m),
+        blend=blend,
+        swing_m=swing_m,
+        behind_m=behind_m,
+        stray_m=_stray_m(len(group), delay_s),
+        time_lost_s=lost_s,
+    )
+
+
+def _stray_m(places: int, delay_s: float) -> float:
+    if places > 1:
+        return at_corner.SAME_PLACE_STRAY_M
+    return at_corner.DELAY_STRAY_M if delay_s > 0 else 0.0
+
+
+def _turn_deg(before: Vector, after: Vector) -> float:
+    cross = before[0] * after[1] - before[1] * after[0]
+    dot = before[0] * after[0] + before[1] * after[1]
+    return -math.degrees(math.atan2(cross, dot))

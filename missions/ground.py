@@ -170,7 +170,7 @@ def lay_out(
     SituationError
         The home circle is enforced and home is not known.
     FenceError
-        An inclusion without area.
+        An inclusion without area, or a union with none of it within the home circle.
     """
     warnings: list[str] = []
     barriers = [
@@ -181,9 +181,9 @@ def lay_out(
         circle = _home_circle(home, home_radius_m)
         name = f"home circle (FENCE_RADIUS {home_radius_m:g} m)"
         area = _area(circle, name, frame, warnings)
-        if union:  # the home circle limits even the union
-            barriers = [_within(barrier, area, name) for barrier in barriers]
-        if not (union and any(b.kind is ZoneKind.INCLUSION for b in barriers)):
+        if union and any(barrier.kind is ZoneKind.INCLUSION for barrier in barriers):
+            barriers = _within(barriers, area, name)
+        else:
             barriers.append(Barrier(name, ZoneKind.INCLUSION, area))
     points = frame.to_local_array(around)
     extent = shapely.union_all([*(b.area.envelope for b in barriers), shapely.MultiPoint(points)])
@@ -191,12 +191,36 @@ def lay_out(
     return Ground(frame, tuple(barriers), union, bounds, tuple(warnings))
 
 
-def _within(barrier: Barrier, circle: Area, name: str) -> Barrier:
-    if barrier.kind is ZoneKind.EXCLUSION:
-        return barrier
-    return Barrier(
-        f"{barrier.name} within the {name}", barrier.kind, _polygons(barrier.area.intersection(circle))
-    )
+def check_ground(ground: Ground) -> None:
+    """Refuse a fence that leaves no ground.
+
+    Raises
+    ------
+    FenceError
+        Says which zones leave none.
+    """
+    if not ground.allowed.is_empty:
+        return
+    inclusions = [barrier.name for barrier in ground.barriers if barrier.kind is ZoneKind.INCLUSION]
+    names = " and ".join(inclusions)
+    if not ground.keep_in.is_empty:
+        raise FenceError(f"the exclusions leave no ground of {names}", zones=inclusions)
+    advice = "" if ground.union else "; with FENCE_OPTIONS 2 (union) one of them would be enough"
+    raise FenceError(f"{names} leave no ground in common{advice}", zones=inclusions)
+
+
+def _within(barriers: list[Barrier], circle: Area, name: str) -> list[Barrier]:
+    """Cut a union's inclusions to the home circle, which limits even the union; those beyond it are none."""
+    found = []
+    for barrier in barriers:
+        area = _polygons(barrier.area.intersection(circle))
+        if barrier.kind is ZoneKind.EXCLUSION:
+            found.append(barrier)
+        elif not area.is_empty:
+            found.append(Barrier(f"{barrier.name} within the {name}", barrier.kind, area))
+    if not any(barrier.kind is ZoneKind.INCLUSION for barrier in found):
+        raise FenceError(f"no inclusion reaches into the {name}: the vehicle could be nowhere", zone=name)
+    return found
 
 
 def _home_circle(home: LatLon | None, radius_m: float) -> CircleZone:

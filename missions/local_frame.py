@@ -45,6 +45,22 @@ class AutopilotScale(NamedTuple):
     north: float
 
 
+def check_latitude(position: LatLon) -> None:
+    """Refuse places too near a pole.
+
+    Raises
+    ------
+    InvalidPositionError
+        The place lies beyond ±85° latitude.
+    """
+    if abs(position.lat_deg) > MAX_LATITUDE_DEG:
+        raise InvalidPositionError(
+            f"latitude {position.lat_deg:.4f}° is beyond ±{MAX_LATITUDE_DEG:g}°: "
+            "the autopilot's flat frame is too far off so near a pole",
+            lat_deg=position.lat_deg,
+        )
+
+
 @dataclass(frozen=True)
 class LocalFrame:
     """Metres east and north of an origin.
@@ -63,12 +79,7 @@ class LocalFrame:
     origin: LatLon
 
     def __post_init__(self) -> None:
-        if abs(self.origin.lat_deg) > MAX_LATITUDE_DEG:
-            raise InvalidPositionError(
-                f"latitude {self.origin.lat_deg:.4f}° is beyond ±{MAX_LATITUDE_DEG:g}°: "
-                "the autopilot's flat frame is too far off so near a pole",
-                lat_deg=self.origin.lat_deg,
-            )
+        check_latitude(self.origin)
 
     @cached_property
     def _proj(self) -> Proj:
@@ -108,9 +119,8 @@ def frame_around(positions: Sequence[LatLon]) -> LocalFrame:
     lats_deg = [position.lat_deg for position in positions]
     first_lon_deg = positions[0].lon_deg
     lons_deg = [first_lon_deg + wrap_lon_deg(position.lon_deg - first_lon_deg) for position in positions]
-    farthest = max(lats_deg, key=abs)
-    if abs(farthest) > MAX_LATITUDE_DEG:
-        LocalFrame(LatLon(farthest, first_lon_deg))
+    for position in positions:
+        check_latitude(position)
     centre = LatLon((min(lats_deg) + max(lats_deg)) / 2, wrap_lon_deg((min(lons_deg) + max(lons_deg)) / 2))
     return LocalFrame(rounded(centre))  # PROJ takes 0.6 mm from an origin, or from the equator, for 0
 

@@ -13,7 +13,6 @@ from shapely import LineString, Point
 
 from missions.drive_model import Envelope, envelope
 from missions.errors import (
-    FenceMissingError,
     NoRouteError,
     PlanCheckError,
     SituationError,
@@ -21,12 +20,19 @@ from missions.errors import (
 )
 from missions.fence import PolygonZone
 from missions.geo import distance_m, rounded
-from missions.ground import Ground, lay_out
+from missions.ground import EDGE_BOW_M, Ground, check_ground, lay_out
 from missions.items import MissionItem, last_place, waypoint
-from missions.local_frame import autopilot_line, bow_m, frame_around
+from missions.known_fence import fence_warnings, known_fence
+from missions.local_frame import (
+    MAX_LATITUDE_DEG,
+    LocalPoint,
+    autopilot_line,
+    bow_m,
+    check_latitude,
+    frame_around,
+)
 from missions.narrow import widest_clearance_m
 from missions.route import Route, find_route, simplified
-from missions.situation import ListKind, Situation
 from missions.vehicle import vehicle_from_parameters
 
 if TYPE_CHECKING:
@@ -35,6 +41,7 @@ if TYPE_CHECKING:
     from missions.fence import Fence
     from missions.geo import LatLon
     from missions.request import Request
+    from missions.situation import Situation
     from missions.vehicle import Vehicle
 
 MAX_LEG_M = 1000.0
@@ -51,11 +58,6 @@ _WIDER_M = (0.3, 0.1, 0.03)
 _WIDEST_TRIES = 40
 _WIDEST_SHARE = 0.97
 """What of the widest clearance a route keeps: round corners of the last millimetre would need a waypoint every half metre."""
-
-_FENCE_ADVICE = (
-    "Let the ground station read the fence from the vehicle (MAVProxy: fence list; Mission Planner, QGroundControl: "
-    "download in the plan view) while the stream is recorded, or give a fence file (--fence)"
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,13 +127,13 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
     PlanCheckError
         The finished route failed its check: a defect of this program, never to be driven.
     """
-    fence = _fence(situation)
+    fence = known_fence(situation)
     vehicle = vehicle_from_parameters(situation.parameters, mav_type=situation.vehicle_type)
     start, targets = _ends(situation, request)
     home = situation.home.value if situation.home else None
     ground = ground_for(situation, vehicle, (start, *targets))
     promised_m, allowance_m, warnings = _clearance(request, vehicle)
-    warnings = [*_fence_warnings(vehicle, situation), *ground.warnings, *warnings]
+    warnings = [*fence_warnings(vehicle, situation), *ground.warnings, *warnings]
 
     local = [ground.frame.to_local(position) for position in (start, *targets)]
     reserve_m = _reserve_m(ground)
@@ -157,8 +159,14 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
             f"the start stands {route.start_clearance_m:.2f} m from a fence, nearer than {drawn_m:.2f} m: "
             "the route first leads away, never nearer than that"
         )
-    path = _rounded_path(ground, route)
-    clearance_m = _check(ground, path, route, drawn_m)
+    reached = tuple(map(rounded, ground.frame.to_lat_lons(route.points[list(route.target_indices)])))
+    warnings += [
+        f"the target {asked} is blocked: moved {distance_m(asked, found):.2f} m to {found}"
+        for asked, found in zip(targets, reached, strict=True)
+        if distance_m(asked, found) > ROUNDING_RESERVE_M
+    ]
+    path, lead_away = _rounded_path(ground, route)
+    clearance_m = _check(ground, path, lead_away, route.start_clearance_m, drawn_m)
     forecast = envelope(
         ground.frame.to_local_array(path), vehicle, heading_deg=_heading_deg(situation, start)
     )
@@ -171,7 +179,7 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
         items=tuple(waypoint(position) for position in path[1:]),
         path=path,
         start=start,
-        targets=tuple(map(rounded, ground.frame.to_lat_lons(route.points[list(route.target_indices)]))),
+        targets=reached,
         method=request.method,
         length_m=_length_m(path),
         straight_line_m=_length_m((start, *targets)),
@@ -188,34 +196,6 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
         home=home,
         warnings=tuple(dict.fromkeys(warnings)),
     )
-
-
-def _fence(situation: Situation) -> Fence:
-    known = situation.fence
-    trouble = fence_trouble(situation)
-    if known is None:
-        raise FenceMissingError(
-            f"{trouble or 'no fence was transferred'}: there is nothing to plan around. {_FENCE_ADVICE}"
-        )
-    if not known.value.zones:
-        raise FenceMissingError(f"the fence from {known.source} is empty: there is nothing to plan around")
-    return known.value
-
-
-def fence_trouble(situation: Situation) -> str | None:
-    """Say why the newest fence that was seen cannot be used; None where there is no such trouble."""
-    if situation.fence_trouble:
-        return f"a fence was transferred but is unusable ({situation.fence_trouble})"
-    for to_vehicle in (True, False):
-        transfer = situation.transfers.get((ListKind.FENCE, to_vehicle))
-        if transfer is None:
-            continue
-        what = "upload" if to_vehicle else "read-back"
-        if transfer.is_complete:
-            return f"a fence upload of {transfer.count} items was seen, but not that the vehicle accepted it"
-        of = "an unknown number of" if transfer.count is None else transfer.count
-        return f"a fence {what} was seen only in part ({len(transfer.items)} of {of} items)"
-    return None
 
 
 def _ends(situation: Situation, request: Request) -> tuple[LatLon, tuple[LatLon, ...]]:
@@ -253,28 +233,33 @@ def ground_for(situation: Situation, vehicle: Vehicle, ends: Sequence[LatLon]) -
     FenceMissingError, FenceError, InvalidPositionError, SituationError
         As `plan`.
     """
-    fence = _fence(situation)
+    fence = known_fence(situation)
     positions = [
         position
         for zone in fence.zones
         for position in (zone.vertices if isinstance(zone, PolygonZone) else (zone.centre,))
     ]
     frame = frame_around(positions)
-    for position in (*positions, *ends):
+    home = situation.home.value if situation.home and vehicle.fence.enforces_home_circle else None
+    named = [*(("", position) for position in (*positions, *ends)), *([("home ", home)] if home else [])]
+    for name, position in named:
+        check_latitude(position)
         if (away_m := distance_m(frame.origin, position)) > MAX_FIELD_M:
             raise SituationError(
-                f"{position} is {away_m / 1000:.0f} km from the fence's centre {frame.origin}; "
+                f"{name}{position} is {away_m / 1000:.0f} km from the fence's centre {frame.origin}; "
                 f"at most {MAX_FIELD_M / 1000:.0f} km can be planned",
                 distance_m=away_m,
             )
-    return lay_out(
+    ground = lay_out(
         fence,
         frame,
         union=vehicle.fence.union,
-        home=situation.home.value if situation.home else None,
+        home=home,
         home_radius_m=vehicle.fence.radius_m if vehicle.fence.enforces_home_circle else None,
         around=ends,
     )
+    check_ground(ground)
+    return ground
 
 
 def asked_clearance(situation: Situation, request: Request) -> tuple[Vehicle, float]:
@@ -335,46 +320,39 @@ def _widest_route(find: Callable[..., Route], clearance_m: float) -> tuple[Route
     return find(clearance_m=clearance_m), clearance_m
 
 
-def _fence_warnings(vehicle: Vehicle, situation: Situation) -> list[str]:
-    if situation.fence_trouble:
-        return [
-            f"a newer fence was seen but could not be used, so an older one counts: {situation.fence_trouble}"
-        ]
-    if vehicle.fence.enforces_zones or not situation.parameters:
-        return []
-    reason = "FENCE_TYPE has no bit 2 (value 4)" if vehicle.fence.enabled else "FENCE_ENABLE is 0"
-    return [f"the autopilot does not enforce this fence ({reason}); the route honours it all the same"]
-
-
 def _reserve_m(ground: Ground) -> float:
     east_min_m, north_min_m, east_max_m, north_max_m = ground.allowed.bounds
     diagonal_m = math.hypot(east_max_m - east_min_m, north_max_m - north_min_m)
-    return ROUNDING_RESERVE_M + bow_m(min(diagonal_m, MAX_LEG_M), ground.frame.origin.lat_deg)
+    farthest_lat_deg = min(abs(ground.frame.origin.lat_deg) + diagonal_m / 1.1e5, MAX_LATITUDE_DEG)
+    return ROUNDING_RESERVE_M + bow_m(min(diagonal_m, MAX_LEG_M), farthest_lat_deg)
 
 
-def _rounded_path(ground: Ground, route: Route) -> tuple[LatLon, ...]:
-    """Split long legs, round to degE7, drop waypoints that fall together."""
-    points = [route.points[:1]]
-    for a, b in pairwise(route.points):
+def _rounded_path(ground: Ground, route: Route) -> tuple[tuple[LatLon, ...], int]:
+    """Split long legs, round to degE7, drop waypoints that fall together; tell how many of the first legs lead away."""
+    path = [rounded(ground.frame.to_lat_lon(LocalPoint(*route.points[0].tolist())))]
+    lead_away = 0
+    for number, (a, b) in enumerate(pairwise(route.points)):
         pieces = max(1, math.ceil(math.dist(a, b) / MAX_LEG_M))
-        points.append(a + (b - a) * (np.arange(1, pieces + 1) / pieces)[:, None])
-    positions = [rounded(position) for position in ground.frame.to_lat_lons(np.concatenate(points))]
-    kept = positions[:1]
-    kept += [b for a, b in pairwise(positions) if a != b]
-    return tuple(kept) if len(kept) > 1 else (kept[0], kept[0])
+        for position in ground.frame.to_lat_lons(a + (b - a) * (np.arange(1, pieces + 1) / pieces)[:, None]):
+            if rounded(position) != path[-1]:
+                path.append(rounded(position))
+                lead_away += number < route.lead_away
+    return tuple(path) if len(path) > 1 else (path[0], path[0]), lead_away
 
 
 def _length_m(path: Sequence[LatLon]) -> float:
     return sum(distance_m(a, b) for a, b in pairwise(path))
 
 
-def _check(ground: Ground, path: Sequence[LatLon], route: Route, drawn_m: float) -> float:
+def _check(
+    ground: Ground, path: Sequence[LatLon], lead_away: int, start_clearance_m: float, drawn_m: float
+) -> float:
     """Measure the finished lines, as the autopilot draws them, and give their least clearance."""
     clearances_m = [ground.clearance_m(drawn_leg(ground, a, b)) for a, b in pairwise(path)]
-    lead_away = clearances_m[: route.lead_away]
-    rest = clearances_m[route.lead_away :]
-    asked_m = {"lead-away": route.start_clearance_m - ROUNDING_RESERVE_M, "route": drawn_m}
-    for name, found in (("lead-away", lead_away), ("route", rest)):
+    if not ground.edge.is_empty:  # it may stand so far off the autopilot's
+        clearances_m = [max(0.0, clearance_m - EDGE_BOW_M) for clearance_m in clearances_m]
+    asked_m = {"lead-away": min(start_clearance_m, drawn_m) - ROUNDING_RESERVE_M, "route": drawn_m}
+    for name, found in (("lead-away", clearances_m[:lead_away]), ("route", clearances_m[lead_away:])):
         if found and min(found) < asked_m[name] - 1e-6:
             raise PlanCheckError(
                 f"the {name} comes {min(found):.4f} m near a fence; at least {asked_m[name]:.4f} m was asked. This is a defect",

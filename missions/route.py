@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
-from shapely import LineString, Point, Polygon
+from shapely import LineString, MultiPolygon, Point, Polygon
 
 import pbpp
 from missions.errors import NoRouteError, RouteError, StartBlockedError, TargetBlockedError
@@ -17,10 +18,9 @@ from missions.local_frame import LocalPoint
 from missions.narrow import narrowest_place
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
     from numpy.typing import NDArray
-    from shapely.geometry.base import BaseGeometry
 
     from missions.geo import LatLon
     from missions.ground import Ground
@@ -28,7 +28,14 @@ if TYPE_CHECKING:
 _INSIDE_M = 0.005
 """Points put on the edge of free space stand this far inside it, so that rounding leaves them there."""
 
-_EXITS_TRIED = 8
+_ROUNDED_EXCESS_M = 0.005
+"""What pbpp's round offsets may keep beyond the clearance, and a little."""
+
+_WIDER = (1, 4, 16, 64)
+
+_CHORDS = 64
+_CHORD_SHARE = 1.0002
+"""By so much an arc of that many chords a quarter turn must be wider to keep its distance all along."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,9 +103,9 @@ def find_route(
     )
     search = _Search(ground, planner, clearance_m, method, should_stop)
     start_clearance_m = search.check_start(start)
-    goals = [search.free_target(target, snap_m) for target in targets]
+    goals = [search.free_target(target, snap_m, start) for target in targets]
     lead: list[LocalPoint] = [start]
-    if start_clearance_m < clearance_m and not search.is_free(start):
+    if not search.is_free(start):
         lead = search.lead_away(start, start_clearance_m, goals[0])
     points = [np.array(lead)]
     target_indices = []
@@ -144,7 +151,30 @@ class _Search:
     should_stop: Callable[[], bool] | None
 
     def is_free(self, point: LocalPoint) -> bool:
-        return bool(self.planner.free_space.covers(Point(point)))
+        """Whether the planner takes a point: mitred offsets hold it, or its true distance is what round ones hold."""
+        here = Point(point)
+        if self.planner.free_space.covers(here):
+            return True
+        return self.ground.clearance_m(here) >= self.clearance_m + _ROUNDED_EXCESS_M
+
+    @cached_property
+    def roomy(self) -> list[Polygon]:
+        """Where points are free with some millimetres to spare, part by part.
+
+        Raises
+        ------
+        NoRouteError
+            There is no such place.
+        """
+        reach_m = self.clearance_m * _CHORD_SHARE + _ROUNDED_EXCESS_M + _INSIDE_M
+        inner = self.ground.allowed.buffer(-reach_m, quad_segs=_CHORDS)
+        parts: list[Polygon] = [part for part in shapely.get_parts(inner) if not part.is_empty]
+        if not parts:
+            raise NoRouteError(
+                f"nowhere in the field is {self.clearance_m:.2f} m away from every fence",
+                clearance_m=self.clearance_m,
+            )
+        return parts
 
     def check_start(self, start: LocalPoint) -> float:
         """Give the start's clearance.
@@ -158,8 +188,6 @@ class _Search:
         forbidding = self.ground.forbidding(point)
         if not forbidding and self.ground.allowed.covers(point):
             return self.ground.clearance_m(point)
-        if self.ground.allowed.is_empty:
-            raise StartBlockedError("the fences leave no ground at all to drive on")
         free = self.ground.nearest_point(self.ground.allowed, point)
         distance, bearing, position = self._way(start, free)
         names = _names([barrier.name for barrier in forbidding])
@@ -172,19 +200,14 @@ class _Search:
             nearest_free=list(position),
         )
 
-    def free_target(self, target: LocalPoint, snap_m: float) -> LocalPoint:
-        """Give the target, or the nearest free point within ``snap_m``."""
+    def free_target(self, target: LocalPoint, snap_m: float, start: LocalPoint) -> LocalPoint:
+        """Give the target, or the nearest free point within ``snap_m``, on the start's side of the fences if there is one."""
         if self.is_free(target):
             return target
-        free_space = self.planner.free_space
-        if free_space.is_empty:
-            raise NoRouteError(
-                f"nowhere in the field is {self.clearance_m:.2f} m away from every fence",
-                clearance_m=self.clearance_m,
-            )
         point = Point(target)
-        inner = free_space.buffer(-_INSIDE_M, join_style="mitre")
-        free = self.ground.nearest_point(inner if not inner.is_empty else free_space, point)
+        free = self.ground.nearest_point(self._component(start), point)
+        if not snap_m or point.distance(free) > snap_m:
+            free = self.ground.nearest_point(MultiPolygon(self.roomy), point)
         distance, bearing, position = self._way(target, free)
         if distance <= snap_m:
             return LocalPoint(free.x, free.y)
@@ -211,47 +234,46 @@ class _Search:
         """Plan between two free points."""
         try:
             return self.planner.plan(start, goal, method=self.method, should_stop=self.should_stop)
-        except pbpp.NoPathError:
+        except (pbpp.NoPathError, pbpp.StartBlockedError, pbpp.GoalBlockedError):
             raise self._no_route(start, goal) from None
 
     def lead_away(self, start: LocalPoint, start_clearance_m: float, goal: LocalPoint) -> list[LocalPoint]:
         """Give the first points of a route that leaves a fence's neighbourhood without ever coming nearer to one.
 
-        Of the points where free space can be entered straight, the one that makes the whole route shortest.
+        Little further than need be: of the places not much farther than the nearest, the one most on the way.
         """
         free = self._component(goal)
-        best: tuple[float, LocalPoint] | None = None
-        for tried, exit_point in enumerate(self._exits(start, free, start_clearance_m, goal)):
-            if tried == _EXITS_TRIED:
-                break
-            length_m = Point(start).distance(Point(exit_point)) + self.path(exit_point, goal).length_m
-            best = min(best, (length_m, exit_point)) if best else (length_m, exit_point)
-        if best is not None:
-            return [start, best[1]]
         nearest = self.ground.nearest_point(free, Point(start))
-        raise self._no_route(start, LocalPoint(nearest.x, nearest.y))
+        onward = self.path(LocalPoint(nearest.x, nearest.y), goal).points[1]
+        reach_m = 2 * Point(start).distance(nearest) + 1.0
+        for wider in _WIDER:  # out of a corridor it may be far
+            exits = self._exits(start, start_clearance_m, free, wider * reach_m)
+            if len(exits):
+                detours_m = np.hypot(*(exits - start).T) + np.hypot(*(exits - onward).T)
+                east_m, north_m = exits[np.argmin(detours_m)].tolist()
+                return [start, LocalPoint(east_m, north_m)]
+        raise self._no_route(start, goal)
 
     def _exits(
-        self, start: LocalPoint, free: BaseGeometry, start_clearance_m: float, goal: LocalPoint
-    ) -> Iterator[LocalPoint]:
-        """Give points on free space's edge that can be reached straight, most promising first."""
-        origin = Point(start)
-        inner = free.buffer(-_INSIDE_M, join_style="mitre")
-        if inner.is_empty:
-            return
-        nearest = self.ground.nearest_point(inner, origin)
-        reach_m = 3 * origin.distance(nearest) + 5.0
-        near_edge = inner.boundary.intersection(origin.buffer(reach_m)).segmentize(0.5)
-        candidates = [nearest, *(Point(xy) for xy in shapely.get_coordinates(near_edge))]
-        target = Point(goal)
-        for candidate in sorted(candidates, key=lambda p: origin.distance(p) + p.distance(target)):
-            leg = LineString([origin, candidate])
-            if self.ground.clearance_m(leg) >= start_clearance_m - 1e-9:
-                yield LocalPoint(candidate.x, candidate.y)
+        self, start: LocalPoint, start_clearance_m: float, free: Polygon, reach_m: float
+    ) -> NDArray[np.float64]:
+        """Give the points on a free part's edge that a straight line reaches without coming nearer to a fence, (n, 2)."""
+        near = free.boundary.intersection(Point(start).buffer(reach_m))
+        nearest = shapely.shortest_line(free, Point(start))
+        exits: NDArray[np.float64] = np.vstack(
+            [
+                shapely.get_coordinates(nearest)[:1],
+                shapely.get_coordinates(near.segmentize(max(0.25, reach_m / 200))),
+            ]
+        )
+        legs = shapely.linestrings([[start, xy] for xy in exits])
+        keeps: NDArray[np.bool_] = shapely.distance(self.ground.edge, legs) >= start_clearance_m - 1e-9
+        keeps[keeps] = shapely.covers(self.ground.allowed, legs[keeps])
+        return np.asarray(exits[keeps])
 
     def _component(self, point: LocalPoint) -> Polygon:
-        parts: list[Polygon] = list(shapely.get_parts(self.planner.free_space))
-        return min(parts, key=lambda part: float(part.distance(Point(point))))
+        """Give the part of free ground that a point is on, or nearest to."""
+        return min(self.roomy, key=lambda part: float(part.distance(Point(point))))
 
     def _no_route(self, start: LocalPoint, goal: LocalPoint) -> RouteError:
         """Say how wide a route there is, or which fences part start and target: those along the edge of the smaller area."""

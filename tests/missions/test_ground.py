@@ -15,7 +15,7 @@ from strategies import GEOD, away, offset
 from missions.errors import FenceError, SituationError
 from missions.fence import CircleZone, Fence, PolygonZone, ZoneKind
 from missions.geo import LatLon, rounded, wrap_lon_deg
-from missions.ground import Ground, lay_out
+from missions.ground import Ground, check_ground, lay_out
 from missions.local_frame import LocalFrame
 
 HOME = LatLon(40.071374, -105.22993)
@@ -283,9 +283,23 @@ def test_the_home_circle_limits_even_the_union() -> None:
     assert where.clearance_m(Point(FRAME.to_local(offset(HOME, 40, 0)))) == pytest.approx(10, abs=0.2)
 
 
-def test_a_union_that_no_inclusion_brings_within_the_home_circle_leaves_no_ground() -> None:
-    where = ground(square(IN, 500, 500, 50), union=True, home=HOME, home_radius_m=50)
-    assert where.allowed.is_empty
+def test_a_union_that_no_inclusion_brings_within_the_home_circle_is_refused() -> None:
+    with pytest.raises(FenceError, match=r"no inclusion reaches into the home circle \(FENCE_RADIUS 50 m\)"):
+        ground(square(IN, 500, 500, 50), square(OUT, 0, 0, 10), union=True, home=HOME, home_radius_m=50)
+    alone = ground(square(OUT, 0, 0, 10), union=True, home=HOME, home_radius_m=50)
+    assert not is_allowed(alone, 60, 0)
+    assert is_allowed(alone, -40, 0)
+
+
+def test_a_fence_that_leaves_no_ground_is_refused() -> None:
+    check_ground(ground(square(IN, 0, 0, 10), square(OUT, 0, 0, 9)))
+    with pytest.raises(
+        FenceError,
+        match=r"^inclusion polygon 1 and inclusion polygon 2 leave no ground in common; with FENCE_OPTIONS 2",
+    ):
+        check_ground(ground(square(IN, 0, 0, 10), square(IN, 50, 50, 10)))
+    with pytest.raises(FenceError, match=r"^the exclusions leave no ground of inclusion polygon 1$"):
+        check_ground(ground(square(IN, 0, 0, 10), square(OUT, -5, -5, 20)))
 
 
 def test_an_enforced_home_circle_wants_home() -> None:

@@ -52,6 +52,11 @@ class Codec:
         """System and component id stamped on what is sent."""
         return self._mavlink.srcSystem, self._mavlink.srcComponent
 
+    @identity.setter
+    def identity(self, identity: tuple[int, int]) -> None:
+        for end in (self._mavlink, self._packer):
+            end.srcSystem, end.srcComponent = identity
+
     def encode(self, message: Message) -> bytes:
         """Give the bytes of one MAVLink 2 frame and count the sequence number up."""
         if self._signing is not None:

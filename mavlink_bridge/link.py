@@ -31,6 +31,14 @@ _RECEIVE_BYTES = 65536
 _LINK_SENT = 3
 
 
+_EPOCH_S = time.time() - time.monotonic()
+
+
+def now_s() -> float:
+    """Give the time that machines on links run by: seconds since 1970, but only ever forward."""
+    return _EPOCH_S + time.monotonic()
+
+
 @dataclass(frozen=True, slots=True)
 class Address:
     """A parsed connection string: ``kind`` is udpin, udpout, tcp, tcpin or serial."""
@@ -127,11 +135,6 @@ class Link:
         self._heartbeat_due_s = 0.0
         self._has_spoken = False
 
-    @staticmethod
-    def now_s() -> float:
-        """Give the time that machines on this link run by."""
-        return time.monotonic()
-
     @property
     def identity(self) -> tuple[int, int]:
         """The ids we speak as."""
@@ -154,28 +157,37 @@ class Link:
         """Close the device."""
         self._transport.close()
 
+    def speak_as(self, identity: tuple[int, int]) -> None:
+        """Speak with other ids from now on."""
+        self._codec.identity = identity
+
     def send(self, message: Message) -> None:
         """Send one message."""
         data = self._codec.encode(message)
         self._transport.send(data)
         self._has_spoken = True
         if self._recorder:
-            self._recorder.write(time.time(), data, _LINK_SENT)
+            self._recorder.write(now_s(), data, _LINK_SENT)
 
     def receive(self, timeout_s: float) -> list[Frame]:
         """Give the frames that come within a time, as soon as there are any; our heartbeat goes out when it is due."""
-        now_s = time.monotonic()
-        if now_s >= self._heartbeat_due_s:
-            self._heartbeat_due_s = now_s + _HEARTBEAT_EVERY_S
+        return self.receive_at(timeout_s)[1]
+
+    def receive_at(self, timeout_s: float) -> tuple[float, list[Frame]]:
+        """As `receive`, with the time at which the frames came and under which they are recorded."""
+        begun_s = now_s()
+        if begun_s >= self._heartbeat_due_s:
+            self._heartbeat_due_s = begun_s + _HEARTBEAT_EVERY_S
             self.send(Heartbeat(MavType.ONBOARD_CONTROLLER, Autopilot.INVALID))
-        until_heartbeat_s = self._heartbeat_due_s - now_s
+        until_heartbeat_s = self._heartbeat_due_s - begun_s
         data = self._transport.receive(max(0.0, min(timeout_s, until_heartbeat_s)))
+        came_s = now_s()
         if not data:
-            return []
+            return came_s, []
         decoded = self._codec.decode_with_bytes(data)
         if self._recorder:
             for frame_bytes, _ in decoded:
-                self._recorder.write(time.time(), frame_bytes)
+                self._recorder.write(came_s, frame_bytes)
         frames = [frame for _, frame in decoded if frame is not None]
         ours = [frame for frame in frames if (frame.system, frame.component) == self.identity]
         if ours and not (self._transport.echoes and self._has_spoken):
@@ -183,7 +195,7 @@ class Link:
                 f"somebody on the link already speaks as system {self.identity[0]} component {self.identity[1]}; "
                 "choose others with --source-system and --source-component"
             )
-        return frames
+        return came_s, frames
 
     def run(
         self,
@@ -214,7 +226,7 @@ class Link:
         LinkError
             The time is over, or the link is gone.
         """
-        begun_s = time.monotonic()
+        begun_s = now_s()
         machine.start(begun_s)
         while True:
             if on_step:
@@ -223,17 +235,16 @@ class Link:
                 self.send(message)
             if machine.is_done or until():
                 return
-            now_s = time.monotonic()
-            if timeout_s is not None and now_s - begun_s > timeout_s:
+            if timeout_s is not None and now_s() - begun_s > timeout_s:
                 raise LinkError(f"no outcome within {timeout_s:g} s")
             deadline_s = machine.deadline_s
-            wait_s = 0.5 if deadline_s is None else min(0.5, max(0.0, deadline_s - now_s))
-            frames = self.receive(wait_s)
+            wait_s = 0.5 if deadline_s is None else min(0.5, max(0.0, deadline_s - now_s()))
+            came_s, frames = self.receive_at(wait_s)
             if frames and on_frames:
                 on_frames(frames)
             for frame in frames:
-                machine.receive(frame, time.monotonic())
-            machine.handle_timer(time.monotonic())
+                machine.receive(frame, came_s)
+            machine.handle_timer(now_s())
 
 
 def open_link(

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from mavlink_bridge.cli import demo, download, plan, sim, upload
+from mavlink_bridge.cli import bridge, demo, download, plan, replay, sim, upload
 from mavlink_bridge.cli.common import guarded
 
 app = typer.Typer(
@@ -18,6 +18,8 @@ app = typer.Typer(
 )
 
 app.command("plan")(guarded(plan.plan))
+app.command("bridge")(guarded(bridge.bridge))
+app.command("replay")(guarded(replay.replay))
 app.command("upload")(guarded(upload.upload))
 app.command("download")(guarded(download.download))
 app.command("sim")(guarded(sim.sim))

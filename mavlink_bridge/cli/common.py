@@ -5,8 +5,10 @@ from __future__ import annotations
 import functools
 import json
 import sys
+import tomllib
 from contextlib import contextmanager
 from enum import IntEnum
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -65,6 +67,37 @@ AnyVehicleOption = Annotated[
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="One JSON document on stdout.")]
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no report.")]
+
+
+def _take_config(context: typer.Context, path: Path | None) -> Path | None:
+    """Make a file's options the defaults of the command that runs."""
+    if path is None:
+        return None
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise typer.BadParameter(f"{path} cannot be read: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise typer.BadParameter(f"{path}: not TOML: {error}") from None
+    options = document.get(context.info_name or "", {})
+    known = {parameter.name for parameter in context.command.params}
+    defaults = {name.replace("-", "_"): value for name, value in options.items()}
+    if unknown := sorted(set(defaults) - known):
+        raise typer.BadParameter(f"{path}: unknown option {unknown[0]!r} in [{context.info_name}]")
+    context.default_map = {**(context.default_map or {}), **defaults}
+    return path
+
+
+ConfigOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--config",
+        metavar="FILE.toml",
+        is_eager=True,
+        callback=_take_config,
+        help="Options from a file, under the command's name; those given here count more.",
+    ),
+]
 
 
 def exit_code_of(error: Exception) -> ExitCode:

@@ -55,6 +55,7 @@ def demo(
     from missions.request import Request  # noqa: PLC0415
 
     out.mkdir(parents=True, exist_ok=True)
+    (out / "demo.tlog").unlink(missing_ok=True)
     drive = _Drive()
     begun_s = time.monotonic()
     with ExitStack() as stack:

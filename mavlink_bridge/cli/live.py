@@ -10,7 +10,7 @@ from mavlink_bridge.cli.common import progress_bar
 from mavlink_bridge.cli.plan import timed_plan
 from mavlink_bridge.director import Director, Orders, State
 from mavlink_bridge.errors import LinkError
-from mavlink_bridge.link import ONE_SHOT_IDENTITY, open_link
+from mavlink_bridge.link import ONE_SHOT_IDENTITY, now_s, open_link
 from mavlink_bridge.messages import MissionType
 from mavlink_bridge.protocol.verified_upload import Held
 from missions.formats import read_parameters
@@ -95,7 +95,7 @@ def conduct(
 
         def step() -> None:
             show(_STATE_TEXTS[director.state], *director.progress)
-            keep_backup(director, store, link.now_s())
+            keep_backup(director, store, now_s())
 
         link.run(director, on_frames=on_frames, on_step=step)
     if director.trouble is not None or director.plan is None:

@@ -91,7 +91,7 @@ def plan(
     `pbpp plan --connect udpin:0.0.0.0:14550 --target 40.0726,-105.2290 --upload`
     """
     outputs, plots = output or [], plot or []
-    request = _request(start, target or [], clearance, corner_allowance, snap, method)
+    request = request_from_options(start, target or [], clearance, corner_allowance, snap, method)
     _check_options(fence, log, connect, upload=upload or drive, outputs=outputs, plots=plots)
     if connect is not None:
         from mavlink_bridge.cli.live import plan_live  # noqa: PLC0415 - only with a link
@@ -205,9 +205,16 @@ def _finite(value_m: float | None) -> float | None:
     return None if value_m is None or value_m == float("inf") else round(value_m, 4)
 
 
-def _request(
+def request_from_options(
     start: str | None, targets: list[str], clearance: str | None, allowance: str, snap: float, method: str
 ) -> Request:
+    """Read what is asked of plans from a command's options.
+
+    Raises
+    ------
+    UsageError, InvalidPositionError
+        An option is not what it has to be.
+    """
     from missions.geo import parse_lat_lon  # noqa: PLC0415 - quick help
     from missions.request import Request  # noqa: PLC0415
 

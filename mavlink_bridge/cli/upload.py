@@ -285,7 +285,9 @@ def _upload_list(
         nonlocal backup
         if (old := machine.pending_backup) is not None:
             backup = store.begin(system, mission_type, old)
-            machine.backup_stored(time.monotonic())
+            machine.backup_stored(now_s())
+
+    from mavlink_bridge.link import now_s  # noqa: PLC0415 - pymavlink only where needed
 
     begun_s = time.monotonic()
     try:

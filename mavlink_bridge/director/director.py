@@ -173,6 +173,8 @@ class Director(TableMachine[State, Cue]):
         self.situation = fold(before, frame, now_s)
         if self._is_from_vehicle(frame):
             self._take_vehicle_frame(frame, now_s)
+        if self.orders.passive:
+            self._learn_by_listening(before, now_s)
         self._notice_fence(now_s)
         if self.identity and (
             target := self._targets.look(frame, before, self.situation, now_s, self.identity)
@@ -246,6 +248,8 @@ class Director(TableMachine[State, Cue]):
     def _learn(self, now_s: float) -> None:
         assert self._peer is not None
         self._steps.clear()
+        if self.orders.passive:
+            return
         self._steps.run([(Learning(self._peer, self.orders.patience_s), self._learnt)], now_s)
 
     def _learnt(self, machine: Learning, now_s: float) -> None:
@@ -255,12 +259,22 @@ class Director(TableMachine[State, Cue]):
                 self._learn(now_s)
             return
         self.situation = machine.merged(self.situation, now_s)
+        self._all_learnt(now_s)
+
+    def _all_learnt(self, now_s: float) -> None:
         if self._changes is not None:
             self._changes.settle(now_s)
         self._move(Cue.LEARNT)
         self._fence_known = self.situation.fence
         self._voice.learnt(now_s, self.situation)
         self._want_first_target(now_s)
+
+    def _learn_by_listening(self, before: Situation, now_s: float) -> None:
+        """Know enough once the place is known; the fence may come later."""
+        if self.state is State.LEARNING and self.situation.pose is not None:
+            self._all_learnt(now_s)
+        elif self.situation.mission is not before.mission:
+            self._take_mission_target(now_s)
 
     def _want_first_target(self, now_s: float) -> None:
         """Begin with the targets of the orders; a single job also with the newest of the stream or the mission's last place."""
@@ -521,7 +535,8 @@ class Director(TableMachine[State, Cue]):
 
     @property
     def _may_reread(self) -> bool:
-        return not self.orders.once and self.state in _AT_REST and not self._steps
+        is_settled = self.state in _AT_REST and not self._steps
+        return is_settled and not self.orders.once and not self.orders.passive
 
     def _reread(self, now_s: float) -> None:
         """Read again what somebody may have changed."""

@@ -73,7 +73,7 @@ SCHEMA: dict[EventName, tuple[Severity, tuple[str, ...]]] = {
     ),
     EventName.LEFT_ENVELOPE: (Severity.WARNING, ("outside_m", "position")),
     EventName.BREACH: (Severity.CRITICAL, ("breaches",)),
-    EventName.ARRIVED: (Severity.NOTICE, ("driven_m", "time_s", "least_clearance_m", "breaches")),
+    EventName.ARRIVED: (Severity.NOTICE, ("driven_m", "took_s", "least_clearance_m", "breaches")),
     EventName.TAKEN_OVER: (Severity.NOTICE, ("mode",)),
     EventName.MISSION_CHANGED: (Severity.WARNING, ("mission_items",)),
     EventName.LINK_LOST: (Severity.ERROR, ("silent_s",)),

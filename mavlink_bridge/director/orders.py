@@ -54,6 +54,8 @@ class Orders:
         End after one job: plan, upload, drive, as far as the orders go.
     announce : bool
         Tell decisions to the ground stations as STATUSTEXT.
+    passive : bool
+        Ask nobody anything: learn from what others transfer, as in a replay.
     target_sources : frozenset of TargetSource
         Where targets may come from.
     patience_s : float
@@ -70,5 +72,6 @@ class Orders:
     confirm: bool = False
     once: bool = False
     announce: bool = False
+    passive: bool = False
     target_sources: frozenset[TargetSource] = DEFAULT_SOURCES
     patience_s: float = 30.0

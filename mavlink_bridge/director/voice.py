@@ -113,13 +113,13 @@ class Voice:
 
     def arrived(self, now_s: float, drive: DriveWatch) -> None:
         """Tell the end of a drive."""
-        time_s = now_s - drive.begun_s
+        took_s = now_s - drive.begun_s
         self.tell(
             now_s,
             EventName.ARRIVED,
-            f"arrived after {drive.driven_m:.0f} m in {time_s:.0f} s",
+            f"arrived after {drive.driven_m:.0f} m in {took_s:.0f} s",
             round(drive.driven_m, 2),
-            round(time_s, 1),
+            round(took_s, 1),
             metres(drive.least_clearance_m),
             drive.breaches,
         )

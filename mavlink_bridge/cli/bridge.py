@@ -1,0 +1,353 @@
+"""``pbpp bridge``: the director on a live link, for hours."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import signal
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mavlink_bridge.cli.common import (
+    AnyVehicleOption,
+    ConfigOption,
+    JsonOption,
+    QuietOption,
+    SystemOption,
+    TimeoutOption,
+    exit_code_of,
+    print_json,
+)
+from mavlink_bridge.cli.plan import request_from_options
+from mavlink_bridge.cli.upload import RequiredConnectOption, SigningKeyOption
+from mavlink_bridge.errors import LinkError, UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+
+    from mavlink_bridge.director import Director, Event, Orders
+    from mavlink_bridge.journal import JournalWriter
+    from mavlink_bridge.link import Link
+    from mavlink_bridge.signing import Signing
+    from mavlink_bridge.tlog import TlogWriter
+
+_BACKOFF_S = (0.5, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0)
+_LONGEST_WAIT_S = 0.25
+
+
+def bridge(
+    connect: RequiredConnectOption,
+    target: Annotated[
+        list[str] | None,
+        typer.Option(metavar="LAT,LON", help="The first target; more can be typed or clicked."),
+    ] = None,
+    target_from: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="SOURCE",
+            help="typed, reposition, position-target, guided-item, mission, rally or echo; repeatable.",
+        ),
+    ] = None,
+    clearance: Annotated[
+        str | None, typer.Option(metavar="M|max", help="Promised while driving. Default: from FENCE_MARGIN.")
+    ] = None,
+    corner_allowance: Annotated[
+        str, typer.Option(metavar="M|auto", help="Room for cut corners on top.")
+    ] = "auto",
+    snap: Annotated[
+        float, typer.Option(metavar="M", min=0.0, help="Move blocked targets to free ground.")
+    ] = 0.0,
+    vehicle: Annotated[
+        Path | None, typer.Option(metavar="FILE.parm", help="Parameters that the vehicle does not tell.")
+    ] = None,
+    upload: Annotated[bool, typer.Option("--upload", help="Write missions to the vehicle.")] = False,
+    drive: Annotated[
+        bool, typer.Option("--drive", help="Switch modes: HOLD before a new route, AUTO for a verified one.")
+    ] = False,
+    arm: Annotated[bool, typer.Option("--arm", help="Arm before AUTO.")] = False,
+    confirm: Annotated[bool, typer.Option("--confirm", help="Upload a plan only after a typed yes.")] = False,
+    once: Annotated[bool, typer.Option("--once", help="End after one job.")] = False,
+    log: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.tlog", help="Record both directions, and a journal beside it."),
+    ] = None,
+    config: ConfigOption = None,
+    system: SystemOption = None,
+    any_vehicle: AnyVehicleOption = False,
+    source_system: Annotated[
+        int | None, typer.Option(min=1, max=255, help="Our system id. Default: the vehicle's own.")
+    ] = None,
+    source_component: Annotated[int, typer.Option(min=1, max=255, help="Our component id.")] = 195,
+    signing_key: SigningKeyOption = None,
+    timeout: TimeoutOption = 30.0,
+    json_output: JsonOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Run beside the autopilot: read fences, state and targets from the stream, keep a plan, upload it verified, watch the drive.
+
+    Type targets as `LAT,LON`; `yes` confirms a plan. Without `--upload` and `--drive` it only reports.
+
+    Examples:
+    `pbpp bridge --connect udpin:0.0.0.0:14550`
+
+    `pbpp bridge --connect /dev/ttyAMA0,921600 --upload --drive --log run.tlog --json`
+    """
+    del config  # its callback has taken it
+    signal.signal(signal.SIGTERM, _end)
+    from mavlink_bridge.director import Orders  # noqa: PLC0415 - quick help
+    from mavlink_bridge.director.orders import DEFAULT_SOURCES, TargetSource  # noqa: PLC0415
+    from missions.formats import read_parameters  # noqa: PLC0415
+
+    try:
+        sources = frozenset(TargetSource(name) for name in target_from) if target_from else DEFAULT_SOURCES
+    except ValueError as error:
+        raise UsageError(f"--target-from: {error}; known are {', '.join(TargetSource)}") from None
+    orders = Orders(
+        identity=(source_system, source_component) if source_system else None,
+        system=system,
+        any_vehicle=any_vehicle,
+        request=request_from_options(None, target or [], clearance, corner_allowance, snap, "optimal"),
+        upload=upload or drive,
+        drive=drive,
+        arm=arm,
+        confirm=confirm,
+        once=once,
+        announce=True,
+        target_sources=sources,
+        patience_s=timeout,
+    )
+    parameters = read_parameters(vehicle) if vehicle else {}
+    with contextlib.ExitStack() as stack:
+        recorder, journal = _recorders(stack, log, orders, parameters)
+        shell = _Shell(orders, parameters, _teller(wants_json=json_output, quiet=quiet), recorder, journal)
+        shell.run(connect, _signing(signing_key), timeout)
+    trouble = shell.director.trouble
+    if trouble is not None and shell.director.is_done:
+        if json_output:
+            raise typer.Exit(exit_code_of(trouble))
+        raise trouble
+
+
+def _end(_number: int, _frame: object) -> None:
+    raise KeyboardInterrupt
+
+
+@dataclass(eq=False)
+class _Journaled:
+    """The director, with every call that is no frame written down."""
+
+    director: Director
+    writer: JournalWriter | None
+    frames: int = 0
+
+    def call(self, name: str, now_s: float, target: object = None) -> None:
+        from mavlink_bridge.journal import Call  # noqa: PLC0415 - quick help
+        from missions.geo import LatLon  # noqa: PLC0415
+
+        if self.writer is not None:
+            place = target if isinstance(target, LatLon) else None
+            self.writer.call(Call(self.frames, now_s, name, place))
+
+
+class _Shell:
+    """Sockets, clock, keyboard and files around one director."""
+
+    def __init__(
+        self,
+        orders: Orders,
+        parameters: Mapping[str, float],
+        tell: Callable[[Event], None],
+        recorder: TlogWriter | None,
+        journal: JournalWriter | None,
+    ) -> None:
+        from mavlink_bridge.backup import BackupStore  # noqa: PLC0415 - quick help
+        from mavlink_bridge.director import Director  # noqa: PLC0415
+        from missions.situation import Situation  # noqa: PLC0415
+
+        self.director = Director(orders, Situation(parameters=parameters))
+        self._written = _Journaled(self.director, journal)
+        self._tell = tell
+        self._recorder = recorder
+        self._journal = journal
+        self._store = BackupStore()
+        self._typed = _typed_lines()
+
+    def run(self, connection: str, signing: Signing | None, timeout_s: float) -> None:
+        """Run until the single job is done, or for ever; a link that breaks is opened again."""
+        from mavlink_bridge.link import ONE_SHOT_IDENTITY, now_s, open_link, parse_connection  # noqa: PLC0415 - quick help
+
+        parse_connection(connection)
+        begun_s = now_s()
+        self._written.call("start", begun_s)
+        self.director.start(begun_s)
+        failures = 0
+        while not self.director.is_done:
+            try:
+                identity = self.director.identity or ONE_SHOT_IDENTITY
+                with open_link(
+                    connection, identity, recorder=self._recorder, signing=signing, timeout_s=timeout_s
+                ) as link:
+                    failures = 0
+                    self._run_link(link)
+            except LinkError as error:
+                if self.director.orders.once:
+                    raise
+                wait_s = _BACKOFF_S[min(failures, len(_BACKOFF_S) - 1)]
+                failures += 1
+                typer.secho(f"link: {error}; trying again in {wait_s:g} s", err=True, fg=typer.colors.YELLOW)
+                self._idle(wait_s)
+
+    def _run_link(self, link: Link) -> None:
+        from mavlink_bridge.link import now_s  # noqa: PLC0415 - quick help
+
+        while not self.director.is_done:
+            self._listen_to_keyboard(now_s())
+            self._keep_backup(now_s())
+            if self.director.identity is not None and link.identity != self.director.identity:
+                link.speak_as(self.director.identity)
+            for message in self.director.messages_to_send():
+                link.send(message)
+            self._tell_all()
+            deadline_s = self.director.deadline_s
+            wait_s = (
+                _LONGEST_WAIT_S
+                if deadline_s is None
+                else min(_LONGEST_WAIT_S, max(0.0, deadline_s - now_s()))
+            )
+            came_s, frames = link.receive_at(wait_s)
+            for frame in frames:
+                self.director.receive(frame, came_s)
+                self._written.frames += 1
+            self._run_timer(now_s())
+        for message in self.director.messages_to_send():
+            link.send(message)
+        self._keep_backup(now_s())
+        self._tell_all()
+
+    def _run_timer(self, now: float) -> None:
+        deadline_s = self.director.deadline_s
+        if deadline_s is not None and deadline_s <= now:
+            self._written.call("timer", now)
+            self.director.handle_timer(now)
+
+    def _idle(self, wait_s: float) -> None:
+        """Let time pass without a link, so that the director notices."""
+        from mavlink_bridge.link import now_s  # noqa: PLC0415 - quick help
+
+        until_s = now_s() + wait_s
+        while now_s() < until_s and not self.director.is_done:
+            self._listen_to_keyboard(now_s())
+            self._run_timer(now_s())
+            self._tell_all()
+            time.sleep(min(_LONGEST_WAIT_S, max(0.0, until_s - now_s())))
+
+    def _keep_backup(self, now: float) -> None:
+        from mavlink_bridge.cli.live import keep_backup  # noqa: PLC0415 - quick help
+
+        if self.director.pending_backup is not None:
+            self._written.call("backup_stored", now)
+        keep_backup(self.director, self._store, now)
+
+    def _listen_to_keyboard(self, now: float) -> None:
+        from missions.errors import InvalidPositionError  # noqa: PLC0415 - quick help
+        from missions.geo import parse_lat_lon  # noqa: PLC0415
+
+        line = next(self._typed)
+        if not line:
+            return
+        if line.lower() in ("yes", "y", "go"):
+            self._written.call("confirm", now)
+            self.director.confirm(now)
+            return
+        try:
+            target = parse_lat_lon(line)
+        except InvalidPositionError as error:
+            typer.secho(f"typed: {error}", err=True, fg=typer.colors.YELLOW)
+            return
+        self._written.call("target", now, target)
+        self.director.take_target(target, now)
+
+    def _tell_all(self) -> None:
+        for event in self.director.take_events():
+            if self._journal is not None:
+                self._journal.event(event)
+            self._tell(event)
+
+
+def _typed_lines() -> Iterator[str]:
+    """Give what was typed, a line at a time; an empty text while nothing was. Does not wait."""
+    waiting = b""
+    is_open = True
+    while True:
+        if is_open and b"\n" not in waiting and _has_input():
+            data = os.read(sys.stdin.fileno(), 4096)
+            is_open = bool(data)
+            waiting += data
+        line, found, rest = waiting.partition(b"\n")
+        if found:
+            waiting = rest
+            yield line.decode(errors="replace").strip()
+        else:
+            yield ""
+
+
+def _has_input() -> bool:
+    try:
+        return bool(select.select([sys.stdin], [], [], 0)[0])
+    except (OSError, ValueError):  # no stdin, or one that cannot be waited for (Windows' console)
+        return False
+
+
+def _teller(*, wants_json: bool, quiet: bool) -> Callable[[Event], None]:
+    """Give what tells events: JSON lines, or lines for people."""
+    if wants_json:
+        return lambda event: _flushed_json(event.as_json())
+    if quiet:
+        return lambda _event: None
+    return _tell_people
+
+
+def _flushed_json(document: Mapping[str, object]) -> None:
+    print_json(document)
+    sys.stdout.flush()
+
+
+def _tell_people(event: Event) -> None:
+    from mavlink_bridge.director import Severity  # noqa: PLC0415 - quick help
+
+    colour = {
+        Severity.CRITICAL: typer.colors.RED,
+        Severity.ERROR: typer.colors.RED,
+        Severity.WARNING: typer.colors.YELLOW,
+    }
+    clock = time.strftime("%H:%M:%S", time.localtime(event.time_s))
+    typer.secho(f"{clock} {event.text}", fg=colour.get(event.severity))
+
+
+def _recorders(
+    stack: contextlib.ExitStack, log: Path | None, orders: Orders, parameters: Mapping[str, float]
+) -> tuple[TlogWriter | None, JournalWriter | None]:
+    if log is None:
+        return None, None
+    from mavlink_bridge.journal import JournalWriter, journal_path  # noqa: PLC0415 - quick help
+    from mavlink_bridge.tlog import TlogWriter  # noqa: PLC0415
+
+    if log.exists():
+        raise UsageError(f"--log {log}: the file is there already; a journal belongs to one run")
+    recorder = stack.enter_context(TlogWriter(log))
+    file = stack.enter_context(journal_path(log).open("w", encoding="utf-8"))
+    return recorder, JournalWriter(file, orders, parameters)
+
+
+def _signing(key_file: Path | None) -> Signing | None:
+    if key_file is None:
+        return None
+    from mavlink_bridge.signing import Signing, SigningKey  # noqa: PLC0415 - only where a key is given
+
+    return Signing(SigningKey.read(key_file), time.time)

@@ -1,0 +1,147 @@
+"""The journal beside a recorded log: what the director was told otherwise than by frames, so that a replay decides the same.
+
+A JSON line each: first the orders, then every call of the director that is no frame, with its time and the number of frames received before
+it, and every event.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, TextIO
+
+from mavlink_bridge.director import Event, Orders, TargetSource
+from mavlink_bridge.errors import LogError
+from missions.geo import LatLon
+from missions.request import Request
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+_FORMAT = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """A call of the director: ``start``, ``timer``, ``target``, ``confirm`` or ``backup_stored``.
+
+    Parameters
+    ----------
+    frames : int
+        How many frames were received before it.
+    time_s : float
+        Its time.
+    name : str
+        Which call.
+    target : LatLon, optional
+        The target that was typed.
+    """
+
+    frames: int
+    time_s: float
+    name: str
+    target: LatLon | None = None
+
+
+@dataclass(frozen=True)
+class Journal:
+    """A journal that was read."""
+
+    orders: Orders
+    parameters: Mapping[str, float]
+    calls: tuple[Call, ...]
+    events: tuple[dict[str, Any], ...]
+
+
+class JournalWriter:
+    """Writes a journal, line by line.
+
+    Parameters
+    ----------
+    file : text file
+        Open for writing.
+    orders : Orders
+        What the director may do.
+    parameters : mapping of str to float
+        Parameters that were known beforehand.
+    """
+
+    def __init__(self, file: TextIO, orders: Orders, parameters: Mapping[str, float]) -> None:
+        self._file = file
+        self._write({"journal": _FORMAT, "orders": _orders_to_json(orders), "parameters": dict(parameters)})
+
+    def call(self, call: Call) -> None:
+        """Write a call."""
+        entry: dict[str, Any] = {"frames": call.frames, "time_s": call.time_s, "call": call.name}
+        if call.target is not None:
+            entry["target"] = list(call.target)
+        self._write(entry)
+
+    def event(self, event: Event) -> None:
+        """Write an event."""
+        self._write({"told": event.as_json()})
+
+    def _write(self, entry: Mapping[str, Any]) -> None:
+        self._file.write(json.dumps(entry) + "\n")
+        self._file.flush()
+
+
+def journal_path(log: Path) -> Path:
+    """Give where the journal of a log lies."""
+    return log.with_suffix(".journal.jsonl")
+
+
+def read_journal(path: Path) -> Journal:
+    """Read a journal.
+
+    Raises
+    ------
+    LogError
+        It cannot be read; says at which line.
+    """
+    calls: list[Call] = []
+    events: list[dict[str, Any]] = []
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+        head = json.loads(lines[0])
+        if head["journal"] != _FORMAT:
+            raise LogError(f"{path}: journal format {head['journal']!r}; expected {_FORMAT}")
+        orders = _orders_from_json(head["orders"])
+        for line in lines[1:]:
+            entry = json.loads(line)
+            if "told" in entry:
+                events.append(entry["told"])
+            else:
+                target = LatLon(*entry["target"]) if "target" in entry else None
+                calls.append(Call(entry["frames"], entry["time_s"], entry["call"], target))
+    except OSError as error:
+        raise LogError(f"{path} cannot be read: {error.strerror}", file=str(path)) from None
+    except (ValueError, KeyError, TypeError, IndexError) as error:
+        line_number = len(calls) + len(events) + 2
+        raise LogError(f"{path}: line {line_number} is no journal's: {error!r}", file=str(path)) from None
+    return Journal(orders, head["parameters"], tuple(calls), tuple(events))
+
+
+def _orders_to_json(orders: Orders) -> dict[str, Any]:
+    document = asdict(orders)
+    document["target_sources"] = sorted(orders.target_sources)
+    return document
+
+
+def _orders_from_json(document: dict[str, Any]) -> Orders:
+    request = document["request"]
+    return Orders(
+        **{
+            **document,
+            "identity": tuple(document["identity"]) if document["identity"] else None,
+            "target_sources": frozenset(TargetSource(name) for name in document["target_sources"]),
+            "request": Request(
+                **{
+                    **request,
+                    "start": LatLon(*request["start"]) if request["start"] else None,
+                    "targets": tuple(LatLon(*target) for target in request["targets"]),
+                }
+            ),
+        }
+    )

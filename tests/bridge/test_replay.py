@@ -1,0 +1,114 @@
+"""Replays: of the recordings, what their manifest states; of the bridge's own logs, the same decisions again."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, replace
+
+import pytest
+
+from mavlink_bridge.director import EventName, Orders, TargetSource
+from mavlink_bridge.errors import LogError
+from mavlink_bridge.journal import Call, JournalWriter, journal_path, read_journal
+from mavlink_bridge.replay import replay_foreign
+from mavlink_bridge.tlog import TlogReader
+from missions.geo import LatLon
+from missions.request import Request
+
+SOURCES = frozenset(TargetSource) - {TargetSource.ECHO, TargetSource.RALLY}
+FOUND = [EventName.VEHICLE_FOUND, EventName.LEARNT]
+ROUTE = [EventName.TARGET, EventName.PLANNED]
+UNSAFE_ROUTE = [EventName.TARGET, EventName.STRAIGHT_LINE_UNSAFE, EventName.PLANNED]
+BLOCKED = [EventName.TARGET, EventName.NO_PLAN]
+
+EXPECTED = {
+    "guided-maze": [*FOUND, *ROUTE, *UNSAFE_ROUTE],
+    "mission-yard": [*FOUND, *ROUTE],
+    "position-target-yard": [*FOUND, *BLOCKED, *UNSAFE_ROUTE],
+    "fence-change-yard": [*FOUND, *UNSAFE_ROUTE, EventName.FENCE_CHANGED, *UNSAFE_ROUTE],
+    "no-fence": [*FOUND, *BLOCKED],
+    "union-rally": [*FOUND, *ROUTE],
+    "island-unreachable": [*FOUND, *BLOCKED],
+}
+
+
+@pytest.fixture(scope="module")
+def told(logs):
+    orders = Orders(target_sources=SOURCES)
+    return {name: list(replay_foreign(TlogReader(logs / f"{name}.tlog"), orders)) for name in EXPECTED}
+
+
+@pytest.mark.parametrize("name", EXPECTED)
+def test_a_recording_gives_its_events(told, name):
+    assert [event.name for event in told[name]] == EXPECTED[name]
+
+
+def test_the_numbers_of_some_events(told):
+    maze = [event for event in told["guided-maze"] if event.name is EventName.TARGET]
+    assert [event.data["position"] for event in maze] == [
+        [40.071329, -105.229871],
+        [40.0726316, -105.2290497],
+    ]
+    changed = next(event for event in told["fence-change-yard"] if event.name is EventName.FENCE_CHANGED)
+    assert changed.data == {"zones": 6, "vertices": 19}
+    assert told["no-fence"][-1].data["error"] == "FenceMissingError"
+    assert told["island-unreachable"][-1].data["error"] == "NoRouteError"
+    assert told["mission-yard"][2].data["source"] == "mission"
+
+
+def test_times_are_the_logs_own_and_only_go_forward(told, logs):
+    first, *_, last = (entry.time_s for entry in TlogReader(logs / "guided-maze.tlog"))
+    times = [event.time_s for event in told["guided-maze"]]
+    assert times == sorted(times)
+    assert first <= times[0] <= times[-1] <= last
+
+
+def test_an_empty_log_of_entries_gives_nothing():
+    assert list(replay_foreign([], Orders())) == []
+
+
+ORDERS = Orders(
+    identity=(1, 195),
+    system=1,
+    upload=True,
+    drive=True,
+    request=Request(start=LatLon(1.0, 2.0), targets=(LatLon(3.0, 4.0),), clearance_m=2.0),
+    target_sources=frozenset({TargetSource.TYPED, TargetSource.ECHO}),
+)
+CALLS = (Call(0, 10.0, "start"), Call(3, 11.5, "timer"), Call(9, 12.25, "target", LatLon(5.0, 6.0)))
+
+
+def test_a_journal_reads_back_as_written(tmp_path):
+    path = journal_path(tmp_path / "run.tlog")
+    with path.open("w") as file:
+        writer = JournalWriter(file, ORDERS, {"WP_RADIUS": 2.0})
+        for call in CALLS:
+            writer.call(call)
+    journal = read_journal(path)
+    assert asdict(journal.orders) == asdict(ORDERS)
+    assert journal.calls == CALLS
+    assert journal.parameters == {"WP_RADIUS": 2.0}
+    with path.open("w") as file:
+        JournalWriter(file, replace(ORDERS, identity=None, request=Request()), {})
+    assert read_journal(path).orders.identity is None
+
+
+@pytest.mark.parametrize(
+    "text", ["", "no json\n", '{"journal": 7}\n', '{"journal": 1, "orders": {}}\n', "[]\n"]
+)
+def test_what_is_no_journal_is_one_clear_error(tmp_path, text):
+    path = tmp_path / "run.journal.jsonl"
+    path.write_text(text)
+    with pytest.raises(LogError, match=r"run\.journal\.jsonl"):
+        read_journal(path)
+    with pytest.raises(LogError):
+        read_journal(tmp_path / "missing.jsonl")
+
+
+def test_a_damaged_line_is_named(tmp_path):
+    path = tmp_path / "run.journal.jsonl"
+    with path.open("w") as file:
+        JournalWriter(file, ORDERS, {}).call(CALLS[0])
+        file.write(json.dumps({"frames": 1}) + "\n")
+    with pytest.raises(LogError, match="line 3"):
+        read_journal(path)

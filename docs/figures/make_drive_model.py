@@ -31,21 +31,21 @@ def main() -> None:
     note(cut, "blend of the two\nlegs' motions", (1.2, -1.2), (7, -9))
     note(cut, "0.30 m on the inside,\n0.45 m elsewhere", (-0.45, -15), (3, -16))
     draw(swing, bent(20, 40, 140), SLOW, (-4, 12, -14, 4), "140° at 2 m/s: steered wheels swing out …")
-    note(swing, "swing, 1.2 m and the band", (2.6, -0.6), (5, 1.5))
-    note(swing, "… and the tail dies\nwithin 5 s a third", (6.2, -5.6), (6.8, -3))
+    note(swing, "swing and band", (2.6, -0.6), (5, 1.5))
+    note(swing, "… and the tail is down\nto a third in 5 s", (6.2, -5.6), (6.8, -3))
     pivoted = Vehicle(waypoint_radius_m=2.0, speed_mps=2.0, steering=Steering.SKID)
     draw(
         start,
         bent(20, 40, 90),
         SLOW,
         (-5, 15, -24, 4),
-        "Start with the heading 120° off; skid steer would pivot",
+        "Starting with the heading 120° off",
         120.0,
     )
     area = envelope(bent(20, 40, 90), pivoted, heading_deg=120.0).area
     plot_polygon(area, ax=start, add_points=False, facecolor="none", edgecolor="tab:green", linestyle="--")
     note(start, "start: swings to\nwhere it faces", (1.3, -18), (4, -20))
-    note(start, "skid steer (dashed)", (0.3, -0.3), (-4.5, 2.2))
+    note(start, "dashed: skid steer, pivots", (0.3, -0.3), (-4.5, 2.2))
     recorded(drive)
     figure.savefig(HERE / "drive-model.svg", metadata={"Date": None})
 

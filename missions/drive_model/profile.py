@@ -18,7 +18,7 @@ class Ramp:
     Parameters
     ----------
     speed_mps : float
-        The speed reached, 0 or more.
+        The speed reached, above 0.
     accel_mps2, jerk_mps3 : float
         The limits, above 0.
     """
@@ -35,8 +35,6 @@ class Ramp:
     @cached_property
     def duration_s(self) -> float:
         """How long the whole ramp takes."""
-        if self.jerk_s == 0:
-            return 0.0
         return self.jerk_s + self.speed_mps / (self.jerk_mps3 * self.jerk_s)
 
     @property
@@ -59,7 +57,7 @@ class Ramp:
     def time_s(self, distance_m: float) -> float:
         """Give the time to a distance within the first half of the ramp."""
         jerk_m = self.jerk_mps3 * self.jerk_s**3 / 6
-        if distance_m <= jerk_m or self.jerk_s == 0:
+        if distance_m <= jerk_m:
             return math.cbrt(6 * distance_m / self.jerk_mps3)
         half_s = self.jerk_s / 2
         accel_mps2 = self.jerk_mps3 * self.jerk_s
@@ -80,7 +78,7 @@ class LegProfile:
     Parameters
     ----------
     length_m : float
-        Its length, 0 or more.
+        Its length, above 0.
     ramp : Ramp
         Its start; the end is the same backwards.
     """
@@ -96,8 +94,6 @@ class LegProfile:
     @cached_property
     def duration_s(self) -> float:
         """How long it takes from rest to rest."""
-        if self.top_speed_mps == 0:
-            return 0.0
         return self.length_m / self.top_speed_mps + self.ramp.duration_s
 
     def travelled_m(self, time_s: float) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -66,11 +68,18 @@ def plan(
     method: Annotated[str, typer.Option(metavar="|".join(_METHODS), help="How to search.")] = "optimal",
     output: Annotated[
         list[Path] | None,
-        typer.Option("-o", "--output", metavar="FILE", help="Write the mission: .waypoints, .plan."),
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="FILE",
+            help="Write the mission: .waypoints, .plan, .geojson, .kml, .gpx.",
+        ),
     ] = None,
     plot: Annotated[
-        list[Path] | None, typer.Option(metavar="FILE", help="Draw the plan: .png, .svg, .pdf.")
+        list[Path] | None,
+        typer.Option(metavar="FILE", help="Draw the plan: .png, .svg, .pdf, .html; - in the terminal."),
     ] = None,
+    blocks: Annotated[bool, typer.Option("--blocks", help="Draw the blocks of the free space too.")] = False,
     upload: Annotated[bool, typer.Option("--upload", help="Upload to the vehicle and verify.")] = False,
     drive: Annotated[bool, typer.Option("--drive", help="Then switch to AUTO; arms nothing.")] = False,
     system: SystemOption = None,
@@ -93,6 +102,8 @@ def plan(
     outputs, plots = output or [], plot or []
     request = request_from_options(start, target or [], clearance, corner_allowance, snap, method)
     _check_options(fence, log, connect, upload=upload or drive, outputs=outputs, plots=plots)
+    if json_output and Path("-") in plots:
+        raise UsageError("--plot - and --json both want the standard output; give a file to --plot")
     if connect is not None:
         from mavlink_bridge.cli.live import plan_live  # noqa: PLC0415 - only with a link
         from mavlink_bridge.director import Orders  # noqa: PLC0415
@@ -116,7 +127,7 @@ def plan(
         planned, planning_s = timed_plan(situation, request)
         uploaded = verified = False
     warn(planned.warnings)
-    written = write_outputs(planned, situation, outputs, plots)
+    written = write_outputs(planned, situation, outputs, plots, blocks=blocks)
     document = {
         **plan_document(planned),
         "source": Path(str(fence or log)).name if connect is None else connect,
@@ -150,7 +161,9 @@ def with_parameter_file(situation: Situation, vehicle: Path | None) -> Situation
     return replace(situation, parameters={**read_parameters(vehicle), **situation.parameters})
 
 
-def write_outputs(planned: Plan, situation: Situation, outputs: list[Path], plots: list[Path]) -> list[Path]:
+def write_outputs(
+    planned: Plan, situation: Situation, outputs: list[Path], plots: list[Path], *, blocks: bool = False
+) -> list[Path]:
     """Write the mission and draw the plan; give the files."""
     from missions.formats import write_mission  # noqa: PLC0415 - quick help
     from missions.situation import Known, Mission  # noqa: PLC0415
@@ -161,12 +174,22 @@ def write_outputs(planned: Plan, situation: Situation, outputs: list[Path], plot
     )
     for path in outputs:
         write_mission(to_write, path)
-    if plots:
-        from missions.picture import draw_plan  # noqa: PLC0415 - matplotlib is slow to come
+    return [*outputs, *_draw(planned, plots, blocks=blocks)]
 
-        for path in plots:
-            draw_plan(planned, path)
-    return [*outputs, *plots]
+
+def _draw(planned: Plan, plots: list[Path], *, blocks: bool) -> list[Path]:
+    """Draw the plan to files, and to the terminal where ``-`` is among them; give the files."""
+    if not plots:
+        return []
+    from missions.picture import TERMINAL, draw_plan, sketch_plan  # noqa: PLC0415 - quick help
+
+    for path in plots:
+        if str(path) == TERMINAL:
+            columns = min(80, shutil.get_terminal_size().columns)
+            typer.echo(sketch_plan(planned, columns=columns, encoding=sys.stdout.encoding))
+        else:
+            draw_plan(planned, path, blocks=blocks)
+    return [path for path in plots if str(path) != TERMINAL]
 
 
 def plan_document(planned: Plan) -> dict[str, object]:

@@ -29,6 +29,14 @@ _HATCH = {
     "size": 8,
     "solidity": 0.25,
 }
+_CONFIG = {
+    "displaylogo": False,
+    "scrollZoom": True,
+    "responsive": True,
+    # Nobody's field belongs on plotly's server: plotly 7 has a button for that by default.
+    "plotlyServerURL": "",
+    "modeBarButtonsToRemove": ["sendChartToCloud", "sendDataToCloud", "select2d", "lasso2d"],
+}
 
 
 def write_html(scene: Scene, path: Path, *, title: str | None = None, blocks: bool = False) -> None:
@@ -44,7 +52,8 @@ def write_html(scene: Scene, path: Path, *, title: str | None = None, blocks: bo
         include_plotlyjs=True,
         full_html=True,
         div_id="plan",
-        config={"displaylogo": False, "scrollZoom": True, "responsive": True},
+        default_height="94vh",
+        config=_CONFIG,
     )
     path.write_text(page, encoding="utf-8", newline="\n")
 
@@ -138,7 +147,11 @@ def _lines(scene: Scene) -> Iterator[go.Scatter]:
     yield _points(scene.route[1:-1], "waypoint", texts[1:-1], "circle", "white", 8)
     yield _points(scene.route[:1], "start", [f"start<br>{scene.plan.start}"], "square", style.ROUTE, 12)
     targets = [f"target {number}<br>{at}" for number, at in enumerate(scene.plan.targets, start=1)]
-    yield _points(scene.targets, "target", targets, "star", style.TARGET, 16)
+    numbers = [f"<b>{number}</b>" for number in range(1, len(targets) + 1)]
+    if len(targets) > 1:
+        yield _points(scene.targets, "target", targets, "circle", style.TARGET, 22, numbers)
+    else:
+        yield _points(scene.targets, "target", targets, "star", style.TARGET, 16)
 
 
 def _leg_hovers(scene: Scene) -> go.Scatter:
@@ -184,12 +197,23 @@ def _line(points: NDArray[np.float64], name: str, *, showlegend: bool = True, **
 
 
 def _points(
-    points: NDArray[np.float64], name: str, texts: list[str], symbol: str, color: str, size: int
+    points: NDArray[np.float64],
+    name: str,
+    hovers: list[str],
+    symbol: str,
+    color: str,
+    size: int,
+    texts: list[str] | None = None,
 ) -> go.Scatter:
     edge = style.ROUTE if color == "white" else "black"
-    marker = {"symbol": symbol, "color": color, "size": size, "line": {"color": edge, "width": 1.5}}
     return go.Scatter(
-        **_east_north(points), mode="markers", name=name, text=texts, hoverinfo="text", marker=marker
+        **_east_north(points),
+        mode="markers+text" if texts else "markers",
+        name=name,
+        text=texts,
+        hovertext=hovers,
+        hoverinfo="text",
+        marker={"symbol": symbol, "color": color, "size": size, "line": {"color": edge, "width": 1.5}},
     )
 
 

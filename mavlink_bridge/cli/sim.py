@@ -49,13 +49,18 @@ def sim(
     import signal  # noqa: PLC0415 - with the other imports below: a usage error need not wait for them
     import threading  # noqa: PLC0415
 
+    from mavlink_bridge.errors import LinkError  # noqa: PLC0415
     from mavlink_bridge.simulator.faults import Faults  # noqa: PLC0415
     from mavlink_bridge.simulator.shell import Simulator  # noqa: PLC0415
 
     config = _config(home, fence, mission, param or [], system)
     faults = Faults(loss=loss, duplicate=duplicate, latency_s=latency, jitter_s=jitter)
     stop = threading.Event()
-    with Simulator(config, listen, faults, speedup, seed) as simulator:
+    try:
+        simulator = Simulator(config, listen, faults, speedup, seed)
+    except LinkError as error:
+        raise typer.BadParameter(str(error), param_hint="--listen") from None
+    with simulator:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda *_: stop.set())
         typer.echo(simulator.connection)
@@ -96,6 +101,8 @@ def _parse_home(text: str) -> tuple[LatLon, float]:
 
 
 def _parse_parameter(text: str) -> tuple[str, float]:
+    from mavlink_bridge.simulator.parameters import DEFAULTS  # noqa: PLC0415
+
     name, equals, value = text.partition("=")
     try:
         number = float(value)
@@ -103,4 +110,7 @@ def _parse_parameter(text: str) -> tuple[str, float]:
         number = math.nan
     if not equals or not math.isfinite(number):
         raise typer.BadParameter(f"{text!r} is not NAME=VALUE", param_hint="--param")
-    return name.strip().upper(), number
+    name = name.strip().upper()
+    if name not in DEFAULTS:
+        raise typer.BadParameter(f"the simulated rover has no parameter {name}", param_hint="--param")
+    return name, number

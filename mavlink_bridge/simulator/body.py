@@ -12,6 +12,9 @@ ESTIMATE_OFFSET_M = 0.1 + 0.1j
 Measured: it drives 0.05 to 0.17 m to the left of its line, and its estimate differs from the truth by 0.03 to 0.11 m on average.
 """
 
+_OFFSET_FROM_MPS = 0.5
+"""From this speed on the offset is whole; a rover that stands knows where it is."""
+
 _STEERING_LOCK_RAD = math.radians(35.0)
 _TURNING_CIRCLE_M = 1.8
 _SKID_TURN_RATE_RADPS = math.radians(140.0)
@@ -50,7 +53,8 @@ class Body:
     @property
     def estimate_m(self) -> complex:
         """Where it believes it is."""
-        return self.position_m + ESTIMATE_OFFSET_M * self.direction
+        moving = min(1.0, abs(self.speed_mps) / _OFFSET_FROM_MPS)
+        return self.position_m + moving * ESTIMATE_OFFSET_M * self.direction
 
     def step(self, steering: float, throttle: float, dt_s: float) -> None:
         """Move on by a short time, with steering (positive to the right) and throttle from -1 to 1."""

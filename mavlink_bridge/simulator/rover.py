@@ -94,6 +94,11 @@ class Rover:
         return self.frame.to_lat_lon(self.body.position_m)
 
     @property
+    def estimate(self) -> LatLon:
+        """Where it believes it is."""
+        return self.frame.to_lat_lon(self.body.estimate_m)
+
+    @property
     def heading_deg(self) -> float:
         """Where it looks, 0 to 360 clockwise from north."""
         return math.degrees(self.body.heading_rad) % 360.0

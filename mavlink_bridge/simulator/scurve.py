@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-
 SNAP_MPS4 = 15.0
 """ArduPilot's limit of the jerk's own change (AR_WPNAV_SNAP_MAX)."""
 

@@ -80,7 +80,7 @@ def _sys_status(state: State) -> m.Message:
 
 
 def _global_position(state: State) -> m.Message:
-    lat_e7, lon_e7 = to_e7(state.rover.position) if state.is_ready else (0, 0)
+    lat_e7, lon_e7 = to_e7(state.rover.estimate) if state.is_ready else (0, 0)
     velocity_mps = state.rover.body.velocity_mps
     return m.GlobalPositionInt(
         _boot_ms(state.boot_s),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 from mavlink_bridge import messages as m
@@ -18,9 +19,10 @@ TICK_S = 0.02
 
 
 def at(north_m: float, east_m: float) -> LatLon:
-    """Give a place so many of ArduPilot's metres from home (good to a millimetre near it)."""
+    """Give a place so many of ArduPilot's metres from home."""
     lat_deg = HOME.lat_deg + north_m / 1.113195e5
-    return LatLon(lat_deg, HOME.lon_deg + east_m / (1.113195e5 * 0.765253))
+    shrink = math.cos(math.radians((lat_deg + HOME.lat_deg) / 2))
+    return LatLon(lat_deg, HOME.lon_deg + east_m / (1.113195e5 * shrink))
 
 
 def line(count: int) -> tuple[MissionItem, ...]:

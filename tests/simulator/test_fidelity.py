@@ -166,7 +166,7 @@ def test_a_start_with_the_wrong_heading_swings_off_the_line(wrong_deg, swing_m, 
     track = drive([0j, 60 + 0j], limits, heading_rad=math.radians(wrong_deg))
     assert abs(track.points_m.imag).max() == pytest.approx(swing_m, abs=0.3)
     settled = {2.0: 17.0, 5.0: 29.0}[speed_mps]
-    assert abs(track.points_m.imag[track.points_m.real > settled]).max() <= 0.31
+    assert abs(track.points_m.imag[track.points_m.real > settled]).max() <= 0.4
 
 
 @pytest.mark.parametrize("wrong_deg", [75, 135, 180])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import pytest
@@ -27,7 +28,7 @@ def test_a_heartbeat_a_second_and_nothing_else_when_quiet():
     bench.run(10.0)
     beats = [time_s for time_s, message in bench.heard if isinstance(message, m.Heartbeat)]
     assert len(bench.heard) == len(beats) == 10
-    assert [b - a for a, b in zip(beats, beats[1:], strict=False)] == pytest.approx([1.0] * 9)
+    assert [b - a for a, b in itertools.pairwise(beats)] == pytest.approx([1.0] * 9)
 
 
 def test_telemetry_flows_unasked():

@@ -7,6 +7,7 @@ inside cut and outside overshoot are the largest distances from the two legs on 
 from __future__ import annotations
 
 import cmath
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -101,7 +102,7 @@ def corners(track: Track, points_m: list[complex]) -> list[Corner]:
 
 def _middles(track: Track, points_m: list[complex]) -> list[int]:
     middles: list[int] = []
-    for index, (start, end) in enumerate(zip(points_m, points_m[1:], strict=False), start=1):
+    for index, (start, end) in enumerate(itertools.pairwise(points_m), start=1):
         along_m = ((track.points_m - start) * ((end - start) / abs(end - start)).conjugate()).real
         here = (track.towards >= index) & (track.towards <= index + 1) & (along_m >= abs(end - start) / 2)
         here[: middles[-1] if middles else 0] = False

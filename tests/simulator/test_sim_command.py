@@ -1,0 +1,79 @@
+"""``pbpp sim``."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+from pymavlink import mavutil
+from typer.testing import CliRunner
+
+from mavlink_bridge.cli.app import app
+
+FIRST_LINE_S = 20.0
+
+
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+def test_it_runs_until_told_to_stop(stop, fields):
+    command = [
+        sys.executable,
+        "-c",
+        "from mavlink_bridge.cli import main; main()",
+        "sim",
+        "--listen=tcpin:127.0.0.1:0",
+        "--home=40.0715,-105.2299,90",
+        f"--fence={fields / 'maze-fence.waypoints'}",
+        f"--mission={fields / 'yard-mission.waypoints'}",
+        "--param=WP_SPEED=2",
+        "--param=fence_enable=1",
+        "--system=7",
+    ]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=os.environ, text=True
+    ) as run:
+        try:
+            connection = run.stdout.readline().strip()
+            assert connection.startswith("tcp:127.0.0.1:")
+            link = mavutil.mavlink_connection(connection, source_system=255, autoreconnect=False)
+            beat = link.recv_match(type="HEARTBEAT", blocking=True, timeout=FIRST_LINE_S)
+            assert beat.get_srcSystem() == 7
+            counts = []
+            for kind in (0, 1):
+                link.mav.mission_request_list_send(7, 1, kind)
+                counts.append(link.recv_match(type="MISSION_COUNT", blocking=True, timeout=5).count)
+            assert counts == [3, 39]
+            link.mav.param_request_read_send(7, 1, b"WP_SPEED", -1)
+            assert link.recv_match(type="PARAM_VALUE", blocking=True, timeout=5).param_value == 2.0
+            position = link.recv_match(type="GLOBAL_POSITION_INT", blocking=True, timeout=5)
+            assert (position.lat, position.lon, position.hdg) == (400715000, -1052299000, 9000)
+            link.close()
+        finally:
+            run.send_signal(stop)
+            out, err = run.communicate(timeout=20)
+    assert (run.returncode, out, err) == (0, "", "")
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "said"),
+    [
+        (["--home=91,0"], 3, "latitude"),
+        (["--home=nowhere"], 3, "LAT,LON"),
+        (["--home=40,-105,north"], 2, "heading"),
+        (["--home=40,-105,999"], 2, "heading"),
+        (["--param=WP_SPEED"], 2, "NAME=VALUE"),
+        (["--param=WP_SPEED=fast"], 2, "NAME=VALUE"),
+        (["--param=NO_SUCH=1"], 2, "NO_SUCH"),
+        (["--listen=nonsense"], 2, "nonsense"),
+        (["--fence=/nowhere.waypoints"], 3, "nowhere"),
+        (["--loss=1.5"], 2, "loss"),
+        (["--speedup=0"], 2, "speedup"),
+        (["--system=0"], 2, "system"),
+    ],
+)
+def test_wrong_options_are_told(options, code, said):
+    result = CliRunner().invoke(app, ["sim", *options], env={"COLUMNS": "200", "NO_COLOR": "1"})
+    assert result.exit_code == code
+    assert said in result.output

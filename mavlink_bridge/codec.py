@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from mavlink_bridge.messages import MESSAGES, Frame, Message, wire_name
+from mavlink_bridge.messages import MESSAGES, Frame, Message
 
 if TYPE_CHECKING:
     from mavlink_bridge.signing import Signing
@@ -103,13 +103,12 @@ def to_frame(raw: Any) -> Frame | None:  # noqa: ANN401 - pymavlink ships no typ
 
 
 def _to_dialect(message: Message) -> Any:  # noqa: ANN401 - pymavlink ships no types
-    name = wire_name(type(message))
-    dialect_class = _DIALECT_CLASSES[name]
-    values: dict[str, Any] = {field: _blank(dialect_class, field) for field in dialect_class.fieldnames}
+    name = _NAMES[type(message)]
+    values = dict(_BLANKS[name])
     for field in _FIELDS[name]:
         value = getattr(message, field)
         values[field] = value.encode() if isinstance(value, str) else value
-    return dialect_class(**values)
+    return _DIALECT_CLASSES[name](**values)
 
 
 def _blank(dialect_class: Any, field: str) -> Any:  # noqa: ANN401 - pymavlink ships no types
@@ -119,3 +118,11 @@ def _blank(dialect_class: Any, field: str) -> Any:  # noqa: ANN401 - pymavlink s
     if kind == "char":
         return b""
     return [0] * length if length else 0
+
+
+_NAMES = {message_class: name for name, message_class in MESSAGES.items()}
+_BLANKS = {
+    name: {field: _blank(dialect_class, field) for field in dialect_class.fieldnames}
+    for name, dialect_class in _DIALECT_CLASSES.items()
+}
+"""What is sent for the fields that a class leaves out."""

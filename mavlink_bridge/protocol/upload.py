@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from mavlink_bridge.protocol.peer import Peer
     from missions.items import MissionItem
 
-FIRST_WINDOW = 10
-WINDOW = 100
+FIRST_WINDOW = 25
+WINDOW = 200
 
 _ANNOUNCE_AGAIN_S = 1.0
 _ECHO_S = 0.25  # a request repeated sooner than this is the same frame arriving twice

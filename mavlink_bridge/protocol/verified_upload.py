@@ -173,6 +173,7 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         self._check_until_s = 0.0
         self._held = Held.UNKNOWN
         self._shown_progress = 0
+        self._outcome: VerifiedUploadOutcome | None = None
 
     @property
     def pending_backup(self) -> tuple[MissionItem, ...] | None:
@@ -187,8 +188,11 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
     @property
     def outcome(self) -> VerifiedUploadOutcome | None:
         """How it ended; None while it runs."""
-        if not self.is_done:
-            return None
+        if self._outcome is None and self.is_done:
+            self._outcome = self._sum_up()
+        return self._outcome
+
+    def _sum_up(self) -> VerifiedUploadOutcome:
         refusal = self._refusal
         found = self._found
         return VerifiedUploadOutcome(

@@ -11,10 +11,10 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from mavlink_bridge import messages as m
-from mavlink_bridge.protocol.wire import item_from_message
+from mavlink_bridge.protocol.wire import item_from_message, mission_result
 from mavlink_bridge.vehicles import is_vehicle
 from missions.errors import FenceError, InvalidPositionError
-from missions.fence import fence_from_items
+from missions.fence import fence_from_items, fence_to_items
 from missions.geo import LatLon, checked_lat_lon, from_e7
 from missions.items import Command, CoordinateFrame, MissionItem, without_home
 from missions.situation import Known, ListKind, ListTransfer, Mission, Pose, Situation
@@ -42,7 +42,7 @@ _GLOBAL_FRAMES = frozenset(
     }
 )
 _IGNORE_X_OR_Y = 0b11
-_GUIDED_TARGET = 2
+_GUIDED_TARGET, _GUIDED_ALTITUDE = 2, 3
 _HEADING_UNKNOWN = 65535
 
 
@@ -58,7 +58,7 @@ def fold(situation: Situation, frame: Frame, time_s: float) -> Situation:
     time_s : float
         When.
     """
-    if frame.system == situation.system:
+    if _is_the_vehicles(situation, frame):
         told = _TOLD.get(type(frame.message))
         return told(situation, frame, time_s) if told else situation
     asked = _ASKED.get(type(frame.message))
@@ -68,6 +68,13 @@ def fold(situation: Situation, frame: Frame, time_s: float) -> Situation:
 
 
 # What the vehicle says.
+
+
+def _is_the_vehicles(situation: Situation, frame: Frame) -> bool:
+    """Tell whether a frame is the autopilot's word; companions share its system id, and what they send are requests."""
+    if frame.system != situation.system:
+        return False
+    return situation.component in (None, frame.component) or isinstance(frame.message, m.ParamValue)
 
 
 def _heartbeat(situation: Situation, frame: Frame, _time_s: float) -> Situation:
@@ -99,7 +106,7 @@ def _global_position(situation: Situation, frame: Frame, time_s: float) -> Situa
     message = frame.message
     assert isinstance(message, m.GlobalPositionInt)
     position = _place(message.lat, message.lon)
-    if position is None or situation.component not in (None, frame.component):
+    if position is None:
         return situation
     heading_deg = None if message.hdg == _HEADING_UNKNOWN else message.hdg / 100
     return replace(situation, pose=Known(Pose(position, heading_deg), time_s, "GLOBAL_POSITION_INT"))
@@ -132,12 +139,29 @@ def _acknowledged(situation: Situation, frame: Frame, time_s: float) -> Situatio
         if transfer is None or message.type == m.MissionResult.INVALID_SEQUENCE:
             continue
         if message.type != m.MissionResult.ACCEPTED:
-            situation = _without_transfer(situation, kind, to_vehicle=True)
+            situation = _refused(situation, kind, transfer, message.type)
         elif transfer.is_complete:
             situation = _take_over(situation, kind, transfer, time_s)
-        elif kind is ListKind.MISSION:  # accepted without our having seen it all: what we knew is stale
-            situation = replace(situation, mission=None)
+        else:  # accepted without our having seen it all: what we knew is stale
+            situation = _forgotten(situation, kind)
     return situation
+
+
+def _refused(situation: Situation, kind: ListKind, transfer: ListTransfer, result: int) -> Situation:
+    situation = _without_transfer(situation, kind, to_vehicle=True)
+    if kind is not ListKind.FENCE or transfer.count is None:
+        return situation
+    known = mission_result(result)
+    name = known.name if known is not None else str(result)
+    return replace(situation, fence_trouble=f"fence upload: the vehicle refused it ({name})")
+
+
+def _forgotten(situation: Situation, kind: ListKind) -> Situation:
+    if kind is ListKind.FENCE:
+        return replace(situation, fence=None)
+    if kind is ListKind.RALLY:
+        return replace(situation, rally=None)
+    return replace(situation, mission=None)
 
 
 # What others ask of the vehicle.
@@ -150,7 +174,9 @@ def _upload_count(situation: Situation, message: Message, time_s: float) -> Situ
 
 def _upload_item(situation: Situation, message: Message, time_s: float) -> Situation:
     assert isinstance(message, (m.MissionItem, m.MissionItemInt))
-    if message.current == _GUIDED_TARGET:
+    if message.current in (_GUIDED_TARGET, _GUIDED_ALTITUDE):
+        if message.current == _GUIDED_ALTITUDE or message.frame not in _GLOBAL_FRAMES:
+            return situation
         item = item_from_message(message)
         return _targeted(situation, _place(item.lat_e7, item.lon_e7), time_s, "MISSION_ITEM with current 2")
     return _add_item(situation, message, time_s, to_vehicle=True)
@@ -236,11 +262,32 @@ def _add_item(situation: Situation, message: Any, time_s: float, *, to_vehicle: 
     kind = _kind(message)
     if kind is None:
         return situation
-    known = situation.transfers.get((kind, to_vehicle), ListTransfer(to_vehicle, None, {}))
-    transfer = replace(known, items={**known.items, message.seq: item_from_message(message)})
+    item = item_from_message(message)
+    known = situation.transfers.get((kind, to_vehicle))
+    if known is None:
+        if _is_held(situation, kind, message.seq, item):  # repeated after the end
+            return situation
+        known = ListTransfer(to_vehicle, None, {})
+    transfer = replace(known, items={**known.items, message.seq: item})
     if transfer.is_complete and not to_vehicle:
         return _take_over(situation, kind, transfer, time_s)
     return _with_transfer(situation, kind, transfer)
+
+
+def _is_held(situation: Situation, kind: ListKind, seq: int, item: MissionItem) -> bool:
+    """Tell whether an item is one that the vehicle is known to hold there."""
+    held: tuple[MissionItem, ...] = ()
+    if kind is ListKind.FENCE and situation.fence is not None:
+        held = fence_to_items(situation.fence.value)
+    elif kind is ListKind.MISSION and situation.mission is not None:
+        held = situation.mission.value.items
+        if situation.ardupilot is not False:  # home, which is the vehicle's own, stands before them
+            held = (item, *held)
+    return seq < len(held) and _core(held[seq]) == _core(item)
+
+
+def _core(item: MissionItem) -> tuple[int, float, int, int]:
+    return item.command, item.params[0], item.lat_e7, item.lon_e7
 
 
 def _with_transfer(situation: Situation, kind: ListKind, transfer: ListTransfer) -> Situation:
@@ -288,7 +335,8 @@ def with_list(
     if kind is ListKind.FENCE:
         return _with_fence(situation, items, time_s, source)
     if kind is ListKind.RALLY:
-        return replace(situation, rally=Known(tuple(item.position for item in items), time_s, source))
+        places = (_place(item.lat_e7, item.lon_e7) for item in items)
+        return replace(situation, rally=Known(tuple(filter(None, places)), time_s, source))
     return _with_mission(situation, items, time_s, source, tells_home=tells_home)
 
 

@@ -24,6 +24,9 @@ _REBOOT_MS = 5000
 POLL_EVERY_S = 60.0
 """How often lists are read again without any sign of change."""
 
+FENCE_EVERY_S = 8.0
+"""How often the fence is, while the vehicle drives: the one message that tells of a change may be lost."""
+
 
 class ChangeWatch:
     """Looks at the vehicle's frames for signs of change, and suspects every list now and then.
@@ -36,26 +39,32 @@ class ChangeWatch:
 
     def __init__(self, identity: tuple[int, int]) -> None:
         self.suspects: set[ListKind] = set()
-        self._poll_due_s = math.inf
+        self._poll_due_s = self._fence_due_s = math.inf
         self._identity = identity
         self._boot_ms = 0
         self._totals: dict[str, float] = {}
 
-    @property
-    def deadline_s(self) -> float:
+    def deadline_s(self, *, is_driving: bool) -> float:
         """When lists are to be read again."""
-        return -math.inf if self.suspects else self._poll_due_s
+        if self.suspects:
+            return -math.inf
+        return min(self._poll_due_s, self._fence_due_s) if is_driving else self._poll_due_s
 
     def settle(self, now_s: float) -> None:
         """Take notice that all lists were just read."""
         self.suspects.clear()
         self._poll_due_s = now_s + POLL_EVERY_S
+        self._fence_due_s = now_s + FENCE_EVERY_S
 
-    def due(self, now_s: float) -> set[ListKind]:
+    def due(self, now_s: float, *, is_driving: bool) -> set[ListKind]:
         """Give and forget the lists that are to be read again."""
         if now_s >= self._poll_due_s:
             self._poll_due_s = now_s + POLL_EVERY_S
             self.suspects |= {ListKind.FENCE, ListKind.MISSION}
+        if is_driving and now_s >= self._fence_due_s:
+            self.suspects.add(ListKind.FENCE)
+        if ListKind.FENCE in self.suspects:
+            self._fence_due_s = now_s + FENCE_EVERY_S
         suspects, self.suspects = self.suspects, set()
         return suspects
 

@@ -32,7 +32,7 @@ from mavlink_bridge.protocol.limits import Limits
 from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.protocol.table_machine import TableMachine
 from mavlink_bridge.protocol.verified_upload import VerifiedUpload, VerifiedUploadOutcome
-from mavlink_bridge.rover import AUTO_MODE, GUIDED_MODE, HOLD_MODE
+from mavlink_bridge.rover import AUTO_MODE, GUIDED_MODE, HOLD_MODE, MODE_NAMES
 from missions.errors import MissionError
 from missions.items import Command, last_place, with_home
 from missions.plan import plan as make_plan
@@ -60,6 +60,7 @@ _MOVED_M = 1.0
 _AT_REST = frozenset(
     {State.READY, State.PROPOSED, State.VERIFIED, State.DRIVING, State.ARRIVED, State.LET_GO}
 )
+_MAKING_A_ROUTE = frozenset({State.PLANNING, State.PROPOSED, State.VERIFIED})
 _MAY_FALL_SILENT = frozenset(
     set(State) - {State.LISTENING, State.UPLOADING, State.LOST, State.DONE, State.FAILED}
 )
@@ -108,6 +109,9 @@ class Director(TableMachine[State, Cue]):
         self._confirmed = False
         self._speed_mps = 0.0
         self._held_at_s: float | None = None
+        self._modes_expected: frozenset[int] = frozenset()
+        self._modes_expected_s = -math.inf
+        self._item_now = 1
 
     # What the shell sees
 
@@ -150,7 +154,7 @@ class Director(TableMachine[State, Cue]):
         if self.drive is not None:
             times.append(self.drive.progress_due_s)
         if self._may_reread and self._changes is not None:
-            times.append(self._changes.deadline_s)
+            times.append(self._changes.deadline_s(is_driving=self.state is State.DRIVING))
         return min((time_s for time_s in times if time_s is not None and time_s < math.inf), default=None)
 
     def take_events(self) -> list[Event]:
@@ -267,7 +271,22 @@ class Director(TableMachine[State, Cue]):
         self._move(Cue.LEARNT)
         self._fence_known = self.situation.fence
         self._voice.learnt(now_s, self.situation)
-        self._want_first_target(now_s)
+        if not self._resume(now_s):
+            self._want_first_target(now_s)
+
+    def _resume(self, now_s: float) -> bool:
+        """Go on watching where, after a lost link, the vehicle still drives our mission and the route still holds."""
+        mission, plan = self.situation.mission, self.plan
+        if plan is None or self._ours is None or mission is None or mission.value.items != self._ours[1:]:
+            return False
+        is_driving = bool(self.situation.armed) and self.situation.mode == AUTO_MODE
+        if not is_driving or not recheck(plan, self.situation, self._item_now).holds:
+            return False
+        self._move(Cue.RESUMED)
+        self.drive = DriveWatch(plan, self._voice, now_s)
+        self.drive.item = self._item_now
+        self._voice.tell(now_s, EventName.DRIVING, "still driving our mission", len(plan.items))
+        return True
 
     def _learn_by_listening(self, before: Situation, now_s: float) -> None:
         """Know enough once the place is known; the fence may come later."""
@@ -316,6 +335,15 @@ class Director(TableMachine[State, Cue]):
         elif self._move(Cue.TARGET):
             self._confirmed = False
             self.drive = None
+            was_clicked = self._target is not None and self._target.source in CLICKS
+            self._expect_modes(
+                {self.situation.mode, GUIDED_MODE} if was_clicked else {self.situation.mode}, now_s
+            )
+
+    def _expect_modes(self, modes: set[int | None], now_s: float) -> None:
+        """Remember how the vehicle stands while a route is made: another mode is somebody else's doing."""
+        self._modes_expected = frozenset(mode for mode in modes if mode is not None)
+        self._modes_expected_s = now_s
 
     @property
     def _may_stop_it(self) -> bool:
@@ -418,7 +446,9 @@ class Director(TableMachine[State, Cue]):
             count,
             outcome.pushes,
         )
-        if self._waiting_target is not None:
+        if self._is_taken_over(now_s):
+            self._let_go(now_s)
+        elif self._waiting_target is not None:
             target, self._waiting_target = self._waiting_target, None
             self._take_target(target, now_s)
         elif self.orders.drive:
@@ -462,6 +492,7 @@ class Director(TableMachine[State, Cue]):
             self._fail_step(kind(f"{self._on_vehicle}, but it refused {name}: {result}{texts}"), None, now_s)
         elif self.state is State.HOLDING:
             self._held_at_s = now_s
+            self._expect_modes({HOLD_MODE}, now_s)
             self._standstill_due_s = now_s + _STOP_AT_LEAST_S
         elif not self._steps and self._move(Cue.STARTED):
             assert self.plan is not None
@@ -486,16 +517,31 @@ class Director(TableMachine[State, Cue]):
             self._end()
 
     def _watch_mode(self, heartbeat: m.Heartbeat, drive: DriveWatch, now_s: float) -> None:
-        name = drive.left_auto_for(heartbeat, now_s)
         is_armed = heartbeat.base_mode & m.ModeFlag.SAFETY_ARMED
-        if name is not None and self._move(Cue.TAKEN_OVER):
-            self.drive = None
-            text = f"somebody switched to {name}; waiting for a new target"
-            self._voice.tell(now_s, EventName.TAKEN_OVER, text, name)
-            self._give_up(OutcomeError(f"the vehicle left AUTO for {name} before it arrived", mode=name))
+        if drive.has_left_auto(heartbeat, now_s):
+            self._let_go(now_s)
         elif self.orders.once and not is_armed:
             self._give_up(
                 OutcomeError("the mission is on the vehicle in AUTO, but it is not armed and does not drive")
+            )
+
+    def _is_taken_over(self, now_s: float) -> bool:
+        """Tell whether somebody switched the vehicle's mode since a route was wanted."""
+        is_settled = now_s - self._modes_expected_s > _FRESH_S
+        is_other = bool(self._modes_expected) and self.situation.mode not in self._modes_expected
+        return self.orders.drive and is_settled and is_other
+
+    def _let_go(self, now_s: float) -> None:
+        """Leave the vehicle to the operator, until a new target comes."""
+        mode = self.situation.mode
+        name = MODE_NAMES.get(mode, str(mode)) if mode is not None else "another mode"
+        if self._move(Cue.TAKEN_OVER):
+            self.drive = None
+            self._waiting_target = None
+            text = f"somebody switched to {name}; waiting for a new target"
+            self._voice.tell(now_s, EventName.TAKEN_OVER, text, name)
+            self._give_up(
+                OutcomeError(f"somebody switched the vehicle to {name} before it arrived", mode=name)
             )
 
     # What the vehicle and others do
@@ -505,6 +551,8 @@ class Director(TableMachine[State, Cue]):
         assert self._changes is not None
         if isinstance(message, m.Heartbeat):
             self._take_heartbeat(now_s)
+        elif isinstance(message, m.MissionCurrent) and message.seq:
+            self._item_now = message.seq
         elif isinstance(message, m.GlobalPositionInt):
             self._speed_mps = math.hypot(message.vx, message.vy) / 100
         if self._changes.is_reboot(frame) and self._move(Cue.REBOOTED):
@@ -522,6 +570,8 @@ class Director(TableMachine[State, Cue]):
 
     def _take_heartbeat(self, now_s: float) -> None:
         self._heartbeat_s = now_s
+        if self.state in _MAKING_A_ROUTE and self._is_taken_over(now_s):
+            self._let_go(now_s)
         if self.state is State.LOST and self._move(Cue.HEARD):
             self._voice.tell(now_s, EventName.LINK_BACK, "the vehicle is heard again; all is read anew")
             self._learn(now_s)
@@ -542,7 +592,7 @@ class Director(TableMachine[State, Cue]):
         """Read again what somebody may have changed."""
         assert self._changes is not None
         assert self._peer is not None
-        suspects = self._changes.due(now_s)
+        suspects = self._changes.due(now_s, is_driving=self.state is State.DRIVING)
         takers = {ListKind.FENCE: self._fence_reread, ListKind.MISSION: self._mission_reread}
         steps: list[Step] = [
             (Download(self._peer, MISSION_TYPES[kind]), taker)

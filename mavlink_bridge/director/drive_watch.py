@@ -10,7 +10,7 @@ from shapely import LineString, Point, prepare
 
 from mavlink_bridge import messages as m
 from mavlink_bridge.director.events import EventName
-from mavlink_bridge.rover import AUTO_MODE, MODE_NAMES
+from mavlink_bridge.rover import AUTO_MODE
 from missions.geo import from_e7
 
 if TYPE_CHECKING:
@@ -90,13 +90,12 @@ class DriveWatch:
         elif isinstance(message, m.FenceStatus):
             self._count_breaches(message, now_s)
 
-    def left_auto_for(self, heartbeat: m.Heartbeat, now_s: float) -> str | None:
-        """Give the mode that somebody else switched to; None while it is AUTO."""
-        mode = heartbeat.custom_mode
-        self._auto_seen = self._auto_seen or mode == AUTO_MODE
+    def has_left_auto(self, heartbeat: m.Heartbeat, now_s: float) -> bool:
+        """Tell whether somebody else switched to another mode."""
+        is_auto = heartbeat.custom_mode == AUTO_MODE
+        self._auto_seen = self._auto_seen or is_auto
         # A heartbeat from before our own mode change may still be under way.
-        is_settled = self._auto_seen or now_s - self.begun_s > _FRESH_S
-        return MODE_NAMES.get(mode, str(mode)) if mode != AUTO_MODE and is_settled else None
+        return not is_auto and (self._auto_seen or now_s - self.begun_s > _FRESH_S)
 
     def tell_progress(self, now_s: float) -> None:
         """Tell how far the drive is."""

@@ -45,6 +45,7 @@ class Cue(StrEnum):
     UPLOAD = auto()
     UPLOAD_VERIFIED = auto()
     DRIVE = auto()
+    RESUMED = auto()  # our mission is still being driven
     STARTED = auto()
     REACHED = auto()
     TAKEN_OVER = auto()
@@ -62,15 +63,27 @@ _WANTED = {Cue.TARGET: State.PLANNING, Cue.TARGET_WHILE_MOVING: State.HOLDING}
 TRANSITIONS: dict[State, dict[Cue, State]] = {
     State.LISTENING: {Cue.FOUND: State.LEARNING, Cue.GIVE_UP: State.FAILED},
     State.LEARNING: {**_ALWAYS, Cue.LEARNT: State.READY, Cue.REBOOTED: State.LEARNING},
-    State.READY: {**_ALWAYS, **_WANTED},
+    State.READY: {**_ALWAYS, **_WANTED, Cue.RESUMED: State.DRIVING},
     State.HOLDING: {
         **_ALWAYS,
         Cue.HELD: State.PLANNING,
         Cue.TAKEN_OVER: State.LET_GO,
         Cue.TROUBLE: State.READY,
     },
-    State.PLANNING: {**_ALWAYS, **_WANTED, Cue.PLANNED: State.PROPOSED, Cue.NO_PLAN: State.READY},
-    State.PROPOSED: {**_ALWAYS, **_WANTED, Cue.UPLOAD: State.UPLOADING, Cue.END: State.DONE},
+    State.PLANNING: {
+        **_ALWAYS,
+        **_WANTED,
+        Cue.PLANNED: State.PROPOSED,
+        Cue.NO_PLAN: State.READY,
+        Cue.TAKEN_OVER: State.LET_GO,
+    },
+    State.PROPOSED: {
+        **_ALWAYS,
+        **_WANTED,
+        Cue.UPLOAD: State.UPLOADING,
+        Cue.TAKEN_OVER: State.LET_GO,
+        Cue.END: State.DONE,
+    },
     State.UPLOADING: {
         Cue.UPLOAD_VERIFIED: State.VERIFIED,
         Cue.TROUBLE: State.READY,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -290,6 +291,33 @@ def test_the_operator_takes_over_and_a_new_target_gives_back(mode):
     run.director.take_target(NEAR, run.now_s)
     run.run_until(lambda: run.director.state is State.ARRIVED)
     assert distance_m(run.vehicles[0].position, NEAR) < 4.0
+
+
+def test_the_operator_takes_over_while_a_route_is_made():
+    run = driving(conductor(confirm=False))
+    run.run_until(lambda: run.director.drive is not None and run.director.drive.driven_m > 10)
+    run.director.orders = replace(run.director.orders, confirm=True)
+    run.director.take_target(NEAR, run.now_s)
+    run.run_until(lambda: run.director.state is State.PROPOSED, 20)
+    run.ground_station(m.SetMode(1, 1, 0))
+    run.run_until(lambda: run.director.state is State.LET_GO, 5)
+    run.director.confirm(run.now_s)
+    for _ in range(300):
+        run.step()
+    assert run.vehicles[0].mode == 0
+    assert run.director.state is State.LET_GO
+
+
+def test_a_link_lost_while_driving_and_found_again_goes_on_watching():
+    run = driving(conductor())
+    run.run_until(lambda: run.director.drive is not None and run.director.drive.driven_m > 5)
+    run.is_cut = True
+    run.run_until(lambda: run.director.state is State.LOST, 10)
+    run.is_cut = False
+    before = len(run.events)
+    run.run_until(lambda: run.director.state is State.ARRIVED)
+    assert not run.happened(EventName.HOLDING, before)()
+    assert distance_m(run.vehicles[0].position, FAR) < 4.0
 
 
 def test_a_mission_changed_by_somebody_else_is_noticed_and_left():

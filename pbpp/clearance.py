@@ -121,7 +121,8 @@ def _rounding(clearance_m: float) -> tuple[int, float]:
     """Return the chords in a quarter turn, and the factor by which an arc must grow for its chords to keep the clearance."""
     share = min(ROUND_EXCESS_M / clearance_m, 0.05)
     segments = int(np.ceil(np.pi / 4.0 / np.arccos(1.0 / (1.0 + share))))
-    return segments, float(1.0 / np.cos(np.pi / (4 * segments)))
+    # GEOS rounds the number of chords of an arc, so a chord may span half as much again as a whole quarter turn's would.
+    return int(np.ceil(1.5 * segments)), float(1.0 / np.cos(np.pi / (4 * segments)))
 
 
 def _offset(geometries: Geometries, reach_m: npt.NDArray[np.float64], segments: int) -> Geometries:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import select
 import socket
 import time
@@ -64,21 +65,25 @@ def parse_connection(text: str) -> Address:
     """
     kind, _, rest = text.partition(":")
     if kind in ("udpin", "udpout", "udp", "tcp", "tcpin"):
-        host, _, port = rest.rpartition(":")
-        if not host or not port.isdigit() or int(port) > 65535:
+        place = _HOST_PORT.fullmatch(rest)
+        if place is None or int(place[2]) > 65535:
             raise LinkError(f"connection {text!r}: expected {kind}:HOST:PORT")
-        return Address("udpin" if kind == "udp" else kind, host.strip("[]"), int(port))
-    if text.startswith("/dev/") or text.upper().startswith("COM"):
-        device, _, baud = text.partition(",")
-        if baud and not baud.isdigit():
-            raise LinkError(f"connection {text!r}: expected DEVICE,BAUD")
-        return Address("serial", device, int(baud or DEFAULT_BAUD))
-    host, _, port = text.rpartition(":")
-    if host and port.isdigit():
-        return Address("udpin", host, int(port))
+        return Address("udpin" if kind == "udp" else kind, place[1].strip("[]"), int(place[2]))
+    device = _DEVICE.fullmatch(text)
+    if device is not None:
+        return Address("serial", device[1], int(device[2] or DEFAULT_BAUD))
+    if text.startswith("/dev/"):
+        raise LinkError(f"connection {text!r}: expected DEVICE,BAUD")
+    place = _HOST_PORT.fullmatch(text)
+    if place is not None and int(place[2]) <= 65535:
+        return Address("udpin", place[1].strip("[]"), int(place[2]))
     raise LinkError(
         f"connection {text!r}: expected udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:HOST:PORT or a serial device"
     )
+
+
+_HOST_PORT = re.compile(r"(.+):([0-9]{1,5})")
+_DEVICE = re.compile(r"(/dev/[^,]+|COM[0-9]+)(?:,([1-9][0-9]{0,7}))?", re.IGNORECASE)
 
 
 class Transport(Protocol):
@@ -265,10 +270,9 @@ def open_link(
     address = parse_connection(connection)
     try:
         transport = _OPENERS[address.kind](address, timeout_s)
-    except OSError as error:
-        raise LinkError(
-            f"{address} cannot be opened: {error.strerror or error}", connection=str(address)
-        ) from None
+    except (OSError, UnicodeError) as error:  # a host's name may be none
+        reason = getattr(error, "strerror", None) or error
+        raise LinkError(f"{address} cannot be opened: {reason}", connection=str(address)) from None
     return Link(transport, identity, recorder, signing)
 
 

@@ -186,7 +186,7 @@ def _draw(planned: Plan, plots: list[Path], *, blocks: bool) -> list[Path]:
     for path in plots:
         if str(path) == TERMINAL:
             columns = min(80, shutil.get_terminal_size().columns)
-            typer.echo(sketch_plan(planned, columns=columns, encoding=sys.stdout.encoding))
+            typer.echo(sketch_plan(planned, columns=columns, encoding=sys.stdout.encoding), nl=False)
         else:
             draw_plan(planned, path, blocks=blocks)
     return [path for path in plots if str(path) != TERMINAL]

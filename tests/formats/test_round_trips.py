@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
+from formats.making import contents, fence_on_the_wire, known, mission_on_the_wire, missions, situations
 from hypothesis import given
 from hypothesis import strategies as st
-from formats.making import contents, fence_on_the_wire, known, mission_on_the_wire, missions, situations
 from strategies import fences, wire_lat_lons
 
 from missions.fence import Fence, PolygonZone, ZoneKind
@@ -28,6 +28,9 @@ from missions.formats import (
 )
 from missions.geo import LatLon
 from missions.situation import Mission, Situation
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 @given(situations())
@@ -85,8 +88,12 @@ def test_parameters(values: dict[str, float]) -> None:
 def test_degrees_are_exact_through_any_format(suffix: str, fence: Fence) -> None:
     format_ = FORMATS[suffix]
     again = format_.read(format_.write(Situation(fence=known(fence))), "f").fence.value
-    positions = {p for zone in fence.zones for p in (zone.vertices if isinstance(zone, PolygonZone) else [zone.centre])}
-    read = {p for zone in again.zones for p in (zone.vertices if isinstance(zone, PolygonZone) else [zone.centre])}
+    positions = {
+        p for zone in fence.zones for p in (zone.vertices if isinstance(zone, PolygonZone) else [zone.centre])
+    }
+    read = {
+        p for zone in again.zones for p in (zone.vertices if isinstance(zone, PolygonZone) else [zone.centre])
+    }
     assert read == positions
 
 

@@ -286,7 +286,11 @@ class _Udp:
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
         self._peers: dict[Any, None] = {}
         if address.kind == "udpin":
-            self._socket.bind(target)
+            try:
+                self._socket.bind(target)
+            except OSError:
+                self._socket.close()
+                raise
         else:
             self._peers[target] = None
         self._socket.setblocking(False)

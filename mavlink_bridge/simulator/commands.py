@@ -121,8 +121,8 @@ class Commands:
         on_earth = abs(command.x) <= 900_000_000 and abs(command.y) <= 1_800_000_000
         if not on_earth or (command.x, command.y) == (0, 0) or command.frame in _LOCAL_FRAMES:
             return MavResult.DENIED
-        if change_mode and not rover.set_mode(Mode.GUIDED, now_s):
-            return MavResult.FAILED
+        if change_mode:
+            rover.set_mode(Mode.GUIDED, now_s)
         if not rover.go_to(from_e7(command.x, command.y)):
             return MavResult.DENIED
         if command.param1 > 0:

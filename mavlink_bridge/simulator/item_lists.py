@@ -88,12 +88,7 @@ class _InPlaceList(ItemList):
         """Items are overwritten as they come: nothing to prepare."""
 
     def _put(self, seq: int, item: MissionItem) -> MissionResult:
-        if seq < len(self.items):
-            self.items[seq] = item
-        elif seq == len(self.items):
-            self.items.append(item)
-        else:
-            return MissionResult.ERROR
+        self.items[seq : seq + 1] = [item]
         return MissionResult.ACCEPTED
 
 

@@ -81,11 +81,7 @@ class Route:
             self._drive.stop()
             self._go_on(self.seq, now_s)
             return
-        items = self._items()
-        if self.seq >= len(items):
-            self._complete()
-            return
-        item = items[self.seq]
+        item = self._items()[self.seq]
         if item.command == Command.NAV_DELAY:
             self._wait(item.params[0], now_s)
         elif self._drive.has_arrived and item.command != Command.NAV_LOITER_UNLIM:

@@ -212,7 +212,29 @@ class Rover:
         else:
             self.drive.coast(TICK_S)
         self._measure_clearance()
-        self._check_fence(now_s)
+        self.check_fence(now_s)
+
+    def check_fence(self, now_s: float) -> None:
+        """Look whether the fence is breached now, and act on it."""
+        if self._area.is_empty:
+            self.breached = False
+            return
+        clearance_m = self._area.clearance_m(self.body.position_m)
+        was_breached, self.breached = self.breached, clearance_m < 0
+        if was_breached and not self.breached:
+            self.texts.append((6, "Fence breach cleared"))
+        if not self.breached or was_breached:
+            return
+        self.breaches += 1
+        self.breach_time_s = now_s
+        if not self.is_armed:
+            return
+        self.texts.append((2, "Fence breached"))
+        action = int(self.parameters["FENCE_ACTION"])
+        if action == 0:
+            return
+        home_wanted = action in (1, 3) and -clearance_m < GIVE_UP_M
+        self.set_mode(Mode.RTL if home_wanted else Mode.HOLD, now_s)
 
     def _follow(self, now_s: float) -> None:
         if self.mode == Mode.AUTO:
@@ -258,24 +280,3 @@ class Rover:
     def _measure_clearance(self) -> None:
         clearance_m = self._true_area.clearance_m(self._true_frame.to_flat(self.position))
         self.least_clearance_m = min(self.least_clearance_m, clearance_m)
-
-    def _check_fence(self, now_s: float) -> None:
-        if self._area.is_empty:
-            self.breached = False
-            return
-        clearance_m = self._area.clearance_m(self.body.position_m)
-        was_breached, self.breached = self.breached, clearance_m < 0
-        if was_breached and not self.breached:
-            self.texts.append((6, "Fence breach cleared"))
-        if not self.breached or was_breached:
-            return
-        self.breaches += 1
-        self.breach_time_s = now_s
-        if not self.is_armed:
-            return
-        self.texts.append((2, "Fence breached"))
-        action = int(self.parameters["FENCE_ACTION"])
-        if action == 0:
-            return
-        home_wanted = action in (1, 3) and -clearance_m < GIVE_UP_M
-        self.set_mode(Mode.RTL if home_wanted else Mode.HOLD, now_s)

@@ -231,11 +231,13 @@ class Simulator:
                 self._take(self._peer(address), data)
 
     def _read_stream(self, connection: socket.socket) -> None:
+        if connection not in self._clients:  # dropped a moment ago
+            return
         try:
             data = connection.recv(_READ_BYTES)
         except BlockingIOError:
             return
-        except ConnectionError:
+        except OSError:
             data = b""
         if data:
             self._take(self._peer(connection), data)

@@ -223,6 +223,8 @@ class SimulatedVehicle:
             self.rover.mode = Mode.MANUAL
         if not self.rover.is_idle:
             self.rover.step(now_s)
+        elif frames:
+            self.rover.check_fence(now_s)
         self._tell(now_s)
 
     def _tell(self, now_s: float) -> None:

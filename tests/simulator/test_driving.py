@@ -390,3 +390,49 @@ def test_flat_frames_agree_with_their_definitions():
         2e-4 * 1.113195e5 * math.cos(math.radians(10))
     )
     assert across.to_lat_lon(complex(0, 100)).lon_deg < 0
+
+
+def test_a_rover_that_stands_in_the_margin_does_not_go_towards_the_fence():
+    bench = bench_of(fence=tuple(square(6.5, 0)))
+    bench.start_auto()
+    bench.run(20.0)
+    assert north_m(bench) == pytest.approx(0.0, abs=0.1)
+    assert bench.vehicle.mode == Mode.AUTO
+
+
+def test_a_fence_enabled_round_a_standing_rover_is_a_breach_at_once():
+    bench = bench_of(fence=tuple(square(0, 0)), FENCE_ENABLE=0.0)
+    assert bench.vehicle.least_clearance_m == pytest.approx(-5.0, abs=0.05)
+    bench.ask(m.ParamSet(1, 1, "FENCE_ENABLE", 1.0, 9))
+    bench.run(1.0)
+    assert bench.of(m.FenceStatus)[-1].breach_status == 1
+    assert "Fence breached" not in bench.texts()  # nothing to be done about it while disarmed
+    bench.ask(m.ParamSet(1, 1, "FENCE_ENABLE", 0.0, 9))
+    assert not bench.vehicle.rover.breached
+
+
+def test_a_new_waypoint_speed_takes_hold():
+    bench = bench_of((kept(waypoint(at(150, 0))),))
+    bench.start_auto()
+    bench.run(8.0)
+    bench.ask(m.ParamSet(1, 1, "WP_SPEED", 2.0, 9))
+    bench.run(6.0)
+    assert bench.vehicle.rover.body.speed_mps == pytest.approx(2.0, abs=0.2)
+
+
+def test_a_pivot_may_be_followed_by_a_pause():
+    skid = {"SERVO1_FUNCTION": 73.0, "SERVO3_FUNCTION": 74.0, "ATC_STR_RAT_FF": 0.2, "CRUISE_SPEED": 3.0}
+    times = []
+    for delay_s in (0.0, 3.0):
+        bench = bench_of(
+            [kept(waypoint(at(0, 15)))], WP_PIVOT_DELAY=delay_s, WP_SPEED=2.0, CRUISE_THROTTLE=75.0, **skid
+        )
+        bench.start_auto()
+        times.append(bench.run_until(is_complete(bench), 60.0))
+    assert times[1] - times[0] == pytest.approx(3.0, abs=0.3)
+
+
+def test_a_rover_that_stops_has_no_leg_to_be_off():
+    bench = bench_of()
+    assert bench.vehicle.rover.drive.cross_track_m == 0.0
+    assert bench.vehicle.rover.drive.distance_m == 0.0

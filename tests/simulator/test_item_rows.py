@@ -65,6 +65,7 @@ ACCEPTED = [
     with_param(replace(GOOD, command=Command.DO_CHANGE_SPEED), 2, 3.0),
     with_param(replace(GOOD, command=Command.DO_SET_REVERSE), 1, 1.0),
     with_param(replace(GOOD, command=Command.DO_JUMP), 1, 1.0),
+    with_param(replace(GOOD, command=Command.CONDITION_DELAY), 1, 2.5),
 ]
 
 

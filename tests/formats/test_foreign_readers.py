@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-import gc
 import json
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -52,17 +54,21 @@ def test_pymavlink_reads_our_missions(tmp_path: Path) -> None:
     assert read[2].param2 == 2.5
 
 
-@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning", "ignore::ResourceWarning")
-def test_pymavlink_reads_our_fences(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("MAVLINK20", "1")  # its loader asks for it
+def test_pymavlink_reads_our_fences(tmp_path: Path) -> None:
     path = tmp_path / "f.waypoints"
     write_fence(FENCE, path)
-    loader = mavwp.MissionItemProtocol_Fence()
-    assert loader.load(str(path)) == 9
-    gc.collect()  # it leaves the file open
-    read = [loader.wp(seq) for seq in range(9)]
-    assert [item.command for item in read] == [5001] * 4 + [5004] + [5002] * 3 + [5000]
-    assert (read[4].x, read[4].y, read[4].param1) == (40.0007, -104.9993, 12.25)
+    code = (
+        "import json, sys; from pymavlink import mavwp; loader = mavwp.MissionItemProtocol_Fence(); count = loader.load(sys.argv[1]);"
+        "items = [loader.wp(seq) for seq in range(count)];"
+        "print(json.dumps([[i.command, i.mission_type, i.param1, i.x, i.y] for i in items]))"
+    )
+    environment = {**os.environ, "MAVLINK20": "1"}  # read when pymavlink is loaded
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True, env=environment
+    )
+    read = json.loads(done.stdout)
+    assert [item[0] for item in read] == [5001] * 4 + [5004] + [5002] * 3 + [5000]
+    assert read[4] == [5004, 1, 12.25, 40.0007, -104.9993]
 
 
 def test_pymavlink_reads_our_fen_files(tmp_path: Path) -> None:

@@ -1,0 +1,29 @@
+"""The documentation is as the code says."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+DOCS = Path(__file__).parents[1] / "docs"
+
+
+@pytest.fixture(scope="module")
+def generated():
+    spec = importlib.util.spec_from_file_location("generated", DOCS / "generated.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda page: page.stem)
+def test_made_parts_are_up_to_date(generated, page):
+    text = page.read_text(encoding="utf-8")
+    assert generated.renewed(text) == text
+
+
+def test_every_part_stands_somewhere(generated):
+    text = "".join(page.read_text(encoding="utf-8") for page in DOCS.glob("*.md"))
+    assert all(f"<!-- made: {name} -->" in text for name in generated.PARTS)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from pathlib import Path
 
 import pytest
 from simulator.station import HOME, TICK_S, Bench, at, line, placed, square
@@ -377,3 +378,9 @@ def test_a_rally_list_can_be_configured():
     assert [item.command for item in vehicle.rally] == [Command.RALLY_POINT]
     assert placed(Command.RALLY_POINT, HOME).lat_e7 == vehicle.rally[0].lat_e7
     assert TICK_S == 0.02
+
+
+def test_the_docs_list_every_parameter_with_its_default():
+    text = (Path(__file__).parents[2] / "docs" / "simulator.md").read_text().split("## Parameters")[1]
+    told = dict(entry.split() for entry in " ".join(text.split()).split(", "))
+    assert {name: float(value) for name, value in told.items()} == DEFAULTS

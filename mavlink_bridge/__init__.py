@@ -1,1 +1,53 @@
-"""Placeholder."""
+"""Between MAVLink streams and missions: fold, protocol machines, director, links, logs, the simulated rover, the command line.
+
+The names below are stable; they are loaded when they are first asked for, so that importing this package costs nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from mavlink_bridge.director import Director, Orders
+    from mavlink_bridge.errors import BridgeError
+    from mavlink_bridge.link import Link, open_link
+    from mavlink_bridge.messages import Frame
+    from mavlink_bridge.recorded import situation_from_log
+    from mavlink_bridge.simulator import Simulator, SimulatorConfig
+    from mavlink_bridge.tlog import TlogReader, TlogWriter
+
+__all__ = [
+    "BridgeError",
+    "Director",
+    "Frame",
+    "Link",
+    "Orders",
+    "Simulator",
+    "SimulatorConfig",
+    "TlogReader",
+    "TlogWriter",
+    "open_link",
+    "situation_from_log",
+]
+
+_HOMES = {
+    "BridgeError": "errors",
+    "Director": "director",
+    "Frame": "messages",
+    "Link": "link",
+    "Orders": "director",
+    "Simulator": "simulator",
+    "SimulatorConfig": "simulator",
+    "TlogReader": "tlog",
+    "TlogWriter": "tlog",
+    "open_link": "link",
+    "situation_from_log": "recorded",
+}
+
+
+def __getattr__(name: str) -> object:
+    home = _HOMES.get(name)
+    if home is None:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{home}"), name)

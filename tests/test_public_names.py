@@ -1,0 +1,39 @@
+"""The names people may rely on, and that importing the packages stays cheap."""
+
+from __future__ import annotations
+
+import importlib
+import subprocess
+import sys
+
+import pytest
+
+PACKAGES = ("pbpp", "missions", "mavlink_bridge")
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_every_public_name_is_there(package):
+    module = importlib.import_module(package)
+    for name in module.__all__:
+        assert getattr(module, name) is not None
+    with pytest.raises(AttributeError, match="no_such_name"):
+        _ = module.no_such_name
+
+
+@pytest.mark.parametrize("package", ["missions", "mavlink_bridge", "mavlink_bridge.cli"])
+def test_importing_loads_nothing_heavy(package):
+    heavy = "{'numpy', 'shapely', 'pyproj', 'pymavlink', 'matplotlib', 'plotly', 'serial'}"
+    code = f"import sys, {package}; print(sorted({heavy} & set(sys.modules)))"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == "[]"
+
+
+def test_planning_from_a_file_never_loads_pymavlink(fields):
+    code = (
+        "import sys; from pathlib import Path; from missions import LatLon, Request, Situation, plan_mission, read_situation;"
+        f"s = read_situation(Path({str(fields / 'yard-fence.waypoints')!r}));"
+        "plan_mission(s, Request(start=LatLon(40.071374, -105.22993), targets=(LatLon(40.0720926, -105.2286152),)));"
+        "print('pymavlink' in sys.modules)"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == "False"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from pathlib import Path
 
 import pytest
@@ -55,6 +56,14 @@ def test_the_tables_know_nothing_of_messages():
     }
     assert imported == {"__future__", "enum"}
     assert transitions.TABLES
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_the_drawn_diagram_shows_the_table(name):
+    figure = FOLDER.parents[1] / "docs" / "figures" / f"states-{name.replace('_', '-')}.svg"
+    drawn = set(re.split(r", |<[^>]*>", figure.read_text(encoding="utf-8")))
+    members = {*TABLES[name], *(event for following in TABLES[name].values() for event in following)}
+    assert {member.name.lower().replace("_", " ") for member in members} <= drawn
 
 
 def _closure(states, table):

@@ -8,7 +8,16 @@ import pytest
 from protocol.scripted import Script
 from protocol.twin import PEER, Client, Faults, Twin, Vehicle, plain_fence, plain_mission
 
-from mavlink_bridge.messages import Frame, Heartbeat, MissionCount, MissionResult, MissionType, Statustext
+from mavlink_bridge.messages import (
+    Frame,
+    Heartbeat,
+    MissionAck,
+    MissionCount,
+    MissionRequestInt,
+    MissionResult,
+    MissionType,
+    Statustext,
+)
 from mavlink_bridge.protocol.limits import Limits
 from mavlink_bridge.protocol.transitions import VerifiedUploadState
 from mavlink_bridge.protocol.verified_upload import Held, OutcomeKind, VerifiedUpload
@@ -168,8 +177,6 @@ def test_a_silent_vehicle_was_not_written_to():
 
 def test_a_vehicle_that_gives_no_list_is_not_written_to():
     script = Script(VerifiedUpload(PEER, RALLY, []))
-    from mavlink_bridge.messages import MissionAck
-
     for _ in range(4):
         script.hear(
             MissionAck(PEER.own_system, PEER.own_component, MissionResult.UNSUPPORTED, RALLY), after_s=0.6
@@ -230,3 +237,68 @@ def test_a_finished_or_unstarted_machine_ignores_everything():
     machine.start(2.0)
     machine.start(2.0)
     assert len(machine.messages_to_send()) == 1
+
+
+def test_a_failed_restore_says_what_is_there():
+    vehicle = Vehicle()
+    vehicle.hold(MISSION, plain_mission(12, salt=1))
+    machine = VerifiedUpload(PEER, MISSION, plain_mission(20), is_active=False, window=1)
+    client = Client(machine, PEER)
+    twin = Twin(vehicle, [client])
+    deliver = twin._to_vehicle
+
+    def drop_later_items(frame):
+        last = 2 if machine.state is VerifiedUploadState.RESTORING else 5
+        if getattr(frame.message, "x", None) is None or frame.message.seq <= last:
+            deliver(frame)
+
+    twin._to_vehicle = drop_later_items
+    twin.run()
+    outcome = machine.outcome
+    assert (outcome.kind, outcome.held) == (OutcomeKind.DIFFERENT, Held.UNFINISHED)
+    assert len(outcome.backup) == 12
+    assert outcome.found == vehicle.held(MISSION)
+    assert client.ended_s <= machine.bound_s
+
+
+def test_a_vehicle_that_takes_no_list_is_busy_and_unchanged():
+    vehicle = Vehicle()
+    vehicle.hold(MISSION, plain_mission(12, salt=1))
+    machine = VerifiedUpload(PEER, MISSION, plain_mission(20), is_active=False, rival_patience_s=2.0)
+    client = Client(machine, PEER)
+    twin = Twin(vehicle, [client])
+    deliver = twin._to_vehicle
+
+    def deny_counts(frame):
+        if isinstance(frame.message, MissionCount):
+            denied = MissionAck(PEER.own_system, PEER.own_component, MissionResult.DENIED, MISSION)
+            twin._carry(("down",), twin._to_clients, Frame(1, 1, denied))
+        else:
+            deliver(frame)
+
+    twin._to_vehicle = deny_counts
+    twin.run()
+    assert (machine.outcome.kind, machine.outcome.held) == (OutcomeKind.BUSY, Held.OLD)
+    assert len(vehicle.held(MISSION)) == 12
+
+
+def test_a_rival_that_comes_after_the_backup_is_reported():
+    script = at_backup(is_active=False, rival_patience_s=2.0)
+    script.machine.backup_stored(script.now_s)
+    denied = MissionAck(PEER.own_system, PEER.own_component, MissionResult.DENIED, MISSION)
+    while not script.machine.is_done and script.now_s < 100.0:
+        script.hear(denied, after_s=0.5)
+    assert (script.machine.outcome.kind, script.machine.outcome.held) == (OutcomeKind.BUSY, Held.UNKNOWN)
+
+
+def test_a_vehicle_with_float_positions_is_verified_as_far_as_they_go():
+    vehicle = Vehicle()
+    vehicle.hold(MISSION, plain_mission(3, salt=1))
+    client = Client(VerifiedUpload(PEER, MISSION, plain_mission(5), is_active=False), PEER)
+    twin = Twin(vehicle, [client])
+    deliver = twin._to_vehicle
+    twin._to_vehicle = lambda frame: None if isinstance(frame.message, MissionRequestInt) else deliver(frame)
+    twin.run()
+    outcome = client.machine.outcome
+    assert outcome.is_verified
+    assert outcome.is_coarse

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import functools
 import json
+import math
 import sys
 import tomllib
+import traceback
+from collections.abc import Mapping
 from contextlib import contextmanager
 from enum import IntEnum
 from pathlib import Path
@@ -17,7 +20,7 @@ from mavlink_bridge import errors as bridge_errors
 from missions import errors as mission_errors
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator
 
 
 class ExitCode(IntEnum):
@@ -123,13 +126,43 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
             message = str(interrupt) or "interrupted; the vehicle was left as it was"
             _report(command.__name__, "Interrupted", message, ExitCode.INTERRUPTED, {}, wants_json=wants_json)
             raise typer.Exit(ExitCode.INTERRUPTED) from None
+        except (typer.Exit, typer.Abort, typer.BadParameter):
+            raise
+        except Exception as error:
+            _report(
+                command.__name__,
+                "InternalError",
+                _defect(error),
+                ExitCode.INTERNAL,
+                {},
+                wants_json=wants_json,
+            )
+            raise typer.Exit(ExitCode.INTERNAL) from error
 
     return run
 
 
 def print_json(document: Mapping[str, object]) -> None:
-    """Put a JSON document on stdout."""
-    sys.stdout.write(json.dumps(document, allow_nan=False) + "\n")
+    """Put a JSON document on stdout; numbers that JSON has not become null."""
+    sys.stdout.write(json.dumps(_plain(document), allow_nan=False) + "\n")
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, Mapping):
+        return {key: _plain(one) for key, one in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(one) for one in value]
+    return value
+
+
+def _defect(error: Exception) -> str:
+    """Say in one line what broke and where, so that it can be reported."""
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    where = f"{Path(place.filename).name}:{place.lineno}"
+    what = " ".join(f"{type(error).__name__}: {error}".split())
+    return f"internal error, a bug in pbpp: {what} (at {where}); please report this line with the command and its input files"
 
 
 def warn(texts: Iterable[str]) -> None:

@@ -244,12 +244,12 @@ def request_from_options(
     if method not in _METHODS:
         raise UsageError(f"--method {method!r}: expected one of {', '.join(_METHODS)}")
     return Request(
-        start=parse_lat_lon(start) if start else None,
+        start=parse_lat_lon(start) if start is not None else None,
         targets=tuple(parse_lat_lon(target) for target in targets),
         clearance_m=None if clearance == "max" else _metres("--clearance", clearance, "max"),
         widest=clearance == "max",
         corner_allowance_m=None if allowance == "auto" else _metres("--corner-allowance", allowance, "auto"),
-        snap_m=snap,
+        snap_m=_metres("--snap", str(snap), "leave it out") or 0.0,
         method=method,
     )
 
@@ -277,7 +277,8 @@ def _check_options(
     plots: list[Path],
 ) -> None:
     """Find what cannot work before any work is done."""
-    from missions.formats import check_writable_format  # noqa: PLC0415 - quick help
+    from missions.errors import MissionFormatError  # noqa: PLC0415 - quick help
+    from missions.formats import check_writable_format  # noqa: PLC0415
 
     if [fence, log, connect].count(None) != 2:
         raise UsageError("give one SOURCE: --fence FILE, --log FILE.tlog or --connect CONNECTION")
@@ -285,6 +286,11 @@ def _check_options(
         raise UsageError("--upload and --drive need a live link: --connect CONNECTION")
     for path in outputs:
         check_writable_format(path)
+        if path.suffix != ".plan" and fence is not None and path.resolve() == fence.resolve():
+            raise UsageError(f"-o {path} would overwrite the fence with a mission")
+    for path in (*outputs, *plots):
+        if not path.parent.is_dir():
+            raise MissionFormatError(f"{path} cannot be written: there is no folder {path.parent}")
     if plots:
         from missions.picture import check_picture_format  # noqa: PLC0415 - quick help
 
@@ -298,7 +304,9 @@ def _offline_situation(
     if log is not None:
         from mavlink_bridge.recorded import situation_from_log  # noqa: PLC0415 - pymavlink only where needed
 
-        return situation_from_log(log, system, any_vehicle=any_vehicle)
+        return situation_from_log(
+            log, system, any_vehicle=any_vehicle, on_damage=lambda damage: warn([f"{log}: {damage}"])
+        )
     from missions.errors import FenceMissingError  # noqa: PLC0415 - quick help
     from missions.formats import read_situation  # noqa: PLC0415
 

@@ -12,10 +12,19 @@ from mavlink_bridge.vehicles import choose_vehicle, vehicles_heard
 from missions.situation import Situation
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
+    from mavlink_bridge.tlog import Damage
 
-def situation_from_log(path: Path, system: int | None = None, *, any_vehicle: bool = False) -> Situation:
+
+def situation_from_log(
+    path: Path,
+    system: int | None = None,
+    *,
+    any_vehicle: bool = False,
+    on_damage: Callable[[Damage], None] | None = None,
+) -> Situation:
     """Fold a whole log into the situation at its end.
 
     Parameters
@@ -26,6 +35,8 @@ def situation_from_log(path: Path, system: int | None = None, *, any_vehicle: bo
         Which vehicle, by MAVLink system id; needed where several were heard.
     any_vehicle : bool
         Take vehicles that are neither rover nor boat too.
+    on_damage : callable, optional
+        Told what of the log could not be read, if anything.
 
     Raises
     ------
@@ -38,6 +49,9 @@ def situation_from_log(path: Path, system: int | None = None, *, any_vehicle: bo
     except VehicleNotFoundError as error:
         raise LogError(f"{path}: {error}", file=str(path)) from None
     situation = Situation(system=vehicle.system, component=vehicle.component, vehicle_type=vehicle.type)
-    for entry in TlogReader(path, FOLDED):
+    reader = TlogReader(path, FOLDED)
+    for entry in reader:
         situation = fold(situation, entry.frame, entry.time_s)
+    if on_damage is not None and not reader.damage.is_clean:
+        on_damage(reader.damage)
     return situation

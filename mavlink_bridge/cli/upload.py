@@ -266,6 +266,7 @@ def _upload_list(
     limits: Limits,
     wish: _Wish,
 ) -> _Done:
+    from mavlink_bridge.link import now_s  # noqa: PLC0415 - pymavlink takes its time
     from mavlink_bridge.outcomes import upload_trouble  # noqa: PLC0415
     from mavlink_bridge.protocol.verified_upload import Held, VerifiedUpload  # noqa: PLC0415
 

@@ -74,21 +74,37 @@ _KEPT_PARAMS: dict[int, tuple[Callable[[float], _Stored], ...]] = {
     Command.DO_SET_REVERSE: (_whole, _dropped, _dropped, _dropped),
     Command.DO_FENCE_ENABLE: (_whole, _dropped, _dropped, _dropped),
     Command.NAV_SET_YAW_SPEED: (_float32, _float32, _float32, _dropped),
+    115: (_float32, _float32, _whole, _whole),  # CONDITION_YAW
+    181: (_whole, _whole, _dropped, _dropped),  # DO_SET_RELAY
+    182: (_whole, _whole, _float32, _dropped),  # DO_REPEAT_RELAY
+    183: (_whole, _whole, _dropped, _dropped),  # DO_SET_SERVO
+    184: (_whole, _whole, _whole, _float32),  # DO_REPEAT_SERVO
+    201: (_whole, _dropped, _dropped, _dropped),  # DO_SET_ROI
+    211: (_whole, _whole, _dropped, _dropped),  # DO_GRIPPER
 }
-_WITHOUT_PLACE = frozenset(
+_WITH_PLACE = frozenset(
     {
-        Command.NAV_RETURN_TO_LAUNCH,
-        Command.NAV_DELAY,
-        Command.CONDITION_DELAY,
-        Command.CONDITION_DISTANCE,
-        Command.DO_SET_MODE,
-        Command.DO_JUMP,
-        Command.DO_CHANGE_SPEED,
-        Command.DO_SET_REVERSE,
-        Command.DO_FENCE_ENABLE,
-        Command.NAV_SET_YAW_SPEED,
+        Command.NAV_WAYPOINT,
+        Command.NAV_LOITER_UNLIM,
+        Command.NAV_LOITER_TURNS,
+        Command.NAV_LOITER_TIME,
+        Command.NAV_LAND,
+        Command.NAV_TAKEOFF,
+        Command.NAV_GUIDED_ENABLE,
+        Command.DO_SET_HOME,
+        30,  # NAV_CONTINUE_AND_CHANGE_ALT
+        31,  # NAV_LOITER_TO_ALT
+        82,  # NAV_SPLINE_WAYPOINT
+        84,  # NAV_VTOL_TAKEOFF
+        85,  # NAV_VTOL_LAND
+        94,  # NAV_PAYLOAD_PLACE
+        189,  # DO_LAND_START
+        191,  # DO_GO_AROUND
+        201,  # DO_SET_ROI
     }
 )
+"""Commands stored with a place and a frame (``AP_Mission::stored_in_location``); others read back with frame 0 and mostly without a place."""
+
 _POLYGON_VERTICES = frozenset(
     {Command.FENCE_POLYGON_VERTEX_INCLUSION, Command.FENCE_POLYGON_VERTEX_EXCLUSION}
 )
@@ -128,7 +144,11 @@ def is_same_item(a: MissionItem, b: MissionItem, mission_type: MissionType, *, c
     if a == b:
         return True
     stored_a, stored_b = _stored(a, mission_type), _stored(b, mission_type)
-    if stored_a.fixed != stored_b.fixed or not _is_near(stored_a.alt_m, stored_b.alt_m):
+    if stored_a.fixed != stored_b.fixed:
+        return False
+    if stored_a.may_lose_place and (_has_none(stored_a) or _has_none(stored_b)):
+        return True
+    if not _is_near(stored_a.alt_m, stored_b.alt_m):
         return False
     if not coarse:
         return stored_a.place == stored_b.place
@@ -186,6 +206,7 @@ class _StoredItem:
     fixed: tuple[object, ...]
     place: tuple[int, int]
     alt_m: float
+    may_lose_place: bool = False
 
 
 def _stored(item: MissionItem, mission_type: MissionType) -> _StoredItem:
@@ -199,10 +220,14 @@ def _stored(item: MissionItem, mission_type: MissionType) -> _StoredItem:
         return _StoredItem((command, _whole(item.alt_m)), place, 0.0)
     keepers = _KEPT_PARAMS.get(command, _KEEPS_ALL)
     params = tuple(keep(value) for keep, value in zip(keepers, item.params, strict=True))
-    if command in _WITHOUT_PLACE:
-        return _StoredItem((command, params), (0, 0), 0.0)
+    if command not in _WITH_PLACE:
+        return _StoredItem((command, params), place, item.alt_m, may_lose_place=True)
     frame = _FRAMES.get(int(item.frame), int(item.frame))
     return _StoredItem((command, frame, params), place, item.alt_m)
+
+
+def _has_none(stored: _StoredItem) -> bool:
+    return stored.place == (0, 0) and stored.alt_m == 0
 
 
 def _is_near(a_m: float, b_m: float) -> bool:

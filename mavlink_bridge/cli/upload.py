@@ -288,7 +288,6 @@ def _upload_list(
             backup = store.begin(system, mission_type, old)
             machine.backup_stored(now_s())
 
-    from mavlink_bridge.link import now_s  # noqa: PLC0415 - pymavlink only where needed
 
     begun_s = time.monotonic()
     try:

@@ -288,7 +288,6 @@ def _upload_list(
             backup = store.begin(system, mission_type, old)
             machine.backup_stored(now_s())
 
-
     begun_s = time.monotonic()
     try:
         session.run(machine, f"{name}: {len(items)} items", step)

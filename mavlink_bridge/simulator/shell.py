@@ -131,7 +131,8 @@ class Simulator:
         if self._thread is None:
             return
         self._stopping = True
-        self._waker.send(b"x")
+        with contextlib.suppress(OSError):  # closed already if the rover failed
+            self._waker.send(b"x")
         self._thread.join()
         self._thread = None
         if self._failure is not None:

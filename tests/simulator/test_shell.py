@@ -180,6 +180,10 @@ def test_a_failure_in_the_background_comes_out_at_the_end(monkeypatch):
 
     monkeypatch.setattr(simulator.vehicle, "handle_timer", fail)
     simulator.start()
+    end_s = time.monotonic() + 5.0
+    while simulator.is_running and time.monotonic() < end_s:
+        time.sleep(0.01)
+    assert not simulator.is_running
     with pytest.raises(RuntimeError, match="broken rover"):
         simulator.stop()
     simulator.stop()

@@ -284,3 +284,78 @@ def test_signed_links_need_the_key(rover, tmp_path):
     code, _, output = run(rover, "download", "mission", "--signing-key", key, timeout_s=1)
     assert code == 5
     assert "not signed with this key" in output
+
+
+@pytest.mark.parametrize(("patched", "left_behind"), [("begin", False), ("backup_stored", True)])
+def test_an_interrupt_says_what_it_left_behind(rover, tmp_path, monkeypatch, patched, left_behind):
+    from mavlink_bridge.protocol.verified_upload import VerifiedUpload
+
+    owner = BackupStore if patched == "begin" else VerifiedUpload
+    original = getattr(owner, patched)
+
+    def interrupted(*arguments):
+        original(*arguments)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(owner, patched, interrupted)
+    code, document, _ = run(rover, "upload", mission_file(tmp_path), "--json")
+    assert code == 130
+    assert ("part of the old and part of the new" in document["message"]) is left_behind
+    assert ("was left as it was" in document["message"]) is not left_behind
+
+
+def test_a_parameter_the_vehicle_keeps_is_an_outcome(rover, tmp_path, monkeypatch):
+    vehicle = rover.vehicle
+    monkeypatch.setattr(
+        vehicle,
+        "_set_parameter",
+        lambda message: vehicle._outbox.append(vehicle._parameter(message.param_id, 65535)),
+    )
+    path = tmp_path / "one.param"
+    path.write_text("WP_SPEED 7\n")
+    code, document, _ = run(rover, "upload", path, "--json")
+    assert code == 7
+    assert (document["details"]["wanted"], document["details"]["found"]) == (7.0, 5.0)
+
+
+@pytest.mark.parametrize("what", ["mission", "parameters"])
+def test_a_vehicle_that_falls_silent(rover, monkeypatch, what):
+    monkeypatch.setattr("mavlink_bridge.protocol.download.PATIENCE_S", 0.4)
+    monkeypatch.setattr("mavlink_bridge.protocol.parameters.PATIENCE_S", 0.4)
+    monkeypatch.setattr(rover.vehicle, "receive", lambda frame, now_s: None)
+    assert run(rover, "download", what)[0] == 5
+
+
+def test_a_vehicle_that_refuses_or_is_busy(rover, monkeypatch):
+    from mavlink_bridge.messages import MissionAck, MissionRequestList
+
+    vehicle, results = rover.vehicle, [3]
+    receive = vehicle.receive
+
+    def refuse(frame, now_s):
+        if isinstance(frame.message, MissionRequestList):
+            vehicle._outbox.append(
+                MissionAck(frame.system, frame.component, results[0], frame.message.mission_type)
+            )
+        else:
+            receive(frame, now_s)
+
+    monkeypatch.setattr(vehicle, "receive", refuse)
+    code, document, _ = run(rover, "download", "fence", "--json")
+    assert (code, document["details"]["result"]) == (6, "UNSUPPORTED")
+    results[0] = 14
+    monkeypatch.setattr(
+        "mavlink_bridge.protocol.download.Download.__init__.__kwdefaults__",
+        {"window": 100, "rival_patience_s": 0.5, "round_trip": None, "float_form": True},
+    )
+    code, document, _ = run(rover, "download", "fence", "--json")
+    assert (code, document["details"]["result"]) == (6, "DENIED")
+
+
+def test_an_autopilot_that_is_not_ardupilot_is_not_written_to(rover, tmp_path, monkeypatch):
+    from mavlink_bridge.cli import session
+
+    monkeypatch.setattr(session.Session, "is_ardupilot", property(lambda _: False))
+    code, _, output = run(rover, "upload", mission_file(tmp_path))
+    assert code == 2
+    assert "not ArduPilot" in output

@@ -88,9 +88,6 @@ def _polygons(feature: Feature, kind: ZoneKind) -> list[Zone]:
         raise feature.error(
             "an exclusion with a hole; expected one without: a fence has no ground inside an exclusion"
         )
-    for ring in feature.lines:
-        if len(ring) < 3:
-            raise feature.error(f"a ring of {len(ring)} vertices; a polygon needs at least 3")
     return [PolygonZone(kind, outer), *(PolygonZone(ZoneKind.EXCLUSION, hole) for hole in holes)]
 
 

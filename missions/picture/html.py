@@ -34,7 +34,7 @@ _CONFIG = {
     "scrollZoom": True,
     "responsive": True,
     # Nobody's field belongs on plotly's server: plotly 7 has a button for that by default.
-    "plotlyServerURL": "",
+    "showSendToCloud": False,
     "modeBarButtonsToRemove": ["sendChartToCloud", "sendDataToCloud", "select2d", "lasso2d"],
 }
 

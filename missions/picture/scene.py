@@ -120,13 +120,16 @@ class Scene:
         return [self.plan.ground.clearance_m(LineString(leg)) for leg in legs]
 
     def blocks(self) -> list[NDArray[np.float64]]:
-        """Give the corners of the blocks that the route was searched in; none where there are too many to see."""
+        """Give the corners of the blocks of the free space at the drawn clearance; none where there are too many to see."""
         ground, plan = self.plan.ground, self.plan
         clearance_m = 0.99 * plan.drawn_clearance_m if math.isfinite(plan.drawn_clearance_m) else 0.0
         areas = ground.areas(ZoneKind.INCLUSION), ground.areas(ZoneKind.EXCLUSION)
-        planner = pbpp.Planner(*areas, clearance_m=clearance_m, union=ground.union)
         target = LocalPoint(*self.targets[-1].tolist())
-        drawing = planner.plan(target, target, method=plan.method).drawing
+        try:
+            planner = pbpp.Planner(*areas, clearance_m=clearance_m, union=ground.union)
+            drawing = planner.plan(target, target, method=plan.method).drawing
+        except pbpp.PlanningError:  # a picture without blocks is better than none
+            return []
         partition = drawing.field.slabs if drawing.partition == "slabs" else drawing.field.blocks
         if len(partition) > _MOST_BLOCKS:
             return []

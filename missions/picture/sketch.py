@@ -21,6 +21,7 @@ _CELL_SHAPE = 2.0
 """A terminal's cell is about twice as high as wide."""
 
 _COVERED_SHARE = 0.4
+_THIN_SHARE = 0.05
 _BRAILLE = 0x2800
 _DOT_BITS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
 
@@ -57,7 +58,8 @@ def sketch(scene: Scene, *, columns: int = 80, encoding: str = "utf-8") -> str:
     signs = _BLOCKS if _understands(encoding) else _PLAIN
     grid = _Grid.of(scene, max(columns, _FEWEST_COLUMNS))
     cells = np.full((grid.rows, grid.columns), " ")
-    cells[grid.covered(scene.outside)] = signs.outside
+    forbidden = shapely.union_all([scene.outside, scene.exclusions])
+    cells[grid.covered(forbidden)] = signs.outside if scene.has_inclusion else signs.exclusion
     cells[grid.covered(scene.exclusions)] = signs.exclusion
     if len(scene.track):
         _draw(cells, grid, scene.track, signs.track)
@@ -107,12 +109,11 @@ class _Grid(NamedTuple):
             east_m[None, :] + self.cell_m,
             north_m[:, None],
         )
-        shown = np.zeros(boxes.shape, dtype=bool)
         cell_m2 = _CELL_SHAPE * self.cell_m**2
+        shown: NDArray[np.bool_] = shapely.area(shapely.intersection(boxes, area)) > _COVERED_SHARE * cell_m2
         for part in shapely.get_parts(area):
-            shares = shapely.area(shapely.intersection(boxes, part)) / cell_m2
-            thin = part.buffer(-self.cell_m / 2).is_empty
-            shown |= shares > (0.05 if thin else _COVERED_SHARE)
+            if part.buffer(-self.cell_m / 2).is_empty:
+                shown |= shapely.area(shapely.intersection(boxes, part)) > _THIN_SHARE * cell_m2
         return shown
 
     def _dots(self, points: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -199,6 +199,21 @@ def test_plan(tmp_path: Path, text: str, problem: str) -> None:
     check(tmp_path / "x.plan", text, problem)
 
 
+HOME = "0\t1\t0\t16\t0\t0\t0\t0\t40\t-105\t0\t1"
+
+
+@pytest.mark.parametrize(
+    ("line", "problem"),
+    [
+        ("1\t0\t2\t178\t1\t2\t0\t0\tinf\t0\t0\t1", "line 3: params 5 and 6 are inf and 0; expected numbers"),
+        ("1\t0\t3\t16\t0\t0\t0\t0\t4_0\t-105\t0\t1", "line 3: could not convert string to float: '4_0'; expected numbers"),
+        ("QGC WPL 110", "line 3: 3 columns; expected 12"),
+    ],
+)  # fmt: skip
+def test_waypoints(tmp_path: Path, line: str, problem: str) -> None:
+    check(tmp_path / "x.waypoints", f"QGC WPL 110\n{HOME}\n{line}\n", problem)
+
+
 @pytest.mark.parametrize("suffix", [".plan", ".waypoints", ".fen", ".poly", ".geojson", ".kml", ".parm"])
 def test_bytes_that_are_no_text(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"x{suffix}"

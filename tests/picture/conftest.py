@@ -1,0 +1,44 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import pytest
+
+from missions.formats import read_situation
+from missions.geo import LatLon
+from missions.picture.scene import Scene
+from missions.plan import plan
+from missions.request import Request
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from missions.plan import Plan
+
+START = LatLon(40.071374, -105.22993)
+REQUESTS = {
+    "maze": Request(start=START, targets=(LatLon(40.0726316, -105.2290497),), clearance_m=2.0),
+    "yard": Request(
+        start=START,
+        targets=(LatLon(40.07209265, -105.22861524), LatLon(40.0720, -105.2300)),
+        clearance_m=2.0,
+    ),
+    "union": Request(start=START, targets=(LatLon(40.0721, -105.2285),), clearance_m=1.0),
+}
+
+
+@pytest.fixture(scope="session")
+def plans(fields: Path) -> dict[str, Plan]:
+    """A plan in each of three fields."""
+    made = {}
+    for name, request in REQUESTS.items():
+        situation = read_situation(fields / f"{name}-fence.waypoints")
+        parameters = {"WP_RADIUS": 2.0, "WP_SPEED": 4.0, "FENCE_OPTIONS": 2.0 if name == "union" else 0.0}
+        made[name] = plan(replace(situation, parameters=parameters), request)
+    return made
+
+
+@pytest.fixture(params=REQUESTS)
+def scene(request: pytest.FixtureRequest, plans: dict[str, Plan]) -> Scene:
+    return Scene(plans[request.param])

@@ -48,7 +48,9 @@ def failure(*arguments: object) -> dict[str, Any]:
     assert found["status"] == "error"
     assert found["command"] == "plan"
     assert found["exit_code"] == result.exit_code
-    assert result.stderr == f"error: {found['message']}\n"
+    *before, last = result.stderr.splitlines()
+    assert last == f"error: {found['message']}"
+    assert all(line.startswith("warning: ") for line in before)
     assert isinstance(found["details"], dict)
     return found
 

@@ -8,7 +8,7 @@ PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; 
 BIN := .venv/bin
 OUT ?= demo-out
 
-.PHONY: soak demo test lint format types walls check lock clean
+.PHONY: docs soak demo test lint format types walls check lock clean
 
 demo: .venv/run.stamp
 	$(BIN)/pbpp demo --out $(OUT)
@@ -44,6 +44,10 @@ walls: .venv/dev.stamp
 	$(BIN)/lint-imports
 
 check: lint types walls test
+
+docs: .venv/dev.stamp
+	$(BIN)/python docs/generated.py
+	$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_build
 
 lock: .venv/run.stamp
 	$(BIN)/python -m pip install --quiet uv

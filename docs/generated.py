@@ -5,10 +5,15 @@ A part stands between ``<!-- made: NAME -->`` and ``<!-- end -->``; a test check
 
 from __future__ import annotations
 
+import inspect
 import re
 from collections import defaultdict
 from pathlib import Path
+from typing import Any
 
+import typer
+
+from mavlink_bridge.cli.app import app
 from mavlink_bridge.director import SCHEMA, TRANSITIONS
 
 DOCS = Path(__file__).parent
@@ -37,7 +42,34 @@ def director_diagram() -> str:
     return "\n".join([*lines, "```"])
 
 
-PARTS = {"bridge-events": event_table, "director-states": director_diagram}
+def commands() -> str:
+    """Give every command's options, from the command line itself."""
+    group = typer.main.get_command(app)
+    parts = []
+    for name, command in sorted(group.commands.items()):
+        rows = [
+            _option_row(parameter) for parameter in command.params if not getattr(parameter, "hidden", False)
+        ]
+        text = inspect.cleandoc(command.help or "")
+        table = "\n".join(["| option | meaning | default |", "|---|---|---|", *rows])
+        parts.append(f"## pbpp {name}\n\n{text}\n\n{table}")
+    return "\n\n".join(parts)
+
+
+def _option_row(parameter: Any) -> str:  # noqa: ANN401 - the command line's own type
+    is_option = parameter.param_type_name == "option"
+    word = parameter.metavar or parameter.name.upper()
+    names = parameter.opts if is_option else [word]
+    metavar = f" {word}" if is_option and not getattr(parameter, "is_flag", False) else ""
+    shown = ", ".join(f"`{name}{metavar}`" for name in names)
+    meaning = getattr(parameter, "help", None) or ""
+    default = parameter.default
+    is_shown = default != "" and isinstance(default, (str, int, float)) and not isinstance(default, bool)
+    cells = (shown, meaning, f"`{default}`" if is_shown else "")
+    return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"
+
+
+PARTS = {"bridge-events": event_table, "commands": commands, "director-states": director_diagram}
 
 
 def renewed(text: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 from pathlib import Path
 
 import pytest
@@ -27,3 +28,14 @@ def test_made_parts_are_up_to_date(generated, page):
 def test_every_part_stands_somewhere(generated):
     text = "".join(page.read_text(encoding="utf-8") for page in DOCS.glob("*.md"))
     assert all(f"<!-- made: {name} -->" in text for name in generated.PARTS)
+
+
+PAGES = [page for folder in (DOCS, DOCS.parent, DOCS.parent / "sitl_logs") for page in sorted(folder.glob("*.md"))]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: f"{page.parent.name}-{page.stem}")
+def test_every_relative_link_leads_somewhere(page):
+    text = page.read_text(encoding="utf-8")
+    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        if "://" not in target and not target.startswith("#"):
+            assert (page.parent / target.partition("#")[0]).exists(), target

@@ -1,0 +1,17 @@
+"""Sphinx: `make docs`."""
+
+import importlib.metadata
+
+project = "PBPP Rover"
+author = "the PBPP Rover maintainers"
+release = importlib.metadata.version("pbpp-rover")
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+source_suffix = {".md": "markdown"}
+exclude_patterns = ["_build"]
+html_theme = "furo"
+html_title = "PBPP Rover"
+myst_enable_extensions = ["colon_fence"]
+myst_heading_anchors = 3
+autodoc_typehints = "none"
+# Links into the repository: a test checks every relative link. Mermaid is drawn by the forges that show the pages.
+suppress_warnings = ["myst.xref_missing", "misc.highlighting_failure"]

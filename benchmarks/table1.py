@@ -14,11 +14,15 @@ import sys
 import time
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
 
 import pbpp
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 HERE = Path(__file__).parent
 DATA = HERE.parent / "tests" / "pbpp" / "data"
@@ -95,7 +99,7 @@ def rrt(case: dict, seed: int) -> float:
     return np.inf
 
 
-def timed(function) -> tuple[float, float]:
+def timed(function: Callable[[], float]) -> tuple[float, float]:
     """Return the result of a function and the least of its times in seconds."""
     times = []
     for _ in range(RUNS):
@@ -110,17 +114,27 @@ def scenario(number: int) -> list[tuple[str, float, float, str, str]]:
     case = json.loads((DATA / f"table1_{number}.json").read_text())
     query = case["queries"][0]
 
-    def own(method: str):
-        return lambda: pbpp.plan_path([case["inclusion"]], case["exclusions"], query[:2], query[2:], method=method).length_m
+    def own(method: str) -> Callable[[], float]:
+        return lambda: (
+            pbpp.plan_path(
+                [case["inclusion"]], case["exclusions"], query[:2], query[2:], method=method
+            ).length_m
+        )
 
-    found = {name: timed(own(method)) for name, method in (("PBPP", "pbpp"), ("PBPP-taut", "pbpp-taut"), ("optimal", "optimal"))}
+    found = {
+        name: timed(own(method))
+        for name, method in (("PBPP", "pbpp"), ("PBPP-taut", "pbpp-taut"), ("optimal", "optimal"))
+    }
     began = time.perf_counter()
     found["A*"] = grid_a_star(case), time.perf_counter() - began
     runs = []
     for seed in range(RRT_RUNS):
         began = time.perf_counter()
         runs.append((rrt(case, seed), time.perf_counter() - began))
-    found["RRT"] = statistics.mean(length for length, _ in runs), statistics.mean(seconds for _, seconds in runs)
+    found["RRT"] = (
+        statistics.mean(length for length, _ in runs),
+        statistics.mean(seconds for _, seconds in runs),
+    )
     shortest = found["optimal"][0]
     rows = []
     for name, (length, seconds) in found.items():
@@ -132,11 +146,12 @@ def scenario(number: int) -> list[tuple[str, float, float, str, str]]:
 
 def main() -> None:
     """Print the table; with --write keep it in benchmarks/results."""
+    versions = f"numpy {np.__version__}, shapely {shapely.__version__}"
     lines = [
         "# Table 1",
         "",
-        f"{datetime.now(UTC).date().isoformat()}, {platform.machine()}, Python {platform.python_version()}, numpy {np.__version__}, "
-        f"shapely {shapely.__version__}. Made by `benchmarks/table1.py`.",
+        f"{datetime.now(UTC).date().isoformat()}, {platform.machine()}, Python {platform.python_version()}, {versions}.",
+        "Made by `benchmarks/table1.py`.",
         "",
         "The paper's maps are lost with its figures; these are ours, with the paper's map size, starts and goals, fitted so that the shortest",
         "path has the paper's length (274, 221, 242). So ratios compare and metres do not. Times are from polygons to path, the least of five;",

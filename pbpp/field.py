@@ -96,8 +96,6 @@ class Field:
 
     def holds(self, point: Point) -> bool:
         """Return whether a point lies in the bounds of free space."""
-        if not self.free.polygons:
-            return False
         west, south, east, north = self.free.geometry.bounds
         return west <= point[0] <= east and south <= point[1] <= north
 
@@ -110,6 +108,9 @@ class Field:
     def require(self, point: Point, error: type[StartBlockedError | GoalBlockedError]) -> frozenset[int]:
         """Return the components that a point of the map lies in; raise the error with the nearest free point if in none."""
         local = self.scene.to_local(point)
+        blocks = self.slabs.locate(local)
+        if blocks:
+            return self.slabs.components(blocks)
         components = self.free.components_at(local, BOUNDARY_TOLERANCE_M)
         if components:
             return components

@@ -1,4 +1,7 @@
-"""Compare the planner with its peers: ``python benchmarks/planner/run.py`` (BENCH_SLOW=1 also runs what takes minutes).
+"""Compare the planner with its peers: ``python benchmarks/planner/run.py``.
+
+(BENCH_SLOW=1 also runs what takes minutes, ``--ratios`` only
+measures the ratios anew).
 
 Each peer runs in a pinned virtual environment of its own under benchmarks/planner/.venvs, made here when it is missing; each pair of
 planner and case runs in a process of its own, one after the other. Paths are checked by shapely. Writes benchmarks/results/planner.*.
@@ -6,7 +9,7 @@ planner and case runs in a process of its own, one after the other. Paths are ch
 
 from __future__ import annotations
 
-import datetime
+import datetime as dt
 import json
 import os
 import platform
@@ -39,7 +42,9 @@ def python_of(peer: str) -> str:
     if not stamp.exists() or json.loads(stamp.read_text()) != wanted:
         base = os.environ.get("PEER_PYTHON", "python3.11")
         subprocess.run([base, "-m", "venv", "--clear", str(home)], check=True)
-        subprocess.run([str(home / "bin" / "pip"), "-q", "install", "--disable-pip-version-check", *wanted], check=True)
+        subprocess.run(
+            [str(home / "bin" / "pip"), "-q", "install", "--disable-pip-version-check", *wanted], check=True
+        )
         stamp.write_text(json.dumps(wanted))
     return str(home / "bin" / "python")
 
@@ -50,9 +55,19 @@ def measure(peer: str, name: str) -> dict:
     if peer == "extremitypathfinder" and name == "rand1000" and not slow:
         return {"failed": "needs minutes: BENCH_SLOW=1"}
     case_file = DATA / f"{name}.json"
-    command = [python_of(peer), "-W", "ignore", str(HERE / "peers" / "drive.py"), peer, str(case_file), str(FEW_QUERIES.get(peer, 20))]
+    command = [
+        python_of(peer),
+        "-W",
+        "ignore",
+        str(HERE / "peers" / "drive.py"),
+        peer,
+        str(case_file),
+        str(FEW_QUERIES.get(peer, 20)),
+    ]
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=SLOW_S if slow else LIMIT_S, check=False)
+        done = subprocess.run(
+            command, capture_output=True, text=True, timeout=SLOW_S if slow else LIMIT_S, check=False
+        )
     except subprocess.TimeoutExpired as error:
         return {"failed": f"more than {error.timeout:.0f} s"}
     if done.returncode:
@@ -64,7 +79,9 @@ def judge(run: dict, name: str) -> dict:
     """Add length ratios and the number of paths that cross an obstacle."""
     case = json.loads((DATA / f"{name}.json").read_text())
     exact = json.loads((DATA / "exact.json").read_text())[name]
-    inside = shapely.buffer(shapely.union_all([shapely.Polygon(ring) for ring in case["exclusions"]]), -INSIDE_M)
+    inside = shapely.buffer(
+        shapely.union_all([shapely.Polygon(ring) for ring in case["exclusions"]]), -INSIDE_M
+    )
     ratios, invalid = [], 0
     for path, length in zip(run["paths"], exact, strict=False):
         if path is not None:
@@ -86,24 +103,56 @@ def judge(run: dict, name: str) -> dict:
 
 def table(results: dict, ratios: dict) -> str:
     """Return the results as Markdown."""
-    lines = ["# Planners compared", "", f"{results['date']}, {results['machine']}. Made by `benchmarks/planner/run.py`.", ""]
-    lines += ["Versions: " + "; ".join(f"{peer}: {', '.join(pins)}" for peer, pins in results["versions"].items()) + ".", ""]
-    lines += ["One process for each planner and case, build then queries one after the other; grids have cells of 1 m (200 m maps) or 2 m;", "OMPL is BIT* with one second a query. An invalid path runs through an obstacle by more than 1e-6 m.", ""]
+    lines = [
+        "# Planners compared",
+        "",
+        f"{results['date']}, {results['machine']}. Made by `benchmarks/planner/run.py`.",
+        "",
+    ]
+    lines += [
+        "Versions: "
+        + "; ".join(f"{peer}: {', '.join(pins)}" for peer, pins in results["versions"].items())
+        + ".",
+        "",
+    ]
+    lines += [
+        "One process for each planner and case, build then queries one after the other; grids have cells of 1 m (200 m maps) or 2 m;",
+        "OMPL is BIT* with one second a query. An invalid path runs through an obstacle by more than 1e-6 m.",
+        "",
+    ]
     for name, rows in results["cases"].items():
-        lines += [f"## {name}", "", "| planner | build ms | query median ms | queries | failed | invalid | length ratio mean / max | peak MB over imports |", "|---|--:|--:|--:|--:|--:|--:|--:|"]
+        lines += [
+            f"## {name}",
+            "",
+            "| planner | build ms | query median ms | queries | failed | invalid | length ratio mean / max | peak MB over imports |",
+            "|---|--:|--:|--:|--:|--:|--:|--:|",
+        ]
         for peer, row in rows.items():
             if "failed" in row:
                 lines.append(f"| {peer} | {row['failed']} | | | | | | |")
             else:
-                ratio = "-" if row["ratio_mean"] is None else f"{row['ratio_mean']:.4f} / {row['ratio_max']:.4f}"
-                lines.append(f"| {peer} | {row['build_ms']:.1f} | {row['query_ms']:.2f} | {row['queries']} | {row['failures']} | {row['invalid']} | {ratio} | {row['memory_mb']:.0f} |")
+                ratio = (
+                    "-" if row["ratio_mean"] is None else f"{row['ratio_mean']:.4f} / {row['ratio_max']:.4f}"
+                )
+                lines.append(
+                    f"| {peer} | {row['build_ms']:.1f} | {row['query_ms']:.2f} | {row['queries']} | {row['failures']} | {row['invalid']} | {ratio} | {row['memory_mb']:.0f} |"
+                )
         lines.append("")
-    lines += ["## Ratios", "", "By `benchmarks/planner/ratios.py` in the same run; build and query over `shapely.constrained_delaunay_triangles` of the same free space.", ""]
+    lines += [
+        "## Ratios",
+        "",
+        "By `benchmarks/planner/ratios.py` in the same run; build and query over `shapely.constrained_delaunay_triangles` of the same free space.",
+        "",
+    ]
     for key, value in ratios.items():
-        text = ", ".join(f"{k} {v:.4g}" for k, v in value.items()) if isinstance(value, dict) else f"{value:.3g}"
+        text = (
+            ", ".join(f"{k} {v:.4g}" for k, v in value.items()) if isinstance(value, dict) else f"{value:.3g}"
+        )
         lines.append(f"- {key}: {text}")
     for name, own, peer in speedups(results):
-        lines.append(f"- build and 20 queries on {name}: {peer / own:.0f} times as fast as extremitypathfinder")
+        lines.append(
+            f"- build and 20 queries on {name}: {peer / own:.0f} times as fast as extremitypathfinder"
+        )
     return "\n".join(lines) + "\n"
 
 
@@ -129,7 +178,13 @@ def plot(results: dict, target: Path) -> None:
     for ax, name in zip(axes, names, strict=True):
         for number, (peer, row) in enumerate(results["cases"][name].items()):
             if "failed" not in row and row["ratio_mean"] is not None:
-                ax.plot(row["build_ms"] + row["query_ms"], 100 * (row["ratio_mean"] - 1), "ov^sDP*X<>"[number], label=peer, markersize=8)
+                ax.plot(
+                    row["build_ms"] + row["query_ms"],
+                    100 * (row["ratio_mean"] - 1),
+                    "ov^sDP*X<>"[number],
+                    label=peer,
+                    markersize=8,
+                )
         ax.set_xscale("log")
         ax.set_yscale("symlog", linthresh=0.1)
         ax.set_title(name)
@@ -145,18 +200,31 @@ def main() -> None:
     """Run everything and write the results."""
     pins = json.loads((HERE / "peers" / "requirements.json").read_text())
     results = {
-        "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
+        "date": dt.datetime.now(dt.UTC).date().isoformat(),
         "machine": f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}",
-        "versions": {"pbpp": [f"numpy=={np.__version__}", f"shapely=={shapely.__version__}", f"GEOS=={shapely.geos_version_string}"], **pins},
+        "versions": {
+            "pbpp": [
+                f"numpy=={np.__version__}",
+                f"shapely=={shapely.__version__}",
+                f"GEOS=={shapely.geos_version_string}",
+            ],
+            **pins,
+        },
         "cases": {},
     }
-    for name in CASES:
+    if "--ratios" in sys.argv:
+        results = json.loads((RESULTS / "planner.json").read_text())
+    for name in () if "--ratios" in sys.argv else CASES:
         results["cases"][name] = {}
         for peer in (*OWN, *pins):
             row = measure(peer, name)
             results["cases"][name][peer] = row
             print(name, peer, row, flush=True)
-    ratios = json.loads(subprocess.run([sys.executable, str(HERE / "ratios.py")], capture_output=True, check=True, text=True).stdout)
+    ratios = json.loads(
+        subprocess.run(
+            [sys.executable, str(HERE / "ratios.py")], capture_output=True, check=True, text=True
+        ).stdout
+    )
     RESULTS.mkdir(exist_ok=True)
     (RESULTS / "planner.json").write_text(json.dumps({**results, "ratios": ratios}, indent=1) + "\n")
     (RESULTS / "planner.md").write_text(table(results, ratios))

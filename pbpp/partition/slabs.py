@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Slabs"]
 
+_REMEMBERED = 64
+
 
 class Slabs:
     """The slab partition of free space.
@@ -62,6 +64,7 @@ class Slabs:
         self._west = np.array(sweep.west)
         self._east = np.array(sweep.east)
         self._portal_rows = sweep.portals
+        self._located: dict[Point, list[int]] = {}
         self.ways = sweep.ways
         self.beside = (sweep.west_above, sweep.west_below, sweep.east_above, sweep.east_below)
         self.above, self.below = sweep.above, sweep.below
@@ -152,14 +155,31 @@ class Slabs:
 
     def locate(self, point: Point) -> list[int]:
         """Return the blocks that a point lies in or on the edge of, in rising order."""
+        found = self._located.get(point)
+        if found is None:
+            if len(self._located) >= _REMEMBERED:
+                self._located.clear()
+            found = self._located[point] = self._locate(point)
+        return found
+
+    def _locate(self, point: Point) -> list[int]:
         east, north = point
-        near = np.flatnonzero((self._west <= east + TOLERANCE_M) & (self._east >= east - TOLERANCE_M))
-        place = np.clip(east, self._west[near], self._east[near])
-        floor = self._edge_north(self._floor[near], place)
-        ceiling = self._edge_north(self._ceiling[near], place)
+        # The sweep opens blocks in the order of their west sides.
+        last = int(np.searchsorted(self._west, east + TOLERANCE_M, side="right"))
+        near = np.flatnonzero(self._east[:last] >= east - TOLERANCE_M)
+        west = self._west[near]
+        width = self._east[near] - west
+        along = np.minimum(np.maximum(east - west, 0.0), width) / width
+        floor_west, floor_east, ceiling_west, ceiling_east = (side[near] for side in self._sides)
+        floor = floor_west + along * (floor_east - floor_west)
+        ceiling = ceiling_west + along * (ceiling_east - ceiling_west)
         inside = (floor <= north + TOLERANCE_M) & (ceiling >= north - TOLERANCE_M)
         found: list[int] = near[inside].tolist()
         return found
+
+    def components(self, blocks: Sequence[int]) -> frozenset[int]:
+        """Return the polygons that blocks lie in, by their place among those the slabs were made of."""
+        return frozenset(self.vertices.owner[self._floor[list(blocks)]].tolist())
 
     def line_neighbours(self, point: Point, block: int) -> list[tuple[int, bool]]:
         """Return the vertices next to a point on the side line of a block that it stands on.

@@ -87,10 +87,12 @@ class Sweep:
         starts = self._vertices.line_start.tolist()
         order = self._vertices.order.tolist()
         for x, first, last in zip(self._vertices.line_x.tolist(), starts, starts[1:], strict=False):
-            if last - first == 1:
-                self._vertex(x, order[first])
+            there = order[first:last]
+            if len(there) == 1 or self._independent(x, there):
+                for vertex in there:
+                    self._vertex(x, vertex)
             else:
-                self._line(x, order[first:last])
+                self._line(x, there)
 
     def _new_block(self, x: float, floor: int, ceiling: int) -> int:
         block = len(self.west)
@@ -210,6 +212,29 @@ class Sweep:
         right = self._open(x, floors, ceilings)
         self._join(x, left, right)
         self._place(there, left, right)
+
+    def _independent(self, x: float, there: list[int]) -> bool:
+        """Return whether no two vertices of a line concern the same block, so that each can be handled as if alone."""
+        seen: set[int] = set()
+        out, prev, y = self._out, self._prev, self._y
+        for vertex in there:
+            before = prev[vertex]
+            leaves, arrives = out[vertex], out[before]
+            if not leaves or not arrives:
+                return False
+            slots = []
+            if leaves < 0:
+                slots.append(self._by_ceiling[vertex])
+            if arrives > 0:
+                slots.append(self._by_floor[before])
+            if not slots:
+                place = self._find(x, y[vertex])
+                slots += self._active[max(place - 1, 0) : place + 1]
+            names = {id(slot) for slot in slots}
+            if names & seen:
+                return False
+            seen |= names
+        return True
 
     def _touched(self, x: float, there: list[int]) -> list[_Slot]:
         """Take the open blocks that end at or are met by the vertices of a line out of the order, and return them."""

@@ -42,6 +42,7 @@ class Vertices:
         last[:-1] = ring[1:] != ring[:-1]
         ring_of = ring[~last]
         self.points: Floats = points[~last]
+        self.owner: Ints = owner[ring_of]
         count = len(self.points)
         place = np.arange(count)
         starts = np.flatnonzero(np.diff(ring_of, prepend=-1))

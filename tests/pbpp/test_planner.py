@@ -61,6 +61,7 @@ def test_clearance_is_kept_everywhere(square):
 
 def test_blocked_ends_carry_where_to_go_instead(square):
     planner = pbpp.Planner([square], [BOX], clearance_m=2.0)
+    assert planner.clearance_m == 2.0
     with pytest.raises(pbpp.StartBlockedError, match="the start") as caught:
         planner.plan((33, 50), (90, 50))
     assert caught.value.nearest_free_m == pytest.approx((28.0, 50.0), abs=0.003)

@@ -78,8 +78,15 @@ def test_stopped_it_tells_what_is_proven(square):
     way = pbpp.widest([square], GATE, (50, 10), (50, 90), should_stop=lambda: True)
     assert way.clearance_m == 0.0
     assert way.limited_by == "gap"
-    hugging = pbpp.widest([square], GATE, (10, 10), (50, 90), should_stop=lambda: True)
+    hugging = pbpp.widest([square], GATE, (44, 10), (44, 90), should_stop=lambda: True)
     assert hugging.clearance_m == 0.0
+
+
+@pytest.mark.parametrize("east", [3.498, 3.5, 3.5012, 3.502, 3.505])
+def test_a_gap_and_an_end_of_nearly_the_same_width(square, east):
+    way = pbpp.widest([square], GATE, (east, 10), (50, 90))
+    assert way.clearance_m == pytest.approx(min(east, 3.5), abs=0.01)
+    assert way.limited_by in {"gap", "start"}
 
 
 @pytest.mark.parametrize("seed", range(120))

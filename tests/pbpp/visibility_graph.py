@@ -22,7 +22,8 @@ def pinches(free):
 
 def shortest_length(free, start, goal):
     """Return the length of the shortest path in closed free space that squeezes through no pinch; infinite if there is none."""
-    touching = pinches(free)
+    # An end on a pinch may leave it to either side.
+    touching = [point for point in pinches(free) if point not in {tuple(start), tuple(goal)}]
     if touching:
         free = free.difference(
             shapely.union_all(shapely.buffer(shapely.points(touching), PINCH_M, quad_segs=2))

@@ -37,7 +37,17 @@ def main(planner: str, case_file: str, most: str) -> None:
         query_s.append(time.perf_counter() - began)
         paths.append(None if path is None else [[float(x), float(y)] for x, y in path])
     memory_mb = peak_mb() - idle_mb
-    print(json.dumps({"import_s": import_s, "build_s": build_s, "query_s": query_s, "paths": paths, "memory_mb": memory_mb}))
+    print(
+        json.dumps(
+            {
+                "import_s": import_s,
+                "build_s": build_s,
+                "query_s": query_s,
+                "paths": paths,
+                "memory_mb": memory_mb,
+            }
+        )
+    )
 
 
 if __name__ == "__main__":

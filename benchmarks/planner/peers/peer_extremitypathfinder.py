@@ -1,3 +1,4 @@
+# ruff: noqa: ANN001, ANN201, ANN202
 """extremitypathfinder: an optimised visibility graph."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# ruff: noqa: ANN001, ANN201
 """nano-astar: grid A* in C++."""
 
 import nano_astar

@@ -1,3 +1,4 @@
+# ruff: noqa: ANN001, ANN201
 """A visibility graph by shapely, searched by networkx."""
 
 import networkx as nx
@@ -15,7 +16,7 @@ def build(case):
     one, two = np.triu_indices(len(points), 1)
     seen = shapely.covers(fat, shapely.linestrings(np.stack([points[one], points[two]], axis=1)))
     lengths = np.hypot(*(points[one[seen]] - points[two[seen]]).T)
-    graph.add_weighted_edges_from(zip(one[seen].tolist(), two[seen].tolist(), lengths.tolist()))
+    graph.add_weighted_edges_from(zip(one[seen].tolist(), two[seen].tolist(), lengths.tolist(), strict=True))
     return graph, points, fat
 
 
@@ -26,7 +27,9 @@ def query(state, start, goal):
     count = len(points)
     for number in (count, count + 1):
         others = np.arange(number)
-        lines = shapely.linestrings(np.stack([every[others], np.broadcast_to(every[number], (number, 2))], axis=1))
+        lines = shapely.linestrings(
+            np.stack([every[others], np.broadcast_to(every[number], (number, 2))], axis=1)
+        )
         for other in others[shapely.covers(fat, lines)].tolist():
             graph.add_edge(number, other, weight=float(np.hypot(*(every[number] - every[other]))))
     try:

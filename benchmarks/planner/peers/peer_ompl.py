@@ -1,3 +1,4 @@
+# ruff: noqa: ANN001, ANN002, ANN201, ANN202, ANN204, N802
 """OMPL: BIT* for one second a query, with exact checks of motions by shapely."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# ruff: noqa: ANN001, ANN201
 """pathplanning: Theta* on a grid, native code."""
 
 from pathplanning import plan_discrete

@@ -1,3 +1,4 @@
+# ruff: noqa: ANN001, ANN201
 """This project's planner, method="pbpp-taut" over the paper's blocks."""
 
 import pbpp

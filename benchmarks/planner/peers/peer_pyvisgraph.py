@@ -1,3 +1,4 @@
+# ruff: noqa: ANN001, ANN201
 """pyvisgraph: Lee's sweep; it knows no inclusion, so the square's edge is left out."""
 
 import pyvisgraph
@@ -10,4 +11,6 @@ def build(case):
 
 
 def query(graph, start, goal):
-    return [(point.x, point.y) for point in graph.shortest_path(pyvisgraph.Point(*start), pyvisgraph.Point(*goal))]
+    return [
+        (point.x, point.y) for point in graph.shortest_path(pyvisgraph.Point(*start), pyvisgraph.Point(*goal))
+    ]

@@ -1,3 +1,4 @@
+# ruff: noqa: ANN001, ANN201, ANN204
 """The free cells of a case, for the planners that know only grids: a cell that an obstacle's inside touches is blocked."""
 
 import numpy as np
@@ -12,8 +13,12 @@ class Raster:
         columns, rows = int((east - west) / self.cell_m), int((north - south) / self.cell_m)
         x, y = np.meshgrid(west + np.arange(columns) * self.cell_m, south + np.arange(rows) * self.cell_m)
         cells = shapely.box(x, y, x + self.cell_m, y + self.cell_m)
-        inside = shapely.buffer(shapely.union_all([shapely.Polygon(ring) for ring in case["exclusions"]]), -1e-9)
-        outside = shapely.difference(shapely.box(west - 1, south - 1, east + 1, north + 1), shapely.Polygon(case["inclusion"]))
+        inside = shapely.buffer(
+            shapely.union_all([shapely.Polygon(ring) for ring in case["exclusions"]]), -1e-9
+        )
+        outside = shapely.difference(
+            shapely.box(west - 1, south - 1, east + 1, north + 1), shapely.Polygon(case["inclusion"])
+        )
         blocked = shapely.union(inside, shapely.buffer(outside, -1e-9))
         shapely.prepare(blocked)
         self.blocked = shapely.intersects(blocked, cells)

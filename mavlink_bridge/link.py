@@ -267,13 +267,23 @@ def open_link(
     LinkError
         The string is none, or the device cannot be opened; says why.
     """
+    return Link(open_transport(connection, timeout_s=timeout_s), identity, recorder, signing)
+
+
+def open_transport(connection: str, *, timeout_s: float = 10.0) -> Transport:
+    """Open the device of a connection string, for bytes as they are.
+
+    Raises
+    ------
+    LinkError
+        The string is none, or the device cannot be opened; says why.
+    """
     address = parse_connection(connection)
     try:
-        transport = _OPENERS[address.kind](address, timeout_s)
+        return _OPENERS[address.kind](address, timeout_s)
     except (OSError, UnicodeError) as error:  # a host's name may be none
         reason = getattr(error, "strerror", None) or error
         raise LinkError(f"{address} cannot be opened: {reason}", connection=str(address)) from None
-    return Link(transport, identity, recorder, signing)
 
 
 class _Udp:

@@ -10,10 +10,14 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.director import Director, Orders
+from mavlink_bridge.journal import journal_path, read_journal
+from mavlink_bridge.logbook.clock import SteadyClock
+from mavlink_bridge.tlog import TlogReader
 from missions.situation import Situation
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
+    from pathlib import Path
 
     from mavlink_bridge.director import Event
     from mavlink_bridge.journal import Call, Journal
@@ -21,6 +25,37 @@ if TYPE_CHECKING:
 
 SENT_LINK = 3
 """MAVProxy's link number, and ours, for what the recording side sent."""
+
+
+def replay_log(log: Path, orders: Orders, wait: Callable[[float], None] | None = None) -> Iterator[Event]:
+    """Give the director's events over a log; with its journal where there is one.
+
+    Parameters
+    ----------
+    log : pathlib.Path
+        A telemetry log.
+    orders : Orders
+        What is asked of plans where there is no journal.
+    wait : callable, optional
+        Called before each frame with the seconds since the log's begin, to let them pass.
+
+    Raises
+    ------
+    LogError
+        The log or its journal cannot be used.
+    """
+    entries: Iterable[LogEntry] = TlogReader(log)
+    if wait is not None:
+        entries = _paced(entries, wait)
+    journal = journal_path(log)
+    if journal.exists():
+        return replay_recorded(entries, read_journal(journal))
+    return replay_foreign(entries, orders)
+
+
+def replay_to_json(log: Path, orders: Orders) -> list[dict[str, object]]:
+    """Replay a whole log; give its events as JSON objects, with the log's name. For worker processes."""
+    return [{"log": log.name, **event.as_json()} for event in replay_log(log, orders)]
 
 
 def replay_recorded(entries: Iterable[LogEntry], journal: Journal) -> Iterator[Event]:
@@ -44,20 +79,37 @@ def replay_recorded(entries: Iterable[LogEntry], journal: Journal) -> Iterator[E
 
 
 def replay_foreign(entries: Iterable[LogEntry], orders: Orders) -> Iterator[Event]:
-    """Let the director listen to a log that somebody else recorded; give its events."""
+    """Let the director listen to a log that somebody else recorded; give its events, at the log's times.
+
+    The director's own time only goes forward: where the log's clock was set, it goes on from where it was.
+    """
     director = Director(replace(orders, passive=True, upload=False, drive=False, arm=False, once=False))
-    now_s: float | None = None
-    for entry in entries:
-        if now_s is None:
-            director.start(entry.time_s)
-            now_s = entry.time_s
-        yield from _timers(director, now_s, entry.time_s)
-        now_s = max(now_s, entry.time_s)
+    clock = SteadyClock()
+    before_s: float | None = None
+    for entry, now_s in clock.over(entries):
+        if before_s is None:
+            director.start(now_s)
+            before_s = now_s
+        yield from _at_log_time(_timers(director, before_s, now_s), clock)
+        before_s = now_s
         director.receive(entry.frame, now_s)
-        yield from _spoken(director)
-    if now_s is not None:
-        director.handle_timer(now_s)
-        yield from _spoken(director)
+        yield from _at_log_time(_spoken(director), clock)
+    if before_s is not None:
+        director.handle_timer(before_s)
+        yield from _at_log_time(_spoken(director), clock)
+
+
+def _at_log_time(events: Iterable[Event], clock: SteadyClock) -> Iterator[Event]:
+    for event in events:
+        yield replace(event, time_s=event.time_s + clock.offset_s)
+
+
+def _paced(entries: Iterable[LogEntry], wait: Callable[[float], None]) -> Iterator[LogEntry]:
+    begin_s: float | None = None
+    for entry, now_s in SteadyClock().over(entries):
+        begin_s = now_s if begin_s is None else begin_s
+        wait(now_s - begin_s)
+        yield entry
 
 
 def _timers(director: Director, now_s: float, until_s: float) -> Iterator[Event]:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from mavlink_bridge.cli import bridge, demo, download, plan, replay, sim, upload
+from mavlink_bridge.cli import bridge, check, demo, download, log, plan, replay, sim, upload
 from mavlink_bridge.cli.common import guarded
 
 app = typer.Typer(
@@ -18,7 +18,9 @@ app = typer.Typer(
 )
 
 app.command("plan")(guarded(plan.plan))
+app.command("check")(guarded(check.check))
 app.command("bridge")(guarded(bridge.bridge))
+app.command("log")(guarded(log.log))
 app.command("replay")(guarded(replay.replay))
 app.command("upload")(guarded(upload.upload))
 app.command("download")(guarded(download.download))

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
-import json
+import multiprocessing
+import os
+import time
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,16 +19,17 @@ from mavlink_bridge.cli.common import (
     QuietOption,
     SystemOption,
     print_json,
+    progress_bar,
 )
 from mavlink_bridge.cli.plan import request_from_options
-from mavlink_bridge.errors import LogError
+from mavlink_bridge.errors import LogError, UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator
 
-    from mavlink_bridge.director import Event, Orders
+    from mavlink_bridge.director import Orders
 
-_TIME_TOLERANCE_S = 1e-3
+_Told = dict[str, Any]
 
 
 def replay(
@@ -33,7 +37,27 @@ def replay(
     expect: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="JSON lines of the events that are expected; exit 8 if others come."
+            metavar="FILE",
+            help="JSON lines of the events that are expected, or a folder with each log's .events.jsonl; exit 8 if others come.",
+        ),
+    ] = None,
+    record: Annotated[
+        bool, typer.Option("--record", help="Write what is told beside each log, as its .events.jsonl.")
+    ] = False,
+    send: Annotated[
+        str | None,
+        typer.Option(metavar="CONNECTION", help="Play the vehicle's side of one log to a live client."),
+    ] = None,
+    speed: Annotated[
+        float | None,
+        typer.Option(
+            metavar="X", help="Times the log's own speed. Default: as fast as it goes; 1 with --send."
+        ),
+    ] = None,
+    jobs: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N", min=1, help="Logs replayed side by side. Default: as many as there are processors."
         ),
     ] = None,
     clearance: Annotated[str | None, typer.Option(metavar="M|max", help="As for plan.")] = None,
@@ -50,68 +74,219 @@ def replay(
     Examples:
     `pbpp replay sitl_logs/guided-maze.tlog`
 
-    `pbpp replay run.tlog --json > run.events; pbpp replay run.tlog --expect run.events`
+    `pbpp replay field.tlog --record; pbpp replay field.tlog --expect field.events.jsonl`
+
+    `pbpp replay field.tlog --send udpout:127.0.0.1:14550`
     """
     from mavlink_bridge.director import Orders, TargetSource  # noqa: PLC0415 - quick help
 
-    sources = frozenset(TargetSource) - {TargetSource.ECHO, TargetSource.RALLY}
+    if speed is not None and not 0 < speed < float("inf"):
+        raise UsageError(f"--speed {speed:g}: expected a number above 0")
+    if send is not None:
+        if len(logs) > 1 or record or expect is not None:
+            raise UsageError("--send plays one LOG and compares nothing")
+        _send(logs[0], send, speed or 1.0, system, any_vehicle=any_vehicle, quiet=quiet or json_output)
+        return
     orders = Orders(
         system=system,
         any_vehicle=any_vehicle,
         request=request_from_options(None, [], clearance, corner_allowance, 0.0, "optimal"),
-        target_sources=sources,
+        target_sources=frozenset(TargetSource) - {TargetSource.ECHO, TargetSource.RALLY},
     )
-    told = []
+    expected = _expected(logs, expect)
+    teller = _Teller(wants_json=json_output, quiet=quiet, names_logs=len(logs) > 1)
+    results = _replayed(logs, orders, speed, jobs, teller)
+    if record:
+        _record(results, quiet=quiet or json_output)
+    if not _is_as_expected(expected, results):
+        raise typer.Exit(ExitCode.CHECK)
+    if any(isinstance(result, LogError) for result in results.values()):
+        raise typer.Exit(ExitCode.INPUT)
+
+
+class _Teller:
+    """Puts events on stdout, as they come."""
+
+    def __init__(self, *, wants_json: bool, quiet: bool, names_logs: bool) -> None:
+        self.is_quiet = quiet or wants_json
+        self._wants_json = wants_json
+        self._is_silent = quiet and not wants_json
+        self._names_logs = names_logs
+
+    def tell(self, event: _Told) -> None:
+        if self._wants_json:
+            print_json(event)
+        elif not self._is_silent:
+            prefix = f"{event['log']}: " if self._names_logs else ""
+            typer.echo(f"{prefix}{event['time_s']:.2f} {event['event']}: {event['text']}")
+
+    def fail(self, log: Path, error: LogError) -> None:
+        """Tell of a log among several that cannot be used; the others are replayed all the same."""
+        if self._wants_json:
+            print_json({"log": log.name, "status": "error", "error": "LogError", "message": str(error)})
+        typer.secho(f"error: {error}", err=True, fg=typer.colors.RED)
+
+
+_Results = dict[Path, list[_Told] | LogError]
+
+
+def _replayed(
+    logs: list[Path], orders: Orders, speed: float | None, jobs: int | None, teller: _Teller
+) -> _Results:
+    """Replay the logs; tell each one's events in the order in which the logs were given."""
+    workers = min(jobs or os.cpu_count() or 1, len(logs))
+    if len(logs) == 1 or speed is not None or workers == 1:
+        return _one_after_the_other(logs, orders, speed, teller)
+    return _side_by_side(logs, orders, workers, teller)
+
+
+def _one_after_the_other(logs: list[Path], orders: Orders, speed: float | None, teller: _Teller) -> _Results:
+    from mavlink_bridge.replay import replay_log  # noqa: PLC0415 - quick help
+
+    results: _Results = {}
     for log in logs:
-        for event in events_of(log, orders):
-            document = {"log": log.name, **event.as_json()}
-            told.append(document)
-            if json_output:
-                print_json(document)
-            elif not quiet:
-                prefix = f"{log.name}: " if len(logs) > 1 else ""
-                typer.echo(f"{prefix}{event.time_s:.2f} {event.name}: {event.text}")
-    if expect is not None:
-        differences = _differences(_expected(expect), told)
-        for line in differences:
-            typer.secho(line, err=True)
-        if differences:
-            raise typer.Exit(ExitCode.CHECK)
+        wait = None if speed is None else _Pace(speed).wait
+        told: list[_Told] = []
+        try:
+            for event in replay_log(log, orders, wait):
+                told.append({"log": log.name, **event.as_json()})
+                teller.tell(told[-1])
+        except LogError as error:
+            if len(logs) == 1:
+                raise
+            teller.fail(log, error)
+            results[log] = error
+        else:
+            results[log] = told
+    return results
 
 
-def events_of(log: Path, orders: Orders) -> Iterator[Event]:
-    """Give the director's events over a log; with its journal where there is one."""
-    from mavlink_bridge.journal import journal_path, read_journal  # noqa: PLC0415 - quick help
-    from mavlink_bridge.replay import replay_foreign, replay_recorded  # noqa: PLC0415
-    from mavlink_bridge.tlog import TlogReader  # noqa: PLC0415
+def _side_by_side(logs: list[Path], orders: Orders, workers: int, teller: _Teller) -> _Results:
+    from mavlink_bridge.replay import replay_to_json  # noqa: PLC0415 - quick help
 
-    journal = journal_path(log)
-    if journal.exists():
-        return replay_recorded(TlogReader(log), read_journal(journal))
-    return replay_foreign(TlogReader(log), orders)
-
-
-def _expected(path: Path) -> list[dict[str, Any]]:
+    results: _Results = {}
+    context = multiprocessing.get_context("spawn")  # a fork would copy the progress bar's thread half alive
+    pool = ProcessPoolExecutor(workers, mp_context=context)
     try:
-        return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
-    except OSError as error:
-        raise LogError(f"{path} cannot be read: {error.strerror}") from None
-    except ValueError as error:
-        raise LogError(f"{path}: not JSON lines: {error}") from None
+        futures = {log: pool.submit(replay_to_json, log, orders) for log in logs}
+        with progress_bar(quiet=teller.is_quiet) as show:
+            for number, (log, future) in enumerate(futures.items()):
+                show(log.name, number, len(logs))
+                try:
+                    results[log] = future.result()
+                except LogError as error:
+                    teller.fail(log, error)
+                    results[log] = error
+                    continue
+                for event in results[log]:  # type: ignore[union-attr]
+                    teller.tell(event)
+    finally:
+        pool.shutdown(cancel_futures=True)
+    return results
 
 
-def _differences(expected: Sequence[dict[str, Any]], told: Sequence[dict[str, Any]]) -> list[str]:
-    """Compare events; times may differ by a millisecond."""
-    before, after = _lines(expected, told), _lines(told, expected)
-    return list(difflib.unified_diff(before, after, "expected", "told", lineterm="", n=1))
+def _expected(logs: list[Path], expect: Path | None) -> dict[Path | None, list[_Told]]:
+    """Read what is expected: of each log by itself, or (under None) of all together."""
+    from mavlink_bridge.expectations import expectation_path, read_expectation  # noqa: PLC0415 - quick help
+
+    if expect is None:
+        return {}
+    if expect.is_dir():
+        return {log: read_expectation(expect / expectation_path(log).name) for log in logs}
+    return {None: read_expectation(expect)}
 
 
-def _lines(events: Sequence[dict[str, Any]], others: Sequence[dict[str, Any]]) -> list[str]:
-    """Give each event as a line, its time as the other side's where the two are as good as the same."""
-    lines = []
-    for index, event in enumerate(events):
-        times_s = [event.get("time_s"), others[index].get("time_s") if index < len(others) else None]
-        numbers = [time_s for time_s in times_s if isinstance(time_s, (int, float))]
-        is_near = len(numbers) == 2 and abs(numbers[0] - numbers[1]) <= _TIME_TOLERANCE_S + 1e-9
-        lines.append(json.dumps({**event, "time_s": min(numbers) if is_near else times_s[0]}, sort_keys=True))
-    return lines
+def _is_as_expected(expected: dict[Path | None, list[_Told]], results: _Results) -> bool:
+    from mavlink_bridge.expectations import differences  # noqa: PLC0415 - quick help
+
+    found = []
+    for log, events in expected.items():
+        chosen = results.values() if log is None else [results[log]]
+        told = [event for result in chosen if not isinstance(result, LogError) for event in result]
+        found += differences(events, told)
+    for line in found:
+        typer.secho(line, err=True)
+    if found:
+        typer.secho("- expected, did not come; + came, not expected; ~ came otherwise", err=True)
+    return not found
+
+
+def _record(results: _Results, *, quiet: bool) -> None:
+    from mavlink_bridge.expectations import expectation_path, to_expect  # noqa: PLC0415 - quick help
+
+    for log, told in results.items():
+        if isinstance(told, LogError):
+            continue
+        path = expectation_path(log)
+        try:
+            path.write_text(to_expect(told), encoding="utf-8")
+        except OSError as error:
+            raise LogError(f"{path} cannot be written: {error.strerror}", file=str(path)) from None
+        if not quiet:
+            typer.echo(f"Wrote {path}")
+
+
+class _Pace:
+    """Lets a log's time pass, so many times faster than it did."""
+
+    def __init__(self, speed: float) -> None:
+        self._speed = speed
+        self._begun_s = time.monotonic()
+
+    def wait(self, elapsed_s: float) -> None:
+        """Wait until so many of the log's seconds have passed."""
+        time.sleep(max(0.0, self.left_s(elapsed_s)))
+
+    def left_s(self, elapsed_s: float) -> float:
+        """Tell how long that is yet."""
+        return self._begun_s + elapsed_s / self._speed - time.monotonic()
+
+
+def _send(
+    log: Path, connection: str, speed: float, system: int | None, *, any_vehicle: bool, quiet: bool
+) -> None:
+    """Play the vehicle's side of a log; what the client sends is read and left alone."""
+    from mavlink_bridge.link import open_transport, parse_connection  # noqa: PLC0415 - quick help
+    from mavlink_bridge.logbook.playback import vehicle_frames  # noqa: PLC0415
+
+    is_called = parse_connection(connection).kind == "udpin"
+    frames = vehicle_frames(log, system, any_vehicle=any_vehicle)
+    with closing(open_transport(connection)) as transport, progress_bar(quiet=quiet) as show:
+        if is_called:
+            show(f"waiting for a client on {connection}", 0, 0)
+            while not transport.receive(0.5):
+                pass
+        count = _play(frames, speed, transport.send, transport.receive, show)
+    if not quiet:
+        typer.echo(f"Sent {count} messages")
+
+
+def _play(
+    frames: Iterable[tuple[float, bytes]],
+    speed: float,
+    send: Callable[[bytes], None],
+    receive: Callable[[float], bytes],
+    show: Callable[[str, int, int], None],
+) -> int:
+    pace = _Pace(speed)
+    count = 0
+    for elapsed_s, data in _elapsed(frames):
+        while (left_s := pace.left_s(elapsed_s)) > 0:
+            receive(min(left_s, 0.5))
+        send(data)
+        count += 1
+        if count % 50 == 0:
+            show(f"{elapsed_s:.0f} s", count, 0)
+    return count
+
+
+def _elapsed(frames: Iterable[tuple[float, bytes]]) -> Iterator[tuple[float, bytes]]:
+    """Give the seconds since the first frame, by a clock that only goes forward."""
+    from mavlink_bridge.logbook import SteadyClock  # noqa: PLC0415 - quick help
+
+    clock = SteadyClock()
+    begin_s: float | None = None
+    for time_s, data in frames:
+        now_s = clock.advance(time_s, None)
+        begin_s = now_s if begin_s is None else begin_s
+        yield now_s - begin_s, data

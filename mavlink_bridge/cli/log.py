@@ -1,0 +1,309 @@
+"""``pbpp log``: what a recorded log holds."""
+
+from __future__ import annotations
+
+import datetime as dt
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, TypeVar
+
+import typer
+
+from mavlink_bridge.cli.common import (
+    ExitCode,
+    JsonOption,
+    QuietOption,
+    SystemOption,
+    print_json,
+    progress_bar,
+)
+from mavlink_bridge.errors import LogError, UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from rich.table import Table
+
+    from mavlink_bridge.grade import Grade
+    from mavlink_bridge.logbook import Logbook, VehicleLog
+
+Row = TypeVar("Row")
+_MOST_ROWS = 40
+_UNION_BIT = 2
+"""FENCE_OPTIONS: inside one inclusion is enough."""
+
+
+def log(
+    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Telemetry logs: .tlog, .raw, .gz.")],
+    plot: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="FILE", help="Draw fence, track, mission and targets: .png, .svg, .pdf, .html."),
+    ] = None,
+    system: SystemOption = None,
+    json_output: JsonOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Tell what telemetry logs hold: who speaks, fences and missions transferred, targets, modes, the drive and its clearance.
+
+    Drives of a mission (AUTO) are graded: least clearance, deviation and time against what the drive model foresees.
+
+    Examples:
+    `pbpp log flight.tlog --plot flight.png`
+
+    `pbpp log *.tlog --json`
+    """
+    plots = plot or []
+    if plots and len(files) > 1:
+        raise UsageError("--plot draws one log: give one FILE")
+    if plots:
+        from missions.picture import check_picture_format  # noqa: PLC0415 - quick help
+
+        for path in plots:
+            check_picture_format(path)
+    from mavlink_bridge.logbook import read_logbook  # noqa: PLC0415 - quick help
+    from mavlink_bridge.logbook.document import as_document  # noqa: PLC0415
+
+    documents: list[dict[str, object]] = []
+    is_unusable = False
+    with progress_bar(quiet=quiet or json_output or len(files) == 1) as show:
+        for number, path in enumerate(files):
+            show(path.name, number, len(files))
+            try:
+                book = read_logbook(path, system)
+            except LogError as error:
+                if len(files) == 1:
+                    raise
+                is_unusable = True
+                documents.append({"log": path.name, "error": "LogError", "message": str(error)})
+                typer.secho(f"error: {error}", err=True, fg=typer.colors.RED)
+                continue
+            if json_output:
+                documents.append(as_document(book))
+            elif not quiet:
+                _print(book)
+            for picture in plots:
+                _draw(book, picture)
+    if json_output:
+        status = "error" if is_unusable else "ok"
+        code = {"exit_code": int(ExitCode.INPUT)} if is_unusable else {}
+        print_json({"status": status, "command": "log", **code, "logs": documents})
+    elif not quiet:
+        for picture in plots:
+            typer.echo(f"Wrote {picture}")
+    if is_unusable:
+        raise typer.Exit(ExitCode.INPUT)
+
+
+def _draw(book: Logbook, path: Path) -> None:
+    from missions.picture.track import TrackPicture, draw_track  # noqa: PLC0415 - slow to come
+
+    if not book.vehicles:
+        raise LogError(f"{book.name}: no vehicle was heard: there is nothing to draw")
+    vehicle = book.vehicles[0]
+    if len(book.vehicles) > 1:
+        names = ", ".join(str(other.system) for other in book.vehicles)
+        raise UsageError(f"{book.name} holds vehicles {names}; choose one to draw with --system N")
+    mission = vehicle.situation.mission
+    waypoints = [item.position for item in mission.value.items if item.is_placed] if mission else []
+    bits = vehicle.parameters.get("FENCE_OPTIONS", 0.0)
+    picture = TrackPicture(
+        fence=vehicle.fences[-1][1] if vehicle.fences else None,
+        parts=tuple((part.mode, part.positions) for part in vehicle.track),
+        mission=tuple(waypoints),
+        targets=tuple(target.position for target in vehicle.targets),
+        title=f"{book.name}: {_driven(vehicle)}",
+        union=bool(int(bits) & _UNION_BIT),
+    )
+    draw_track(picture, path)
+
+
+# Tables for people
+
+
+def _print(book: Logbook) -> None:
+    from rich.console import Console  # noqa: PLC0415 - quick help
+
+    console = Console(highlight=False, soft_wrap=False)
+    console.print(f"[bold]{_safe(book.name)}[/bold]: {_length(book)}", soft_wrap=True)
+    if not book.damage.is_clean:
+        console.print(f"Damage passed over: {book.damage}", soft_wrap=True)
+    if book.clock_jumps:
+        console.print(
+            f"The log's clock was set {book.clock_jumps} times while it was written: rates are off",
+            soft_wrap=True,
+        )
+    console.print(_senders(book))
+    for vehicle in book.vehicles:
+        console.print(f"\n[bold]Vehicle {vehicle.system}[/bold]: {_driven(vehicle)}", soft_wrap=True)
+        for line in _findings(vehicle):
+            console.print(line, soft_wrap=True, markup=False)
+        for table in _vehicle_tables(vehicle):
+            console.print(table)
+    console.print(_messages(book))
+
+
+def _length(book: Logbook) -> str:
+    begin = (
+        f" from {dt.datetime.fromtimestamp(book.begins_s, dt.UTC):%Y-%m-%d %H:%M:%S} UTC"
+        if book.has_timestamps
+        else ", raw: without times of its own"
+    )
+    return f"{_duration(book.duration_s)}{begin}, {book.damage.frames} messages"
+
+
+def _senders(book: Logbook) -> Table:
+    table = _table("Senders", "system", "component", "what", "types", "messages")
+    vehicles = {(vehicle.system, vehicle.component): vehicle.mav_type for vehicle in book.vehicles}
+    for sender, group in groupby(book.traffic, key=lambda traffic: (traffic.system, traffic.component)):
+        rows = list(group)
+        mav_type = vehicles.get(sender)
+        what = "" if mav_type is None else _TYPES.get(mav_type, f"MAV_TYPE {mav_type}")
+        table.add_row(*map(str, sender), what, str(len(rows)), str(sum(row.count for row in rows)))
+    return table
+
+
+def _messages(book: Logbook) -> Table:
+    table = _table("Messages", "system", "component", "type", "count", "rate (Hz)")
+    for traffic in book.traffic:
+        table.add_row(
+            str(traffic.system),
+            str(traffic.component),
+            traffic.name,
+            str(traffic.count),
+            f"{traffic.rate_hz:.2f}" if traffic.rate_hz else "",
+        )
+    return table
+
+
+def _driven(vehicle: VehicleLog) -> str:
+    near = vehicle.nearest
+    clearance = "" if near is None else f", nearest to the fence {near.clearance_m:.2f} m"
+    return f"{vehicle.driven_m:.1f} m driven{clearance}"
+
+
+def _findings(vehicle: VehicleLog) -> Iterable[str]:
+    near = vehicle.nearest
+    if near is not None:
+        yield f"Least clearance: {near.clearance_m:.2f} m at {near.time_s:.1f} s, {near.position}, {near.zone}"
+    for intrusion in vehicle.intrusions[:_MOST_ROWS]:
+        yield (
+            f"On forbidden ground: {intrusion.begun_s:.1f} to {intrusion.ended_s:.1f} s, {intrusion.deepest_m:.2f} m deep, "
+            f"{intrusion.zone}"
+        )
+    if vehicle.reported_breaches:
+        last = vehicle.reported_breaches[-1]
+        yield f"Breaches reported by the autopilot: {len(vehicle.reported_breaches)}, the last at {last.time_s:.1f} s"
+    for grade in vehicle.grades[:_MOST_ROWS]:
+        yield from _graded(grade)
+    yield from (f"Note: {note}" for note in vehicle.notes)
+
+
+def _graded(grade: Grade) -> Iterable[str]:
+    foreseen = grade.foreseen
+    ending = "arrived" if grade.arrived else f"{grade.reached} of {grade.items} waypoints reached"
+    yield f"Drive from {grade.begun_s:.1f} s: items {grade.first_item} to {grade.last_item}, {grade.driven_m:.1f} m, {ending}"
+
+    def compared(name: str, found: float | None, told: float | None, unit: str) -> Iterable[str]:
+        if found is not None:
+            beside = "" if told is None else f", {told:.2f} {unit} foreseen"
+            yield f"  {name}: {found:.2f} {unit}{beside}"
+
+    told = (
+        (None, None, None)
+        if foreseen is None
+        else (foreseen.least_clearance_m, foreseen.deviation_m, foreseen.took_s)
+    )
+    yield from compared("least clearance", grade.least_clearance_m, told[0], "m")
+    yield from compared("farthest off the lines", grade.deviation_m, told[1], "m")
+    yield from compared("time to the last waypoint reached", grade.took_s, told[2], "s")
+    if grade.outside_m is not None:
+        verdict = (
+            "within the band foreseen"
+            if grade.is_as_foreseen
+            else f"{grade.outside_m:.2f} m outside the band foreseen"
+        )
+        yield f"  {verdict}"
+    yield from (f"  {note}" for note in grade.notes)
+
+
+def _vehicle_tables(vehicle: VehicleLog) -> Iterable[Table]:
+    if vehicle.transfers:
+        table = _table("Lists transferred", "at (s)", "list", "way", "by", "items", "outcome")
+        for transfer in _rows(table, vehicle.transfers):
+            station = "?" if transfer.station is None else "/".join(map(str, transfer.station))
+            announced = "?" if transfer.announced is None else transfer.announced
+            result = f" ({transfer.result})" if transfer.result not in (None, "ACCEPTED") else ""
+            table.add_row(
+                f"{transfer.begun_s:.1f}",
+                str(transfer.kind),
+                str(transfer.way),
+                station,
+                f"{transfer.seen} of {announced}",
+                f"{transfer.ending}{result}",
+            )
+        yield table
+    if vehicle.targets:
+        table = _table(f"Targets ({vehicle.targets_seen})", "at (s)", "position", "by", "from")
+        for target in _rows(table, vehicle.targets):
+            source = target.source if target.said == 1 else f"{target.source}, {target.said} times"
+            table.add_row(
+                f"{target.time_s:.1f}", str(target.position), source, "/".join(map(str, target.station))
+            )
+        yield table
+    if vehicle.modes:
+        table = _table("Modes", "from (s)", "to (s)", "mode", "armed", "driven (m)")
+        for span in _rows(table, vehicle.modes):
+            armed = "yes" if span.armed else "no"
+            table.add_row(
+                f"{span.begun_s:.1f}", f"{span.ended_s:.1f}", span.name, armed, f"{span.driven_m:.1f}"
+            )
+        yield table
+    if vehicle.parameters:
+        table = _table(f"Parameters that matter, of {vehicle.parameters_seen}", "name", "value", "was")
+        before: dict[str, list[str]] = {}
+        for change in vehicle.parameter_changes:
+            before.setdefault(change.name, []).append(f"{change.before:g} until {change.time_s:.1f} s")
+        for name, value in vehicle.parameters.items():
+            table.add_row(name, f"{value:g}", ", ".join(before.get(name, [])[-3:]))
+        yield table
+
+
+def _rows(table: Table, rows: Sequence[Row]) -> Sequence[Row]:
+    """Give the rows of a table, the last ones where they are too many."""
+    if len(rows) > _MOST_ROWS:
+        table.caption = f"the last {_MOST_ROWS} of {len(rows)}; all with --json"
+    return rows[-_MOST_ROWS:]
+
+
+def _table(title: str, *columns: str) -> Table:
+    from rich.box import SIMPLE_HEAD  # noqa: PLC0415 - quick help
+    from rich.table import Table  # noqa: PLC0415
+
+    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
+    for column in columns:
+        is_number = column.endswith(")") or column in ("count", "types", "messages", "system", "component")
+        table.add_column(column, justify="right" if is_number else "left", overflow="fold")
+    return table
+
+
+def _safe(text: str) -> str:
+    from rich.markup import escape  # noqa: PLC0415 - quick help
+
+    return escape(text)
+
+
+def _duration(duration_s: float) -> str:
+    if duration_s < 120:
+        return f"{duration_s:.1f} s"
+    minutes, seconds = divmod(round(duration_s), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes:02} min {seconds:02} s" if hours else f"{minutes} min {seconds:02} s"
+
+
+_TYPES = {
+    1: "fixed wing",
+    2: "quadrotor",
+    10: "rover",
+    11: "boat",
+    12: "submarine",
+}

@@ -1,0 +1,72 @@
+"""A clock that only runs forward, from the times of a log, which may jump and run backwards."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from mavlink_bridge.tlog import LogEntry
+
+NEAR_S: Final = 5.0
+"""Records no farther apart than this follow one another; a step back by less is a late record."""
+
+SILENCE_S: Final = 86_400.0
+"""A step forward by at most this is time that passed; by more, or backwards, the clock was set."""
+
+
+class SteadyClock:
+    """Turns a log's times into times that only go forward.
+
+    Attributes
+    ----------
+    offset_s : float
+        The log's time less the clock's; it changes only where the log's clock was set.
+    jumps : int
+        How often that was.
+    outliers : int
+        Lone records whose time lies off both neighbours'; they get the time before.
+    """
+
+    def __init__(self) -> None:
+        self.offset_s = 0.0
+        self.jumps = 0
+        self.outliers = 0
+        self._now_s: float | None = None
+
+    def over(self, entries: Iterable[LogEntry]) -> Iterator[tuple[LogEntry, float]]:
+        """Give each entry with the clock's time; looks one entry ahead."""
+        before: LogEntry | None = None
+        for entry in entries:
+            if before is not None:
+                yield before, self.advance(before.time_s, entry.time_s)
+            before = entry
+        if before is not None:
+            yield before, self.advance(before.time_s, None)
+
+    def advance(self, time_s: float, next_s: float | None) -> float:
+        """Give the clock's time at a record.
+
+        Parameters
+        ----------
+        time_s : float
+            The record's time.
+        next_s : float or None
+            The next record's; None at the end.
+        """
+        now_s = self._now_s
+        step_s = 0.0 if now_s is None else time_s - self.offset_s - now_s
+        if now_s is None or 0 <= step_s <= NEAR_S:
+            self._now_s = time_s - self.offset_s
+        elif -NEAR_S <= step_s < 0:
+            pass
+        elif next_s is not None and abs(next_s - self.offset_s - now_s) <= NEAR_S:
+            self.outliers += 1
+        elif 0 < step_s <= SILENCE_S:
+            self._now_s = time_s - self.offset_s
+        else:
+            self.offset_s = time_s - now_s
+            self.jumps += 1
+        assert self._now_s is not None
+        return self._now_s

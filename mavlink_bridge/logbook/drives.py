@@ -1,0 +1,91 @@
+"""Finding the drives of missions in a track, and having them graded."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING, Final
+
+from mavlink_bridge.grade import STANDING_MPS, DriveGrader, Field, Grade, way_of
+from mavlink_bridge.logbook.modes import drives_mission
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from mavlink_bridge.logbook.track import FenceMeter, Fix
+    from missions.local_frame import LocalFrame
+    from missions.situation import Situation
+    from missions.vehicle import Vehicle
+
+_HEARTBEAT_S: Final = 1.5
+"""A mode change is told by the next heartbeat: the drive may have begun so long before."""
+
+_MOST_RECENT = 64
+
+
+class Drives:
+    """Follows a vehicle's drives: each runs while it is armed in AUTO with a mission that is known."""
+
+    def __init__(self) -> None:
+        self.grades: list[Grade] = []
+        self._grader: DriveGrader | None = None
+        self._recent: deque[Fix] = deque(maxlen=_MOST_RECENT)
+
+    def drive(
+        self,
+        situation: Situation,
+        fixes: Sequence[Fix],
+        clearances_m: NDArray[np.float64] | None,
+        vehicle: Vehicle,
+        frame: LocalFrame,
+        meter: FenceMeter | None,
+    ) -> None:
+        """Take positions that were all driven in one situation, and what the track to each keeps to the fence."""
+        if not _is_driving(situation):
+            self.end()
+        elif self._grader is None:
+            self._begin(situation, fixes[0], Field(frame, meter, vehicle))
+        if self._grader is not None:
+            self._grader.drive(fixes, clearances_m)
+        self._recent.extend(fixes)
+
+    def reached(self, seq: int) -> None:
+        """Take notice that a mission item was reached at the latest position."""
+        if self._grader is not None:
+            self._grader.reached(seq, self._recent[-1].boot_s)
+
+    def end(self) -> None:
+        """End the drive under way, if there is one."""
+        grader, self._grader = self._grader, None
+        if grader is not None and (grade := grader.finish()) is not None:
+            self.grades.append(grade)
+
+    def _begin(self, situation: Situation, first: Fix, field: Field) -> None:
+        assert situation.mission is not None
+        home_first = situation.ardupilot is not False
+        way = way_of(situation.mission.value.items, max(int(home_first), first.item), home_first=home_first)
+        if not way.seqs:
+            return
+        before = self._from_standing(first)
+        self._grader = DriveGrader(way, before[0] if before else first, field)
+        if before:
+            points = field.frame.to_local_array([fix.position for fix in before])
+            clearances_m = field.meter.at_points(points) if field.meter else None
+            self._grader.drive(before, clearances_m)
+
+    def _from_standing(self, first: Fix) -> list[Fix]:
+        """Give the positions shortly before, from the last at which it stood; none where it still stands or none is known."""
+        if first.speed_mps <= STANDING_MPS:
+            return []
+        before = [fix for fix in self._recent if first.time_s - fix.time_s <= _HEARTBEAT_S]
+        standing = [index for index, fix in enumerate(before) if fix.speed_mps <= STANDING_MPS]
+        return before[standing[-1] :] if standing else []
+
+
+def _is_driving(situation: Situation) -> bool:
+    return (
+        bool(situation.armed)
+        and situation.mission is not None
+        and drives_mission(situation.mode, situation.vehicle_type, ardupilot=situation.ardupilot)
+    )

@@ -63,11 +63,11 @@ def plan_figure(scene: Scene, *, title: str | None = None, blocks: bool = False)
     """
     west, south, east, north = scene.bounds_m
     shape = min(_TALLEST, max(_NARROWEST, (north - south) / (east - west)))
-    figure = Figure(figsize=(_WIDTH_IN, _WIDTH_IN * shape + 1.3), layout="constrained", dpi=_DPI)
+    figure = Figure(figsize=(_WIDTH_IN, _WIDTH_IN * shape + 1.4), layout="constrained", dpi=_DPI)
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     axes.set(xlim=(west, east), ylim=(south, north), aspect="equal", xlabel="east (m)", ylabel="north (m)")
-    axes.set_title(title or scene.title(), fontsize=11, pad=28)
+    axes.set_title(title or scene.title(), fontsize=11, pad=34)
     _draw_ground(axes, scene)
     if blocks:
         outlines = PolyCollection(scene.blocks(), facecolor="none", edgecolor=style.BLOCK, linewidth=0.4)
@@ -170,8 +170,9 @@ def _draw_scale(axes: Any, scene: Scene) -> None:  # noqa: ANN401
         "",
         xy=(0.98, 1),
         xytext=(0.98, 1),
-        xycoords=above(30),
+        xycoords=above(29),
         textcoords=above(11),
         annotation_clip=False,
+        gid="north",
         arrowprops={"arrowstyle": "-|>", "linewidth": 1.5, "color": "black", "shrinkA": 0, "shrinkB": 0},
     )

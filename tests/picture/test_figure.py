@@ -75,6 +75,7 @@ def problems(figure: Figure, scene: Scene) -> list[str]:
     found += ["edge texts on one another"] * any(
         box.intersects(other) for i, box in enumerate(edges) for other in edges[:i]
     )
+    assert len(edges) == 4  # the scale, the N, its arrow, the title
     return found
 
 
@@ -95,6 +96,17 @@ def test_the_check_finds_what_is_wrong(plans: dict[str, Plan]) -> None:
     assert problems(figure, scene) == [f"{other.get_text()} on {label.get_text()}"]
     axes.set_xlim(0, 50)
     assert {"route out of the frame", "inclusion polygon 1 out of the frame"} <= set(problems(figure, scene))
+
+
+@pytest.mark.parametrize(("east_m", "north_m"), [(15.0, 200.0), (400.0, 20.0)])
+def test_long_fields(plans: dict[str, Plan], east_m: float, north_m: float) -> None:
+    frame = plans["maze"].ground.frame
+    corners = np.array([(-east_m, -north_m), (east_m, -north_m), (east_m, north_m), (-east_m, north_m)])
+    fence = Fence((PolygonZone(ZoneKind.INCLUSION, tuple(frame.to_lat_lons(corners))),))
+    path = tuple(frame.to_lat_lons(0.9 * corners[[0, 2]]))
+    ground = lay_out(fence, frame)
+    scene = Scene(replace(plans["maze"], fence=fence, ground=ground, path=path, targets=path[1:]))
+    assert problems(plan_figure(scene), scene) == []
 
 
 @pytest.mark.parametrize("name", ["maze", "yard", "union"])

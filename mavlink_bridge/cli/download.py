@@ -73,7 +73,7 @@ def download(
             items: tuple[MissionItem, ...] = ()
         else:
             parameters = {}
-            items = _read_list(session, what)
+            items = read_list(session, what)
     for path in outputs:
         _write(path, what, items, parameters)
     document: dict[str, Any] = {
@@ -103,7 +103,16 @@ def _check(what: str, connect: str, outputs: list[Path]) -> None:
             )
 
 
-def _read_list(session: Session, what: str) -> tuple[MissionItem, ...]:
+def read_list(session: Session, what: str) -> tuple[MissionItem, ...]:
+    """Read a list of the vehicle: ``mission``, ``fence`` or ``rally``.
+
+    Raises
+    ------
+    RefusedError
+        The vehicle refused to give it.
+    LinkError
+        It fell silent.
+    """
     from mavlink_bridge.messages import MissionType  # noqa: PLC0415
     from mavlink_bridge.protocol.download import Download  # noqa: PLC0415
     from mavlink_bridge.protocol.transitions import DownloadState  # noqa: PLC0415

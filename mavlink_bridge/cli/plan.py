@@ -174,10 +174,10 @@ def write_outputs(
     )
     for path in outputs:
         write_mission(to_write, path)
-    return [*outputs, *_draw(planned, plots, blocks=blocks)]
+    return [*outputs, *draw(planned, plots, blocks=blocks)]
 
 
-def _draw(planned: Plan, plots: list[Path], *, blocks: bool) -> list[Path]:
+def draw(planned: Plan, plots: list[Path], *, title: str | None = None, blocks: bool = False) -> list[Path]:
     """Draw the plan to files, and to the terminal where ``-`` is among them; give the files."""
     if not plots:
         return []
@@ -188,7 +188,7 @@ def _draw(planned: Plan, plots: list[Path], *, blocks: bool) -> list[Path]:
             columns = min(80, shutil.get_terminal_size().columns)
             typer.echo(sketch_plan(planned, columns=columns, encoding=sys.stdout.encoding), nl=False)
         else:
-            draw_plan(planned, path, blocks=blocks)
+            draw_plan(planned, path, title=title, blocks=blocks)
     return [path for path in plots if str(path) != TERMINAL]
 
 

@@ -1,0 +1,314 @@
+"""``pbpp check``: every leg of a mission against a fence, from files, a log or a live vehicle."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mavlink_bridge.cli.common import (
+    AnyVehicleOption,
+    ConnectOption,
+    ExitCode,
+    JsonOption,
+    QuietOption,
+    SourceComponentOption,
+    SourceSystemOption,
+    SystemOption,
+    TimeoutOption,
+    print_json,
+    progress_bar,
+    warn,
+)
+from mavlink_bridge.errors import UsageError
+
+if TYPE_CHECKING:
+    from mavlink_bridge.cli.session import Address
+    from missions.check import CheckedLeg, MissionCheck
+    from missions.situation import Situation
+
+
+def check(
+    mission: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Mission file: .plan, .waypoints, …")
+    ] = None,
+    fence: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Fence file; not needed where --mission holds one.")
+    ] = None,
+    log: Annotated[
+        Path | None, typer.Option(metavar="FILE.tlog", help="Recorded log, for what no file is given for.")
+    ] = None,
+    connect: ConnectOption = None,
+    start: Annotated[
+        str | None,
+        typer.Option(metavar="LAT,LON", help="Default: the vehicle's position; of files and logs home."),
+    ] = None,
+    vehicle: Annotated[
+        Path | None, typer.Option(metavar="FILE.parm", help="Parameters that log or link do not tell.")
+    ] = None,
+    clearance: Annotated[
+        float | None,
+        typer.Option(
+            metavar="M", min=0.0, help="To be kept by each leg while driving. Default: from FENCE_MARGIN."
+        ),
+    ] = None,
+    plot: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="FILE", help="Draw it: .png, .svg, .pdf, .html; - in the terminal."),
+    ] = None,
+    system: SystemOption = None,
+    any_vehicle: AnyVehicleOption = False,
+    source_system: SourceSystemOption = 245,
+    source_component: SourceComponentOption = 190,
+    timeout: TimeoutOption = 30.0,
+    json_output: JsonOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Check every leg of a mission, whoever wrote it: what it keeps to the fence drawn and driven. Exit 8 if one breaks the promise.
+
+    Examples:
+    `pbpp check --mission mission.waypoints --fence fence.waypoints --clearance 2`
+
+    `pbpp check --mission field.plan --vehicle rover.parm --plot check.png`
+
+    `pbpp check --log field.tlog`
+    """
+    plots = plot or []
+    _check_options(mission, log, connect, plots)
+    if json_output and Path("-") in plots:
+        raise UsageError("--plot - and --json both want the standard output; give a file to --plot")
+    from missions.check import check_mission  # noqa: PLC0415 - quick help
+    from missions.geo import parse_lat_lon  # noqa: PLC0415
+
+    begin = parse_lat_lon(start) if start else None
+    situation: Situation | None = None
+    if log is not None:
+        from mavlink_bridge.recorded import situation_from_log  # noqa: PLC0415 - pymavlink only where needed
+
+        situation = situation_from_log(log, system, any_vehicle=any_vehicle)
+    elif connect is not None:
+        from mavlink_bridge.cli.session import Address as At  # noqa: PLC0415 - only with a link
+
+        address = At(connect, (source_system, source_component), system, any_vehicle, timeout)
+        situation = _live_situation(address, quiet=quiet or json_output)
+    situation = _with_files(situation, mission, fence, vehicle)
+    if situation.mission is None:
+        raise UsageError(f"{log or connect} tells of no mission; give one (--mission FILE)")
+    if begin is None and log is not None and situation.home is not None:
+        begin = situation.home.value  # at a log's end the vehicle may stand anywhere on its way
+    checked = check_mission(situation.mission.value, situation, clearance, start=begin)
+    warn([*checked.warnings, *_storage_warnings(checked, situation)])
+    _draw(checked, situation, plots)
+    if json_output:
+        print_json(_document(checked, situation, plots))
+    elif not quiet:
+        _report(checked, plots)
+    if not checked.holds:
+        raise typer.Exit(ExitCode.CHECK)
+
+
+def _check_options(mission: Path | None, log: Path | None, connect: str | None, plots: list[Path]) -> None:
+    """Find what cannot work before any work is done."""
+    if mission is None and log is None and connect is None:
+        raise UsageError("give a mission: --mission FILE, --log FILE.tlog or --connect CONNECTION")
+    if log is not None and connect is not None:
+        raise UsageError("give one of --log and --connect")
+    if plots:
+        from missions.picture import check_picture_format  # noqa: PLC0415 - quick help
+
+        for path in plots:
+            check_picture_format(path)
+
+
+def _with_files(
+    source: Situation | None, mission: Path | None, fence: Path | None, vehicle: Path | None
+) -> Situation:
+    """Put what files tell in the place of what the log or the link told; of parameters the vehicle's own count more."""
+    from missions.errors import FenceMissingError  # noqa: PLC0415 - quick help
+    from missions.formats import read_mission, read_parameters, read_situation  # noqa: PLC0415
+    from missions.situation import Known, Situation  # noqa: PLC0415
+
+    found = source or Situation()
+    if fence is not None:
+        told = read_situation(fence)
+        if told.fence is None:
+            raise FenceMissingError(f"{fence} holds no fence", file=str(fence))
+        found = replace(
+            found, fence=told.fence, fence_trouble=None, transfers={}, home=found.home or told.home
+        )
+    if mission is not None:
+        read_mission(mission)  # which says what is wrong where there is none
+        told = read_situation(mission)
+        assert told.mission is not None
+        home = told.mission.value.home
+        found = replace(
+            found,
+            mission=told.mission,
+            fence=told.fence if fence is None and told.fence else found.fence,
+            rally=found.rally or told.rally,
+            home=found.home if source or not home else Known(home, None, str(mission)),
+        )
+    if vehicle is not None:
+        found = replace(found, parameters={**read_parameters(vehicle), **found.parameters})
+    return found
+
+
+def _live_situation(address: Address, *, quiet: bool) -> Situation:
+    """Read mission, fence, rally points and parameters from the vehicle; nothing is written to it.
+
+    Raises
+    ------
+    BridgeError
+        The vehicle is not there, or does not give them.
+    """
+    from mavlink_bridge.cli.download import read_list  # noqa: PLC0415 - only with a link
+    from mavlink_bridge.cli.session import open_session  # noqa: PLC0415
+    from mavlink_bridge.protocol.parameters import ReadParameters  # noqa: PLC0415
+    from missions.fence import fence_from_items  # noqa: PLC0415
+    from missions.items import without_home  # noqa: PLC0415
+    from missions.mission_end import PARAMETER_NAMES as END_NAMES  # noqa: PLC0415
+    from missions.situation import Known, Mission, Situation  # noqa: PLC0415
+    from missions.vehicle import PARAMETER_NAMES  # noqa: PLC0415
+
+    with progress_bar(quiet=quiet) as show, open_session(address, show) as session:
+        items, fence, rally = (read_list(session, what) for what in ("mission", "fence", "rally"))
+        machine = ReadParameters(session.vehicle, (*PARAMETER_NAMES, *END_NAMES))
+        session.run(machine, "reading parameters")
+        peer = session.vehicle
+    assert machine.outcome is not None
+    source = "the vehicle"
+    home = items[0].position if items and (items[0].lat_e7, items[0].lon_e7) != (0, 0) else None
+    return Situation(
+        system=peer.system,
+        component=peer.component,
+        fence=Known(fence_from_items(fence), None, source) if fence else None,
+        mission=Known(Mission(without_home(items), home), None, source),
+        rally=Known(tuple(item.position for item in rally), None, source) if rally else None,
+        home=Known(home, None, source) if home else None,
+        parameters=dict(machine.outcome.values),
+    )
+
+
+def _storage_warnings(checked: MissionCheck, situation: Situation) -> list[str]:
+    """Warn of a mission that the vehicle cannot hold."""
+    from mavlink_bridge.protocol.limits import Limits  # noqa: PLC0415 - quick help
+
+    most = Limits.from_parameters(situation.parameters).mission_items
+    count = len(checked.mission.items) + 1
+    return [f"{count} mission items with home; the vehicle holds {most}"] if count > most else []
+
+
+def _draw(checked: MissionCheck, situation: Situation, plots: list[Path]) -> None:
+    if not plots:
+        return
+    from mavlink_bridge.cli.plan import draw  # noqa: PLC0415 - quick help
+    from missions.check import plan_of  # noqa: PLC0415
+
+    broken = len(checked.broken)
+    title = (
+        f"{checked.length_m:.1f} m, about {checked.duration_s:.0f} s: "
+        + (f"{broken} of {len(checked.legs)} legs break" if broken else f"{len(checked.legs)} legs keep")
+        + f" {checked.clearance_m:g} m"
+    )
+    draw(plan_of(checked, situation), plots, title=title)
+
+
+def _report(checked: MissionCheck, plots: list[Path]) -> None:
+    from rich.console import Console  # noqa: PLC0415 - quick help
+    from rich.table import Table  # noqa: PLC0415
+
+    table = Table(box=None, pad_edge=False)
+    for name in ("leg", "length", "time", "drawn", "driven", "nearest fence", "where"):
+        right = name in {"length", "time", "drawn", "driven"}
+        table.add_column(name, justify="right" if right else "left", no_wrap=name != "nearest fence")
+    for leg in checked.legs:
+        table.add_row(*_row(leg), style="red" if leg.breaks else None)
+    Console().print(table)
+    typer.echo(
+        f"{len(checked.legs)} legs, {checked.length_m:.1f} m, about {checked.duration_s:.0f} s"
+        f"{' for one time round' if checked.course.is_endless else ''}; {len(checked.mission.items) + 1} mission items with home"
+    )
+    for path in plots:
+        if str(path) != "-":
+            typer.echo(f"Wrote {path}")
+    for trouble in checked.troubles:
+        typer.secho(f"not understood: {trouble}", fg=typer.colors.RED)
+    for leg in checked.broken:
+        typer.secho(f"BREAKS: {_sentence(leg)}", fg=typer.colors.RED)
+    if checked.holds:
+        typer.echo(f"Every leg keeps {checked.clearance_m:g} m while driving")
+
+
+def _row(leg: CheckedLeg) -> tuple[str, ...]:
+    return (
+        leg.name,
+        f"{leg.length_m:.1f} m",
+        f"{leg.time_s:.0f} s",
+        "crosses" if leg.crosses else _metres(leg.drawn_clearance_m),
+        "crosses" if leg.crosses else _metres(leg.driven_clearance_m),
+        ", ".join(leg.crosses) or leg.fence or "none",
+        str(leg.at or ""),
+    )
+
+
+def _metres(value_m: float) -> str:
+    return "far" if value_m == float("inf") else f"{value_m:.2f} m"
+
+
+def _sentence(leg: CheckedLeg) -> str:
+    if leg.crosses:
+        return f"leg {leg.name} crosses {', '.join(leg.crosses)}, first at {leg.at}"
+    return (
+        f"leg {leg.name} comes {leg.driven_clearance_m:.2f} m near {leg.fence} while driving "
+        f"({leg.drawn_clearance_m:.2f} m drawn, at {leg.at}); {leg.asked_m:.2f} m are to be kept"
+    )
+
+
+def _document(checked: MissionCheck, situation: Situation, plots: list[Path]) -> dict[str, object]:
+    return {
+        "status": "ok" if checked.holds else "failed",
+        "command": "check",
+        "exit_code": int(ExitCode.DONE if checked.holds else ExitCode.CHECK),
+        "system": situation.system,
+        "clearance_m": checked.clearance_m,
+        "length_m": round(checked.length_m, 3),
+        "duration_s": round(checked.duration_s, 1),
+        "drawn_clearance_m": _finite(checked.drawn_clearance_m),
+        "driven_clearance_m": _finite(checked.driven_clearance_m),
+        "mission_items": len(checked.mission.items) + 1,
+        "endless": checked.course.is_endless,
+        "broken": len(checked.broken),
+        "legs": [_leg_document(leg) for leg in checked.legs],
+        "not_understood": list(checked.troubles),
+        "outputs": [str(path) for path in plots],
+        "warnings": [*checked.warnings, *_storage_warnings(checked, situation)],
+    }
+
+
+def _leg_document(leg: CheckedLeg) -> dict[str, object]:
+    course = leg.leg
+    return {
+        "from_item": course.first_item,
+        "to_item": course.last_item,
+        "jump_item": course.jump_item,
+        "rtl": course.is_return,
+        "start": list(course.start),
+        "end": list(course.end),
+        "length_m": round(leg.length_m, 3),
+        "time_s": round(leg.time_s, 1),
+        "speed_mps": course.speed_mps,
+        "stop_s": course.stop_s,
+        "drawn_clearance_m": _finite(leg.drawn_clearance_m),
+        "driven_clearance_m": _finite(leg.driven_clearance_m),
+        "asked_m": round(leg.asked_m, 4),
+        "fence": leg.fence,
+        "at": list(leg.at) if leg.at else None,
+        "crosses": list(leg.crosses),
+        "breaks": leg.breaks,
+    }
+
+
+def _finite(value_m: float) -> float | None:
+    return None if value_m == float("inf") else round(value_m, 4)

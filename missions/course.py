@@ -1,0 +1,346 @@
+"""What a mission has a rover drive: its items followed in the order in which the autopilot executes them, jumps and all.
+
+The commands that ArduPilot Rover executes (ModeAuto::start_command), and what it does with them (AP_Mission): DO_ commands between two
+places take effect as the leg to the second one begins; jumps count how often they were taken and are passed by when the count is used up.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from missions.items import PLACED_COMMANDS as _PLACED
+from missions.items import Command
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from missions.geo import LatLon
+    from missions.items import MissionItem
+    from missions.situation import Mission
+
+MOST_LEGS = 2000
+"""Missions that repeat themselves longer than this are followed with each jump taken twice: every leg there is occurs in that."""
+
+_FEW_TIMES = 2
+_SKIPPED = {Command.NAV_TAKEOFF: "TAKEOFF", Command.NAV_LAND: "LAND"}
+_STRAYING = {
+    Command.NAV_GUIDED_ENABLE: "hands the vehicle to another computer (NAV_GUIDED_ENABLE)",
+    Command.NAV_SET_YAW_SPEED: "drives at a heading and a speed (NAV_SET_YAW_SPEED)",
+    42702: "hands the vehicle to a script (NAV_SCRIPT_TIME)",
+    42703: "holds an attitude (NAV_ATTITUDE_TIME)",
+}
+_CONDITIONS = range(112, 160)
+_JUMP_TAG, _DO_JUMP_TAG = 600, 601
+CIRCLE_M = 20.0
+"""ArduPilot Rover's CIRC_RADIUS, for LOITER_TURNS without a radius of its own."""
+
+
+@dataclass(frozen=True, slots=True)
+class CourseLeg:
+    """A straight leg that a mission has the vehicle drive.
+
+    Parameters
+    ----------
+    first_item, last_item : int
+        Seq of the items that it leaves and leads to; 0 is where the vehicle stands (home in ArduPilot's count).
+    start, end : LatLon
+        From where to where.
+    jump_item : int or None
+        Seq of the jump that was taken between them.
+    speed_mps : float or None
+        What DO_CHANGE_SPEED asked for; None is the vehicle's own speed.
+    stop_s : float or None
+        How long it stops at the end; None where it drives on.
+    circle_m : float
+        The radius it circles with at the end (LOITER_TURNS); 0 where it does not.
+    is_return : bool
+        Whether it is the straight line of an RTL item.
+    """
+
+    first_item: int
+    last_item: int
+    start: LatLon
+    end: LatLon
+    jump_item: int | None = None
+    speed_mps: float | None = None
+    stop_s: float | None = None
+    circle_m: float = 0.0
+    is_return: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """The legs of a mission in the order in which they are driven.
+
+    Parameters
+    ----------
+    legs : tuple of CourseLeg
+        Each as often as it is driven.
+    troubles : tuple of str
+        What was not understood: where the vehicle goes then is not known.
+    notes : tuple of str
+        What else is to be said.
+    is_endless : bool
+        Whether the mission goes round without end.
+    ends_in_loiter : bool
+        Whether it ends with LOITER_UNLIM.
+    """
+
+    legs: tuple[CourseLeg, ...]
+    troubles: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    is_endless: bool = False
+    ends_in_loiter: bool = False
+
+
+def is_navigation(item: MissionItem) -> bool:
+    """Tell whether an item is a navigation command: one that the vehicle is busy with until it is done (AP_Mission::is_nav_cmd)."""
+    return 0 < item.command <= Command.NAV_LAST or item.command in _STRAYING
+
+
+def follow_mission(
+    mission: Mission,
+    start: LatLon | None,
+    *,
+    return_to: Callable[[LatLon, LatLon | None], LatLon | None] = lambda _here, home: home,
+    home: LatLon | None = None,
+    return_speed_mps: float | None = None,
+    circle_m: float = CIRCLE_M,
+    own_speed_mps: float = 0.0,
+) -> Course:
+    """Follow a mission from its first item to its end.
+
+    Parameters
+    ----------
+    mission : Mission
+        The items, without the home item.
+    start : LatLon or None
+        Where the vehicle stands; not known: the first leg is the one from the first place.
+    return_to : callable
+        Where RTL leads from a place, with the home of that moment; default: home.
+    home : LatLon, optional
+        Where the vehicle's home is.
+    return_speed_mps : float, optional
+        The speed of RTL (RTL_SPEED); default: the vehicle's own.
+    circle_m : float
+        The radius of LOITER_TURNS that tell none (CIRC_RADIUS).
+    own_speed_mps : float
+        The vehicle's own speed, which holds until the mission changes it.
+    """
+    for most_repeats in (None, _FEW_TIMES):
+        walk = _Walk(
+            mission.items, start, home, return_to, return_speed_mps, circle_m, own_speed_mps, most_repeats
+        )
+        walk.run()
+        if len(walk.legs) < MOST_LEGS:
+            break
+    if len(walk.legs) >= MOST_LEGS:
+        walk.troubles.append(
+            f"the mission drives more than {MOST_LEGS} legs; what comes after them was not followed"
+        )
+    elif most_repeats is not None:
+        walk.notes.append(
+            f"the mission drives more than {MOST_LEGS} legs; length and time count each jump {_FEW_TIMES} times"
+        )
+    return Course(
+        tuple(walk.legs),
+        tuple(dict.fromkeys(walk.troubles)),
+        tuple(dict.fromkeys(walk.notes)),
+        walk.is_endless,
+        walk.ends_in_loiter,
+    )
+
+
+@dataclass
+class _Walk:
+    """The autopilot's state while it executes a mission."""
+
+    items: tuple[MissionItem, ...]
+    here: LatLon | None
+    home: LatLon | None
+    return_to: Callable[[LatLon, LatLon | None], LatLon | None]
+    return_speed_mps: float | None
+    default_circle_m: float
+    own_speed_mps: float
+    most_repeats: int | None
+    here_item: int = 0
+    speed_mps: float | None = None
+    is_conditional: bool = False
+    jump_item: int | None = None
+    taken: dict[int, int] = field(default_factory=dict)
+    seen: set[tuple[object, ...]] = field(default_factory=set)
+    legs: list[CourseLeg] = field(default_factory=list)
+    troubles: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    is_endless: bool = False
+    ends_in_loiter: bool = False
+
+    def run(self) -> None:
+        index: int | None = 0
+        jumps_in_a_row = 0
+        while index is not None and index < len(self.items) and len(self.legs) < MOST_LEGS:
+            item = self.items[index]
+            if item.command in (Command.DO_JUMP, _DO_JUMP_TAG):
+                jumps_in_a_row += 1
+                if jumps_in_a_row > 2 * len(self.items):
+                    self._trouble(index, "jumps in a circle in which there is no place to drive to")
+                    break
+                index = self._jump(index)
+                continue
+            if is_navigation(item):
+                jumps_in_a_row = 0
+                if not self._navigate(index):
+                    break
+                self.jump_item = None
+            else:
+                self._do(index)
+            index += 1
+
+    def _trouble(self, index: int, text: str) -> None:
+        self.troubles.append(f"item {index + 1} {text}")
+
+    def _note(self, index: int, text: str) -> None:
+        self.notes.append(f"item {index + 1} {text}")
+
+    def _navigate(self, index: int) -> bool:
+        """Execute a navigation command; tell whether the mission goes on after it."""
+        item = self.items[index]
+        if item.command == Command.NAV_RETURN_TO_LAUNCH:
+            self._return(index)
+        elif item.command == Command.NAV_DELAY:
+            self._stop(item.params[0])
+        elif item.command in _SKIPPED:
+            self._note(index, f"is a {_SKIPPED[Command(item.command)]}, which a rover passes over")
+        elif item.command in _STRAYING:
+            self._trouble(index, f"{_STRAYING[item.command]}: where the vehicle goes then is not known")
+        elif item.is_placed:
+            self._drive(index)
+        elif item.command in _PLACED and (item.lat_e7, item.lon_e7) == (0, 0):
+            self._stop(item.params[0] if item.command != Command.NAV_LOITER_TURNS else 0.0)
+        elif item.command in _PLACED:
+            self._trouble(index, f"has a place in frame {item.frame}, which is none on Earth")
+        else:
+            self._trouble(
+                index,
+                f"is command {item.command}, which is not understood: where the vehicle goes then is not known",
+            )
+        if item.command == Command.NAV_LOITER_UNLIM:
+            self.ends_in_loiter = True
+            if index + 1 < len(self.items):
+                self._note(index, "loiters without end; what comes after it is never driven")
+            return False
+        return True
+
+    def _drive(self, index: int) -> None:
+        item = self.items[index]
+        stop_s = (
+            None
+            if item.command == Command.NAV_WAYPOINT and not item.params[0] > 0
+            else max(0.0, item.params[0])
+        )
+        circle_m = 0.0
+        if item.command in (Command.NAV_LOITER_UNLIM, Command.NAV_LOITER_TURNS):
+            stop_s = 0.0
+        if item.command == Command.NAV_LOITER_TURNS:
+            radius_m = abs(item.params[2])
+            circle_m = radius_m if 0 < radius_m < math.inf else self.default_circle_m
+            self._note(
+                index, f"circles with a radius of {circle_m:g} m (LOITER_TURNS), which was never measured"
+            )
+        self._go(index, item.position, stop_s=stop_s, circle_m=circle_m)
+
+    def _return(self, index: int) -> None:
+        goal = self.return_to(self.here, self.home) if self.here else self.home
+        if goal is None:
+            self._trouble(index, "returns to launch, and home is not known")
+            return
+        self.speed_mps = self.return_speed_mps  # entering RTL sets the speed anew
+        self._go(index, goal, stop_s=0.0, is_return=True)
+        self.speed_mps = None
+
+    def _go(
+        self, index: int, end: LatLon, *, stop_s: float | None, circle_m: float = 0.0, is_return: bool = False
+    ) -> None:
+        if self.here is not None:
+            self.legs.append(
+                CourseLeg(
+                    self.here_item,
+                    index + 1,
+                    self.here,
+                    end,
+                    self.jump_item,
+                    self.speed_mps,
+                    stop_s,
+                    circle_m,
+                    is_return,
+                )
+            )
+        self.here, self.here_item = end, index + 1
+        self.is_conditional = False
+
+    def _stop(self, delay_s: float) -> None:
+        """Stop where the last leg ended."""
+        if self.legs:
+            last = self.legs[-1]
+            stop_s = (last.stop_s or 0.0) + max(0.0, 0.0 if math.isnan(delay_s) else delay_s)
+            self.legs[-1] = replace(last, stop_s=stop_s)
+
+    def _do(self, index: int) -> None:
+        """Execute a command that moves nothing by itself."""
+        item = self.items[index]
+        if item.command in _CONDITIONS:
+            self.is_conditional = True
+        elif item.command == Command.DO_CHANGE_SPEED:
+            self._change_speed(item.params[1])
+        elif item.command == Command.DO_SET_HOME:
+            self.home = self.here if item.params[0] == 1 else item.position
+        elif item.command == Command.DO_SET_REVERSE and item.params[0] == 1:
+            self._note(index, "has the vehicle drive in reverse, which was never measured")
+        elif item.command == Command.DO_FENCE_ENABLE and item.params[0] == 0:
+            self._note(index, "turns the autopilot's own fence off (DO_FENCE_ENABLE 0)")
+
+    def _change_speed(self, speed_mps: float) -> None:
+        if not 0 < speed_mps < math.inf:
+            return  # the autopilot refuses it and keeps its speed
+        if self.is_conditional:  # it may come late on this leg, or never: the faster one counts
+            speed_mps = max(speed_mps, self.own_speed_mps if self.speed_mps is None else self.speed_mps)
+        self.speed_mps = speed_mps
+
+    def _jump(self, index: int) -> int | None:
+        """Give the index that the mission goes on with; None where it ends here."""
+        item = self.items[index]
+        goal = self._jump_goal(item)
+        if goal is None:
+            name = "tag" if item.command == _DO_JUMP_TAG else "item"
+            self._trouble(index, f"jumps to {name} {item.params[0]:g}, which is none")
+            return index + 1
+        repeats = int(item.params[1]) if math.isfinite(item.params[1]) else 0
+        if repeats < 0:
+            finite = tuple(sorted(self.taken.items()))
+            state = (index, finite, self.speed_mps, self.here_item)
+            if state in self.seen:
+                self.is_endless = True
+                if index + 1 < len(self.items):
+                    self._note(index, "jumps back without end; what comes after it is never driven that way")
+                return None
+            self.seen.add(state)
+        else:
+            if self.most_repeats is not None:
+                repeats = min(repeats, self.most_repeats)
+            if self.taken.get(index, 0) >= repeats:
+                return index + 1
+            self.taken[index] = self.taken.get(index, 0) + 1
+        self.jump_item = index + 1
+        return goal
+
+    def _jump_goal(self, item: MissionItem) -> int | None:
+        """Give the index that a jump leads to; None where there is no such item."""
+        wanted = item.params[0]
+        if item.command == _DO_JUMP_TAG:
+            tags = (
+                i for i, one in enumerate(self.items) if one.command == _JUMP_TAG and one.params[0] == wanted
+            )
+            return next(tags, None)
+        return int(wanted) - 1 if 1 <= wanted <= len(self.items) else None

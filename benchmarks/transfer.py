@@ -100,8 +100,8 @@ def _outcomes(pool: Pool, trials: int) -> tuple[str, list[Lie]]:
         "",
         "Frames are lost and delayed each way (50 to 100 ms, in order, if not said otherwise); the vehicle held another mission of 12 items.",
         "",
-        "| link | verified | old list put back | old list never replaced | unknown | no answer | pushes (mean) | median s | 95 % s | longest s |",
-        "|---|---|---|---|---|---|---|---|---|---|",
+        "| link | verified | old list put back | old list never replaced | unknown | different | no answer | pushes (mean) | median s | 95 % s | longest s |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     lies = []
     for name, faults in LINKS.items():
@@ -111,11 +111,9 @@ def _outcomes(pool: Pool, trials: int) -> tuple[str, list[Lie]]:
         kinds = Counter(str(entry.outcome.kind) for entry in judged)
         times_s = sorted(entry.took_s for entry in judged)
         pushes = statistics.mean(entry.outcome.pushes for entry in judged)
-        other = kinds["refused"] + kinds["different"] + kinds["busy"]
-        assert other == 0, kinds
         cells = [
             _share(kinds[kind], trials)
-            for kind in ("verified", "restored", "unchanged", "unknown", "no_answer")
+            for kind in ("verified", "restored", "unchanged", "unknown", "different", "no_answer")
         ]
         lines.append(
             f"| {name} | {' | '.join(cells)} | {pushes:.2f} | {statistics.median(times_s):.1f} | "

@@ -32,6 +32,7 @@ _ECHO_S = 0.25  # a request repeated sooner than this is the same frame arriving
 _ASKED_AGAIN_S = 0.9  # ArduPilot asks again after 1 s
 _PROBE_AFTER_S = 2.0  # it would have asked again by now
 _PROBE_END_AFTER_S = 1.2
+_GIVEN_UP_AFTER_S = 6.0  # ArduPilot gives an upload up after 8 s; its messages may be late
 _LEAST_SETTLE_S = 0.03
 _MOST_SETTLE_S = 1.0
 
@@ -111,6 +112,7 @@ class Upload(TableMachine[UploadState, UploadEvent]):
         self._heard_s = 0.0
         self._act_at_s = 0.0
         self._gap_at_s: float | None = None
+        self._advanced_s = math.inf  # when another item was asked for
         self._rival_since_s: float | None = None
         self._limit_s = 0.0
 
@@ -214,6 +216,8 @@ class Upload(TableMachine[UploadState, UploadEvent]):
         if not 0 <= seq < len(self._messages) or not self._move(UploadEvent.REQUEST):
             return
         self._heard_s = now_s
+        if seq != self._wanted:
+            self._advanced_s = now_s
         self._rival_since_s = None
         if seq > self._wanted:
             self._keep_up(seq, now_s)
@@ -286,10 +290,10 @@ class Upload(TableMachine[UploadState, UploadEvent]):
                 self._rival_since_s = now_s if self._rival_since_s is None else self._rival_since_s
                 self._act_at_s = now_s + _ANNOUNCE_AGAIN_S
         else:
-            event = (
-                UploadEvent.CANCELLED if result is MissionResult.OPERATION_CANCELLED else UploadEvent.REFUSAL
-            )
-            if self._move(event):
+            # After so long a stall the vehicle has given up, and ERROR only says that it waits for no item.
+            has_given_up = result is MissionResult.ERROR and now_s >= self._advanced_s + _GIVEN_UP_AFTER_S
+            is_cancelled = result is MissionResult.OPERATION_CANCELLED or has_given_up
+            if self._move(UploadEvent.CANCELLED if is_cancelled else UploadEvent.REFUSAL):
                 self._result = result
 
     def _suspect_gap(self, now_s: float) -> None:

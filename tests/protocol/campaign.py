@@ -121,6 +121,8 @@ def _lies(scenario, client, outcome, stored, timeline):
             lies.append("verified, but what was read back is not the list")
         if any(time_s > last_read_s and isinstance(message, WRITES) for time_s, message in client.sent):
             lies.append("verified, but something was written after the read-back began")
+    if outcome.kind is OutcomeKind.REFUSED:
+        lies.append("refused, but the vehicle refuses nothing in this list")
     if scenario.rival is None and outcome.held is Held.FOREIGN:
         lies.append("a foreign list, but there was no rival")
     return lies

@@ -271,3 +271,12 @@ def test_an_unstarted_machine_is_quiet():
     assert machine.messages_to_send() == []
     assert machine.deadline_s is None
     assert machine.outcome is None
+
+
+def test_an_error_after_a_long_stall_is_no_refusal():
+    script = push(5, window=1)
+    script.hear(ask(0), ask(1))
+    for _ in range(7):
+        script.hear(ask(1), after_s=1.0)
+    script.hear(ack(MissionResult.ERROR))
+    assert script.machine.outcome.state is UploadState.UNCONFIRMED

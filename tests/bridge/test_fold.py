@@ -388,6 +388,19 @@ class TestMission:
         acknowledged = after(known, again[1], again[3], again[-1])
         assert acknowledged.mission == known.mission
 
+    def test_other_autopilots_repeat_items_too(self) -> None:
+        known = after(replace(NEW, ardupilot=False), *upload(self.ITEMS, 0))
+        assert after(known, upload(self.ITEMS, 0)[2]) == known
+        assert after(known, upload(self.ITEMS, 0)[1]) == known
+
+    def test_rally_points_accepted_but_seen_in_part_are_forgotten(self) -> None:
+        items = (MissionItem(5100, 3, lat_e7=400726316, lon_e7=-1052290497),) * 2
+        known = after(NEW, *upload(items, 2))
+        assert known.rally is not None
+        told = upload(items, 2)
+        told.pop(1)
+        assert after(known, *told).rally is None
+
     def test_rally_points(self) -> None:
         items = (
             MissionItem(5100, 3, lat_e7=400726316, lon_e7=-1052290497),

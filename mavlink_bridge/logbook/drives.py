@@ -11,6 +11,7 @@ from mavlink_bridge.logbook.modes import drives_mission
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    import numpy as np
     from numpy.typing import NDArray
 
     from mavlink_bridge.logbook.track import FenceMeter, Fix

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from missions.geo import LatLon
     from missions.ground import Ground
 
-MOVED_M: Final = 0.5
+MOVED_M: Final = 0.3
 """A vehicle has moved when it is so far from where it was last found to have moved to: less is its position's wandering."""
 
 _JOINED_M, _JOINED_S = 20.0, 3.0

@@ -3,44 +3,42 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from dataclasses import asdict, replace
+from pathlib import Path
 
 import pytest
 
 from mavlink_bridge.director import EventName, Orders, TargetSource
 from mavlink_bridge.errors import LogError
+from mavlink_bridge.expectations import differences, read_expectation
 from mavlink_bridge.journal import Call, JournalWriter, journal_path, read_journal
 from mavlink_bridge.replay import replay_foreign
 from mavlink_bridge.tlog import TlogReader
 from missions.geo import LatLon
 from missions.request import Request
 
+FOLDER = Path(__file__).parents[2] / "sitl_logs"
+MANIFEST = tomllib.loads((FOLDER / "manifest.toml").read_text(encoding="utf-8"))
+MANIFEST.pop("origin")
 SOURCES = frozenset(TargetSource) - {TargetSource.ECHO, TargetSource.RALLY}
-FOUND = [EventName.VEHICLE_FOUND, EventName.LEARNT]
-ROUTE = [EventName.TARGET, EventName.PLANNED]
-UNSAFE_ROUTE = [EventName.TARGET, EventName.STRAIGHT_LINE_UNSAFE, EventName.PLANNED]
-BLOCKED = [EventName.TARGET, EventName.NO_PLAN]
-
-EXPECTED = {
-    "guided-maze": [*FOUND, *ROUTE, *UNSAFE_ROUTE],
-    "mission-yard": [*FOUND, *ROUTE],
-    "position-target-yard": [*FOUND, *BLOCKED, *UNSAFE_ROUTE],
-    "fence-change-yard": [*FOUND, *UNSAFE_ROUTE, EventName.FENCE_CHANGED, *UNSAFE_ROUTE],
-    "no-fence": [*FOUND, *BLOCKED],
-    "union-rally": [*FOUND, *ROUTE],
-    "island-unreachable": [*FOUND, *BLOCKED],
-}
 
 
 @pytest.fixture(scope="module")
-def told(logs):
+def told():
     orders = Orders(target_sources=SOURCES)
-    return {name: list(replay_foreign(TlogReader(logs / f"{name}.tlog"), orders)) for name in EXPECTED}
+    return {name: list(replay_foreign(TlogReader(FOLDER / f"{name}.tlog"), orders)) for name in MANIFEST}
 
 
-@pytest.mark.parametrize("name", EXPECTED)
+@pytest.mark.parametrize("name", MANIFEST)
 def test_a_recording_gives_its_events(told, name):
-    assert [event.name for event in told[name]] == EXPECTED[name]
+    assert [event.name for event in told[name]] == MANIFEST[name]["events"]
+
+
+@pytest.mark.parametrize("name", MANIFEST)
+def test_a_recording_gives_what_was_recorded_of_its_events(told, name):
+    expected = read_expectation(FOLDER / f"{name}.events.jsonl")
+    assert differences(expected, [event.as_json() for event in told[name]]) == []
 
 
 def test_the_numbers_of_some_events(told):
@@ -61,6 +59,32 @@ def test_times_are_the_logs_own_and_only_go_forward(told, logs):
     times = [event.time_s for event in told["guided-maze"]]
     assert times == sorted(times)
     assert first <= times[0] <= times[-1] <= last
+
+
+def test_a_clock_that_is_set_amid_a_log_changes_no_decision(told):
+    """Days back at first, as before the first GPS fix; an hour back from the middle on."""
+    entries = list(TlogReader(FOLDER / "fence-change-yard.tlog"))
+    middle = len(entries) // 2
+    shifts_s = [-3 * 86_400.0 if index < 500 else -3600.0 * (index > middle) for index in range(len(entries))]
+    crooked = [
+        replace(entry, time_s=entry.time_s + shift_s)
+        for entry, shift_s in zip(entries, shifts_s, strict=True)
+    ]
+    again = list(replay_foreign(crooked, Orders(target_sources=SOURCES)))
+    straight = told["fence-change-yard"]
+    assert [event.name for event in again] == [event.name for event in straight]
+    assert again[-1].time_s == pytest.approx(straight[-1].time_s - 3600.0, abs=1e-6)
+
+
+def test_an_hour_without_a_heartbeat_is_a_link_lost(told):
+    entries = list(TlogReader(FOLDER / "no-fence.tlog"))
+    middle = len(entries) // 2
+    later = [
+        replace(entry, time_s=entry.time_s + 3600.0 * (index > middle)) for index, entry in enumerate(entries)
+    ]
+    names = [event.name for event in replay_foreign(later, Orders(target_sources=SOURCES))]
+    assert EventName.LINK_LOST in names
+    assert EventName.LINK_BACK in names
 
 
 def test_an_empty_log_of_entries_gives_nothing():

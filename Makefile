@@ -8,7 +8,7 @@ PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; 
 BIN := .venv/bin
 OUT ?= demo-out
 
-.PHONY: docs soak demo test lint format types walls check lock clean
+.PHONY: docs soak bench-tlog fuzz demo test lint format types walls check lock clean
 
 demo: .venv/run.stamp
 	$(BIN)/pbpp demo --out $(OUT)
@@ -58,6 +58,12 @@ lock: .venv/run.stamp
 
 soak: .venv/dev.stamp
 	$(BIN)/python tests/bridge/soak.py --hours 100 --minutes $(or $(MINUTES),30)
+
+bench-tlog: .venv/dev.stamp
+	$(BIN)/python benchmarks/tlog.py
+
+fuzz: .venv/dev.stamp
+	$(BIN)/python tests/tlog/fuzz_tlog.py --count 100000
 
 clean:
 	rm -rf .venv demo-out dist build .coverage* .hypothesis .mypy_cache .ruff_cache .pytest_cache

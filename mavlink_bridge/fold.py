@@ -17,7 +17,7 @@ from missions.errors import FenceError, InvalidPositionError
 from missions.fence import fence_from_items, fence_to_items
 from missions.geo import LatLon, checked_lat_lon, from_e7
 from missions.items import Command, CoordinateFrame, MissionItem, without_home
-from missions.situation import Known, ListKind, ListTransfer, Mission, Pose, Situation
+from missions.situation import Fix, Known, ListKind, ListTransfer, Mission, Pose, Situation
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -110,6 +110,15 @@ def _global_position(situation: Situation, frame: Frame, time_s: float) -> Situa
         return situation
     heading_deg = None if message.hdg == _HEADING_UNKNOWN else message.hdg / 100
     return replace(situation, pose=Known(Pose(position, heading_deg), time_s, "GLOBAL_POSITION_INT"))
+
+
+def _gps_raw(situation: Situation, frame: Frame, time_s: float) -> Situation:
+    message = frame.message
+    assert isinstance(message, m.GpsRawInt)
+    fix = Fix(message.fix_type, message.h_acc / 1000 if message.h_acc else None)
+    if situation.fix is not None and situation.fix.value == fix:
+        return situation
+    return replace(situation, fix=Known(fix, time_s, "GPS_RAW_INT"))
 
 
 def _home_position(situation: Situation, frame: Frame, time_s: float) -> Situation:
@@ -225,6 +234,7 @@ _TOLD: dict[type[Message], Callable[[Situation, Frame, float], Situation]] = {
     m.Heartbeat: _heartbeat,
     m.ParamValue: _param_value,
     m.GlobalPositionInt: _global_position,
+    m.GpsRawInt: _gps_raw,
     m.HomePosition: _home_position,
     m.MissionCount: _read_back_count,
     m.MissionItem: _read_back_item,

@@ -14,6 +14,7 @@ from mavlink_bridge.director import Event, Orders, TargetSource
 from mavlink_bridge.errors import LogError
 from missions.geo import LatLon
 from missions.request import Request
+from missions.vehicle import Footprint
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -141,6 +142,7 @@ def _orders_from_json(document: dict[str, Any]) -> Orders:
                     **request,
                     "start": LatLon(*request["start"]) if request["start"] else None,
                     "targets": tuple(LatLon(*target) for target in request["targets"]),
+                    "footprint": Footprint(**request.get("footprint", {})),
                 }
             ),
         }

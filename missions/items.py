@@ -125,6 +125,11 @@ def waypoint(position: LatLon) -> MissionItem:
     return MissionItem(Command.NAV_WAYPOINT, lat_e7=lat_e7, lon_e7=lon_e7)
 
 
+def change_speed(speed_mps: float) -> MissionItem:
+    """Give a DO_CHANGE_SPEED of the ground speed (param1 1), throttle unchanged (param3 -1)."""
+    return MissionItem(Command.DO_CHANGE_SPEED, CoordinateFrame.MISSION, params=(1.0, speed_mps, -1.0, 0.0))
+
+
 def with_home(items: Sequence[MissionItem], home: LatLon) -> tuple[MissionItem, ...]:
     """Put the home item at seq 0, where ArduPilot keeps its own home (what is sent there is not stored)."""
     lat_e7, lon_e7 = to_e7(home)

@@ -2,62 +2,71 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from bisect import bisect_left
+from dataclasses import dataclass, replace
 from functools import partial
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from shapely import LineString, Point
 
-from missions.drive_model import Envelope, envelope
-from missions.errors import (
-    NoRouteError,
-    PlanCheckError,
-    SituationError,
-    TargetBlockedError,
-)
-from missions.fence import PolygonZone
-from missions.geo import distance_m, rounded
-from missions.ground import EDGE_BOW_M, Ground, check_ground, lay_out
-from missions.items import MissionItem, last_place, waypoint
+from missions import clearance
+from missions.clearance import known_vehicle, promise
+from missions.drawn import DrawnPoint
+from missions.drive_model import beyond_measured, envelope
+from missions.driven_route import DrivenRoute, RouteSearch
+from missions.errors import NoRouteError, PlanCheckError, RouteError, TargetBlockedError
+from missions.geo import bearing_deg, distance_m, rounded
 from missions.known_fence import fence_warnings, known_fence
-from missions.local_frame import (
-    MAX_LATITUDE_DEG,
-    LocalPoint,
-    autopilot_line,
-    bow_m,
-    check_latitude,
-    frame_around,
+from missions.lines import (
+    MAX_LEG_M,
+    ROUNDING_RESERVE_M,
+    Lines,
+    check_lines,
+    drawn_leg,
+    finished,
+    mission_items,
+    path_length_m,
+    reserve_m,
 )
+from missions.local_frame import LocalPoint
 from missions.narrow import widest_clearance_m
 from missions.route import Route, find_route, simplified
-from missions.vehicle import vehicle_from_parameters
+from missions.surroundings import MAX_FIELD_M, ground_for, heading_at, route_ends
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from missions.clearance import Promise
+    from missions.drive_model import Envelope
     from missions.fence import Fence
     from missions.geo import LatLon
+    from missions.ground import Ground
+    from missions.items import MissionItem
     from missions.request import Request
     from missions.situation import Situation
     from missions.vehicle import Vehicle
 
-MAX_LEG_M = 1000.0
-"""Longer legs are split: the autopilot's straight line bows off ours with the square of the length."""
+__all__ = [
+    "MAX_FIELD_M",
+    "MAX_LEG_M",
+    "ROUNDING_RESERVE_M",
+    "Plan",
+    "asked_clearance",
+    "drawn_leg",
+    "ground_for",
+    "plan",
+]
 
-ROUNDING_RESERVE_M = 0.01
-"""Rounding to degE7 moves a waypoint by 8 mm at most."""
-
-MAX_FIELD_M = 100_000.0
-
-_SAMPLE_M = 50.0
 _TINY_LEG_M = 1.5
 _WIDER_M = (0.3, 0.1, 0.03)
 _WIDEST_TRIES = 40
 _WIDEST_SHARE = 0.97
 """What of the widest clearance a route keeps: round corners of the last millimetre would need a waypoint every half metre."""
+
+_DRIVEN_SHARES = (1.0, 0.9, 0.8, 0.65, 0.5, 0.35, 0.2, 0.1, 0.0)
+"""What of the widest clearance is tried one after another where the route is to be driven."""
+
+_ROUNDING_M = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,17 +76,22 @@ class Plan:
     Parameters
     ----------
     items : tuple of MissionItem
-        Waypoints for the autopilot, without the home item and without the start.
+        For the autopilot, without the home item and without the start: waypoints, and changes of speed between them.
     path : tuple of LatLon
         The drawn lines as rounded into the items, start first.
+    seqs : tuple of int
+        For each point of the path the seq of its waypoint in the mission (home is 0, and stands for the start).
+    speeds : tuple of float or None
+        The speed asked for on each leg of the path in m/s; None is the vehicle's own.
     clearance_m : float or None
         Promised for the rover as it drives; None where only drawn lines were asked for.
     asked_m : float
-        What the drawn lines have to keep (less where the first ones lead away from a fence nearby).
+        What the drawn lines have to keep (less where the first ones lead away from a fence nearby); where the route is fitted to the
+        drive model, the driven band too: the promise, the position's error and the owner's reserve.
     drawn_clearance_m : float
         The least distance of the drawn lines, as rounded and as the autopilot draws them, to any fence (infinite without a fence near).
     driven_clearance_m : float
-        The predicted least distance of the driven track.
+        The least distance of the band that the vehicle is foreseen to drive in.
     blocks : int
         Blocks of the partition that was searched.
     fence, ground : Fence, Ground
@@ -92,6 +106,8 @@ class Plan:
 
     items: tuple[MissionItem, ...]
     path: tuple[LatLon, ...]
+    seqs: tuple[int, ...]
+    speeds: tuple[float | None, ...]
     start: LatLon
     targets: tuple[LatLon, ...]
     method: str
@@ -110,6 +126,10 @@ class Plan:
     home: LatLon | None
     warnings: tuple[str, ...]
 
+    def path_index(self, seq: int) -> int:
+        """Give which point of the path a mission item drives to; for a change of speed the one that it is for."""
+        return min(bisect_left(self.seqs, seq), len(self.path) - 1)
+
 
 def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bool] | None = None) -> Plan:
     """Plan a mission around the situation's fence.
@@ -123,171 +143,212 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
     FenceError, VehicleError, InvalidPositionError
         The fence, a parameter or a position cannot be used.
     StartBlockedError, TargetBlockedError, NoRouteError
-        No route; with the fences to blame.
+        No route; with the fences, or the corner, to blame.
     PlanCheckError
         The finished route failed its check: a defect of this program, never to be driven.
     """
     fence = known_fence(situation)
-    vehicle = vehicle_from_parameters(situation.parameters, mav_type=situation.vehicle_type)
-    start, targets = _ends(situation, request)
-    home = situation.home.value if situation.home else None
+    vehicle = known_vehicle(situation, request)
+    start, targets = route_ends(situation, request)
     ground = ground_for(situation, vehicle, (start, *targets))
-    promised_m, allowance_m, warnings = _clearance(request, vehicle)
-    warnings = [*fence_warnings(vehicle, situation), *ground.warnings, *warnings]
+    asked = promise(situation, request, vehicle)
+    warnings = [*fence_warnings(vehicle, situation), *ground.warnings, *asked.warnings]
 
-    local = [ground.frame.to_local(position) for position in (start, *targets)]
-    reserve_m = _reserve_m(ground)
-    find = partial(
-        find_route,
-        ground,
-        local[0],
-        local[1:],
-        snap_m=request.snap_m,
-        method=request.method,
-        should_stop=should_stop,
-    )
-    if request.widest:
-        route, kept_m = _widest_route(find, widest_clearance_m(ground, local, should_stop))
-        route = simplified(ground, route, _WIDEST_SHARE * kept_m)
-        drawn_m = _WIDEST_SHARE * kept_m - reserve_m
-        promised_m = max(0.0, drawn_m - allowance_m)
-    else:
-        drawn_m = promised_m + allowance_m
-        route = _sparse_route(ground, find, drawn_m + reserve_m)
-    if route.lead_away:
-        warnings.append(
-            f"the start stands {route.start_clearance_m:.2f} m from a fence, nearer than {drawn_m:.2f} m: "
-            "the route first leads away, never nearer than that"
-        )
-    reached = tuple(map(rounded, ground.frame.to_lat_lons(route.points[list(route.target_indices)])))
-    warnings += [
-        f"the target {asked} is blocked: moved {distance_m(asked, found):.2f} m to {found}"
-        for asked, found in zip(targets, reached, strict=True)
-        if distance_m(asked, found) > ROUNDING_RESERVE_M
-    ]
-    path, lead_away = _rounded_path(ground, route)
-    clearance_m = _check(ground, path, lead_away, route.start_clearance_m, drawn_m)
-    forecast = envelope(
-        ground.frame.to_local_array(path), vehicle, heading_deg=_heading_deg(situation, start)
-    )
-    driven_m = max(0.0, forecast.clearance_m(ground.edge))
-    if allowance_m and driven_m < promised_m - 0.005 and not route.lead_away:
-        warnings.append(
-            f"the drive model foresees {driven_m:.2f} m at the nearest while driving, less than the {promised_m:.2f} m promised by the rule of thumb"
-        )
+    heading_deg = heading_at(situation, start)
+    problem = _Problem(situation, request, ground, vehicle, heading_deg, (start, *targets), should_stop)
+    asked, found = problem.uniform(asked) if asked.allowance_m is not None else problem.fitted(asked)
+    lines = finished(ground, found.drawing, found.lead_away)
+    reached = tuple(map(rounded, ground.frame.to_lat_lons(np.array(found.targets))))
+    least_m = asked.required_m + (asked.allowance_m or 0.0)
+    drawn_clearance_m = check_lines(ground, lines, found.start_clearance_m, least_m)
+    band = _band(ground, lines, vehicle, heading_deg)
+    if asked.allowance_m is None:
+        _check_band(ground, lines, band, found, asked)
+    items, seqs = mission_items(lines, vehicle.speed_mps, request.speed_mps)
+    driven_m = max(0.0, band.clearance_m(ground.edge))
     return Plan(
-        items=tuple(waypoint(position) for position in path[1:]),
-        path=path,
+        items=items,
+        path=lines.path,
+        seqs=seqs,
+        speeds=lines.speeds,
         start=start,
         targets=reached,
         method=request.method,
-        length_m=_length_m(path),
-        straight_line_m=_length_m((start, *targets)),
-        duration_s=forecast.duration_s,
-        clearance_m=promised_m if allowance_m else None,
-        asked_m=drawn_m,
-        drawn_clearance_m=clearance_m,
+        length_m=path_length_m(lines.path),
+        straight_line_m=path_length_m((start, *targets)),
+        duration_s=band.duration_s,
+        clearance_m=None if asked.allowance_m == 0 else asked.promised_m,
+        asked_m=least_m,
+        drawn_clearance_m=drawn_clearance_m,
         driven_clearance_m=driven_m,
-        envelope=forecast,
-        blocks=route.blocks,
+        envelope=band,
+        blocks=found.blocks,
         fence=fence,
         ground=ground,
         vehicle=vehicle,
-        home=home,
-        warnings=tuple(dict.fromkeys(warnings)),
-    )
-
-
-def _ends(situation: Situation, request: Request) -> tuple[LatLon, tuple[LatLon, ...]]:
-    start = request.start
-    if start is None and situation.pose is not None:
-        start = situation.pose.value.position
-    if start is None and situation.home is not None:
-        start = situation.home.value
-    if start is None:
-        raise SituationError("the start is not known: no position and no home; give one (--start LAT,LON)")
-    targets = request.targets
-    if not targets and situation.target is not None:
-        targets = (situation.target.value,)
-    if not targets and situation.mission is not None:
-        place = last_place(situation.mission.value.items)
-        targets = (place,) if place else ()
-    if not targets:
-        raise SituationError(
-            "the target is not known: none was sent and no mission holds one; give one (--target LAT,LON)"
-        )
-    return start, targets
-
-
-def _heading_deg(situation: Situation, start: LatLon) -> float | None:
-    """Give the vehicle's heading where the route starts from where it stands."""
-    pose = situation.pose
-    return pose.value.heading_deg if pose is not None and pose.value.position == start else None
-
-
-def ground_for(situation: Situation, vehicle: Vehicle, ends: Sequence[LatLon]) -> Ground:
-    """Lay the situation's fence out in the plane as the vehicle's parameters say.
-
-    Raises
-    ------
-    FenceMissingError, FenceError, InvalidPositionError, SituationError
-        As `plan`.
-    """
-    fence = known_fence(situation)
-    positions = [
-        position
-        for zone in fence.zones
-        for position in (zone.vertices if isinstance(zone, PolygonZone) else (zone.centre,))
-    ]
-    frame = frame_around(positions)
-    home = situation.home.value if situation.home and vehicle.fence.enforces_home_circle else None
-    named = [*(("", position) for position in (*positions, *ends)), *([("home ", home)] if home else [])]
-    for name, position in named:
-        check_latitude(position)
-        if (away_m := distance_m(frame.origin, position)) > MAX_FIELD_M:
-            raise SituationError(
-                f"{name}{position} is {away_m / 1000:.0f} km from the fence's centre {frame.origin}; "
-                f"at most {MAX_FIELD_M / 1000:.0f} km can be planned",
-                distance_m=away_m,
+        home=situation.home.value if situation.home else None,
+        warnings=tuple(
+            dict.fromkeys(
+                [
+                    *warnings,
+                    *_lead_away_warnings(found, least_m),
+                    *_moved_target_warnings(targets, reached),
+                    *_drive_warnings(vehicle, heading_deg, asked, driven_m, found),
+                ]
             )
-    ground = lay_out(
-        fence,
-        frame,
-        union=vehicle.fence.union,
-        home=home,
-        home_radius_m=vehicle.fence.radius_m if vehicle.fence.enforces_home_circle else None,
-        around=ends,
+        ),
     )
-    check_ground(ground)
-    return ground
 
 
 def asked_clearance(situation: Situation, request: Request) -> tuple[Vehicle, float]:
     """Give the situation's vehicle and the clearance that a plan would promise."""
-    vehicle = vehicle_from_parameters(situation.parameters, mav_type=situation.vehicle_type)
-    return vehicle, _clearance(request, vehicle)[0]
+    vehicle = known_vehicle(situation, request)
+    return vehicle, promise(situation, request, vehicle).promised_m
 
 
-def _clearance(request: Request, vehicle: Vehicle) -> tuple[float, float, list[str]]:
-    """Give the clearance promised, the allowance on top, and what to say about them."""
-    warnings = []
-    promised_m = request.clearance_m
-    if promised_m is None:
-        promised_m = max(vehicle.fence.margin_m + 0.5, 1.0)
-    elif vehicle.stops_within_m > promised_m:
-        warnings.append(
-            f"nearer than FENCE_MARGIN {vehicle.stops_within_m:g} m to the fence the vehicle stops in AUTO for good "
-            f"(AVOID_ENABLE); the clearance of {promised_m:g} m is less"
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """Everything a route is sought with."""
+
+    situation: Situation
+    request: Request
+    ground: Ground
+    vehicle: Vehicle
+    heading_deg: float | None
+    ends: tuple[LatLon, ...]
+    should_stop: Callable[[], bool] | None
+
+    @property
+    def local(self) -> list[LocalPoint]:
+        """Start and targets in the plane."""
+        return [self.ground.frame.to_local(position) for position in self.ends]
+
+    def fitted(self, asked: Promise) -> tuple[Promise, DrivenRoute]:
+        """Give a route whose driven band keeps what is promised."""
+        if not self.request.widest:
+            return asked, self._search(asked.required_m).find()
+        widest_m = widest_clearance_m(self.ground, self.local, self.should_stop)
+        refusal: RouteError | None = None
+        for share in _DRIVEN_SHARES:
+            required_m = max(0.0, share * (widest_m - clearance.NARROWEST_BAND_M))
+            try:
+                found = self._search(required_m).find()
+            except RouteError as error:
+                refusal = error
+                continue
+            promised_m = max(0.0, required_m - asked.error_m)
+            return replace(asked, promised_m=promised_m, error_m=required_m - promised_m), found
+        assert refusal is not None
+        raise refusal
+
+    def _search(self, required_m: float) -> RouteSearch:
+        start, *targets = self.local
+        return RouteSearch(
+            self.ground,
+            start,
+            targets,
+            required_m,
+            reserve_m(self.ground),
+            self.vehicle,
+            self.heading_deg,
+            self.request.snap_m,
+            self.request.method,
+            self.should_stop,
         )
-    allowance_m = request.corner_allowance_m
-    if allowance_m is None:
-        allowance_m = vehicle.waypoint_radius_m
-        warnings.append(
-            f"{allowance_m:g} m (WP_RADIUS) are kept on top of the clearance everywhere for cut corners: a rule of thumb"
+
+    def uniform(self, asked: Promise) -> tuple[Promise, DrivenRoute]:
+        """Give a route with the same room everywhere on top of the promise."""
+        wanted_m = asked.allowance_m or 0.0
+        start, *targets = self.local
+        find = partial(
+            find_route,
+            self.ground,
+            start,
+            targets,
+            snap_m=self.request.snap_m,
+            method=self.request.method,
+            should_stop=self.should_stop,
         )
-    named = {"FENCE_MARGIN": request.clearance_m is None, "WP_RADIUS": request.corner_allowance_m is None}
-    warnings += [str(assumed) for assumed in vehicle.assumed if named.get(assumed.parameter)]
-    return promised_m, allowance_m, warnings
+        rounding_m = reserve_m(self.ground)
+        if self.request.widest:
+            route, kept_m = _widest_route(find, widest_clearance_m(self.ground, self.local, self.should_stop))
+            route = simplified(self.ground, route, _WIDEST_SHARE * kept_m)
+            drawn_m = _WIDEST_SHARE * kept_m - rounding_m
+            promised_m = max(0.0, drawn_m - wanted_m - asked.error_m)
+            asked = replace(asked, promised_m=promised_m, error_m=drawn_m - wanted_m - promised_m)
+        else:
+            drawn_m = asked.required_m + wanted_m
+            route = _sparse_route(self.ground, find, drawn_m + rounding_m)
+        drawing = tuple(
+            DrawnPoint(east_m, north_m, drawn_m, drawn_m) for east_m, north_m in route.points.tolist()
+        )
+        reached = tuple(LocalPoint(*route.points[index].tolist()) for index in route.target_indices)
+        return asked, DrivenRoute(drawing, route.lead_away, route.start_clearance_m, reached, route.blocks)
+
+
+def _band(ground: Ground, lines: Lines, vehicle: Vehicle, heading_deg: float | None) -> Envelope:
+    """Foresee the drive; a heading that is not known is taken along the first leg."""
+    if heading_deg is None:
+        heading_deg = bearing_deg(*lines.path[:2])
+    return envelope(
+        ground.frame.to_local_array(lines.path),
+        vehicle,
+        heading_deg=heading_deg,
+        speeds=lines.speeds,
+        stops=lines.stops,
+    )
+
+
+def _check_band(ground: Ground, lines: Lines, band: Envelope, found: DrivenRoute, asked: Promise) -> None:
+    """Refuse a plan whose band breaks the promise."""
+    clearances_m = band.clearances_m(ground.edge)
+    leading = (band.waypoints <= lines.lead_away) & (lines.lead_away > 0)
+    for name, part, least_m in (
+        ("lead-away", leading, min(found.lead_away_m, asked.required_m)),
+        ("route", ~leading, asked.required_m),
+    ):
+        kept_m = float(clearances_m[part].min(initial=np.inf))
+        if kept_m < least_m - _ROUNDING_M:
+            raise PlanCheckError(
+                f"the {name} is foreseen to be driven {kept_m:.4f} m near a fence; {least_m:.4f} m was required. This is a defect",
+                clearance_m=kept_m,
+                asked_m=least_m,
+            )
+
+
+def _lead_away_warnings(found: DrivenRoute, least_m: float) -> list[str]:
+    if not found.lead_away:
+        return []
+    distance = f"{found.start_clearance_m:.2f} m from a fence, nearer than {least_m:.2f} m"
+    return [f"the start stands {distance}: the route first leads away, never nearer than that"]
+
+
+def _moved_target_warnings(targets: Sequence[LatLon], reached: Sequence[LatLon]) -> list[str]:
+    return [
+        f"the target {asked} is blocked: moved {distance_m(asked, found):.2f} m to {found}"
+        for asked, found in zip(targets, reached, strict=True)
+        if distance_m(asked, found) > ROUNDING_RESERVE_M
+    ]
+
+
+def _drive_warnings(
+    vehicle: Vehicle, heading_deg: float | None, asked: Promise, driven_m: float, found: DrivenRoute
+) -> list[str]:
+    """Say what the drive model's word rests on."""
+    if asked.allowance_m == 0:
+        return []
+    warnings = list(beyond_measured(vehicle))
+    if heading_deg is None:
+        warnings.append("the vehicle's heading is not known: it is taken to face along the first leg")
+    assumed = [f"{one.parameter} {one.value:g}" for one in vehicle.assumed if one.parameter in _DRIVEN_BY]
+    if assumed:
+        warnings.append(f"how the vehicle drives is not known in full; taken as {', '.join(assumed)}")
+    if asked.allowance_m and driven_m < asked.promised_m - 0.005 and not found.lead_away:
+        warnings.append(
+            f"the drive model foresees {driven_m:.2f} m at the nearest while driving, less than the {asked.promised_m:.2f} m promised "
+            f"with an allowance of {asked.allowance_m:g} m"
+        )
+    return warnings
 
 
 def _sparse_route(ground: Ground, find: Callable[..., Route], clearance_m: float) -> Route:
@@ -320,50 +381,18 @@ def _widest_route(find: Callable[..., Route], clearance_m: float) -> tuple[Route
     return find(clearance_m=clearance_m), clearance_m
 
 
-def _reserve_m(ground: Ground) -> float:
-    east_min_m, north_min_m, east_max_m, north_max_m = ground.allowed.bounds
-    diagonal_m = math.hypot(east_max_m - east_min_m, north_max_m - north_min_m)
-    farthest_lat_deg = min(abs(ground.frame.origin.lat_deg) + diagonal_m / 1.1e5, MAX_LATITUDE_DEG)
-    return ROUNDING_RESERVE_M + bow_m(min(diagonal_m, MAX_LEG_M), farthest_lat_deg)
-
-
-def _rounded_path(ground: Ground, route: Route) -> tuple[tuple[LatLon, ...], int]:
-    """Split long legs, round to degE7, drop waypoints that fall together; tell how many of the first legs lead away."""
-    path = [rounded(ground.frame.to_lat_lon(LocalPoint(*route.points[0].tolist())))]
-    lead_away = 0
-    for number, (a, b) in enumerate(pairwise(route.points)):
-        pieces = max(1, math.ceil(math.dist(a, b) / MAX_LEG_M))
-        for position in ground.frame.to_lat_lons(a + (b - a) * (np.arange(1, pieces + 1) / pieces)[:, None]):
-            if rounded(position) != path[-1]:
-                path.append(rounded(position))
-                lead_away += number < route.lead_away
-    return tuple(path) if len(path) > 1 else (path[0], path[0]), lead_away
-
-
-def _length_m(path: Sequence[LatLon]) -> float:
-    return sum(distance_m(a, b) for a, b in pairwise(path))
-
-
-def _check(
-    ground: Ground, path: Sequence[LatLon], lead_away: int, start_clearance_m: float, drawn_m: float
-) -> float:
-    """Measure the finished lines, as the autopilot draws them, and give their least clearance."""
-    clearances_m = [ground.clearance_m(drawn_leg(ground, a, b)) for a, b in pairwise(path)]
-    if not ground.edge.is_empty:  # it may stand so far off the autopilot's
-        clearances_m = [max(0.0, clearance_m - EDGE_BOW_M) for clearance_m in clearances_m]
-    asked_m = {"lead-away": min(start_clearance_m, drawn_m) - ROUNDING_RESERVE_M, "route": drawn_m}
-    for name, found in (("lead-away", clearances_m[:lead_away]), ("route", clearances_m[lead_away:])):
-        if found and min(found) < asked_m[name] - 1e-6:
-            raise PlanCheckError(
-                f"the {name} comes {min(found):.4f} m near a fence; at least {asked_m[name]:.4f} m was asked. This is a defect",
-                clearance_m=min(found),
-                asked_m=asked_m[name],
-            )
-    return min(clearances_m)
-
-
-def drawn_leg(ground: Ground, a: LatLon, b: LatLon) -> LineString | Point:
-    """Give the autopilot's straight line between two positions, in the plane."""
-    pieces = max(1, math.ceil(distance_m(a, b) / _SAMPLE_M))
-    line = ground.frame.to_local_array(autopilot_line(a, b, pieces))
-    return Point(line[0]) if a == b else LineString(line)
+_DRIVEN_BY = frozenset(
+    {
+        "WP_SPEED",
+        "WP_RADIUS",
+        "TURN_RADIUS",
+        "ATC_TURN_MAX_G",
+        "ATC_ACCEL_MAX",
+        "WP_PIVOT_ANGLE",
+        "SERVO1_FUNCTION",
+        "NAV_ACC_RAD",
+        "RO_SPEED_LIM",
+        "CA_AIRFRAME",
+    }
+)
+"""Parameters whose defaults a driver should see when they stand in for the vehicle's own."""

@@ -10,7 +10,9 @@ from shapely import LineString, Point
 
 from missions.errors import MissionError
 from missions.geo import distance_m
-from missions.plan import asked_clearance, drawn_leg, ground_for
+from missions.lines import drawn_leg
+from missions.plan import asked_clearance
+from missions.surroundings import ground_for
 
 if TYPE_CHECKING:
     from missions.geo import LatLon
@@ -50,7 +52,7 @@ class Recheck:
 
 
 def recheck(plan: Plan, situation: Situation, item: int) -> Recheck:
-    """Check the rest of a plan: from the vehicle's place to waypoint ``item`` of the path, and on from there.
+    """Check the rest of a plan: from the vehicle's place to where mission item ``item`` leads, and on from there.
 
     On the first line the vehicle may be off the drawn one: there it has to keep what was foreseen for the driven track. Where the plan
     leads away from a fence nearby, that line has to come no nearer than the vehicle is.
@@ -61,7 +63,7 @@ def recheck(plan: Plan, situation: Situation, item: int) -> Recheck:
         ground = ground_for(situation, plan.vehicle, (here, *plan.targets))
     except MissionError as error:
         return Recheck(0.0, plan.asked_m, str(error))
-    rest = plan.path[min(item, len(plan.path) - 1) :]
+    rest = plan.path[plan.path_index(item) :]
     here_m = ground.clearance_m(Point(ground.frame.to_local(here)))
     first_asked_m = min(plan.asked_m, plan.driven_clearance_m, here_m)
     lines = [(drawn_leg(ground, here, rest[0]), first_asked_m)]

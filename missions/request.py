@@ -5,8 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from missions.vehicle import Footprint
+
 if TYPE_CHECKING:
     from missions.geo import LatLon
+    from missions.situation import Mission
+
+
+POINT = Footprint()
+"""A vehicle of no size: its clearance counts from where its position is known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,11 +31,30 @@ class Request:
     widest : bool
         Take the widest route there is; `clearance_m` then says nothing.
     corner_allowance_m : float, optional
-        Room for cut corners and tracking error on top of the clearance. Default: from the vehicle; 0 plans the drawn lines only.
+        Room for cut corners and tracking error everywhere on top of the clearance; 0 plans the drawn lines only. Default: the route is
+        fitted to the drive model, with no more room than each corner needs.
     snap_m : float
         A blocked target is moved to free ground within this distance.
     method : str
         ``optimal``, ``pbpp-taut`` or ``pbpp``.
+    position_error_m : float, optional
+        How far the vehicle may be from where it believes to be. Default: from the kind of its fix.
+    reserve_m : float
+        The owner's own, for wind and slip.
+    speed_mps : float, optional
+        Driven with this speed (DO_CHANGE_SPEED). Default: the vehicle's own.
+    footprint : Footprint
+        The rectangle the vehicle covers.
+    escape : bool
+        Whether a vehicle on forbidden ground may drive out.
+    order : str
+        ``given``: the targets in their order; ``best``: in the shortest one (`missions.tour`).
+    comes_back : bool
+        Whether the route leads home after the last target (`missions.tour`).
+    end : str
+        At the end ``hold``, ``loiter`` or ``rtl`` (`missions.tour`).
+    via : Mission, optional
+        A mission to repair, in the place of targets (`missions.repair`).
     """
 
     start: LatLon | None = None
@@ -38,3 +64,12 @@ class Request:
     corner_allowance_m: float | None = None
     snap_m: float = 0.0
     method: str = "optimal"
+    position_error_m: float | None = None
+    reserve_m: float = 0.0
+    speed_mps: float | None = None
+    footprint: Footprint = POINT
+    escape: bool = False
+    order: str = "given"
+    comes_back: bool = False
+    end: str = "hold"
+    via: Mission | None = None

@@ -18,7 +18,7 @@ from missions.local_frame import LocalPoint
 from missions.narrow import narrowest_place
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -62,13 +62,20 @@ class Route:
     target_indices: tuple[int, ...]
     blocks: int
 
+    @property
+    def length_m(self) -> float:
+        """How long the lines are."""
+        return float(np.hypot(*np.diff(self.points, axis=0).T).sum())
 
-def find_route(
+
+def find_route(  # noqa: PLR0913 - what is sought, and how
     ground: Ground,
     start: LocalPoint,
     targets: list[LocalPoint],
     clearance_m: float,
     *,
+    promised_m: float | None = None,
+    blocked: Sequence[Polygon] = (),
     method: str = "optimal",
     snap_m: float = 0.0,
     should_stop: Callable[[], bool] | None = None,
@@ -83,6 +90,10 @@ def find_route(
         Where from, and where to.
     clearance_m : float
         What the drawn lines keep to any fence; where the start is nearer, the route first leads away, never nearer than the start is.
+    promised_m : float, optional
+        What of it is promised while driving, for errors to say.
+    blocked : sequence of shapely polygon
+        Places to keep away from as from exclusions, to find another way round.
     method : str
         ``optimal``, ``pbpp-taut`` or ``pbpp``.
     snap_m : float
@@ -97,11 +108,11 @@ def find_route(
     """
     planner = pbpp.Planner(
         ground.areas(ZoneKind.INCLUSION),
-        ground.areas(ZoneKind.EXCLUSION),
+        [*ground.areas(ZoneKind.EXCLUSION), *blocked],
         clearance_m=clearance_m,
         union=ground.union,
     )
-    search = _Search(ground, planner, clearance_m, method, should_stop)
+    search = _Search(ground, planner, clearance_m, method, should_stop, promised_m, bool(blocked))
     start_clearance_m = search.check_start(start)
     goals = [search.free_target(target, snap_m, start) for target in targets]
     lead: list[LocalPoint] = [start]
@@ -149,6 +160,15 @@ class _Search:
     clearance_m: float
     method: str
     should_stop: Callable[[], bool] | None
+    promised_m: float | None = None
+    is_other_way: bool = False
+
+    @property
+    def asked(self) -> str:
+        """The clearance in words."""
+        if self.promised_m is None:
+            return f"{self.clearance_m:.2f} m"
+        return f"{self.promised_m:.2f} m while driving ({self.clearance_m:.2f} m drawn)"
 
     def is_free(self, point: LocalPoint) -> bool:
         """Whether the planner takes a point: mitred offsets hold it, or its true distance is what round ones hold."""
@@ -218,9 +238,7 @@ class _Search:
             problem = f"the target is on forbidden ground ({self._position(target)}): {_names(names)}"
         else:
             names = [nearest.name] if nearest else []
-            problem = (
-                f"the target is {gap_m:.2f} m from {_names(names)}, nearer than {self.clearance_m:.2f} m"
-            )
+            problem = f"the target is {gap_m:.2f} m from {_names(names)}, nearer than {self.asked}"
         raise TargetBlockedError(
             f"{problem}; the nearest free point is {distance:.2f} m away, bearing {round(bearing) % 360}°, at {position}",
             fences=names,
@@ -277,10 +295,14 @@ class _Search:
 
     def _no_route(self, start: LocalPoint, goal: LocalPoint) -> RouteError:
         """Say how wide a route there is, or which fences part start and target: those along the edge of the smaller area."""
+        if self.is_other_way:
+            return NoRouteError(
+                f"no other way round keeps {self.asked}", clearance_m=round(self.clearance_m, 3)
+            )
         place = narrowest_place(self.ground, start, goal, self.should_stop)
         if place is not None:
             return NoRouteError(
-                f"no route keeps {self.clearance_m:.2f} m; {place}",
+                f"no route keeps {self.asked}; {place}",
                 clearance_m=round(self.clearance_m, 3),
                 widest_m=round(place.clearance_m, 3),
                 fences=list(place.between),

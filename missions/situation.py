@@ -42,6 +42,22 @@ class Pose:
     heading_deg: float | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class Fix:
+    """How well the vehicle knows its position.
+
+    Parameters
+    ----------
+    kind : int
+        GPS_FIX_TYPE: 3 is 3D, 4 DGPS, 5 RTK float, 6 RTK fixed.
+    error_m : float or None
+        The receiver's own word for its horizontal error (GPS_RAW_INT.h_acc), None where it gives none.
+    """
+
+    kind: int
+    error_m: float | None = None
+
+
 class ListKind(StrEnum):
     """The lists a vehicle holds."""
 
@@ -113,6 +129,7 @@ class Situation:
     rally: Known[tuple[LatLon, ...]] | None = None
     home: Known[LatLon] | None = None
     pose: Known[Pose] | None = None
+    fix: Known[Fix] | None = None
     target: Known[LatLon] | None = None
     parameters: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     transfers: Mapping[tuple[ListKind, bool], ListTransfer] = field(

@@ -66,7 +66,7 @@ class DriveWatch:
     @property
     def distance_left_m(self) -> float:
         """What is left of the drawn lines."""
-        rest = self._points[min(self.item, len(self._points) - 1) :]
+        rest = self._points[self._plan.path_index(self.item) :]
         legs_m = float(np.hypot(*np.diff(rest, axis=0).T).sum()) if len(rest) > 1 else 0.0
         return legs_m + (self._here.distance(Point(rest[0])) if self._here else 0.0)
 

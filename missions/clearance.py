@@ -1,0 +1,121 @@
+"""The clearance that is promised while driving, and what the foreseen track has to keep for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from missions.errors import VehicleError
+from missions.vehicle import vehicle_from_parameters
+
+if TYPE_CHECKING:
+    from missions.request import Request
+    from missions.situation import Fix, Situation
+    from missions.vehicle import Vehicle
+
+MARGIN_RESERVE_M = 0.1
+"""More than FENCE_MARGIN, where coming nearer stops the vehicle for good: so far measured rovers left the drive model's band."""
+
+DEFAULT_BEYOND_MARGIN_M = 0.5
+LEAST_DEFAULT_M = 1.0
+
+NARROWEST_BAND_M = 0.3
+"""What the band of a straight line at 1 m/s, rounding and the search for the widest route leave of its clearance."""
+
+FIX_ERRORS_M = {3: 1.5, 4: 0.6, 5: 0.3, 6: 0.05}
+"""By GPS_FIX_TYPE (3D, DGPS, RTK float, RTK fixed), where the receiver does not tell its own error."""
+
+
+@dataclass(frozen=True, slots=True)
+class Promise:
+    """What is promised, and what that asks for.
+
+    Parameters
+    ----------
+    promised_m : float
+        The vehicle, the middle of it, keeps this to any fence while driving.
+    error_m : float
+        Of its position, and the owner's reserve for wind and slip.
+    allowance_m : float or None
+        Room asked for everywhere on top of the promise; None where the route is fitted to the drive model.
+    warnings : tuple of str
+        What is to be said about them.
+    """
+
+    promised_m: float
+    error_m: float
+    allowance_m: float | None
+    warnings: tuple[str, ...]
+
+    @property
+    def required_m(self) -> float:
+        """What the foreseen track has to keep."""
+        return self.promised_m + self.error_m
+
+
+def known_vehicle(situation: Situation, request: Request) -> Vehicle:
+    """Give the vehicle, with the speed that is asked for.
+
+    Raises
+    ------
+    VehicleError
+        A parameter or the speed cannot be used.
+    """
+    vehicle = vehicle_from_parameters(situation.parameters, mav_type=situation.vehicle_type)
+    if request.speed_mps is None:
+        return vehicle
+    if not 0 < request.speed_mps < float("inf"):
+        raise VehicleError(f"a speed of {request.speed_mps:g} m/s is none", speed_mps=request.speed_mps)
+    return replace(vehicle, speed_mps=request.speed_mps)
+
+
+def promise(situation: Situation, request: Request, vehicle: Vehicle) -> Promise:
+    """Give the clearance to promise: what is asked, but no less than the vehicle's own avoidance and its corners need."""
+    warnings: list[str] = []
+    promised_m = request.clearance_m
+    if promised_m is None:
+        promised_m = max(vehicle.fence.margin_m + DEFAULT_BEYOND_MARGIN_M, LEAST_DEFAULT_M)
+        warnings += [str(assumed) for assumed in vehicle.assumed if assumed.parameter == "FENCE_MARGIN"]
+    swept_m = request.footprint.swept_radius_m
+    if promised_m < swept_m:
+        warnings.append(
+            f"the vehicle's corners sweep {swept_m:.2f} m when it turns: the clearance of {promised_m:g} m is raised to that"
+        )
+        promised_m = swept_m
+    if request.corner_allowance_m is not None:
+        if promised_m < vehicle.stops_within_m:
+            warnings.append(f"{_stops(vehicle)}; the clearance of {promised_m:g} m is less")
+        error_m = request.reserve_m + (request.position_error_m or 0.0)
+        return Promise(promised_m, error_m, request.corner_allowance_m, tuple(warnings))
+    if vehicle.stops_within_m and promised_m < vehicle.stops_within_m + MARGIN_RESERVE_M:
+        raised_m = vehicle.stops_within_m + MARGIN_RESERVE_M
+        if not request.widest:
+            warnings.append(
+                f"{_stops(vehicle)}; the clearance of {promised_m:g} m is raised to {raised_m:g} m"
+            )
+        promised_m = raised_m
+    error_m, told = _position_error_m(situation.fix.value if situation.fix else None, request)
+    return Promise(promised_m, error_m + request.reserve_m, None, (*warnings, *told))
+
+
+def _stops(vehicle: Vehicle) -> str:
+    return (
+        f"nearer than FENCE_MARGIN {vehicle.stops_within_m:g} m to the fence the vehicle stops in AUTO for good "
+        "(AVOID_ENABLE)"
+    )
+
+
+def _position_error_m(fix: Fix | None, request: Request) -> tuple[float, tuple[str, ...]]:
+    if request.position_error_m is not None:
+        return request.position_error_m, ()
+    if fix is None:
+        return 0.0, ()
+    if fix.error_m is not None:
+        error_m = fix.error_m
+    elif fix.kind in FIX_ERRORS_M:
+        error_m = FIX_ERRORS_M[fix.kind]
+    else:
+        return 0.0, (
+            "the vehicle has no 3D fix: no room is kept for its position's error (--position-error)",
+        )
+    return error_m, (f"{error_m:g} m are kept on top for the error of the vehicle's position",)

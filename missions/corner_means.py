@@ -1,0 +1,181 @@
+"""What can be done where the band of drawn lines comes too near to a fence: other lines, or a slower stretch.
+
+Each means takes lines and the number of a point and yields lines that may do better; which of them does is measured elsewhere.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from missions import drawn
+from missions.drawn import Drawing, Vector, shifted
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+MOVES = (0.5, 1.0, 1.5, 2.5)
+"""In lengths of what is missing."""
+
+SPACINGS_M = (6.0, 10.0, 15.0, 20.0)
+SLOW_MPS = (2.0, 1.0)
+SLOW_BEFORE_M = {2.0: 10.0, 1.0: 5.0}
+SLOW_AFTER_M = 6.0
+"""Measured on corners: 1 m/s from 5 m before to 6 m after takes away the cut (docs/drive-model.md)."""
+
+APART_M = 3.0
+"""Turns nearer to one another are one turn to a rover."""
+
+STOP_S = 1.0
+HEAD_M = (5.0, 9.0, 15.0)
+SIDE_DEG = (0.0, 35.0, -35.0, 70.0, -70.0)
+APPROACHES = 8
+APPROACH_M = (8.0, 16.0)
+SHARP_DEG = 110.0
+
+
+def moved(drawing: Drawing, index: int, missing_m: float) -> Iterator[Drawing]:
+    """Move a corner outwards; where that does not help, inwards or sideways."""
+    if _is_end_or_fixed(drawing, index):
+        return
+    out = drawn.outward(drawing, index)
+    if out is None:
+        ahead = drawn.direction(drawing[index - 1], drawing[index])
+        out = (-ahead[1], ahead[0])
+    along = (-out[1], out[0])
+    ways = (out, (-out[0], -out[1]), *(_between(out, side) for side in (along, (-along[0], -along[1]))))
+    half_rad = math.radians(abs(drawn.turn_deg(drawing, index))) / 2
+    unit_m = missing_m / max(math.cos(half_rad), 0.4) + 0.05
+    for way in (*ways, along, (-along[0], -along[1])):
+        for share in MOVES:
+            yield _with(drawing, index, shifted(drawing[index].place, way, unit_m * share))
+
+
+def without(drawing: Drawing, index: int) -> Iterator[Drawing]:
+    """Leave a corner out."""
+    if not _is_end_or_fixed(drawing, index):
+        yield (*drawing[:index], *drawing[index + 1 :])
+
+
+def merged(drawing: Drawing, index: int) -> Iterator[Drawing]:
+    """Make one corner of this one and the next: where the outer legs meet, or half-way."""
+    if _is_end_or_fixed(drawing, index) or _is_end_or_fixed(drawing, index + 1):
+        return
+    here, following = drawing[index], drawing[index + 1]
+    middle = ((here.east_m + following.east_m) / 2, (here.north_m + following.north_m) / 2)
+    meeting = drawn.crossing(drawing[index - 1], here, following, drawing[index + 2])
+    for place in (meeting, middle):
+        if place is not None and math.dist(place, middle) < 3 * math.dist(here.place, following.place):
+            yield (*drawing[:index], following.at(place), *drawing[index + 2 :])
+
+
+def split(drawing: Drawing, index: int) -> Iterator[Drawing]:
+    """Make two gentler corners of one, or three: round the outside of it."""
+    out = None if _is_end_or_fixed(drawing, index) else drawn.outward(drawing, index)
+    if out is None:
+        return
+    turn_deg = abs(drawn.turn_deg(drawing, index))
+    before, after = (
+        drawn.direction(drawing[index - 1], drawing[index]),
+        drawn.direction(drawing[index], drawing[index + 1]),
+    )
+    middle = _between(before, after) if turn_deg < 175 else (-out[1], out[0])
+    here = drawing[index]
+    for spacing_m in SPACINGS_M:
+        for out_m in (0.0, 0.35 * spacing_m):
+            first = shifted(shifted(here.place, out, out_m), middle, -spacing_m / 2)
+            second = shifted(shifted(here.place, out, out_m), middle, spacing_m / 2)
+            yield (*drawing[:index], here.at(first), here.at(second), *drawing[index + 1 :])
+        if turn_deg > SHARP_DEG:
+            top = here.at(shifted(here.place, out, spacing_m * 0.7))
+            sides = [here.at(shifted(here.place, middle, side * spacing_m * 0.7)) for side in (-1, 1)]
+            yield (*drawing[:index], sides[0], top, sides[1], *drawing[index + 1 :])
+    for side in (-1, 1):  # round by one side: off one leg, and back across the corner
+        for spacing_m in SPACINGS_M[1:]:
+            other = shifted(shifted(here.place, out, spacing_m / 2), middle, side * spacing_m)
+            pair = (here, here.at(other)) if side > 0 else (here.at(other), here)
+            yield (*drawing[:index], *pair, *drawing[index + 1 :])
+
+
+def slowed(drawing: Drawing, index: int, place: Vector, speed_mps: float) -> Iterator[Drawing]:
+    """Drive a stretch slower than at a speed: from before a place near a point, or the leg to it, to behind it."""
+    along = drawn.distances_m(drawing)
+    at_m = _along_m(drawing, along, place, index)
+    for slow_mps in (slow for slow in SLOW_MPS if slow < speed_mps):
+        begin_m = max(at_m - SLOW_BEFORE_M[slow_mps], 0.0)
+        end_m = min(at_m + SLOW_AFTER_M, along[-1])
+        longer, first = drawn.with_point_at(drawing, begin_m, APART_M)
+        longer, last = drawn.with_point_at(longer, end_m, APART_M)
+        if last > first:
+            yield tuple(
+                _slower(point, slow_mps) if first < number <= last else point
+                for number, point in enumerate(longer)
+            )
+
+
+def stopped(drawing: Drawing, index: int) -> Iterator[Drawing]:
+    """Stop at a corner (for rovers that turn on the spot)."""
+    if 0 < index < len(drawing) - 1:
+        yield (*drawing[:index], replace(drawing[index], stop_s=STOP_S), *drawing[index + 1 :])
+
+
+def headed(drawing: Drawing, heading_deg: float) -> Iterator[Drawing]:
+    """Begin with a leg the way the vehicle faces, or with two that bring it round."""
+    start = drawing[0]
+    for length_m in HEAD_M:
+        for side_deg in SIDE_DEG:
+            first = start.at(shifted(start.place, _vector(heading_deg + side_deg), length_m))
+            first = replace(first, is_fixed=False)
+            yield (start, first, *drawing[1:])
+            if side_deg:
+                second = first.at(shifted(first.place, _vector(heading_deg + 2.5 * side_deg), length_m))
+                yield (start, first, second, *drawing[1:])
+
+
+def approached(drawing: Drawing, index: int) -> Iterator[Drawing]:
+    """Come to a fixed point, or leave it, from another side."""
+    here = drawing[index]
+    for number in range(APPROACHES):
+        way = _vector(360.0 * number / APPROACHES)
+        for length_m in APPROACH_M:
+            point = replace(here.at(shifted(here.place, way, length_m)), is_fixed=False, stop_s=None)
+            if index:
+                yield (*drawing[:index], point, *drawing[index:])
+            if index < len(drawing) - 1:
+                yield (*drawing[: index + 1], point, *drawing[index + 1 :])
+
+
+def _is_end_or_fixed(drawing: Drawing, index: int) -> bool:
+    return not 0 < index < len(drawing) - 1 or drawing[index].is_fixed
+
+
+def _with(drawing: Drawing, index: int, place: Vector) -> Drawing:
+    return (*drawing[:index], drawing[index].at(place), *drawing[index + 1 :])
+
+
+def _between(a: Vector, b: Vector) -> Vector:
+    length = math.hypot(a[0] + b[0], a[1] + b[1]) or 1.0
+    return ((a[0] + b[0]) / length, (a[1] + b[1]) / length)
+
+
+def _vector(bearing_deg: float) -> Vector:
+    return (math.sin(math.radians(bearing_deg)), math.cos(math.radians(bearing_deg)))
+
+
+def _slower(point: drawn.DrawnPoint, speed_mps: float) -> drawn.DrawnPoint:
+    return replace(point, speed_mps=speed_mps if point.speed_mps is None else min(speed_mps, point.speed_mps))
+
+
+def _along_m(drawing: Drawing, along: list[float], place: Vector, index: int) -> float:
+    """Give how far along the leg to a point, or the one after it, a place lies."""
+    best = (math.inf, along[index])
+    for leg in (index - 1, index):
+        if 0 <= leg < len(drawing) - 1:
+            ahead = drawn.direction(drawing[leg], drawing[leg + 1])
+            length_m = along[leg + 1] - along[leg]
+            off = (place[0] - drawing[leg].east_m, place[1] - drawing[leg].north_m)
+            there_m = min(max(off[0] * ahead[0] + off[1] * ahead[1], 0.0), length_m)
+            away_m = math.dist(place, shifted(drawing[leg].place, ahead, there_m))
+            best = min(best, (away_m, along[leg] + there_m))
+    return best[1]

@@ -1,0 +1,138 @@
+"""Lines being drawn: waypoints with the speed of the leg to each, and what the driven band has to keep there."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+Vector = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class DrawnPoint:
+    """One point of the lines.
+
+    Parameters
+    ----------
+    east_m, north_m : float
+        Where, in the plane.
+    required_m : float
+        What the band about it, and about the leg to it, has to keep.
+    line_m : float
+        What the drawn leg to it has to keep.
+    speed_mps : float or None
+        Asked for on the leg to it; None is the vehicle's own.
+    stop_s : float or None
+        How long the vehicle waits there; None where it drives on.
+    is_fixed : bool
+        Whether it has to stay: the start, a target.
+    """
+
+    east_m: float
+    north_m: float
+    required_m: float
+    line_m: float
+    speed_mps: float | None = None
+    stop_s: float | None = None
+    is_fixed: bool = False
+
+    @property
+    def place(self) -> Vector:
+        """East and north in metres."""
+        return (self.east_m, self.north_m)
+
+    def at(self, place: Vector) -> DrawnPoint:
+        """Give it elsewhere."""
+        return replace(self, east_m=place[0], north_m=place[1])
+
+
+Drawing = tuple[DrawnPoint, ...]
+
+
+def places(drawing: Sequence[DrawnPoint]) -> NDArray[np.float64]:
+    """Give the points' places, (n, 2)."""
+    return np.array([point.place for point in drawing])
+
+
+def speeds(drawing: Sequence[DrawnPoint]) -> list[float | None]:
+    """Give the speed asked for on each leg."""
+    return [point.speed_mps for point in drawing[1:]]
+
+
+def stops(drawing: Sequence[DrawnPoint]) -> dict[int, float]:
+    """Give where the vehicle waits, and how long."""
+    return {number: point.stop_s for number, point in enumerate(drawing) if point.stop_s is not None}
+
+
+def direction(a: DrawnPoint, b: DrawnPoint) -> Vector:
+    """Give the unit vector from one point to another."""
+    length_m = math.dist(a.place, b.place) or 1.0
+    return ((b.east_m - a.east_m) / length_m, (b.north_m - a.north_m) / length_m)
+
+
+def turn_deg(drawing: Sequence[DrawnPoint], index: int) -> float:
+    """Give how the course changes at an inner point, to the right positive."""
+    before, after = (
+        direction(drawing[index - 1], drawing[index]),
+        direction(drawing[index], drawing[index + 1]),
+    )
+    cross = before[0] * after[1] - before[1] * after[0]
+    return -math.degrees(math.atan2(cross, before[0] * after[0] + before[1] * after[1]))
+
+
+def outward(drawing: Sequence[DrawnPoint], index: int) -> Vector | None:
+    """Give the unit vector out of a corner along its bisector; None where it hardly turns."""
+    before, after = (
+        direction(drawing[index - 1], drawing[index]),
+        direction(drawing[index], drawing[index + 1]),
+    )
+    east, north = before[0] - after[0], before[1] - after[1]
+    length = math.hypot(east, north)
+    return (east / length, north / length) if length > 0.02 else None
+
+
+def shifted(place: Vector, along: Vector, by_m: float) -> Vector:
+    """Give a place moved along a unit vector."""
+    return (place[0] + along[0] * by_m, place[1] + along[1] * by_m)
+
+
+def crossing(a: DrawnPoint, b: DrawnPoint, c: DrawnPoint, d: DrawnPoint) -> Vector | None:
+    """Give where the line from a through b, prolonged, meets the line from d through c, prolonged."""
+    ahead, back = direction(a, b), direction(d, c)
+    cross = ahead[0] * back[1] - ahead[1] * back[0]
+    if abs(cross) < 1e-3:
+        return None
+    between = (c.east_m - b.east_m, c.north_m - b.north_m)
+    ahead_m = (between[0] * back[1] - between[1] * back[0]) / cross
+    back_m = (between[0] * ahead[1] - between[1] * ahead[0]) / cross
+    return shifted(b.place, ahead, ahead_m) if ahead_m >= 0 and back_m >= 0 else None
+
+
+def distances_m(drawing: Sequence[DrawnPoint]) -> list[float]:
+    """Give how far along the lines each point lies."""
+    found = [0.0]
+    for a, b in pairwise(drawing):
+        found.append(found[-1] + math.dist(a.place, b.place))
+    return found
+
+
+def with_point_at(drawing: Drawing, along_m: float, near_m: float) -> tuple[Drawing, int]:
+    """Give the lines with a point at a distance along them, and its number; a point that lies nearer than ``near_m`` does."""
+    along = distances_m(drawing)
+    nearest = min(range(len(along)), key=lambda number: abs(along[number] - along_m))
+    if abs(along[nearest] - along_m) <= near_m:
+        return drawing, nearest
+    after = next(number for number, there_m in enumerate(along) if there_m > along_m)
+    ahead = direction(drawing[after - 1], drawing[after])
+    place = shifted(drawing[after - 1].place, ahead, along_m - along[after - 1])
+    new = replace(drawing[after].at(place), stop_s=None, is_fixed=False)
+    return (*drawing[:after], new, *drawing[after:]), after

@@ -1,0 +1,262 @@
+"""Fitting drawn lines to a vehicle: until the band it is foreseen to drive in keeps what is required, at the least time.
+
+A descent: where the band comes too near, every means is tried at that corner and measured by the drive model; the best is kept. What
+is measured decides, not the means.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+
+from missions import corner_means, drawn
+from missions.drive_model import envelope
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+
+    from missions.drawn import Drawing, Vector
+    from missions.drive_model import Envelope
+    from missions.ground import Ground
+    from missions.vehicle import Vehicle
+
+
+ENOUGH_M = 0.002
+"""What may be missing: less than rounding to degE7 adds, which is required on top."""
+
+UNBOUNDED_EXTRA_M = 2.0
+"""What corners that left the model when measured (by up to 1.6 m) have to keep on top."""
+
+_MISSING_COST_S_PER_M = 100.0
+_POINT_COST_S = 0.3
+_NEAR_TURNS_COST_S = 3.0
+_TURN_DEG = 5.0
+_SHORT_LEG_M = 12.0
+_LEAST_GAIN_S = 0.05
+_CONTEXT = 3
+_MOST_MEASUREMENTS = 1500
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """What the drive model says of lines.
+
+    Parameters
+    ----------
+    missing_m : tuple of float
+        What is missing of the required clearance at each point, 0 where nothing is.
+    worst : tuple of (float, float)
+        Where the band comes nearest to a fence, for each point.
+    cost_s : float
+        Time, and what is missing as time.
+    """
+
+    missing_m: tuple[float, ...]
+    worst: tuple[Vector, ...]
+    cost_s: float
+
+    @property
+    def is_enough(self) -> bool:
+        """Whether the band keeps what is required."""
+        return max(self.missing_m) <= ENOUGH_M
+
+
+@dataclass(eq=False)
+class Fitting:
+    """Lines, a vehicle and a field; `fit` betters the lines.
+
+    Parameters
+    ----------
+    ground : Ground
+        The field.
+    vehicle : Vehicle
+        What drives.
+    heading_deg : float or None
+        Where it faces at the start; None along its first leg.
+    should_stop : callable, optional
+        Asked now and then; True ends the search.
+    """
+
+    ground: Ground
+    vehicle: Vehicle
+    heading_deg: float | None
+    should_stop: Callable[[], bool] | None = None
+    measurements: int = field(default=0, init=False)
+
+    def fit(self, drawing: Drawing) -> tuple[Drawing, Measured]:
+        """Better lines until their band keeps what is required, or nothing helps."""
+        self.measurements = 0
+        drawing = self._fewer(drawing)
+        for means in (self._gentle, self._all):
+            drawing = self._descend(drawing, means)
+            if self.measure(drawing).is_enough:
+                drawing = self._fewer(drawing)
+                break
+        return drawing, self.measure(drawing)
+
+    def foresee(self, drawing: Drawing, heading_deg: float | None) -> Envelope:
+        """Give the band of lines."""
+        return envelope(
+            drawn.places(drawing),
+            self.vehicle,
+            heading_deg=heading_deg,
+            speeds=drawn.speeds(drawing),
+            stops=drawn.stops(drawing),
+        )
+
+    def measure(self, drawing: Drawing) -> Measured:
+        """Measure whole lines."""
+        return self._measure(drawing, 0, len(drawing))
+
+    def _measure(self, drawing: Drawing, begin: int, end: int) -> Measured:
+        """Measure the points from ``begin`` to before ``end``; ends of it that are no ends of the lines do not count."""
+        self.measurements += 1
+        part = drawing[begin:end]
+        heading_deg = _course_deg(part) if begin or self.heading_deg is None else self.heading_deg
+        band = self.foresee(part, heading_deg)
+        clearances_m = band.clearances_m(self.ground.edge)
+        least_m, pieces = np.full(len(part), np.inf), np.full(len(part), -1)
+        for piece in np.argsort(-clearances_m):
+            least_m[band.waypoints[piece]] = clearances_m[piece]
+            pieces[band.waypoints[piece]] = piece
+        legs = shapely.linestrings([[a.place, b.place] for a, b in pairwise(part)])
+        lines_m = np.array([np.inf, *np.atleast_1d(shapely.distance(legs, self.ground.edge))])
+        lines_m[np.isnan(lines_m)] = np.inf
+        required_m = np.array([point.required_m for point in part])
+        asked_m = np.array([point.line_m for point in part])
+        missing_m = np.maximum(np.maximum(required_m - least_m, asked_m - lines_m), 0.0)
+        for corner in band.corners:
+            if not corner.bounded:
+                here = slice(corner.waypoint, corner.waypoint + 2)
+                room_m = required_m[here] + UNBOUNDED_EXTRA_M - least_m[here]
+                missing_m[here] = np.maximum(missing_m[here], room_m)
+        if begin:
+            missing_m[0] = 0.0
+        if end < len(drawing):
+            missing_m[-1] = 0.0
+        cost_s = (
+            band.duration_s
+            + _POINT_COST_S * len(part)
+            + _NEAR_TURNS_COST_S * _near_turns(part)
+            + _MISSING_COST_S_PER_M * float(missing_m.sum())
+        )
+        worst = [
+            self._nearest(band, int(piece)) if missing > ENOUGH_M and piece >= 0 else (math.nan, math.nan)
+            for piece, missing in zip(pieces, missing_m, strict=True)
+        ]
+        return Measured(tuple(missing_m.tolist()), tuple(worst), cost_s)
+
+    def _nearest(self, band: Envelope, piece: int) -> Vector:
+        line = shapely.shortest_line(band.cores[piece], self.ground.edge)
+        east_m, north_m = shapely.get_coordinates(line)[0].tolist()
+        return (east_m, north_m)
+
+    def _gentle(self, drawing: Drawing, index: int, measured: Measured) -> Iterator[Drawing]:
+        """Give the means that cost little time."""
+        yield from corner_means.moved(drawing, index, measured.missing_m[index])
+        yield from corner_means.without(drawing, index)
+        yield from corner_means.merged(drawing, index)
+        yield from corner_means.merged(drawing, index - 1)
+        if _is_corner(drawing, index) and abs(drawn.turn_deg(drawing, index)) > 25.0:
+            yield from corner_means.split(drawing, index)
+        if index <= 1 and self.heading_deg is not None:
+            yield from corner_means.headed(drawing, self.heading_deg)
+        if drawing[index].is_fixed:
+            yield from corner_means.approached(drawing, index)
+
+    def _all(self, drawing: Drawing, index: int, measured: Measured) -> Iterator[Drawing]:
+        place = measured.worst[index]
+        if not math.isnan(place[0]):
+            yield from corner_means.slowed(drawing, index, place, self.vehicle.speed_mps)
+        if _is_corner(drawing, index):
+            yield from corner_means.slowed(drawing, index, drawing[index].place, self.vehicle.speed_mps)
+            if self.vehicle.can_pivot:
+                yield from corner_means.stopped(drawing, index)
+        yield from self._gentle(drawing, index, measured)
+
+    def _descend(
+        self, drawing: Drawing, means: Callable[[Drawing, int, Measured], Iterable[Drawing]]
+    ) -> Drawing:
+        """Use means at the worst points until nothing is missing or nothing helps."""
+        measured = self.measure(drawing)
+        while not measured.is_enough and not self._is_over():
+            for index in sorted(range(len(drawing)), key=lambda number: -measured.missing_m[number]):
+                if measured.missing_m[index] <= ENOUGH_M:
+                    return drawing
+                better = self._best(drawing, measured, means(drawing, index, measured))
+                if better is not None:
+                    drawing, measured = better
+                    break
+        return drawing
+
+    def _fewer(self, drawing: Drawing) -> Drawing:
+        """Leave out and merge points as long as that loses neither time nor clearance."""
+        measured = self.measure(drawing)
+        index = 1
+        while index < len(drawing) - 1 and not self._is_over():
+            candidates = list(corner_means.without(drawing, index))
+            if math.dist(drawing[index].place, drawing[index + 1].place) < _SHORT_LEG_M:
+                candidates += corner_means.merged(drawing, index)
+            better = self._best(drawing, measured, candidates)
+            if better is None:
+                index += 1
+            else:
+                drawing, measured = better
+                index = max(index - 1, 1)
+        return drawing
+
+    def _best(
+        self, drawing: Drawing, measured: Measured, candidates: Iterable[Drawing]
+    ) -> tuple[Drawing, Measured] | None:
+        """Give the lines that gain most, if any do, judged by the part that changes and then on the whole."""
+        known: dict[tuple[int, int], float] = {}
+        gains: list[tuple[float, int, Drawing]] = []
+        for number, candidate in enumerate(candidates):
+            begin, kept = _changed(drawing, candidate)
+            span = (begin, len(drawing) - kept)
+            if span not in known:
+                known[span] = self._measure(drawing, *span).cost_s
+            gain_s = known[span] - self._measure(candidate, begin, len(candidate) - kept).cost_s
+            if gain_s > _LEAST_GAIN_S:
+                gains.append((gain_s, -number, candidate))
+        for _, _, candidate in sorted(gains, reverse=True)[:3]:
+            found = self.measure(candidate)
+            if found.cost_s < measured.cost_s - _LEAST_GAIN_S:
+                return candidate, found
+        return None
+
+    def _is_over(self) -> bool:
+        stop = self.should_stop is not None and self.should_stop()
+        return stop or self.measurements > _MOST_MEASUREMENTS
+
+
+def _is_corner(drawing: Drawing, index: int) -> bool:
+    return 0 < index < len(drawing) - 1
+
+
+def _course_deg(drawing: Drawing) -> float:
+    east, north = drawn.direction(drawing[0], drawing[1])
+    return math.degrees(math.atan2(east, north))
+
+
+def _near_turns(drawing: Drawing) -> int:
+    """Count turns so near to the next that a rover drives them as one."""
+    turns = [abs(drawn.turn_deg(drawing, index)) > _TURN_DEG for index in range(1, len(drawing) - 1)]
+    return sum(
+        math.dist(drawing[index + 1].place, drawing[index + 2].place) < corner_means.APART_M
+        for index, (turn, following) in enumerate(pairwise(turns))
+        if turn and following
+    )
+
+
+def _changed(old: Drawing, new: Drawing) -> tuple[int, int]:
+    """Give where the part begins in which lines differ, some points before, and how many points after it are the same."""
+    shorter = min(len(old), len(new))
+    same = next((i for i in range(shorter) if old[i] != new[i]), shorter)
+    rest = next((i for i in range(shorter - same) if old[-1 - i] != new[-1 - i]), shorter - same)
+    return max(0, same - _CONTEXT), max(0, rest - _CONTEXT)

@@ -11,9 +11,7 @@ from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
-import typer
-
-from mavlink_bridge.cli.app import app
+from mavlink_bridge.cli.app import COMMANDS, load
 from mavlink_bridge.director import SCHEMA, TRANSITIONS
 
 DOCS = Path(__file__).parent
@@ -44,9 +42,8 @@ def director_diagram() -> str:
 
 def commands() -> str:
     """Give every command's options, from the command line itself."""
-    group = typer.main.get_command(app)
     parts = []
-    for name, command in sorted(group.commands.items()):
+    for name, command in sorted((name, load(name)) for name in COMMANDS):
         rows = [
             _option_row(parameter) for parameter in command.params if not getattr(parameter, "hidden", False)
         ]

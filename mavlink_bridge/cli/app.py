@@ -1,31 +1,128 @@
-"""The application: its commands and options of its own."""
+"""The application: its commands, each loaded when it is called, and the one place where errors end."""
 
 from __future__ import annotations
 
-from typing import Annotated
+import sys
+from importlib import import_module
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperCommand, TyperGroup
 
-from mavlink_bridge.cli import bridge, check, demo, download, log, plan, replay, sim, upload
-from mavlink_bridge.cli.common import guarded
+from mavlink_bridge.cli.failing import ExitCode, report, report_defect, says_no_colour
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+COMMANDS = {
+    "plan": "Plan a mission around fences; write it, draw it, upload it.",
+    "check": "Check every leg of a mission against a fence.",
+    "bridge": "Run beside the autopilot: targets in, verified missions out.",
+    "log": "Tell what telemetry logs hold.",
+    "replay": "Run the bridge over recorded logs.",
+    "upload": "Upload a file to the vehicle, verified; or put an old list back.",
+    "download": "Download a mission, fence, rally points or parameters.",
+    "convert": "Convert a file from one format to another.",
+    "sim": "Run a simulated rover.",
+    "demo": "Show the whole loop on a simulated rover.",
+    "doctor": "Look at this installation: versions, ports, keys, a test plan.",
+    "config": "Show where options may be kept, and which are set.",
+}
+"""Every command and what help says of it in a line; the module of the same name holds it."""
+
+_USAGE = 2
+
+
+class Commands(TyperGroup):
+    """A group that imports a command's module when the command is called: help and usage errors need none of them."""
+
+    def list_commands(self, ctx: Any) -> list[str]:  # noqa: ANN401, ARG002 - the parser library is typer's own affair
+        """Give the names, in the order of help."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:  # noqa: ANN401 - as above
+        """Give a command that was called before, or what help needs to know of it."""
+        known = super().get_command(ctx, cmd_name)
+        if known is None and cmd_name in COMMANDS:
+            return TyperCommand(cmd_name, help=COMMANDS[cmd_name])
+        return known
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401 - as above
+        """Load the command that is called, or suggest one of a similar name."""
+        if args[0] in COMMANDS:
+            self.commands[args[0]] = load(args[0])
+        elif not args[0].startswith("-"):
+            from difflib import get_close_matches  # noqa: PLC0415 - only for a mistake
+
+            similar = get_close_matches(args[0], COMMANDS)
+            hint = f"did you mean {' or '.join(similar)}?" if similar else f"there are {', '.join(COMMANDS)}"
+            ctx.fail(f"no command {args[0]!r}; {hint}")
+        return super().resolve_command(ctx, args)
+
+    def main(self, args: Sequence[str] | None = None, *rest: Any, **options: Any) -> Any:  # noqa: ANN401 - as above
+        """Run, and end with the right exit code whatever happens."""
+        if not options.get("standalone_mode", True):
+            return super().main(args, *rest, **options)
+        words = list(sys.argv[1:] if args is None else args)
+        sys.exit(
+            _exit_code(
+                lambda: super(Commands, self).main(args, *rest, **{**options, "standalone_mode": False}),
+                words,
+            )
+        )
+
+
+def load(name: str) -> Any:  # noqa: ANN401 - a command of the parser library that typer uses
+    """Give a command, with its options."""
+    from mavlink_bridge.cli.common import guarded  # noqa: PLC0415 - quick help
+
+    function = getattr(import_module(f"mavlink_bridge.cli.{name}"), name)
+    single = typer.Typer(add_completion=False, rich_markup_mode="markdown", pretty_exceptions_enable=False)
+    single.command(name)(guarded(function))
+    return typer.main.get_command(single)
+
+
+def _exit_code(run: Any, words: list[str]) -> int:  # noqa: ANN401 - a function without arguments
+    wants_json = "--json" in words
+    command = next((word for word in words if word in COMMANDS), "")
+    try:
+        return int(run() or 0)
+    except typer.Abort:
+        report(command, "Interrupted", "aborted", ExitCode.INTERRUPTED, wants_json=wants_json)
+        return ExitCode.INTERRUPTED
+    except BrokenPipeError:  # `pbpp log … | head`
+        import os  # noqa: PLC0415 - only then
+
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 128 + 13
+    except Exception as error:  # noqa: BLE001 - the last place where one can be told
+        if getattr(error, "exit_code", None) == _USAGE and hasattr(error, "format_message"):
+            _report_usage(error, command, wants_json=wants_json)
+            return ExitCode.USAGE
+        return report_defect(
+            command, error, wants_json=wants_json, verbose="-v" in words or "--verbose" in words
+        )
+
+
+def _report_usage(error: Any, command: str, *, wants_json: bool) -> None:  # noqa: ANN401 - a click usage error, typer's own copy or click's
+    path = f"pbpp {command}".strip()
+    message = " ".join(error.format_message().split())
+    option = getattr(error, "option_name", None) or getattr(getattr(error, "param", None), "name", None)
+    details = {"option": option} if option else {}
+    advice = f"see `{path} --help`"
+    report(
+        command, "UsageError", message, ExitCode.USAGE, {**details, "advice": advice}, wants_json=wants_json
+    )
+
 
 app = typer.Typer(
     name="pbpp",
-    no_args_is_help=True,
-    rich_markup_mode="markdown",
+    cls=Commands,
+    invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
+    suggest_commands=False,
 )
-
-app.command("plan")(guarded(plan.plan))
-app.command("check")(guarded(check.check))
-app.command("bridge")(guarded(bridge.bridge))
-app.command("log")(guarded(log.log))
-app.command("replay")(guarded(replay.replay))
-app.command("upload")(guarded(upload.upload))
-app.command("download")(guarded(download.download))
-app.command("sim")(guarded(sim.sim))
-app.command("demo")(guarded(demo.demo))
 
 
 def _version(wanted: bool) -> None:  # noqa: FBT001 - typer's way
@@ -38,7 +135,8 @@ def _version(wanted: bool) -> None:  # noqa: FBT001 - typer's way
 
 @app.callback()
 def _app(
-    version: Annotated[
+    context: typer.Context,
+    version: Annotated[  # noqa: ARG001 - its callback does it
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
     ] = False,
 ) -> None:
@@ -46,8 +144,16 @@ def _app(
 
     Nothing is written to a vehicle without `--upload`; nothing drives without `--drive`.
     """
+    if says_no_colour():
+        context.color = False
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+        raise typer.Exit(ExitCode.USAGE)
 
 
 def main() -> None:
     """Run the command line."""
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):  # a console that has no × shows a ? for it
+            stream.reconfigure(errors="replace")
     app()

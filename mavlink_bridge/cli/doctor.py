@@ -1,0 +1,223 @@
+"""``pbpp doctor``: whether this installation can do its work."""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+import tempfile
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mavlink_bridge.cli.common import ExitCode, JsonOption, QuietOption, print_json
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+_NEEDED = ("numpy", "shapely", "pyproj", "pymavlink", "pyserial", "typer", "rich", "platformdirs")
+_WANTED = {"matplotlib": "pictures (.png, .svg, .pdf)", "plotly": "interactive pages (.html)"}
+_START, _TARGET = (40.071374, -105.229930), (40.0726316, -105.2290497)
+_CLEARANCE_M = 2.5
+SHORTEST_M = 163.1
+"""No route of the test plan can be shorter: by a visibility graph around the same fence (a test of this project)."""
+
+
+class _Verdict(StrEnum):
+    """How a look turned out."""
+
+    OK = "ok"
+    NOTE = "note"
+    WRONG = "wrong"
+
+
+@dataclass(frozen=True, slots=True)
+class _Finding:
+    """What was found, and what to do about it."""
+
+    verdict: _Verdict
+    what: str
+    found: str
+    advice: str | None = None
+
+
+def doctor(
+    signing_key: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Look at this signing key and who may read it.")
+    ] = None,
+    json_output: JsonOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Look at this installation: versions, serial ports, options file, signing key, backups, and a plan with a known answer.
+
+    Nothing is opened and nothing is sent. Exit 8 if something is wrong.
+
+    Examples:
+    `pbpp doctor`
+
+    `pbpp doctor --signing-key rover.key --json`
+    """
+    looks: list[Callable[[], Iterator[_Finding]]] = [
+        _python, _packages, _ports, _options, lambda: _key(signing_key), _backups, _test_plan,
+    ]  # fmt: skip
+    findings = [finding for look in looks for finding in look()]
+    is_well = all(finding.verdict is not _Verdict.WRONG for finding in findings)
+    if json_output:
+        status = {"status": "ok"} if is_well else {"status": "error", "exit_code": int(ExitCode.CHECK)}
+        print_json({**status, "command": "doctor", "findings": [asdict(finding) for finding in findings]})
+    else:
+        for finding in findings:
+            if not quiet or finding.verdict is _Verdict.WRONG:
+                _tell(finding)
+    if not is_well:
+        raise typer.Exit(ExitCode.CHECK)
+
+
+def _tell(finding: _Finding) -> None:
+    colour = {
+        _Verdict.OK: typer.colors.GREEN,
+        _Verdict.NOTE: typer.colors.YELLOW,
+        _Verdict.WRONG: typer.colors.RED,
+    }
+    typer.echo(
+        f"{typer.style(f'{finding.verdict:<5}', fg=colour[finding.verdict])}  {finding.what}: {finding.found}"
+    )
+    if finding.advice:
+        typer.echo(f"       advice: {finding.advice}")
+
+
+def _python() -> Iterator[_Finding]:
+    version = platform.python_version()
+    found = f"{version} ({sys.executable}) on {platform.system()} {platform.machine()}"
+    yield _Finding(_Verdict.OK, "Python", found)
+
+
+def _packages() -> Iterator[_Finding]:
+    from importlib.metadata import PackageNotFoundError, version  # noqa: PLC0415 - quick help
+
+    yield _Finding(_Verdict.OK, "pbpp-rover", version("pbpp-rover"))
+    for name in _NEEDED:
+        try:
+            yield _Finding(_Verdict.OK, name, version(name))
+        except PackageNotFoundError:
+            yield _Finding(_Verdict.WRONG, name, "not installed", f"python -m pip install {name}")
+    for name, use in _WANTED.items():
+        try:
+            yield _Finding(_Verdict.OK, name, version(name))
+        except PackageNotFoundError:
+            advice = "python -m pip install 'pbpp-rover[plot]'"
+            yield _Finding(_Verdict.NOTE, name, f"not installed: no {use}", advice)
+
+
+def _ports() -> Iterator[_Finding]:
+    from serial.tools.list_ports import comports  # noqa: PLC0415 - quick help
+
+    ports = sorted(comports(), key=lambda port: port.device)
+    if not ports:
+        yield _Finding(_Verdict.NOTE, "serial ports", "none: radios and autopilots on USB would show here")
+    for port in ports:
+        told = f"{port.description}" if port.description not in (None, "n/a", port.device) else "present"
+        if os.name == "posix" and not os.access(port.device, os.R_OK | os.W_OK):
+            advice = _permission_advice(Path(port.device))
+            yield _Finding(
+                _Verdict.WRONG, f"serial port {port.device}", f"{told}, but you may not use it", advice
+            )
+        else:
+            yield _Finding(_Verdict.OK, f"serial port {port.device}", told)
+
+
+def _permission_advice(device: Path) -> str:
+    try:
+        group = device.group()
+    except (KeyError, OSError):
+        return f"ask the administrator for access to {device}"
+    return f"sudo usermod -aG {group} $USER, then log in anew"
+
+
+def _options() -> Iterator[_Finding]:
+    from mavlink_bridge.cli.config import settings_of  # noqa: PLC0415 - quick help
+    from mavlink_bridge.cli.options_file import user_file  # noqa: PLC0415
+
+    path = user_file()
+    if not path.is_file():
+        yield _Finding(_Verdict.OK, "options file", f"none ({path})")
+        return
+    try:
+        count = len(settings_of(path, is_asked_for=False))
+    except typer.BadParameter as error:
+        yield _Finding(
+            _Verdict.WRONG, "options file", error.message, "mend it; `pbpp config --template` shows one"
+        )
+    else:
+        yield _Finding(_Verdict.OK, "options file", f"{path} ({count} options set)")
+
+
+def _key(path: Path | None) -> Iterator[_Finding]:
+    if path is None:
+        return
+    from mavlink_bridge.errors import UsageError  # noqa: PLC0415 - quick help
+    from mavlink_bridge.signing import SigningKey  # noqa: PLC0415
+
+    try:
+        SigningKey.read(path)
+    except UsageError as error:
+        yield _Finding(_Verdict.WRONG, "signing key", str(error))
+    else:
+        yield _Finding(
+            _Verdict.OK,
+            "signing key",
+            f"{path} is one; only you may read it" if os.name == "posix" else f"{path} is one",
+        )
+
+
+def _backups() -> Iterator[_Finding]:
+    from mavlink_bridge.backup import BackupStore  # noqa: PLC0415 - quick help
+
+    folder = BackupStore().folder
+    above = next(path for path in (folder, *folder.parents) if path.exists())
+    try:
+        with tempfile.TemporaryFile(dir=above):
+            pass
+    except OSError as error:
+        advice = "uploads need it: make it writable, or set XDG_STATE_HOME"
+        yield _Finding(_Verdict.WRONG, "backups", f"{above} cannot be written: {error.strerror}", advice)
+        return
+    kept = len(list(folder.glob("system-*Z.json"))) if folder.is_dir() else 0
+    yield _Finding(_Verdict.OK, "backups", f"{folder} ({kept} kept)")
+
+
+def _test_plan() -> Iterator[_Finding]:
+    """Plan through the demo's maze; the answer is known, and its clearance is measured again."""
+    from dataclasses import replace  # noqa: PLC0415 - quick help
+    from importlib.resources import as_file, files  # noqa: PLC0415
+
+    from shapely import LineString  # noqa: PLC0415
+
+    from missions.formats import read_situation  # noqa: PLC0415
+    from missions.geo import LatLon  # noqa: PLC0415
+    from missions.plan import plan  # noqa: PLC0415
+    from missions.request import Request  # noqa: PLC0415
+    from missions.situation import Situation  # noqa: PLC0415
+
+    request = Request(LatLon(*_START), (LatLon(*_TARGET),), clearance_m=_CLEARANCE_M, corner_allowance_m=0.0)
+    try:
+        with as_file(files("mavlink_bridge.cli") / "data" / "maze-fence.waypoints") as path:
+            situation: Situation = replace(read_situation(path), home=None)
+        planned = plan(situation, request)
+        line = LineString(planned.ground.frame.to_local_array(planned.path))
+        clearance_m = planned.ground.clearance_m(line)
+    except Exception as error:  # noqa: BLE001 - whatever is broken here is what is looked for
+        yield _Finding(
+            _Verdict.WRONG, "test plan", f"{type(error).__name__}: {error}", "reinstall, or report this"
+        )
+        return
+    found = f"{planned.length_m:.2f} m, {clearance_m:.3f} m from every fence"
+    is_right = SHORTEST_M <= planned.length_m <= 1.01 * SHORTEST_M and clearance_m >= _CLEARANCE_M
+    if is_right:
+        yield _Finding(_Verdict.OK, "test plan", found)
+    else:
+        wanted = f"{SHORTEST_M} m, or 1 % more, and {_CLEARANCE_M} m were expected"
+        yield _Finding(_Verdict.WRONG, "test plan", f"{found}; {wanted}", "do not trust this installation")

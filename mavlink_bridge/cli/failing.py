@@ -1,0 +1,190 @@
+"""How a command ends: exit codes, and errors told to people and scripts."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+import sys
+from collections.abc import Mapping
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from enum import IntEnum
+from pathlib import Path
+
+import typer
+
+from mavlink_bridge import errors as bridge_errors
+from missions import errors as mission_errors
+
+
+class ExitCode(IntEnum):
+    """What the exit codes mean."""
+
+    DONE = 0
+    INTERNAL = 1
+    USAGE = 2
+    INPUT = 3
+    NO_ROUTE = 4
+    LINK = 5
+    REFUSED = 6
+    OUTCOME = 7
+    CHECK = 8
+    INTERRUPTED = 130
+
+
+_EXIT_CODES: tuple[tuple[type[Exception], ExitCode], ...] = (
+    (mission_errors.PlanCheckError, ExitCode.INTERNAL),
+    (mission_errors.RouteError, ExitCode.NO_ROUTE),
+    (mission_errors.MissionError, ExitCode.INPUT),
+    (bridge_errors.UsageError, ExitCode.USAGE),
+    (bridge_errors.LogError, ExitCode.INPUT),
+    (bridge_errors.LinkError, ExitCode.LINK),
+    (bridge_errors.RefusedError, ExitCode.REFUSED),
+    (bridge_errors.OutcomeError, ExitCode.OUTCOME),
+    (bridge_errors.BridgeError, ExitCode.INTERNAL),
+)
+
+_ADVICE: Mapping[type[Exception], str] = {
+    mission_errors.InvalidPositionError: "positions are LAT,LON in decimal degrees, such as 40.0713,-105.2299",
+    mission_errors.FenceMissingError: "upload a fence to the vehicle, or give a file that holds one",
+    mission_errors.FenceError: "mend the fence where it was drawn, and save or upload it again",
+    mission_errors.VehicleError: "correct the parameter on the vehicle or in the file",
+    mission_errors.StartBlockedError: "drive it to free ground by hand, or ask for less with --clearance",
+    mission_errors.TargetBlockedError: "choose another target, or let --snap M move it to free ground",
+    mission_errors.NoRouteError: "ask for less with --clearance; --clearance max looks for the widest way",
+    mission_errors.PlanCheckError: "nothing was written; please report this with the command and its input files",
+    bridge_errors.IdentityTakenError: "speak as somebody else: --source-component",
+    bridge_errors.VehicleNotFoundError: "choose the vehicle with --system N, or take one of any kind with --any-vehicle",
+    bridge_errors.LinkError: "is the vehicle on, and nobody else using the port? `pbpp doctor` lists the serial ports",
+    bridge_errors.RefusedError: "the vehicle's own messages in the ground station may say more",
+    bridge_errors.OutcomeError: "look at what the vehicle holds (`pbpp download`) before it drives",
+}
+_REPORT = (
+    "please report this line with the command and its input files; PBPP_TRACEBACK=1 or -v shows the traceback"
+)
+
+
+@dataclass(slots=True)
+class Telling:
+    """How much a run tells, and which warnings it has told."""
+
+    verbose: bool = False
+    warned: set[str] = field(default_factory=set)
+
+
+_telling: ContextVar[Telling | None] = ContextVar("telling", default=None)
+
+
+def telling() -> Telling:
+    """Give how much the command that runs is to tell."""
+    return _telling.get() or begin_telling(verbose=False)
+
+
+def begin_telling(*, verbose: bool) -> Telling:
+    """Begin a command."""
+    now = Telling(verbose)
+    _telling.set(now)
+    return now
+
+
+def exit_code_of(error: Exception) -> ExitCode:
+    """Give the exit code of an error."""
+    return next(code for kind, code in _EXIT_CODES if isinstance(error, kind))
+
+
+def says_no_colour() -> bool:
+    """Tell whether the user wants no colour (https://no-color.org), or the terminal has none."""
+    return bool(os.environ.get("NO_COLOR")) or os.environ.get("TERM") == "dumb"
+
+
+def print_json(document: Mapping[str, object]) -> None:
+    """Put a JSON document on stdout; numbers that JSON has not become null."""
+    sys.stdout.write(json.dumps(_plain(document), allow_nan=False) + "\n")
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, Mapping):
+        return {str(key): _plain(one) for key, one in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(one) for one in value]
+    if isinstance(value, (str, int, float)) or value is None:
+        return value
+    return str(value)
+
+
+def say(text: str, colour: str) -> None:
+    """Put a line on stderr, in colour if that is a terminal."""
+    typer.secho(text, err=True, fg=colour, color=False if says_no_colour() else None)
+
+
+def report_error(command: str, error: Exception, *, wants_json: bool) -> ExitCode:
+    """Report an error of ours; give its exit code."""
+    code = exit_code_of(error)
+    details = dict(getattr(error, "details", {}))
+    if "advice" not in details and (advice := _advice(command, error)):
+        details["advice"] = advice
+    report(command, type(error).__name__, str(error), code, details, wants_json=wants_json)
+    return code
+
+
+def report_defect(command: str, error: BaseException, *, wants_json: bool, verbose: bool = False) -> ExitCode:
+    """Report what should never happen, in a line that says what broke and where; give its exit code."""
+    import traceback  # noqa: PLC0415 - only then
+
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    where = f"{Path(place.filename).name}:{place.lineno}"
+    what = " ".join(f"{type(error).__name__}: {error}".split())
+    message = f"internal error, a bug in pbpp: {what} (at {where})"
+    details: dict[str, object] = {"advice": _REPORT}
+    if verbose or os.environ.get("PBPP_TRACEBACK", "") not in ("", "0"):
+        trace = "".join(traceback.format_exception(error))
+        details["traceback"] = trace
+        sys.stderr.write(trace)
+    report(command, "InternalError", message, ExitCode.INTERNAL, details, wants_json=wants_json)
+    return ExitCode.INTERNAL
+
+
+def report(
+    command: str,
+    name: str,
+    message: str,
+    code: ExitCode,
+    details: Mapping[str, object] | None = None,
+    *,
+    wants_json: bool,
+) -> None:
+    """Tell an error: what and why in a line, what to do in another; with JSON wanted as one document too."""
+    rest = dict(details or {})
+    advice = rest.pop("advice", None)
+    if wants_json:
+        print_json(
+            {
+                "status": "error",
+                "command": command,
+                "error": name,
+                "message": message,
+                "advice": advice,
+                "exit_code": int(code),
+                "details": rest,
+            }
+        )
+    say(f"error: {message}", typer.colors.RED)
+    if telling().verbose and rest:
+        shown = ", ".join(f"{key} = {value}" for key, value in rest.items() if key != "traceback")
+        say(f"details: {shown}", typer.colors.BRIGHT_BLACK)
+    if advice:
+        say(f"advice: {advice}", typer.colors.CYAN)
+
+
+def _advice(command: str, error: Exception) -> str | None:
+    """Say what to do, where the message itself does not."""
+    if isinstance(error, bridge_errors.UsageError):
+        return f"see `pbpp {command} --help`"
+    found = next((_ADVICE[kind] for kind in type(error).__mro__ if kind in _ADVICE), None)
+    if found is None or any(option in str(error) for option in re.findall(r"--[a-z-]+", found)):
+        return None
+    return found

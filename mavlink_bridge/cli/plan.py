@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from missions.situation import Situation
 
 _METHODS = ("optimal", "pbpp-taut", "pbpp")
+_ORDERS = ("given", "best")
+_ENDS = ("hold", "loiter", "rtl")
 
 
 def plan(
@@ -65,6 +67,20 @@ def plan(
         float,
         typer.Option(metavar="M", min=0.0, help="Move a blocked target to free ground within M metres."),
     ] = 0.0,
+    order: Annotated[
+        str, typer.Option(metavar="|".join(_ORDERS), help="best: the targets in the shortest order.")
+    ] = "given",
+    come_back: Annotated[
+        bool, typer.Option("--return", help="Come home after the last target (home not known: to the start).")
+    ] = False,
+    end: Annotated[
+        str,
+        typer.Option(metavar="|".join(_ENDS), help="At the end; rtl only where its straight line is free."),
+    ] = "hold",
+    via_mission: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Repair this mission: replace the legs that break the clearance."),
+    ] = None,
     method: Annotated[str, typer.Option(metavar="|".join(_METHODS), help="How to search.")] = "optimal",
     output: Annotated[
         list[Path] | None,
@@ -101,6 +117,7 @@ def plan(
     """
     outputs, plots = output or [], plot or []
     request = request_from_options(start, target or [], clearance, corner_allowance, snap, method)
+    request = _with_tour(request, order, end, via_mission, comes_back=come_back, drive=drive)
     _check_options(fence, log, connect, upload=upload or drive, outputs=outputs, plots=plots)
     if json_output and Path("-") in plots:
         raise UsageError("--plot - and --json both want the standard output; give a file to --plot")
@@ -145,10 +162,10 @@ def plan(
 
 def timed_plan(situation: Situation, request: Request) -> tuple[Plan, float]:
     """Plan, and tell how long it took."""
-    from missions.plan import plan as plan_mission  # noqa: PLC0415 - quick help
+    from missions.tour import plan_tour  # noqa: PLC0415 - quick help
 
     begun_s = time.perf_counter()
-    planned = plan_mission(situation, request)
+    planned = plan_tour(situation, request)
     return planned, time.perf_counter() - begun_s
 
 
@@ -252,6 +269,34 @@ def request_from_options(
         snap_m=_metres("--snap", str(snap), "leave it out") or 0.0,
         method=method,
     )
+
+
+def _with_tour(
+    request: Request, order: str, end: str, via: Path | None, *, comes_back: bool, drive: bool
+) -> Request:
+    """Add order, way home, end or a mission to repair.
+
+    Raises
+    ------
+    UsageError
+        An option is not what it has to be, or does not go with another.
+    """
+    for option, value, known in (("--order", order, _ORDERS), ("--end", end, _ENDS)):
+        if value not in known:
+            raise UsageError(f"{option} {value!r}: expected one of {', '.join(known)}")
+    if via is None:
+        return replace(request, order=order, comes_back=comes_back, end=end)
+    if request.targets or comes_back or (order, end) != ("given", "hold"):
+        raise UsageError(
+            "--via-mission keeps the mission's own places, order and end; it does not go with --target, --order, --return, --end"
+        )
+    if request.widest:
+        raise UsageError("--via-mission needs a clearance in metres, not max")
+    if drive:
+        raise UsageError("--drive does not go with --via-mission: upload it, check it, and start it yourself")
+    from missions.formats import read_mission  # noqa: PLC0415 - quick help
+
+    return replace(request, via=read_mission(via))
 
 
 def _metres(option: str, text: str | None, word: str) -> float | None:

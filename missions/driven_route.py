@@ -60,8 +60,8 @@ class DrivenRoute:
         The targets as reached, in order.
     blocks : int
         Blocks of the partition that was searched.
-    lead_away_m : float
-        What the band has to keep while the route leads away.
+    lead_away_m : float or None
+        What the band has to keep while the route leads away; None where the lines were not fitted to a vehicle.
     """
 
     drawing: Drawing
@@ -69,7 +69,7 @@ class DrivenRoute:
     start_clearance_m: float
     targets: tuple[LocalPoint, ...]
     blocks: int
-    lead_away_m: float = 0.0
+    lead_away_m: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

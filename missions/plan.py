@@ -303,8 +303,9 @@ def _check_band(ground: Ground, lines: Lines, band: Envelope, found: DrivenRoute
     """Refuse a plan whose band breaks the promise."""
     clearances_m = band.clearances_m(ground.edge)
     leading = (band.waypoints <= lines.lead_away) & (lines.lead_away > 0)
+    near_m = asked.required_m if found.lead_away_m is None else found.lead_away_m
     for name, part, least_m in (
-        ("lead-away", leading, min(found.lead_away_m, asked.required_m)),
+        ("lead-away", leading, near_m),
         ("route", ~leading, asked.required_m),
     ):
         kept_m = float(clearances_m[part].min(initial=np.inf))
@@ -319,8 +320,14 @@ def _check_band(ground: Ground, lines: Lines, band: Envelope, found: DrivenRoute
 def _lead_away_warnings(found: DrivenRoute, least_m: float) -> list[str]:
     if not found.lead_away:
         return []
-    distance = f"{found.start_clearance_m:.2f} m from a fence, nearer than {least_m:.2f} m"
-    return [f"the start stands {distance}: the route first leads away, never nearer than that"]
+    if found.lead_away_m is None:
+        distance = f"{found.start_clearance_m:.2f} m from a fence, nearer than {least_m:.2f} m"
+        return [f"the start stands {distance}: the route first leads away, never nearer than that"]
+    distance = f"{found.start_clearance_m:.2f} m from a fence, too near to leave it with {least_m:.2f} m kept"
+    nearest_m = max(found.lead_away_m, 0.0)
+    return [
+        f"the start stands {distance}: the route first leads away; turning there the vehicle may come as near as {nearest_m:.2f} m"
+    ]
 
 
 def _moved_target_warnings(targets: Sequence[LatLon], reached: Sequence[LatLon]) -> list[str]:
@@ -339,10 +346,10 @@ def _drive_warnings(
         return []
     warnings = list(beyond_measured(vehicle))
     if heading_deg is None:
-        warnings.append("the vehicle's heading is not known: it is taken to face along the first leg")
+        warnings.append("the vehicle's heading is not told: it is taken to face along the first leg")
     assumed = [f"{one.parameter} {one.value:g}" for one in vehicle.assumed if one.parameter in _DRIVEN_BY]
     if assumed:
-        warnings.append(f"how the vehicle drives is not known in full; taken as {', '.join(assumed)}")
+        warnings.append(f"how the vehicle drives is not told in full; taken as {', '.join(assumed)}")
     if asked.allowance_m and driven_m < asked.promised_m - 0.005 and not found.lead_away:
         warnings.append(
             f"the drive model foresees {driven_m:.2f} m at the nearest while driving, less than the {asked.promised_m:.2f} m promised "

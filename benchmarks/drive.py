@@ -1,0 +1,242 @@
+"""Whether planned missions are driven as promised: seeded fields, three vehicles, the simulator's drive law in stepped time.
+
+``python benchmarks/drive.py [--fields N] [--first SEED] [--jobs N] [-o docs/drive-bench.md]``. Each run plans a mission, hands its items to the simulated
+rover, drives it in AUTO with the fence enabled, and measures the true track against the fence.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import statistics
+import sys
+import time
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from drive_fields import Field, make_field
+
+from mavlink_bridge.simulator.config import Mode, SimulatorConfig
+from mavlink_bridge.simulator.rover import TICK_S
+from mavlink_bridge.simulator.vehicle import SimulatedVehicle
+from missions.errors import MissionError
+from missions.fence import fence_to_items
+from missions.geo import distance_m
+from missions.narrow import widest_clearance_m
+from missions.plan import Plan, plan
+from missions.request import Request
+from missions.situation import Known, Pose, Situation
+from missions.surroundings import ground_for
+from missions.vehicle import vehicle_from_parameters
+
+TOLERANCE_M = 0.10
+SPARE_M = 0.5
+VEHICLES: dict[str, dict[str, float]] = {
+    "steered, 2 m/s, WP_RADIUS 2": {"WP_SPEED": 2.0, "WP_RADIUS": 2.0},
+    "steered, 5 m/s, WP_RADIUS 3": {
+        "WP_SPEED": 5.0,
+        "WP_RADIUS": 3.0,
+        "CRUISE_SPEED": 5.0,
+        "CRUISE_THROTTLE": 30.0,
+    },
+    "skid, 2 m/s, WP_RADIUS 2": {
+        "WP_SPEED": 2.0,
+        "WP_RADIUS": 2.0,
+        "SERVO1_FUNCTION": 73.0,
+        "SERVO3_FUNCTION": 74.0,
+        "ATC_STR_RAT_FF": 0.2,
+        "CRUISE_SPEED": 3.0,
+        "CRUISE_THROTTLE": 75.0,
+    },
+}
+_KNOWN = {
+    "TURN_RADIUS": 0.9,
+    "ATC_TURN_MAX_G": 0.6,
+    "ATC_ACCEL_MAX": 1.0,
+    "WP_PIVOT_ANGLE": 60.0,
+    "SERVO1_FUNCTION": 26.0,
+    "SERVO3_FUNCTION": 70.0,
+    "FENCE_ENABLE": 1.0,
+    "FENCE_TYPE": 4.0,
+    "AVOID_ENABLE": 3.0,
+}
+
+
+@dataclass(frozen=True)
+class Run:
+    """One field and one vehicle."""
+
+    seed: int
+    kind: str
+    vehicle: str
+    promised_m: float
+    widest_m: float
+    refusal: str | None = None
+    planning_s: float = 0.0
+    leads_away_m: float | None = None
+    length_m: float = 0.0
+    shortest_m: float = 0.0
+    waypoints: int = 0
+    slow: int = 0
+    foreseen_s: float = 0.0
+    foreseen_m: float = 0.0
+    driven_m: float = 0.0
+    driven_s: float = 0.0
+    breaches: int = 0
+    arrived: bool = False
+
+    @property
+    def short_m(self) -> float:
+        """How much less than promised was kept."""
+        return (self.promised_m if self.leads_away_m is None else self.leads_away_m) - self.driven_m
+
+
+def main() -> None:
+    """Run the benchmark and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--fields", type=int, default=200)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("-o", "--output", type=Path)
+    options = parser.parse_args()
+    seeds = range(options.first, options.first + options.fields)
+    begun_s = time.perf_counter()
+    with ProcessPoolExecutor(options.jobs) as pool:
+        runs = [run for found in pool.map(runs_of, seeds) for run in found]
+    text = report(runs, time.perf_counter() - begun_s)
+    print(text)
+    if options.output:
+        options.output.write_text(text + "\n", encoding="utf-8")
+
+
+def runs_of(seed: int) -> list[Run]:
+    """Plan and drive one field with each vehicle."""
+    field = make_field(seed)
+    return [_run(field, name) for name in VEHICLES]
+
+
+def _run(field: Field, name: str) -> Run:
+    parameters = {**_KNOWN, **VEHICLES[name], "FENCE_MARGIN": field.clearance_m - 0.1}
+    situation = Situation(
+        fence=Known(field.fence, None, "bench"),
+        pose=Known(Pose(field.start, field.heading_deg), None, "bench"),
+        home=Known(field.start, None, "bench"),
+        parameters=parameters,
+    )
+    ground = ground_for(situation, vehicle_from_parameters(parameters), (field.start, field.target))
+    widest_m = widest_clearance_m(
+        ground, [ground.frame.to_local(field.start), ground.frame.to_local(field.target)]
+    )
+    request = Request(targets=(field.target,), clearance_m=field.clearance_m)
+    known = {
+        "seed": field.seed,
+        "kind": field.kind,
+        "vehicle": name,
+        "promised_m": field.clearance_m,
+        "widest_m": widest_m,
+    }
+    begun_s = time.perf_counter()
+    try:
+        planned = plan(situation, request)
+    except MissionError as error:
+        return Run(**known, refusal=str(error), planning_s=time.perf_counter() - begun_s)  # type: ignore[arg-type]
+    planning_s = time.perf_counter() - begun_s
+    shortest = plan(
+        situation, Request(targets=(field.target,), clearance_m=field.clearance_m, corner_allowance_m=0.0)
+    )
+    driven_s, rover, arrived = _drive(field, planned, parameters)
+    return Run(
+        **known,  # type: ignore[arg-type]
+        planning_s=planning_s,
+        leads_away_m=planned.driven_clearance_m if planned.driven_clearance_m < field.clearance_m else None,
+        length_m=planned.length_m,
+        shortest_m=shortest.length_m,
+        waypoints=len(planned.path) - 1,
+        slow=sum(speed is not None for speed in planned.speeds),
+        foreseen_s=planned.duration_s,
+        foreseen_m=planned.driven_clearance_m,
+        driven_m=rover.least_clearance_m,
+        driven_s=driven_s,
+        breaches=rover.breaches,
+        arrived=arrived,
+    )
+
+
+def _drive(field: Field, planned: Plan, parameters: dict[str, float]) -> tuple[float, SimulatedVehicle, bool]:
+    """Drive a plan in AUTO until it is complete, or much longer than foreseen."""
+    vehicle = SimulatedVehicle(
+        SimulatorConfig(
+            home=field.start,
+            heading_deg=field.heading_deg,
+            mission=planned.items,
+            fence=fence_to_items(field.fence),
+            parameters=parameters,
+            streams=False,
+        )
+    )
+    rover = vehicle.rover
+    rover.arm()
+    now_s = 1.0
+    rover.set_mode(Mode.AUTO, now_s)
+    limit_s = 3 * planned.duration_s + 60.0
+    while rover.mode == Mode.AUTO and not rover.route.is_complete and now_s < limit_s:
+        now_s += TICK_S
+        rover.step(now_s)
+    near = distance_m(vehicle.position, planned.targets[-1]) < max(parameters["WP_RADIUS"], 1.5) + 1.0
+    return now_s - 1.0, vehicle, rover.route.is_complete and near
+
+
+def report(runs: list[Run], took_s: float) -> str:
+    """Give the tables."""
+    lines = [
+        f"{len({run.seed for run in runs})} fields x {len(VEHICLES)} vehicles, {took_s:.0f} s.",
+        "",
+        "| | routes | refused, widest ≥ promised + 0.5 m | least driven − promised | short by > 0.10 m | breaches | not arrived "
+        "| longer than the shortest, median / p90 | time foreseen / driven, p10 … p90 | planning, median / max |",
+        "|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for name in VEHICLES:
+        mine = [run for run in runs if run.vehicle == name]
+        routes = [run for run in mine if run.refusal is None]
+        wide = [run for run in mine if run.widest_m >= run.promised_m + SPARE_M]
+        refused = [run for run in wide if run.refusal is not None]
+        longer = sorted(run.length_m / run.shortest_m - 1 for run in routes)
+        times = sorted(run.foreseen_s / run.driven_s for run in routes if run.arrived)
+        lines.append(
+            f"| {name} | {len(routes)} of {len(mine)} | {len(refused)} of {len(wide)} ({len(refused) / max(1, len(wide)):.1%}) "
+            f"| {min(-run.short_m for run in routes):+.2f} m | {sum(run.short_m > TOLERANCE_M for run in routes)} "
+            f"| {sum(run.breaches for run in routes)} | {sum(not run.arrived for run in routes)} "
+            f"| {statistics.median(longer):.1%} / {_p(longer, 0.9):.1%} "
+            f"| {_p(times, 0.1):.2f} … {_p(times, 0.9):.2f} "
+            f"| {statistics.median(run.planning_s for run in mine):.2f} / {max(run.planning_s for run in mine):.2f} s |"
+        )
+    away = [run for run in runs if run.leads_away_m is not None]
+    lines += [
+        "",
+        f"{len(away)} runs begin nearer to a fence than the promise (counted against what the plan says of them).",
+    ]
+    lines += ["", "Refused although the widest route keeps 0.5 m more than promised:", ""]
+    lines += [
+        f"- {run.kind} {run.seed}, {run.vehicle}, widest {run.widest_m:.2f} m: {run.refusal}"
+        for run in runs
+        if run.refusal is not None and run.widest_m >= run.promised_m + SPARE_M
+    ] or ["- none"]
+    lines += ["", "Short of the promise, or not arrived:", ""]
+    lines += [
+        f"- {run.kind} {run.seed}, {run.vehicle}: promised {run.promised_m:g} m, foreseen {run.foreseen_m:.2f} m, driven {run.driven_m:.2f} m, "
+        f"{'arrived' if run.arrived else 'not arrived'}, {run.breaches} breaches"
+        for run in runs
+        if run.refusal is None and (run.short_m > TOLERANCE_M or not run.arrived or run.breaches)
+    ] or ["- none"]
+    return "\n".join(lines)
+
+
+def _p(values: list[float], share: float) -> float:
+    return values[min(len(values) - 1, math.floor(share * len(values)))] if values else math.nan
+
+
+if __name__ == "__main__":
+    main()

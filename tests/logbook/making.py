@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -100,7 +101,7 @@ class Log:
         self.row(ROVER, m.MissionCurrent(first_item))
         self.position(*points[0])
         self.now_s += 0.2
-        for item, (a, b) in enumerate(zip(points[:-1], points[1:], strict=True), start=first_item):
+        for item, (a, b) in enumerate(itertools.pairwise(points), start=first_item):
             self.row(ROVER, m.MissionCurrent(item), 0.0)
             length_m = math.dist(a, b)
             steps = max(1, round(length_m / speed_mps / 0.25))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -42,7 +44,7 @@ def test_steps(times_s, expected, jumps, outliers):
 @given(st.lists(st.floats(0, 1e10)))
 def test_never_runs_backwards_and_never_leaps_a_day(times_s):
     clock, found = run(times_s)
-    steps = [after - before for before, after in zip(found[:-1], found[1:], strict=True)]
+    steps = [after - before for before, after in itertools.pairwise(found)]
     assert all(0 <= step <= DAY_S + 1e-3 for step in steps)
     assert len(found) == len(times_s)
     assert clock.jumps + clock.outliers <= len(times_s)

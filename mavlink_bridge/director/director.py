@@ -12,61 +12,42 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from mavlink_bridge import messages as m
-from mavlink_bridge.director.changes import ChangeWatch
 from mavlink_bridge.director.drive_watch import DriveWatch
-from mavlink_bridge.director.events import Event, EventName
-from mavlink_bridge.director.learning import MISSION_TYPES, Learning, list_of
-from mavlink_bridge.director.orders import PATH_PLANNER_COMPONENT, Orders, TargetSource
-from mavlink_bridge.director.states import TRANSITIONS, Cue, State
-from mavlink_bridge.director.steps import Step, Steps
+from mavlink_bridge.director.events import EventName
+from mavlink_bridge.director.keeper import FRESH_S, Keeper
+from mavlink_bridge.director.orders import Orders, TargetSource
+from mavlink_bridge.director.states import Cue, State
 from mavlink_bridge.director.targets import CLICKS, Target, TargetWatch
-from mavlink_bridge.director.voice import Voice
-from mavlink_bridge.errors import BridgeError, LinkError, OutcomeError, RefusedError
-from mavlink_bridge.fold import fold, with_list
-from mavlink_bridge.messages import Frame
+from mavlink_bridge.errors import BridgeError, OutcomeError, RefusedError
 from mavlink_bridge.outcomes import upload_trouble
 from mavlink_bridge.protocol.command import SendCommand
-from mavlink_bridge.protocol.download import Download
-from mavlink_bridge.protocol.find import FindVehicle
 from mavlink_bridge.protocol.limits import Limits
-from mavlink_bridge.protocol.peer import Peer
-from mavlink_bridge.protocol.table_machine import TableMachine
 from mavlink_bridge.protocol.verified_upload import VerifiedUpload, VerifiedUploadOutcome
 from mavlink_bridge.rover import AUTO_MODE, GUIDED_MODE, HOLD_MODE, MODE_NAMES
 from missions.errors import MissionError
 from missions.items import Command, last_place, with_home
 from missions.plan import plan as make_plan
 from missions.recheck import recheck, straight_line
-from missions.situation import Known, ListKind, Situation
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from mavlink_bridge.messages import Message
-    from missions.fence import Fence
+    from mavlink_bridge.director.steps import Step
+    from mavlink_bridge.messages import Frame
     from missions.geo import LatLon
     from missions.items import MissionItem
     from missions.plan import Plan
     from missions.request import Request
+    from missions.situation import Situation
 
-_FRESH_S = 1.5
-"""How old a heartbeat may be to tell what the vehicle does now."""
-
-_SILENCE_S = 5.0
 _STILL_MPS = 0.3
 _STOP_AT_LEAST_S = 0.25
 _STOP_PATIENCE_S = 8.0
 _MOVED_M = 1.0
-_AT_REST = frozenset(
-    {State.READY, State.PROPOSED, State.VERIFIED, State.DRIVING, State.ARRIVED, State.LET_GO}
-)
 _MAKING_A_ROUTE = frozenset({State.PLANNING, State.PROPOSED, State.VERIFIED})
-_MAY_FALL_SILENT = frozenset(
-    set(State) - {State.LISTENING, State.UPLOADING, State.LOST, State.DONE, State.FAILED}
-)
 
 
-class Director(TableMachine[State, Cue]):
+class Director(Keeper):
     """Takes targets to verified missions, and missions to arrival.
 
     Parameters
@@ -85,45 +66,24 @@ class Director(TableMachine[State, Cue]):
         situation: Situation | None = None,
         planner: Callable[[Situation, Request], Plan] = make_plan,
     ) -> None:
-        super().__init__(TRANSITIONS, State.LISTENING)
-        self.orders = orders
-        self.situation = situation or Situation()
-        self.trouble: BridgeError | MissionError | None = None
+        super().__init__(orders, situation)
         self.upload_outcome: VerifiedUploadOutcome | None = None
         self.plan: Plan | None = None
         self.drive: DriveWatch | None = None
         self._planner = planner
-        patience_s = orders.patience_s if orders.once else math.inf
-        self._find = FindVehicle(orders.system, any_vehicle=orders.any_vehicle, patience_s=patience_s)
-        self._peer: Peer | None = None
-        self._steps = Steps()
-        self._voice = Voice(announce=orders.announce)
         self._targets = TargetWatch(orders.target_sources)
-        self._changes: ChangeWatch | None = None
-        self._fence_known: Known[Fence] | None = None
         self._target: Target | None = None
         self._waiting_target: Target | None = None
         self._ours: tuple[MissionItem, ...] | None = None  # the mission that is on the vehicle by us
-        self._standstill_due_s = math.inf
-        self._heartbeat_s = -math.inf
         self._confirmed = False
         self._speed_mps = 0.0
         self._held_at_s: float | None = None
+        self._standstill_due_s = math.inf
         self._modes_expected: frozenset[int] = frozenset()
         self._modes_expected_s = -math.inf
         self._item_now = 1
 
     # What the shell sees
-
-    @property
-    def identity(self) -> tuple[int, int] | None:
-        """The ids we speak with; None until they are known."""
-        return (self._peer.own_system, self._peer.own_component) if self._peer else self.orders.identity
-
-    @property
-    def peer(self) -> Peer | None:
-        """The vehicle, once it was found."""
-        return self._peer
 
     @property
     def progress(self) -> tuple[int, int]:
@@ -139,74 +99,7 @@ class Director(TableMachine[State, Cue]):
         upload = self._steps.current
         return upload.pending_backup if isinstance(upload, VerifiedUpload) else None
 
-    @property
-    def deadline_s(self) -> float | None:
-        """When `handle_timer` wants to be called."""
-        times = [self._steps.deadline_s, self._voice.deadline_s]
-        if self.state is State.LISTENING:
-            times.append(self._find.deadline_s)
-        if self.state is State.HOLDING:
-            times.append(self._standstill_due_s)
-        if self.state is State.PLANNING:
-            times.append(-math.inf)
-        if self.state in _MAY_FALL_SILENT:
-            times.append(self._heartbeat_s + _SILENCE_S)
-        if self.drive is not None:
-            times.append(self.drive.progress_due_s)
-        if self._may_reread and self._changes is not None:
-            times.append(self._changes.deadline_s(is_driving=self.state is State.DRIVING))
-        return min((time_s for time_s in times if time_s is not None and time_s < math.inf), default=None)
-
-    def take_events(self) -> list[Event]:
-        """Give and forget what happened."""
-        return self._voice.take_events()
-
     # What the shell does
-
-    def start(self, now_s: float) -> None:
-        """Begin to listen."""
-        self._find.start(now_s)
-
-    def receive(self, frame: Frame, now_s: float) -> None:
-        """Take a frame."""
-        if self.state is State.LISTENING:
-            self._find.receive(frame, now_s)
-            self._found(now_s)
-            return
-        before = self.situation
-        self.situation = fold(before, frame, now_s)
-        if self._is_from_vehicle(frame):
-            self._take_vehicle_frame(frame, now_s)
-        if self.orders.passive:
-            self._learn_by_listening(before, now_s)
-        self._notice_fence(now_s)
-        if self.identity and (
-            target := self._targets.look(frame, before, self.situation, now_s, self.identity)
-        ):
-            self._take_target(target, now_s)
-        self._steps.receive(frame, now_s)
-
-    def handle_timer(self, now_s: float) -> None:
-        """Take notice that time has passed."""
-        self._outgoing += self._voice.due(now_s)
-        self._steps.handle_timer(now_s)
-        if self.state is State.LISTENING:
-            self._find.handle_timer(now_s)
-            self._found(now_s)
-        elif self.state is State.HOLDING:
-            self._await_standstill(now_s)
-        elif self.state is State.PLANNING and not self._steps:
-            self._plan_route(now_s)
-        elif self.drive is not None and now_s >= self.drive.progress_due_s:
-            self.drive.tell_progress(now_s)
-        if self.state in _MAY_FALL_SILENT and now_s >= self._heartbeat_s + _SILENCE_S:
-            self._fall_silent(now_s)
-        if self._may_reread:
-            self._reread(now_s)
-
-    def messages_to_send(self) -> list[Message]:
-        """Give and forget what is to be sent now."""
-        return super().messages_to_send() + self._steps.messages_to_send()
 
     def take_target(self, position: LatLon, now_s: float) -> None:
         """Take a target that was typed."""
@@ -224,53 +117,9 @@ class Director(TableMachine[State, Cue]):
         if isinstance(upload, VerifiedUpload):
             upload.backup_stored(now_s)
 
-    # Listening and learning
+    # What follows from learning
 
-    def _found(self, now_s: float) -> None:
-        """Go on from listening, once it is clear who is meant."""
-        find = self._find
-        if find.trouble is not None:
-            self._voice.error(now_s, EventName.TROUBLE, find.trouble, dict(find.trouble.details))
-            self.trouble = find.trouble
-            self._move(Cue.GIVE_UP)
-        if find.vehicle is None or find.heartbeat is None:
-            return
-        vehicle = find.vehicle
-        identity = self.orders.identity or (vehicle.system, PATH_PLANNER_COMPONENT)
-        self._peer = Peer(vehicle.system, vehicle.component, *identity)
-        self._changes = ChangeWatch(identity)
-        self._move(Cue.FOUND)
-        self._voice.tell(now_s, EventName.VEHICLE_FOUND, f"vehicle found: system {vehicle.system}", *vehicle)
-        known = replace(
-            self.situation, system=vehicle.system, component=vehicle.component, vehicle_type=vehicle.type
-        )
-        heartbeat = Frame(vehicle.system, vehicle.component, find.heartbeat)
-        self.situation = fold(known, heartbeat, find.heard_s)
-        self._heartbeat_s = find.heard_s
-        self._learn(now_s)
-
-    def _learn(self, now_s: float) -> None:
-        assert self._peer is not None
-        self._steps.clear()
-        if self.orders.passive:
-            return
-        self._steps.run([(Learning(self._peer, self.orders.patience_s), self._learnt)], now_s)
-
-    def _learnt(self, machine: Learning, now_s: float) -> None:
-        if machine.trouble is not None:
-            self._despair(machine.trouble, now_s)
-            if not self.orders.once:
-                self._learn(now_s)
-            return
-        self.situation = machine.merged(self.situation, now_s)
-        self._all_learnt(now_s)
-
-    def _all_learnt(self, now_s: float) -> None:
-        if self._changes is not None:
-            self._changes.settle(now_s)
-        self._move(Cue.LEARNT)
-        self._fence_known = self.situation.fence
-        self._voice.learnt(now_s, self.situation)
+    def _learnt(self, now_s: float) -> None:
         if not self._resume(now_s):
             self._want_first_target(now_s)
 
@@ -287,13 +136,6 @@ class Director(TableMachine[State, Cue]):
         self.drive.item = self._item_now
         self._voice.tell(now_s, EventName.DRIVING, "still driving our mission", len(plan.items))
         return True
-
-    def _learn_by_listening(self, before: Situation, now_s: float) -> None:
-        """Know enough once the place is known; the fence may come later."""
-        if self.state is State.LEARNING and self.situation.pose is not None:
-            self._all_learnt(now_s)
-        elif self.situation.mission is not before.mission:
-            self._take_mission_target(now_s)
 
     def _want_first_target(self, now_s: float) -> None:
         """Begin with the targets of the orders; a single job also with the newest of the stream or the mission's last place."""
@@ -423,7 +265,7 @@ class Director(TableMachine[State, Cue]):
             m.MissionType.MISSION,
             items,
             limits=Limits.from_parameters(self.situation.parameters),
-            is_active=is_active if now_s - self._heartbeat_s <= _FRESH_S else None,
+            is_active=is_active if now_s - self._heartbeat_s <= FRESH_S else None,
         )
         self._voice.tell(now_s, EventName.UPLOADING, f"uploading {len(items)} items", len(items))
         self._steps.run([(upload, self._uploaded)], now_s)
@@ -527,7 +369,7 @@ class Director(TableMachine[State, Cue]):
 
     def _is_taken_over(self, now_s: float) -> bool:
         """Tell whether somebody switched the vehicle's mode since a route was wanted."""
-        is_settled = now_s - self._modes_expected_s > _FRESH_S
+        is_settled = now_s - self._modes_expected_s > FRESH_S
         is_other = bool(self._modes_expected) and self.situation.mode not in self._modes_expected
         return self.orders.drive and is_settled and is_other
 
@@ -546,88 +388,65 @@ class Director(TableMachine[State, Cue]):
 
     # What the vehicle and others do
 
+    def _own_deadlines_s(self) -> list[float | None]:
+        times: list[float | None] = []
+        if self.state is State.HOLDING:
+            times.append(self._standstill_due_s)
+        if self.state is State.PLANNING:
+            times.append(-math.inf)
+        if self.drive is not None:
+            times.append(self.drive.progress_due_s)
+        return times
+
+    def _handle_own_timer(self, now_s: float) -> None:
+        if self.state is State.HOLDING:
+            self._await_standstill(now_s)
+        elif self.state is State.PLANNING and not self._steps:
+            self._plan_route(now_s)
+        elif self.drive is not None and now_s >= self.drive.progress_due_s:
+            self.drive.tell_progress(now_s)
+
+    def _take_any_frame(self, frame: Frame, before: Situation, now_s: float) -> None:
+        if self.identity is None:
+            return
+        target = self._targets.look(frame, before, self.situation, now_s, self.identity)
+        if target is not None:
+            self._take_target(target, now_s)
+
     def _take_vehicle_frame(self, frame: Frame, now_s: float) -> None:
         message = frame.message
-        assert self._changes is not None
-        if isinstance(message, m.Heartbeat):
-            self._take_heartbeat(now_s)
-        elif isinstance(message, m.MissionCurrent) and message.seq:
+        if isinstance(message, m.MissionCurrent) and message.seq:
             self._item_now = message.seq
         elif isinstance(message, m.GlobalPositionInt):
             self._speed_mps = math.hypot(message.vx, message.vy) / 100
-        if self._changes.is_reboot(frame) and self._move(Cue.REBOOTED):
-            self._voice.tell(
-                now_s, EventName.REBOOTED, "the vehicle was switched off and on; all is read anew"
-            )
-            self._ours = None
-            self.drive = None
-            self._learn(now_s)
-        self._changes.look(frame)
-        if self.state is State.UPLOADING:
-            self._changes.suspects.discard(ListKind.MISSION)
+        super()._take_vehicle_frame(frame, now_s)
+        if isinstance(message, m.Heartbeat) and self.state in _MAKING_A_ROUTE and self._is_taken_over(now_s):
+            self._let_go(now_s)
         if self.state is State.DRIVING:
             self._watch_drive(frame, now_s)
 
-    def _take_heartbeat(self, now_s: float) -> None:
-        self._heartbeat_s = now_s
-        if self.state in _MAKING_A_ROUTE and self._is_taken_over(now_s):
-            self._let_go(now_s)
-        if self.state is State.LOST and self._move(Cue.HEARD):
-            self._voice.tell(now_s, EventName.LINK_BACK, "the vehicle is heard again; all is read anew")
-            self._learn(now_s)
+    def _vehicle_gone(self, *, has_forgotten: bool) -> None:
+        self.drive = None
+        if has_forgotten:
+            self._ours = None
 
-    def _fall_silent(self, now_s: float) -> None:
-        if self._move(Cue.SILENCE):
-            self._steps.clear()
-            self.drive = None
-            self._voice.tell(now_s, EventName.LINK_LOST, f"no heartbeat for {_SILENCE_S:g} s", _SILENCE_S)
-            self._give_up(LinkError(f"the vehicle fell silent: no heartbeat for {_SILENCE_S:g} s"))
+    def _mission_heard(self, now_s: float) -> None:
+        self._take_mission_target(now_s)
 
-    @property
-    def _may_reread(self) -> bool:
-        is_settled = self.state in _AT_REST and not self._steps
-        return is_settled and not self.orders.once and not self.orders.passive
-
-    def _reread(self, now_s: float) -> None:
-        """Read again what somebody may have changed."""
-        assert self._changes is not None
-        assert self._peer is not None
-        suspects = self._changes.due(now_s, is_driving=self.state is State.DRIVING)
-        takers = {ListKind.FENCE: self._fence_reread, ListKind.MISSION: self._mission_reread}
-        steps: list[Step] = [
-            (Download(self._peer, MISSION_TYPES[kind]), taker)
-            for kind, taker in takers.items()
-            if kind in suspects
-        ]
-        self._steps.run(steps, now_s)
-
-    def _fence_reread(self, machine: Download, now_s: float) -> None:
-        items = list_of(machine, ListKind.FENCE)
-        if isinstance(items, BridgeError):
-            return  # the next poll asks again
-        self.situation = with_list(
-            self.situation, ListKind.FENCE, items, now_s, "fence read from the vehicle"
-        )
-        self._notice_fence(now_s)
-
-    def _notice_fence(self, now_s: float) -> None:
-        """Compare the fence with the one that was last acted upon."""
-        fence, known = self.situation.fence, self._fence_known
-        if fence is known or self.state is State.LEARNING:
+    def _mission_read(self, items: tuple[MissionItem, ...], now_s: float) -> None:
+        if self._ours is not None and items[1:] == self._ours[1:]:
             return
-        self._fence_known = fence
-        if fence is None or (known is not None and fence.value == known.value):
-            return
-        self._voice.tell(
-            now_s,
-            EventName.FENCE_CHANGED,
-            f"the fence changed: {len(fence.value.zones)} zones",
-            len(fence.value.zones),
-            fence.value.vertex_count,
-        )
-        self._recheck_route(now_s)
+        if self._ours is not None:
+            self._ours = None
+            count = len(items)
+            self._voice.tell(
+                now_s, EventName.MISSION_CHANGED, f"somebody changed the mission: {count} items", count
+            )
+            if self.state is State.DRIVING and self._move(Cue.TAKEN_OVER):
+                self.drive = None
+        self._take_mission_target(now_s)
 
-    def _recheck_route(self, now_s: float) -> None:
+    def _fence_changed(self, now_s: float) -> None:
         if self.plan is None or self.state in (State.READY, State.LET_GO, State.ARRIVED):
             if self.state is State.READY and self._target is not None:
                 self._cue_target(now_s)
@@ -639,25 +458,6 @@ class Director(TableMachine[State, Cue]):
         self._voice.rechecked(now_s, EventName.ROUTE_BROKEN, "the rest of the route", found)
         if self.state is not State.DRIVING or self.orders.drive:
             self._cue_target(now_s)
-
-    def _mission_reread(self, machine: Download, now_s: float) -> None:
-        items = list_of(machine, ListKind.MISSION)
-        if isinstance(items, BridgeError):
-            return  # the next poll asks again
-        self.situation = with_list(
-            self.situation, ListKind.MISSION, items, now_s, "mission read from the vehicle"
-        )
-        if self._ours is None or items[1:] == self._ours[1:]:
-            if self._ours is None:
-                self._take_mission_target(now_s)
-            return
-        self._ours = None
-        self._voice.tell(
-            now_s, EventName.MISSION_CHANGED, f"somebody changed the mission: {len(items)} items", len(items)
-        )
-        if self.state is State.DRIVING and self._move(Cue.TAKEN_OVER):
-            self.drive = None
-        self._take_mission_target(now_s)
 
     def _take_mission_target(self, now_s: float) -> None:
         mission = self.situation.mission
@@ -678,29 +478,10 @@ class Director(TableMachine[State, Cue]):
             self._answer(self._target, result)
             self._target = replace(self._target, command=None)
 
-    # Ends
-
-    def _end(self) -> None:
-        if self.orders.once:
-            self._move(Cue.END)
-
-    def _give_up(self, trouble: BridgeError | MissionError) -> None:
-        """End a single job with its trouble; the bridge goes on."""
-        self.trouble = trouble
-        if self.orders.once:
-            self._steps.clear()
-            self.state = State.FAILED
-
-    def _despair(self, trouble: BridgeError, now_s: float) -> None:
-        self._voice.error(now_s, EventName.TROUBLE, trouble, dict(trouble.details))
-        self._give_up(trouble)
+    # A step that failed
 
     def _fail_step(self, trouble: BridgeError, name: EventName | None, now_s: float) -> None:
         if name is not None:
             self._voice.error(now_s, name, trouble, dict(trouble.details))
         self._move(Cue.TROUBLE)
         self._give_up(trouble)
-
-    def _is_from_vehicle(self, frame: Frame) -> bool:
-        peer = self._peer
-        return peer is not None and (frame.system, frame.component) == (peer.system, peer.component)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from mavlink_bridge.cli.failing import ExitCode, report, report_defect, says_no_colour
+from mavlink_bridge.cli.failing import ExitCode, drop_stdout, report, report_defect, says_no_colour
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,8 +29,6 @@ COMMANDS = {
     "config": "Show where options may be kept, and which are set.",
 }
 """Every command and what help says of it in a line; the module of the same name holds it."""
-
-_USAGE = 2
 
 
 class Commands(TyperGroup):
@@ -86,22 +84,20 @@ def _exit_code(run: Any, words: list[str]) -> int:  # noqa: ANN401 - a function 
     wants_json = "--json" in words
     command = next((word for word in words if word in COMMANDS), "")
     try:
-        return int(run() or 0)
+        code = int(run() or 0)
+        sys.stdout.flush()
     except typer.Abort:
         report(command, "Interrupted", "aborted", ExitCode.INTERRUPTED, wants_json=wants_json)
         return ExitCode.INTERRUPTED
-    except BrokenPipeError:  # `pbpp log … | head`
-        import os  # noqa: PLC0415 - only then
-
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 128 + 13
+    except BrokenPipeError:
+        return drop_stdout()
     except Exception as error:  # noqa: BLE001 - the last place where one can be told
-        if getattr(error, "exit_code", None) == _USAGE and hasattr(error, "format_message"):
+        if getattr(error, "exit_code", None) == ExitCode.USAGE and hasattr(error, "format_message"):
             _report_usage(error, command, wants_json=wants_json)
             return ExitCode.USAGE
-        return report_defect(
-            command, error, wants_json=wants_json, verbose="-v" in words or "--verbose" in words
-        )
+        verbose = "-v" in words or "--verbose" in words
+        return report_defect(command, error, wants_json=wants_json, verbose=verbose)
+    return code
 
 
 def _report_usage(error: Any, command: str, *, wants_json: bool) -> None:  # noqa: ANN401 - a click usage error, typer's own copy or click's

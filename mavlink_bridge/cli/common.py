@@ -16,6 +16,7 @@ from mavlink_bridge import errors as bridge_errors
 from mavlink_bridge.cli.failing import (
     ExitCode,
     begin_telling,
+    drop_stdout,
     exit_code_of,
     print_json,
     report,
@@ -121,8 +122,10 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
             message = str(interrupt) or "interrupted; the vehicle was left as it was"
             report(name, "Interrupted", message, ExitCode.INTERRUPTED, wants_json=wants_json)
             raise typer.Exit(ExitCode.INTERRUPTED) from None
-        except (typer.Exit, typer.Abort, typer.BadParameter, BrokenPipeError):
+        except (typer.Exit, typer.Abort, typer.BadParameter):
             raise
+        except BrokenPipeError:
+            raise typer.Exit(drop_stdout()) from None
         except Exception as error:
             if isinstance(error, OSError) and error.filename is not None:
                 message = f"{error.filename}: {error.strerror or error}"

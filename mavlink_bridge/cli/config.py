@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mavlink_bridge.cli.common import ConfigOption, JsonOption, QuietOption, print_json
-from mavlink_bridge.cli.options_file import DARING, FOR_ALL, options_for, read_tables, user_file
+from mavlink_bridge.cli.options_file import DARING, FOR_ALL, is_there, options_for, read_tables, user_file
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -57,7 +57,7 @@ def config(
     from mavlink_bridge.backup import BackupStore  # noqa: PLC0415 - quick help
 
     own = user_file()
-    settings = settings_of(own, is_asked_for=False) if own.is_file() else []
+    settings = settings_of(own, is_asked_for=False) if is_there(own) else []
     if config is not None:
         given = settings_of(config, is_asked_for=True)
         covered = {(setting.command, setting.option) for setting in given}
@@ -70,7 +70,7 @@ def config(
                 "status": "ok",
                 "command": "config",
                 "file": str(own),
-                "exists": own.is_file(),
+                "exists": is_there(own),
                 "backups": str(backups),
                 "settings": [asdict(setting) for setting in settings],
                 "environment": variables,
@@ -80,7 +80,7 @@ def config(
     if quiet:
         return
     typer.echo(
-        f"Your options: {own}{'' if own.is_file() else ' (not there; `pbpp config --template` shows one)'}"
+        f"Your options: {own}{'' if is_there(own) else ' (not there; `pbpp config --template` shows one)'}"
     )
     typer.echo(f"Backups of what was on vehicles: {backups}")
     for setting in settings:

@@ -139,10 +139,10 @@ def _permission_advice(device: Path) -> str:
 
 def _options() -> Iterator[_Finding]:
     from mavlink_bridge.cli.config import settings_of  # noqa: PLC0415 - quick help
-    from mavlink_bridge.cli.options_file import user_file  # noqa: PLC0415
+    from mavlink_bridge.cli.options_file import is_there, user_file  # noqa: PLC0415
 
     path = user_file()
-    if not path.is_file():
+    if not is_there(path):
         yield _Finding(_Verdict.OK, "options file", f"none ({path})")
         return
     try:

@@ -99,6 +99,12 @@ def says_no_colour() -> bool:
     return bool(os.environ.get("NO_COLOR")) or os.environ.get("TERM") == "dumb"
 
 
+def drop_stdout() -> int:
+    """Let go of a standard output that nobody reads any more (``pbpp log … | head``); give the exit code, as a shell tells of SIGPIPE."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return 128 + 13
+
+
 def print_json(document: Mapping[str, object]) -> None:
     """Put a JSON document on stdout; numbers that JSON has not become null."""
     sys.stdout.write(json.dumps(_plain(document), allow_nan=False) + "\n")
@@ -173,8 +179,8 @@ def report(
             }
         )
     say(f"error: {message}", typer.colors.RED)
-    if telling().verbose and rest:
-        shown = ", ".join(f"{key} = {value}" for key, value in rest.items() if key != "traceback")
+    shown = ", ".join(f"{key} = {value}" for key, value in rest.items() if key != "traceback")
+    if telling().verbose and shown:
         say(f"details: {shown}", typer.colors.BRIGHT_BLACK)
     if advice:
         say(f"advice: {advice}", typer.colors.CYAN)

@@ -25,6 +25,14 @@ def user_file() -> Path:
     return platformdirs.user_config_path("pbpp-rover", appauthor=False) / FILE_NAME
 
 
+def is_there(path: Path) -> bool:
+    """Tell whether there is such a file; one in a folder that may not be looked into is none of ours."""
+    try:
+        return path.is_file()
+    except OSError:
+        return False
+
+
 def read_tables(path: Path) -> dict[str, dict[str, Any]]:
     """Read a file of options: for each table the options by parameter name.
 
@@ -89,7 +97,7 @@ def take_options(context: typer.Context, path: Path | None) -> Path | None:
     known = {parameter.name for parameter in context.command.params if parameter.name} - {"config"}
     options: dict[str, Any] = {}
     own = user_file()
-    if own.is_file():
+    if is_there(own):
         options |= options_for(own, command, known, is_asked_for=False)
     if path is not None:
         options |= options_for(path, command, known, is_asked_for=True)

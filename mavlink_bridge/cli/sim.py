@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from mavlink_bridge.cli.common import JsonOption, QuietOption, print_json
 
 if TYPE_CHECKING:
     from mavlink_bridge.simulator.config import SimulatorConfig
@@ -40,12 +43,20 @@ def sim(
     jitter: Annotated[float, typer.Option(min=0, help="Up to so many seconds more, at random.")] = 0.0,
     seed: Annotated[int, typer.Option(help="Seed of the link's faults.")] = 0,
     system: Annotated[int, typer.Option(min=1, max=255, help="MAVLink system id.")] = 1,
+    json_output: JsonOption = False,
+    quiet: QuietOption = False,
 ) -> None:
     """Run a simulated rover until Ctrl-C.
 
     It answers MAVLink 2 as ArduPilot Rover does: missions, fences, rally points, parameters, modes, arming; it drives AUTO and GUIDED.
     Prints the connection string to open as soon as it listens.
+
+    Examples:
+    `pbpp sim --fence field.plan --home 40.0713,-105.2299`
+
+    `pbpp sim --listen udpout:127.0.0.1:14550 --loss 0.1 --latency 0.2`
     """
+    del quiet  # one line is all there is to tell
     import signal  # noqa: PLC0415 - with the other imports below: a usage error need not wait for them
     import threading  # noqa: PLC0415
 
@@ -63,7 +74,11 @@ def sim(
     with simulator:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda *_: stop.set())
-        typer.echo(simulator.connection)
+        if json_output:
+            print_json({"status": "ok", "command": "sim", "connection": simulator.connection})
+        else:
+            typer.echo(simulator.connection)
+        sys.stdout.flush()
         while not stop.wait(0.5) and simulator.is_running:
             pass
 

@@ -200,3 +200,37 @@ def test_a_drive_that_began_moving_is_noted(tmp_path):
     assert "from rest" in grade.notes[0]
     assert math.isclose(grade.driven_m, 19.5, abs_tol=0.2)
     assert grade.took_s is None
+
+
+def test_a_drive_begins_before_the_heartbeat_that_tells_of_it(tmp_path):
+    log = begun()
+    log.heartbeat(0, armed=True)
+    log.row(ROVER, m.MissionCurrent(1))
+    log.position(0.0, 0.0)
+    log.now_s += 0.24
+    for step in range(60):
+        if step == 3:
+            log.heartbeat(10, armed=True)
+        log.position(0.0, 0.5 * (step + 1), 2.0)
+        log.now_s += 0.24
+    log.row(ROVER, m.MissionItemReached(1))
+    (grade,) = read(log, tmp_path).grades
+    assert grade.notes == ()
+    assert grade.took_s == pytest.approx(15.0, abs=0.3)
+    assert grade.driven_m == pytest.approx(30.0, abs=0.05)
+    assert grade.least_clearance_m == pytest.approx(10.0, abs=0.05)
+
+
+def test_a_mission_without_places_is_no_drive(tmp_path):
+    log = begun()
+    log.upload(m.MissionType.MISSION, with_home([item(Command.NAV_DELAY)], ORIGIN))
+    log.drive(LINES)
+    assert read(log, tmp_path).grades == ()
+
+
+def test_hardly_moving_is_no_drive(tmp_path):
+    log = begun()
+    log.heartbeat(10, armed=True)
+    for _ in range(5):
+        log.position(0.0, 0.1)
+    assert read(log, tmp_path).grades == ()

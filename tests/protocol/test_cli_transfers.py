@@ -229,13 +229,16 @@ def test_a_backup_is_restored_by_its_file(rover, tmp_path):
 def test_kill_9_at_every_item(killed_at, rover, tmp_path):
     vehicle = rover.vehicle
     receive = vehicle.receive
-    vehicle.receive = lambda frame, now_s: (
-        None
-        if frame.system == 245
-        and getattr(frame.message, "x", None) is not None
-        and frame.message.seq > killed_at
-        else receive(frame, now_s)
-    )
+    passed = []
+
+    def receive_up_to_it(frame, now_s):
+        if frame.system == 245 and passed:
+            return  # deaf from then on, so that the upload cannot come to its outcome before the kill
+        if getattr(frame.message, "x", None) is not None and frame.message.seq == killed_at:
+            passed.append(frame)
+        receive(frame, now_s)
+
+    vehicle.receive = receive_up_to_it
     command = ["upload", mission_file(tmp_path), "--connect", rover.connection, "--system", "1", "-q"]
     process = subprocess.Popen(
         [sys.executable, "-m", "mavlink_bridge.cli", *map(str, command)], env=dict(os.environ)

@@ -6,7 +6,6 @@ What is given on the command line counts most, then ``--config``, then the user'
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +40,8 @@ def read_tables(path: Path) -> dict[str, dict[str, Any]]:
     typer.BadParameter
         It cannot be read, is not TOML, or holds something else than tables.
     """
+    import tomllib  # noqa: PLC0415 - quick start where there is no such file
+
     try:
         document = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:

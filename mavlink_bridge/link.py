@@ -15,7 +15,7 @@ from mavlink_bridge.errors import IdentityTakenError, LinkError
 from mavlink_bridge.messages import Autopilot, Heartbeat, MavType
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from types import TracebackType
 
     from mavlink_bridge.messages import Frame, Message
@@ -91,6 +91,9 @@ class Transport(Protocol):
 
     echoes: bool
     """Whether what is sent may come back (half-duplex radios)."""
+
+    is_stream: bool
+    """Whether several frames may be sent as one piece (datagrams hold one each)."""
 
     def send(self, data: bytes) -> None:
         """Send, or do nothing while nobody is there to send to."""
@@ -174,6 +177,20 @@ class Link:
         if self._recorder:
             self._recorder.write(now_s(), data, _LINK_SENT)
 
+    def send_all(self, messages: Sequence[Message]) -> None:
+        """Send messages in order; on a stream as one piece, which is far quicker for long lists."""
+        if not self._transport.is_stream:
+            for message in messages:
+                self.send(message)
+            return
+        packets = [self._codec.encode(message) for message in messages]
+        if packets:
+            self._transport.send(b"".join(packets))
+            self._has_spoken = True
+        if self._recorder:
+            for packet in packets:
+                self._recorder.write(now_s(), packet, _LINK_SENT)
+
     def receive(self, timeout_s: float) -> list[Frame]:
         """Give the frames that come within a time, as soon as there are any; our heartbeat goes out when it is due."""
         return self.receive_at(timeout_s)[1]
@@ -236,8 +253,7 @@ class Link:
         while True:
             if on_step:
                 on_step()
-            for message in machine.messages_to_send():
-                self.send(message)
+            self.send_all(machine.messages_to_send())
             if machine.is_done or until():
                 return
             if timeout_s is not None and now_s() - begun_s > timeout_s:
@@ -290,6 +306,7 @@ class _Udp:
     """UDP: ``udpout`` speaks first to one address, ``udpin`` answers everybody it has heard."""
 
     echoes = False
+    is_stream = False
 
     def __init__(self, address: Address, _timeout_s: float) -> None:
         family, _, _, _, target = socket.getaddrinfo(address.host, address.port, type=socket.SOCK_DGRAM)[0]
@@ -331,6 +348,7 @@ class _Tcp:
     """TCP: ``tcp`` connects, ``tcpin`` waits for one to connect."""
 
     echoes = False
+    is_stream = True
 
     def __init__(self, address: Address, timeout_s: float) -> None:
         if address.kind == "tcp":
@@ -367,6 +385,7 @@ class _Serial:
     """A serial port, by pyserial."""
 
     echoes = True
+    is_stream = True
 
     def __init__(self, address: Address, _timeout_s: float) -> None:
         import serial  # noqa: PLC0415 - only where there is a serial port

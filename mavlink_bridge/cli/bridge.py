@@ -23,6 +23,7 @@ from mavlink_bridge.cli.common import (
     TimeoutOption,
     exit_code_of,
     print_json,
+    warn,
 )
 from mavlink_bridge.cli.plan import request_from_options
 from mavlink_bridge.cli.upload import RequiredConnectOption, SigningKeyOption
@@ -100,6 +101,7 @@ def bridge(
     """
     del config  # its callback has taken it
     signal.signal(signal.SIGTERM, _end)
+    from mavlink_bridge.cli.session import signing_of  # noqa: PLC0415
     from mavlink_bridge.director import Orders  # noqa: PLC0415 - quick help
     from mavlink_bridge.director.orders import DEFAULT_SOURCES, TargetSource  # noqa: PLC0415
     from missions.formats import read_parameters  # noqa: PLC0415
@@ -126,7 +128,7 @@ def bridge(
     with contextlib.ExitStack() as stack:
         recorder, journal = _recorders(stack, log, orders, parameters)
         shell = _Shell(orders, parameters, _teller(wants_json=json_output, quiet=quiet), recorder, journal)
-        shell.run(connect, _signing(signing_key), timeout)
+        shell.run(connect, signing_of(signing_key), timeout)
     trouble = shell.director.trouble
     if trouble is not None and shell.director.is_done:
         if json_output:
@@ -166,7 +168,7 @@ class _Shell:
         recorder: TlogWriter | None,
         journal: JournalWriter | None,
     ) -> None:
-        from mavlink_bridge.backup import BackupStore  # noqa: PLC0415 - quick help
+        from mavlink_bridge.cli.live import BackupKeeper  # noqa: PLC0415 - quick help
         from mavlink_bridge.director import Director  # noqa: PLC0415
         from missions.situation import Situation  # noqa: PLC0415
 
@@ -175,7 +177,7 @@ class _Shell:
         self._tell = tell
         self._recorder = recorder
         self._journal = journal
-        self._store = BackupStore()
+        self._backups = BackupKeeper(self.director)
         self._typed = _typed_lines()
 
     def run(self, connection: str, signing: Signing | None, timeout_s: float) -> None:
@@ -211,8 +213,7 @@ class _Shell:
             self._keep_backup(now_s())
             if self.director.identity is not None and link.identity != self.director.identity:
                 link.speak_as(self.director.identity)
-            for message in self.director.messages_to_send():
-                link.send(message)
+            link.send_all(self.director.messages_to_send())
             self._tell_all()
             deadline_s = self.director.deadline_s
             wait_s = (
@@ -225,8 +226,7 @@ class _Shell:
                 self.director.receive(frame, came_s)
                 self._written.frames += 1
             self._run_timer(now_s())
-        for message in self.director.messages_to_send():
-            link.send(message)
+        link.send_all(self.director.messages_to_send())
         self._keep_backup(now_s())
         self._tell_all()
 
@@ -248,11 +248,9 @@ class _Shell:
             time.sleep(min(_LONGEST_WAIT_S, max(0.0, until_s - now_s())))
 
     def _keep_backup(self, now: float) -> None:
-        from mavlink_bridge.cli.live import keep_backup  # noqa: PLC0415 - quick help
-
         if self.director.pending_backup is not None:
             self._written.call("backup_stored", now)
-        keep_backup(self.director, self._store, now)
+        warn(self._backups.step(now))
 
     def _listen_to_keyboard(self, now: float) -> None:
         from missions.errors import InvalidPositionError  # noqa: PLC0415 - quick help
@@ -343,11 +341,3 @@ def _recorders(
     recorder = stack.enter_context(TlogWriter(log))
     file = stack.enter_context(journal_path(log).open("w", encoding="utf-8"))
     return recorder, JournalWriter(file, orders, parameters)
-
-
-def _signing(key_file: Path | None) -> Signing | None:
-    if key_file is None:
-        return None
-    from mavlink_bridge.signing import Signing, SigningKey  # noqa: PLC0415 - only where a key is given
-
-    return Signing(SigningKey.read(key_file), time.time)

@@ -6,10 +6,12 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.backup import BackupStore
-from mavlink_bridge.cli.common import progress_bar
+from mavlink_bridge.cli.common import progress_bar, warn
 from mavlink_bridge.cli.plan import timed_plan
+from mavlink_bridge.cli.session import signing_of
+from mavlink_bridge.cli.upload import interrupted_warnings, with_backup
 from mavlink_bridge.director import Director, Orders, State
-from mavlink_bridge.errors import LinkError
+from mavlink_bridge.errors import BridgeError, LinkError
 from mavlink_bridge.link import ONE_SHOT_IDENTITY, now_s, open_link
 from mavlink_bridge.messages import MissionType
 from mavlink_bridge.protocol.verified_upload import Held
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
 
     from mavlink_bridge.link import Link
     from mavlink_bridge.messages import Frame
+    from missions.errors import MissionError
     from missions.plan import Plan
     from missions.request import Request
 
@@ -54,7 +57,9 @@ class LiveResult:
     verified: bool
 
 
-def plan_live(connection: str, orders: Orders, *, vehicle_file: Path | None, quiet: bool) -> LiveResult:
+def plan_live(
+    connection: str, orders: Orders, *, vehicle_file: Path | None, key_file: Path | None, quiet: bool
+) -> LiveResult:
     """Open a link and take one mission as far as the orders go.
 
     Raises
@@ -63,7 +68,8 @@ def plan_live(connection: str, orders: Orders, *, vehicle_file: Path | None, qui
         What went wrong, on the link or in planning.
     """
     parameters = read_parameters(vehicle_file) if vehicle_file else {}
-    with open_link(connection, orders.identity or ONE_SHOT_IDENTITY) as link:
+    identity = orders.identity or ONE_SHOT_IDENTITY
+    with open_link(connection, identity, signing=signing_of(key_file)) as link:
         return conduct(link, orders, Situation(parameters=parameters), quiet=quiet)
 
 
@@ -90,16 +96,16 @@ def conduct(
         return planned
 
     director = Director(replace(orders, once=True), situation, timed)
-    store = BackupStore()
+    backups = BackupKeeper(director)
     with progress_bar(quiet=quiet) as show:
 
         def step() -> None:
             show(_STATE_TEXTS[director.state], *director.progress)
-            keep_backup(director, store, now_s())
+            warn(backups.step(now_s()))
 
         link.run(director, on_frames=on_frames, on_step=step)
     if director.trouble is not None or director.plan is None:
-        raise director.trouble or LinkError("the director ended without a plan")
+        raise backups.explained(director.trouble or LinkError("the director ended without a plan"))
     outcome = director.upload_outcome
     return LiveResult(
         director.plan,
@@ -109,13 +115,48 @@ def conduct(
     )
 
 
-def keep_backup(director: Director, store: BackupStore, now_s: float) -> None:
-    """Store the vehicle's old mission when the director wants it stored; take the note away when the outcome is known."""
-    peer = director.peer
-    if peer is None:
-        return
-    if (old := director.pending_backup) is not None:
-        store.begin(peer.system, MissionType.MISSION, old)
-        director.backup_stored(now_s)
-    elif director.upload_outcome is not None and director.upload_outcome.held in (Held.WANTED, Held.OLD):
-        store.end(peer.system, MissionType.MISSION)
+class BackupKeeper:
+    """Keeps a director's backups: stores the old mission before anything is written, and the note of an upload under way.
+
+    Parameters
+    ----------
+    director : Director
+        Whose missions.
+    store : BackupStore, optional
+        Where; the user's state folder if not given.
+    """
+
+    def __init__(self, director: Director, store: BackupStore | None = None) -> None:
+        self._director = director
+        self._store = store or BackupStore()
+        self._path: Path | None = None
+        self._was_interrupted: bool | None = None
+        self._settled: object = None
+
+    def step(self, now_s: float) -> list[str]:
+        """Do what the director waits for; give warnings of earlier uploads that were interrupted, once."""
+        director, peer = self._director, self._director.peer
+        if peer is None:
+            return []
+        warnings = []
+        if self._was_interrupted is None:
+            warnings = interrupted_warnings(self._store, peer.system)
+            self._was_interrupted = self._store.interrupted(peer.system, MissionType.MISSION) is not None
+        if (old := director.pending_backup) is not None:
+            self._path = self._store.begin(peer.system, MissionType.MISSION, old)
+            director.backup_stored(now_s)
+        outcome = director.upload_outcome
+        if outcome is not None and outcome is not self._settled:
+            self._settled = outcome
+            is_settled = outcome.held in (Held.OLD, Held.FOREIGN) and not self._was_interrupted
+            if outcome.held is Held.WANTED or is_settled:
+                self._store.end(peer.system, MissionType.MISSION)
+                self._was_interrupted = False
+        return warnings
+
+    def explained(self, trouble: BridgeError | MissionError) -> BridgeError | MissionError:
+        """Give the director's trouble, after an upload with where the old mission lies."""
+        outcome = self._director.upload_outcome
+        if outcome is None or outcome.is_verified or not isinstance(trouble, BridgeError):
+            return trouble
+        return with_backup(trouble, "mission", self._path, is_old_there=outcome.held is Held.OLD)

@@ -23,6 +23,7 @@ from mavlink_bridge.cli.common import (
     print_json,
     warn,
 )
+from mavlink_bridge.cli.upload import SigningKeyOption
 from mavlink_bridge.errors import UsageError
 
 if TYPE_CHECKING:
@@ -102,6 +103,7 @@ def plan(
     any_vehicle: AnyVehicleOption = False,
     source_system: SourceSystemOption = 245,
     source_component: SourceComponentOption = 190,
+    signing_key: SigningKeyOption = None,
     timeout: TimeoutOption = 30.0,
     json_output: JsonOption = False,
     quiet: QuietOption = False,
@@ -134,7 +136,9 @@ def plan(
             drive=drive,
             patience_s=timeout,
         )
-        result = plan_live(connect, orders, vehicle_file=vehicle, quiet=quiet or json_output)
+        result = plan_live(
+            connect, orders, vehicle_file=vehicle, key_file=signing_key, quiet=quiet or json_output
+        )
         planned, planning_s, situation = result.plan, result.planning_s, result.situation
         uploaded = verified = result.verified
     else:

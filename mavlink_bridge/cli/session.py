@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.link import Link
     from mavlink_bridge.messages import Frame
     from mavlink_bridge.protocol.machine import Machine
+    from mavlink_bridge.signing import Signing
 
 _MODE_PATIENCE_S = 5.0
 _FRESH_S = 3.0
@@ -168,6 +169,21 @@ class Session:
         )
 
 
+def signing_of(key_file: Path | None) -> Signing | None:
+    """Give the signing that a key file asks for.
+
+    Raises
+    ------
+    UsageError
+        The key cannot be used.
+    """
+    if key_file is None:
+        return None
+    from mavlink_bridge.signing import Signing, SigningKey  # noqa: PLC0415 - only where a key is given
+
+    return Signing(SigningKey.read(key_file), time.time)
+
+
 @contextmanager
 def open_session(address: Address, show: Callable[[str, int, int], None]) -> Iterator[Session]:
     """Open the link, find the vehicle, and close the link at the end.
@@ -179,13 +195,11 @@ def open_session(address: Address, show: Callable[[str, int, int], None]) -> Ite
     UsageError
         The signing key cannot be used.
     """
-    signing = None
-    if address.key_file is not None:
-        from mavlink_bridge.signing import Signing, SigningKey  # noqa: PLC0415 - only where a key is given
-
-        signing = Signing(SigningKey.read(address.key_file), time.time)
     with open_link(
-        address.connection, address.identity, signing=signing, timeout_s=address.timeout_s
+        address.connection,
+        address.identity,
+        signing=signing_of(address.key_file),
+        timeout_s=address.timeout_s,
     ) as link:
         yield Session(link, address, show)
 

@@ -301,10 +301,11 @@ def _upload_list(
         return _Done(mission_type, outcome, backup, time.monotonic() - begun_s)
     if outcome.held in (Held.OLD, Held.FOREIGN) and not was_interrupted:
         store.end(system, mission_type)
-    raise _with_backup(trouble, name, backup, is_old_there=outcome.held is Held.OLD)
+    raise with_backup(trouble, name, backup, is_old_there=outcome.held is Held.OLD)
 
 
-def _with_backup(trouble: BridgeError, name: str, backup: Path | None, *, is_old_there: bool) -> BridgeError:
+def with_backup(trouble: BridgeError, name: str, backup: Path | None, *, is_old_there: bool) -> BridgeError:
+    """Give an upload's error with where the old list lies."""
     message = f"{name}: {trouble}"
     if backup is not None and not is_old_there:
         message += f"; the old list is kept in {backup}, `pbpp upload --restore {backup}` puts it back"

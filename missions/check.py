@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from missions.vehicle import Vehicle
 
 _FAR_M = 50_000.0
+_STEP_M = 0.5
 
 TOLERANCE_M = 0.01
 """A leg that falls short by no more than this keeps its promise: positions are rounded to degE7."""
@@ -292,8 +293,7 @@ def _checked_legs(
             leg_driven_m = min(leg_driven_m, max(0.0, drawn.clearance_m - forecast_band_m(forecast)))
         asked_m = promised_m
         if leg.first_item == 0 and number == 0:
-            start_m = ground.clearance_m(Point(ground.frame.to_local(leg.start)))
-            asked_m = min(promised_m, max(0.0, start_m - forecast_band_m(forecast)))
+            asked_m = _asked_of_first_leg_m(ground, leg, forecast_band_m(forecast), promised_m)
         checked.append(
             CheckedLeg(
                 leg=leg,
@@ -309,6 +309,19 @@ def _checked_legs(
         )
         circle_before_m = leg.circle_m
     return tuple(checked)
+
+
+def _asked_of_first_leg_m(ground: Ground, leg: CourseLeg, band_m: float, promised_m: float) -> float:
+    """Give what the leg from the start has to keep: less than the others where the start is near a fence and the leg leads away from it."""
+    line = drawn_leg(ground, leg.start, leg.end)
+    if not isinstance(line, LineString) or not ground.allowed.covers(line):
+        return promised_m
+    at_m = np.arange(0.0, line.length + _STEP_M, _STEP_M)
+    clearances_m = shapely.distance(shapely.line_interpolate_point(line, at_m), ground.edge)
+    far = np.flatnonzero(clearances_m >= promised_m + band_m)
+    if len(far) and clearances_m[far[0] :].min() < promised_m + band_m - TOLERANCE_M:
+        return promised_m  # it has led away, and comes near a fence again
+    return min(promised_m, max(0.0, float(clearances_m[0]) - band_m))
 
 
 def forecast_band_m(forecast: Envelope) -> float:

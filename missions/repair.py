@@ -7,24 +7,28 @@ from typing import TYPE_CHECKING
 
 from missions.check import MissionCheck, check_mission, plan_of
 from missions.errors import NoRouteError, RouteError, SituationError
-from missions.geo import bearing_deg, distance_m
+from missions.geo import bearing_deg, distance_m, to_e7
 from missions.item_list import ItemList
-from missions.items import change_speed, waypoint
+from missions.items import change_speed
 from missions.lines import ROUNDING_RESERVE_M
 from missions.plan import Plan, plan
 from missions.situation import Known, Mission, Pose
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from missions.check import CheckedLeg
     from missions.course import CourseLeg
+    from missions.geo import LatLon
     from missions.item_list import LegKey
     from missions.items import MissionItem
     from missions.request import Request
     from missions.situation import Situation
 
-_ROUNDS = 6
+_ROUNDS = 8
+_EXTRA_M, _MOST_EXTRA_M = 0.1, 0.5
+"""More room for routes where the corners between them and their neighbours need it."""
+
 MOST_TRACKED_JUMPS = 15
 """ArduPilot counts so many DO_JUMPs on small boards (AP_MISSION_MAX_NUM_DO_JUMP_COMMANDS); further ones are never taken."""
 
@@ -106,25 +110,27 @@ def repair_mission(
     asked = check_mission(mission, situation, request.clearance_m, start=request.start)
     if asked.troubles:
         raise SituationError(f"the mission cannot be repaired: {'; '.join(asked.troubles)}")
-    checked, keys = asked, {_key(leg.leg) for leg in asked.broken}
-    repaired = ItemList(mission)
+    repaired, checked = ItemList(mission), asked
+    keys = {_key(leg.leg) for leg in asked.broken}
+    clearance_m = asked.clearance_m
     for _ in range(_ROUNDS):
         if checked.holds:
             _check_jumps(repaired)
             return Repair(checked.mission, checked, _changes(repaired))
-        repaired = ItemList(mission)
-        for run in _runs(asked, keys):
-            for leg, detour in zip(run, _detours(run, asked, situation, request, should_stop), strict=True):
-                repaired.replace_leg(_key(leg), detour.before, detour.goal, detour.after)
+        try:
+            routed = _routed(asked, keys, situation, replace(request, clearance_m=clearance_m), should_stop)
+        except RouteError:
+            if clearance_m > asked.clearance_m:
+                break  # there is no more room: what was found before is to be told
+            raise
+        repaired = routed
         checked = check_mission(repaired.mission(), situation, request.clearance_m, start=request.start)
         found = {repaired.origin(leg.leg) for leg in checked.broken}
         more = found if not found <= keys else _beside(asked, found)
-        if more <= keys and not checked.holds:
-            break
+        if more <= keys and checked.broken:
+            missing_m = max(leg.asked_m - leg.driven_clearance_m for leg in checked.broken)
+            clearance_m += min(missing_m, _MOST_EXTRA_M) + _EXTRA_M
         keys |= more
-    if checked.holds:
-        _check_jumps(repaired)
-        return Repair(checked.mission, checked, _changes(repaired))
     worst = min(checked.broken, key=lambda leg: leg.driven_clearance_m - leg.asked_m)
     raise NoRouteError(
         f"the mission cannot be repaired: about {_names(repaired.origin(worst.leg))} the vehicle would still come "
@@ -134,6 +140,37 @@ def repair_mission(
     )
 
 
+def _routed(
+    asked: MissionCheck,
+    keys: set[LegKey],
+    situation: Situation,
+    request: Request,
+    should_stop: Callable[[], bool] | None,
+) -> ItemList:
+    """Give the mission with routes in the place of some legs."""
+    repaired = ItemList(asked.mission)
+    moved: dict[int, LatLon] = {}
+
+    def put(run: Sequence[CourseLeg]) -> None:
+        there = [_where_moved(leg, moved) for leg in run]
+        for leg, detour in zip(run, _detours(there, asked, situation, request, should_stop), strict=True):
+            repaired.replace_leg(_key(leg), detour.before, detour.goal, detour.after)
+            if detour.goal.is_placed:
+                moved[leg.last_item] = detour.goal.position
+
+    for run in _runs(asked, keys):
+        try:
+            put(run)
+        except RouteError:
+            if len(run) == 1:
+                raise
+            for (
+                leg
+            ) in run:  # one by one; whether the corners between them keep the promise is checked afterwards
+                put([leg])
+    return repaired
+
+
 def _key(leg: CourseLeg) -> LegKey:
     return leg.first_item, leg.last_item, leg.jump_item
 
@@ -141,6 +178,11 @@ def _key(leg: CourseLeg) -> LegKey:
 def _names(key: LegKey) -> str:
     first, last, jump = key
     return f"leg {first or 'start'} → {last}{f' (jump {jump})' if jump else ''}"
+
+
+def _where_moved(leg: CourseLeg, moved: Mapping[int, LatLon]) -> CourseLeg:
+    """Give a leg between the places where its ends are now."""
+    return replace(leg, start=moved.get(leg.first_item, leg.start), end=moved.get(leg.last_item, leg.end))
 
 
 def _first_driven(checked: MissionCheck) -> list[tuple[int, CheckedLeg]]:
@@ -221,25 +263,27 @@ def _split(planned: Plan, run: Sequence[CourseLeg], mission: Mission) -> list[_D
     detours = []
     begin = int(run[0].speed_mps is not None)  # the mission sets its speed itself
     point = 0
-    for number, (leg, target) in enumerate(zip(run, planned.targets, strict=True)):
-        point = next(index for index in range(point + 1, len(planned.path)) if planned.path[index] == target)
+    for leg, target in zip(run, planned.targets, strict=True):
+        goal = mission.items[leg.last_item - 1]
+        if not leg.is_return and distance_m(goal.position, target) > ROUNDING_RESERVE_M:
+            lat_e7, lon_e7 = to_e7(target)
+            goal = replace(goal, lat_e7=lat_e7, lon_e7=lon_e7)
+        before_point = point
+        point = next(index for index in range(point, len(planned.path)) if planned.path[index] == target)
+        if point == before_point:  # it leads to where it begins
+            detours.append(_Detour((), goal, ()))
+            continue
         end = planned.seqs[point]
-        new = planned.items[end - 1]
-        old = mission.items[leg.last_item - 1]
-        before = planned.items[begin : end - 1]
-        goal = old
+        before, there = planned.items[begin : end - 1], planned.items[end - 1]
         if leg.is_return:
-            before = (*before, waypoint(target))
-        elif distance_m(old.position, target) > ROUNDING_RESERVE_M:
-            goal = replace(old, lat_e7=new.lat_e7, lon_e7=new.lon_e7)
-        if new.params[0] > 0 and not goal.params[0] > 0 and not leg.is_return:
-            goal = replace(goal, params=(new.params[0], *goal.params[1:]))
-        after: tuple[MissionItem, ...] = ()
-        last_speed = planned.speeds[point - 1]
-        if number == len(run) - 1 and last_speed is not None and last_speed != planned.vehicle.speed_mps:
-            after = (change_speed(planned.vehicle.speed_mps),)
-        detours.append(_Detour(before, goal, after))
+            before = (*before, there)
+        elif there.params[0] > 0 and not goal.params[0] > 0:
+            goal = replace(goal, params=(there.params[0], *goal.params[1:]))
+        detours.append(_Detour(before, goal, ()))
         begin = end
+    last_mps = planned.speeds[point - 1] if point else None
+    if last_mps is not None and last_mps != planned.vehicle.speed_mps:
+        detours[-1] = replace(detours[-1], after=(change_speed(planned.vehicle.speed_mps),))
     return detours
 
 

@@ -177,6 +177,16 @@ def test_a_start_near_a_fence_has_to_keep_what_it_has():
     assert [leg.name for leg in nearer.broken] == ["start → 1"]
 
 
+def test_a_first_leg_that_comes_near_a_fence_again_breaks():
+    # From near the barn away and, still on the first leg, as near past another fence.
+    situation = situation_of(FIELD, BARN, box(OUT, 0, 32, 10, 50))
+    again = check_mission(mission_of((-20.0, 30.8)), situation, 2.0, start=place(38.8, 30.8))
+    assert again.broken
+    assert again.legs[0].asked_m == 2.0
+    away = check_mission(mission_of((20.0, 30.8)), situation, 2.0, start=place(38.8, 30.8))
+    assert away.holds
+
+
 def test_a_start_that_is_not_known_is_said():
     found = check_mission(mission_of((0.0, 0.0), (10.0, 0.0), home=None), situation_of(FIELD), 2.0)
     assert [leg.name for leg in found.legs] == ["1 → 2"]

@@ -26,6 +26,7 @@ from mavlink_bridge.errors import UsageError
 
 if TYPE_CHECKING:
     from mavlink_bridge.cli.session import Address
+    from mavlink_bridge.messages import Frame
     from missions.check import CheckedLeg, MissionCheck
     from missions.situation import Situation
 
@@ -79,7 +80,8 @@ def check(
     _check_options(mission, log, connect, plots)
     if json_output and Path("-") in plots:
         raise UsageError("--plot - and --json both want the standard output; give a file to --plot")
-    from missions.check import check_mission  # noqa: PLC0415 - quick help
+    from mavlink_bridge.cli.plan import storage_warnings  # noqa: PLC0415 - quick help
+    from missions.check import check_mission  # noqa: PLC0415
     from missions.geo import parse_lat_lon  # noqa: PLC0415
 
     begin = parse_lat_lon(start) if start else None
@@ -99,10 +101,11 @@ def check(
     if begin is None and log is not None and situation.home is not None:
         begin = situation.home.value  # at a log's end the vehicle may stand anywhere on its way
     checked = check_mission(situation.mission.value, situation, clearance, start=begin)
-    warn([*checked.warnings, *_storage_warnings(checked, situation)])
+    warnings = [*checked.warnings, *storage_warnings(checked.mission.items, situation)]
+    warn(warnings)
     _draw(checked, situation, plots)
     if json_output:
-        print_json(_document(checked, situation, plots))
+        print_json(_document(checked, warnings, situation.system, plots))
     elif not quiet:
         _report(checked, plots)
     if not checked.holds:
@@ -165,6 +168,8 @@ def _live_situation(address: Address, *, quiet: bool) -> Situation:
     """
     from mavlink_bridge.cli.download import read_list  # noqa: PLC0415 - only with a link
     from mavlink_bridge.cli.session import open_session  # noqa: PLC0415
+    from mavlink_bridge.fold import fold  # noqa: PLC0415
+    from mavlink_bridge.link import now_s  # noqa: PLC0415
     from mavlink_bridge.protocol.parameters import ReadParameters  # noqa: PLC0415
     from missions.fence import fence_from_items  # noqa: PLC0415
     from missions.items import without_home  # noqa: PLC0415
@@ -173,31 +178,31 @@ def _live_situation(address: Address, *, quiet: bool) -> Situation:
     from missions.vehicle import PARAMETER_NAMES  # noqa: PLC0415
 
     with progress_bar(quiet=quiet) as show, open_session(address, show) as session:
+        peer = session.vehicle
+        heard = Situation(system=peer.system, component=peer.component)
+
+        def listen(frames: list[Frame]) -> None:
+            nonlocal heard
+            for frame in frames:
+                heard = fold(heard, frame, now_s())
+
+        session.listeners.append(listen)
         items, fence, rally = (read_list(session, what) for what in ("mission", "fence", "rally"))
         machine = ReadParameters(session.vehicle, (*PARAMETER_NAMES, *END_NAMES))
         session.run(machine, "reading parameters")
-        peer = session.vehicle
     assert machine.outcome is not None
     source = "the vehicle"
     home = items[0].position if items and (items[0].lat_e7, items[0].lon_e7) != (0, 0) else None
-    return Situation(
-        system=peer.system,
-        component=peer.component,
+    if heard.pose is None:
+        warn(["the vehicle did not tell its position: it is taken to stand at its home"])
+    return replace(
+        heard,
         fence=Known(fence_from_items(fence), None, source) if fence else None,
         mission=Known(Mission(without_home(items), home), None, source),
         rally=Known(tuple(item.position for item in rally), None, source) if rally else None,
-        home=Known(home, None, source) if home else None,
-        parameters=dict(machine.outcome.values),
+        home=Known(home, None, source) if home else heard.home,
+        parameters={**heard.parameters, **machine.outcome.values},
     )
-
-
-def _storage_warnings(checked: MissionCheck, situation: Situation) -> list[str]:
-    """Warn of a mission that the vehicle cannot hold."""
-    from mavlink_bridge.protocol.limits import Limits  # noqa: PLC0415 - quick help
-
-    most = Limits.from_parameters(situation.parameters).mission_items
-    count = len(checked.mission.items) + 1
-    return [f"{count} mission items with home; the vehicle holds {most}"] if count > most else []
 
 
 def _draw(checked: MissionCheck, situation: Situation, plots: list[Path]) -> None:
@@ -266,12 +271,14 @@ def _sentence(leg: CheckedLeg) -> str:
     )
 
 
-def _document(checked: MissionCheck, situation: Situation, plots: list[Path]) -> dict[str, object]:
+def _document(
+    checked: MissionCheck, warnings: list[str], system: int | None, plots: list[Path]
+) -> dict[str, object]:
     return {
         "status": "ok" if checked.holds else "failed",
         "command": "check",
         "exit_code": int(ExitCode.DONE if checked.holds else ExitCode.CHECK),
-        "system": situation.system,
+        "system": system,
         "clearance_m": checked.clearance_m,
         "length_m": round(checked.length_m, 3),
         "duration_s": round(checked.duration_s, 1),
@@ -283,7 +290,7 @@ def _document(checked: MissionCheck, situation: Situation, plots: list[Path]) ->
         "legs": [_leg_document(leg) for leg in checked.legs],
         "not_understood": list(checked.troubles),
         "outputs": [str(path) for path in plots],
-        "warnings": [*checked.warnings, *_storage_warnings(checked, situation)],
+        "warnings": warnings,
     }
 
 

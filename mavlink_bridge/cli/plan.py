@@ -27,6 +27,9 @@ from mavlink_bridge.cli.upload import SigningKeyOption
 from mavlink_bridge.errors import UsageError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from missions.items import MissionItem
     from missions.plan import Plan
     from missions.request import Request
     from missions.situation import Situation
@@ -147,7 +150,8 @@ def plan(
         )
         planned, planning_s = timed_plan(situation, request)
         uploaded = verified = False
-    warn(planned.warnings)
+    warnings = [*planned.warnings, *storage_warnings(planned.items, situation)]
+    warn(warnings)
     written = write_outputs(planned, situation, outputs, plots, blocks=blocks)
     document = {
         **plan_document(planned),
@@ -155,6 +159,7 @@ def plan(
         "system": situation.system,
         "planning_s": round(planning_s, 6),
         "outputs": [str(path) for path in written],
+        "warnings": warnings,
         "uploaded": uploaded,
         "verified": verified,
     }
@@ -171,6 +176,15 @@ def timed_plan(situation: Situation, request: Request) -> tuple[Plan, float]:
     begun_s = time.perf_counter()
     planned = plan_tour(situation, request)
     return planned, time.perf_counter() - begun_s
+
+
+def storage_warnings(items: Sequence[MissionItem], situation: Situation) -> list[str]:
+    """Warn of a mission (its items without home) that the vehicle cannot hold."""
+    from mavlink_bridge.protocol.limits import Limits  # noqa: PLC0415 - quick help
+
+    most = Limits.from_parameters(situation.parameters).mission_items
+    count = len(items) + 1
+    return [f"{count} mission items with home; the vehicle holds {most}"] if count > most else []
 
 
 def with_parameter_file(situation: Situation, vehicle: Path | None) -> Situation:

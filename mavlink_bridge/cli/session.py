@@ -69,6 +69,11 @@ class Session:
     show : callable
         Moves the progress bar: text, steps done, steps in all.
 
+    Attributes
+    ----------
+    listeners : list of callable
+        Told of every batch of frames.
+
     Raises
     ------
     LinkError
@@ -82,6 +87,7 @@ class Session:
         self._heartbeat: Heartbeat | None = None
         self._heartbeat_s = 0.0
         self.peer: Peer | None = None
+        self.listeners: list[Callable[[list[Frame]], None]] = []
         self.run(finder, "listening for the vehicle")
         if finder.vehicle is None:
             assert finder.trouble is not None
@@ -151,6 +157,8 @@ class Session:
         return self._heartbeat is not None and self._heartbeat.custom_mode == mode
 
     def _listen(self, frames: list[Frame]) -> None:
+        for listener in self.listeners:
+            listener(frames)
         for frame in frames:
             if (
                 self.peer is not None

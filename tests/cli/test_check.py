@@ -1,0 +1,263 @@
+"""``pbpp check``, and ``pbpp plan`` with several targets and missions to repair."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+
+import pytest
+from shapely import LineString, Polygon
+from typer.testing import CliRunner
+
+from mavlink_bridge.cli.app import app
+from mavlink_bridge.simulator import Simulator, SimulatorConfig
+from missions.fence import fence_to_items
+from missions.formats import read_fence, read_mission, read_situation, write_situation
+from missions.geo import LatLon
+from missions.items import Command, with_home
+from missions.situation import Known, Mission, Situation
+
+HOME = LatLon(40.071374, -105.229930)
+TARGETS = ("40.07209265,-105.22861524", "40.0713,-105.2286", "40.0717,-105.2301")
+
+
+@pytest.fixture(autouse=True)
+def state_folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+
+
+@pytest.fixture
+def yard(fields):
+    return {"mission": str(fields / "yard-mission.waypoints"), "fence": str(fields / "yard-fence.waypoints")}
+
+
+def run(*arguments: str):
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def document_of(*arguments: str, code: int = 0) -> dict:
+    result = run(*arguments, "--json")
+    assert result.exit_code == code, result.output
+    return json.loads(result.stdout)
+
+
+def check_yard(yard, *more: str, code: int = 8) -> dict:
+    return document_of("check", "--mission", yard["mission"], "--fence", yard["fence"], *more, code=code)
+
+
+def test_the_leg_through_the_barn_is_found(yard):
+    document = check_yard(yard, "--clearance", "2")
+    assert (document["status"], document["exit_code"], document["broken"]) == ("failed", 8, 1)
+    first, second = document["legs"]
+    assert (first["breaks"], second["breaks"]) == (False, True)
+    assert second["crosses"] == ["exclusion polygon 1", "exclusion polygon 2"]
+    assert (second["from_item"], second["to_item"]) == (1, 2)
+    barn = read_fence(yard_path(yard)).zones[1]
+    line = LineString([second["start"], second["end"]])
+    entry = line.intersection(Polygon(barn.vertices)).coords[0]
+    assert second["at"] == pytest.approx(entry, abs=1e-6)
+    assert document["mission_items"] == 3
+    assert any("RTL" in warning for warning in document["warnings"])
+
+
+def yard_path(yard):
+    from pathlib import Path
+
+    return Path(yard["fence"])
+
+
+def test_a_person_sees_a_table(yard):
+    result = run("check", "--mission", yard["mission"], "--fence", yard["fence"], "--clearance", "2")
+    assert result.exit_code == 8
+    assert re.search(r"start → 1 +10\.3 m", result.stdout)
+    assert re.search(r"1 → 2 +134\.3 m +\d+ s +crosses +crosses", result.stdout)
+    assert (
+        "BREAKS: leg 1 → 2 crosses exclusion polygon 1, exclusion polygon 2, first at 40.07156"
+        in result.stdout
+    )
+    assert run("check", "--mission", yard["mission"], "--fence", yard["fence"], "-q").stdout == ""
+
+
+def test_a_leg_that_is_only_near_says_how_near(tmp_path, yard):
+    made = tmp_path / "made.plan"
+    options = ("--start", f"{HOME}", "--target", TARGETS[0], "--clearance", "2")
+    planned = document_of("plan", "--fence", yard["fence"], *options, "-o", made)
+    result = run("check", "--mission", made, "--clearance", "3")
+    assert result.exit_code == 8
+    said = re.search(
+        r"BREAKS: leg . → . comes (\d\.\d\d) m near exclusion polygon \d while driving", result.stdout
+    )
+    assert 2 <= float(said[1]) < 3
+    worst = min(float(near) for near in re.findall(r"comes (\d\.\d\d) m near", result.stdout))
+    assert worst == pytest.approx(planned["driven_clearance_m"], abs=0.01)
+
+
+def test_what_was_planned_passes(tmp_path, yard):
+    made = tmp_path / "made.plan"
+    options = ("--start", f"{HOME}", "--target", TARGETS[0], "--clearance", "2")
+    planned = document_of("plan", "--fence", yard["fence"], *options, "-o", made)
+    document = document_of("check", "--mission", made, "--clearance", "2")
+    assert document["broken"] == 0
+    assert document["driven_clearance_m"] == pytest.approx(planned["driven_clearance_m"], abs=0.01)
+    assert document["length_m"] == pytest.approx(planned["length_m"], abs=0.01)
+    assert "Every leg keeps 2 m while driving" in run("check", "--mission", made, "--clearance", "2").stdout
+
+
+def test_the_recorded_log_tells_it_all(logs):
+    document = document_of("check", "--log", logs / "mission-yard.tlog", code=8)
+    assert document["system"] == 1
+    assert [leg["breaks"] for leg in document["legs"]] == [False, True]
+    assert not any("not known of the vehicle" in warning for warning in document["warnings"])
+
+
+def test_files_come_before_the_log(logs, fields, yard):
+    log = logs / "mission-yard.tlog"
+    other = document_of("check", "--log", log, "--fence", fields / "maze-fence.waypoints", code=8)
+    assert other["legs"] != document_of("check", "--log", log, code=8)["legs"]
+    start = document_of(
+        "check", "--log", log, "--mission", yard["mission"], "--start", "40.0713,-105.2300", code=8
+    )
+    assert start["legs"][0]["start"] == [40.0713, -105.23]
+
+
+def test_a_live_vehicle_is_asked(fields, yard):
+    mission = read_mission(fields / "yard-mission.waypoints")
+    config = SimulatorConfig(
+        home=HOME,
+        fence=fence_to_items(read_fence(fields / "yard-fence.waypoints")),
+        mission=with_home(mission.items, HOME),
+        parameters={"FENCE_ENABLE": 1.0, "WP_SPEED": 3.0},
+    )
+    away = LatLon(40.0713, -105.2301)
+    with Simulator(replace(config, home=away), "tcpin:127.0.0.1:0") as simulator:
+        held = simulator.vehicle.mission
+        document = document_of("check", "--connect", simulator.connection, "--clearance", "2", code=8)
+        assert simulator.vehicle.mission == held
+        assert document["legs"][-1]["crosses"] == ["exclusion polygon 1", "exclusion polygon 2"]
+        assert document["clearance_m"] == pytest.approx(2.1)  # FENCE_MARGIN and a reserve
+        assert document["system"] == 1
+        assert document["legs"][0]["start"] == pytest.approx(away, abs=1e-5)
+        assert not any("did not tell its position" in text for text in document["warnings"])
+
+
+def test_pictures(tmp_path, yard):
+    picture = tmp_path / "check.svg"
+    document = check_yard(yard, "--plot", str(picture))
+    assert document["outputs"] == [str(picture)]
+    assert "1 of 2 legs break" in picture.read_text()
+    sketch = run("check", "--mission", yard["mission"], "--fence", yard["fence"], "--plot", "-")
+    assert len(sketch.stdout.splitlines()) > 20
+
+
+def test_the_vehicle_file_counts(tmp_path, yard):
+    slow, fast = tmp_path / "slow.parm", tmp_path / "fast.parm"
+    slow.write_text("WP_SPEED 1\nWP_RADIUS 1\n")
+    fast.write_text("WP_SPEED 5\nWP_RADIUS 3\n")
+    times_s = [check_yard(yard, "--vehicle", str(file))["duration_s"] for file in (slow, fast)]
+    assert times_s[0] > 3 * times_s[1]
+
+
+def test_missions_of_others(tmp_path, yard):
+    # Mission Planner's home line has command 0; the commands of others are kept or named.
+    rows = [
+        "QGC WPL 110",
+        "0\t1\t0\t0\t0\t0\t0\t0\t40.071374\t-105.229930\t1600\t1",
+        "1\t0\t3\t16\t0\t0\t0\t0\t40.0714\t-105.2300\t0\t1",
+        "2\t0\t3\t82\t0\t0\t0\t0\t40.0714\t-105.2301\t0\t1",
+        "3\t0\t3\t178\t1\t1.5\t0\t0\t0\t0\t0\t1",
+        "4\t0\t3\t177\t1\t2\t0\t0\t0\t0\t0\t1",
+    ]
+    file = tmp_path / "other.waypoints"
+    file.write_text("\n".join(rows) + "\n")
+    document = document_of("check", "--mission", file, "--fence", yard["fence"], code=8)
+    assert document["broken"] == 0
+    assert "item 2 is command 82" in document["not_understood"][0]
+    assert "not understood: item 2" in run("check", "--mission", file, "--fence", yard["fence"]).stdout
+
+
+def test_wrong_usage(tmp_path, yard, logs):
+    log = str(logs / "mission-yard.tlog")
+    assert run("check").exit_code == 2
+    assert run("check", "--log", log, "--connect", "udpin:127.0.0.1:1").exit_code == 2
+    assert run("check", "--mission", yard["mission"], "--plot", "-", "--json").exit_code == 2
+    assert run("check", "--mission", yard["mission"], "--plot", "picture.doc").exit_code == 3
+    assert run("check", "--mission", yard["mission"]).exit_code == 3  # no fence
+    assert run("check", "--mission", yard["fence"], "--fence", yard["fence"]).exit_code == 3
+    assert run("check", "--mission", yard["mission"], "--fence", yard["mission"]).exit_code == 3
+    assert run("check", "--log", str(logs / "no-fence.tlog")).exit_code in (2, 3)
+
+
+def test_too_many_items_are_said(tmp_path, yard):
+    mission = read_mission(yard_path({"fence": yard["mission"]}))
+    file = tmp_path / "long.plan"
+    write_situation(Situation(mission=Known(Mission(mission.items[:1] * 700, HOME), None, "test")), file)
+    document = document_of("check", "--mission", file, "--fence", yard["fence"])
+    assert "701 mission items with home; the vehicle holds 655" in document["warnings"]
+
+
+def test_the_best_order_and_the_way_home(tmp_path, yard):
+    targets = [option for target in TARGETS for option in ("--target", target)]
+    given = document_of("plan", "--fence", yard["fence"], "--start", f"{HOME}", *targets, "--clearance", "2")
+    made = tmp_path / "tour.waypoints"
+    options = ("--order", "best", "--return", "-o", made)
+    best = document_of(
+        "plan", "--fence", yard["fence"], "--start", f"{HOME}", *targets, "--clearance", "2", *options
+    )
+    assert sorted(best["targets"][:3]) == sorted(given["targets"])
+    assert best["targets"][3] == best["path"][-1] == [HOME.lat_deg, HOME.lon_deg]
+    assert best["warnings"][0].startswith("the targets are visited in the order ")
+    assert (
+        document_of("check", "--mission", made, "--fence", yard["fence"], "--clearance", "2")["broken"] == 0
+    )
+
+
+@pytest.mark.parametrize(
+    ("end", "command"), [("loiter", Command.NAV_LOITER_UNLIM), ("hold", Command.NAV_WAYPOINT)]
+)
+def test_ends(tmp_path, yard, end, command):
+    made = tmp_path / "made.plan"
+    options = ("--start", f"{HOME}", "--target", TARGETS[0], "--clearance", "2", "--end", end)
+    document_of("plan", "--fence", yard["fence"], *options, "-o", made)
+    assert read_mission(made).items[-1].command == command
+
+
+def test_rtl_needs_a_free_line_home(tmp_path, fields, yard):
+    file = tmp_path / "yard.plan"
+    fence = read_situation(fields / "yard-fence.waypoints").fence
+    write_situation(Situation(fence=fence, mission=Known(Mission((), HOME), None, "test")), file)
+    options = ("--target", TARGETS[0], "--clearance", "2", "--end", "rtl")
+    refused = document_of("plan", "--fence", file, *options, code=4)
+    assert refused["error"] == "NoRouteError"
+    assert "--return" in refused["message"]
+    made = tmp_path / "made.waypoints"
+    document_of("plan", "--fence", file, *options, "--return", "-o", made)
+    assert read_mission(made).items[-1].command == Command.NAV_RETURN_TO_LAUNCH
+    assert document_of("check", "--mission", made, "--fence", file, "--clearance", "2")["broken"] == 0
+
+
+def test_a_mission_is_repaired(tmp_path, yard):
+    made = tmp_path / "repaired.waypoints"
+    document = document_of(
+        "plan", "--fence", yard["fence"], "--via-mission", yard["mission"], "--clearance", "2", "-o", made
+    )
+    assert document["warnings"][0].startswith("leg 1 → 2: replaced by a route")
+    old, new = read_mission(yard_path({"fence": yard["mission"]})), read_mission(made)
+    assert (new.items[0].position, new.items[-1].position) == (old.items[0].position, old.items[-1].position)
+    assert new.home == old.home
+    assert document["mission_items"] == len(new.items) + 1
+    assert (
+        document_of("check", "--mission", made, "--fence", yard["fence"], "--clearance", "2")["broken"] == 0
+    )
+
+
+def test_wrong_usage_of_tours(yard):
+    base = ("plan", "--fence", yard["fence"], "--start", f"{HOME}")
+    via = ("--via-mission", yard["mission"])
+    assert run(*base, "--target", TARGETS[0], "--order", "random").exit_code == 2
+    assert run(*base, "--target", TARGETS[0], "--end", "land").exit_code == 2
+    assert run(*base, *via, "--target", TARGETS[0]).exit_code == 2
+    assert run(*base, *via, "--return").exit_code == 2
+    assert run(*base, *via, "--end", "rtl").exit_code == 2
+    assert run(*base, *via, "--clearance", "max").exit_code == 2
+    assert run("plan", "--connect", "udpin:127.0.0.1:1", *via, "--drive").exit_code == 2

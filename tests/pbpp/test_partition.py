@@ -166,3 +166,11 @@ def test_the_sweep_does_not_depend_on_how_the_map_is_turned(seed):
             shapely.transform(one, lambda points, spin=spin: points @ np.array(spin)) for one in free.polygons
         ]
         assert Slabs(turned).area_m2 == pytest.approx(free.geometry.area, rel=1e-9)
+
+
+def test_locating_many_points_forgets_none_of_their_blocks(load_case):
+    slabs = Slabs(free_of(load_case("rand10")).polygons)
+    points = [(float(east), 500.5) for east in range(0, 1000, 10)]
+    once = [slabs.locate(point) for point in points]
+    assert [slabs.locate(point) for point in points] == once
+    assert any(once)

@@ -251,6 +251,18 @@ def test_a_mission_is_repaired(tmp_path, yard):
     )
 
 
+def test_a_mission_is_repaired_on_the_vehicle(fields, yard):
+    config = SimulatorConfig(home=HOME, fence=fence_to_items(read_fence(fields / "yard-fence.waypoints")))
+    with Simulator(config, "tcpin:127.0.0.1:0") as simulator:
+        via = ("--via-mission", yard["mission"], "--clearance", "2.2", "--upload")
+        document = document_of("plan", "--connect", simulator.connection, *via)
+        assert (document["uploaded"], document["verified"]) == (True, True)
+        assert len(simulator.vehicle.mission) == document["mission_items"]
+        checked = document_of("check", "--connect", simulator.connection, "--clearance", "2.2")
+        assert checked["broken"] == 0
+        assert checked["mission_items"] == document["mission_items"]
+
+
 def test_wrong_usage_of_tours(yard):
     base = ("plan", "--fence", yard["fence"], "--start", f"{HOME}")
     via = ("--via-mission", yard["mission"])

@@ -8,14 +8,22 @@ from __future__ import annotations
 import inspect
 import re
 from collections import defaultdict
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+from mavlink_bridge import errors as bridge_errors
 from mavlink_bridge.cli.app import COMMANDS, load
+from mavlink_bridge.cli.common import ExitCode, exit_code_of
 from mavlink_bridge.director import SCHEMA, TRANSITIONS
+from missions import errors as mission_errors
+from missions.vehicle import PARAMETER_NAMES
+from missions.vehicle.ardupilot import ardupilot_vehicle
+from missions.vehicle.px4 import px4_vehicle
+from missions.vehicle.reader import ParameterReader
 
 DOCS = Path(__file__).parent
-_PART = re.compile(r"(<!-- made: ([a-z-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
+_PART = re.compile(r"(<!-- made: ([a-z0-9-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
 def event_table() -> str:
@@ -66,7 +74,88 @@ def _option_row(parameter: Any) -> str:  # noqa: ANN401 - the command line's own
     return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"
 
 
-PARTS = {"bridge-events": event_table, "commands": commands, "director-states": director_diagram}
+def exit_codes() -> str:
+    """Give the table of exit codes and the errors that end with each."""
+    kinds = defaultdict(list)
+    for module in (mission_errors, bridge_errors):
+        for name, kind in vars(module).items():
+            if isinstance(kind, type) and issubclass(kind, Exception) and kind.__module__ == module.__name__:
+                kinds[exit_code_of(kind(""))].append(f"`{name}`")
+    kinds[ExitCode.USAGE].append("wrong options")
+    kinds[ExitCode.INPUT].append("`FileError`")
+    kinds[ExitCode.INTERNAL].append("`InternalError`")
+    rows = [f"| {int(code)} | {_CODES[code]} | {', '.join(kinds[code]) or '—'} |" for code in ExitCode]
+    return "\n".join(["| exit | meaning | errors |", "|---|---|---|", *rows])
+
+
+_CODES = {
+    ExitCode.DONE: "done, verified",
+    ExitCode.INTERNAL: "internal error: a bug; says how to report it",
+    ExitCode.USAGE: "wrong usage",
+    ExitCode.INPUT: "input unusable: file, log or fence; says where",
+    ExitCode.NO_ROUTE: "no route: start or target blocked, or unreachable; says what blocks it",
+    ExitCode.LINK: "link: no connection, no heartbeat, silence",
+    ExitCode.REFUSED: "the vehicle refused; says its result by name, and the item",
+    ExitCode.OUTCOME: "what is on the vehicle is not what was wanted, or unknown; says what is known and where the backup lies",
+    ExitCode.CHECK: "a check or comparison failed (`check`, `replay --expect`, `doctor`)",
+    ExitCode.INTERRUPTED: "interrupted by the user; the vehicle was left as it was, or this says otherwise",
+}
+
+
+class _Reading(ParameterReader):
+    """A reader that notes every name it is asked for, and what is taken instead."""
+
+    asked: dict[str, float | None]
+
+    def known(self, name: str) -> float | None:
+        self.asked.setdefault(name, None)
+        return super().known(name)
+
+    def value(self, name: str, default: float, *, least: float = 0.0) -> float:
+        if self.asked.get(name) is None:
+            self.asked[name] = default
+        return super().value(name, default, least=least)
+
+
+def parameters() -> str:
+    """Give the vehicle's parameters that count, with what is taken where they are not told."""
+    rows = []
+    vehicles = (
+        ("ArduPilot", ardupilot_vehicle, ({},)),
+        ("PX4", px4_vehicle, ({"CA_AIRFRAME": 5.0}, {"CA_AIRFRAME": 6.0})),
+    )
+    for autopilot, read, airframes in vehicles:
+        asked: dict[str, float | None] = {}
+        for airframe in airframes:
+            reading = _Reading(airframe)
+            reading.asked = asked
+            read(reading, None)
+        if autopilot == "ArduPilot":
+            asked = {name: asked.get(name) for name in dict.fromkeys((*PARAMETER_NAMES, *asked))}
+        rows += [
+            f"| `{name}` | {autopilot} | {'—' if default is None else f'{default:g}'} |"
+            for name, default in asked.items()
+        ]
+    return "\n".join(["| parameter | autopilot | taken where it is not told |", "|---|---|---|", *rows])
+
+
+def _planners(case: str) -> str:
+    """Give a map's table out of the benchmark's results."""
+    text = (DOCS.parent / "benchmarks" / "results" / "planner.md").read_text(encoding="utf-8")
+    found = re.search(rf"^## {case}\n\n(.*?)\n\n", text, re.DOTALL | re.MULTILINE)
+    assert found is not None
+    return found[1]
+
+
+PARTS = {
+    "bridge-events": event_table,
+    "commands": commands,
+    "director-states": director_diagram,
+    "exit-codes": exit_codes,
+    "parameters": parameters,
+    "planners-100": partial(_planners, "rand100"),
+    "planners-1000": partial(_planners, "rand1000"),
+}
 
 
 def renewed(text: str) -> str:
@@ -75,6 +164,6 @@ def renewed(text: str) -> str:
 
 
 if __name__ == "__main__":
-    for page in sorted(DOCS.glob("*.md")):
+    for page in sorted(DOCS.rglob("*.md")):
         text = page.read_text(encoding="utf-8")
         page.write_text(renewed(text), encoding="utf-8")

@@ -19,18 +19,18 @@ def generated():
     return module
 
 
-@pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", sorted(DOCS.rglob("*.md")), ids=lambda page: page.stem)
 def test_made_parts_are_up_to_date(generated, page):
     text = page.read_text(encoding="utf-8")
     assert generated.renewed(text) == text
 
 
 def test_every_part_stands_somewhere(generated):
-    text = "".join(page.read_text(encoding="utf-8") for page in DOCS.glob("*.md"))
+    text = "".join(page.read_text(encoding="utf-8") for page in DOCS.rglob("*.md"))
     assert all(f"<!-- made: {name} -->" in text for name in generated.PARTS)
 
 
-PAGES = [page for folder in (DOCS, DOCS.parent, DOCS.parent / "sitl_logs") for page in sorted(folder.glob("*.md"))]
+PAGES = sorted([*DOCS.rglob("*.md"), *DOCS.parent.glob("*.md"), *DOCS.parent.glob("sitl_logs/*.md")])
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: f"{page.parent.name}-{page.stem}")

@@ -1,0 +1,28 @@
+"""Learn fence, parameters and position from a vehicle and plan; nothing is written: ``plan_on_a_vehicle.py CONNECTION LAT,LON``."""
+
+# begin
+import sys
+
+from mavlink_bridge import Director, Orders, open_link
+from missions import Plan, Request
+from missions.geo import parse_lat_lon
+
+
+def plan_to(connection: str, target: str) -> Plan:
+    """Give the plan; what goes wrong is raised as a BridgeError or MissionError."""
+    orders = Orders(identity=(245, 190), request=Request(targets=(parse_lat_lon(target),)), once=True)
+    director = Director(orders)
+    with open_link(connection, orders.identity) as link:
+        link.run(director)
+    if director.trouble is not None:
+        raise director.trouble
+    return director.plan
+
+
+# end
+
+if __name__ == "__main__":
+    plan = plan_to(*sys.argv[1:3])
+    print(f"{plan.length_m:.1f} m, {len(plan.items)} waypoints")
+    for warning in plan.warnings:
+        print(f"warning: {warning}")

@@ -1,0 +1,212 @@
+"""Every code block of the documentation is run: shell commands, sessions and Python, in a folder with a field, a log and parameters.
+
+Blocks of a page run one after the other in one folder, Python in one namespace. Where a command connects, it is a simulated rover it connects
+to. ``# exit N`` behind a command is the exit code it must have. Blocks that cannot be run here have their reason above them:
+``<!-- not run: REASON -->``.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from mavlink_bridge.cli.app import app
+from mavlink_bridge.simulator import Simulator, SimulatorConfig
+from missions.fence import fence_to_items
+from missions.formats import read_fence, read_parameters
+from missions.geo import LatLon
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+RUN = ("sh", "console", "python")
+_BLOCK = re.compile(
+    r"(?:<!-- not run: (?P<reason>[^\n]+) -->\n)?^```(?P<language>[\w-]*)[^\n]*\n(?P<text>.*?)^```",
+    re.DOTALL | re.MULTILINE,
+)
+_CONNECTION = re.compile(r"(?:udpin|udpout|tcpin|tcp):[\w.]+:\d+|/dev/tty\w+(?:,\d+)?")
+_EXIT = re.compile(r"#(?:.*:)?\s*exit (\d+)\s*$")
+_SHELL = re.compile(r"[|;&<>*$`~]")
+PADDOCK = '{"type": "Polygon", "coordinates": [[[-105.23, 40.071], [-105.228, 40.071], [-105.228, 40.072], [-105.23, 40.071]]]}'
+HOME = LatLon(40.071374, -105.229930)
+PARAMETERS = "FENCE_ENABLE,1\nFENCE_TYPE,6\nFENCE_MARGIN,2\nWP_RADIUS,2\nWP_SPEED,2\nTURN_RADIUS,0.9\nSERVO1_FUNCTION,26\nAVOID_ENABLE,0\nOA_TYPE,0\n"
+
+
+def blocks(page: Path) -> list[re.Match]:
+    return list(_BLOCK.finditer(page.read_text(encoding="utf-8")))
+
+
+RUNNABLE = [
+    page for page in PAGES if any(block["language"] in RUN and not block["reason"] for block in blocks(page))
+]
+NOT_RUN = [
+    pytest.param(block["reason"], id=f"{page.relative_to(ROOT)}:{number}")
+    for page in PAGES
+    for number, block in enumerate(blocks(page))
+    if block["reason"]
+]
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch) -> Path:
+    """A folder as the pages take it for granted."""
+    fields = ROOT / "tests" / "fields"
+    shutil.copytree(fields, tmp_path / "tests" / "fields")
+    shutil.copytree(ROOT / "sitl_logs", tmp_path / "sitl_logs")
+    shutil.copytree(ROOT / "examples", tmp_path / "examples")
+    shutil.copy(fields / "yard-fence.waypoints", tmp_path / "fence.waypoints")
+    shutil.copy(fields / "maze-fence.waypoints", tmp_path / "maze.waypoints")
+    shutil.copy(fields / "yard-mission.waypoints", tmp_path / "drawn.waypoints")
+    shutil.copy(fields / "yard-mission.waypoints", tmp_path / "mission.waypoints")
+    for name in ("field.tlog", "flight.tlog"):
+        shutil.copy(ROOT / "sitl_logs" / "guided-maze.tlog", tmp_path / name)
+    (tmp_path / "paddock.geojson").write_text(PADDOCK)
+    (tmp_path / "rover.parm").write_text(PARAMETERS)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
+    for name in ("field.plan", "field.kml"):
+        assert CliRunner().invoke(app, ["convert", "fence.waypoints", name]).exit_code == 0
+    plan = json.loads((tmp_path / "field.plan").read_text())
+    plan["mission"]["plannedHomePosition"] = [*HOME, 0]
+    (tmp_path / "field.plan").write_text(json.dumps(plan))
+    return tmp_path
+
+
+class Reader:
+    """Somebody who does what the page says."""
+
+    def __init__(self) -> None:
+        self.connection: str | None = None
+        self._processes: list[subprocess.Popen] = []
+        self._simulator: Simulator | None = None
+        self._names: dict[str, object] = {"__name__": "page"}
+
+    def close(self) -> None:
+        for process in self._processes:
+            process.send_signal(signal.SIGINT)
+            process.communicate(timeout=10)
+        if self._simulator is not None:
+            self._simulator.__exit__(None, None, None)
+
+    def read(self, language: str, text: str) -> None:
+        if language == "python":
+            exec(compile(text, "page", "exec"), self._names)
+        elif language == "sh":
+            for line in _commands(text):
+                self.run(line)
+        else:
+            for session in re.split(r"^\$ ", text, flags=re.MULTILINE)[1:]:
+                line, _, shown = session.partition("\n")
+                _compare(shown, self.run(line))
+
+    def run(self, line: str) -> str:
+        """Run a command; give what it told on stdout and stderr."""
+        expected = int(found[1]) if (found := _EXIT.search(line)) else 0
+        words = shlex.split(line, comments=True)
+        if words[:2] == ["pbpp", "sim"]:
+            return self._start_simulator(words)
+        line = _CONNECTION.sub(lambda _: self._connect(), line)
+        words = shlex.split(line, comments=True)
+        if words[:2] == ["pbpp", "bridge"] and "--once" not in words:
+            return self._listen_for_a_while(words)
+        if words[:2] == ["pbpp", "replay"] and "--send" in words:
+            words[words.index("--send") + 1] = "udpout:127.0.0.1:9"
+            words[words.index("--speed") + 1] = "1e6"
+        elif words[0] != "pbpp" or _SHELL.search(shlex.join(words).replace("'", "")):
+            done = subprocess.run(
+                ["bash", "-euc", line], capture_output=True, text=True, timeout=120, check=False
+            )
+            assert done.returncode == expected, f"{line}\n{done.stdout}{done.stderr}"
+            return done.stdout + done.stderr
+        result = CliRunner().invoke(app, words[1:])
+        assert result.exit_code == expected, f"{line}\n{result.output}"
+        return result.output
+
+    def _connect(self) -> str:
+        if self.connection is None:
+            fence = fence_to_items(read_fence(Path("fence.waypoints")))
+            config = SimulatorConfig(
+                home=HOME, fence=fence, parameters=dict(read_parameters(Path("rover.parm")))
+            )
+            self._simulator = Simulator(config, "tcpin:127.0.0.1:0", speedup=5.0).__enter__()
+            self.connection = self._simulator.connection
+        return self.connection
+
+    def _start_simulator(self, words: list[str]) -> str:
+        command = [sys.executable, "-m", "mavlink_bridge.cli", *words[1:], "--listen", "tcpin:127.0.0.1:0"]
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self._processes.append(process)
+        self.connection = process.stdout.readline().strip()
+        assert self.connection.startswith("tcp:"), process.stderr.read()
+        return self.connection
+
+    @staticmethod
+    def _listen_for_a_while(words: list[str]) -> str:
+        """Run the bridge until it has learnt the vehicle, then press Ctrl-C."""
+        command = [sys.executable, "-m", "mavlink_bridge.cli", *words[1:], "--json"]
+        process = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.PIPE, text=True
+        )
+        events = []
+        for line in process.stdout:
+            events.append(json.loads(line).get("event"))
+            if events[-1] == "learnt":
+                break
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=20)
+        assert (process.returncode, events[-1]) == (130, "learnt"), errors
+        return ""
+
+
+def _commands(text: str) -> list[str]:
+    joined = text.replace("\\\n", " ")
+    return [
+        line.strip() for line in joined.splitlines() if line.strip() and not line.lstrip().startswith("#")
+    ]
+
+
+def _compare(shown: str, told: str) -> None:
+    """Each line that a session shows was told; numbers may be others."""
+    lines = {_bare(line) for line in told.splitlines()}
+    for line in filter(None, map(str.strip, shown.splitlines())):
+        assert _bare(line) in lines, f"not told: {line}\n{told}"
+
+
+def _bare(line: str) -> str:
+    return re.sub(r"\d+(?:\.\d+)?", "#", line.strip())
+
+
+@pytest.mark.parametrize("page", RUNNABLE, ids=lambda page: str(page.relative_to(ROOT)))
+def test_what_a_page_says_can_be_done(page, place):
+    reader = Reader()
+    try:
+        for block in blocks(page):
+            if block["language"] in RUN and not block["reason"]:
+                reader.read(block["language"], block["text"])
+    finally:
+        reader.close()
+
+
+@pytest.mark.parametrize("reason", NOT_RUN)
+def test_what_is_not_run_says_why(reason):
+    """So that the reasons show in the report."""
+    assert len(reason.split()) >= 2
+    pytest.skip(f"not run: {reason}")
+
+
+def test_most_blocks_are_run():
+    every = [block for page in PAGES for block in blocks(page) if block["language"] in RUN]
+    left_out = [block for block in every if block["reason"]]
+    assert len(every) > 40
+    assert len(left_out) <= len(every) // 4

@@ -27,11 +27,12 @@ from mavlink_bridge.cli.common import (
 )
 from mavlink_bridge.cli.plan import request_from_options
 from mavlink_bridge.cli.upload import RequiredConnectOption, SigningKeyOption
-from mavlink_bridge.errors import LinkError, UsageError
+from mavlink_bridge.errors import IdentityTakenError, LinkError, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
+    from mavlink_bridge.cli.bridge_view import LiveView
     from mavlink_bridge.director import Director, Event, Orders
     from mavlink_bridge.journal import JournalWriter
     from mavlink_bridge.link import Link
@@ -102,9 +103,10 @@ def bridge(
     del config  # its callback has taken it
     signal.signal(signal.SIGTERM, _end)
     from mavlink_bridge.cli.session import signing_of  # noqa: PLC0415
-    from mavlink_bridge.director import Orders  # noqa: PLC0415 - quick help
+    from mavlink_bridge.director import Director, Orders  # noqa: PLC0415 - quick help
     from mavlink_bridge.director.orders import DEFAULT_SOURCES, TargetSource  # noqa: PLC0415
     from missions.formats import read_parameters  # noqa: PLC0415
+    from missions.situation import Situation  # noqa: PLC0415
 
     try:
         sources = frozenset(TargetSource(name) for name in target_from) if target_from else DEFAULT_SOURCES
@@ -127,7 +129,10 @@ def bridge(
     parameters = read_parameters(vehicle) if vehicle else {}
     with contextlib.ExitStack() as stack:
         recorder, journal = _recorders(stack, log, orders, parameters)
-        shell = _Shell(orders, parameters, _teller(wants_json=json_output, quiet=quiet), recorder, journal)
+        director = Director(orders, Situation(parameters=parameters))
+        view = _view(stack, director, is_wanted=not (json_output or quiet))
+        tell = view.tell if view else _teller(wants_json=json_output, quiet=quiet)
+        shell = _Shell(director, tell, view, recorder, journal)
         shell.run(connect, signing_of(signing_key), timeout)
     trouble = shell.director.trouble
     if trouble is not None and shell.director.is_done:
@@ -162,17 +167,16 @@ class _Shell:
 
     def __init__(
         self,
-        orders: Orders,
-        parameters: Mapping[str, float],
+        director: Director,
         tell: Callable[[Event], None],
+        view: LiveView | None,
         recorder: TlogWriter | None,
         journal: JournalWriter | None,
     ) -> None:
         from mavlink_bridge.cli.live import BackupKeeper  # noqa: PLC0415 - quick help
-        from mavlink_bridge.director import Director  # noqa: PLC0415
-        from missions.situation import Situation  # noqa: PLC0415
 
-        self.director = Director(orders, Situation(parameters=parameters))
+        self.director = director
+        self._view = view
         self._written = _Journaled(self.director, journal)
         self._tell = tell
         self._recorder = recorder
@@ -197,6 +201,8 @@ class _Shell:
                 ) as link:
                     failures = 0
                     self._run_link(link)
+            except IdentityTakenError:
+                raise
             except LinkError as error:
                 if self.director.orders.once:
                     raise
@@ -226,6 +232,8 @@ class _Shell:
                 self.director.receive(frame, came_s)
                 self._written.frames += 1
             self._run_timer(now_s())
+            if self._view is not None:
+                self._view.show(now_s())
         link.send_all(self.director.messages_to_send())
         self._keep_backup(now_s())
         self._tell_all()
@@ -300,6 +308,15 @@ def _has_input() -> bool:
         return bool(select.select([sys.stdin], [], [], 0)[0])
     except (OSError, ValueError):  # no stdin, or one that cannot be waited for (Windows' console)
         return False
+
+
+def _view(stack: contextlib.ExitStack, director: Director, *, is_wanted: bool) -> LiveView | None:
+    """Open the live view where somebody watches a terminal."""
+    if not is_wanted or not sys.stdout.isatty():
+        return None
+    from mavlink_bridge.cli.bridge_view import LiveView  # noqa: PLC0415 - only in a terminal
+
+    return stack.enter_context(LiveView(director))
 
 
 def _teller(*, wants_json: bool, quiet: bool) -> Callable[[Event], None]:

@@ -18,7 +18,7 @@ from mavlink_bridge.director.orders import PATH_PLANNER_COMPONENT, Orders
 from mavlink_bridge.director.states import TRANSITIONS, Cue, State
 from mavlink_bridge.director.steps import Step, Steps
 from mavlink_bridge.director.voice import Voice
-from mavlink_bridge.errors import BridgeError, LinkError
+from mavlink_bridge.errors import BridgeError, LinkError, VehicleNotFoundError
 from mavlink_bridge.fold import fold, with_list
 from mavlink_bridge.messages import Frame
 from mavlink_bridge.protocol.download import Download
@@ -144,6 +144,9 @@ class Keeper(TableMachine[State, Cue]):
             self._move(Cue.GIVE_UP)
         if find.vehicle is None or find.heartbeat is None:
             return
+        if find.heartbeat.autopilot != m.Autopilot.ARDUPILOTMEGA and not self.orders.passive:
+            self._refuse_autopilot(find.vehicle.system, find.heartbeat.autopilot, now_s)
+            return
         vehicle = find.vehicle
         identity = self.orders.identity or (vehicle.system, PATH_PLANNER_COMPONENT)
         self._peer = Peer(vehicle.system, vehicle.component, *identity)
@@ -157,6 +160,16 @@ class Keeper(TableMachine[State, Cue]):
         self.situation = fold(known, heartbeat, find.heard_s)
         self._heartbeat_s = find.heard_s
         self._learn(now_s)
+
+    def _refuse_autopilot(self, system: int, autopilot: int, now_s: float) -> None:
+        """Say that missions are made for ArduPilot only: where home stands and what modes are called is its own."""
+        name = "PX4" if autopilot == m.Autopilot.PX4 else f"MAV_AUTOPILOT {autopilot}"
+        error = VehicleNotFoundError(
+            f"system {system} is no ArduPilot ({name}): for now only ArduPilot is served"
+        )
+        self._voice.error(now_s, EventName.TROUBLE, error, dict(error.details))
+        self.trouble = error
+        self._move(Cue.GIVE_UP)
 
     def _learn(self, now_s: float) -> None:
         assert self._peer is not None

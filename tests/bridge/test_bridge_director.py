@@ -405,6 +405,22 @@ def test_over_a_bad_link_a_changed_fence_stops_it_within_ten_seconds():
     assert run.vehicles[0].breaches == 0
 
 
+def test_another_autopilot_is_refused_with_a_clear_word():
+    run = conductor()
+    push = run.down.push
+
+    def as_px4(frame: m.Frame, now_s: float) -> None:
+        if isinstance(frame.message, m.Heartbeat):
+            frame = replace(frame, message=replace(frame.message, autopilot=m.Autopilot.PX4))
+        push(frame, now_s)
+
+    run.down.push = as_px4
+    run.run_until(lambda: run.director.is_done, 10)
+    assert run.director.state is State.FAILED
+    assert "PX4" in str(run.director.trouble)
+    assert not run.sent
+
+
 def test_every_event_follows_its_schema():
     run = driving(conductor())
     run.run_until(lambda: run.director.state is State.ARRIVED)

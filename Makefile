@@ -8,7 +8,7 @@ PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; 
 BIN := .venv/bin
 OUT ?= demo-out
 
-.PHONY: bench-transfer test-foreign docs soak bench-tlog fuzz demo test lint format types walls check lock clean
+.PHONY: bench bench-drive bench-transfer test-foreign docs soak bench-tlog fuzz demo test lint format types walls check lock clean
 
 demo: .venv/run.stamp
 	$(BIN)/pbpp demo --out $(OUT)
@@ -55,6 +55,13 @@ lock: .venv/run.stamp
 		--generate-hashes --no-header --quiet -o requirements/run.lock
 	$(BIN)/uv pip compile pyproject.toml requirements/build.in --extra plot --extra test --extra docs --extra dev --universal \
 		--python-version 3.11 --generate-hashes --no-header --quiet -c requirements/run.lock -o requirements/dev.lock
+
+bench: .venv/dev.stamp
+	$(BIN)/python benchmarks/planner/run.py
+	$(BIN)/python benchmarks/table1.py --write
+
+bench-drive: .venv/dev.stamp
+	$(BIN)/python benchmarks/drive.py
 
 bench-transfer: .venv/dev.stamp
 	$(BIN)/python benchmarks/transfer.py

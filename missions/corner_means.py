@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 MOVES = (0.5, 1.0, 1.5, 2.5)
 """In lengths of what is missing."""
 
+PROLONGED_M = (3.0, 6.0, 10.0, 15.0)
 SPACINGS_M = (6.0, 10.0, 15.0, 20.0)
 SLOW_MPS = (2.0, 1.0)
 SLOW_BEFORE_M = {2.0: 10.0, 1.0: 5.0}
@@ -50,6 +51,23 @@ def moved(drawing: Drawing, index: int, missing_m: float) -> Iterator[Drawing]:
     for way in (*ways, along, (-along[0], -along[1])):
         for share in MOVES:
             yield _with(drawing, index, shifted(drawing[index].place, way, unit_m * share))
+
+
+def prolonged(drawing: Drawing, index: int) -> Iterator[Drawing]:
+    """Turn later, or earlier, on the line of one of its legs; the corner itself may stay as a point of the line."""
+    if _is_end_or_fixed(drawing, index):
+        return
+    here = drawing[index]
+    before = drawn.direction(drawing[index - 1], here)
+    after = drawn.direction(here, drawing[index + 1])
+    for length_m in PROLONGED_M:
+        later = here.at(shifted(here.place, before, length_m))
+        earlier = here.at(shifted(here.place, after, -length_m))
+        yield (*drawing[:index], later, *drawing[index + 1 :])
+        yield (*drawing[:index], earlier, *drawing[index + 1 :])
+        yield (*drawing[:index], earlier, later, *drawing[index + 1 :])
+        yield (*drawing[:index], here, later, *drawing[index + 1 :])
+        yield (*drawing[:index], earlier, here, *drawing[index + 1 :])
 
 
 def without(drawing: Drawing, index: int) -> Iterator[Drawing]:

@@ -15,6 +15,7 @@ import numpy as np
 import shapely
 
 from missions import corner_means, drawn
+from missions.avoidance import with_avoidance
 from missions.drive_model import envelope
 
 if TYPE_CHECKING:
@@ -33,13 +34,15 @@ UNBOUNDED_EXTRA_M = 2.0
 """What corners that left the model when measured (by up to 1.6 m) have to keep on top."""
 
 _MISSING_COST_S_PER_M = 100.0
+_CROSSING_COST_S = 10_000.0
 _POINT_COST_S = 0.3
 _NEAR_TURNS_COST_S = 3.0
 _TURN_DEG = 5.0
 _SHORT_LEG_M = 12.0
 _LEAST_GAIN_S = 0.05
 _CONTEXT = 3
-_MOST_MEASUREMENTS = 1500
+_TINY_LEG_M = 2.5
+_JOINED_TURN_DEG = 80.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,12 +89,12 @@ class Fitting:
     vehicle: Vehicle
     heading_deg: float | None
     should_stop: Callable[[], bool] | None = None
+    most_measurements: int = 3000
     measurements: int = field(default=0, init=False)
 
     def fit(self, drawing: Drawing) -> tuple[Drawing, Measured]:
         """Better lines until their band keeps what is required, or nothing helps."""
-        self.measurements = 0
-        drawing = self._fewer(drawing)
+        drawing = self._fewer(_joined(drawing))
         for means in (self._gentle, self._all):
             drawing = self._descend(drawing, means)
             if self.measure(drawing).is_enough:
@@ -101,13 +104,14 @@ class Fitting:
 
     def foresee(self, drawing: Drawing, heading_deg: float | None) -> Envelope:
         """Give the band of lines."""
-        return envelope(
+        band = envelope(
             drawn.places(drawing),
             self.vehicle,
             heading_deg=heading_deg,
             speeds=drawn.speeds(drawing),
             stops=drawn.stops(drawing),
         )
+        return with_avoidance(band, self.vehicle, self.ground.edge)
 
     def measure(self, drawing: Drawing) -> Measured:
         """Measure whole lines."""
@@ -144,6 +148,7 @@ class Fitting:
             + _POINT_COST_S * len(part)
             + _NEAR_TURNS_COST_S * _near_turns(part)
             + _MISSING_COST_S_PER_M * float(missing_m.sum())
+            + _CROSSING_COST_S * int((lines_m <= 0).sum())
         )
         worst = [
             self._nearest(band, int(piece)) if missing > ENOUGH_M and piece >= 0 else (math.nan, math.nan)
@@ -164,6 +169,7 @@ class Fitting:
         yield from corner_means.merged(drawing, index - 1)
         if _is_corner(drawing, index) and abs(drawn.turn_deg(drawing, index)) > 25.0:
             yield from corner_means.split(drawing, index)
+            yield from corner_means.prolonged(drawing, index)
         if index <= 1 and self.heading_deg is not None:
             yield from corner_means.headed(drawing, self.heading_deg)
         if drawing[index].is_fixed:
@@ -232,7 +238,24 @@ class Fitting:
 
     def _is_over(self) -> bool:
         stop = self.should_stop is not None and self.should_stop()
-        return stop or self.measurements > _MOST_MEASUREMENTS
+        return stop or self.measurements > self.most_measurements
+
+
+def _joined(drawing: Drawing) -> Drawing:
+    """Give lines without tiny legs: pairs of points become one where the outer legs meet, or half-way."""
+    while True:
+        pairs = [
+            (math.dist(drawing[index].place, drawing[index + 1].place), index)
+            for index in range(1, len(drawing) - 2)
+            if not (drawing[index].is_fixed or drawing[index + 1].is_fixed)
+        ]
+        for length_m, index in sorted(pairs):
+            turn_deg = drawn.turn_deg(drawing, index) + drawn.turn_deg(drawing, index + 1)
+            if length_m < _TINY_LEG_M and abs(turn_deg) < _JOINED_TURN_DEG:
+                drawing = next(iter(corner_means.merged(drawing, index)), drawing)
+                break
+        else:
+            return drawing
 
 
 def _is_corner(drawing: Drawing, index: int) -> bool:

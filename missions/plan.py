@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from missions import clearance
+from missions.avoidance import with_avoidance
 from missions.clearance import known_vehicle, promise
 from missions.drawn import DrawnPoint
 from missions.drive_model import beyond_measured, envelope
@@ -290,13 +291,14 @@ def _band(ground: Ground, lines: Lines, vehicle: Vehicle, heading_deg: float | N
     """Foresee the drive; a heading that is not known is taken along the first leg."""
     if heading_deg is None:
         heading_deg = bearing_deg(*lines.path[:2])
-    return envelope(
+    band = envelope(
         ground.frame.to_local_array(lines.path),
         vehicle,
         heading_deg=heading_deg,
         speeds=lines.speeds,
         stops=lines.stops,
     )
+    return with_avoidance(band, vehicle, ground.edge)
 
 
 def _check_band(ground: Ground, lines: Lines, band: Envelope, found: DrivenRoute, asked: Promise) -> None:

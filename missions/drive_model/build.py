@@ -178,6 +178,7 @@ def _corner(route: Route, number: int) -> Corner:
         ),
         outside_overshoot_m=max(coming_m, going.left_m, midway.left_m) + band_m,
         reach_m=before.profile.length_m - before.profile.travelled_m(blend_s),
+        middle_m=plan.blend.reach_m,
         time_lost_s=plan.time_lost_s,
         bounded=plan.bounded,
     )

@@ -32,6 +32,8 @@ class Corner:
         How far it may get off its two legs to the inside and to the outside of the turn, the band included.
     reach_m : float
         How far before and after the waypoint it may leave the legs for the cut.
+    middle_m : float
+        How far before and after the waypoint the middle of the cut lies along each leg; 0 where it stops.
     time_lost_s : float
         Against driving on at full speed.
     bounded : bool
@@ -45,6 +47,7 @@ class Corner:
     inside_cut_m: float
     outside_overshoot_m: float
     reach_m: float
+    middle_m: float
     time_lost_s: float
     bounded: bool
 

@@ -53,6 +53,28 @@ def moved(drawing: Drawing, index: int, missing_m: float) -> Iterator[Drawing]:
             yield _with(drawing, index, shifted(drawing[index].place, way, unit_m * share))
 
 
+def bent(drawing: Drawing, index: int, place: Vector, away: Vector, missing_m: float) -> Iterator[Drawing]:
+    """Bend the leg to a point, or the one after it, away from a fence by a corner at a place beside it."""
+    along = drawn.distances_m(drawing)
+    longer, there = drawn.with_point_at(drawing, _along_m(drawing, along, place, index), APART_M)
+    if len(longer) > len(drawing):
+        for share in (1.0, 1.6, 2.5):
+            yield _with(longer, there, shifted(longer[there].place, away, share * missing_m + 0.05))
+
+
+def together(drawing: Drawing, index: int, missing_m: float) -> Iterator[Drawing]:
+    """Move a corner and the next one, or the one before, the same way."""
+    for other in (index - 1, index + 1):
+        if _is_end_or_fixed(drawing, index) or _is_end_or_fixed(drawing, other):
+            continue
+        for number in range(8):
+            way = _vector(45.0 * number)
+            for share in (0.7, 1.5, 3.0):
+                by_m = share * missing_m + 0.02
+                both = _with(drawing, index, shifted(drawing[index].place, way, by_m))
+                yield _with(both, other, shifted(drawing[other].place, way, by_m))
+
+
 def prolonged(drawing: Drawing, index: int) -> Iterator[Drawing]:
     """Turn later, or earlier, on the line of one of its legs; the corner itself may stay as a point of the line."""
     if _is_end_or_fixed(drawing, index):

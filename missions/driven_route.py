@@ -41,6 +41,7 @@ _DEPARTURES = 24
 _DEPARTURE_M = 15.0
 _DEPARTURE_SLACK_M = 0.05
 _BLOCK_M = 0.5
+_BLOCK_AWAY_M = 8.0
 _SHORTER_SHARE = 0.97
 
 
@@ -129,7 +130,7 @@ class RouteSearch:
         blocked: list[Polygon] = []
         while not found and len(blocked) < _OTHER_WAYS and not self._is_stopped():
             drawing, measured = refused[-1]
-            blocked.append(_block(drawing, measured))
+            blocked.append(_block(route, drawing, measured))
             try:
                 route = self._draw(routes[-1][1], blocked)
             except RouteError:
@@ -273,10 +274,11 @@ class RouteSearch:
         )
 
 
-def _block(drawing: Drawing, measured: Measured) -> Polygon:
-    """Give a small square where most is missing, to send the next route elsewhere."""
+def _block(route: Route, drawing: Drawing, measured: Measured) -> Polygon:
+    """Give a small square on a route near where most is missing, to send the next one elsewhere."""
     index = max(range(len(drawing)), key=lambda number: measured.missing_m[number])
-    place = drawing[index].place
-    if drawing[index].is_fixed:
-        place = drawing[min(max(index, 1), len(drawing) - 2)].place
-    return shapely.box(place[0] - _BLOCK_M, place[1] - _BLOCK_M, place[0] + _BLOCK_M, place[1] + _BLOCK_M)
+    place = measured.worst[index] if not math.isnan(measured.worst[index][0]) else drawing[index].place
+    line = shapely.LineString(route.points)
+    margin_m = min(_BLOCK_AWAY_M, line.length / 3)
+    along_m = min(max(line.project(Point(place)), margin_m), line.length - margin_m)
+    return line.interpolate(along_m).buffer(_BLOCK_M, cap_style="square")

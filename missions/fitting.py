@@ -33,6 +33,9 @@ ENOUGH_M = 0.002
 UNBOUNDED_EXTRA_M = 2.0
 """What corners that left the model when measured (by up to 1.6 m) have to keep on top."""
 
+FIT_MEASUREMENTS, MOST_MEASUREMENTS = 900, 2500
+"""Taken for one route, and for all that are tried: a search that is not done by then is given up."""
+
 _MISSING_COST_S_PER_M = 100.0
 _CROSSING_COST_S = 10_000.0
 _POINT_COST_S = 0.3
@@ -41,6 +44,7 @@ _TURN_DEG = 5.0
 _SHORT_LEG_M = 12.0
 _LEAST_GAIN_S = 0.05
 _CONTEXT = 3
+_MORE_TRIES = 12
 _TINY_LEG_M = 2.5
 _JOINED_TURN_DEG = 80.0
 
@@ -89,11 +93,12 @@ class Fitting:
     vehicle: Vehicle
     heading_deg: float | None
     should_stop: Callable[[], bool] | None = None
-    most_measurements: int = 3000
     measurements: int = field(default=0, init=False)
+    _until: int = field(default=0, init=False)
 
     def fit(self, drawing: Drawing) -> tuple[Drawing, Measured]:
         """Better lines until their band keeps what is required, or nothing helps."""
+        self._until = min(self.measurements + FIT_MEASUREMENTS, MOST_MEASUREMENTS)
         drawing = self._fewer(_joined(drawing))
         for means in (self._gentle, self._all):
             drawing = self._descend(drawing, means)
@@ -124,6 +129,9 @@ class Fitting:
         heading_deg = _course_deg(part) if begin or self.heading_deg is None else self.heading_deg
         band = self.foresee(part, heading_deg)
         clearances_m = band.clearances_m(self.ground.edge)
+        for piece in np.flatnonzero(clearances_m <= -band.bands_m):  # tell how deep in it lies
+            inside = shapely.difference(band.cores[piece], self.ground.allowed)
+            clearances_m[piece] -= math.sqrt(inside.area) + inside.length / 10
         least_m, pieces = np.full(len(part), np.inf), np.full(len(part), -1)
         for piece in np.argsort(-clearances_m):
             least_m[band.waypoints[piece]] = clearances_m[piece]
@@ -161,9 +169,20 @@ class Fitting:
         east_m, north_m = shapely.get_coordinates(line)[0].tolist()
         return (east_m, north_m)
 
+    def _away(self, place: Vector) -> Vector:
+        """Give the unit vector from the nearest fence to a place."""
+        line = shapely.shortest_line(self.ground.edge, shapely.Point(place))
+        (east_a, north_a), (east_b, north_b) = shapely.get_coordinates(line).tolist()
+        length_m = math.dist((east_a, north_a), (east_b, north_b)) or 1.0
+        return ((east_b - east_a) / length_m, (north_b - north_a) / length_m)
+
     def _gentle(self, drawing: Drawing, index: int, measured: Measured) -> Iterator[Drawing]:
         """Give the means that cost little time."""
-        yield from corner_means.moved(drawing, index, measured.missing_m[index])
+        missing_m, place = measured.missing_m[index], measured.worst[index]
+        yield from corner_means.moved(drawing, index, missing_m)
+        if not math.isnan(place[0]):
+            yield from corner_means.bent(drawing, index, place, self._away(place), missing_m)
+        yield from corner_means.together(drawing, index, missing_m)
         yield from corner_means.without(drawing, index)
         yield from corner_means.merged(drawing, index)
         yield from corner_means.merged(drawing, index - 1)
@@ -222,23 +241,30 @@ class Fitting:
         """Give the lines that gain most, if any do, judged by the part that changes and then on the whole."""
         known: dict[tuple[int, int], float] = {}
         gains: list[tuple[float, int, Drawing]] = []
+        solved_at = None
         for number, candidate in enumerate(candidates):
             begin, kept = _changed(drawing, candidate)
             span = (begin, len(drawing) - kept)
             if span not in known:
                 known[span] = self._measure(drawing, *span).cost_s
-            gain_s = known[span] - self._measure(candidate, begin, len(candidate) - kept).cost_s
+            found = self._measure(candidate, begin, len(candidate) - kept)
+            gain_s = known[span] - found.cost_s
             if gain_s > _LEAST_GAIN_S:
                 gains.append((gain_s, -number, candidate))
+                solved_at = number if found.is_enough and solved_at is None else solved_at
+            # The means come with the cheapest first: once one has done it, a few more are looked at.
+            if self._is_over() or (solved_at is not None and number >= solved_at + _MORE_TRIES):
+                break
         for _, _, candidate in sorted(gains, reverse=True)[:3]:
             found = self.measure(candidate)
-            if found.cost_s < measured.cost_s - _LEAST_GAIN_S:
+            more_m = sum(found.missing_m) - sum(measured.missing_m)
+            if found.cost_s < measured.cost_s - _LEAST_GAIN_S and more_m <= ENOUGH_M:
                 return candidate, found
         return None
 
     def _is_over(self) -> bool:
         stop = self.should_stop is not None and self.should_stop()
-        return stop or self.measurements > self.most_measurements
+        return stop or self.measurements > self._until
 
 
 def _joined(drawing: Drawing) -> Drawing:

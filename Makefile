@@ -8,7 +8,7 @@ PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; 
 BIN := .venv/bin
 OUT ?= demo-out
 
-.PHONY: bench bench-drive bench-transfer test-foreign docs soak bench-tlog fuzz demo test lint format types walls check lock clean
+.PHONY: package bench bench-drive bench-transfer test-foreign docs soak bench-tlog fuzz demo test lint format types walls check lock clean
 
 demo: .venv/run.stamp
 	$(BIN)/pbpp demo --out $(OUT)
@@ -48,6 +48,9 @@ check: lint types walls test
 docs: .venv/dev.stamp
 	$(BIN)/python docs/generated.py
 	$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_build
+
+package: .venv/dev.stamp
+	$(BIN)/python tools/package.py $(if $(LOWEST),--lowest)
 
 lock: .venv/run.stamp
 	$(BIN)/python -m pip install --quiet uv

@@ -333,7 +333,9 @@ class _Udp:
         if not select.select([self._socket], [], [], timeout_s)[0]:
             return b""
         received = []
-        with contextlib.suppress(BlockingIOError, ConnectionRefusedError):
+        with contextlib.suppress(
+            BlockingIOError, ConnectionError
+        ):  # Windows says "reset" of a port that refused
             while True:
                 data, peer = self._socket.recvfrom(_RECEIVE_BYTES)
                 self._peers.setdefault(peer)

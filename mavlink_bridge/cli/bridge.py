@@ -101,7 +101,12 @@ def bridge(
     `pbpp bridge --connect /dev/ttyAMA0,921600 --upload --drive --log run.tlog --json`
     """
     del config  # its callback has taken it
-    signal.signal(signal.SIGTERM, _end)
+    for name in (
+        "SIGTERM",
+        "SIGBREAK",
+    ):  # the latter is Ctrl-Break on Windows, where nothing sends the former
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), _end)
     from mavlink_bridge.cli.session import signing_of  # noqa: PLC0415
     from mavlink_bridge.director import Director, Orders  # noqa: PLC0415 - quick help
     from mavlink_bridge.director.orders import DEFAULT_SOURCES, TargetSource  # noqa: PLC0415
@@ -288,13 +293,11 @@ class _Shell:
 
 def _typed_lines() -> Iterator[str]:
     """Give what was typed, a line at a time; an empty text while nothing was. Does not wait."""
+    read = _keyboard_thread(0) if os.name == "nt" else _typed_now
     waiting = b""
-    is_open = True
     while True:
-        if is_open and b"\n" not in waiting and _has_input():
-            data = os.read(sys.stdin.fileno(), 4096)
-            is_open = bool(data)
-            waiting += data
+        if b"\n" not in waiting:
+            waiting += read()
         line, found, rest = waiting.partition(b"\n")
         if found:
             waiting = rest
@@ -303,11 +306,39 @@ def _typed_lines() -> Iterator[str]:
             yield ""
 
 
-def _has_input() -> bool:
+def _typed_now() -> bytes:
+    """Give what was typed, empty while nothing was."""
     try:
-        return bool(select.select([sys.stdin], [], [], 0)[0])
-    except (OSError, ValueError):  # no stdin, or one that cannot be waited for (Windows' console)
-        return False
+        has_input = bool(select.select([sys.stdin], [], [], 0)[0])
+        return os.read(sys.stdin.fileno(), 4096) if has_input else b""
+    except (OSError, ValueError):  # no stdin, or a closed one
+        return b""
+
+
+def _keyboard_thread(descriptor: int) -> Callable[[], bytes]:
+    """Give what gives what was typed, read by a thread: Windows cannot tell whether a console has input.
+
+    The thread reads the descriptor itself: one that waits in ``sys.stdin`` would hold its lock when the program ends.
+    """
+    import queue  # noqa: PLC0415 - only on Windows
+    import threading  # noqa: PLC0415
+
+    typed: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+
+    def read() -> None:
+        with contextlib.suppress(OSError):
+            while data := os.read(descriptor, 4096):
+                typed.put(data)
+
+    threading.Thread(target=read, name="keyboard", daemon=True).start()
+
+    def give() -> bytes:
+        try:
+            return typed.get_nowait()
+        except queue.Empty:
+            return b""
+
+    return give
 
 
 def _view(stack: contextlib.ExitStack, director: Director, *, is_wanted: bool) -> LiveView | None:

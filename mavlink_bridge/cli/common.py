@@ -54,7 +54,7 @@ ConnectOption = Annotated[
     typer.Option(
         "--connect",
         metavar="CONNECTION",
-        help="A live link: udpin:0.0.0.0:14550, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:…, /dev/ttyACM0[,BAUD].",
+        help="A live link: udpin:0.0.0.0:14550, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:…, /dev/ttyACM0[,BAUD], COM7[,BAUD].",
     ),
 ]
 SystemOption = Annotated[

@@ -41,7 +41,7 @@ RequiredConnectOption = Annotated[
     typer.Option(
         "--connect",
         metavar="CONNECTION",
-        help="udpin:0.0.0.0:14550, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:…, /dev/ttyACM0[,BAUD].",
+        help="udpin:0.0.0.0:14550, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:…, /dev/ttyACM0[,BAUD], COM7[,BAUD].",
     ),
 ]
 SigningKeyOption = Annotated[

@@ -1,0 +1,173 @@
+"""Build wheel and sdist, look into them, install the wheel into a fresh environment and plan with it: ``make package``.
+
+``--lowest`` installs the oldest dependencies that ``pyproject.toml`` allows, otherwise those of ``requirements/run.lock``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import email
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tarfile
+import tempfile
+import tomllib
+import venv
+import zipfile
+from pathlib import Path
+
+from packaging.metadata import Metadata
+
+ROOT = Path(__file__).parents[1]
+NEEDED = {
+    "pbpp/py.typed",
+    "missions/py.typed",
+    "mavlink_bridge/py.typed",
+    "mavlink_bridge/cli/data/maze-fence.waypoints",
+}
+START, TARGET = "40.071374,-105.229930", "40.0720926,-105.2286152"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--lowest", action="store_true")
+    lowest = parser.parse_args().lowest
+    dist = ROOT / "dist"
+    shutil.rmtree(dist, ignore_errors=True)
+    run(sys.executable, "-m", "hatchling", "build", "-d", str(dist), cwd=ROOT)
+    (wheel,), (sdist,) = dist.glob("*.whl"), dist.glob("*.tar.gz")
+    names = look_into_wheel(wheel)
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder)
+        look_into_sdist(sdist, names, place)
+        install_and_plan(wheel, place, lowest=lowest)
+    print(f"good: {wheel.name}, {sdist.name}")
+
+
+def run(*command: str, cwd: Path, **options: str) -> str:
+    done = subprocess.run(
+        command, cwd=cwd, capture_output=True, text=True, check=False, env={**os.environ, **options}
+    )
+    if done.returncode:
+        sys.exit(f"{' '.join(command)}\n{done.stdout}{done.stderr}")
+    return done.stdout
+
+
+def look_into_wheel(wheel: Path) -> set[str]:
+    """Check the metadata as an index would, and that what is needed is there; give the names of all files."""
+    with zipfile.ZipFile(wheel) as archive:
+        names = set(archive.namelist())
+        (info,) = {name.split("/")[0] for name in names if ".dist-info/" in name}
+        text = archive.read(f"{info}/METADATA")
+        entries = archive.read(f"{info}/entry_points.txt").decode()
+    metadata = Metadata.from_email(text, validate=True)
+    description = email.message_from_bytes(text).get_payload()
+    assert metadata.description_content_type == "text/markdown", metadata.description_content_type
+    assert description.strip(), "no description"
+    assert f"{info}/licenses/LICENSE" in names, "no LICENSE"
+    assert "pbpp = mavlink_bridge.cli:main" in entries, entries
+    assert names >= NEEDED, f"not in the wheel: {NEEDED - names}"
+    foreign = {
+        name for name in names if name.split("/")[0] not in {"pbpp", "missions", "mavlink_bridge", info}
+    }
+    assert not foreign, f"does not belong into the wheel: {foreign}"
+    return names
+
+
+def look_into_sdist(sdist: Path, names: set[str], place: Path) -> None:
+    """Check that the sdist makes the same wheel."""
+    with tarfile.open(sdist) as archive:
+        archive.extractall(place / "sdist", filter="data")
+    (source,) = (place / "sdist").iterdir()
+    run(sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(place / "again"), cwd=source)
+    (again,) = (place / "again").glob("*.whl")
+    with zipfile.ZipFile(again) as archive:
+        assert set(archive.namelist()) == names, set(archive.namelist()) ^ names
+    for needed in (
+        "LICENSE",
+        "README.md",
+        "Makefile",
+        "Containerfile",
+        "tests/conftest.py",
+        "examples/plan_a_file.py",
+        "docs/conf.py",
+    ):
+        assert (source / needed).is_file(), f"not in the sdist: {needed}"
+
+
+def install_and_plan(wheel: Path, place: Path, *, lowest: bool) -> None:
+    """Install into an environment of its own; run the command far from the checkout."""
+    venv.create(place / "env", with_pip=True)
+    python = place / "env" / ("Scripts" if os.name == "nt" else "bin") / "python"
+    constraints = place / "constraints.txt"
+    constraints.write_text(lowest_versions() if lowest else locked_versions())
+    run(
+        str(python),
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
+        "--disable-pip-version-check",
+        "-c",
+        str(constraints),
+        f"{wheel}[plot]",
+        cwd=place,
+    )
+    run(str(python), "-m", "pip", "check", "--disable-pip-version-check", cwd=place)
+    print(
+        run(
+            str(python), "-m", "pip", "list", "--format=freeze", "--disable-pip-version-check", cwd=place
+        ).replace("\n", " ")
+    )
+    shutil.copy(ROOT / "tests" / "fields" / "yard-fence.waypoints", place / "fence.waypoints")
+    pbpp = str(python.with_name("pbpp"))
+    clean = {
+        "XDG_CONFIG_HOME": str(place / "config"),
+        "XDG_STATE_HOME": str(place / "state"),
+        "PYTHONWARNINGS": "error::UserWarning",
+    }
+    print(run(pbpp, "--version", cwd=place, **clean).strip())
+    plan = ["plan", "--fence", "fence.waypoints", "--start", START, "--target", TARGET]
+    told = run(
+        pbpp,
+        *plan,
+        "-o",
+        "m.plan",
+        "-o",
+        "m.waypoints",
+        "--plot",
+        "m.png",
+        "--plot",
+        "m.html",
+        "--json",
+        cwd=place,
+        **clean,
+    )
+    document = json.loads(told)
+    assert document["status"] == "ok", document
+    assert all((place / name).stat().st_size > 100 for name in document["outputs"])
+    looked = json.loads(run(pbpp, "doctor", "--json", cwd=place, **clean))
+    assert looked["status"] == "ok", looked
+    driven = json.loads(run(pbpp, "demo", "--speedup", "20", "--out", "demo", "--json", cwd=place, **clean))
+    assert (driven["arrived"], driven["breaches"], driven["verified"]) == (True, 0, True), driven
+
+
+def locked_versions() -> str:
+    """Give the lock file without its hashes: a local wheel has none."""
+    text = (ROOT / "requirements" / "run.lock").read_text()
+    return "\n".join(re.findall(r"^[\w.-]+==[^\\\n]*", text, re.MULTILINE))
+
+
+def lowest_versions() -> str:
+    """Give the oldest versions that are allowed of what is named itself."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    wanted = [*project["dependencies"], *project["optional-dependencies"]["plot"]]
+    return "\n".join(need.replace(">=", "==") for need in wanted)
+
+
+if __name__ == "__main__":
+    main()

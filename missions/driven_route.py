@@ -97,6 +97,8 @@ class RouteSearch:
         ``optimal``, ``pbpp-taut`` or ``pbpp``.
     should_stop : callable, optional
         Asked now and then; True ends the search.
+    escape : bool
+        Whether a start on forbidden ground may be left.
     """
 
     ground: Ground
@@ -109,6 +111,7 @@ class RouteSearch:
     snap_m: float = 0.0
     method: str = "optimal"
     should_stop: Callable[[], bool] | None = None
+    escape: bool = False
 
     def find(self) -> DrivenRoute:
         """Find the quickest of the routes tried whose band keeps what is required.
@@ -176,6 +179,7 @@ class RouteSearch:
             blocked=blocked,
             snap_m=self.snap_m,
             method=self.method,
+            escape=self.escape,
             should_stop=self.should_stop,
         )
 
@@ -197,16 +201,16 @@ class RouteSearch:
             route.start_clearance_m,
             targets,
             route.blocks,
-            self.departure_m,
+            self._least_departing_m(route),
         )
         found.append((measured.cost_s, driven))
 
     def _drawing(self, route: Route) -> Drawing:
         """Give a route's lines with what each point has to keep: where it leads away, no less than the start does."""
         required_m = self.required_m + self.reserve_m
-        near_m = self.departure_m + self.reserve_m
-        line_m = min(required_m, route.start_clearance_m)
-        fixed = {0, *route.target_indices}
+        near_m = self._least_departing_m(route) + self.reserve_m
+        line_m = min(required_m, route.start_clearance_m) if route.start_clearance_m >= 0 else -math.inf
+        fixed = {0, *route.target_indices} | ({1} if route.start_clearance_m < 0 else set())
         leading = {*range(max(route.lead_away, 1) + 1)} - {*route.target_indices}
         return tuple(
             DrawnPoint(
@@ -238,6 +242,10 @@ class RouteSearch:
             if best_m >= self.required_m + self.reserve_m:
                 return self.required_m
         return min(self.required_m, best_m - 2 * self.reserve_m - _DEPARTURE_SLACK_M)
+
+    def _least_departing_m(self, route: Route) -> float:
+        """Give what the band has to keep while the route leads away; nothing while it leaves forbidden ground."""
+        return self.departure_m if route.start_clearance_m >= 0 else -math.inf
 
     def _lead_away(self, drawing: Drawing) -> int:
         """Give how many of the first legs lead away."""

@@ -156,7 +156,7 @@ class Fitting:
             + _POINT_COST_S * len(part)
             + _NEAR_TURNS_COST_S * _near_turns(part)
             + _MISSING_COST_S_PER_M * float(missing_m.sum())
-            + _CROSSING_COST_S * int((lines_m <= 0).sum())
+            + _CROSSING_COST_S * int(((lines_m <= 0) & np.isfinite(asked_m)).sum())
         )
         worst = [
             self._nearest(band, int(piece)) if missing > ENOUGH_M and piece >= 0 else (math.nan, math.nan)

@@ -123,7 +123,10 @@ def check_lines(ground: Ground, lines: Lines, start_clearance_m: float, asked_m:
     clearances_m = [ground.clearance_m(drawn_leg(ground, a, b)) for a, b in pairwise(lines.path)]
     if not ground.edge.is_empty:  # it may stand so far off the autopilot's
         clearances_m = [max(0.0, clearance_m - EDGE_BOW_M) for clearance_m in clearances_m]
-    least_m = {"lead-away": min(start_clearance_m, asked_m) - ROUNDING_RESERVE_M, "route": asked_m}
+    leading_m = min(start_clearance_m, asked_m) - ROUNDING_RESERVE_M
+    if start_clearance_m < 0:  # it leaves forbidden ground
+        leading_m = 0.0
+    least_m = {"lead-away": leading_m, "route": asked_m}
     parts = {"lead-away": clearances_m[: lines.lead_away], "route": clearances_m[lines.lead_away :]}
     for name, found in parts.items():
         if found and min(found) < least_m[name] - 1e-6:

@@ -255,6 +255,7 @@ class _Problem:
             self.request.snap_m,
             self.request.method,
             self.should_stop,
+            self.request.escape,
         )
 
     def uniform(self, asked: Promise) -> tuple[Promise, DrivenRoute]:
@@ -268,6 +269,7 @@ class _Problem:
             targets,
             snap_m=self.request.snap_m,
             method=self.request.method,
+            escape=self.request.escape,
             should_stop=self.should_stop,
         )
         rounding_m = reserve_m(self.ground)
@@ -322,6 +324,10 @@ def _check_band(ground: Ground, lines: Lines, band: Envelope, found: DrivenRoute
 def _lead_away_warnings(found: DrivenRoute, least_m: float) -> list[str]:
     if not found.lead_away:
         return []
+    if found.start_clearance_m < 0:
+        return [
+            f"the start is on forbidden ground, {-found.start_clearance_m:.2f} m from free ground: the first leg drives out of it"
+        ]
     if found.lead_away_m is None:
         distance = f"{found.start_clearance_m:.2f} m from a fence, nearer than {least_m:.2f} m"
         return [f"the start stands {distance}: the route first leads away, never nearer than that"]

@@ -49,7 +49,7 @@ class Route:
     lead_away : int
         How many of the first legs lead away from a fence that the start stands nearer to than the clearance.
     start_clearance_m : float
-        The start's distance to the nearest fence.
+        The start's distance to the nearest fence; negative on forbidden ground, by the distance to free ground.
     target_indices : tuple of int
         Which points are the targets, in order.
     blocks : int
@@ -78,6 +78,7 @@ def find_route(  # noqa: PLR0913 - what is sought, and how
     blocked: Sequence[Polygon] = (),
     method: str = "optimal",
     snap_m: float = 0.0,
+    escape: bool = False,
     should_stop: Callable[[], bool] | None = None,
 ) -> Route:
     """Find the shortest route over the targets in the order given.
@@ -98,6 +99,8 @@ def find_route(  # noqa: PLR0913 - what is sought, and how
         ``optimal``, ``pbpp-taut`` or ``pbpp``.
     snap_m : float
         A blocked target is moved to free ground within this distance.
+    escape : bool
+        Whether a start on forbidden ground is left by the shortest straight line that crosses no other forbidden ground.
     should_stop : callable, optional
         Asked now and then; True ends the search.
 
@@ -113,10 +116,12 @@ def find_route(  # noqa: PLR0913 - what is sought, and how
         union=ground.union,
     )
     search = _Search(ground, planner, clearance_m, method, should_stop, promised_m, bool(blocked))
-    start_clearance_m = search.check_start(start)
+    start_clearance_m = search.check_start(start, escape=escape)
     goals = [search.free_target(target, snap_m, start) for target in targets]
     lead: list[LocalPoint] = [start]
-    if not search.is_free(start):
+    if start_clearance_m < 0:
+        lead = search.escape(start, goals[0])
+    elif not search.is_free(start):
         lead = search.lead_away(start, start_clearance_m, goals[0])
     points = [np.array(lead)]
     target_indices = []
@@ -196,8 +201,8 @@ class _Search:
             )
         return parts
 
-    def check_start(self, start: LocalPoint) -> float:
-        """Give the start's clearance.
+    def check_start(self, start: LocalPoint, *, escape: bool) -> float:
+        """Give the start's clearance; on ground that it may escape from, the distance to free ground below 0.
 
         Raises
         ------
@@ -210,6 +215,8 @@ class _Search:
             return self.ground.clearance_m(point)
         free = self.ground.nearest_point(self.ground.allowed, point)
         distance, bearing, position = self._way(start, free)
+        if escape:
+            return -max(distance, _INSIDE_M)
         names = _names([barrier.name for barrier in forbidding])
         raise StartBlockedError(
             f"the start is on forbidden ground ({self._position(start)}): {names}; "
@@ -271,6 +278,43 @@ class _Search:
                 east_m, north_m = exits[np.argmin(detours_m)].tolist()
                 return [start, LocalPoint(east_m, north_m)]
         raise self._no_route(start, goal)
+
+    def escape(self, start: LocalPoint, goal: LocalPoint) -> list[LocalPoint]:
+        """Give the first points of a route off forbidden ground: straight out, across no other forbidden ground.
+
+        Raises
+        ------
+        StartBlockedError
+            Every such line crosses other forbidden ground.
+        """
+        ground = self.ground
+        free = self._component(goal)
+        forbidding = ground.forbidding(Point(start))
+        own = shapely.union_all(
+            [
+                barrier.area if barrier.kind is ZoneKind.EXCLUSION else ground.bounds.difference(barrier.area)
+                for barrier in forbidding
+            ]
+        )
+        for wider in _WIDER:
+            reach_m = wider * (2 * Point(start).distance(free) + 1.0)
+            near = free.boundary.intersection(Point(start).buffer(reach_m))
+            exits = shapely.get_coordinates(near.segmentize(max(0.25, reach_m / 200)))
+            legs = shapely.linestrings([[start, xy] for xy in exits]) if len(exits) else np.array([])
+            outside = shapely.difference(legs, ground.allowed)
+            # Straight out: forbidden ground ahead is that of the start, in one piece.
+            keeps = (shapely.length(shapely.difference(outside, own)) < _INSIDE_M) & (
+                shapely.get_num_geometries(outside) == 1
+            )
+            if keeps.any():
+                east_m, north_m = exits[keeps][np.argmin(shapely.length(legs[keeps]))].tolist()
+                return [start, LocalPoint(east_m, north_m)]
+        names = [barrier.name for barrier in forbidding]
+        raise StartBlockedError(
+            f"the start is on forbidden ground ({self._position(start)}): {_names(names)}; every straight way out crosses other "
+            "forbidden ground",
+            fences=names,
+        )
 
     def _exits(
         self, start: LocalPoint, start_clearance_m: float, free: Polygon, reach_m: float

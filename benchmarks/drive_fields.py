@@ -40,7 +40,7 @@ class Field:
 
 def make_field(seed: int) -> Field:
     """Give the field of a seed."""
-    rng = random.Random(seed)  # noqa: S311 - reproducible fields, no secrets
+    rng = random.Random(seed)
     kind = ("yard", "circles", "gates", "hairpins")[seed % 4]
     size_m = rng.uniform(80.0, 220.0)
     clearance_m = rng.choice(CLEARANCES_M)
@@ -91,7 +91,7 @@ def _outline(rng: random.Random, size_m: float) -> Polygon:
     )
 
 
-def _yard(rng: random.Random, outline: Polygon, size_m: float, _: float) -> tuple[list[Polygon], Circles]:
+def _yard(rng: random.Random, _outline: Polygon, size_m: float, _: float) -> tuple[list[Polygon], Circles]:
     """Give buildings, some of them with a court, turned any way."""
     found: list[Polygon] = []
     for _try in range(rng.randint(3, 9)):

@@ -24,6 +24,16 @@ from mavlink_bridge.cli.common import (
     warn,
 )
 from mavlink_bridge.cli.upload import SigningKeyOption
+from mavlink_bridge.cli.vehicle_options import (
+    EscapeOption,
+    GpsOption,
+    LengthOption,
+    PositionErrorOption,
+    ReserveOption,
+    SpeedOption,
+    WidthOption,
+    with_vehicle,
+)
 from mavlink_bridge.errors import UsageError
 
 if TYPE_CHECKING:
@@ -71,6 +81,13 @@ def plan(
         float,
         typer.Option(metavar="M", min=0.0, help="Move a blocked target to free ground within M metres."),
     ] = 0.0,
+    speed: SpeedOption = None,
+    reserve: ReserveOption = 0.0,
+    position_error: PositionErrorOption = None,
+    length: LengthOption = 0.0,
+    width: WidthOption = 0.0,
+    gps: GpsOption = "0,0",
+    escape: EscapeOption = False,
     order: Annotated[
         str, typer.Option(metavar="|".join(_ORDERS), help="best: the targets in the shortest order.")
     ] = "given",
@@ -122,6 +139,14 @@ def plan(
     """
     outputs, plots = output or [], plot or []
     request = request_from_options(start, target or [], clearance, corner_allowance, snap, method)
+    request = with_vehicle(
+        request,
+        speed=speed,
+        reserve=reserve,
+        position_error=position_error,
+        size=(length, width, gps),
+        escape=escape,
+    )
     request = _with_tour(request, order, end, via_mission, comes_back=come_back, drive=drive)
     _check_options(fence, log, connect, upload=upload or drive, outputs=outputs, plots=plots)
     if json_output and Path("-") in plots:

@@ -1,0 +1,79 @@
+"""Options that say what a vehicle needs: speed, size, how well its position is known, a reserve of the owner's."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mavlink_bridge.errors import UsageError
+
+if TYPE_CHECKING:
+    from missions.request import Request
+
+SpeedOption = Annotated[
+    float | None, typer.Option(metavar="M/S", help="Drive at this speed. Default: the vehicle's own.")
+]
+ReserveOption = Annotated[
+    float, typer.Option(metavar="M", help="Kept on top of the clearance, for wind and slip.")
+]
+PositionErrorOption = Annotated[
+    float | None,
+    typer.Option(metavar="M", help="Of the vehicle's position, kept on top too. Default: from its fix."),
+]
+EscapeOption = Annotated[
+    bool, typer.Option("--escape", help="Let a vehicle that stands on forbidden ground drive out.")
+]
+LengthOption = Annotated[float, typer.Option(metavar="M", help="The vehicle's length, tools included.")]
+WidthOption = Annotated[float, typer.Option(metavar="M", help="The vehicle's width, tools included.")]
+GpsOption = Annotated[
+    str,
+    typer.Option(metavar="FORWARD,RIGHT", help="The GPS antenna from the middle of the vehicle, metres."),
+]
+
+
+def with_vehicle(
+    request: Request,
+    *,
+    speed: float | None,
+    reserve: float,
+    position_error: float | None,
+    size: tuple[float, float, str],
+    escape: bool,
+) -> Request:
+    """Add what a vehicle needs to what is asked of a plan; ``size`` is its length, width and antenna.
+
+    Raises
+    ------
+    UsageError
+        An option is not what it has to be.
+    """
+    from missions.vehicle import Footprint  # noqa: PLC0415 - quick help
+
+    length_m, width_m, antenna = size
+    for option, value in (
+        ("--reserve", reserve),
+        ("--position-error", position_error or 0.0),
+        ("--length", length_m),
+        ("--width", width_m),
+    ):
+        if not 0 <= value < math.inf:
+            raise UsageError(f"{option} {value:g}: expected metres (0 or more)")
+    if speed is not None and not 0 < speed < math.inf:
+        raise UsageError(f"--speed {speed:g}: expected metres a second, above 0")
+    try:
+        forward_m, right_m = (float(part) for part in antenna.split(","))
+    except ValueError:
+        raise UsageError(f"--gps {antenna!r}: expected FORWARD,RIGHT in metres") from None
+    if not (math.isfinite(forward_m) and math.isfinite(right_m)):
+        raise UsageError(f"--gps {antenna!r}: expected FORWARD,RIGHT in metres")
+    return replace(
+        request,
+        speed_mps=speed,
+        reserve_m=reserve,
+        position_error_m=position_error,
+        footprint=Footprint(length_m, width_m, forward_m, right_m),
+        escape=escape,
+    )

@@ -68,13 +68,13 @@ class TestDoctor:
 
         def shape(zone):
             if hasattr(zone, "radius_m"):
-                return shapely.Point(chart(*zone.centre[::-1])).buffer(zone.radius_m, quad_segs=64)
+                return shapely.Point(chart(*zone.centre[::-1])).buffer(zone.radius_m, quad_segs=34)
             return shapely.Polygon([chart(*vertex[::-1]) for vertex in zone.vertices])
 
         inside = shapely.union_all([shape(zone) for zone in fence.zones if zone.kind is ZoneKind.INCLUSION])
         outside = shapely.union_all([shape(zone) for zone in fence.zones if zone.kind is ZoneKind.EXCLUSION])
         clearance_m = 2.5
-        free = inside.buffer(-clearance_m, quad_segs=6).difference(outside.buffer(clearance_m, quad_segs=6))
+        free = inside.buffer(-clearance_m, quad_segs=3).difference(outside.buffer(clearance_m, quad_segs=3))
         ends = [chart(*place[::-1]) for place in (doctor_command._START, doctor_command._TARGET)]
         shortest_m = graph.shortest_length(free, *ends)
         assert doctor_command.SHORTEST_M <= shortest_m <= 1.001 * doctor_command.SHORTEST_M

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
 
-    from missions.drive_model import Envelope
+    from missions.drive_model import Corner, Envelope
     from missions.vehicle import Vehicle
 
 SPEEDS_MPS = (1.0, 2.0, 5.0)
@@ -33,8 +33,12 @@ TAIL_M = 12.0
 """So far inside the next leg it then still is, and so much farther along it comes back to it."""
 
 _LEAST_TURN_DEG = 8.0
-_SHARES = (0.0, 0.25, 0.5)
-"""Of the turn: the directions in which a fence ahead slows it."""
+_SLOW_MPS = 0.7
+_OUT_DEG = 20.0
+"""It may look so far to the outside of its course when it comes to a corner."""
+
+_IN_THE_TURN = ((0.25, 2.0), (0.5, 2.0), (0.75, 1.5), (1.0, 1.0))
+"""Shares of the turn, and how much it tells when avoidance slows it there: speed missing of that meant, times this."""
 
 
 def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry) -> Envelope:
@@ -65,11 +69,10 @@ def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry) -> Env
         within_m, more_m, aside_m = (
             float(np.interp(speed_mps, SPEEDS_MPS, table)) for table in (WITHIN_M, MORE_M, ASIDE_M)
         )
-        ahead = _Ahead(band.points, corner.waypoint, corner.turn_deg, vehicle.stops_within_m)
-        spare_m = ahead.spare_m(fence, within_m)
-        if spare_m >= within_m:
+        ahead = _Ahead(band.points, corner, vehicle, fence)
+        share = max(ahead.before(within_m), ahead.within())
+        if not share:
             continue
-        share = 1 - max(spare_m, 0.0) / within_m
         reach_m = 2 * corner.middle_m + more_m * share
         hull = [
             *_along(band.points[: corner.waypoint + 1][::-1], reach_m),
@@ -91,28 +94,52 @@ def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry) -> Env
 
 @dataclass(frozen=True, slots=True)
 class _Ahead:
-    """Where a corner looks to."""
+    """What lies ahead of a rover at a corner; the answers are 1 where avoidance slows it most, 0 where it does not."""
 
     points: NDArray[np.float64]
-    index: int
-    turn_deg: float
-    margin_m: float
+    corner: Corner
+    vehicle: Vehicle
+    fence: BaseGeometry
 
-    def spare_m(self, fence: BaseGeometry, within_m: float) -> float:
-        """Give how far beyond the corner the margin of a fence ahead begins; infinite beyond a distance."""
-        place = self.points[self.index]
-        reach_m = self.margin_m + within_m
-        if shapely.distance(shapely.Point(place), fence) > reach_m:
+    @property
+    def course_rad(self) -> float:
+        """The course to the corner."""
+        east_m, north_m = self.points[self.corner.waypoint] - self.points[self.corner.waypoint - 1]
+        return math.atan2(east_m, north_m)
+
+    def before(self, within_m: float) -> float:
+        """Tell from how near the margin lies behind the corner."""
+        place = self.points[self.corner.waypoint]
+        out_rad = -math.copysign(math.radians(_OUT_DEG), self.corner.turn_deg)
+        spare_m = min(self._spare_m(place, self.course_rad + by_rad, within_m) for by_rad in (0.0, out_rad))
+        return max(0.0, 1 - max(spare_m, 0.0) / within_m)
+
+    def within(self) -> float:
+        """Tell from the speed that avoidance allows in the turn, and the speed meant there."""
+        turn_rad = math.radians(self.corner.turn_deg)
+        half_mps = math.sqrt(2 * self.vehicle.accel_max_mps2 * self.corner.middle_m)
+        meant_mps = 2 * half_mps * math.cos(turn_rad / 2)
+        inside_rad = self.course_rad + turn_rad / 2 + math.copysign(math.pi / 2, turn_rad)
+        inside_m = 2 * self.corner.middle_m * abs(math.sin(turn_rad / 2))
+        middle = self.points[self.corner.waypoint] + inside_m * np.array(
+            [math.sin(inside_rad), math.cos(inside_rad)]
+        )
+        gain_per_s = self.vehicle.position_gain_per_s
+        most = 0.0
+        for share, weight in _IN_THE_TURN if meant_mps > _SLOW_MPS else ():
+            spare_m = self._spare_m(middle, self.course_rad + share * turn_rad, meant_mps / gain_per_s)
+            most = max(most, weight * (1 - max(spare_m, 0.0) * gain_per_s / meant_mps))
+        return min(most, 1.0)
+
+    def _spare_m(self, place: NDArray[np.float64], way_rad: float, within_m: float) -> float:
+        """Give how far ahead of a place the margin of a fence begins; infinite beyond a distance."""
+        reach_m = self.vehicle.stops_within_m + within_m
+        here = shapely.Point(place)
+        if not shapely.dwithin(here, self.fence, reach_m):
             return math.inf
-        course_rad = math.atan2(*(place - self.points[self.index - 1]))
-        spares_m = [math.inf]
-        for share in _SHARES:
-            ahead_rad = course_rad + math.radians(self.turn_deg) * share
-            there = (place[0] + reach_m * math.sin(ahead_rad), place[1] + reach_m * math.cos(ahead_rad))
-            met = shapely.intersection(shapely.LineString([place, there]), fence)
-            if not met.is_empty:
-                spares_m.append(float(shapely.distance(shapely.Point(place), met)) - self.margin_m)
-        return min(spares_m)
+        there = (place[0] + reach_m * math.sin(way_rad), place[1] + reach_m * math.cos(way_rad))
+        met = shapely.intersection(shapely.LineString([place, there]), self.fence)
+        return math.inf if met.is_empty else float(shapely.distance(here, met)) - self.vehicle.stops_within_m
 
 
 def _along(points: NDArray[np.float64], reach_m: float) -> list[tuple[float, float]]:

@@ -87,14 +87,15 @@ def promise(situation: Situation, request: Request, vehicle: Vehicle) -> Promise
             warnings.append(f"{_stops(vehicle)}; the clearance of {promised_m:g} m is less")
         error_m = request.reserve_m + (request.position_error_m or 0.0)
         return Promise(promised_m, error_m, request.corner_allowance_m, tuple(warnings))
-    if vehicle.stops_within_m and promised_m < vehicle.stops_within_m + MARGIN_RESERVE_M:
-        raised_m = vehicle.stops_within_m + MARGIN_RESERVE_M
+    error_m, told = _position_error_m(situation.fix.value if situation.fix else None, request)
+    # Avoidance goes by where the vehicle believes to be: the error of its position counts towards the margin.
+    raised_m = vehicle.stops_within_m + MARGIN_RESERVE_M - error_m
+    if vehicle.stops_within_m and promised_m < raised_m:
         if not request.widest:
             warnings.append(
                 f"{_stops(vehicle)}; the clearance of {promised_m:g} m is raised to {raised_m:g} m"
             )
         promised_m = raised_m
-    error_m, told = _position_error_m(situation.fix.value if situation.fix else None, request)
     return Promise(promised_m, error_m + request.reserve_m, None, (*warnings, *told))
 
 

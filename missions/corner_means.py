@@ -53,6 +53,17 @@ def moved(drawing: Drawing, index: int, missing_m: float) -> Iterator[Drawing]:
             yield _with(drawing, index, shifted(drawing[index].place, way, unit_m * share))
 
 
+def eased(drawing: Drawing, index: int, step_m: float) -> Iterator[Drawing]:
+    """Move a corner a step back towards the straight line, or along its legs."""
+    out = None if _is_end_or_fixed(drawing, index) else drawn.outward(drawing, index)
+    if out is None:
+        return
+    along = (-out[1], out[0])
+    back = (-out[0], -out[1])
+    for way in (back, along, (out[1], -out[0])):
+        yield _with(drawing, index, shifted(drawing[index].place, way, step_m))
+
+
 def bent(drawing: Drawing, index: int, place: Vector, away: Vector, missing_m: float) -> Iterator[Drawing]:
     """Bend the leg to a point, or the one after it, away from a fence by a corner at a place beside it."""
     along = drawn.distances_m(drawing)

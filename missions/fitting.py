@@ -33,6 +33,9 @@ ENOUGH_M = 0.002
 UNBOUNDED_EXTRA_M = 2.0
 """What corners that left the model when measured (by up to 1.6 m) have to keep on top."""
 
+TURN_BACK_DEG, TURN_BACK_EXTRA_M = 165.0, 4.0
+"""A turn so sharp may be driven round either side; the model tells of one."""
+
 FIT_MEASUREMENTS, MOST_MEASUREMENTS = 900, 2500
 """Taken for one route, and for all that are tried: a search that is not done by then is given up."""
 
@@ -45,6 +48,7 @@ _SHORT_LEG_M = 12.0
 _LEAST_GAIN_S = 0.05
 _CONTEXT = 3
 _MORE_TRIES = 12
+_EASING_STEPS_M = (1.6, 0.5)
 _TINY_LEG_M = 2.5
 _JOINED_TURN_DEG = 80.0
 
@@ -103,7 +107,7 @@ class Fitting:
         for means in (self._gentle, self._all):
             drawing = self._descend(drawing, means)
             if self.measure(drawing).is_enough:
-                drawing = self._fewer(drawing)
+                drawing = self._eased(self._fewer(drawing))
                 break
         return drawing, self.measure(drawing)
 
@@ -143,9 +147,11 @@ class Fitting:
         asked_m = np.array([point.line_m for point in part])
         missing_m = np.maximum(np.maximum(required_m - least_m, asked_m - lines_m), 0.0)
         for corner in band.corners:
-            if not corner.bounded:
+            turns_back = abs(corner.turn_deg) > TURN_BACK_DEG and not corner.pivots
+            if not corner.bounded or turns_back:
                 here = slice(corner.waypoint, corner.waypoint + 2)
-                room_m = required_m[here] + UNBOUNDED_EXTRA_M - least_m[here]
+                extra_m = TURN_BACK_EXTRA_M if turns_back else UNBOUNDED_EXTRA_M
+                room_m = required_m[here] + extra_m - least_m[here]
                 missing_m[here] = np.maximum(missing_m[here], room_m)
         if begin:
             missing_m[0] = 0.0
@@ -233,6 +239,18 @@ class Fitting:
             else:
                 drawing, measured = better
                 index = max(index - 1, 1)
+        return drawing
+
+    def _eased(self, drawing: Drawing) -> Drawing:
+        """Take back, step by step, what the route does not need."""
+        measured = self.measure(drawing)
+        for step_m in _EASING_STEPS_M:
+            for index in range(1, len(drawing) - 1):
+                while not self._is_over():
+                    better = self._best(drawing, measured, corner_means.eased(drawing, index, step_m))
+                    if better is None:
+                        break
+                    drawing, measured = better
         return drawing
 
     def _best(

@@ -13,12 +13,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
+import shapely.ops
+
+from missions.drive_model.corner import INSIDE_BAND_M
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
 
-    from missions.drive_model import Corner, Envelope
+    from missions.drive_model import Envelope
     from missions.vehicle import Vehicle
 
 SPEEDS_MPS = (1.0, 2.0, 5.0)
@@ -33,6 +36,7 @@ TAIL_M = 12.0
 """So far inside the next leg it then still is, and so much farther along it comes back to it."""
 
 _LEAST_TURN_DEG = 8.0
+_NEGLIGIBLE_M = 0.1
 _SLOW_MPS = 0.7
 _OUT_DEG = 20.0
 """It may look so far to the outside of its course when it comes to a corner."""
@@ -60,74 +64,123 @@ def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry) -> Env
     """
     if not vehicle.stops_within_m or fence.is_empty:
         return band
-    cores, bands_m, waypoints = [], [], []
-    for number, corner in enumerate(band.corners):
-        if corner.stops or abs(corner.turn_deg) < _LEAST_TURN_DEG:
-            continue
-        place = band.points[corner.waypoint]
-        speed_mps = max(band.legs[number].top_speed_mps, band.legs[number + 1].top_speed_mps)
-        within_m, more_m, aside_m = (
-            float(np.interp(speed_mps, SPEEDS_MPS, table)) for table in (WITHIN_M, MORE_M, ASIDE_M)
-        )
-        ahead = _Ahead(band.points, corner, vehicle, fence)
-        share = max(ahead.before(within_m), ahead.within())
-        if not share:
-            continue
-        reach_m = 2 * corner.middle_m + more_m * share
-        hull = [
-            *_along(band.points[: corner.waypoint + 1][::-1], reach_m),
-            *_along(band.points[corner.waypoint :], reach_m + TAIL_M * share),
-            _aside(band.points[corner.waypoint :], reach_m, math.copysign(aside_m * share, corner.turn_deg)),
-        ]
-        cores.append(shapely.convex_hull(shapely.multipoints([place, *hull])))
-        bands_m.append(min(band.legs[number].half_width_m, 0.3))
-        waypoints.append(corner.waypoint)
-    if not cores:
+    more = [
+        piece
+        for number, corner in enumerate(band.corners)
+        if not corner.stops and abs(corner.turn_deg) >= _LEAST_TURN_DEG
+        for piece in _pieces(band, number, vehicle, fence)
+    ]
+    if not more:
         return band
     return replace(
         band,
-        cores=np.array([*band.cores, *cores], dtype=np.object_),
-        bands_m=np.array([*band.bands_m, *bands_m]),
-        waypoints=np.array([*band.waypoints, *waypoints], dtype=np.int64),
+        cores=np.array([*band.cores, *(piece.core for piece in more)], dtype=np.object_),
+        bands_m=np.array([*band.bands_m, *(piece.band_m for piece in more)]),
+        waypoints=np.array([*band.waypoints, *(piece.waypoint for piece in more)], dtype=np.int64),
     )
+
+
+@dataclass(frozen=True, slots=True)
+class _Piece:
+    """One more piece of an envelope."""
+
+    core: BaseGeometry
+    band_m: float
+    waypoint: int
+
+
+def _pieces(band: Envelope, number: int, vehicle: Vehicle, fence: BaseGeometry) -> list[_Piece]:
+    """Give what a corner needs more: its cut, and the tail of it at the next corner."""
+    corner, before, after = band.corners[number], band.legs[number], band.legs[number + 1]
+    place = band.points[corner.waypoint]
+    bend = _Bend(band.points[before.first], place, band.points[after.first + 1], corner.turn_deg)
+    speed_mps = max(before.top_speed_mps, after.top_speed_mps)
+    within_m, more_m, aside_m = (
+        float(np.interp(speed_mps, SPEEDS_MPS, table)) for table in (WITHIN_M, MORE_M, ASIDE_M)
+    )
+    ahead = _Ahead(bend, corner.middle_m, vehicle, fence)
+    share = max(ahead.before(within_m), ahead.within())
+    if not share:
+        return []
+    band_m = min(before.half_width_m, INSIDE_BAND_M)
+    left_m, cut = bend.cut(2 * corner.middle_m + more_m * share, aside_m * share)
+    pieces = [_Piece(cut, band_m, corner.waypoint)]
+    if left_m > _NEGLIGIBLE_M and number + 2 < len(band.legs):
+        # The next leg ends before the rover is back on it: it comes to the next corner so far aside, and leaves it so.
+        first = band.legs[number + 2].first
+        leg = shapely.LineString(band.points[[first, first + 1]])
+        tail = shapely.ops.substring(leg, 0.0, min(TAIL_M * left_m / ASIDE_M[-1], leg.length))
+        pieces.append(_Piece(tail, band_m + left_m, band.corners[number + 1].waypoint))
+    return pieces
+
+
+@dataclass(frozen=True, slots=True)
+class _Bend:
+    """A corner between two legs, in the plane."""
+
+    before: NDArray[np.float64]
+    place: NDArray[np.float64]
+    after: NDArray[np.float64]
+    turn_deg: float
+
+    @property
+    def course_rad(self) -> float:
+        """The course to the corner."""
+        east_m, north_m = self.place - self.before
+        return math.atan2(east_m, north_m)
+
+    def cut(self, reach_m: float, aside_m: float) -> tuple[float, BaseGeometry]:
+        """Give the ground of a cut, and how far aside the rover still is where the next leg ends."""
+        back, back_m = _unit(self.before - self.place)
+        ahead, ahead_m = _unit(self.after - self.place)
+        inside = math.copysign(1.0, self.turn_deg) * np.array([ahead[1], -ahead[0]])
+        near_m, far_m = min(reach_m, ahead_m), min(reach_m + TAIL_M, ahead_m)
+        left_m = aside_m * (1 - (far_m - near_m) / TAIL_M)
+        corners = [
+            self.place,
+            self.place + min(reach_m, back_m) * back,
+            self.place + near_m * ahead + aside_m * inside,
+            self.place + far_m * ahead + left_m * inside,
+            self.place + far_m * ahead,
+        ]
+        return left_m, shapely.MultiPoint(corners).convex_hull
+
+
+def _unit(step: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+    length_m = float(np.hypot(*step))
+    return step / (length_m or 1.0), length_m
 
 
 @dataclass(frozen=True, slots=True)
 class _Ahead:
     """What lies ahead of a rover at a corner; the answers are 1 where avoidance slows it most, 0 where it does not."""
 
-    points: NDArray[np.float64]
-    corner: Corner
+    bend: _Bend
+    middle_m: float
     vehicle: Vehicle
     fence: BaseGeometry
 
-    @property
-    def course_rad(self) -> float:
-        """The course to the corner."""
-        east_m, north_m = self.points[self.corner.waypoint] - self.points[self.corner.waypoint - 1]
-        return math.atan2(east_m, north_m)
-
     def before(self, within_m: float) -> float:
         """Tell from how near the margin lies behind the corner."""
-        place = self.points[self.corner.waypoint]
-        out_rad = -math.copysign(math.radians(_OUT_DEG), self.corner.turn_deg)
-        spare_m = min(self._spare_m(place, self.course_rad + by_rad, within_m) for by_rad in (0.0, out_rad))
+        out_rad = -math.copysign(math.radians(_OUT_DEG), self.bend.turn_deg)
+        spare_m = min(
+            self._spare_m(self.bend.place, self.bend.course_rad + by_rad, within_m)
+            for by_rad in (0.0, out_rad)
+        )
         return max(0.0, 1 - max(spare_m, 0.0) / within_m)
 
     def within(self) -> float:
         """Tell from the speed that avoidance allows in the turn, and the speed meant there."""
-        turn_rad = math.radians(self.corner.turn_deg)
-        half_mps = math.sqrt(2 * self.vehicle.accel_max_mps2 * self.corner.middle_m)
+        turn_rad = math.radians(self.bend.turn_deg)
+        half_mps = math.sqrt(2 * self.vehicle.accel_max_mps2 * self.middle_m)
         meant_mps = 2 * half_mps * math.cos(turn_rad / 2)
-        inside_rad = self.course_rad + turn_rad / 2 + math.copysign(math.pi / 2, turn_rad)
-        inside_m = 2 * self.corner.middle_m * abs(math.sin(turn_rad / 2))
-        middle = self.points[self.corner.waypoint] + inside_m * np.array(
-            [math.sin(inside_rad), math.cos(inside_rad)]
-        )
+        inside_rad = self.bend.course_rad + turn_rad / 2 + math.copysign(math.pi / 2, turn_rad)
+        inside_m = 2 * self.middle_m * abs(math.sin(turn_rad / 2))
+        middle = self.bend.place + inside_m * np.array([math.sin(inside_rad), math.cos(inside_rad)])
         gain_per_s = self.vehicle.position_gain_per_s
         most = 0.0
         for share, weight in _IN_THE_TURN if meant_mps > _SLOW_MPS else ():
-            spare_m = self._spare_m(middle, self.course_rad + share * turn_rad, meant_mps / gain_per_s)
+            spare_m = self._spare_m(middle, self.bend.course_rad + share * turn_rad, meant_mps / gain_per_s)
             most = max(most, weight * (1 - max(spare_m, 0.0) * gain_per_s / meant_mps))
         return min(most, 1.0)
 
@@ -137,22 +190,6 @@ class _Ahead:
         here = shapely.Point(place)
         if not shapely.dwithin(here, self.fence, reach_m):
             return math.inf
-        there = (place[0] + reach_m * math.sin(way_rad), place[1] + reach_m * math.cos(way_rad))
+        there = place + reach_m * np.array([math.sin(way_rad), math.cos(way_rad)])
         met = shapely.intersection(shapely.LineString([place, there]), self.fence)
         return math.inf if met.is_empty else float(shapely.distance(here, met)) - self.vehicle.stops_within_m
-
-
-def _along(points: NDArray[np.float64], reach_m: float) -> list[tuple[float, float]]:
-    """Give the first point of lines and the place at a distance from it, no farther than the next point."""
-    (a_east, a_north), (b_east, b_north) = points[:2].tolist()
-    length_m = math.dist((a_east, a_north), (b_east, b_north))
-    share = min(1.0, reach_m / length_m) if length_m else 1.0
-    return [(a_east, a_north), (a_east + (b_east - a_east) * share, a_north + (b_north - a_north) * share)]
-
-
-def _aside(points: NDArray[np.float64], reach_m: float, right_m: float) -> tuple[float, float]:
-    """Give the place at a distance along a leg and so far to its right."""
-    start, (east_m, north_m) = _along(points, reach_m)
-    length_m = math.dist(start, (east_m, north_m)) or 1.0
-    ahead_east, ahead_north = (east_m - start[0]) / length_m, (north_m - start[1]) / length_m
-    return (east_m + ahead_north * right_m, north_m - ahead_east * right_m)

@@ -36,7 +36,7 @@ UNBOUNDED_EXTRA_M = 2.0
 TURN_BACK_DEG, TURN_BACK_EXTRA_M = 165.0, 4.0
 """A turn so sharp may be driven round either side; the model tells of one."""
 
-FIT_MEASUREMENTS, MOST_MEASUREMENTS = 900, 2500
+FIT_MEASUREMENTS, MOST_MEASUREMENTS = 700, 1800
 """Taken for one route, and for all that are tried: a search that is not done by then is given up."""
 
 _MISSING_COST_S_PER_M = 100.0

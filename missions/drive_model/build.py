@@ -66,12 +66,11 @@ def envelope(
     start, behind_m = _start(array, vehicle, heading_deg)
     route = plan_route(array, vehicle, speeds, stops or {}, start)
     pieces = Pieces()
-    add_start(pieces, route, array, behind_m)
-    for number in range(len(route.legs)):
-        add_leg(pieces, route, number)
-        if number < len(route.corners):
-            add_corner(pieces, route, number)
-    add_end(pieces, route)
+    _add_route(pieces, route, array, behind_m)
+    if heading_deg is None and len(array) > 1:
+        # Starting straight on it is sooner at speed, and then strays further from short legs than after the worst start.
+        along, behind_m = _start(array, vehicle, _bearing_deg(array))
+        _add_route(pieces, plan_route(array, vehicle, speeds, stops or {}, along), array, behind_m)
     return Envelope(
         points=array,
         cores=pieces.cores(),
@@ -81,6 +80,24 @@ def envelope(
         legs=tuple(_leg(route, number) for number in range(len(route.legs))),
         arrivals_s=_arrivals_s(route, len(array)),
     )
+
+
+def _add_route(pieces: Pieces, route: Route, points: NDArray[np.float64], behind_m: float) -> None:
+    add_start(pieces, route, points, behind_m)
+    for number in range(len(route.legs)):
+        add_leg(pieces, route, number)
+        if number < len(route.corners):
+            add_corner(pieces, route, number)
+    add_end(pieces, route)
+
+
+def _bearing_deg(points: NDArray[np.float64]) -> float:
+    """Give the bearing of the first leg that leads anywhere."""
+    away = points[np.hypot(*(points - points[0]).T) > SAME_PLACE_M]
+    if not len(away):
+        return 0.0
+    east_m, north_m = away[0] - points[0]
+    return math.degrees(math.atan2(east_m, north_m)) % 360.0
 
 
 def corner_forecast(

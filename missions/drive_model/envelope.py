@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
 QUARTER_SEGMENTS = 8
+_ROUNDING_M = 2e-6
+"""What joining many polygons may take from their outline."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +121,7 @@ class Envelope:
     def pieces(self) -> NDArray[np.object_]:
         """The band piece by piece, in the order of `waypoints`."""
         # Buffers of few segments lie inside the true circle; grown a little they hold it.
-        grown_m = self.bands_m / np.cos(np.pi / (4 * QUARTER_SEGMENTS))
+        grown_m = self.bands_m / np.cos(np.pi / (4 * QUARTER_SEGMENTS)) + _ROUNDING_M
         pieces: NDArray[np.object_] = shapely.buffer(self.cores, grown_m, quad_segs=QUARTER_SEGMENTS)
         return pieces
 

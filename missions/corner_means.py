@@ -29,6 +29,7 @@ APART_M = 3.0
 """Turns nearer to one another are one turn to a rover."""
 
 STOP_S = 1.0
+CRAWL_M = 18.0
 HEAD_M = (5.0, 9.0, 15.0)
 SIDE_DEG = (0.0, 35.0, -35.0, 70.0, -70.0)
 APPROACHES = 8
@@ -163,6 +164,32 @@ def slowed(drawing: Drawing, index: int, place: Vector, speed_mps: float) -> Ite
                 _slower(point, slow_mps) if first < number <= last else point
                 for number, point in enumerate(longer)
             )
+
+
+def crawling(drawing: Drawing, spots: list[Vector], speed_mps: float) -> Drawing:
+    """Drive at the slowest speed for a good way about each of some spots near the lines."""
+    slow_mps = min(SLOW_MPS)
+    if slow_mps >= speed_mps:
+        return drawing
+    stretches = []
+    for spot in spots:
+        along = drawn.distances_m(drawing)
+        at_m = min(
+            (_along_m(drawing, along, spot, index) for index in range(1, len(drawing))),
+            key=lambda there_m: math.dist(drawn.place_at(drawing, there_m), spot),
+        )
+        begin_m, end_m = max(at_m - CRAWL_M, 0.0), min(at_m + CRAWL_M, along[-1])
+        drawing, _ = drawn.with_point_at(drawing, begin_m, APART_M)
+        drawing, _ = drawn.with_point_at(drawing, end_m, APART_M)
+        stretches.append((begin_m - APART_M, end_m + APART_M))
+    along = drawn.distances_m(drawing)
+    return tuple(
+        _slower(point, slow_mps)
+        if number
+        and any(begin_m <= along[number - 1] and along[number] <= end_m for begin_m, end_m in stretches)
+        else point
+        for number, point in enumerate(drawing)
+    )
 
 
 def stopped(drawing: Drawing, index: int) -> Iterator[Drawing]:

@@ -125,6 +125,14 @@ def distances_m(drawing: Sequence[DrawnPoint]) -> list[float]:
     return found
 
 
+def place_at(drawing: Drawing, along_m: float) -> Vector:
+    """Give the place at a distance along the lines."""
+    along = distances_m(drawing)
+    after = next((number for number, there_m in enumerate(along) if there_m > along_m), len(along) - 1)
+    ahead = direction(drawing[after - 1], drawing[after])
+    return shifted(drawing[after - 1].place, ahead, along_m - along[after - 1])
+
+
 def with_point_at(drawing: Drawing, along_m: float, near_m: float) -> tuple[Drawing, int]:
     """Give the lines with a point at a distance along them, and its number; a point that lies nearer than ``near_m`` does."""
     along = distances_m(drawing)

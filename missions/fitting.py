@@ -36,8 +36,8 @@ UNBOUNDED_EXTRA_M = 2.0
 TURN_BACK_DEG, TURN_BACK_EXTRA_M = 165.0, 4.0
 """A turn so sharp may be driven round either side; the model tells of one."""
 
-FIT_MEASUREMENTS, MOST_MEASUREMENTS = 700, 1800
-"""Taken for one route, and for all that are tried: a search that is not done by then is given up."""
+FIT_MEASUREMENTS, CRAWL_MEASUREMENTS, MOST_MEASUREMENTS = 600, 500, 2200
+"""Taken for one route, for a slow one, and for all that are tried: a search that is not done by then is given up."""
 
 _MISSING_COST_S_PER_M = 100.0
 _CROSSING_COST_S = 10_000.0
@@ -102,8 +102,23 @@ class Fitting:
 
     def fit(self, drawing: Drawing) -> tuple[Drawing, Measured]:
         """Better lines until their band keeps what is required, or nothing helps."""
-        self._until = min(self.measurements + FIT_MEASUREMENTS, MOST_MEASUREMENTS)
-        drawing = self._fewer(_joined(drawing))
+        drawn_first = _joined(drawing)
+        self._allow(FIT_MEASUREMENTS)
+        drawing, measured = self._fitted(self._fewer(drawn_first))
+        if not measured.is_enough:
+            # Many small corners in little room: begin again, slowly all about them.
+            spots = [drawing[index].place for index, m in enumerate(measured.missing_m) if m > ENOUGH_M]
+            slow = corner_means.crawling(drawn_first, spots, self.vehicle.speed_mps)
+            self._allow(CRAWL_MEASUREMENTS)
+            other, found = self._fitted(slow)
+            if sum(found.missing_m) < sum(measured.missing_m):
+                return other, found
+        return drawing, measured
+
+    def _allow(self, measurements: int) -> None:
+        self._until = min(self.measurements + measurements, MOST_MEASUREMENTS)
+
+    def _fitted(self, drawing: Drawing) -> tuple[Drawing, Measured]:
         for means in (self._gentle, self._all):
             drawing = self._descend(drawing, means)
             if self.measure(drawing).is_enough:

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from missions.drive_model import Envelope
     from missions.vehicle import Vehicle
 
+    Edges = tuple[NDArray[np.float64], NDArray[np.float64]]
+
 SPEEDS_MPS = (1.0, 2.0, 5.0)
 MORE_M = (0.3, 2.6, 3.9)
 """At these speeds: by so much more of both legs a rover cuts a corner when the margin lies right behind it."""
@@ -41,7 +43,7 @@ _SLOW_MPS = 0.7
 _OUT_DEG = 20.0
 """It may look so far to the outside of its course when it comes to a corner."""
 
-_IN_THE_TURN = ((0.25, 2.0), (0.5, 2.0), (0.75, 1.5), (1.0, 1.0))
+_IN_THE_TURN = np.array([(0.25, 2.0), (0.5, 2.0), (0.75, 1.5), (1.0, 1.0)])
 """Shares of the turn, and how much it tells when avoidance slows it there: speed missing of that meant, times this."""
 
 
@@ -64,11 +66,12 @@ def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry) -> Env
     """
     if not vehicle.stops_within_m or fence.is_empty:
         return band
+    edges = _edges(fence)
     more = [
         piece
         for number, corner in enumerate(band.corners)
         if not corner.stops and abs(corner.turn_deg) >= _LEAST_TURN_DEG
-        for piece in _pieces(band, number, vehicle, fence)
+        for piece in _pieces(band, number, vehicle, edges)
     ]
     if not more:
         return band
@@ -89,7 +92,7 @@ class _Piece:
     waypoint: int
 
 
-def _pieces(band: Envelope, number: int, vehicle: Vehicle, fence: BaseGeometry) -> list[_Piece]:
+def _pieces(band: Envelope, number: int, vehicle: Vehicle, edges: Edges) -> list[_Piece]:
     """Give what a corner needs more: its cut, and the tail of it at the next corner."""
     corner, before, after = band.corners[number], band.legs[number], band.legs[number + 1]
     place = band.points[corner.waypoint]
@@ -98,7 +101,7 @@ def _pieces(band: Envelope, number: int, vehicle: Vehicle, fence: BaseGeometry) 
     within_m, more_m, aside_m = (
         float(np.interp(speed_mps, SPEEDS_MPS, table)) for table in (WITHIN_M, MORE_M, ASIDE_M)
     )
-    ahead = _Ahead(bend, corner.middle_m, vehicle, fence)
+    ahead = _Ahead(bend, corner.middle_m, vehicle, edges)
     share = max(ahead.before(within_m), ahead.within())
     if not share:
         return []
@@ -158,38 +161,44 @@ class _Ahead:
     bend: _Bend
     middle_m: float
     vehicle: Vehicle
-    fence: BaseGeometry
+    edges: Edges
 
     def before(self, within_m: float) -> float:
         """Tell from how near the margin lies behind the corner."""
         out_rad = -math.copysign(math.radians(_OUT_DEG), self.bend.turn_deg)
-        spare_m = min(
-            self._spare_m(self.bend.place, self.bend.course_rad + by_rad, within_m)
-            for by_rad in (0.0, out_rad)
-        )
-        return max(0.0, 1 - max(spare_m, 0.0) / within_m)
+        ways_rad = self.bend.course_rad + np.array([0.0, out_rad])
+        return max(0.0, 1 - float(self._spares_m(self.bend.place, ways_rad).min()) / within_m)
 
     def within(self) -> float:
         """Tell from the speed that avoidance allows in the turn, and the speed meant there."""
         turn_rad = math.radians(self.bend.turn_deg)
         half_mps = math.sqrt(2 * self.vehicle.accel_max_mps2 * self.middle_m)
         meant_mps = 2 * half_mps * math.cos(turn_rad / 2)
+        if meant_mps <= _SLOW_MPS:
+            return 0.0
         inside_rad = self.bend.course_rad + turn_rad / 2 + math.copysign(math.pi / 2, turn_rad)
         inside_m = 2 * self.middle_m * abs(math.sin(turn_rad / 2))
         middle = self.bend.place + inside_m * np.array([math.sin(inside_rad), math.cos(inside_rad)])
-        gain_per_s = self.vehicle.position_gain_per_s
-        most = 0.0
-        for share, weight in _IN_THE_TURN if meant_mps > _SLOW_MPS else ():
-            spare_m = self._spare_m(middle, self.bend.course_rad + share * turn_rad, meant_mps / gain_per_s)
-            most = max(most, weight * (1 - max(spare_m, 0.0) * gain_per_s / meant_mps))
-        return min(most, 1.0)
+        spares_m = self._spares_m(middle, self.bend.course_rad + _IN_THE_TURN[:, 0] * turn_rad)
+        allowed_mps = spares_m * self.vehicle.position_gain_per_s
+        return float(np.clip(_IN_THE_TURN[:, 1] * (1 - allowed_mps / meant_mps), 0.0, 1.0).max())
 
-    def _spare_m(self, place: NDArray[np.float64], way_rad: float, within_m: float) -> float:
-        """Give how far ahead of a place the margin of a fence begins; infinite beyond a distance."""
-        reach_m = self.vehicle.stops_within_m + within_m
-        here = shapely.Point(place)
-        if not shapely.dwithin(here, self.fence, reach_m):
-            return math.inf
-        there = place + reach_m * np.array([math.sin(way_rad), math.cos(way_rad)])
-        met = shapely.intersection(shapely.LineString([place, there]), self.fence)
-        return math.inf if met.is_empty else float(shapely.distance(here, met)) - self.vehicle.stops_within_m
+    def _spares_m(self, place: NDArray[np.float64], ways_rad: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Give how far ahead of a place the margin of a fence begins, for each way; infinite where there is none."""
+        starts, steps = self.edges
+        ahead = np.column_stack((np.sin(ways_rad), np.cos(ways_rad)))[:, None, :]
+        off = starts - place
+        with np.errstate(divide="ignore", invalid="ignore"):  # an edge along the way is met at its neighbours
+            cross = ahead[..., 0] * steps[:, 1] - ahead[..., 1] * steps[:, 0]
+            away_m = (off[:, 0] * steps[:, 1] - off[:, 1] * steps[:, 0]) / cross
+            share = (off[:, 0] * ahead[..., 1] - off[:, 1] * ahead[..., 0]) / cross
+        met = (away_m >= 0) & (share >= 0) & (share <= 1)
+        found: NDArray[np.float64] = np.where(met, away_m, np.inf).min(axis=1, initial=np.inf)
+        return np.maximum(found - self.vehicle.stops_within_m, 0.0)
+
+
+def _edges(fence: BaseGeometry) -> Edges:
+    """Give the straight pieces of lines: where they start, and the way to their ends."""
+    points, lines = shapely.get_coordinates(shapely.get_parts(fence), return_index=True)
+    joined = lines[1:] == lines[:-1]
+    return points[:-1][joined], np.diff(points, axis=0)[joined]

@@ -5,15 +5,27 @@ from __future__ import annotations
 import itertools
 import math
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 import shapely
+from charts import (
+    FIELD,
+    HOME,
+    IN,
+    MERCATOR_TOLERANCE_M,
+    OUT,
+    WALL,
+    Chart,
+    box,
+    length_m,
+    place,
+    polygon,
+    situation_of,
+)
 from hypothesis import given, settings
-from pyproj import Proj
-from shapely import LineString, Point, Polygon
-from strategies import GEOD, RandomField, offset, random_fields
+from shapely import Polygon
+from strategies import RandomField, random_fields
 
 from missions.errors import (
     FenceError,
@@ -25,95 +37,13 @@ from missions.errors import (
     StartBlockedError,
     TargetBlockedError,
 )
-from missions.fence import CircleZone, Fence, PolygonZone, Zone, ZoneKind
+from missions.fence import CircleZone, Fence, ZoneKind
 from missions.formats import read_fence
-from missions.geo import LatLon, rounded, wrap_lon_deg
+from missions.geo import LatLon, rounded
 from missions.items import MissionItem, waypoint
 from missions.plan import Plan, plan
 from missions.request import Request
 from missions.situation import Known, ListKind, ListTransfer, Mission, Pose, Situation
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-HOME = LatLon(40.071374, -105.22993)
-IN, OUT = ZoneKind.INCLUSION, ZoneKind.EXCLUSION
-MERCATOR_TOLERANCE_M = 2e-3  # a transverse Mercator's stretch over some kilometres, and chords of the samples
-
-
-def straight(a: LatLon, b: LatLon, pieces: int = 40) -> list[tuple[float, float]]:
-    """Sample the autopilot's line: straight in latitude and longitude."""
-    east_deg = wrap_lon_deg(b.lon_deg - a.lon_deg)
-    return [
-        (a.lat_deg + (b.lat_deg - a.lat_deg) * i / pieces, a.lon_deg + east_deg * i / pieces)
-        for i in range(pieces + 1)
-    ]
-
-
-class Chart:
-    """The test's own map: transverse Mercator about a place."""
-
-    def __init__(self, centre: LatLon) -> None:
-        self._proj = Proj(proj="tmerc", ellps="WGS84", lat_0=centre.lat_deg, lon_0=centre.lon_deg, k=1)
-
-    def points(self, places: Sequence[tuple[float, float]]) -> np.ndarray:
-        lat_lon = np.array(places)
-        return np.column_stack(self._proj(lat_lon[:, 1], lat_lon[:, 0]))
-
-    def line(self, path: Sequence[LatLon]) -> LineString:
-        return LineString(self.points([place for a, b in pairwise(path) for place in straight(a, b)]))
-
-    def zone_line(self, zone: PolygonZone) -> LineString:
-        return self.line([*zone.vertices, zone.vertices[0]])
-
-    def clearance_m(self, zone: Zone, path: Sequence[LatLon]) -> float:
-        """Give a path's distance to where it must not be, negative (or 0) where it is there."""
-        line = self.line(path)
-        if isinstance(zone, CircleZone):
-            centre = Point(self.points([zone.centre])[0])
-            if zone.kind is OUT:
-                return line.distance(centre) - zone.radius_m
-            return zone.radius_m - max(centre.distance(Point(xy)) for xy in line.coords)
-        inside = _even_odd(shapely.get_coordinates(self.zone_line(zone)), line.coords[0])
-        return line.distance(self.zone_line(zone)) * (1 if inside == (zone.kind is IN) else -1)
-
-    def fence_clearance_m(self, fence: Fence, path: Sequence[LatLon]) -> float:
-        return min((self.clearance_m(zone, path) for zone in fence.zones), default=math.inf)
-
-
-def _even_odd(ring: np.ndarray, point: tuple[float, float]) -> bool:
-    a, b = ring[:-1], ring[1:]
-    spans = (a[:, 1] > point[1]) != (b[:, 1] > point[1])
-    a, b = a[spans], b[spans]
-    return bool(
-        (a[:, 0] + (point[1] - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0]) > point[0]).sum() % 2
-    )
-
-
-def length_m(path: Sequence[LatLon]) -> float:
-    return sum(GEOD.inv(a.lon_deg, a.lat_deg, b.lon_deg, b.lat_deg)[2] for a, b in pairwise(path))
-
-
-def polygon(kind: ZoneKind, *east_north_m: tuple[float, float], origin: LatLon = HOME) -> PolygonZone:
-    return PolygonZone(kind, tuple(rounded(offset(origin, *point)) for point in east_north_m))
-
-
-def box(
-    kind: ZoneKind, west_m: float, south_m: float, east_m: float, north_m: float, origin: LatLon = HOME
-) -> PolygonZone:
-    return polygon(
-        kind, (west_m, south_m), (east_m, south_m), (east_m, north_m), (west_m, north_m), origin=origin
-    )
-
-
-def place(east_m: float, north_m: float, origin: LatLon = HOME) -> LatLon:
-    return rounded(offset(origin, east_m, north_m))
-
-
-def situation_of(*zones: Zone, **parameters: float) -> Situation:
-    return Situation(
-        fence=Known(Fence(zones), None, "test"), parameters=parameters, home=Known(HOME, None, "test")
-    )
 
 
 def drawn(situation: Situation, start: LatLon, *targets: LatLon, clearance_m: float = 2.0, **options) -> Plan:
@@ -139,10 +69,6 @@ def assert_consistent(result: Plan) -> None:
     assert all(length_m(leg) <= 1000.5 for leg in pairwise(result.path))
     assert result.targets[-1] == result.path[-1]
     assert set(result.targets) <= set(result.path)
-
-
-FIELD = box(IN, -100, -100, 100, 100)
-WALL = box(OUT, -5, -80, 5, 60)
 
 
 @given(random_fields())

@@ -6,10 +6,12 @@ from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
+from hypothesis.internal.conjecture import providers
 
 _ROOT = Path(__file__).parents[1]
 
-# A fixed seed and no database: a run says the same today and tomorrow. `--hypothesis-profile=search` looks further.
+# A fixed seed and no database: a run says the same today and tomorrow. `--hypothesis-profile=search` looks further,
+# with new seeds and with the constants of the code under test.
 settings.register_profile(
     "default", derandomize=True, database=None, deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
@@ -17,6 +19,13 @@ settings.register_profile(
     "search", max_examples=2000, database=None, deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile("default")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Keep the default examples the same: drawn from the constants of loaded modules, each edit would change them."""
+    if config.getoption("--hypothesis-profile", None) is None and hasattr(providers, "_get_local_constants"):
+        nothing = providers._local_constants
+        providers._get_local_constants = lambda: nothing
 
 
 @pytest.fixture(scope="session")

@@ -22,13 +22,16 @@ from mavlink_bridge.cli.common import (
     progress_bar,
     warn,
 )
-from mavlink_bridge.errors import UsageError
+from mavlink_bridge.errors import LinkError, UsageError
 
 if TYPE_CHECKING:
     from mavlink_bridge.cli.session import Address
     from mavlink_bridge.messages import Frame
     from missions.check import CheckedLeg, MissionCheck
     from missions.situation import Situation
+
+_TELEMETRY_PATIENCE_S = 5.0
+"""A vehicle that tells its position does so at least once a second."""
 
 
 def check(
@@ -86,6 +89,7 @@ def check(
 
     begin = parse_lat_lon(start) if start else None
     situation: Situation | None = None
+    unknown: list[str] = []
     if log is not None:
         from mavlink_bridge.recorded import situation_from_log  # noqa: PLC0415 - pymavlink only where needed
 
@@ -94,14 +98,14 @@ def check(
         from mavlink_bridge.cli.session import Address as At  # noqa: PLC0415 - only with a link
 
         address = At(connect, (source_system, source_component), system, any_vehicle, timeout)
-        situation = _live_situation(address, quiet=quiet or json_output)
+        situation, unknown = _live_situation(address, quiet=quiet or json_output)
     situation = _with_files(situation, mission, fence, vehicle)
     if situation.mission is None:
         raise UsageError(f"{log or connect} tells of no mission; give one (--mission FILE)")
     if begin is None and log is not None and situation.home is not None:
         begin = situation.home.value  # at a log's end the vehicle may stand anywhere on its way
     checked = check_mission(situation.mission.value, situation, clearance, start=begin)
-    warnings = [*checked.warnings, *storage_warnings(checked.mission.items, situation)]
+    warnings = [*unknown, *checked.warnings, *storage_warnings(checked.mission.items, situation)]
     warn(warnings)
     _draw(checked, situation, plots)
     if json_output:
@@ -158,8 +162,8 @@ def _with_files(
     return found
 
 
-def _live_situation(address: Address, *, quiet: bool) -> Situation:
-    """Read mission, fence, rally points and parameters from the vehicle; nothing is written to it.
+def _live_situation(address: Address, *, quiet: bool) -> tuple[Situation, list[str]]:
+    """Read mission, fence, rally points and parameters from the vehicle; nothing is written to it. Give what it did not tell, too.
 
     Raises
     ------
@@ -187,15 +191,22 @@ def _live_situation(address: Address, *, quiet: bool) -> Situation:
                 heard = fold(heard, frame, now_s())
 
         session.listeners.append(listen)
+        session.ask_telemetry()
         items, fence, rally = (read_list(session, what) for what in ("mission", "fence", "rally"))
         machine = ReadParameters(session.vehicle, (*PARAMETER_NAMES, *END_NAMES))
         session.run(machine, "reading parameters")
-    assert machine.outcome is not None
+        # What is promised rests on the fix: whether it is known must not be a matter of luck.
+        session.listen_until(lambda: heard.pose is not None and heard.fix is not None, _TELEMETRY_PATIENCE_S)
+    if machine.outcome is None or machine.outcome.is_silent:
+        raise LinkError("the vehicle does not answer when asked for its parameters")
     source = "the vehicle"
     home = items[0].position if items and (items[0].lat_e7, items[0].lon_e7) != (0, 0) else None
+    unknown = []
     if heard.pose is None:
-        warn(["the vehicle did not tell its position: it is taken to stand at its home"])
-    return replace(
+        unknown.append("the vehicle did not tell its position: it is taken to stand at its home")
+    if heard.fix is None:
+        unknown.append("the vehicle did not tell how good its position is: no room is kept for its error")
+    found = replace(
         heard,
         fence=Known(fence_from_items(fence), None, source) if fence else None,
         mission=Known(Mission(without_home(items), home), None, source),
@@ -203,6 +214,7 @@ def _live_situation(address: Address, *, quiet: bool) -> Situation:
         home=Known(home, None, source) if home else heard.home,
         parameters={**heard.parameters, **machine.outcome.values},
     )
+    return found, unknown
 
 
 def _draw(checked: MissionCheck, situation: Situation, plots: list[Path]) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from mavlink_bridge.errors import LinkError, OutcomeError, RefusedError
 from mavlink_bridge.link import open_link
-from mavlink_bridge.messages import Autopilot, CommandLong, Heartbeat, ModeFlag
+from mavlink_bridge.messages import Autopilot, CommandLong, Heartbeat, ModeFlag, RequestDataStream
 from mavlink_bridge.protocol.command import SendCommand
 from mavlink_bridge.protocol.find import FindVehicle
 from mavlink_bridge.protocol.peer import Peer
@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
 _MODE_PATIENCE_S = 5.0
 _FRESH_S = 3.0
+_STREAMS = (6, 2)
+"""MAV_DATA_STREAM_POSITION and _EXTENDED_STATUS, which holds GPS_RAW_INT."""
+_STREAM_HZ = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,9 +152,20 @@ class Session:
             raise RefusedError(
                 f"the vehicle refused mode {name}: {outcome.result.name}{texts}", result=outcome.result.name
             )
-        self._link.run(_Listen(_MODE_PATIENCE_S), on_frames=self._listen, until=lambda: self._is_in(mode))
-        if not self._is_in(mode):
+        if not self.listen_until(lambda: self._is_in(mode), _MODE_PATIENCE_S):
             raise OutcomeError(f"the vehicle does not show mode {name}", mode=name)
+
+    def ask_telemetry(self) -> None:
+        """Ask for the position and its quality, which not every link gets unasked."""
+        peer = self.vehicle
+        self._link.send_all(
+            [RequestDataStream(peer.system, peer.component, stream, _STREAM_HZ, 1) for stream in _STREAMS]
+        )
+
+    def listen_until(self, is_enough: Callable[[], bool], for_s: float) -> bool:
+        """Listen until something is so, no longer than a time; give whether it is."""
+        self._link.run(_Listen(for_s), on_frames=self._listen, until=is_enough)
+        return is_enough()
 
     def _is_in(self, mode: int) -> bool:
         return self._heartbeat is not None and self._heartbeat.custom_mode == mode

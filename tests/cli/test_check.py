@@ -121,13 +121,15 @@ def test_files_come_before_the_log(logs, fields, yard):
     assert start["legs"][0]["start"] == [40.0713, -105.23]
 
 
-def test_a_live_vehicle_is_asked(fields, yard):
+@pytest.mark.parametrize("streams", [True, False])
+def test_a_live_vehicle_is_asked(fields, yard, streams):
     mission = read_mission(fields / "yard-mission.waypoints")
     config = SimulatorConfig(
         home=HOME,
         fence=fence_to_items(read_fence(fields / "yard-fence.waypoints")),
         mission=with_home(mission.items, HOME),
         parameters={"FENCE_ENABLE": 1.0, "WP_SPEED": 3.0},
+        streams=streams,
     )
     away = LatLon(40.0713, -105.2301)
     with Simulator(replace(config, home=away), "tcpin:127.0.0.1:0") as simulator:
@@ -135,10 +137,38 @@ def test_a_live_vehicle_is_asked(fields, yard):
         document = document_of("check", "--connect", simulator.connection, "--clearance", "2", code=8)
         assert simulator.vehicle.mission == held
         assert document["legs"][-1]["crosses"] == ["exclusion polygon 1", "exclusion polygon 2"]
-        assert document["clearance_m"] == pytest.approx(2.1)  # FENCE_MARGIN and a reserve
+        # The fix is good to 0.3 m: kept on top of what is promised, it is more than FENCE_MARGIN and its reserve ask for.
+        assert document["clearance_m"] == 2
+        assert document["legs"][-1]["asked_m"] == pytest.approx(2.3)
+        assert any("0.3 m are kept on top" in text for text in document["warnings"])
         assert document["system"] == 1
         assert document["legs"][0]["start"] == pytest.approx(away, abs=1e-5)
         assert not any("did not tell its position" in text for text in document["warnings"])
+
+
+def test_what_a_live_vehicle_does_not_tell_is_said(fields, yard, monkeypatch):
+    monkeypatch.setattr("mavlink_bridge.cli.check._TELEMETRY_PATIENCE_S", 0.5)
+    config = SimulatorConfig(
+        home=HOME,
+        fence=fence_to_items(read_fence(fields / "yard-fence.waypoints")),
+        mission=with_home(read_mission(fields / "yard-mission.waypoints").items, HOME),
+        parameters={"FENCE_ENABLE": 1.0},
+        streams=False,
+    )
+    monkeypatch.setattr("mavlink_bridge.cli.session.Session.ask_telemetry", lambda _session: None)
+    with Simulator(config, "tcpin:127.0.0.1:0") as simulator:
+        document = document_of("check", "--connect", simulator.connection, "--clearance", "2", code=8)
+        assert document["warnings"][:2] == [
+            "the vehicle did not tell its position: it is taken to stand at its home",
+            "the vehicle did not tell how good its position is: no room is kept for its error",
+        ]
+        assert document["clearance_m"] == pytest.approx(2.1)  # FENCE_MARGIN and a reserve
+        monkeypatch.setattr("mavlink_bridge.protocol.parameters.PATIENCE_S", 0.5)
+        monkeypatch.setattr(
+            "mavlink_bridge.protocol.parameters.ReadParameters.receive", lambda *_arguments: None
+        )
+        silent = document_of("check", "--connect", simulator.connection, code=5)
+        assert "does not answer when asked for its parameters" in silent["message"]
 
 
 def test_pictures(tmp_path, yard):

@@ -10,7 +10,7 @@ from missions.vehicle import vehicle_from_parameters
 
 if TYPE_CHECKING:
     from missions.request import Request
-    from missions.situation import Fix, Situation
+    from missions.situation import Situation
     from missions.vehicle import Vehicle
 
 MARGIN_RESERVE_M = 0.1
@@ -21,6 +21,10 @@ LEAST_DEFAULT_M = 1.0
 
 NARROWEST_BAND_M = 0.3
 """What the band of a straight line at 1 m/s, rounding and the search for the widest route leave of its clearance."""
+
+_FIX_NOT_TOLD = (
+    "the vehicle did not tell how good its position is: no room is kept for its error (--position-error)"
+)
 
 FIX_ERRORS_M = {3: 1.5, 4: 0.6, 5: 0.3, 6: 0.05}
 """By GPS_FIX_TYPE (3D, DGPS, RTK float, RTK fixed), where the receiver does not tell its own error."""
@@ -87,7 +91,7 @@ def promise(situation: Situation, request: Request, vehicle: Vehicle) -> Promise
             warnings.append(f"{_stops(vehicle)}; the clearance of {promised_m:g} m is less")
         error_m = request.reserve_m + (request.position_error_m or 0.0)
         return Promise(promised_m, error_m, request.corner_allowance_m, tuple(warnings))
-    error_m, told = _position_error_m(situation.fix.value if situation.fix else None, request)
+    error_m, told = _position_error_m(situation, request)
     # Avoidance goes by where the vehicle believes to be: the error of its position counts towards the margin.
     raised_m = vehicle.stops_within_m + MARGIN_RESERVE_M - error_m
     if vehicle.stops_within_m and promised_m < raised_m:
@@ -106,11 +110,12 @@ def _stops(vehicle: Vehicle) -> str:
     )
 
 
-def _position_error_m(fix: Fix | None, request: Request) -> tuple[float, tuple[str, ...]]:
+def _position_error_m(situation: Situation, request: Request) -> tuple[float, tuple[str, ...]]:
     if request.position_error_m is not None:
         return request.position_error_m, ()
-    if fix is None:
-        return 0.0, ()
+    if situation.fix is None:
+        return 0.0, (_FIX_NOT_TOLD,) if situation.system is not None else ()
+    fix = situation.fix.value
     if fix.error_m is not None:
         error_m = fix.error_m
     elif fix.kind in FIX_ERRORS_M:

@@ -204,8 +204,6 @@ def _live_situation(address: Address, *, quiet: bool) -> tuple[Situation, list[s
     unknown = []
     if heard.pose is None:
         unknown.append("the vehicle did not tell its position: it is taken to stand at its home")
-    if heard.fix is None:
-        unknown.append("the vehicle did not tell how good its position is: no room is kept for its error")
     found = replace(
         heard,
         fence=Known(fence_from_items(fence), None, source) if fence else None,

@@ -31,6 +31,8 @@ MISSION_TYPES = {
 _POSITION_STREAM, _STATUS_STREAM = 6, 2
 _STREAM_HZ = 4
 _ASK_STREAMS_EVERY_S = 3.0
+_FIX_PATIENCE_S = 3.0
+"""What is promised rests on the fix, so that whether it is known must not be a matter of luck; not every vehicle tells it."""
 _STORAGE_NAMES = ("BRD_SD_MISSION", "BRD_SD_FENCE")
 
 
@@ -54,13 +56,17 @@ class Learning:
         self._parameters: dict[str, float] = {}
         self._lists: dict[ListKind, tuple[MissionItem, ...]] = {}
         self._has_position = False
+        self._awaits_fix = True
+        self._fix_until_s = 0.0
         self._streams_due_s = 0.0
         self._position_until_s = 0.0
 
     @property
     def is_done(self) -> bool:
         """Whether all is learnt, or something cannot be."""
-        return self.trouble is not None or (not self._steps and self._has_position)
+        return self.trouble is not None or (
+            not self._steps and self._has_position and not self._awaits_fix
+        )
 
     @property
     def progress(self) -> tuple[int, int]:
@@ -75,6 +81,8 @@ class Learning:
         times = [self._streams_due_s] if not self._has_position else []
         if not self._steps:
             times.append(self._position_until_s)
+            if self._awaits_fix:
+                times.append(self._fix_until_s)
         elif self._steps.deadline_s is not None:
             times.append(self._steps.deadline_s)
         return min(times, default=None)
@@ -87,7 +95,7 @@ class Learning:
         home = m.CommandLong(peer.system, peer.component, Command.GET_HOME_POSITION)
         self._steps.run(
             [
-                (ReadParameters(peer, PARAMETER_NAMES), self._take_parameters),
+                (ReadParameters(peer, (*PARAMETER_NAMES, *_STORAGE_NAMES)), self._take_parameters),
                 (Download(peer, m.MissionType.FENCE), self._take_fence),
                 (Download(peer, m.MissionType.MISSION), self._take_mission),
                 (SendCommand(peer, home), self._take_home),
@@ -100,11 +108,15 @@ class Learning:
         message = frame.message
         if isinstance(message, m.GlobalPositionInt) and self._peer.accepts(frame):
             self._has_position = self._has_position or (message.lat, message.lon) != (0, 0)
+        elif isinstance(message, m.GpsRawInt) and self._peer.accepts(frame):
+            self._awaits_fix = False
         self._steps.receive(frame, now_s)
 
     def handle_timer(self, now_s: float) -> None:
         """Take notice that time has passed."""
         self._steps.handle_timer(now_s)
+        if not self._steps and now_s >= self._fix_until_s:
+            self._awaits_fix = False
         if not self._has_position:
             self._ask_streams(now_s)
             if not self._steps and now_s >= self._position_until_s:
@@ -153,6 +165,7 @@ class Learning:
 
     def _take_home(self, _machine: SendCommand, now_s: float) -> None:
         self._position_until_s = now_s + self._patience_s
+        self._fix_until_s = now_s + min(self._patience_s, _FIX_PATIENCE_S)
 
     def _fail(self, trouble: BridgeError) -> None:
         self._steps.clear()

@@ -132,6 +132,27 @@ def test_no_position_is_told():
     assert "no position" in str(run.director.trouble)
 
 
+def test_a_plan_waits_for_the_fix_but_not_for_ever():
+    late = conductor(rover())
+    push = late.down.push
+    late.down.push = lambda frame, now_s: (
+        None if isinstance(frame.message, m.GpsRawInt) and now_s < 2.0 else push(frame, now_s)
+    )
+    assert late.run() is State.DONE
+    assert late.director.situation.fix.value.error_m == 0.3
+    assert any("0.3 m are kept on top" in text for text in late.director.plan.warnings)
+    never = conductor(rover())
+    never.down.push = _without(never.down.push, m.GpsRawInt)
+    assert never.run() is State.DONE
+    assert any("did not tell how good its position is" in text for text in never.director.plan.warnings)
+
+
+def test_learns_how_much_the_vehicle_holds():
+    run = conductor(rover(parameters={"BRD_SD_MISSION": 64.0}))
+    run.run()
+    assert run.director.situation.parameters["BRD_SD_MISSION"] == 64
+
+
 def test_a_vehicle_that_falls_silent_after_its_heartbeat():
     run = conductor(rover())
     run.down.push = _only(run.down.push, m.Heartbeat)

@@ -64,9 +64,7 @@ class Learning:
     @property
     def is_done(self) -> bool:
         """Whether all is learnt, or something cannot be."""
-        return self.trouble is not None or (
-            not self._steps and self._has_position and not self._awaits_fix
-        )
+        return self.trouble is not None or (not self._steps and self._has_position and not self._awaits_fix)
 
     @property
     def progress(self) -> tuple[int, int]:

@@ -78,6 +78,7 @@ class Director(Keeper):
         self._confirmed = False
         self._speed_mps = 0.0
         self._held_at_s: float | None = None
+        self._mode_set_s = -math.inf  # when the vehicle took the newest mode of ours
         self._standstill_due_s = math.inf
         self._modes_expected: frozenset[int] = frozenset()
         self._modes_expected_s = -math.inf
@@ -191,7 +192,11 @@ class Director(Keeper):
     def _may_stop_it(self) -> bool:
         """Whether the vehicle may be on its way and is ours to stop; a click sets it going before any heartbeat says so."""
         orders, situation = self.orders, self.situation
-        if not orders.drive or not situation.armed or (orders.once and self.state is not State.DRIVING):
+        if not orders.drive or (orders.once and self.state is not State.DRIVING):
+            return False
+        if self.state in (State.STARTING, State.DRIVING):
+            return True
+        if not situation.armed:
             return False
         was_clicked = self._target is not None and self._target.source in CLICKS
         return was_clicked or situation.mode in (AUTO_MODE, GUIDED_MODE)
@@ -260,12 +265,14 @@ class Director(Keeper):
             return
         items = with_home(self.plan.items, self.plan.home or self.plan.start)
         is_active = bool(self.situation.armed) and self.situation.mode == AUTO_MODE
+        # A heartbeat from before our own change of mode still tells the mode before it.
+        is_fresh = max(now_s - FRESH_S, self._mode_set_s) <= self._heartbeat_s
         upload = VerifiedUpload(
             self._peer,
             m.MissionType.MISSION,
             items,
             limits=Limits.from_parameters(self.situation.parameters),
-            is_active=is_active if now_s - self._heartbeat_s <= FRESH_S else None,
+            is_active=is_active if is_fresh else None,
         )
         self._voice.tell(now_s, EventName.UPLOADING, f"uploading {len(items)} items", len(items))
         self._steps.run([(upload, self._uploaded)], now_s)
@@ -324,6 +331,8 @@ class Director(Keeper):
     def _commanded(self, machine: SendCommand, now_s: float) -> None:
         outcome = machine.outcome
         assert outcome is not None
+        if outcome.is_accepted and outcome.command == Command.DO_SET_MODE:
+            self._mode_set_s = now_s
         if not outcome.is_accepted:
             name = Command(outcome.command).name
             result = outcome.result.name if outcome.result is not None else "no answer"

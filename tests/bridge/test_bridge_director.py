@@ -256,6 +256,19 @@ def test_a_fence_across_the_route_while_driving():
     assert distance_m(vehicle.position, FAR) < 4.0
 
 
+@pytest.mark.parametrize("wait_s", [0.0, 0.2, 0.4, 0.6, 0.8])
+def test_a_new_route_right_after_the_start_does_not_believe_the_heartbeat_before_hold(wait_s):
+    # At walking pace it stands again before its next heartbeat; the last one still says AUTO.
+    run = driving(conductor())
+    begins_s = run.now_s + wait_s
+    run.run_until(lambda: run.now_s >= begins_s)
+    run.director.take_target(NEAR, run.now_s)
+    run.run_until(run.happened(EventName.HOLDING))
+    run.run_until(lambda: run.director.state is State.ARRIVED)
+    assert not run.happened(EventName.UPLOAD_FAILED)()
+    assert distance_m(run.vehicles[0].position, NEAR) < 4.0
+
+
 def test_a_fence_that_leaves_the_route_alone_is_only_reported():
     run = driving(conductor())
     aside = Fence((*FENCE.zones, CircleZone(ZoneKind.EXCLUSION, LatLon(40.0721500, -105.2301500), 3.0)))

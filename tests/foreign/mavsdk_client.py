@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 from mavsdk import ComponentType, Configuration, Mavsdk
+from mavsdk.plugins.geofence import Geofence
 from mavsdk.plugins.mission_raw import MissionItem, MissionRaw
 
 FIELDS = (
@@ -41,6 +42,10 @@ def main(connection, step, path):
             )
         elif step == "clear-mission":
             result = mission.clear_mission()
+        elif step == "clear-fence":
+            geofence = Geofence(system)
+            result = geofence.clear_geofence()
+            geofence.destroy()
         else:
             items = mission.download_mission() if step == "download-mission" else mission.download_geofence()
             with Path(path).open("w", encoding="utf-8") as file:

@@ -9,61 +9,87 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from missions.check import CheckedLeg, MissionCheck, check_mission
     from missions.errors import MissionError
     from missions.fence import CircleZone, Fence, PolygonZone, ZoneKind
-    from missions.formats import read_fence, read_mission, read_parameters, read_situation, write_mission
+    from missions.formats import (
+        read_fence,
+        read_mission,
+        read_parameters,
+        read_situation,
+        write_mission,
+        write_situation,
+    )
     from missions.geo import LatLon
     from missions.items import MissionItem, waypoint
     from missions.plan import Plan
     from missions.plan import plan as plan_mission
+    from missions.repair import Repair, repair_mission
     from missions.request import Request
-    from missions.situation import Mission, Situation
+    from missions.situation import Known, Mission, Situation
+    from missions.tour import plan_tour
     from missions.vehicle import Vehicle, vehicle_from_parameters
 
 __all__ = [
+    "CheckedLeg",
     "CircleZone",
     "Fence",
+    "Known",
     "LatLon",
     "Mission",
+    "MissionCheck",
     "MissionError",
     "MissionItem",
     "Plan",
     "PolygonZone",
+    "Repair",
     "Request",
     "Situation",
     "Vehicle",
     "ZoneKind",
+    "check_mission",
     "plan_mission",
+    "plan_tour",
     "read_fence",
     "read_mission",
     "read_parameters",
     "read_situation",
+    "repair_mission",
     "vehicle_from_parameters",
     "waypoint",
     "write_mission",
+    "write_situation",
 ]
 
 _HOMES = {
+    "CheckedLeg": "check",
     "CircleZone": "fence",
     "Fence": "fence",
+    "Known": "situation",
     "LatLon": "geo",
     "Mission": "situation",
+    "MissionCheck": "check",
     "MissionError": "errors",
     "MissionItem": "items",
     "Plan": "plan",
     "PolygonZone": "fence",
+    "Repair": "repair",
     "Request": "request",
     "Situation": "situation",
     "Vehicle": "vehicle",
     "ZoneKind": "fence",
+    "check_mission": "check",
     "plan_mission": "plan",
+    "plan_tour": "tour",
     "read_fence": "formats",
     "read_mission": "formats",
     "read_parameters": "formats",
     "read_situation": "formats",
+    "repair_mission": "repair",
     "vehicle_from_parameters": "vehicle",
     "waypoint": "items",
     "write_mission": "formats",
+    "write_situation": "formats",
 }
 
 

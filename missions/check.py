@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
 _FAR_M = 50_000.0
 _STEP_M = 0.5
+_ANYTHING = Request()
 
 TOLERANCE_M = 0.01
 """A leg that falls short by no more than this keeps its promise: positions are rounded to degE7."""
@@ -155,9 +156,7 @@ class MissionCheck:
         return (self.legs[0].leg.start, *(leg.leg.end for leg in self.legs))
 
 
-def check_mission(
-    mission: Mission, situation: Situation, clearance_m: float | None = None, *, start: LatLon | None = None
-) -> MissionCheck:
+def check_mission(mission: Mission, situation: Situation, request: Request = _ANYTHING) -> MissionCheck:
     """Check every leg of a mission against the situation's fence, for the situation's vehicle.
 
     Parameters
@@ -166,10 +165,9 @@ def check_mission(
         The items, without the home item.
     situation : Situation
         Fence, parameters, home and where the vehicle is.
-    clearance_m : float, optional
-        What every leg has to keep while driving. Default: as for plans, from FENCE_MARGIN.
-    start : LatLon, optional
-        Where the vehicle starts. Default: where it is, else home.
+    request : Request
+        What every leg has to keep while driving, as for plans: clearance, reserve, the position's error, the vehicle's size. Where the vehicle
+        starts; default: where it is, else home. The rest of it says nothing here: places and speeds are the mission's.
 
     Raises
     ------
@@ -181,14 +179,14 @@ def check_mission(
         The fence, a parameter or a position cannot be used.
     """
     fence = known_fence(situation)
-    request = Request(clearance_m=clearance_m)
+    request = replace(request, widest=False, speed_mps=None, corner_allowance_m=None)
     vehicle = known_vehicle(situation, request)
     asked = promise(situation, request, vehicle)
     home = situation.home.value if situation.home else mission.home
     if home and not situation.home:
         situation = replace(situation, home=Known(home, None, "the mission"))
     pose = situation.pose.value if situation.pose else None
-    start = start or (pose.position if pose else home)
+    start = request.start or (pose.position if pose else home)
     course = _course(mission, situation, vehicle, start, home)
     path = (course.legs[0].start, *(leg.end for leg in course.legs))
     near_home = [home] if home and distance_m(home, path[0]) < _FAR_M else []

@@ -107,7 +107,7 @@ def repair_mission(
     FenceMissingError, FenceError, VehicleError, InvalidPositionError
         As `missions.check.check_mission`.
     """
-    asked = check_mission(mission, situation, request.clearance_m, start=request.start)
+    asked = check_mission(mission, situation, request)
     if asked.troubles:
         raise SituationError(f"the mission cannot be repaired: {'; '.join(asked.troubles)}")
     repaired, checked = ItemList(mission), asked
@@ -124,7 +124,7 @@ def repair_mission(
                 break  # there is no more room: what was found before is to be told
             raise
         repaired = routed
-        checked = check_mission(repaired.mission(), situation, request.clearance_m, start=request.start)
+        checked = check_mission(repaired.mission(), situation, request)
         found = {repaired.origin(leg.leg) for leg in checked.broken}
         more = found if not found <= keys else _beside(asked, found)
         if more <= keys and checked.broken:

@@ -83,7 +83,7 @@ def plan_tour(
     # The targets are given only where they have to be: else the plan says itself where they come from.
     asked = replace(request, targets=targets) if len(targets) > 1 or request.targets else request
     planned = plan(situation, asked, should_stop=should_stop)
-    planned = with_end(planned, situation, End(request.end))
+    planned = with_end(planned, situation, request)
     return replace(planned, warnings=(*said, *planned.warnings)) if said else planned
 
 
@@ -176,8 +176,8 @@ def _length_m(
         return float("inf")
 
 
-def with_end(planned: Plan, situation: Situation, end: End) -> Plan:
-    """Give a plan with the end that is wanted.
+def with_end(planned: Plan, situation: Situation, request: Request) -> Plan:
+    """Give a plan with the end that is asked for.
 
     Raises
     ------
@@ -186,6 +186,7 @@ def with_end(planned: Plan, situation: Situation, end: End) -> Plan:
     SituationError
         RTL, and home is not known.
     """
+    end = End(request.end)
     if end is End.HOLD:
         return planned
     items = ending(planned.items, end)
@@ -193,7 +194,8 @@ def with_end(planned: Plan, situation: Situation, end: End) -> Plan:
         return replace(planned, items=items)
     if planned.home is None:
         raise SituationError("RTL leads home, and home is not known; end with hold or loiter")
-    checked = check_mission(Mission(items, planned.home), situation, planned.clearance_m, start=planned.start)
+    wanted = replace(request, clearance_m=planned.clearance_m, start=planned.start)
+    checked = check_mission(Mission(items, planned.home), situation, wanted)
     last = checked.legs[-1]
     is_broken = last.breaks if planned.clearance_m is not None else last.drawn_clearance_m < planned.asked_m
     if is_broken:

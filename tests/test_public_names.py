@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import importlib
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -18,6 +20,22 @@ def test_every_public_name_is_there(package):
         assert getattr(module, name) is not None
     with pytest.raises(AttributeError, match="no_such_name"):
         _ = module.no_such_name
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_every_public_name_is_on_the_page(package):
+    page = (Path(__file__).parents[1] / "docs" / "api.md").read_text(encoding="utf-8")
+    listed = []
+    for kind, path in re.findall(r"\.\. auto(module|class|function):: (\S+)", page):
+        if kind == "module":
+            module = importlib.import_module(path)
+            listed += [getattr(module, name) for name in getattr(module, "__all__", dir(module))]
+        else:
+            home, _, name = path.rpartition(".")
+            listed.append(getattr(importlib.import_module(home), name))
+    module = importlib.import_module(package)
+    missing = [name for name in module.__all__ if not any(getattr(module, name) is one for one in listed)]
+    assert missing == []
 
 
 @pytest.mark.parametrize("package", ["missions", "mavlink_bridge", "mavlink_bridge.cli"])

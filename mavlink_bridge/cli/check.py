@@ -22,6 +22,15 @@ from mavlink_bridge.cli.common import (
     progress_bar,
     warn,
 )
+from mavlink_bridge.cli.upload import SigningKeyOption
+from mavlink_bridge.cli.vehicle_options import (
+    GpsOption,
+    LengthOption,
+    PositionErrorOption,
+    ReserveOption,
+    WidthOption,
+    with_vehicle,
+)
 from mavlink_bridge.errors import LinkError, UsageError
 
 if TYPE_CHECKING:
@@ -62,10 +71,16 @@ def check(
         list[Path] | None,
         typer.Option(metavar="FILE", help="Draw it: .png, .svg, .pdf, .html; - in the terminal."),
     ] = None,
+    reserve: ReserveOption = 0.0,
+    position_error: PositionErrorOption = None,
+    length: LengthOption = 0.0,
+    width: WidthOption = 0.0,
+    gps: GpsOption = "0,0",
     system: SystemOption = None,
     any_vehicle: AnyVehicleOption = False,
     source_system: SourceSystemOption = 245,
     source_component: SourceComponentOption = 190,
+    signing_key: SigningKeyOption = None,
     timeout: TimeoutOption = 30.0,
     json_output: JsonOption = False,
     quiet: QuietOption = False,
@@ -86,7 +101,14 @@ def check(
     from mavlink_bridge.cli.plan import storage_warnings  # noqa: PLC0415 - quick help
     from missions.check import check_mission  # noqa: PLC0415
     from missions.geo import parse_lat_lon  # noqa: PLC0415
+    from missions.request import Request  # noqa: PLC0415
 
+    request = with_vehicle(
+        Request(clearance_m=clearance),
+        reserve=reserve,
+        position_error=position_error,
+        size=(length, width, gps),
+    )
     begin = parse_lat_lon(start) if start else None
     situation: Situation | None = None
     unknown: list[str] = []
@@ -97,14 +119,14 @@ def check(
     elif connect is not None:
         from mavlink_bridge.cli.session import Address as At  # noqa: PLC0415 - only with a link
 
-        address = At(connect, (source_system, source_component), system, any_vehicle, timeout)
+        address = At(connect, (source_system, source_component), system, any_vehicle, timeout, signing_key)
         situation, unknown = _live_situation(address, quiet=quiet or json_output)
     situation = _with_files(situation, mission, fence, vehicle)
     if situation.mission is None:
         raise UsageError(f"{log or connect} tells of no mission; give one (--mission FILE)")
     if begin is None and log is not None and situation.home is not None:
         begin = situation.home.value  # at a log's end the vehicle may stand anywhere on its way
-    checked = check_mission(situation.mission.value, situation, clearance, start=begin)
+    checked = check_mission(situation.mission.value, situation, replace(request, start=begin))
     warnings = [*unknown, *checked.warnings, *storage_warnings(checked.mission.items, situation)]
     warn(warnings)
     _draw(checked, situation, plots)

@@ -37,11 +37,11 @@ GpsOption = Annotated[
 def with_vehicle(
     request: Request,
     *,
-    speed: float | None,
     reserve: float,
     position_error: float | None,
     size: tuple[float, float, str],
-    escape: bool,
+    speed: float | None = None,
+    escape: bool = False,
 ) -> Request:
     """Add what a vehicle needs to what is asked of a plan; ``size`` is its length, width and antenna.
 

@@ -24,6 +24,7 @@ from missions.picture import draw_plan
 from missions.plan import plan
 from missions.request import Request
 from missions.situation import Known, Mission, Pose, Situation
+from missions.vehicle import Footprint
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -70,7 +71,9 @@ def do(command: int, *params: float) -> MissionItem:
 def checked(
     *items: MissionItem | tuple[float, float], clearance_m: float = 2.0, **parameters: float
 ) -> MissionCheck:
-    return check_mission(mission_of(*items), situation_of(FIELD, BARN, **parameters), clearance_m)
+    return check_mission(
+        mission_of(*items), situation_of(FIELD, BARN, **parameters), Request(clearance_m=clearance_m)
+    )
 
 
 RTL = do(20)
@@ -79,7 +82,7 @@ RTL = do(20)
 def test_the_leg_through_the_barn_of_the_recorded_mission_is_found(fields):
     mission = read_mission(fields / "yard-mission.waypoints")
     fence = read_fence(fields / "yard-fence.waypoints")
-    found = check_mission(mission, Situation(fence=Known(fence, None, "file")), 2.0)
+    found = check_mission(mission, Situation(fence=Known(fence, None, "file")), Request(clearance_m=2.0))
 
     first, second = (
         LineString(plane(leg)) for leg in pairwise((mission.home, *(i.position for i in mission.items)))
@@ -132,7 +135,7 @@ def test_driven_clearance_is_that_of_the_band():
 def test_a_plan_of_this_program_passes():
     situation = replace(situation_of(FIELD, BARN), home=Known(HOME, None, "test"))
     planned = plan(situation, Request(HOME, (place(100, 60),), 2.0))
-    found = check_mission(Mission(planned.items, HOME), situation, 2.0)
+    found = check_mission(Mission(planned.items, HOME), situation, Request(clearance_m=2.0))
     assert found.holds
     assert found.driven_clearance_m == pytest.approx(planned.driven_clearance_m, abs=0.01)
     assert found.duration_s == pytest.approx(planned.duration_s)
@@ -169,26 +172,28 @@ def test_a_jump_is_checked_where_it_leads():
 
 def test_a_start_near_a_fence_has_to_keep_what_it_has():
     situation = situation_of(FIELD, BARN)
-    near = check_mission(mission_of((0.0, 0.0)), situation, 2.0, start=place(39.2, 30.0))
+    near = check_mission(mission_of((0.0, 0.0)), situation, Request(place(39.2, 30.0), clearance_m=2.0))
     assert near.holds
     assert 0.4 < near.legs[0].asked_m < 0.8
     assert any("its first leg has to keep" in warning for warning in near.warnings)
-    nearer = check_mission(mission_of((39.6, 60.0)), situation, 2.0, start=place(38.8, 10.0))
+    nearer = check_mission(mission_of((39.6, 60.0)), situation, Request(place(38.8, 10.0), clearance_m=2.0))
     assert [leg.name for leg in nearer.broken] == ["start → 1"]
 
 
 def test_a_first_leg_that_comes_near_a_fence_again_breaks():
     # From near the barn away and, still on the first leg, as near past another fence.
     situation = situation_of(FIELD, BARN, box(OUT, 0, 32, 10, 50))
-    again = check_mission(mission_of((-20.0, 30.8)), situation, 2.0, start=place(38.8, 30.8))
+    again = check_mission(mission_of((-20.0, 30.8)), situation, Request(place(38.8, 30.8), clearance_m=2.0))
     assert again.broken
     assert again.legs[0].asked_m == 2.0
-    away = check_mission(mission_of((20.0, 30.8)), situation, 2.0, start=place(38.8, 30.8))
+    away = check_mission(mission_of((20.0, 30.8)), situation, Request(place(38.8, 30.8), clearance_m=2.0))
     assert away.holds
 
 
 def test_a_start_that_is_not_known_is_said():
-    found = check_mission(mission_of((0.0, 0.0), (10.0, 0.0), home=None), situation_of(FIELD), 2.0)
+    found = check_mission(
+        mission_of((0.0, 0.0), (10.0, 0.0), home=None), situation_of(FIELD), Request(clearance_m=2.0)
+    )
     assert [leg.name for leg in found.legs] == ["1 → 2"]
     assert any("where the vehicle starts is not known" in warning for warning in found.warnings)
 
@@ -196,7 +201,7 @@ def test_a_start_that_is_not_known_is_said():
 def test_the_vehicles_own_place_comes_before_home():
     pose = Pose(place(0.0, 60.0), 90.0)
     situation = replace(situation_of(FIELD, BARN), pose=Known(pose, None, "test"))
-    found = check_mission(mission_of((20.0, 60.0)), situation, 2.0)
+    found = check_mission(mission_of((20.0, 60.0)), situation, Request(clearance_m=2.0))
     assert found.legs[0].leg.start == pose.position
     assert not any("heads" in warning for warning in found.warnings)
 
@@ -248,14 +253,18 @@ def test_what_calls_for_rtl_is_named():
 def test_rtl_goes_to_the_nearest_rally_point():
     rally = (place(110.0, 80.0), place(-40.0, 60.0))
     situation = replace(situation_of(FIELD, BARN), rally=Known(rally, None, "test"))
-    found = check_mission(mission_of((100.0, -10.0), (100.0, 80.0), RTL), situation, 2.0)
+    found = check_mission(mission_of((100.0, -10.0), (100.0, 80.0), RTL), situation, Request(clearance_m=2.0))
     assert found.legs[-1].leg.end == rally[0]
     home_too = replace(situation, parameters={"RALLY_INCL_HOME": 1.0})
-    back = check_mission(mission_of((10.0, -10.0), RTL), home_too, 2.0)
+    back = check_mission(mission_of((10.0, -10.0), RTL), home_too, Request(clearance_m=2.0))
     assert back.legs[-1].leg.end == HOME
     far = replace(situation, parameters={"RALLY_LIMIT_KM": 0.005})
-    assert check_mission(mission_of((10.0, -10.0), RTL), far, 2.0).legs[-1].leg.end == HOME
-    no_home = check_mission(mission_of((100.0, -10.0), (100.0, 80.0), RTL, home=None), situation, 2.0)
+    assert (
+        check_mission(mission_of((10.0, -10.0), RTL), far, Request(clearance_m=2.0)).legs[-1].leg.end == HOME
+    )
+    no_home = check_mission(
+        mission_of((100.0, -10.0), (100.0, 80.0), RTL, home=None), situation, Request(clearance_m=2.0)
+    )
     assert no_home.legs[-1].leg.end == rally[0]
 
 
@@ -285,7 +294,7 @@ def test_places_on_one_another_are_one():
     assert first.driven_clearance_m == again.driven_clearance_m <= alone.legs[0].driven_clearance_m < 2.8
     assert last.driven_clearance_m < math.inf
     start = check_mission(
-        mission_of((0.0, 0.0), (30.0, 0.0)), situation_of(FIELD, BARN), 2.0, start=place(0, 0)
+        mission_of((0.0, 0.0), (30.0, 0.0)), situation_of(FIELD, BARN), Request(place(0, 0), clearance_m=2.0)
     )
     assert start.holds
 
@@ -296,7 +305,9 @@ def test_sharp_turns_between_short_legs_are_named():
 
 
 def test_without_a_fence_nearby_everything_is_far():
-    found = check_mission(mission_of((10.0, 0.0)), situation_of(box(OUT, 400, 400, 500, 500)), 2.0)
+    found = check_mission(
+        mission_of((10.0, 0.0)), situation_of(box(OUT, 400, 400, 500, 500)), Request(clearance_m=2.0)
+    )
     assert found.holds
     assert found.legs[0].drawn_clearance_m > 500
 
@@ -304,13 +315,15 @@ def test_without_a_fence_nearby_everything_is_far():
 def test_a_home_far_away_does_not_stand_in_the_way():
     away = LatLon(-35.363262, 149.165237)
     situation = replace(situation_of(FIELD, BARN), pose=Known(Pose(HOME, 0.0), None, "test"))
-    found = check_mission(mission_of((10.0, 0.0), home=away), situation, 2.0)
+    found = check_mission(mission_of((10.0, 0.0), home=away), situation, Request(clearance_m=2.0))
     assert found.holds
 
 
 def test_the_home_circle_counts():
     found = check_mission(
-        mission_of((100.0, 0.0)), situation_of(FIELD, FENCE_ENABLE=1, FENCE_TYPE=6, FENCE_RADIUS=60), 2.0
+        mission_of((100.0, 0.0)),
+        situation_of(FIELD, FENCE_ENABLE=1, FENCE_TYPE=6, FENCE_RADIUS=60),
+        Request(clearance_m=2.0),
     )
     assert found.legs[0].crosses == ("home circle (FENCE_RADIUS 60 m)",)
 
@@ -336,8 +349,18 @@ def test_a_check_can_be_drawn(tmp_path):
 
 def test_a_circle_zone_is_measured_too():
     pond = CircleZone(OUT, place(50, 0), 8.0)
-    found = check_mission(mission_of((30.0, 12.0), (70.0, 12.0)), situation_of(FIELD, pond), 2.0)
+    found = check_mission(
+        mission_of((30.0, 12.0), (70.0, 12.0)), situation_of(FIELD, pond), Request(clearance_m=2.0)
+    )
     centre = Point(plane([pond.centre])[0])
     line = LineString(plane([leg.leg.end for leg in found.legs]))
     assert found.legs[1].drawn_clearance_m == pytest.approx(line.distance(centre) - 8, abs=0.12)
     assert found.legs[1].fence == "exclusion circle 1"
+
+
+def test_reserve_position_error_and_size_count_as_for_plans():
+    mission, situation = mission_of((0.0, 0.0), (30.0, 0.0)), situation_of(FIELD, BARN)
+    plain = check_mission(mission, situation, Request(clearance_m=1.0))
+    more = check_mission(mission, situation, Request(clearance_m=1.0, reserve_m=0.5, position_error_m=0.25))
+    wide = check_mission(mission, situation, Request(clearance_m=1.0, footprint=Footprint(3.0, 4.0)))
+    assert [found.legs[-1].asked_m for found in (plain, more, wide)] == pytest.approx([1.0, 1.75, 2.5])

@@ -74,7 +74,7 @@ def repair(*items: MissionItem, situation: Situation | None = None, **options) -
 def assert_holds(found: Repair, situation: Situation) -> None:
     """Measure what is driven, and check it as any other mission."""
     assert_clear_of_barns(found, situation, HOME)
-    assert check_mission(found.mission, situation, 2.0).holds
+    assert check_mission(found.mission, situation, Request(clearance_m=2.0)).holds
     assert not follow_mission(found.mission, HOME, home=HOME).troubles
 
 
@@ -338,7 +338,7 @@ def test_random_missions_in_random_fields():
         except RouteError:  # a place so near to fences that the vehicle cannot turn there
             refused.append(seed)
             continue
-        assert check_mission(found.mission, situation, 2.0, start=start).holds
+        assert check_mission(found.mission, situation, Request(start, clearance_m=2.0)).holds
         assert_clear_of_barns(found, situation, start)
         kept(found, do(178, 1, 1.5), SERVO)
         before, after = (follow_mission(Mission(one, HOME), start) for one in (items, found.mission.items))

@@ -27,6 +27,8 @@ _FRAMES = {
 }
 
 _Stored = float | str | None
+_MOST_EXACT_RADIUS_M = 255.0
+"""Of circles beyond it ArduPilot keeps tens of metres."""
 
 
 def _float32(value: float) -> _Stored:
@@ -50,6 +52,16 @@ def _flag(value: float) -> _Stored:
     return 1.0 if value > 0 else 0.0
 
 
+def _turns(value: float) -> _Stored:
+    return math.trunc(value * 256) / 256 if 0 < value < 1 else _whole(value)
+
+
+def _turn_radius(value: float) -> _Stored:
+    if not math.isfinite(value) or abs(value) <= _MOST_EXACT_RADIUS_M:
+        return _whole(value)
+    return math.copysign(10.0 * math.trunc(min(_MOST_EXACT_RADIUS_M, abs(value) * 0.1)), value)
+
+
 def _dropped(value: float) -> _Stored:  # noqa: ARG001 - one of a family
     return None
 
@@ -58,7 +70,7 @@ _KEEPS_ALL = (_float32, _float32, _float32, _float32)
 _KEPT_PARAMS: dict[int, tuple[Callable[[float], _Stored], ...]] = {
     Command.NAV_WAYPOINT: (_whole, _dropped, _dropped, _dropped),
     Command.NAV_LOITER_UNLIM: (_dropped, _dropped, _whole, _dropped),
-    Command.NAV_LOITER_TURNS: (_whole, _dropped, _whole, _flag),
+    Command.NAV_LOITER_TURNS: (_turns, _dropped, _turn_radius, _flag),
     Command.NAV_LOITER_TIME: (_whole, _dropped, _sign, _flag),
     Command.NAV_RETURN_TO_LAUNCH: (_dropped, _dropped, _dropped, _dropped),
     Command.NAV_LAND: (_whole, _dropped, _dropped, _dropped),
@@ -73,7 +85,7 @@ _KEPT_PARAMS: dict[int, tuple[Callable[[float], _Stored], ...]] = {
     Command.DO_SET_HOME: (_whole, _dropped, _dropped, _dropped),
     Command.DO_SET_REVERSE: (_whole, _dropped, _dropped, _dropped),
     Command.DO_FENCE_ENABLE: (_whole, _dropped, _dropped, _dropped),
-    Command.NAV_SET_YAW_SPEED: (_float32, _float32, _float32, _dropped),
+    Command.NAV_SET_YAW_SPEED: (_float32, _float32, _whole, _dropped),
     115: (_float32, _float32, _whole, _whole),  # CONDITION_YAW
     181: (_whole, _whole, _dropped, _dropped),  # DO_SET_RELAY
     182: (_whole, _whole, _float32, _dropped),  # DO_REPEAT_RELAY

@@ -49,6 +49,7 @@ PLACED = frozenset(
         Command.NAV_LOITER_TIME,
         Command.NAV_LAND,
         Command.NAV_TAKEOFF,
+        Command.NAV_GUIDED_ENABLE,
         Command.DO_SET_HOME,
     }
 )
@@ -71,6 +72,30 @@ def _kept_three(params: Params) -> Params:
     return (float(int(params[0])), float32(params[1]), float32(params[2]), 0.0)
 
 
+def _kept_radius(params: Params) -> Params:
+    return (0.0, 0.0, math.copysign(_uint16(abs(params[2])), params[2]), 0.0)
+
+
+def _kept_turns(params: Params) -> Params:
+    # Turns and radius share 16 bits: parts of one turn count in 256ths, a radius beyond 255 m in tens of metres.
+    turns = int(params[0] * 256) / 256 if 0 < params[0] < 1 else float(min(255, _uint16(params[0])))
+    radius_m = abs(params[2])
+    kept_m = int(radius_m) if radius_m <= 255 else 10 * int(min(255.0, radius_m * 0.1))
+    return (turns, 0.0, math.copysign(kept_m, params[2]), float(params[3] > 0))
+
+
+def _kept_time(params: Params) -> Params:
+    return (float(_uint16(params[0])), 0.0, -1.0 if params[2] < 0 else 1.0, float(params[3] > 0))
+
+
+def _kept_land(params: Params) -> Params:
+    return (float(_uint16(params[0])), 0.0, 0.0, -1.0 if params[3] < 0 else 1.0)
+
+
+def _kept_yaw_speed(params: Params) -> Params:
+    return (float32(params[0]), float32(params[1]), float(_uint8(params[2])), 0.0)
+
+
 def _kept_jump(params: Params) -> Params:
     return (float(_uint16(params[0])), float(int(params[1])), 0.0, 0.0)
 
@@ -81,15 +106,15 @@ def _kept_all(params: Params) -> Params:
 
 _KEPT: dict[int, Callable[[Params], Params]] = {
     Command.NAV_WAYPOINT: _kept_first,
-    Command.NAV_LOITER_UNLIM: _kept_none,
-    Command.NAV_LOITER_TURNS: _kept_first,
-    Command.NAV_LOITER_TIME: _kept_first,
+    Command.NAV_LOITER_UNLIM: _kept_radius,
+    Command.NAV_LOITER_TURNS: _kept_turns,
+    Command.NAV_LOITER_TIME: _kept_time,
     Command.NAV_RETURN_TO_LAUNCH: _kept_none,
-    Command.NAV_LAND: _kept_first,
+    Command.NAV_LAND: _kept_land,
     Command.NAV_TAKEOFF: _kept_first,
     Command.NAV_GUIDED_ENABLE: _kept_first,
     Command.NAV_DELAY: _kept_all,
-    Command.NAV_SET_YAW_SPEED: _kept_three,
+    Command.NAV_SET_YAW_SPEED: _kept_yaw_speed,
     Command.CONDITION_DELAY: _kept_float,
     Command.CONDITION_DISTANCE: _kept_float,
     Command.DO_JUMP: _kept_jump,

@@ -14,22 +14,23 @@ from mavlink_bridge.protocol.stored_form import Difference, differences, is_same
 from missions.items import MissionItem
 
 MISSION, FENCE, RALLY = MissionType.MISSION, MissionType.FENCE, MissionType.RALLY
-SMALL = st.floats(0.0, 300.0, width=32)
+SMALL = st.floats(0.0, 250.0, width=32)
+SIGNED = st.floats(-3000.0, 3000.0, width=32)
+LOITERS = [17, 18, 19]
 COMMANDS = [16, 17, 18, 19, 20, 21, 22, 92, 93, 112, 114, 178, 179, 194, 207, 213]
 
 
 @given(
     st.sampled_from(COMMANDS),
     st.sampled_from([0, 2, 3, 5, 6, 10, 11]),
-    st.tuples(SMALL, SMALL, SMALL, SMALL),
+    st.tuples(SMALL, SMALL, SIGNED, SIGNED),
     st.integers(-900000000, 900000000),
     st.integers(-1800000000, 1800000000),
     st.floats(-1000.0, 8000.0, width=32),
 )
 def test_what_the_vehicle_stores_is_the_same_item(command, frame, params, lat_e7, lon_e7, alt_m):
-    # The simulator drops a loiter's radius and direction, which ArduPilot keeps: left out here.
-    params = (params[0], params[1], 0.0 if command in (17, 18, 19) else params[2], params[3])
-    params = (*params[:3], 0.0) if command in (18, 19) else params
+    if command not in LOITERS:  # others keep some of these in a byte
+        params = (*params[:2], abs(params[2]) / 12, abs(params[3]) / 12)
     item = MissionItem(command, frame, params, lat_e7, lon_e7, alt_m)
     stored = Vehicle().lists[MISSION]
     stored.begin(1)
@@ -59,6 +60,12 @@ def test_another_value_is_another_item(field, change):
         (MissionItem(16, params=(0, 0, 0, float("nan"))), MissionItem(16, 3), True),
         (MissionItem(19, params=(5, 0, 0, 0)), MissionItem(19, 3, params=(5, 0, 1, 0)), True),
         (MissionItem(19, params=(5, 0, -2, 0)), MissionItem(19, 3, params=(5, 0, 1, 0)), False),
+        (MissionItem(17, params=(0, 0, -7.9, 0)), MissionItem(17, 3, (0, 0, -7.0, 0)), True),
+        (MissionItem(17, params=(0, 0, -7.0, 0)), MissionItem(17, 3, (0, 0, 7.0, 0)), False),
+        (MissionItem(18, params=(0.7, 0, 304.0, 2)), MissionItem(18, 3, (0.69921875, 0, 300.0, 1)), True),
+        (MissionItem(18, params=(0.7, 0, 9.0, 0)), MissionItem(18, 3, (0.5, 0, 9.0, 0)), False),
+        (MissionItem(18, params=(2.7, 0, -9.0, 0)), MissionItem(18, 3, (2.0, 0, -9.0, 0)), True),
+        (MissionItem(21, params=(0, 0, 0, -3)), MissionItem(21, 3, (0, 0, 0, -1)), True),
         (MissionItem(178, 6, (1, 3.3, 0, 0), 5, 6), MissionItem(178, 0, (1, 3.299999952316284, 0, 0)), True),
         (MissionItem(178, 6, (1, 3.3, 0, 0)), MissionItem(178, 0, (1, 3.31, 0, 0)), False),
         (

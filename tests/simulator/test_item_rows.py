@@ -97,6 +97,26 @@ def test_the_acceptance_radius_is_dropped_and_the_delay_is_whole():
     assert (read.current, read.autocontinue) == (0, 1)
 
 
+@pytest.mark.parametrize(
+    ("command", "sent", "read"),
+    [
+        (Command.NAV_LOITER_UNLIM, (1.0, 2.0, -12.7, 4.0), (0.0, 0.0, -12.0, 0.0)),
+        (Command.NAV_LOITER_TURNS, (2.7, 2.0, 9.9, 1.0), (2.0, 0.0, 9.0, 1.0)),
+        (Command.NAV_LOITER_TURNS, (0.7, 2.0, -304.0, 0.0), (0.69921875, 0.0, -300.0, 0.0)),
+        (Command.NAV_LOITER_TURNS, (900.0, 2.0, 9000.0, 0.0), (255.0, 0.0, 2550.0, 0.0)),
+        (Command.NAV_LOITER_TIME, (70.7, 2.0, -12.0, 1.0), (70.0, 0.0, -1.0, 1.0)),
+        (Command.NAV_LOITER_TIME, (70.7, 2.0, 0.0, 0.0), (70.0, 0.0, 1.0, 0.0)),
+        (Command.NAV_LAND, (1.0, 2.0, 3.0, -4.0), (1.0, 0.0, 0.0, -1.0)),
+        (Command.NAV_LAND, (1.0, 2.0, 3.0, NAN), (1.0, 0.0, 0.0, 1.0)),
+    ],
+)
+def test_loiters_keep_radius_and_direction(command, sent, read):
+    bench = Bench()
+    bench.upload_mission([replace(GOOD, command=command, params=sent)])
+    back = bench.download()[1]
+    assert (back.param1, back.param2, back.param3, back.param4) == read
+
+
 def test_commands_without_a_place_keep_their_parameters():
     bench = Bench()
     speed = MissionItem(Command.DO_CHANGE_SPEED, 3, (1.0, 2.3, -1.0, 9.0), 5, 6, 7.0)

@@ -215,7 +215,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
 
 
 def plan_of(check: MissionCheck, situation: Situation, *, method: str = "optimal") -> Plan:
-    """Give a mission that was checked as a plan: for pictures, files and uploads (not to watch a drive with jumps)."""
+    """Give a mission that was checked as a plan: for pictures, files, uploads and drives."""
     path = check.path
     home = situation.home.value if situation.home else check.mission.home
     return Plan(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -127,9 +126,15 @@ class Plan:
     home: LatLon | None
     warnings: tuple[str, ...]
 
-    def path_index(self, seq: int) -> int:
-        """Give which point of the path a mission item drives to; for a change of speed the one that it is for."""
-        return min(bisect_left(self.seqs, seq), len(self.path) - 1)
+    def path_index(self, seq: int, after: int = 0) -> int:
+        """Give which point of the path a mission item drives to; for a change of speed the one that it is for.
+
+        Of an item that is driven to several times the first time from point ``after`` on, else the first of all.
+        """
+        points = (*range(after, len(self.path)), *range(after))
+        exact = (point for point in points if self.seqs[point] == seq)
+        later = (point for point in points if self.seqs[point] > seq)
+        return next(exact, next(later, len(self.path) - 1))
 
 
 def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bool] | None = None) -> Plan:

@@ -64,15 +64,19 @@ class _Detour:
 def repaired_plan(
     situation: Situation, request: Request, *, should_stop: Callable[[], bool] | None = None
 ) -> Plan:
-    """Repair the request's mission, and give it as a plan.
+    """Repair the request's mission, else the situation's, and give it as a plan.
 
     Raises
     ------
+    SituationError
+        No mission is known.
     MissionError
         As `repair_mission`.
     """
-    assert request.via is not None
-    repair = repair_mission(request.via, situation, request, should_stop=should_stop)
+    mission = request.via or (situation.mission.value if situation.mission else None)
+    if mission is None or not mission.items:
+        raise SituationError("there is no mission to repair: none was told (--via-mission FILE gives one)")
+    repair = repair_mission(mission, situation, request, should_stop=should_stop)
     made = plan_of(repair.check, situation, method=request.method)
     return replace(made, warnings=(*repair.changes, *made.warnings))
 
@@ -238,6 +242,7 @@ def _detours(
         start=first.start,
         targets=tuple(leg.end for leg in run),
         via=None,
+        via_own=False,
         speed_mps=first.speed_mps,
     )
     try:

@@ -55,6 +55,8 @@ class Request:
         At the end ``hold``, ``loiter`` or ``rtl`` (`missions.tour`).
     via : Mission, optional
         A mission to repair, in the place of targets (`missions.repair`).
+    via_own : bool
+        Repair the mission that the situation tells of.
     """
 
     start: LatLon | None = None
@@ -73,3 +75,9 @@ class Request:
     comes_back: bool = False
     end: str = "hold"
     via: Mission | None = None
+    via_own: bool = False
+
+    @property
+    def repairs(self) -> bool:
+        """Whether a mission is to be repaired."""
+        return self.via is not None or self.via_own

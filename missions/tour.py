@@ -70,7 +70,7 @@ def plan_tour(
     MissionError
         As `missions.plan.plan` and `missions.repair.repair_mission`; NoRouteError too where RTL at the end would break the promise.
     """
-    if request.via is not None:
+    if request.repairs:
         return repaired_plan(situation, request, should_stop=should_stop)
     start, targets = route_ends(situation, request)
     said: list[str] = []

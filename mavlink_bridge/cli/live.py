@@ -15,8 +15,11 @@ from mavlink_bridge.errors import BridgeError, LinkError
 from mavlink_bridge.link import ONE_SHOT_IDENTITY, now_s, open_link
 from mavlink_bridge.messages import MissionType
 from mavlink_bridge.protocol.verified_upload import Held
+from missions.course import follow_mission
+from missions.errors import SituationError
 from missions.formats import read_parameters
-from missions.situation import Situation
+from missions.items import Command
+from missions.situation import Mission, Situation
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -89,9 +92,17 @@ def conduct(
         The director's trouble.
     """
     planning_s: list[float] = []
+    has_driven = False
 
     def timed(situation: Situation, request: Request) -> Plan:
+        if request.repairs and has_driven:
+            raise SituationError(
+                "the rest of the mission would no longer keep its clearance, and the vehicle was switched to HOLD: part of the mission "
+                "is driven already, so that it is not begun anew"
+            )
         planned, seconds = timed_plan(situation, request)
+        if request.repairs and orders.drive:
+            _check_drivable(planned)
         planning_s.append(seconds)
         return planned
 
@@ -100,6 +111,8 @@ def conduct(
     with progress_bar(quiet=quiet) as show:
 
         def step() -> None:
+            nonlocal has_driven
+            has_driven = has_driven or director.state is State.DRIVING
             show(_STATE_TEXTS[director.state], *director.progress)
             warn(backups.step(now_s()))
 
@@ -113,6 +126,29 @@ def conduct(
         director.situation,
         verified=outcome is not None and outcome.is_verified,
     )
+
+
+def _check_drivable(planned: Plan) -> None:
+    """Refuse to drive what cannot be watched to its end, or what the drive model says nothing of.
+
+    Raises
+    ------
+    SituationError
+        The mission goes round without end, or in reverse.
+    """
+    course = follow_mission(Mission(planned.items), planned.start, home=planned.home)
+    if course.is_endless:
+        raise SituationError(
+            "the mission goes round without end, so that --drive would never see it arrive; nothing was written: "
+            "upload it (--upload), and start it yourself"
+        )
+    for seq, item in enumerate(planned.items, 1):
+        if item.command == Command.DO_SET_REVERSE and item.params[0] == 1:
+            raise SituationError(
+                f"item {seq} has the vehicle drive in reverse, of which the drive model says nothing; nothing was written: "
+                "upload it (--upload), and start it yourself",
+                item=seq,
+            )
 
 
 class BackupKeeper:

@@ -47,6 +47,7 @@ if TYPE_CHECKING:
 _METHODS = ("optimal", "pbpp-taut", "pbpp")
 _ORDERS = ("given", "best")
 _ENDS = ("hold", "loiter", "rtl")
+_OWN = "own"
 
 
 def plan(
@@ -99,8 +100,11 @@ def plan(
         typer.Option(metavar="|".join(_ENDS), help="At the end; rtl only where its straight line is free."),
     ] = "hold",
     via_mission: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Repair this mission: replace the legs that break the clearance."),
+        str | None,
+        typer.Option(
+            metavar="FILE|own",
+            help="Repair this mission: replace the legs that break the clearance; own: the one in the SOURCE.",
+        ),
     ] = None,
     method: Annotated[str, typer.Option(metavar="|".join(_METHODS), help="How to search.")] = "optimal",
     output: Annotated[
@@ -147,7 +151,7 @@ def plan(
         size=(length, width, gps),
         escape=escape,
     )
-    request = _with_tour(request, order, end, via_mission, comes_back=come_back, drive=drive)
+    request = _with_tour(request, order, end, via_mission, comes_back=come_back)
     _check_options(fence, log, connect, upload=upload or drive, outputs=outputs, plots=plots)
     if json_output and Path("-") in plots:
         raise UsageError("--plot - and --json both want the standard output; give a file to --plot")
@@ -164,6 +168,8 @@ def plan(
             drive=drive,
             patience_s=timeout,
         )
+        if request.repairs:  # it goes where the mission goes, whatever is clicked meanwhile
+            orders = replace(orders, target_sources=frozenset())
         result = plan_live(
             connect, orders, vehicle_file=vehicle, key_file=signing_key, quiet=quiet or json_output
         )
@@ -314,9 +320,7 @@ def request_from_options(
     )
 
 
-def _with_tour(
-    request: Request, order: str, end: str, via: Path | None, *, comes_back: bool, drive: bool
-) -> Request:
+def _with_tour(request: Request, order: str, end: str, via: str | None, *, comes_back: bool) -> Request:
     """Add order, way home, end or a mission to repair.
 
     Raises
@@ -335,11 +339,16 @@ def _with_tour(
         )
     if request.widest:
         raise UsageError("--via-mission needs a clearance in metres, not max")
-    if drive:
-        raise UsageError("--drive does not go with --via-mission: upload it, check it, and start it yourself")
+    if request.speed_mps is not None or request.corner_allowance_m is not None or request.escape:
+        raise UsageError(
+            "--via-mission keeps the mission's own speeds and goes by the drive model; it does not go with --speed, "
+            "--corner-allowance, --escape"
+        )
+    if via == _OWN:
+        return replace(request, via_own=True)
     from missions.formats import read_mission  # noqa: PLC0415 - quick help
 
-    return replace(request, via=read_mission(via))
+    return replace(request, via=read_mission(Path(via)))
 
 
 def _metres(option: str, text: str | None, word: str) -> float | None:

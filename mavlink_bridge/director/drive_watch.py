@@ -26,6 +26,8 @@ PROGRESS_EVERY_S = 1.0
 _FRESH_S = 1.5
 _STANDING_MPS = 0.15
 _STANDING_S = 3.0
+_ACTIVE, _COMPLETE = 3, 5
+"""MISSION_STATE_ACTIVE and _COMPLETE."""
 
 
 class DriveWatch:
@@ -45,6 +47,9 @@ class DriveWatch:
         self.begun_s = now_s
         self.progress_due_s = now_s + PROGRESS_EVERY_S
         self.item = 1
+        self._point = plan.path_index(1)  # of the path: items may be driven to several times
+        self._current_seq: int | None = None
+        self._is_executing = False
         self.least_clearance_m = math.inf
         self.driven_m = 0.0
         self.deviation_m = 0.0
@@ -66,7 +71,7 @@ class DriveWatch:
     @property
     def distance_left_m(self) -> float:
         """What is left of the drawn lines."""
-        rest = self._points[self._plan.path_index(self.item) :]
+        rest = self._points[self._point :]
         legs_m = float(np.hypot(*np.diff(rest, axis=0).T).sum()) if len(rest) > 1 else 0.0
         return legs_m + (self._here.distance(Point(rest[0])) if self._here else 0.0)
 
@@ -79,14 +84,12 @@ class DriveWatch:
     def receive(self, frame: Frame, now_s: float) -> None:
         """Take a frame of the vehicle."""
         message = frame.message
-        last = len(self._plan.items)
         if isinstance(message, m.GlobalPositionInt) and (message.lat, message.lon) != (0, 0):
             self._move(message, now_s)
         elif isinstance(message, m.MissionCurrent) and message.seq:
-            self.item = message.seq
+            self._take_current(message)
         elif isinstance(message, m.MissionItemReached):
-            self.item = min(message.seq + 1, last)
-            self.has_arrived = self.has_arrived or message.seq >= last
+            self._take_reached(message.seq)
         elif isinstance(message, m.FenceStatus):
             self._count_breaches(message, now_s)
 
@@ -102,6 +105,22 @@ class DriveWatch:
         self.progress_due_s = now_s + PROGRESS_EVERY_S
         if self._place is not None:
             self._voice.progress(now_s, self, self._place)
+
+    def _take_current(self, message: m.MissionCurrent) -> None:
+        if message.seq != self._current_seq:  # told again and again, also just after it was reached
+            self._current_seq = self.item = message.seq
+            self._point = self._plan.path_index(message.seq, self._point)
+        self._is_executing = self._is_executing or message.mission_state == _ACTIVE
+        self.has_arrived = self.has_arrived or (self._is_executing and message.mission_state == _COMPLETE)
+
+    def _take_reached(self, seq: int) -> None:
+        last = len(self._points) - 1
+        if seq not in self._plan.seqs:  # a delay, not a place
+            return
+        reached = self._plan.path_index(seq, self._point)
+        self.has_arrived = self.has_arrived or reached == last
+        self._point = min(reached + 1, last)
+        self.item = self._plan.seqs[self._point]
 
     def _move(self, message: m.GlobalPositionInt, now_s: float) -> None:
         self._place = from_e7(message.lat, message.lon)
@@ -124,7 +143,7 @@ class DriveWatch:
     def _notice_standing(self, here: Point, speed_mps: float, now_s: float) -> None:
         """Take standing at the last waypoint for arrival: the message that says so may be lost."""
         reach_m = self._plan.vehicle.waypoint_radius_m + 1.0
-        is_there = self.item >= len(self._plan.items) and here.distance(Point(self._points[-1])) <= reach_m
+        is_there = self._point == len(self._points) - 1 and here.distance(Point(self._points[-1])) <= reach_m
         if not is_there or speed_mps > _STANDING_MPS:
             self._standing_since_s = None
         elif self._standing_since_s is None:

@@ -11,11 +11,20 @@ from shapely import LineString, Polygon
 from typer.testing import CliRunner
 
 from mavlink_bridge.cli.app import app
+from mavlink_bridge.cli.live import conduct
+from mavlink_bridge.director import Orders
+from mavlink_bridge.link import open_link
+from mavlink_bridge.messages import CommandLong
+from mavlink_bridge.protocol.command import SendCommand
+from mavlink_bridge.protocol.peer import Peer
+from mavlink_bridge.rover import AUTO_MODE, HOLD_MODE
 from mavlink_bridge.simulator import Simulator, SimulatorConfig
-from missions.fence import fence_to_items
+from missions.errors import SituationError
+from missions.fence import PolygonZone, ZoneKind, fence_to_items
 from missions.formats import read_fence, read_mission, read_situation, write_situation
-from missions.geo import LatLon
-from missions.items import Command, with_home
+from missions.geo import LatLon, distance_m
+from missions.items import Command, CoordinateFrame, MissionItem, with_home
+from missions.request import Request
 from missions.situation import Known, Mission, Situation
 
 HOME = LatLon(40.071374, -105.229930)
@@ -293,6 +302,109 @@ def test_a_mission_is_repaired_on_the_vehicle(fields, yard):
         assert checked["mission_items"] == document["mission_items"]
 
 
+def armed(simulator: Simulator) -> None:
+    with open_link(simulator.connection, (255, 190)) as link:
+        arm = SendCommand(Peer(1, 1, 255, 190), CommandLong(1, 1, Command.COMPONENT_ARM_DISARM, param1=1.0))
+        link.run(arm, timeout_s=10)
+        assert arm.outcome.is_accepted
+
+
+def held_by(fields, *items) -> SimulatorConfig:
+    return SimulatorConfig(
+        home=HOME,
+        fence=fence_to_items(read_fence(fields / "yard-fence.waypoints")),
+        mission=items,
+        parameters={"FENCE_ENABLE": 1.0},
+    )
+
+
+def test_the_vehicles_own_mission_is_repaired_and_driven(fields, yard):
+    first, last = read_mission(fields / "yard-mission.waypoints").items
+    wait = MissionItem(Command.CONDITION_DELAY, CoordinateFrame.MISSION, (1.0, 0.0, 0.0, 0.0))
+    pause = MissionItem(Command.NAV_DELAY, CoordinateFrame.MISSION, (1.0, 0.0, 0.0, 0.0))
+    back = MissionItem(Command.DO_JUMP, CoordinateFrame.MISSION, (1.0, 1.0, 0.0, 0.0))
+    with Simulator(
+        held_by(fields, first, pause, wait, last, back), "tcpin:127.0.0.1:0", speedup=20.0
+    ) as simulator:
+        armed(simulator)
+        document = document_of(
+            "plan", "--connect", simulator.connection, "--via-mission", "own", "--clearance", "2", "--drive"
+        )
+        rover = simulator.vehicle
+        assert (document["verified"], rover.breaches) == (True, 0)
+        assert rover.least_clearance_m >= 2.0
+        commands = [item.command for item in rover.mission[1:]]
+        assert [one for one in commands if one not in (16, 177, 178)] == [
+            Command.NAV_DELAY,
+            Command.CONDITION_DELAY,
+        ]
+        assert (
+            rover.rover.route.is_complete
+        )  # and was watched that long: there, back and there again, as its jump says
+        assert document["length_m"] > 3 * distance_m(first.position, last.position)
+        assert distance_m(rover.position, last.position) < 4.0
+
+
+def test_a_fence_that_changes_on_the_way_stops_a_repaired_mission(tmp_path, fields):
+    first, last = read_mission(fields / "yard-mission.waypoints").items
+    fence = read_fence(fields / "yard-fence.waypoints")
+    wall = (
+        LatLon(40.0719, -105.2292),
+        LatLon(40.0719, -105.2284),
+        LatLon(40.0718, -105.2284),
+        LatLon(40.0718, -105.2292),
+    )
+    changed = replace(fence, zones=(*fence.zones, PolygonZone(ZoneKind.EXCLUSION, wall)))
+    file = tmp_path / "changed.plan"
+    write_situation(Situation(fence=Known(changed, None, "test")), file)
+    is_changed = False
+
+    def meddle(frames) -> None:
+        nonlocal is_changed
+        is_on_its_way = any(getattr(frame.message, "seq", 0) == 2 for frame in frames)
+        if is_on_its_way and not is_changed and simulator.vehicle.mode == AUTO_MODE:
+            is_changed = True
+            told = run(
+                "upload",
+                file,
+                "--connect",
+                simulator.connection,
+                "--replace-active",
+                "--source-system",
+                "255",
+            )
+            assert told.exit_code == 0, told.output
+
+    with Simulator(held_by(fields, first, last), "tcpin:127.0.0.1:0") as simulator:
+        armed(simulator)
+        request = Request(clearance_m=2.0, via_own=True)
+        orders = Orders(
+            identity=(245, 190), request=request, upload=True, drive=True, target_sources=frozenset()
+        )
+        with open_link(simulator.connection) as link, pytest.raises(SituationError, match="not begun anew"):
+            conduct(link, orders, quiet=True, on_frames=meddle)
+        assert is_changed
+        assert simulator.vehicle.mode == HOLD_MODE
+
+
+@pytest.mark.parametrize(
+    ("item", "word"),
+    [
+        (MissionItem(Command.DO_JUMP, CoordinateFrame.MISSION, (1.0, -1.0, 0.0, 0.0)), "round without end"),
+        (MissionItem(Command.DO_SET_REVERSE, CoordinateFrame.MISSION, (1.0, 0.0, 0.0, 0.0)), "in reverse"),
+    ],
+)
+def test_what_cannot_be_watched_is_not_driven(fields, item, word):
+    first, last = read_mission(fields / "yard-mission.waypoints").items
+    with Simulator(held_by(fields, first, last, item), "tcpin:127.0.0.1:0") as simulator:
+        held = simulator.vehicle.mission
+        options = ("--via-mission", "own", "--clearance", "2", "--drive")
+        document = document_of("plan", "--connect", simulator.connection, *options, code=3)
+        assert word in document["message"]
+        assert "nothing was written" in document["message"]
+        assert simulator.vehicle.mission == held
+
+
 def test_wrong_usage_of_tours(yard):
     base = ("plan", "--fence", yard["fence"], "--start", f"{HOME}")
     via = ("--via-mission", yard["mission"])
@@ -302,4 +414,7 @@ def test_wrong_usage_of_tours(yard):
     assert run(*base, *via, "--return").exit_code == 2
     assert run(*base, *via, "--end", "rtl").exit_code == 2
     assert run(*base, *via, "--clearance", "max").exit_code == 2
-    assert run("plan", "--connect", "udpin:127.0.0.1:1", *via, "--drive").exit_code == 2
+    for more in (("--speed", "1"), ("--corner-allowance", "0"), ("--escape",)):
+        assert run(*base, *via, *more).exit_code == 2
+    assert run(*base, "--via-mission", "own").exit_code == 3  # the fence's file holds none
+    assert run(*base, "--via-mission", "none.plan").exit_code == 3

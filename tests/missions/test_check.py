@@ -364,3 +364,15 @@ def test_reserve_position_error_and_size_count_as_for_plans():
     more = check_mission(mission, situation, Request(clearance_m=1.0, reserve_m=0.5, position_error_m=0.25))
     wide = check_mission(mission, situation, Request(clearance_m=1.0, footprint=Footprint(3.0, 4.0)))
     assert [found.legs[-1].asked_m for found in (plain, more, wide)] == pytest.approx([1.0, 1.75, 2.5])
+
+
+def test_the_points_of_a_path_are_found_by_items_also_where_they_are_driven_to_twice():
+    delay = do(93, 1.0)
+    items = ((0.0, 0.0), delay, (20.0, 0.0), (20.0, -10.0), do(177, 1, 1))
+    planned = plan_of(check_mission(mission_of(*items), situation_of(FIELD)), situation_of(FIELD))
+    assert planned.seqs == (0, 1, 3, 4, 1, 3, 4)
+    assert [planned.path_index(seq) for seq in (1, 3, 4)] == [1, 2, 3]
+    assert [planned.path_index(seq, 4) for seq in (1, 3, 4)] == [4, 5, 6]
+    assert (planned.path_index(2), planned.path_index(2, 4)) == (2, 5)  # the delay belongs to the place after it
+    assert planned.path_index(3, 6) == 2  # set back by somebody
+    assert planned.path_index(9) == 6

@@ -39,7 +39,7 @@ SHARP_DEG = 110.0
 
 def moved(drawing: Drawing, index: int, missing_m: float) -> Iterator[Drawing]:
     """Move a corner outwards; where that does not help, inwards or sideways."""
-    if _is_end_or_fixed(drawing, index):
+    if drawn.is_end_or_fixed(drawing, index):
         return
     out = drawn.outward(drawing, index)
     if out is None:
@@ -56,7 +56,7 @@ def moved(drawing: Drawing, index: int, missing_m: float) -> Iterator[Drawing]:
 
 def eased(drawing: Drawing, index: int, step_m: float) -> Iterator[Drawing]:
     """Move a corner a step back towards the straight line, or along its legs."""
-    out = None if _is_end_or_fixed(drawing, index) else drawn.outward(drawing, index)
+    out = None if drawn.is_end_or_fixed(drawing, index) else drawn.outward(drawing, index)
     if out is None:
         return
     along = (-out[1], out[0])
@@ -77,7 +77,7 @@ def bent(drawing: Drawing, index: int, place: Vector, away: Vector, missing_m: f
 def together(drawing: Drawing, index: int, missing_m: float) -> Iterator[Drawing]:
     """Move a corner and the next one, or the one before, the same way."""
     for other in (index - 1, index + 1):
-        if _is_end_or_fixed(drawing, index) or _is_end_or_fixed(drawing, other):
+        if drawn.is_end_or_fixed(drawing, index) or drawn.is_end_or_fixed(drawing, other):
             continue
         for number in range(8):
             way = _vector(45.0 * number)
@@ -89,7 +89,7 @@ def together(drawing: Drawing, index: int, missing_m: float) -> Iterator[Drawing
 
 def prolonged(drawing: Drawing, index: int) -> Iterator[Drawing]:
     """Turn later, or earlier, on the line of one of its legs; the corner itself may stay as a point of the line."""
-    if _is_end_or_fixed(drawing, index):
+    if drawn.is_end_or_fixed(drawing, index):
         return
     here = drawing[index]
     before = drawn.direction(drawing[index - 1], here)
@@ -106,13 +106,13 @@ def prolonged(drawing: Drawing, index: int) -> Iterator[Drawing]:
 
 def without(drawing: Drawing, index: int) -> Iterator[Drawing]:
     """Leave a corner out."""
-    if not _is_end_or_fixed(drawing, index):
+    if not drawn.is_end_or_fixed(drawing, index):
         yield (*drawing[:index], *drawing[index + 1 :])
 
 
 def merged(drawing: Drawing, index: int) -> Iterator[Drawing]:
     """Make one corner of this one and the next: where the outer legs meet, or half-way."""
-    if _is_end_or_fixed(drawing, index) or _is_end_or_fixed(drawing, index + 1):
+    if drawn.is_end_or_fixed(drawing, index) or drawn.is_end_or_fixed(drawing, index + 1):
         return
     here, following = drawing[index], drawing[index + 1]
     middle = ((here.east_m + following.east_m) / 2, (here.north_m + following.north_m) / 2)
@@ -124,7 +124,7 @@ def merged(drawing: Drawing, index: int) -> Iterator[Drawing]:
 
 def split(drawing: Drawing, index: int) -> Iterator[Drawing]:
     """Make two gentler corners of one, or three: round the outside of it."""
-    out = None if _is_end_or_fixed(drawing, index) else drawn.outward(drawing, index)
+    out = None if drawn.is_end_or_fixed(drawing, index) else drawn.outward(drawing, index)
     if out is None:
         return
     turn_deg = abs(drawn.turn_deg(drawing, index))
@@ -222,10 +222,6 @@ def approached(drawing: Drawing, index: int) -> Iterator[Drawing]:
                 yield (*drawing[:index], point, *drawing[index:])
             if index < len(drawing) - 1:
                 yield (*drawing[: index + 1], point, *drawing[index + 1 :])
-
-
-def _is_end_or_fixed(drawing: Drawing, index: int) -> bool:
-    return not 0 < index < len(drawing) - 1 or drawing[index].is_fixed
 
 
 def _with(drawing: Drawing, index: int, place: Vector) -> Drawing:

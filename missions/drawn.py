@@ -58,6 +58,11 @@ class DrawnPoint:
 Drawing = tuple[DrawnPoint, ...]
 
 
+def is_end_or_fixed(drawing: Sequence[DrawnPoint], index: int) -> bool:
+    """Tell whether a point has to stay."""
+    return not 0 < index < len(drawing) - 1 or drawing[index].is_fixed
+
+
 def places(drawing: Sequence[DrawnPoint]) -> NDArray[np.float64]:
     """Give the points' places, (n, 2)."""
     return np.array([point.place for point in drawing])

@@ -17,6 +17,7 @@ import shapely
 from missions import corner_means, drawn
 from missions.avoidance import with_avoidance
 from missions.drive_model import envelope
+from missions.neck import find_neck, straight_through
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -202,6 +203,10 @@ class Fitting:
         missing_m, place = measured.missing_m[index], measured.worst[index]
         yield from corner_means.moved(drawing, index, missing_m)
         if not math.isnan(place[0]):
+            ahead = drawn.direction(drawing[max(index - 1, 0)], drawing[max(index, 1)])
+            narrow = find_neck(self.ground.edge, place, ahead)
+            if narrow is not None:
+                yield from straight_through(drawing, index, narrow)
             yield from corner_means.bent(drawing, index, place, self._away(place), missing_m)
         yield from corner_means.together(drawing, index, missing_m)
         yield from corner_means.without(drawing, index)

@@ -226,7 +226,8 @@ def _within(barriers: list[Barrier], circle: Area, name: str) -> list[Barrier]:
 def _home_circle(home: LatLon | None, radius_m: float) -> CircleZone:
     if home is None:
         raise SituationError(
-            f"the autopilot enforces a circle of FENCE_RADIUS {radius_m:g} m around home, and home is not known",
+            f"the autopilot enforces a circle of FENCE_RADIUS {radius_m:g} m around home, and home is not known; "
+            "for a file or a log give it (--home LAT,LON)",
             fence_radius_m=radius_m,
         )
     return CircleZone(ZoneKind.INCLUSION, home, radius_m)

@@ -193,7 +193,9 @@ def with_end(planned: Plan, situation: Situation, request: Request) -> Plan:
     if end is End.LOITER:
         return replace(planned, items=items)
     if planned.home is None:
-        raise SituationError("RTL leads home, and home is not known; end with hold or loiter")
+        raise SituationError(
+            "RTL leads home, and home is not known; give it (--home LAT,LON), or end with hold or loiter"
+        )
     wanted = replace(request, clearance_m=planned.clearance_m, start=planned.start)
     checked = check_mission(Mission(items, planned.home), situation, wanted)
     last = checked.legs[-1]

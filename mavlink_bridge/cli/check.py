@@ -25,10 +25,12 @@ from mavlink_bridge.cli.common import (
 from mavlink_bridge.cli.upload import SigningKeyOption
 from mavlink_bridge.cli.vehicle_options import (
     GpsOption,
+    HomeOption,
     LengthOption,
     PositionErrorOption,
     ReserveOption,
     WidthOption,
+    with_home_option,
     with_vehicle,
 )
 from mavlink_bridge.errors import LinkError, UsageError
@@ -58,6 +60,7 @@ def check(
         str | None,
         typer.Option(metavar="LAT,LON", help="Default: the vehicle's position; of files and logs home."),
     ] = None,
+    home: HomeOption = None,
     vehicle: Annotated[
         Path | None, typer.Option(metavar="FILE.parm", help="Parameters that log or link do not tell.")
     ] = None,
@@ -95,7 +98,7 @@ def check(
     `pbpp check --log field.tlog`
     """
     plots = plot or []
-    _check_options(mission, log, connect, plots)
+    _check_options(mission, log, connect, home, plots)
     if json_output and Path("-") in plots:
         raise UsageError("--plot - and --json both want the standard output; give a file to --plot")
     from mavlink_bridge.cli.plan import storage_warnings  # noqa: PLC0415 - quick help
@@ -121,7 +124,7 @@ def check(
 
         address = At(connect, (source_system, source_component), system, any_vehicle, timeout, signing_key)
         situation, unknown = _live_situation(address, quiet=quiet or json_output)
-    situation = _with_files(situation, mission, fence, vehicle)
+    situation = with_home_option(_with_files(situation, mission, fence, vehicle), home)
     if situation.mission is None:
         raise UsageError(f"{log or connect} tells of no mission; give one (--mission FILE)")
     if begin is None and log is not None and situation.home is not None:
@@ -138,12 +141,16 @@ def check(
         raise typer.Exit(ExitCode.CHECK)
 
 
-def _check_options(mission: Path | None, log: Path | None, connect: str | None, plots: list[Path]) -> None:
+def _check_options(
+    mission: Path | None, log: Path | None, connect: str | None, home: str | None, plots: list[Path]
+) -> None:
     """Find what cannot work before any work is done."""
     if mission is None and log is None and connect is None:
         raise UsageError("give a mission: --mission FILE, --log FILE.tlog or --connect CONNECTION")
     if log is not None and connect is not None:
         raise UsageError("give one of --log and --connect")
+    if home is not None and connect is not None:
+        raise UsageError("--home goes with files and logs: a live vehicle tells its own home")
     if plots:
         from missions.picture import check_picture_format  # noqa: PLC0415 - quick help
 

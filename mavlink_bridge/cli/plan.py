@@ -27,11 +27,13 @@ from mavlink_bridge.cli.upload import SigningKeyOption
 from mavlink_bridge.cli.vehicle_options import (
     EscapeOption,
     GpsOption,
+    HomeOption,
     LengthOption,
     PositionErrorOption,
     ReserveOption,
     SpeedOption,
     WidthOption,
+    with_home_option,
     with_vehicle,
 )
 from mavlink_bridge.errors import UsageError
@@ -75,6 +77,7 @@ def plan(
     corner_allowance: Annotated[
         str, typer.Option(metavar="M|auto", help="Room for cut corners on top; 0 plans the drawn lines only.")
     ] = "auto",
+    home: HomeOption = None,
     vehicle: Annotated[
         Path | None, typer.Option(metavar="FILE.parm", help="Parameters that the source does not tell.")
     ] = None,
@@ -153,6 +156,8 @@ def plan(
     )
     request = _with_tour(request, order, end, via_mission, comes_back=come_back)
     _check_options(fence, log, connect, upload=upload or drive, outputs=outputs, plots=plots)
+    if home is not None and connect is not None:
+        raise UsageError("--home goes with --fence and --log: a live vehicle tells its own home")
     if json_output and Path("-") in plots:
         raise UsageError("--plot - and --json both want the standard output; give a file to --plot")
     if connect is not None:
@@ -176,9 +181,8 @@ def plan(
         planned, planning_s, situation = result.plan, result.planning_s, result.situation
         uploaded = verified = result.verified
     else:
-        situation = with_parameter_file(
-            _offline_situation(fence, log, system, any_vehicle=any_vehicle), vehicle
-        )
+        situation = _offline_situation(fence, log, system, any_vehicle=any_vehicle)
+        situation = with_home_option(with_parameter_file(situation, vehicle), home)
         planned, planning_s = timed_plan(situation, request)
         uploaded = verified = False
     warnings = [*planned.warnings, *storage_warnings(planned.items, situation)]
@@ -420,10 +424,11 @@ def _report(planned: Plan, written: list[Path], *, verified: bool) -> None:
         if planned.clearance_m is not None
         else "nothing promised for the driven track"
     )
-    turns = len(planned.items) - len(planned.targets)
+    waypoints = sum(item.is_placed for item in planned.items)
+    turns = max(0, waypoints - len(planned.targets))
     typer.echo(
         f"Route: {planned.length_m:.1f} m ({planned.straight_line_m:.1f} m as the crow flies), "
-        f"about {planned.duration_s:.0f} s, {len(planned.items)} waypoints ({turns} turns)"
+        f"about {planned.duration_s:.0f} s, {waypoints} waypoints ({turns} turns)"
     )
     typer.echo(f"Clearance: {planned.drawn_clearance_m:.2f} m drawn, {promise}")
     for path in written:

@@ -12,6 +12,7 @@ from mavlink_bridge.errors import UsageError
 
 if TYPE_CHECKING:
     from missions.request import Request
+    from missions.situation import Situation
 
 SpeedOption = Annotated[
     float | None, typer.Option(metavar="M/S", help="Drive at this speed. Default: the vehicle's own.")
@@ -22,6 +23,13 @@ ReserveOption = Annotated[
 PositionErrorOption = Annotated[
     float | None,
     typer.Option(metavar="M", help="Of the vehicle's position, kept on top too. Default: from its fix."),
+]
+HomeOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="LAT,LON",
+        help="Home, where the source tells none: where it starts and returns to, and the centre of FENCE_RADIUS.",
+    ),
 ]
 EscapeOption = Annotated[
     bool, typer.Option("--escape", help="Let a vehicle that stands on forbidden ground drive out.")
@@ -77,3 +85,19 @@ def with_vehicle(
         footprint=Footprint(length_m, width_m, forward_m, right_m),
         escape=escape,
     )
+
+
+def with_home_option(situation: Situation, home: str | None) -> Situation:
+    """Let home be where the user says.
+
+    Raises
+    ------
+    InvalidPositionError
+        It is no position.
+    """
+    if home is None:
+        return situation
+    from missions.geo import parse_lat_lon  # noqa: PLC0415 - quick help
+    from missions.situation import Known  # noqa: PLC0415
+
+    return replace(situation, home=Known(parse_lat_lon(home), None, "--home"))

@@ -582,3 +582,27 @@ class TestAsAProcess:
         ]
         done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
         assert done.returncode == 0, done.stderr
+
+
+def test_home_can_be_given_where_the_file_tells_none(tmp_path, fields):
+    fence, rover = fields / "yard-fence.waypoints", tmp_path / "rover.parm"
+    rover.write_text("FENCE_ENABLE 1\nFENCE_TYPE 6\nFENCE_RADIUS 200\nAVOID_ENABLE 0\n")
+    plain = ("--fence", fence, "--vehicle", rover, "--target", TARGET, "--clearance", "2")
+    refused = failure(*plain, "--start", START)
+    assert refused["exit_code"] == 3
+    assert "--home LAT,LON" in refused["message"]
+    home = [40.071374, -105.22993]
+    planned = document(*plain, "--home", START, "--end", "rtl", "--return")
+    assert planned["start"] == planned["path"][0] == planned["path"][-1] == home
+    (tmp_path / "options.toml").write_text(f'[plan]\nhome = "{START}"\n')
+    assert document(*plain, "--config", tmp_path / "options.toml")["start"] == home
+    assert failure(*plain, "--home", "40.071374")["exit_code"] == 3
+    assert failure("--connect", "udpin:127.0.0.1:0", "--home", START)["exit_code"] == 2
+
+
+def test_home_can_be_given_to_check_too(fields):
+    files = ("--mission", fields / "yard-mission.waypoints", "--fence", fields / "yard-fence.waypoints")
+    result = CliRunner().invoke(app, ["check", *map(str, files), "--home", "40.0713,-105.2300", "--json"])
+    assert json.loads(result.stdout)["legs"][0]["start"] == [40.0713, -105.23]
+    live = CliRunner().invoke(app, ["check", "--connect", "udpin:127.0.0.1:0", "--home", START])
+    assert live.exit_code == 2

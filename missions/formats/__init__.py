@@ -5,6 +5,7 @@ Each format is one module with ``read(text, source) -> Situation``, ``write(situ
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from missions.errors import FenceMissingError, MissionFormatError
@@ -16,7 +17,6 @@ from missions.situation import Known, Situation
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
-    from pathlib import Path
 
     from missions.fence import Fence
     from missions.situation import Mission
@@ -81,7 +81,7 @@ FORMATS: dict[str, Format] = {
 }
 
 
-def read_situation(path: Path) -> Situation:
+def read_situation(path: Path | str) -> Situation:
     """Read what a file tells: fence, mission, rally points, home, parameters.
 
     Raises
@@ -89,6 +89,7 @@ def read_situation(path: Path) -> Situation:
     MissionFormatError
         The file is missing, its suffix is unknown, or it cannot be read as its format; says where.
     """
+    path = Path(path)
     read = format_of(path).read
     if read is None:
         raise MissionFormatError(
@@ -98,7 +99,7 @@ def read_situation(path: Path) -> Situation:
     return read(read_text(path), str(path))
 
 
-def read_fence(path: Path) -> Fence:
+def read_fence(path: Path | str) -> Fence:
     """Read the fence of a file.
 
     Raises
@@ -114,7 +115,7 @@ def read_fence(path: Path) -> Fence:
     return fence.value
 
 
-def read_mission(path: Path) -> Mission:
+def read_mission(path: Path | str) -> Mission:
     """Read the mission of a file.
 
     Raises
@@ -128,14 +129,14 @@ def read_mission(path: Path) -> Mission:
     return mission.value
 
 
-def write_situation(situation: Situation, path: Path, part: Part | None = None) -> tuple[Part, ...]:
+def write_situation(situation: Situation, path: Path | str, part: Part | None = None) -> tuple[Part, ...]:
     """Write what is known and what the format holds, or one part of it; a file is written whole or not at all.
 
     Parameters
     ----------
     situation : Situation
         What is known.
-    path : Path
+    path : Path or str
         The suffix chooses the format.
     part : Part, optional
         Write this and nothing else. Default: all that the format holds.
@@ -151,6 +152,7 @@ def write_situation(situation: Situation, path: Path, part: Part | None = None) 
         The suffix is unknown, nothing that the format holds is known, it holds one part at a time and several are known, or the file
         cannot be written.
     """
+    path = Path(path)
     format_ = format_of(path, "write", part)
     wanted = [one for one in parts_of(situation) if one in format_.holds and part in (None, one)]
     if not wanted:
@@ -173,7 +175,7 @@ def write_situation(situation: Situation, path: Path, part: Part | None = None) 
     return tuple(wanted)
 
 
-def write_mission(situation: Situation, path: Path) -> None:
+def write_mission(situation: Situation, path: Path | str) -> None:
     """Write the situation's mission, and in formats that hold them its fence, rally points and home.
 
     Raises
@@ -181,11 +183,12 @@ def write_mission(situation: Situation, path: Path) -> None:
     MissionFormatError
         The suffix is unknown or its format holds no missions, or the file cannot be written.
     """
+    path = Path(path)
     check_writable_format(path)
     write_situation(situation, path, None if format_of(path, "write").together else Part.MISSION)
 
 
-def write_fence(fence: Fence, path: Path) -> None:
+def write_fence(fence: Fence, path: Path | str) -> None:
     """Write a fence.
 
     Raises
@@ -196,7 +199,7 @@ def write_fence(fence: Fence, path: Path) -> None:
     write_situation(Situation(fence=Known(fence, None, str(path))), path, Part.FENCE)
 
 
-def write_parameters(values: Mapping[str, float], path: Path) -> None:
+def write_parameters(values: Mapping[str, float], path: Path | str) -> None:
     """Write parameters.
 
     Raises

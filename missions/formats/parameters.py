@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import math
 import re
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from missions.errors import MissionFormatError
 from missions.formats.files import read_text
 from missions.situation import Situation
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
 _LINE = re.compile(r"^([A-Za-z][A-Za-z0-9_]{0,15})[\s,=:]+([^\s_]+)(?:\s|$)")
 
 
-def read_parameters(path: Path) -> dict[str, float]:
+def read_parameters(path: Path | str) -> dict[str, float]:
     """Read a parameter file of Mission Planner, MAVProxy or QGroundControl (its last two columns).
 
     Raises
@@ -24,7 +21,7 @@ def read_parameters(path: Path) -> dict[str, float]:
     MissionFormatError
         The file is missing or a line is not a name and a number; says which.
     """
-    return dict(read(read_text(path), str(path)).parameters)
+    return dict(read(read_text(Path(path)), str(path)).parameters)
 
 
 def read(text: str, source: str) -> Situation:

@@ -69,6 +69,14 @@ def test_what_is_written_is_read(tmp_path: Path, suffix: str, part: Part | None,
         assert getattr(found, "value", found) == getattr(expected, "value", expected)
 
 
+def test_paths_may_be_plain_strings(tmp_path: Path) -> None:
+    fence = Fence((INCLUSION, CIRCLE))
+    write_fence(fence, str(tmp_path / "yard.plan"))
+    assert read_fence(str(tmp_path / "yard.plan")).zones == fence.zones
+    write_parameters({"WP_RADIUS": 2.0}, str(tmp_path / "rover.parm"))
+    assert read_parameters(str(tmp_path / "rover.parm")) == {"WP_RADIUS": 2.0}
+
+
 def test_a_plan_of_one_part_keeps_home_and_speed(tmp_path: Path) -> None:
     path = tmp_path / "x.plan"
     write_situation(ALL, path, Part.MISSION)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def situation_from_log(
-    path: Path,
+    path: Path | str,
     system: int | None = None,
     *,
     any_vehicle: bool = False,
@@ -29,7 +29,7 @@ def situation_from_log(
 
     Parameters
     ----------
-    path : Path
+    path : Path or str
         A ``.tlog``.
     system : int, optional
         Which vehicle, by MAVLink system id; needed where several were heard.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +20,6 @@ from mavlink_bridge.tlog.wire import LAYOUTS, layout_of
 if TYPE_CHECKING:
     from collections import Counter
     from collections.abc import Collection, Iterator
-    from pathlib import Path
     from typing import Any
 
     from numpy.typing import NDArray
@@ -51,7 +51,7 @@ class TlogReader:
 
     Parameters
     ----------
-    path : pathlib.Path
+    path : pathlib.Path or str
     wanted : collection of Message types, optional
         What to decode; all types of `mavlink_bridge.messages` by default. Of other frames only the header is looked at.
 
@@ -63,9 +63,9 @@ class TlogReader:
         A wanted class is not a message on the wire.
     """
 
-    def __init__(self, path: Path, wanted: Collection[type[Message]] | None = None) -> None:
+    def __init__(self, path: Path | str, wanted: Collection[type[Message]] | None = None) -> None:
         self._is_wanted = wanted_ids(LAYOUTS if wanted is None else wanted)
-        self._file = LogFile(path)
+        self._file = LogFile(Path(path))
         self._gap_bytes = find_gap_bytes(self._file)
         self._damage = Damage()
 
@@ -103,12 +103,12 @@ class TlogReader:
             self._damage = _damage(walk.tally, bad_crcs)
 
 
-def read_columns(path: Path, message_class: type[Message]) -> dict[str, NDArray[Any]]:
+def read_columns(path: Path | str, message_class: type[Message]) -> dict[str, NDArray[Any]]:
     """Read all messages of one type as columns, without making an object of each.
 
     Parameters
     ----------
-    path : pathlib.Path
+    path : pathlib.Path or str
     message_class : type of Message
 
     Returns

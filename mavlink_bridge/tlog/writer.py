@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import struct
+from pathlib import Path
 from typing import TYPE_CHECKING, Final, Self
 
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.tlog.wire import MAGIC_V1, MAGIC_V2, SIGNATURE_BYTES, SIGNED_FLAG
 
 if TYPE_CHECKING:
-    from pathlib import Path
     from types import TracebackType
 
 SENT_LINK: Final = 3
@@ -24,7 +24,7 @@ class TlogWriter:
 
     Parameters
     ----------
-    path : pathlib.Path
+    path : pathlib.Path or str
 
     Raises
     ------
@@ -32,7 +32,8 @@ class TlogWriter:
         The file cannot be written.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path | str) -> None:
+        path = Path(path)
         try:
             self._file = path.open("ab", buffering=0)
         except OSError as error:

@@ -6,6 +6,7 @@ Images and HTML need the extra ``plot``.
 from __future__ import annotations
 
 from importlib.util import find_spec
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from missions.errors import MissionFormatError
@@ -13,7 +14,6 @@ from missions.picture.scene import Scene
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
     from missions.geo import LatLon
     from missions.plan import Plan
@@ -29,7 +29,7 @@ TERMINAL = "-"
 """In place of a file: a sketch for the terminal."""
 
 
-def check_picture_format(path: Path) -> None:
+def check_picture_format(path: Path | str) -> None:
     """Check, before any work is done, that a picture can be drawn to a path.
 
     Raises
@@ -39,6 +39,7 @@ def check_picture_format(path: Path) -> None:
     """
     if str(path) == TERMINAL:
         return
+    path = Path(path)
     library = _LIBRARIES.get(path.suffix.lower())
     if library is None:
         raise MissionFormatError(
@@ -54,7 +55,7 @@ def check_picture_format(path: Path) -> None:
 
 def draw_plan(
     plan: Plan,
-    path: Path,
+    path: Path | str,
     *,
     track: Sequence[LatLon] = (),
     title: str | None = None,
@@ -66,7 +67,7 @@ def draw_plan(
     ----------
     plan : Plan
         What was planned.
-    path : Path
+    path : Path or str
         The suffix chooses the format.
     track : sequence of LatLon
         Where the vehicle drove, if it did.
@@ -80,6 +81,7 @@ def draw_plan(
     MissionFormatError
         The suffix is unknown, a library is not installed, or the file cannot be written.
     """
+    path = Path(path)
     check_picture_format(path)
     scene = Scene(plan, track)
     try:

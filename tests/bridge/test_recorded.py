@@ -45,7 +45,7 @@ def counts(fence: Fence) -> tuple[int, int, int, int]:
 def test_what_each_log_holds(
     logs: Path, name: str, zones: tuple | None, target: LatLon | None, source: str | None, mode: int | None
 ) -> None:
-    found = situation_from_log(logs / f"{name}.tlog")
+    found = situation_from_log(str(logs / f"{name}.tlog"))
     assert (found.system, found.component, found.vehicle_type, found.ardupilot) == (1, 1, 10, True)
     assert found.fence_trouble is None
     assert not found.transfers

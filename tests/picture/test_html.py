@@ -46,7 +46,7 @@ def _library(page: str) -> str:
 
 def test_the_same_plan_gives_the_same_page(plans: dict[str, Plan], tmp_path: Path) -> None:
     for name in ("a.html", "b.HTML"):
-        draw_plan(plans["union"], tmp_path / name, title="A field", blocks=True, track=plans["union"].path)
+        draw_plan(plans["union"], str(tmp_path / name), title="A field", blocks=True, track=plans["union"].path)
     assert (tmp_path / "a.html").read_bytes() == (tmp_path / "b.HTML").read_bytes()
 
 

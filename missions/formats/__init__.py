@@ -46,8 +46,8 @@ class Format(NamedTuple):
     ----------
     read : callable or None
         From a text and the name of its file to a situation; None where it is only written.
-    write : callable
-        From a situation to a text.
+    write : callable or None
+        From a situation to a text; None where it is only read.
     holds : tuple of Part
         What can be written into a file.
     together : bool
@@ -55,7 +55,7 @@ class Format(NamedTuple):
     """
 
     read: Callable[[str, str], Situation] | None
-    write: Callable[[Situation], str]
+    write: Callable[[Situation], str] | None
     holds: tuple[Part, ...]
     together: bool = True
 
@@ -75,6 +75,7 @@ FORMATS: dict[str, Format] = {
     ".geojson": _GEOJSON,
     ".json": _GEOJSON,
     ".kml": Format(kml.read, kml.write, _LISTS),
+    ".kmz": Format(kml.read, None, ()),
     ".gpx": Format(None, gpx.write, (Part.MISSION,)),
     ".parm": _PARAMETERS,
     ".param": _PARAMETERS,
@@ -167,6 +168,7 @@ def write_situation(situation: Situation, path: Path | str, part: Part | None = 
             f"{path}: a {path.suffix} file holds one list, and there are {' and '.join(wanted)}; choose one",
             file=str(path),
         )
+    assert format_.write is not None
     try:
         text = format_.write(only(situation, part) if part else situation)
     except MissionFormatError as error:
@@ -233,7 +235,7 @@ def format_of(path: Path, verb: str = "read", part: Part | None = None) -> Forma
         It has none.
     """
     found = FORMATS.get(path.suffix.lower())
-    if found is None:
+    if found is None or (verb == "write" and found.write is None):
         raise MissionFormatError(
             f"{path}: no format to {verb} for the suffix {path.suffix!r}; "
             f"known are {_known(part, reading=verb == 'read')}",
@@ -246,6 +248,6 @@ def _known(part: Part | None = None, *, reading: bool = False) -> str:
     suffixes = (
         suffix
         for suffix, format_ in FORMATS.items()
-        if (format_.read or not reading) and (part is None or part in format_.holds)
+        if (format_.read if reading else format_.write) and (part is None or part in format_.holds)
     )
     return ", ".join(suffixes)

@@ -43,9 +43,10 @@ def situation_of(features: Iterable[Feature], source: str) -> Situation:
         elif feature.shape is Shape.LINE:
             found[Role.ROUTE].append(feature)
         elif feature.shape is Shape.POINT:
+            called = f" ({feature.names[0]!r})" if feature.names else ""
             raise feature.error(
-                "a point of which is not said what it is; expected a radius (metres) and a role of inclusion or exclusion, "
-                'or a role like "waypoint", "home" or "drawing"'
+                f"a point{called} of which is not said what it is; expected a radius (metres) and a role of inclusion or exclusion, "
+                'or a role like "waypoint" or "home"; to leave it out, a role "drawing" or a folder of that name'
             )
     home = _lone(found[Role.HOME])
     fence = _fence(zones, _lone(found[Role.RETURN_POINT]))

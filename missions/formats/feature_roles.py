@@ -26,8 +26,8 @@ _ROLES = {role.value: role for role in Role} | {
 _SURE_KEYS = ("role", "fence")
 _LIKELY_KEYS = ("fence_type", "zone", "kind", "type")
 _TRUE, _FALSE = ("true", "1", "yes"), ("false", "0", "no")
-_WHOLE_NAMES = frozenset({Role.HOME, Role.RETURN_POINT})
-"""A field called "Home meadow" is no home."""
+_WHOLE_NAMES = frozenset({Role.HOME, Role.RETURN_POINT, Role.DRAWING})
+"""A field called "Home meadow" is no home; and what is left out must be said to be, by nothing but that word."""
 
 _ZONES = frozenset({Role.INCLUSION, Role.EXCLUSION})
 _POSSIBLE = {
@@ -83,8 +83,12 @@ def _named_role(feature: Feature, possible: Iterable[Role]) -> Role | None:
         roles = {
             role
             for word, role in _ROLES.items()
-            if role in possible and role is not Role.DRAWING  # what is left out must be said to be
-            if (name == word if role in _WHOLE_NAMES else re.search(rf"(?<![a-z]){word}s?(?![a-z])", name))
+            if role in possible
+            if (
+                name in (word, f"{word}s")
+                if role in _WHOLE_NAMES
+                else re.search(rf"(?<![a-z]){word}s?(?![a-z])", name)
+            )
         }
         if len(roles) > 1:
             raise feature.error(

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from missions.geo import LatLon
     from missions.situation import Situation
 
-_GEOMETRIES = ("Point", "LineString", "Polygon", "MultiPolygon")
+_ONE_OF = {"MultiPoint": "Point", "MultiLineString": "LineString", "MultiPolygon": "Polygon"}
+_GEOMETRIES = ("Point", "LineString", "Polygon", *_ONE_OF, "GeometryCollection")
 _WGS84 = ("CRS84", "EPSG::4326", "EPSG:4326")
 
 
@@ -78,23 +79,27 @@ def _shapes(
         raise node["type"].error(
             f"{kind!r} is not supported; expected {', '.join(_GEOMETRIES[:-1])} or {_GEOMETRIES[-1]}"
         )
+    if kind == "GeometryCollection":
+        geometries = _members(node["geometries"], "geometries")
+        return [shape for geometry in geometries for shape in _shapes(geometry, properties, names, at)]
     coordinates = node["coordinates"]
-    found: list[tuple[Shape, tuple[tuple[LatLon, ...], ...]]]
+    parts = _members(coordinates, "parts") if kind in _ONE_OF else [coordinates]
+    return [Feature(*_shape(_ONE_OF.get(kind, kind), part), properties, names, _place(at)) for part in parts]
+
+
+def _shape(kind: str, coordinates: JsonNode) -> tuple[Shape, tuple[tuple[LatLon, ...], ...]]:
     if kind == "Point":
-        found = [(Shape.POINT, ((coordinates.lon_lat(),),))]
-    elif kind == "LineString":
-        found = [(Shape.LINE, (_line(coordinates, 2),))]
-    else:
-        polygons = coordinates.members() if kind == "MultiPolygon" else [coordinates]
-        found = [(Shape.POLYGON, tuple(_ring(ring) for ring in _rings(polygon))) for polygon in polygons]
-    return [Feature(shape, lines, properties, names, _place(at)) for shape, lines in found]
+        return Shape.POINT, ((coordinates.lon_lat(),),)
+    if kind == "LineString":
+        return Shape.LINE, (_line(coordinates, 2),)
+    return Shape.POLYGON, tuple(map(_ring, _members(coordinates, "rings")))
 
 
-def _rings(polygon: JsonNode) -> list[JsonNode]:
-    rings = polygon.members()
-    if not rings:
-        raise polygon.error("expected a polygon's rings")
-    return rings
+def _members(node: JsonNode, what: str) -> list[JsonNode]:
+    members = node.members()
+    if not members:
+        raise node.error(f"expected {what}, found none")
+    return members
 
 
 def _line(node: JsonNode, least: int) -> tuple[LatLon, ...]:

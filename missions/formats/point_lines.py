@@ -1,4 +1,4 @@
-"""Points as text, ``latitude longitude`` a line, # for remarks: what .fen and .poly files are made of."""
+"""Points as text, ``latitude longitude`` a line with spaces, a tab or a comma between, # for remarks: what .fen and .poly files are made of."""
 
 from __future__ import annotations
 
@@ -60,12 +60,12 @@ def lone_inclusion(fence: Fence, suffix: str) -> PolygonZone:
 
 
 def _point(content: str, where: str) -> LatLon:
-    columns = content.split()
+    columns = content.replace(",", " ").split()
     try:
         lat_deg, lon_deg = map(number, columns)
     except ValueError:
         raise MissionFormatError(
-            f"{where}: {content!r}; expected latitude and longitude in decimal degrees with a space between",
+            f"{where}: {content!r}; expected latitude and longitude in decimal degrees with a space or a comma between",
             where=where,
         ) from None
     try:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import zipfile
 from typing import TYPE_CHECKING
 
 import pytest
 
+from missions.errors import MissionFormatError
 from missions.fence import CircleZone, Fence, PolygonZone, ZoneKind
 from missions.formats import fen, geojson, kml, qgc_plan, read_fence, read_situation
 from missions.geo import LatLon
@@ -301,3 +303,68 @@ def test_the_innermost_name_of_a_kml_placemark_counts() -> None:
     fence = kml.read(text, "f").fence
     assert fence is not None
     assert [zone.kind for zone in fence.value.zones] == ["inclusion", "exclusion", "exclusion"]
+
+
+def test_a_zipped_kml_is_read_as_the_kml_in_it(tmp_path: Path) -> None:
+    plain, packed = tmp_path / "farm.kml", tmp_path / "farm.KMZ"
+    plain.write_text(GOOGLE_EARTH)
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("files/icon.png", b"\x89PNG")
+        archive.writestr("doc.kml", GOOGLE_EARTH)
+    assert read_fence(packed) == read_fence(plain)
+
+
+def test_a_pin_in_a_folder_of_drawings_is_left_out() -> None:
+    ring = "<LinearRing><coordinates>8,47 8.1,47 8.1,47.1 8,47</coordinates></LinearRing>"
+    pin = "<Placemark><name>Gate</name><Point><coordinates>8.05,47.05,450</coordinates></Point></Placemark>"
+    text = f"<kml><Placemark>{ring}</Placemark><Folder><name>Drawings</name>{pin}</Folder></kml>"
+    situation = kml.read(text, "f")
+    assert situation.fence is not None
+    assert len(situation.fence.value.zones) == 1
+    with pytest.raises(MissionFormatError, match="a point \\('Gate'\\) of which is not said what it is"):
+        kml.read(text.replace("Drawings", "Drawings of the gate"), "f")
+
+
+def test_geometries_as_map_programs_bundle_them() -> None:
+    corners = [[8.0, 47.0, 450.5], [8.1, 47.0, 450.5], [8.1, 47.1, 450.5], [8.0, 47.0, 450.5]]
+    line = [[8.01, 47.001], [8.02, 47.002]]
+    document = {
+        "type": "FeatureCollection",
+        "features": [
+            {
+                "type": "Feature",
+                "properties": {"fid": 1},
+                "geometry": {
+                    "type": "GeometryCollection",
+                    "geometries": [{"type": "MultiPolygon", "coordinates": [[corners]]}],
+                },
+            },
+            {
+                "type": "Feature",
+                "properties": {"fid": 2, "name": None},
+                "geometry": {"type": "MultiLineString", "coordinates": [line]},
+            },
+        ],
+    }
+    situation = geojson.read(json.dumps(document), "f")
+    assert situation.fence is not None
+    assert situation.mission is not None
+    assert situation.fence.value.zones == (
+        PolygonZone(ZoneKind.INCLUSION, (LatLon(47.0, 8.0), LatLon(47.0, 8.1), LatLon(47.1, 8.1))),
+    )
+    route = [item.position for item in situation.mission.value.items]
+    assert route == [LatLon(47.001, 8.01), LatLon(47.002, 8.02)]
+    bundle = {"type": "MultiPoint", "coordinates": line}
+    points = {"type": "Feature", "properties": {"role": "waypoint"}, "geometry": bundle}
+    again = geojson.read(json.dumps(points), "f").mission
+    assert again is not None
+    assert [item.position for item in again.value.items] == route
+
+
+@pytest.mark.parametrize("order", ["utf-16-le", "utf-16-be"])
+def test_a_file_that_notepad_saved_as_unicode(tmp_path: Path, order: str) -> None:
+    path = tmp_path / "field.poly"
+    path.write_bytes("\ufeff# field\r\n47.0, 8.0\r\n47.0,8.1\r\n47.1\t8.1\r\n".encode(order))
+    assert read_fence(path).zones[0] == PolygonZone(
+        ZoneKind.INCLUSION, (LatLon(47.0, 8.0), LatLon(47.0, 8.1), LatLon(47.1, 8.1))
+    )

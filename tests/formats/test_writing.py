@@ -144,9 +144,10 @@ def test_what_cannot_be_written_is_known_before_any_work() -> None:
             if part in format_.holds:
                 check_writable_format(Path(f"x{suffix}"), part)
             else:
-                with pytest.raises(
-                    MissionFormatError, match=f"a {suffix} file holds no {part}; known for it are "
-                ):
+                reason = f"a {suffix} file holds no {part}; known for it are "
+                if format_.write is None:
+                    reason = f"no format to write for the suffix '{suffix}'; known are "
+                with pytest.raises(MissionFormatError, match=reason):
                     check_writable_format(Path(f"x{suffix}"), part)
     with pytest.raises(
         MissionFormatError, match=r"no format to write for the suffix '\.tlog'; known are \.plan"

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import zipfile
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from missions.errors import MissionFormatError
-from missions.formats import read_situation
+from missions.formats import read_situation, write_situation
+from missions.situation import Situation
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -32,15 +34,16 @@ GEOJSON = [
     ('{"type": "FeatureCollection",\n"features": [', "line 2: not JSON"),
     ("[]", "type: missing"),
     ({}, "type: missing"),
-    ({"type": "Topology"}, "type: 'Topology' is not supported; expected Point, LineString, Polygon or MultiPolygon"),
+    ({"type": "Topology"}, "type: 'Topology' is not supported; expected Point, LineString, Polygon, MultiPoint, MultiLineString, MultiPolygon or GeometryCollection"),
     (collection("x"), "features[0].type: missing"),
     ({"type": "FeatureCollection", "features": {}}, "features: expected a list"),
     ({"type": "FeatureCollection"}, "features: missing"),
     (collection(collection()), "features[0].type: 'FeatureCollection'; expected 'Feature'"),
-    (collection(feature(POLYGON), feature({"type": "GeometryCollection", "geometries": []})), "features[1].geometry.type: 'GeometryCollection' is not supported"),
-    (feature({"type": "MultiPoint", "coordinates": []}), "geometry.type: 'MultiPoint' is not supported"),
+    (collection(feature(POLYGON), feature({"type": "GeometryCollection", "geometries": []})), "features[1].geometry.geometries: expected geometries, found none"),
+    (feature({"type": "MultiPoint", "coordinates": []}), "geometry.coordinates: expected parts, found none"),
+    (feature({"type": "Circle", "coordinates": []}), "geometry.type: 'Circle' is not supported; expected Point, LineString"),
     (feature({"type": "Polygon"}), "geometry.coordinates: missing"),
-    (feature({"type": "Polygon", "coordinates": []}), "geometry.coordinates: expected a polygon's rings"),
+    (feature({"type": "Polygon", "coordinates": []}), "geometry.coordinates: expected rings, found none"),
     (feature({"type": "Polygon", "coordinates": RING}), "geometry.coordinates[0][0]: expected [longitude, latitude]"),
     (feature({"type": "Polygon", "coordinates": [RING[:2]]}), "geometry.coordinates[0]: 2 positions; expected at least 3"),
     (feature({"type": "Polygon", "coordinates": [[RING[0], RING[1], RING[0]]]}), "geometry.coordinates[0]: 2 vertices; a polygon needs at least 3"),
@@ -138,7 +141,7 @@ FEN = [
     ("# nothing\n", "0 points; expected the return point"),
     ("40 -105\n40 -105\n40.1 -105\n40 -105\n", "4 points; expected the return point"),
     ("40 -105\n40 -105\n40.1 -105\n40.1 -105.1\n40 -105.1\n", "line 5: the ring is not closed: expected the point of line 2 again"),
-    ("# x\n40,-105\n", "line 2: '40,-105'; expected latitude and longitude in decimal degrees with a space between"),
+    ("# x\n40;-105\n", "line 2: '40;-105'; expected latitude and longitude in decimal degrees with a space or a comma between"),
     ("40 -105 12\n", "line 1: '40 -105 12'; expected latitude and longitude"),
     ("40\n", "line 1: '40'; expected latitude and longitude"),
     ("forty -105\n", "line 1: 'forty -105'; expected latitude and longitude"),
@@ -219,6 +222,38 @@ def test_bytes_that_are_no_text(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"x{suffix}"
     path.write_bytes(b"\x89PNG\r\n\x1a\n")
     with pytest.raises(MissionFormatError, match=r"is not a text file \(byte 0\); expected UTF-8"):
+        read_situation(path)
+
+
+@pytest.mark.parametrize(
+    ("content", "problem"),
+    [
+        (b"PK no zip", "is no zip file that can be read: File is not a zip file"),
+        (None, "holds no .kml"),
+    ],
+)
+def test_kmz(tmp_path: Path, content: bytes | None, problem: str) -> None:
+    path = tmp_path / "x.kmz"
+    if content is None:
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("readme.txt", "nothing")
+    else:
+        path.write_bytes(content)
+    with pytest.raises(MissionFormatError) as caught:
+        read_situation(path)
+    assert problem in str(caught.value)
+    with pytest.raises(
+        MissionFormatError, match=r"no format to write for the suffix '\.kmz'; known are \.plan"
+    ):
+        write_situation(Situation(), path)
+
+
+def test_a_kmz_that_holds_too_much_is_not_unpacked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("missions.formats.files._MOST_BYTES", 10)
+    path = tmp_path / "x.kmz"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("doc.kml", "<kml>" + " " * 100 + "</kml>")
+    with pytest.raises(MissionFormatError, match=r"doc\.kml is 0 MB; expected at most 0 MB"):
         read_situation(path)
 
 

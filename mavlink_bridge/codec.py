@@ -2,20 +2,77 @@
 
 from __future__ import annotations
 
+import struct
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from mavlink_bridge.messages import MESSAGES, Frame, Message
+from mavlink_bridge.messages import MESSAGES, Frame, Message, MissionCurrent
 
 if TYPE_CHECKING:
     from mavlink_bridge.signing import Signing
 
+
+_HEADER_BYTES_V1, _HEADER_BYTES_V2 = 6, 10
+
+
+class _MissionCurrent(dialect.MAVLink_mission_current_message):  # type: ignore[misc]  # pymavlink ships no types
+    """MISSION_CURRENT with the ids that MAVLink's common.xml has and ArduPilot's own does not: extension fields, after all others.
+
+    Only what is sent and where fields stand comes from here; pymavlink reads what it knows itself, `to_frame` the rest.
+    """
+
+    _IDS = ("mission_id", "fence_id", "rally_points_id")
+    _parent = dialect.MAVLink_mission_current_message
+    fieldnames: ClassVar = [*_parent.fieldnames, *_IDS]
+    ordered_fieldnames: ClassVar = [*_parent.ordered_fieldnames, *_IDS]
+    fieldtypes: ClassVar = [*_parent.fieldtypes, *["uint32_t"] * len(_IDS)]
+    orders: ClassVar = [*_parent.orders, *range(len(_parent.orders), len(fieldnames))]
+    lengths: ClassVar = [*_parent.lengths, *[1] * len(_IDS)]
+    array_lengths: ClassVar = [*_parent.array_lengths, *[0] * len(_IDS)]
+    native_format = bytearray(_parent.native_format + b"I" * len(_IDS))
+    unpacker = struct.Struct(native_format.decode())
+    ids_at = _parent.unpacker.size
+
+    def __init__(
+        self,
+        seq: int,
+        total: int = 0,
+        mission_state: int = 0,
+        mission_mode: int = 0,
+        mission_id: int = 0,
+        fence_id: int = 0,
+        rally_points_id: int = 0,
+    ) -> None:
+        super().__init__(seq, total, mission_state, mission_mode)
+        self.mission_id = mission_id
+        self.fence_id = fence_id
+        self.rally_points_id = rally_points_id
+
+    def pack(self, mav: Any, force_mavlink1: bool = False) -> bytes:  # noqa: ANN401, FBT001, FBT002 - pymavlink's signature
+        values = [getattr(self, name) for name in self.ordered_fieldnames]
+        packed: bytes = self._pack(
+            mav, self.crc_extra, self.unpacker.pack(*values), force_mavlink1=force_mavlink1
+        )
+        return packed
+
+
+def _dialect_classes() -> dict[int, Any]:
+    classes = dict(dialect.mavlink_map)
+    known = classes[_MissionCurrent.id]
+    if not set(_MissionCurrent._IDS) <= set(known.fieldnames):  # noqa: SLF001 - our own class
+        classes[_MissionCurrent.id] = _MissionCurrent
+    return classes
+
+
+DIALECT: dict[int, Any] = _dialect_classes()
+"""pymavlink's class of every message by its id, with the fields that it lacks."""
+
 _FIELDS = {name: tuple(field.name for field in fields(cls)) for name, cls in MESSAGES.items()}
 _DIALECT_CLASSES: dict[str, Any] = {
     message_class.msgname: message_class
-    for message_class in dialect.mavlink_map.values()
+    for message_class in DIALECT.values()
     if message_class.msgname in MESSAGES
 }
 
@@ -98,8 +155,20 @@ def to_frame(raw: Any) -> Frame | None:  # noqa: ANN401 - pymavlink ships no typ
     message_class = MESSAGES.get(name)
     if message_class is None:
         return None
-    message = message_class(*[getattr(raw, field) for field in _FIELDS[name]])
-    return Frame(raw.get_srcSystem(), raw.get_srcComponent(), message)
+    if message_class is MissionCurrent and not hasattr(raw, "fence_id"):
+        values = [*(getattr(raw, field) for field in raw.fieldnames), *_ids_in(raw)]
+    else:
+        values = [getattr(raw, field) for field in _FIELDS[name]]
+    return Frame(raw.get_srcSystem(), raw.get_srcComponent(), message_class(*values))
+
+
+def _ids_in(raw: Any) -> tuple[int, int, int]:  # noqa: ANN401 - pymavlink ships no types
+    """Read the end of a MISSION_CURRENT's payload; MAVLink 2 leaves off what is 0 there."""
+    frame_bytes = bytes(raw.get_msgbuf())
+    begin = _HEADER_BYTES_V1 if frame_bytes[0] == dialect.PROTOCOL_MARKER_V1 else _HEADER_BYTES_V2
+    payload = frame_bytes[begin : begin + frame_bytes[1]].ljust(_MissionCurrent.unpacker.size, b"\0")
+    ids: tuple[int, int, int] = struct.unpack_from("<III", payload, _MissionCurrent.ids_at)
+    return ids
 
 
 def _to_dialect(message: Message) -> Any:  # noqa: ANN401 - pymavlink ships no types

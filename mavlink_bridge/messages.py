@@ -253,12 +253,15 @@ class MissionSetCurrent(Message):
 
 @dataclass(frozen=True, slots=True)
 class MissionCurrent(Message):
-    """MISSION_CURRENT (42)."""
+    """MISSION_CURRENT (42); the ids change with the lists, and are 0 where the autopilot does not fill them."""
 
     seq: int
     total: int = 0
     mission_state: int = 0
     mission_mode: int = 0
+    mission_id: int = 0
+    fence_id: int = 0
+    rally_points_id: int = 0
 
 
 @dataclass(frozen=True, slots=True)

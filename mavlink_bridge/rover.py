@@ -4,6 +4,7 @@ from __future__ import annotations
 
 AUTO_MODE = 10
 HOLD_MODE = 4
+RTL_MODE = 11
 GUIDED_MODE = 15
 
 MODE_NAMES = {
@@ -17,7 +18,7 @@ MODE_NAMES = {
     8: "DOCK",
     9: "CIRCLE",
     AUTO_MODE: "AUTO",
-    11: "RTL",
+    RTL_MODE: "RTL",
     12: "SMART_RTL",
     GUIDED_MODE: "GUIDED",
     16: "INITIALISING",

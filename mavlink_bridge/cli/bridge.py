@@ -119,6 +119,7 @@ def bridge(
         raise UsageError(f"--target-from: {error}; known are {', '.join(TargetSource)}") from None
     orders = Orders(
         identity=(source_system, source_component) if source_system else None,
+        own_component=source_component,
         system=system,
         any_vehicle=any_vehicle,
         request=request_from_options(None, target or [], clearance, corner_allowance, snap, "optimal"),

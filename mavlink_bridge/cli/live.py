@@ -39,6 +39,7 @@ _STATE_TEXTS = {
     State.PLANNING: "planning",
     State.PROPOSED: "planned",
     State.UPLOADING: "uploading and reading back",
+    State.WITHDRAWING: "taken over; ending the upload",
     State.VERIFIED: "verified",
     State.STARTING: "switching to AUTO",
     State.DRIVING: "driving",

@@ -1,4 +1,4 @@
-"""Noticing what others change on the vehicle: its fence, its mission; and that it was switched off and on."""
+"""Noticing what others change on the vehicle: its fence, its mission, its rally points; and that it was switched off and on."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from mavlink_bridge.fold import KINDS
 from missions.situation import ListKind
 
 if TYPE_CHECKING:
-    from mavlink_bridge.messages import Frame
+    from mavlink_bridge.messages import Frame, Message
 
 _TEXTS = {
     "fence indexed": ListKind.FENCE,
@@ -18,6 +18,14 @@ _TEXTS = {
     "flight plan received": ListKind.MISSION,
     "mission upload timeout": ListKind.MISSION,
 }
+_CURRENT = (
+    ("total", ListKind.MISSION),
+    ("mission_id", ListKind.MISSION),
+    ("fence_id", ListKind.FENCE),
+    ("rally_points_id", ListKind.RALLY),
+)
+"""What MISSION_CURRENT tells of each list; the ids are 0 where the autopilot does not fill them."""
+
 _FENCE_TOTAL, _MISSION_TOTAL = "FENCE_TOTAL", "MIS_TOTAL"
 _REBOOT_MS = 5000
 
@@ -35,13 +43,15 @@ class ChangeWatch:
     ----------
     identity : tuple of int
         Our ids; what is acknowledged to us we did ourselves.
+    kinds : frozenset of ListKind
+        The lists that matter.
     """
 
-    def __init__(self, identity: tuple[int, int]) -> None:
+    def __init__(self, identity: tuple[int, int], kinds: frozenset[ListKind]) -> None:
         self.suspects: set[ListKind] = set()
         self._poll_due_s = self._fence_due_s = math.inf
         self._identity = identity
-        self._boot_ms = 0
+        self._kinds = kinds
         self._totals: dict[str, float] = {}
 
     def deadline_s(self, *, is_driving: bool) -> float:
@@ -60,7 +70,7 @@ class ChangeWatch:
         """Give and forget the lists that are to be read again."""
         if now_s >= self._poll_due_s:
             self._poll_due_s = now_s + POLL_EVERY_S
-            self.suspects |= {ListKind.FENCE, ListKind.MISSION}
+            self.suspects |= self._kinds
         if is_driving and now_s >= self._fence_due_s:
             self.suspects.add(ListKind.FENCE)
         if ListKind.FENCE in self.suspects:
@@ -70,33 +80,41 @@ class ChangeWatch:
 
     def look(self, frame: Frame) -> None:
         """Suspect the lists that a frame says may have changed."""
-        self.suspects |= self._signs(frame)
+        self.suspects |= self._signs(frame) & self._kinds
 
     def _signs(self, frame: Frame) -> set[ListKind]:
         message = frame.message
         if isinstance(message, m.MissionAck):
             is_ours = (message.target_system, message.target_component) == self._identity
+            if is_ours or message.type != m.MissionResult.ACCEPTED:
+                return set()
             kind = KINDS.get(message.mission_type)
-            return {kind} if kind and not is_ours and message.type == m.MissionResult.ACCEPTED else set()
+            return set(ListKind) if message.mission_type == m.MissionType.ALL else {kind} if kind else set()
         if isinstance(message, m.Statustext):
             text = message.text.lower()
             return {kind for start, kind in _TEXTS.items() if text.startswith(start)}
         if isinstance(message, m.MissionCurrent):
-            return {ListKind.MISSION} if self._changed("MISSION_CURRENT.total", message.total) else set()
+            return {kind for field, kind in _CURRENT if self._changed(field, getattr(message, field))}
         if isinstance(message, m.ParamValue) and message.param_id in (_FENCE_TOTAL, _MISSION_TOTAL):
             kind = ListKind.FENCE if message.param_id == _FENCE_TOTAL else ListKind.MISSION
             return {kind} if self._changed(message.param_id, message.param_value) else set()
         return set()
 
-    def is_reboot(self, frame: Frame) -> bool:
-        """Tell whether the vehicle's clock has started anew."""
-        message = frame.message
-        if not isinstance(message, m.GlobalPositionInt):
-            return False
-        before, self._boot_ms = self._boot_ms, message.time_boot_ms
-        return message.time_boot_ms < before - _REBOOT_MS
-
     def _changed(self, name: str, value: float) -> bool:
         before = self._totals.get(name)
         self._totals[name] = value
         return before is not None and before != value
+
+
+class RebootWatch:
+    """Looks at the vehicle's own clock."""
+
+    def __init__(self) -> None:
+        self._boot_ms = 0
+
+    def is_reboot(self, message: Message) -> bool:
+        """Tell whether the vehicle's clock has started anew."""
+        if not isinstance(message, m.GlobalPositionInt):
+            return False
+        before, self._boot_ms = self._boot_ms, message.time_boot_ms
+        return message.time_boot_ms < before - _REBOOT_MS

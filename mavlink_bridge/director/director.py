@@ -3,39 +3,37 @@
 It listens for the vehicle, learns it, and makes of each target a plan; uploads the plan verified, drives it in AUTO and watches, as far as its
 orders go. It notices what others do: a changed fence, a changed mission, a changed mode. The operator's word always counts more than its own.
 The same object runs live, in a replay, against the simulator and in tests.
+
+It stands on three others, each with a part of the work: `acquaintance` finds and learns the vehicle, `keeper` keeps true what is known of it,
+`route_maker` makes targets into verified missions. Here the vehicle is made to move, and stopped: nothing else switches modes or arms.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from mavlink_bridge import messages as m
 from mavlink_bridge.director.drive_watch import DriveWatch
 from mavlink_bridge.director.events import EventName
-from mavlink_bridge.director.keeper import FRESH_S, Keeper
-from mavlink_bridge.director.orders import Orders, TargetSource
+from mavlink_bridge.director.mode_switch import AwaitHeartbeat, ModeSwitch, SwitchState
+from mavlink_bridge.director.operator_watch import OperatorWatch, mode_name
+from mavlink_bridge.director.orders import TargetSource
+from mavlink_bridge.director.route_maker import RouteMaker
 from mavlink_bridge.director.states import Cue, State
-from mavlink_bridge.director.targets import CLICKS, Target, TargetWatch
-from mavlink_bridge.errors import BridgeError, OutcomeError, RefusedError
-from mavlink_bridge.outcomes import upload_trouble
+from mavlink_bridge.director.targets import Target
+from mavlink_bridge.errors import OutcomeError, RefusedError
 from mavlink_bridge.protocol.command import SendCommand
-from mavlink_bridge.protocol.limits import Limits
-from mavlink_bridge.protocol.verified_upload import VerifiedUpload, VerifiedUploadOutcome
-from mavlink_bridge.rover import AUTO_MODE, GUIDED_MODE, HOLD_MODE, MODE_NAMES
-from missions.errors import MissionError
-from missions.items import Command, last_place, with_home
+from mavlink_bridge.rover import AUTO_MODE, GUIDED_MODE, HOLD_MODE
+from missions.items import Command
 from missions.plan import plan as make_plan
-from missions.recheck import recheck, straight_line
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from mavlink_bridge.director.orders import Orders
     from mavlink_bridge.director.steps import Step
-    from mavlink_bridge.messages import Frame
-    from missions.geo import LatLon
-    from missions.items import MissionItem
+    from mavlink_bridge.messages import Frame, Message
     from missions.plan import Plan
     from missions.request import Request
     from missions.situation import Situation
@@ -44,10 +42,11 @@ _STILL_MPS = 0.3
 _STOP_AT_LEAST_S = 0.25
 _STOP_PATIENCE_S = 8.0
 _MOVED_M = 1.0
-_MAKING_A_ROUTE = frozenset({State.PLANNING, State.PROPOSED, State.VERIFIED})
+_MAY_BE_IN_AUTO = frozenset({State.STARTING, State.DRIVING})
+"""Our AUTO may be on its way, or no heartbeat may have told of it yet."""
 
 
-class Director(Keeper):
+class Director(RouteMaker):
     """Takes targets to verified missions, and missions to arrival.
 
     Parameters
@@ -66,25 +65,16 @@ class Director(Keeper):
         situation: Situation | None = None,
         planner: Callable[[Situation, Request], Plan] = make_plan,
     ) -> None:
-        super().__init__(orders, situation)
-        self.upload_outcome: VerifiedUploadOutcome | None = None
-        self.plan: Plan | None = None
+        super().__init__(orders, situation, planner)
         self.drive: DriveWatch | None = None
-        self._planner = planner
-        self._targets = TargetWatch(orders.target_sources)
-        self._target: Target | None = None
-        self._waiting_target: Target | None = None
-        self._ours: tuple[MissionItem, ...] | None = None  # the mission that is on the vehicle by us
-        self._confirmed = False
+        self._operator = OperatorWatch()
+        self._stopping: ModeSwitch | None = None  # our HOLD, until a heartbeat has shown it
+        self._taken_over: OutcomeError | None = None
+        self._is_first_time = True
         self._speed_mps = 0.0
-        self._held_at_s: float | None = None
-        self._mode_set_s = -math.inf  # when the vehicle took the newest mode of ours
-        self._standstill_due_s = math.inf
-        self._modes_expected: frozenset[int] = frozenset()
-        self._modes_expected_s = -math.inf
         self._item_now = 1
-
-    # What the shell sees
+        self._held_at_s: float | None = None
+        self._standstill_due_s = math.inf
 
     @property
     def progress(self) -> tuple[int, int]:
@@ -94,333 +84,45 @@ class Director(Keeper):
         progress: tuple[int, int] = self._steps.current.progress if self._steps else (0, 0)
         return progress
 
-    @property
-    def pending_backup(self) -> tuple[MissionItem, ...] | None:
-        """The vehicle's old mission, while it waits to be stored; nothing is written before `backup_stored`."""
-        upload = self._steps.current
-        return upload.pending_backup if isinstance(upload, VerifiedUpload) else None
+    def messages_to_send(self) -> list[Message]:
+        """Give and forget what is to be sent now."""
+        stopping = self._stopping.messages_to_send() if self._stopping is not None else []
+        return stopping + super().messages_to_send()
 
-    # What the shell does
-
-    def take_target(self, position: LatLon, now_s: float) -> None:
-        """Take a target that was typed."""
-        self._targets.take(position, now_s)
-        self._take_target(Target(position, TargetSource.TYPED), now_s)
-
-    def confirm(self, now_s: float) -> None:
-        """Take the operator's yes to the plan that stands."""
-        self._confirmed = True
-        self._go_on(now_s)
-
-    def backup_stored(self, now_s: float) -> None:
-        """Take notice that the old mission is safe."""
-        upload = self._steps.current
-        if isinstance(upload, VerifiedUpload):
-            upload.backup_stored(now_s)
-
-    # What follows from learning
-
-    def _learnt(self, now_s: float) -> None:
-        if not self._resume(now_s):
-            self._want_first_target(now_s)
-
-    def _resume(self, now_s: float) -> bool:
-        """Go on watching where, after a lost link, the vehicle still drives our mission and the route still holds."""
-        mission, plan = self.situation.mission, self.plan
-        if plan is None or self._ours is None or mission is None or mission.value.items != self._ours[1:]:
-            return False
-        is_driving = bool(self.situation.armed) and self.situation.mode == AUTO_MODE
-        if not is_driving or not recheck(plan, self.situation, self._item_now).holds:
-            return False
-        self._move(Cue.RESUMED)
-        self.drive = DriveWatch(plan, self._voice, now_s)
-        self.drive.item = self._item_now
-        self._voice.tell(now_s, EventName.DRIVING, "still driving our mission", len(plan.items))
-        return True
-
-    def _want_first_target(self, now_s: float) -> None:
-        """Begin with the targets of the orders; a single job also with the newest of the stream or the mission's last place."""
-        targets = self.orders.request.targets
-        if self._target is not None:
-            self._take_target(self._target, now_s)
-        elif targets:
-            self._take_target(Target(targets[-1], TargetSource.TYPED), now_s)
-        elif self.orders.once:
-            self._cue_target(now_s)
-        elif TargetSource.MISSION in self.orders.target_sources:
-            self._take_mission_target(now_s)
-
-    # Targets and plans
-
-    def _take_target(self, target: Target, now_s: float) -> None:
-        if self.state is State.UPLOADING:
-            self._waiting_target = target
-            return
-        if self.state in (State.LEARNING, State.LOST):
-            self._target = target
-            return
-        self._target = target
-        self._voice.tell(
-            now_s,
-            EventName.TARGET,
-            f"target {target.position} by {target.source}",
-            list(target.position),
-            str(target.source),
-        )
-        if target.command is not None:
-            self._answer(target, m.MavResult.IN_PROGRESS)
-        self._warn_of_straight_line(target, now_s)
-        self._cue_target(now_s)
-
-    def _cue_target(self, now_s: float) -> None:
-        if self._may_stop_it and self._move(Cue.TARGET_WHILE_MOVING):
-            self._hold("a new route is wanted", now_s)
-        elif self._move(Cue.TARGET):
-            self._confirmed = False
-            self.drive = None
-            was_clicked = self._target is not None and self._target.source in CLICKS
-            self._expect_modes(
-                {self.situation.mode, GUIDED_MODE} if was_clicked else {self.situation.mode}, now_s
-            )
-
-    def _expect_modes(self, modes: set[int | None], now_s: float) -> None:
-        """Remember how the vehicle stands while a route is made: another mode is somebody else's doing."""
-        self._modes_expected = frozenset(mode for mode in modes if mode is not None)
-        self._modes_expected_s = now_s
-
-    @property
-    def _may_stop_it(self) -> bool:
-        """Whether the vehicle may be on its way and is ours to stop; a click sets it going before any heartbeat says so."""
-        orders, situation = self.orders, self.situation
-        if not orders.drive or (orders.once and self.state is not State.DRIVING):
-            return False
-        if self.state in (State.STARTING, State.DRIVING):
-            return True
-        if not situation.armed:
-            return False
-        was_clicked = self._target is not None and self._target.source in CLICKS
-        return was_clicked or situation.mode in (AUTO_MODE, GUIDED_MODE)
-
-    def _warn_of_straight_line(self, target: Target, now_s: float) -> None:
-        """Warn at once: a go-to click makes the vehicle drive straight, before any plan exists."""
-        if self.situation.mode != GUIDED_MODE or not self.situation.armed or self.situation.pose is None:
-            return
-        found = straight_line(self.situation, self.orders.request, target.position)
-        if found is not None and not found.holds:
-            self._voice.rechecked(
-                now_s, EventName.STRAIGHT_LINE_UNSAFE, "the straight line to the target", found
-            )
-
-    def _hold(self, reason: str, now_s: float) -> None:
-        self._confirmed = False
-        self.drive = None
-        self._held_at_s = None
-        self._standstill_due_s = math.inf
-        self._voice.tell(now_s, EventName.HOLDING, f"HOLD: {reason}", reason)
-        self._steps.clear()
-        self._steps.run(
-            [self._command(Command.DO_SET_MODE, m.ModeFlag.CUSTOM_MODE_ENABLED, HOLD_MODE)], now_s
-        )
-
-    def _await_standstill(self, now_s: float) -> None:
-        """Plan from where the vehicle has come to rest."""
-        if self._held_at_s is None or now_s < self._held_at_s + _STOP_AT_LEAST_S:
-            return
-        if self._speed_mps <= _STILL_MPS or now_s >= self._held_at_s + _STOP_PATIENCE_S:
-            self._move(Cue.HELD)
-        else:
-            self._standstill_due_s = now_s + _STOP_AT_LEAST_S
-
-    def _plan_route(self, now_s: float) -> None:
-        request = self._route_request()
-        try:
-            self.plan = self._planner(self.situation, request)
-        except MissionError as error:
-            self.plan = None
-            self._answer_owed(m.MavResult.DENIED)
-            self._move(Cue.NO_PLAN)
-            self._voice.no_plan(now_s, error)
-            self._give_up(error)
-            return
-        self._move(Cue.PLANNED)
-        self._answer_owed(m.MavResult.ACCEPTED)
-        self._voice.planned(now_s, self.plan)
-        self._go_on(now_s)
-
-    def _route_request(self) -> Request:
-        """Give what is asked of the next plan: the orders' request, for the newest target, from where the vehicle is."""
-        request = self.orders.request
-        if self._target is not None and self._target.position not in request.targets:
-            request = replace(request, targets=(self._target.position,))
-        return request if self.orders.once else replace(request, start=None)
-
-    def _go_on(self, now_s: float) -> None:
-        """Do with the plan what the orders allow."""
-        if self.state is not State.PROPOSED or self.plan is None or self._peer is None:
-            return
-        if not self.orders.upload:
-            self._end()
-            return
-        if (self.orders.confirm and not self._confirmed) or not self._move(Cue.UPLOAD):
-            return
-        items = with_home(self.plan.items, self.plan.home or self.plan.start)
-        is_active = bool(self.situation.armed) and self.situation.mode == AUTO_MODE
-        # A heartbeat from before our own change of mode still tells the mode before it.
-        is_fresh = max(now_s - FRESH_S, self._mode_set_s) <= self._heartbeat_s
-        upload = VerifiedUpload(
-            self._peer,
-            m.MissionType.MISSION,
-            items,
-            limits=Limits.from_parameters(self.situation.parameters),
-            is_active=is_active if is_fresh else None,
-        )
-        self._voice.tell(now_s, EventName.UPLOADING, f"uploading {len(items)} items", len(items))
-        self._steps.run([(upload, self._uploaded)], now_s)
-
-    def _uploaded(self, machine: VerifiedUpload, now_s: float) -> None:
-        outcome = self.upload_outcome = machine.outcome
-        assert outcome is not None
-        if (trouble := upload_trouble(outcome)) is not None:
-            self._ours = None
-            self._fail_step(trouble, EventName.UPLOAD_FAILED, now_s)
-            return
-        self._ours = outcome.found if outcome.found is not None else outcome.backup
-        self._move(Cue.UPLOAD_VERIFIED)
-        assert self.plan is not None
-        count = len(self.plan.items) + 1
-        self._voice.tell(
-            now_s,
-            EventName.VERIFIED,
-            f"mission of {count} items verified on the vehicle",
-            count,
-            outcome.pushes,
-        )
-        if self._is_taken_over(now_s):
-            self._let_go(now_s)
-        elif self._waiting_target is not None:
-            target, self._waiting_target = self._waiting_target, None
-            self._take_target(target, now_s)
-        elif self.orders.drive:
-            self._start_driving(now_s)
-        else:
-            self._end()
-
-    # Driving
-
-    def _start_driving(self, now_s: float) -> None:
-        assert self.plan is not None
-        first_leg = recheck(self.plan, self.situation, 1)
-        if not first_leg.holds and first_leg.moved_m > _MOVED_M:
-            self._voice.rechecked(
-                now_s, EventName.ROUTE_BROKEN, "the way to the first waypoint from here", first_leg
-            )
-            self._cue_target(now_s)
-            return
-        self._move(Cue.DRIVE)
-        steps = [self._command(Command.COMPONENT_ARM_DISARM, 1.0)] if self.orders.arm else []
-        steps.append(self._command(Command.DO_SET_MODE, m.ModeFlag.CUSTOM_MODE_ENABLED, AUTO_MODE))
-        # Only after the mode change: before it, in HOLD, ArduPilot reports internal errors.
-        steps.append(self._command(Command.DO_SET_MISSION_CURRENT, 1.0, 1.0))
-        self._steps.run(steps, now_s)
-
-    def _command(self, number: Command, param1: float, param2: float = 0.0) -> Step:
-        assert self._peer is not None
-        message = m.CommandLong(self._peer.system, self._peer.component, number, param1=param1, param2=param2)
-        return SendCommand(self._peer, message), self._commanded
-
-    def _commanded(self, machine: SendCommand, now_s: float) -> None:
-        outcome = machine.outcome
-        assert outcome is not None
-        if outcome.is_accepted and outcome.command == Command.DO_SET_MODE:
-            self._mode_set_s = now_s
-        if not outcome.is_accepted:
-            name = Command(outcome.command).name
-            result = outcome.result.name if outcome.result is not None else "no answer"
-            self._steps.clear()
-            self._voice.tell(now_s, EventName.COMMAND_FAILED, f"{name}: {result}", name, result)
-            kind = OutcomeError if outcome.result is None else RefusedError
-            texts = "".join(f"; {text}" for text in outcome.texts)
-            self._fail_step(kind(f"{self._on_vehicle}, but it refused {name}: {result}{texts}"), None, now_s)
-        elif self.state is State.HOLDING:
-            self._held_at_s = now_s
-            self._expect_modes({HOLD_MODE}, now_s)
-            self._standstill_due_s = now_s + _STOP_AT_LEAST_S
-        elif not self._steps and self._move(Cue.STARTED):
-            assert self.plan is not None
-            self.drive = DriveWatch(self.plan, self._voice, now_s)
-            self._voice.tell(now_s, EventName.DRIVING, "AUTO", len(self.plan.items))
-
-    @property
-    def _on_vehicle(self) -> str:
-        return "the mission is on the vehicle" if self._ours is not None else "nothing was written"
-
-    def _watch_drive(self, frame: Frame, now_s: float) -> None:
-        drive = self.drive
-        if drive is None:
-            return
-        drive.receive(frame, now_s)
-        if isinstance(frame.message, m.Heartbeat):
-            self._watch_mode(frame.message, drive, now_s)
-        if drive.has_arrived and self._move(Cue.REACHED):
-            drive.tell_progress(now_s)
-            self._voice.arrived(now_s, drive)
-            self.drive = None
-            self._end()
-
-    def _watch_mode(self, heartbeat: m.Heartbeat, drive: DriveWatch, now_s: float) -> None:
-        is_armed = heartbeat.base_mode & m.ModeFlag.SAFETY_ARMED
-        if drive.has_left_auto(heartbeat, now_s):
-            self._let_go(now_s)
-        elif self.orders.once and not is_armed:
-            self._give_up(
-                OutcomeError("the mission is on the vehicle in AUTO, but it is not armed and does not drive")
-            )
-
-    def _is_taken_over(self, now_s: float) -> bool:
-        """Tell whether somebody switched the vehicle's mode since a route was wanted."""
-        is_settled = now_s - self._modes_expected_s > FRESH_S
-        is_other = bool(self._modes_expected) and self.situation.mode not in self._modes_expected
-        return self.orders.drive and is_settled and is_other
-
-    def _let_go(self, now_s: float) -> None:
-        """Leave the vehicle to the operator, until a new target comes."""
-        mode = self.situation.mode
-        name = MODE_NAMES.get(mode, str(mode)) if mode is not None else "another mode"
-        if self._move(Cue.TAKEN_OVER):
-            self.drive = None
-            self._waiting_target = None
-            text = f"somebody switched to {name}; waiting for a new target"
-            self._voice.tell(now_s, EventName.TAKEN_OVER, text, name)
-            self._give_up(
-                OutcomeError(f"somebody switched the vehicle to {name} before it arrived", mode=name)
-            )
+    def receive(self, frame: Frame, now_s: float) -> None:
+        """Take a frame."""
+        if self._stopping is not None:
+            self._stopping.receive(frame, now_s)
+            self._look_after_hold(now_s)
+        super().receive(frame, now_s)
 
     # What the vehicle and others do
 
     def _own_deadlines_s(self) -> list[float | None]:
         times: list[float | None] = []
+        if self._stopping is not None:
+            times.append(self._stopping.deadline_s)
         if self.state is State.HOLDING:
             times.append(self._standstill_due_s)
-        if self.state is State.PLANNING:
+        if self.state is State.PLANNING and not self._steps:
             times.append(-math.inf)
         if self.drive is not None:
             times.append(self.drive.progress_due_s)
         return times
 
     def _handle_own_timer(self, now_s: float) -> None:
+        if self._stopping is not None:
+            self._stopping.handle_timer(now_s)
+            self._look_after_hold(now_s)
         if self.state is State.HOLDING:
             self._await_standstill(now_s)
         elif self.state is State.PLANNING and not self._steps:
-            self._plan_route(now_s)
+            if self._is_outdated and self._changes is not None:
+                self._reread(self._changes.due(now_s, is_driving=False), now_s)
+            else:
+                self._plan_route(now_s)
         elif self.drive is not None and now_s >= self.drive.progress_due_s:
             self.drive.tell_progress(now_s)
-
-    def _take_any_frame(self, frame: Frame, before: Situation, now_s: float) -> None:
-        if self.identity is None:
-            return
-        target = self._targets.look(frame, before, self.situation, now_s, self.identity)
-        if target is not None:
-            self._take_target(target, now_s)
 
     def _take_vehicle_frame(self, frame: Frame, now_s: float) -> None:
         message = frame.message
@@ -429,68 +131,305 @@ class Director(Keeper):
         elif isinstance(message, m.GlobalPositionInt):
             self._speed_mps = math.hypot(message.vx, message.vy) / 100
         super()._take_vehicle_frame(frame, now_s)
-        if isinstance(message, m.Heartbeat) and self.state in _MAKING_A_ROUTE and self._is_taken_over(now_s):
-            self._let_go(now_s)
-        if self.state is State.DRIVING:
-            self._watch_drive(frame, now_s)
+        if isinstance(message, m.Heartbeat):
+            self._take_heartbeat(message, now_s)
+        if self.state is State.DRIVING and self.drive is not None:
+            self._watch_drive(self.drive, frame, now_s)
+
+    def _take_heartbeat(self, heartbeat: m.Heartbeat, now_s: float) -> None:
+        taken = self._operator.take_heartbeat(heartbeat, now_s)
+        if taken is not None:
+            self._let_go(taken, now_s)
+        elif self._operator.is_late_click(heartbeat, now_s) and self._stopping is None:
+            self._command_hold(now_s)
+        elif self.state is State.VERIFIED and not self.orders.drive and self._is_driving_ours:
+            self._watch_on(now_s, "somebody drives the mission")
+        elif self.state is State.DRIVING and self.orders.once and not self.situation.armed:
+            self._give_up(
+                OutcomeError("the mission is on the vehicle in AUTO, but it is not armed and does not drive")
+            )
+
+    def _take_any_frame(self, frame: Frame, before: Situation, now_s: float) -> None:
+        peer = self._peer
+        is_anothers = (frame.system, frame.component) != self.identity and not self._is_from_vehicle(frame)
+        if peer is not None and is_anothers:
+            taken = self._operator.overhear(frame.message, peer.system, peer.component, now_s)
+            if taken is not None:
+                self._let_go(taken, now_s)
+        super()._take_any_frame(frame, before, now_s)
+
+    def _learnt(self, now_s: float) -> None:
+        is_first_time, self._is_first_time = self._is_first_time, False
+        targets = self.orders.request.targets
+        if not is_first_time and self.orders.once:
+            self._give_up(OutcomeError("the vehicle was switched off and on meanwhile"))
+        elif not is_first_time:
+            self._note_lists()
+            self._take_up_again(now_s)
+            self._take_waiting_target(now_s)
+        elif self._waiting_target is not None or targets:
+            self._note_lists()
+            if not self._take_waiting_target(now_s):
+                self._take_target(Target(targets[-1], TargetSource.TYPED), now_s)
+        elif self.orders.once:
+            self._cue_target(now_s)
+        else:
+            self._take_mission_target(now_s)
+            self._rally_read(now_s)
+
+    def _take_up_again(self, now_s: float) -> None:
+        """Go on where a lost link left us: with watching, never with driving; somebody may have had the vehicle meanwhile."""
+        mission, ours = self.situation.mission, self._ours
+        if self.plan is None or ours is None or mission is None or mission.value.items != ours[1:]:
+            return
+        self._target = Target(self.plan.targets[-1], TargetSource.TYPED)
+        if self._is_driving_ours:
+            self._watch_on(now_s, "still driving our mission")
+            self._fence_changed(now_s)
+        elif self.orders.drive:
+            self._target = None
+        elif self._move(Cue.STILL_THERE) and self._is_stale:
+            self._fence_changed(now_s)
+
+    def _watch_on(self, now_s: float, text: str) -> None:
+        """Watch a drive on our mission that we did not start just now."""
+        if self.plan is not None and self._move(Cue.RESUMED):
+            self._operator.expect(AUTO_MODE, set(), is_armed=True)
+            self.drive = DriveWatch(self.plan, self._voice, now_s)
+            self.drive.item = self._item_now
+            self._voice.tell(now_s, EventName.DRIVING, text, len(self.plan.items))
 
     def _vehicle_gone(self, *, has_forgotten: bool) -> None:
-        self.drive = None
+        self._let_loose()
         if has_forgotten:
             self._ours = None
+            self._waiting_target = None
 
-    def _mission_heard(self, now_s: float) -> None:
-        self._take_mission_target(now_s)
+    @property
+    def _item(self) -> int:
+        if self.drive is not None:
+            return self.drive.item
+        return self._item_now if self._is_driving_ours else 1
 
-    def _mission_read(self, items: tuple[MissionItem, ...], now_s: float) -> None:
-        if self._ours is not None and items[1:] == self._ours[1:]:
+    # The operator's word
+
+    def _let_go(self, what: str, now_s: float) -> None:
+        """Leave the vehicle to the operator, until a new target comes."""
+        if not self._move(Cue.TAKEN_OVER):
             return
-        if self._ours is not None:
+        self._let_loose()
+        self._waiting_target = None
+        is_withdrawing = self.state is State.WITHDRAWING
+        then = "the upload is finished first" if is_withdrawing else "waiting for a new target"
+        mode = what.rpartition(" ")[2] if "switched" in what else mode_name(self.situation.mode)
+        self._voice.tell(now_s, EventName.TAKEN_OVER, f"somebody {what}; {then}", mode)
+        trouble = OutcomeError(f"somebody {what} before it arrived", mode=mode)
+        if is_withdrawing:
+            self._taken_over = trouble
+        else:
+            self._give_up(trouble)
+
+    def _let_loose(self) -> None:
+        """Forget what was wanted and what is under way, but for an upload and for learning."""
+        self._operator.stop()
+        self._targets.let_go()
+        self._answers.settle(m.MavResult.CANCELLED)
+        self._stopping = None
+        self.drive = None
+        self._target = None
+        if self.state not in (State.WITHDRAWING, State.LEARNING):
+            self._drop_steps()
+
+    def _after_upload(self, now_s: float) -> None:
+        if self._learn_now(now_s):
             self._ours = None
-            count = len(items)
-            self._voice.tell(
-                now_s, EventName.MISSION_CHANGED, f"somebody changed the mission: {count} items", count
-            )
-            if self.state is State.DRIVING and self._move(Cue.TAKEN_OVER):
-                self.drive = None
-        self._take_mission_target(now_s)
+            return
+        taken_over, self._taken_over = self._taken_over, None
+        if taken_over is not None:
+            self._give_up(taken_over)
+        if not self.is_done:
+            super()._after_upload(now_s)
 
-    def _fence_changed(self, now_s: float) -> None:
-        if self.plan is None or self.state in (State.READY, State.LET_GO, State.ARRIVED):
-            if self.state is State.READY and self._target is not None:
-                self._cue_target(now_s)
+    # Stopping
+
+    @property
+    def _may_stop_it(self) -> bool:
+        if not self.orders.drive or self._peer is None:
+            return False
+        if self.state in _MAY_BE_IN_AUTO:
+            return True
+        return not self.orders.once and self._may_move
+
+    @property
+    def _may_move(self) -> bool:
+        """Whether the vehicle may be on its way; a click sets it going before any heartbeat says so."""
+        was_clicked = self._target is not None and self._target.is_click
+        return was_clicked or (bool(self.situation.armed) and self.situation.mode != HOLD_MODE)
+
+    def _sets_it_going(self, target: Target) -> bool:
+        is_command = target.source is TargetSource.REPOSITION
+        return target.is_click and (is_command or self.situation.mode == GUIDED_MODE)
+
+    def _take_target(self, target: Target, now_s: float) -> None:
+        self._operator.take_target(now_s, is_click=target.is_click)
+        super()._take_target(target, now_s)
+
+    def _take_again(self, target: Target, now_s: float) -> None:
+        """Stop the vehicle once more: a command that is repeated has set it going once more."""
+        if target.source is not TargetSource.REPOSITION or not self._operator.is_on or self.orders.once:
             return
-        item = self.drive.item if self.drive is not None else 1
-        found = recheck(self.plan, self.situation, item)
-        if found.holds:
-            return
-        self._voice.rechecked(now_s, EventName.ROUTE_BROKEN, "the rest of the route", found)
-        if self.state is not State.DRIVING or self.orders.drive:
+        self._operator.take_target(now_s, is_click=True)
+        if self.state in _MAY_BE_IN_AUTO:
             self._cue_target(now_s)
+        else:
+            self._command_hold(now_s)
 
-    def _take_mission_target(self, now_s: float) -> None:
-        mission = self.situation.mission
-        place = last_place(mission.value.items) if mission else None
-        is_new = self._target is None or place != self._target.position
-        if place is not None and is_new and TargetSource.MISSION in self.orders.target_sources:
-            self._take_target(Target(place, TargetSource.MISSION), now_s)
+    def _stop_at_once(self, target: Target, now_s: float) -> None:
+        is_heard = self._peer is not None and self.state is not State.LOST
+        is_moving = target.is_click or (bool(self.situation.armed) and self.situation.mode != HOLD_MODE)
+        if self.orders.drive and is_heard and is_moving and not self.orders.once:
+            reason = "a target came; it is gone into in a moment"
+            self._voice.tell(now_s, EventName.HOLDING, f"HOLD: {reason}", reason)
+            self._command_hold(now_s)
 
-    # Answers
+    def _hold(self, reason: str, now_s: float) -> None:
+        self.drive = None
+        self._held_at_s = None
+        self._standstill_due_s = math.inf
+        self._voice.tell(now_s, EventName.HOLDING, f"HOLD: {reason}", reason)
+        self._drop_steps()
+        self._command_hold(now_s)
 
-    def _answer(self, target: Target, result: m.MavResult) -> None:
-        assert target.command is not None
-        asker = target.asker or (0, 0)
-        self._send(m.CommandAck(target.command, result, target_system=asker[0], target_component=asker[1]))
+    def _command_hold(self, now_s: float) -> None:
+        """Switch to HOLD, and expect nothing but what was and what will be."""
+        assert self._peer is not None
+        # Our own AUTO may be on its way still, and so may a click's GUIDED.
+        self._operator.expect(
+            HOLD_MODE,
+            {self.situation.mode, AUTO_MODE, GUIDED_MODE},
+            is_armed=bool(self.situation.armed),
+        )
+        self._stopping = ModeSwitch(self._peer, HOLD_MODE, insists=True)
+        self._stopping.start(now_s)
 
-    def _answer_owed(self, result: m.MavResult) -> None:
-        if self._target is not None and self._target.command is not None:
-            self._answer(self._target, result)
-            self._target = replace(self._target, command=None)
+    def _look_after_hold(self, now_s: float) -> None:
+        stopping = self._stopping
+        if stopping is None:
+            return
+        if stopping.is_granted and self.state is State.HOLDING and self._held_at_s is None:
+            self._held_at_s = now_s
+            self._standstill_due_s = now_s + _STOP_AT_LEAST_S
+        if not stopping.is_done:
+            return
+        self._outgoing += stopping.messages_to_send()
+        self._stopping = None
+        self._operator.settle(now_s)
+        if stopping.state is SwitchState.UNANSWERED:
+            self._voice.tell(
+                now_s, EventName.COMMAND_FAILED, "the vehicle does not go to HOLD", "DO_SET_MODE", "no answer"
+            )
+            if self.state is State.HOLDING:
+                self._fail_step(OutcomeError("the vehicle does not go to HOLD; nothing was written"))
 
-    # A step that failed
+    def _is_mode_known(self, now_s: float) -> bool:
+        # A heartbeat from before our HOLD still tells the mode before it.
+        return self._stopping is None and super()._is_mode_known(now_s)
 
-    def _fail_step(self, trouble: BridgeError, name: EventName | None, now_s: float) -> None:
-        if name is not None:
-            self._voice.error(now_s, name, trouble, dict(trouble.details))
-        self._move(Cue.TROUBLE)
-        self._give_up(trouble)
+    def _await_standstill(self, now_s: float) -> None:
+        """Plan from where the vehicle has come to rest."""
+        if self._held_at_s is None or now_s < self._held_at_s + _STOP_AT_LEAST_S:
+            return
+        is_patience_over = now_s >= self._held_at_s + _STOP_PATIENCE_S and self.situation.mode == HOLD_MODE
+        if self._speed_mps <= _STILL_MPS or is_patience_over:
+            self._move(Cue.HELD)
+        else:
+            self._standstill_due_s = now_s + _STOP_AT_LEAST_S
+
+    def _stand_by(self) -> None:
+        self.drive = None
+        if self.orders.drive:
+            self._operator.expect(self.situation.mode, set(), is_armed=bool(self.situation.armed))
+
+    # Driving
+
+    def _start_driving(self, now_s: float) -> None:
+        if self._move(Cue.DRIVE):
+            self._look_once_more(now_s)
+
+    def _look_once_more(self, now_s: float) -> None:
+        """Read again what somebody may have changed, and wait for a heartbeat: it shows a takeover that was on its way."""
+        assert self._peer is not None
+        if self._changes is not None and self._changes.suspects:
+            self._reread(self._changes.due(now_s, is_driving=False), now_s)
+        self._steps.run([(AwaitHeartbeat(self._peer), self._looked)], now_s)
+
+    def _looked(self, _machine: AwaitHeartbeat, now_s: float) -> None:
+        is_outdated = self._changes is not None and bool(self._changes.suspects)
+        if is_outdated or self._stopping is not None:
+            self._look_once_more(now_s)
+            return
+        found = self._recheck(1)
+        if not found.holds and (found.moved_m > _MOVED_M or self._is_stale):
+            self._route_broke(found, now_s)
+        elif self.orders.arm and not self.situation.armed:
+            self._steps.run([self._command(Command.COMPONENT_ARM_DISARM, 1.0, self._armed)], now_s)
+        else:
+            self._switch_to_auto(now_s)
+
+    def _armed(self, machine: SendCommand, now_s: float) -> None:
+        if self._is_accepted(machine, now_s):
+            self._switch_to_auto(now_s)
+
+    def _switch_to_auto(self, now_s: float) -> None:
+        assert self._peer is not None
+        self._operator.expect(AUTO_MODE, {self.situation.mode}, is_armed=bool(self.situation.armed))
+        self._steps.run([(ModeSwitch(self._peer, AUTO_MODE, insists=False), self._in_auto)], now_s)
+
+    def _in_auto(self, machine: ModeSwitch, now_s: float) -> None:
+        if not machine.is_granted:
+            self._stand_by()
+            self._command_failed("DO_SET_MODE", machine.result_name, "", now_s)
+            return
+        self._operator.settle(now_s)
+        # Only after the mode change: before it, in HOLD, ArduPilot reports internal errors.
+        self._steps.run(
+            [self._command(Command.DO_SET_MISSION_CURRENT, 1.0, self._started, param2=1.0)], now_s
+        )
+
+    def _started(self, machine: SendCommand, now_s: float) -> None:
+        if not self._is_accepted(machine, now_s):
+            self._command_hold(now_s)  # it drives from an item that we do not know
+        elif self._move(Cue.STARTED):
+            assert self.plan is not None
+            self.drive = DriveWatch(self.plan, self._voice, now_s)
+            self._voice.tell(now_s, EventName.DRIVING, "AUTO", len(self.plan.items))
+
+    def _command(
+        self, number: Command, param1: float, take: Callable[[SendCommand, float], None], param2: float = 0.0
+    ) -> Step:
+        assert self._peer is not None
+        message = m.CommandLong(self._peer.system, self._peer.component, number, param1=param1, param2=param2)
+        return SendCommand(self._peer, message), take
+
+    def _is_accepted(self, machine: SendCommand, now_s: float) -> bool:
+        outcome = machine.outcome
+        assert outcome is not None
+        if not outcome.is_accepted:
+            result = outcome.result.name if outcome.result is not None else "no answer"
+            texts = "".join(f"; {text}" for text in outcome.texts)
+            self._command_failed(Command(outcome.command).name, result, texts, now_s)
+        return outcome.is_accepted
+
+    def _command_failed(self, name: str, result: str, texts: str, now_s: float) -> None:
+        self._drop_steps()
+        self._voice.tell(now_s, EventName.COMMAND_FAILED, f"{name}: {result}", name, result)
+        kind = OutcomeError if result == "no answer" else RefusedError
+        self._fail_step(kind(f"the mission is on the vehicle, but it refused {name}: {result}{texts}"))
+
+    def _watch_drive(self, drive: DriveWatch, frame: Frame, now_s: float) -> None:
+        drive.receive(frame, now_s)
+        if drive.has_arrived and self._move(Cue.REACHED):
+            drive.tell_progress(now_s)
+            self._voice.arrived(now_s, drive)
+            self._let_loose()
+            self._end()

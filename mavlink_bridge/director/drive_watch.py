@@ -1,4 +1,4 @@
-"""Watching a drive: how far, how near to the fence, within the band that was foreseen or not, still in AUTO or not."""
+"""Watching a drive: how far, how near to the fence, within the band that was foreseen or not."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from shapely import LineString, Point, prepare
 
 from mavlink_bridge import messages as m
 from mavlink_bridge.director.events import EventName
-from mavlink_bridge.rover import AUTO_MODE
 from missions.geo import from_e7
 
 if TYPE_CHECKING:
@@ -23,7 +22,6 @@ OUTSIDE_M = 0.25
 """How far outside the foreseen band counts: the vehicle's own estimate of its place is off by as much."""
 
 PROGRESS_EVERY_S = 1.0
-_FRESH_S = 1.5
 _STANDING_MPS = 0.15
 _STANDING_S = 3.0
 _ACTIVE, _COMPLETE = 3, 5
@@ -65,7 +63,6 @@ class DriveWatch:
         self._here: Point | None = None
         self._place: LatLon | None = None
         self._is_outside = False
-        self._auto_seen = False
         self._standing_since_s: float | None = None
 
     @property
@@ -92,13 +89,6 @@ class DriveWatch:
             self._take_reached(message.seq)
         elif isinstance(message, m.FenceStatus):
             self._count_breaches(message, now_s)
-
-    def has_left_auto(self, heartbeat: m.Heartbeat, now_s: float) -> bool:
-        """Tell whether somebody else switched to another mode."""
-        is_auto = heartbeat.custom_mode == AUTO_MODE
-        self._auto_seen = self._auto_seen or is_auto
-        # A heartbeat from before our own mode change may still be under way.
-        return not is_auto and (self._auto_seen or now_s - self.begun_s > _FRESH_S)
 
     def tell_progress(self, now_s: float) -> None:
         """Tell how far the drive is."""

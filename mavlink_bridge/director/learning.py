@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from mavlink_bridge import messages as m
@@ -17,6 +18,8 @@ from missions.situation import ListKind
 from missions.vehicle import PARAMETER_NAMES
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from mavlink_bridge.messages import Frame, Message
     from mavlink_bridge.protocol.peer import Peer
     from missions.items import MissionItem
@@ -45,12 +48,15 @@ class Learning:
         The vehicle and our identity.
     patience_s : float
         How long to wait for a position.
+    kinds : sequence of ListKind
+        The lists that are read.
     """
 
-    def __init__(self, peer: Peer, patience_s: float) -> None:
+    def __init__(self, peer: Peer, patience_s: float, kinds: Sequence[ListKind]) -> None:
         self.trouble: BridgeError | None = None
         self._peer = peer
         self._patience_s = patience_s
+        self._kinds = tuple(kinds)
         self._steps = Steps()
         self._outgoing: list[Message] = []
         self._parameters: dict[str, float] = {}
@@ -94,8 +100,10 @@ class Learning:
         self._steps.run(
             [
                 (ReadParameters(peer, (*PARAMETER_NAMES, *_STORAGE_NAMES)), self._take_parameters),
-                (Download(peer, m.MissionType.FENCE), self._take_fence),
-                (Download(peer, m.MissionType.MISSION), self._take_mission),
+                *(
+                    (Download(peer, MISSION_TYPES[kind]), partial(self._take_list, kind))
+                    for kind in self._kinds
+                ),
                 (SendCommand(peer, home), self._take_home),
             ],
             now_s,
@@ -131,7 +139,7 @@ class Learning:
         """Give a situation with what was learnt."""
         situation = replace(situation, parameters={**situation.parameters, **self._parameters})
         for kind, items in self._lists.items():
-            situation = with_list(situation, kind, items, now_s, f"{kind} read from the vehicle")
+            situation = with_read_list(situation, kind, items, now_s)
         return situation
 
     def _ask_streams(self, now_s: float) -> None:
@@ -148,13 +156,7 @@ class Learning:
             return
         self._parameters = dict(outcome.values)
 
-    def _take_fence(self, machine: Download, _now_s: float) -> None:
-        self._take_list(machine, ListKind.FENCE)
-
-    def _take_mission(self, machine: Download, _now_s: float) -> None:
-        self._take_list(machine, ListKind.MISSION)
-
-    def _take_list(self, machine: Download, kind: ListKind) -> None:
+    def _take_list(self, kind: ListKind, machine: Download, _now_s: float) -> None:
         items = list_of(machine, kind)
         if isinstance(items, BridgeError):
             self._fail(items)
@@ -168,6 +170,16 @@ class Learning:
     def _fail(self, trouble: BridgeError) -> None:
         self._steps.clear()
         self.trouble = trouble
+
+
+def with_read_list(
+    situation: Situation, kind: ListKind, items: tuple[MissionItem, ...], now_s: float
+) -> Situation:
+    """Take a list that was read from the vehicle for what it holds; a fence that cannot be used leaves none known."""
+    situation = with_list(situation, kind, items, now_s, f"{kind} read from the vehicle")
+    if kind is ListKind.FENCE and situation.fence_trouble is not None:
+        return replace(situation, fence=None)
+    return situation
 
 
 def list_of(machine: Download, kind: ListKind) -> tuple[MissionItem, ...] | BridgeError:

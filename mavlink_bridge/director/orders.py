@@ -35,7 +35,9 @@ class Orders:
     Parameters
     ----------
     identity : tuple of int, optional
-        Our system and component id. Default: the vehicle's system id and 195.
+        Our system and component id. Default: the vehicle's system id and ``own_component``.
+    own_component : int
+        Our component id beside the vehicle's own system id.
     system : int, optional
         The vehicle's system id; needed where several vehicles are heard.
     any_vehicle : bool
@@ -63,6 +65,7 @@ class Orders:
     """
 
     identity: tuple[int, int] | None = None
+    own_component: int = PATH_PLANNER_COMPONENT
     system: int | None = None
     any_vehicle: bool = False
     request: Request = field(default_factory=Request)

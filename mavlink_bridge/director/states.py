@@ -20,8 +20,11 @@ class State(StrEnum):
     PLANNING = auto()
     PROPOSED = auto()  # a plan stands; it is reported, or waits for a yes
     UPLOADING = auto()
+    WITHDRAWING = (
+        auto()
+    )  # taken over in the middle of an upload: no half mission is left behind, and nothing more is done
     VERIFIED = auto()  # the mission is on the vehicle
-    STARTING = auto()  # arming where asked, switching to AUTO, to the first item
+    STARTING = auto()  # looking once more, arming where asked, switching to AUTO, to the first item
     DRIVING = auto()
     ARRIVED = auto()
     LET_GO = (
@@ -38,17 +41,18 @@ class Cue(StrEnum):
     FOUND = auto()
     LEARNT = auto()
     TARGET = auto()  # a route is wanted
-    TARGET_WHILE_MOVING = auto()  # the same, and the vehicle moves and may be stopped
+    TARGET_WHILE_MOVING = auto()  # the same, and the vehicle may move and may be stopped
     HELD = auto()
     PLANNED = auto()
     NO_PLAN = auto()
     UPLOAD = auto()
     UPLOAD_VERIFIED = auto()
     DRIVE = auto()
-    RESUMED = auto()  # our mission is still being driven
+    RESUMED = auto()  # our mission is being driven, though we did not start it just now
+    STILL_THERE = auto()  # our mission is on the vehicle as we left it
     STARTED = auto()
     REACHED = auto()
-    TAKEN_OVER = auto()
+    TAKEN_OVER = auto()  # somebody else switched the mode, disarmed, or changed the mission
     SILENCE = auto()
     HEARD = auto()
     REBOOTED = auto()
@@ -59,57 +63,37 @@ class Cue(StrEnum):
 
 _ALWAYS = {Cue.SILENCE: State.LOST, Cue.REBOOTED: State.LEARNING, Cue.GIVE_UP: State.FAILED}
 _WANTED = {Cue.TARGET: State.PLANNING, Cue.TARGET_WHILE_MOVING: State.HOLDING}
+_OURS = {**_ALWAYS, **_WANTED, Cue.TAKEN_OVER: State.LET_GO}
 
 TRANSITIONS: dict[State, dict[Cue, State]] = {
     State.LISTENING: {Cue.FOUND: State.LEARNING, Cue.GIVE_UP: State.FAILED},
-    State.LEARNING: {**_ALWAYS, Cue.LEARNT: State.READY, Cue.REBOOTED: State.LEARNING},
-    State.READY: {**_ALWAYS, **_WANTED, Cue.RESUMED: State.DRIVING},
+    State.LEARNING: {**_ALWAYS, Cue.LEARNT: State.READY, Cue.TAKEN_OVER: State.LEARNING},
+    State.READY: {**_OURS, Cue.RESUMED: State.DRIVING, Cue.STILL_THERE: State.VERIFIED},
     State.HOLDING: {
         **_ALWAYS,
+        Cue.TARGET_WHILE_MOVING: State.HOLDING,
         Cue.HELD: State.PLANNING,
         Cue.TAKEN_OVER: State.LET_GO,
         Cue.TROUBLE: State.READY,
     },
-    State.PLANNING: {
-        **_ALWAYS,
-        **_WANTED,
-        Cue.PLANNED: State.PROPOSED,
-        Cue.NO_PLAN: State.READY,
-        Cue.TAKEN_OVER: State.LET_GO,
-    },
-    State.PROPOSED: {
-        **_ALWAYS,
-        **_WANTED,
-        Cue.UPLOAD: State.UPLOADING,
-        Cue.TAKEN_OVER: State.LET_GO,
-        Cue.END: State.DONE,
-    },
+    State.PLANNING: {**_OURS, Cue.PLANNED: State.PROPOSED, Cue.NO_PLAN: State.READY},
+    State.PROPOSED: {**_OURS, Cue.UPLOAD: State.UPLOADING, Cue.END: State.DONE},
     State.UPLOADING: {
         Cue.UPLOAD_VERIFIED: State.VERIFIED,
+        Cue.TAKEN_OVER: State.WITHDRAWING,
+        Cue.REBOOTED: State.WITHDRAWING,
         Cue.TROUBLE: State.READY,
         Cue.GIVE_UP: State.FAILED,
     },
-    State.VERIFIED: {
-        **_ALWAYS,
-        **_WANTED,
-        Cue.DRIVE: State.STARTING,
-        Cue.TAKEN_OVER: State.LET_GO,
-        Cue.END: State.DONE,
+    State.WITHDRAWING: {
+        Cue.UPLOAD_VERIFIED: State.LET_GO,
+        Cue.TROUBLE: State.LET_GO,
+        Cue.GIVE_UP: State.FAILED,
     },
-    State.STARTING: {
-        **_ALWAYS,
-        **_WANTED,
-        Cue.STARTED: State.DRIVING,
-        Cue.TROUBLE: State.VERIFIED,
-        Cue.TAKEN_OVER: State.LET_GO,
-    },
-    State.DRIVING: {
-        **_ALWAYS,
-        **_WANTED,
-        Cue.REACHED: State.ARRIVED,
-        Cue.TAKEN_OVER: State.LET_GO,
-    },
-    State.ARRIVED: {**_ALWAYS, **_WANTED, Cue.TAKEN_OVER: State.LET_GO, Cue.END: State.DONE},
+    State.VERIFIED: {**_OURS, Cue.DRIVE: State.STARTING, Cue.RESUMED: State.DRIVING, Cue.END: State.DONE},
+    State.STARTING: {**_OURS, Cue.STARTED: State.DRIVING, Cue.TROUBLE: State.VERIFIED},
+    State.DRIVING: {**_OURS, Cue.REACHED: State.ARRIVED},
+    State.ARRIVED: {**_OURS, Cue.END: State.DONE},
     State.LET_GO: {**_ALWAYS, **_WANTED},
     State.LOST: {Cue.HEARD: State.LEARNING, Cue.REBOOTED: State.LEARNING, Cue.GIVE_UP: State.FAILED},
     State.DONE: {},

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from mavlink_bridge import messages as m
+from mavlink_bridge.director.answers import is_command_to
 from mavlink_bridge.director.orders import TargetSource
 from mavlink_bridge.rover import GUIDED_MODE
 from missions.geo import distance_m, from_e7
@@ -20,11 +21,9 @@ _SOURCES = {
     "SET_POSITION_TARGET_GLOBAL_INT": TargetSource.POSITION_TARGET,
     "MISSION_ITEM with current 2": TargetSource.GUIDED_ITEM,
 }
-CLICKS = frozenset(
+_CLICKS = frozenset(
     {TargetSource.REPOSITION, TargetSource.POSITION_TARGET, TargetSource.GUIDED_ITEM, TargetSource.ECHO}
 )
-"""Targets that may set the vehicle going, straight."""
-
 _SAME_M = 0.2
 _SAID_AGAIN_S = 3.0
 _ECHO_MOVED_M = 0.5
@@ -40,16 +39,24 @@ class Target:
         The place.
     source : TargetSource
         How it came.
-    command : int, optional
-        The command that asked our own component for it and waits for a COMMAND_ACK.
+    is_to_us : bool
+        Whether our own component was asked for it; then a COMMAND_ACK is waited for, and the vehicle heard nothing.
     asker : tuple of int, optional
         System and component id that sent it.
+    is_again : bool
+        Whether it only says again what was said a moment ago.
     """
 
     position: LatLon
     source: TargetSource
-    command: int | None = None
+    is_to_us: bool = False
     asker: tuple[int, int] | None = None
+    is_again: bool = False
+
+    @property
+    def is_click(self) -> bool:
+        """Whether it may set the vehicle going, straight, before any plan exists."""
+        return self.source in _CLICKS and not self.is_to_us
 
 
 class TargetWatch:
@@ -65,22 +72,29 @@ class TargetWatch:
         self._sources = sources
         self._newest: LatLon | None = None
         self._said_s = 0.0
+        self._commands_count_anew = False
 
     def look(
         self, frame: Frame, before: Situation, after: Situation, now_s: float, identity: tuple[int, int]
     ) -> Target | None:
-        """Give the target that a frame brought, None where it brought none or only said it again."""
+        """Give the target that a frame brought, None where it brought none that is heeded."""
         target = self._asked(frame, before, after, identity) or self._echoed(frame, after)
         if target is None or target.source not in self._sources:
             return None
         is_same = self._newest is not None and distance_m(self._newest, target.position) < _SAME_M
         is_again = is_same and now_s - self._said_s < _SAID_AGAIN_S
+        if target.source is TargetSource.REPOSITION and self._commands_count_anew:
+            is_again = self._commands_count_anew = False
         self._newest, self._said_s = target.position, now_s
-        return None if is_again else target
+        return replace(target, is_again=is_again)
 
     def take(self, position: LatLon, now_s: float) -> None:
         """Take notice of a target from elsewhere, so that the vehicle's echo of it is not taken for a new one."""
         self._newest, self._said_s = position, now_s
+
+    def let_go(self) -> None:
+        """Take the next command for a new one, wherever to; what is streamed counts on."""
+        self._commands_count_anew = True
 
     def _asked(
         self, frame: Frame, before: Situation, after: Situation, identity: tuple[int, int]
@@ -88,13 +102,10 @@ class TargetWatch:
         known = after.target
         if known is None or known is before.target:
             return None
-        message = frame.message
-        is_to_us = getattr(message, "target_component", None) == identity[1]
-        command = message.command if isinstance(message, m.CommandInt | m.CommandLong) else None
         return Target(
             known.value,
             _SOURCES[known.source],
-            command=command if is_to_us else None,
+            is_to_us=is_command_to(frame, identity, after.system),
             asker=(frame.system, frame.component),
         )
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from mavlink_bridge.codec import DIALECT
 from mavlink_bridge.messages import MESSAGES, Message, wire_name
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ class Layout:
 
 
 def _dialect_classes() -> dict[int, Any]:
-    return {number: cls for number, cls in dialect.mavlink_map.items() if number < ID_LIMIT}
+    return {number: cls for number, cls in DIALECT.items() if number < ID_LIMIT}
 
 
 def _formats(cls: Any) -> dict[str, str]:  # noqa: ANN401 - pymavlink ships no types
@@ -93,7 +94,7 @@ def _tables() -> tuple[dict[str, NDArray[Any]], dict[type[Message], Layout]]:
         formats = _formats(cls)
         known[number] = True
         base[number] = _base_bytes(cls, formats)
-        full[number] = cls.unpacker.size
+        full[number] = dialect.mavlink_map[number].unpacker.size
         seed[number] = cls.crc_extra
         if formats.get("time_boot_ms") == "I":
             boot[number] = _offsets(formats)["time_boot_ms"]
@@ -110,7 +111,7 @@ IS_KNOWN: Final[NDArray[np.bool_]] = _TABLES["known"]
 BASE_BYTES: Final[NDArray[np.int16]] = _TABLES["base"]
 """By message id: payload bytes without extension fields, as MAVLink 1 sends it."""
 FULL_BYTES: Final[NDArray[np.int16]] = _TABLES["full"]
-"""By message id: payload bytes with all extension fields."""
+"""By message id: payload bytes with all extension fields that pymavlink knows, which it sends in MAVLink 1 too."""
 CRC_SEED: Final[NDArray[np.uint8]] = _TABLES["seed"]
 """By message id: CRC_EXTRA."""
 BOOT_TIME_AT: Final[NDArray[np.int16]] = _TABLES["boot"]

@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from mavlink_bridge.codec import Codec
+from mavlink_bridge.codec import DIALECT, Codec
 from mavlink_bridge.messages import MESSAGES, Frame, Heartbeat, Message, Statustext, wire_name
 
-CLASSES = {one.msgname: one for one in dialect.mavlink_map.values()}
+CLASSES = {one.msgname: one for one in DIALECT.values()}
 RANGES = {
     "uint8_t": (0, 2**8 - 1), "int8_t": (-(2**7), 2**7 - 1), "uint16_t": (0, 2**16 - 1), "int16_t": (-(2**15), 2**15 - 1),
     "uint32_t": (0, 2**32 - 1), "int32_t": (-(2**31), 2**31 - 1), "uint64_t": (0, 2**64 - 1),

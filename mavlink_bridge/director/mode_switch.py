@@ -1,0 +1,211 @@
+"""Switching the vehicle's mode, and nothing against what it tells meanwhile.
+
+DO_SET_MODE may be lost, and so may its COMMAND_ACK; which mode the vehicle is in its HEARTBEAT tells for certain. HOLD is insisted on: it is
+sent again until a heartbeat shows it. Any other mode is sent again only after a heartbeat that shows the vehicle where it was when we asked,
+and never once it was accepted: what is shown afterwards is somebody else's doing.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum, auto
+from typing import TYPE_CHECKING
+
+from mavlink_bridge.messages import CommandAck, CommandLong, Heartbeat, MavResult, ModeFlag
+from mavlink_bridge.protocol.table_machine import TableMachine
+from missions.items import Command
+
+if TYPE_CHECKING:
+    from mavlink_bridge.messages import Frame
+    from mavlink_bridge.protocol.peer import Peer
+
+_SEND_AGAIN_S = 1.0
+_SETTLE_S = 0.5
+"""A heartbeat that comes sooner after a command may have been sent before it."""
+
+_MOST_SENDS = 8
+
+
+class SwitchState(StrEnum):
+    """Where a mode switch is."""
+
+    IDLE = auto()
+    SENT = auto()
+    ACCEPTED = auto()
+    SEEN = auto()
+    REFUSED = auto()
+    UNANSWERED = auto()
+
+
+class SwitchEvent(StrEnum):
+    """What moves it."""
+
+    START = auto()
+    ACCEPTED = auto()
+    REFUSED = auto()
+    SEEN = auto()
+    SILENCE = auto()
+
+
+_ASKING: dict[SwitchState, dict[SwitchEvent, SwitchState]] = {
+    SwitchState.IDLE: {SwitchEvent.START: SwitchState.SENT},
+    SwitchState.SENT: {
+        SwitchEvent.ACCEPTED: SwitchState.ACCEPTED,
+        SwitchEvent.REFUSED: SwitchState.REFUSED,
+        SwitchEvent.SEEN: SwitchState.SEEN,
+        SwitchEvent.SILENCE: SwitchState.UNANSWERED,
+    },
+    SwitchState.ACCEPTED: {},
+    SwitchState.SEEN: {},
+    SwitchState.REFUSED: {},
+    SwitchState.UNANSWERED: {},
+}
+_INSISTING: dict[SwitchState, dict[SwitchEvent, SwitchState]] = {
+    **_ASKING,
+    # The answer may be that to a command of ours before: only a heartbeat counts.
+    SwitchState.SENT: {
+        SwitchEvent.ACCEPTED: SwitchState.ACCEPTED,
+        SwitchEvent.SEEN: SwitchState.SEEN,
+        SwitchEvent.SILENCE: SwitchState.UNANSWERED,
+    },
+    SwitchState.ACCEPTED: {
+        SwitchEvent.SEEN: SwitchState.SEEN,
+        SwitchEvent.SILENCE: SwitchState.UNANSWERED,
+    },
+}
+
+
+class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
+    """Switches to a mode.
+
+    Parameters
+    ----------
+    peer : Peer
+        The vehicle and our identity.
+    mode : int
+        HEARTBEAT.custom_mode.
+    insists : bool
+        Send it again until a heartbeat shows it (HOLD), whatever was answered.
+    """
+
+    def __init__(self, peer: Peer, mode: int, *, insists: bool) -> None:
+        super().__init__(_INSISTING if insists else _ASKING, SwitchState.IDLE)
+        self._peer = peer
+        self._mode = mode
+        self._insists = insists
+        self._sends = 0
+        self._sent_s = 0.0
+        self._result: MavResult | None = None
+
+    @property
+    def is_granted(self) -> bool:
+        """Whether the vehicle said yes, by its answer or by its heartbeat."""
+        return self.state in (SwitchState.ACCEPTED, SwitchState.SEEN)
+
+    @property
+    def result_name(self) -> str:
+        """How it was answered, by name."""
+        return self._result.name if self._result is not None else "no answer"
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        """Whether it is done, as steps."""
+        return int(self.is_done), 1
+
+    @property
+    def deadline_s(self) -> float | None:
+        """When `handle_timer` wants to be called."""
+        if self.is_done or self.state is SwitchState.IDLE:
+            return None
+        return self._sent_s + (_SEND_AGAIN_S if self._may_send_blindly else _MOST_SENDS * _SEND_AGAIN_S)
+
+    def start(self, now_s: float) -> None:
+        """Send the command."""
+        if self._move(SwitchEvent.START):
+            self._send_once(now_s)
+
+    def receive(self, frame: Frame, now_s: float) -> None:
+        """Take a frame; what is not for this machine is ignored."""
+        if self.is_done or not self._peer.accepts(frame):
+            return
+        message = frame.message
+        if isinstance(message, Heartbeat):
+            if message.custom_mode == self._mode:
+                self._move(SwitchEvent.SEEN)
+            elif now_s >= self._sent_s + _SETTLE_S:
+                self._send_again(now_s)
+        elif isinstance(message, CommandAck) and message.command == Command.DO_SET_MODE:
+            self._take_ack(message.result)
+
+    def handle_timer(self, now_s: float) -> None:
+        """Take notice that time has passed."""
+        deadline_s = self.deadline_s
+        if deadline_s is None or now_s < deadline_s:
+            return
+        if self._may_send_blindly:
+            self._send_again(now_s)
+        else:
+            self._move(SwitchEvent.SILENCE)
+
+    @property
+    def _may_send_blindly(self) -> bool:
+        return self._insists and self.state is SwitchState.SENT
+
+    def _take_ack(self, result: int) -> None:
+        known = {int(one): one for one in MavResult}.get(result)
+        if known is None or known is MavResult.IN_PROGRESS:
+            return
+        self._result = known
+        self._move(SwitchEvent.ACCEPTED if known is MavResult.ACCEPTED else SwitchEvent.REFUSED)
+
+    def _send_again(self, now_s: float) -> None:
+        if self._sends < _MOST_SENDS:
+            self._send_once(now_s)
+        else:
+            self._move(SwitchEvent.SILENCE)
+
+    def _send_once(self, now_s: float) -> None:
+        peer = self._peer
+        self._send(
+            CommandLong(
+                peer.system,
+                peer.component,
+                Command.DO_SET_MODE,
+                min(self._sends, 255),
+                param1=ModeFlag.CUSTOM_MODE_ENABLED,
+                param2=self._mode,
+            )
+        )
+        self._sends += 1
+        self._sent_s = now_s
+
+
+class AwaitHeartbeat:
+    """Waits for the vehicle's next heartbeat: what it tells is no older than our wish to act on it."""
+
+    def __init__(self, peer: Peer) -> None:
+        self._peer = peer
+        self.is_done = False
+
+    @property
+    def deadline_s(self) -> float | None:
+        """Never: a vehicle that falls silent is noticed elsewhere."""
+        return None
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        """Whether it is done, as steps."""
+        return int(self.is_done), 1
+
+    def start(self, now_s: float) -> None:
+        """Begin."""
+
+    def receive(self, frame: Frame, _now_s: float) -> None:
+        """Take a frame."""
+        self.is_done = self.is_done or (isinstance(frame.message, Heartbeat) and self._peer.accepts(frame))
+
+    def handle_timer(self, now_s: float) -> None:
+        """Take notice that time has passed."""
+
+    def messages_to_send(self) -> list[CommandLong]:
+        """Give nothing: it only listens."""
+        return []

@@ -1,0 +1,134 @@
+"""Who has the vehicle: telling what somebody else did to its mode or arming from what we did ourselves.
+
+The vehicle's own heartbeat tells of any takeover, also by remote control; a ground station's command that is overheard tells sooner, and tells
+apart a HOLD that somebody pressed from our own.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from mavlink_bridge import messages as m
+from mavlink_bridge.rover import AUTO_MODE, GUIDED_MODE, HOLD_MODE, MODE_NAMES, RTL_MODE
+from missions.items import Command
+
+if TYPE_CHECKING:
+    from mavlink_bridge.messages import Message
+
+_STALE_S = 1.5
+"""For so long after a mode change was accepted a heartbeat may still show what was before."""
+
+_ON_ITS_WAY_S = 0.5
+
+_CLICK_S = 1.5
+"""A ground station's GUIDED within this time of its go-to click is part of the click."""
+
+_LATE_CLICK_S = 3.0
+
+_MODE_OF_COMMAND = {
+    Command.NAV_RETURN_TO_LAUNCH: RTL_MODE,
+    Command.NAV_LOITER_UNLIM: HOLD_MODE,
+    Command.MISSION_START: AUTO_MODE,
+}
+"""Commands that ArduPilot answers with a change of mode."""
+
+
+class OperatorWatch:
+    """Knows in which mode the vehicle is by our doing, and tells what is not."""
+
+    def __init__(self) -> None:
+        self._ours: int | None = None
+        self._fading: frozenset[int] = frozenset()
+        self._fading_until_s = math.inf
+        self._was_armed = False
+        self._asked_s = self._clicked_s = -math.inf
+
+    @property
+    def is_on(self) -> bool:
+        """Whether anything is watched for."""
+        return self._ours is not None
+
+    def expect(self, mode: int | None, fading: set[int | None], *, is_armed: bool) -> None:
+        """Watch for anything but a mode; the fading ones may show until it was seen or `settle` says how long."""
+        self._ours = mode
+        self._fading = frozenset(one for one in fading if one is not None) - {mode}
+        self._fading_until_s = math.inf
+        self._was_armed = self._was_armed or is_armed
+
+    def settle(self, now_s: float) -> None:
+        """Take notice that our mode was accepted: the ones before may only show a little longer."""
+        self._fading_until_s = now_s + _STALE_S
+
+    def stop(self) -> None:
+        """Watch no more."""
+        self._ours = None
+        self._was_armed = False
+
+    def take_target(self, now_s: float, *, is_click: bool) -> None:
+        """Take notice of a target, a new one or one said again: what was on its way before it does not revoke it."""
+        self._asked_s = now_s
+        if is_click:
+            self._clicked_s = now_s
+
+    def take_heartbeat(self, heartbeat: m.Heartbeat, now_s: float) -> str | None:
+        """Give what somebody did, as the vehicle's heartbeat tells; None where it is as we left it."""
+        if self._ours is None:
+            return None
+        is_armed = bool(heartbeat.base_mode & m.ModeFlag.SAFETY_ARMED)
+        if self._was_armed and not is_armed:
+            return "disarmed the vehicle"
+        self._was_armed = is_armed
+        mode = heartbeat.custom_mode
+        if mode == self._ours:
+            self._fading = frozenset()
+            return None
+        is_stale = mode in self._fading and now_s <= self._fading_until_s
+        if is_stale or self.is_late_click(heartbeat, now_s):
+            return None
+        return f"switched the vehicle to {mode_name(mode)}"
+
+    def is_late_click(self, heartbeat: m.Heartbeat, now_s: float) -> bool:
+        """Tell whether a click has set the vehicle going after our HOLD, having come to it by a slower way than to us."""
+        is_guided = heartbeat.custom_mode == GUIDED_MODE
+        return is_guided and self._ours == HOLD_MODE and now_s - self._clicked_s <= _LATE_CLICK_S
+
+    def overhear(self, message: Message, system: int, component: int, now_s: float) -> str | None:
+        """Give what somebody asks of the vehicle; None where it takes nothing out of our hands."""
+        if self._ours is None or now_s - self._asked_s <= _ON_ITS_WAY_S:
+            return None
+        if getattr(message, "target_system", None) not in (0, system):
+            return None
+        if getattr(message, "target_component", component) not in (0, component):
+            return None
+        if _is_disarming(message):
+            return "disarmed the vehicle"
+        mode = _mode_asked_for(message)
+        if mode is None or (mode == AUTO_MODE and self._ours == AUTO_MODE):
+            return None
+        if mode == GUIDED_MODE and now_s - self._clicked_s <= _CLICK_S:
+            return None
+        return f"switched the vehicle to {mode_name(mode)}"
+
+
+def mode_name(mode: int | None) -> str:
+    """Give a mode's name, its number where it has none here."""
+    return MODE_NAMES.get(mode, f"mode {mode}") if mode is not None else "another mode"
+
+
+def _is_disarming(message: Message) -> bool:
+    return (
+        isinstance(message, m.CommandLong | m.CommandInt)
+        and message.command == Command.COMPONENT_ARM_DISARM
+        and message.param1 == 0
+    )
+
+
+def _mode_asked_for(message: Message) -> int | None:
+    if isinstance(message, m.SetMode):
+        return message.custom_mode
+    if not isinstance(message, m.CommandLong | m.CommandInt):
+        return None
+    if message.command == Command.DO_SET_MODE and math.isfinite(message.param2):
+        return int(message.param2)
+    return _MODE_OF_COMMAND.get(message.command)  # type: ignore[call-overload, no-any-return]

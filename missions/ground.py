@@ -242,16 +242,18 @@ def _area(zone: Zone, name: str, frame: LocalFrame, warnings: list[str]) -> Area
 def _polygon(zone: PolygonZone, name: str, frame: LocalFrame, warnings: list[str]) -> Area:
     ring = frame.to_local_array(_autopilot_ring(zone.vertices))
     plain = Polygon(ring)
-    if plain.is_valid and plain.area > 0:
+    # Of what is thinner than a wall, rounding decides whether it has an area at all.
+    thin = plain.area <= _WALL_M * plain.length
+    if plain.is_valid and plain.area > 0 and not (thin and zone.kind is ZoneKind.EXCLUSION):
         return plain
     area = _even_odd(ring)
     warnings.append(
-        f"{name} crosses or touches itself; it is read by the even-odd rule, as the autopilot tests it"
-        if area.area > 0
-        else f"{name} has no area"
+        f"{name} has no area"
+        if thin and area.area <= _WALL_M * plain.length
+        else f"{name} crosses or touches itself; it is read by the even-odd rule, as the autopilot tests it"
     )
     if zone.kind is ZoneKind.EXCLUSION:  # its lines were drawn to keep something out: they stay walls
-        return _polygons(area.union(LinearRing(ring).buffer(_WALL_M, join_style="mitre")))
+        return _polygons(area.union(_walls(ring)))
     if area.is_empty:
         raise FenceError(f"{name} has no area: the vehicle could be nowhere", zone=name)
     return area
@@ -276,6 +278,12 @@ def _even_odd(ring: NDArray[np.float64]) -> Area:
     faces = shapely.get_parts(shapely.polygonize([lines]))
     inside = [face for face in faces if _crossings(ring, face.representative_point()) % 2]
     return _polygons(shapely.union_all(inside))
+
+
+def _walls(ring: NDArray[np.float64]) -> BaseGeometry:
+    """Give a ring's line as a thin wall, edge by edge: buffered whole, a line that doubles back can lose an end."""
+    edges = shapely.linestrings(np.stack((ring, np.roll(ring, -1, axis=0)), axis=1))
+    return shapely.union_all(shapely.buffer(edges, _WALL_M, cap_style="square"))
 
 
 def _polygons(shape: BaseGeometry) -> Area:

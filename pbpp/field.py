@@ -10,7 +10,7 @@ import shapely
 
 from .block_search import BlockGraph
 from .errors import InvalidGeometryError
-from .free_space import Scene, build_free_space
+from .free_space import Scene, build_free_space, snapped
 from .partition.blocks import Blocks
 from .partition.slabs import Slabs
 
@@ -71,6 +71,14 @@ class Field:
             If it is not.
         """
         try:
+            return self._checked_slabs()
+        except InvalidGeometryError:
+            # Slivers that cross each other within rounding: on a grid they fit together or are gone.
+            self.free = snapped(self.free)
+            return self._checked_slabs()
+
+    def _checked_slabs(self) -> Slabs:
+        try:
             slabs = Slabs(self.free.polygons)
         except (IndexError, ValueError) as error:
             raise InvalidGeometryError("the rings of free space do not fit together") from error
@@ -85,8 +93,25 @@ class Field:
 
     @cached_property
     def blocks(self) -> Blocks:
-        """The paper's block partition."""
-        return Blocks(self.free.polygons, self.slabs)
+        """The paper's block partition.
+
+        Raises
+        ------
+        InvalidGeometryError
+            If the rings of free space do not fit together.
+        TooManyBlocksError
+            If there would be too many.
+        """
+        try:
+            return Blocks(self.free.polygons, self.slabs)
+        except (IndexError, ValueError):
+            # Swept from south to north slivers may cross where they did not from west to east.
+            self.free = snapped(self.free)
+            self.slabs = self._checked_slabs()
+        try:
+            return Blocks(self.free.polygons, self.slabs)
+        except (IndexError, ValueError) as error:
+            raise InvalidGeometryError("the rings of free space do not fit together") from error
 
     def graph(self, partition: str) -> BlockGraph:
         """Return the blocks of a partition with their neighbours, made once."""

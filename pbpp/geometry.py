@@ -176,6 +176,8 @@ def _ring_array(ring: npt.ArrayLike, kind: str, index: int) -> Floats:
 
 def _repaired(geometry: BaseGeometry, kind: str) -> BaseGeometry:
     lines = shapely.union_all(shapely.boundary(polygons_with_rings(geometry)))
+    if lines.is_empty:
+        lines = shapely.Point(shapely.get_coordinates(geometry)[0])  # all of its points are one
     if kind == "inclusion":
         areas = polygons_only(shapely.make_valid(geometry, method="linework"))
     else:

@@ -278,14 +278,13 @@ class Planner:
     ) -> PlannedPath:
         if not field.require(ends[0], StartBlockedError) & field.require(ends[1], GoalBlockedError):
             raise NoPathError(self._clearance_m)
+        # Blocks may move free space by a rounding, so they come before the ends are placed in it.
+        graph = None if method == "optimal" else field.graph(self._partition or "blocks")
         start, goal = (field.onto(self._scene.to_local(end)) for end in ends)
-        if method == "optimal":
+        if graph is None:
             found = _optimal(field, start, goal, should_stop)
         else:
-            partition = self._partition or "blocks"
-            found = _over_blocks(
-                field.graph(partition), start, goal, taut=method == "pbpp-taut", should_stop=should_stop
-            )
+            found = _over_blocks(graph, start, goal, taut=method == "pbpp-taut", should_stop=should_stop)
         if found is None:
             raise NoPathError(self._clearance_m)
         inner = np.array(found.turns, dtype=np.float64).reshape(-1, 2) + self._scene.origin_m

@@ -6,7 +6,7 @@ import math
 from itertools import pairwise
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from shapely import LineString, Point
 from strategies import GEOD, away, offset
@@ -340,3 +340,20 @@ def test_geod_and_the_local_offset_agree() -> None:
     """The helper above is right itself."""
     there = offset(HOME, 30, 40)
     assert GEOD.inv(HOME.lon_deg, HOME.lat_deg, there.lon_deg, there.lat_deg)[2] == pytest.approx(50)
+
+
+@given(st.lists(st.floats(-2e-4, 2e-4), min_size=3, max_size=7), st.sampled_from([0.0, -105.22993]))
+@example([9e-5, -9e-5, 0.0], 0.0)
+@example([9.04e-05, 0.0001809, 0.0], -105.22993)
+@settings(max_examples=200)
+def test_an_exclusion_without_area_is_a_wall_to_its_ends(norths_deg: list[float], east_deg: float) -> None:
+    """Corners on one line, in any order: the line doubles back."""
+    origin = LatLon(0.0, east_deg)
+    corners = [LatLon(north_deg, east_deg) for north_deg in norths_deg]
+    frame = LocalFrame(origin)
+    laid = lay_out(Fence((PolygonZone(OUT, tuple(corners)),)), frame)
+    assert laid.warnings == ("exclusion polygon 1 has no area",)
+    (wall,) = laid.areas(OUT)
+    for corner in corners:
+        assert wall.distance(Point(frame.to_local(corner))) <= 1e-6
+    assert wall.buffer(1e-6).covers(LineString([frame.to_local(one) for one in (min(corners), max(corners))]))

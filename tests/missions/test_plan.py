@@ -23,7 +23,7 @@ from charts import (
     polygon,
     situation_of,
 )
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from shapely import Polygon
 from strategies import RandomField, random_fields
 
@@ -37,7 +37,7 @@ from missions.errors import (
     StartBlockedError,
     TargetBlockedError,
 )
-from missions.fence import CircleZone, Fence, ZoneKind
+from missions.fence import CircleZone, Fence, PolygonZone, ZoneKind
 from missions.formats import read_fence
 from missions.geo import LatLon, rounded
 from missions.items import MissionItem, waypoint
@@ -71,7 +71,19 @@ def assert_consistent(result: Plan) -> None:
     assert set(result.targets) <= set(result.path)
 
 
+def _meridian(*lats_deg: float) -> PolygonZone:
+    """Give an exclusion of corners on one meridian: a wall without area."""
+    return PolygonZone(OUT, tuple(LatLon(lat_deg, -105.23) for lat_deg in lats_deg))
+
+
+_WEST, _EAST = LatLon(0.0, -105.2301437), LatLon(0.0, -105.2298563)
+_POST_AND_WALL = Fence((_meridian(9.04e-05, 0.0001809, 0.0), _meridian(0.0, 0.0, 0.0)))
+_WALL_IN_A_CIRCLE = Fence((CircleZone(IN, LatLon(0.0, -105.23), 40.0), _meridian(4.52e-05, 0.0001809, 0.0)))
+
+
 @given(random_fields())
+@example(RandomField(_POST_AND_WALL, _WEST, _EAST, 2.5))
+@example(RandomField(_WALL_IN_A_CIRCLE, _WEST, _EAST, 0.0))
 @settings(max_examples=150)
 def test_every_route_of_a_random_field_keeps_its_clearance(field: RandomField) -> None:
     situation = Situation(fence=Known(field.fence, None, "random"))

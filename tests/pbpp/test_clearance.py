@@ -61,8 +61,28 @@ def test_lines_are_grown_round_beside_areas():
     assert area.bounds == pytest.approx((-1, -1, 2, 2))
 
 
-def test_an_offset_that_stays_too_near_is_refused(monkeypatch):
-    monkeypatch.setattr(clearance, "_offset", lambda geometries, *_: geometries.copy())
+def too_near(geometries, *_):
+    return geometries.copy()
+
+
+@pytest.mark.parametrize("rounded", [False, True])
+def test_an_offset_that_stays_too_near_is_put_together_from_strips(monkeypatch, rounded):
+    polygons = random_polygons(5)
+    boxes = np.array([shapely.box(0, 0, 10, 10), LineString([(0, 0), (3, 4)]), Point(1, 1)], dtype=object)
+    expected = grow(np.concatenate((polygons, boxes)), 1.0, rounded=True)
+    inner = shrink(boxes[0], 1.0)
+    monkeypatch.setattr(clearance, "_offset", too_near)
+    found = grow(np.concatenate((polygons, boxes)), 1.0, rounded=rounded)
+    assert (shapely.distance(shapely.boundary(found), [*polygons, *boxes]) >= 1.0).all()
+    assert shapely.covers(found, [*polygons, *boxes]).all()
+    excess_m = ROUND_EXCESS_M + 1e-3 if rounded else 0.5  # a square's corner stands off by a half-root of 2
+    assert shapely.covers(shapely.buffer(expected, excess_m), found).all()
+    assert shrink(boxes[0], 1.0, rounded=rounded).equals_exact(inner, 2.0 * ROUND_EXCESS_M, normalize=True)
+
+
+def test_an_offset_that_stays_too_near_even_so_is_refused(monkeypatch):
+    monkeypatch.setattr(clearance, "_offset", too_near)
+    monkeypatch.setattr(clearance, "_in_strips", lambda geometry, *_: geometry)
     with pytest.raises(pbpp.InvalidGeometryError, match="grown by 1 m"):
         grow(np.array([shapely.box(0, 0, 1, 1)], dtype=object), 1.0)
     with pytest.raises(pbpp.InvalidGeometryError, match="shrunk by 1 m"):

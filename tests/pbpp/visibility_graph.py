@@ -11,7 +11,8 @@ FAT_M = 1e-9
 
 
 def rings_of(free):
-    return [ring for polygon in shapely.get_parts(free) for ring in (polygon.exterior, *polygon.interiors)]
+    parts = shapely.get_parts(free)
+    return list(shapely.get_rings(parts[shapely.get_dimensions(parts) == 2]))
 
 
 def pinches(free):

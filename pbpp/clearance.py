@@ -200,5 +200,6 @@ def _in_strips(geometry: BaseGeometry, reach_m: float, segments: int) -> BaseGeo
     # Round, an edge without length adds nothing to the disc about it.
     pieces = [*areas, *np.atleast_1d(np.asarray(shapely.polygons(corners[~short] if segments else corners)))]
     if segments:
-        pieces += list(shapely.buffer(list(shapely.points(points)), reach_m, quad_segs=segments))
+        centers = np.asarray(shapely.points(points), dtype=object)
+        pieces += shapely.buffer(centers, reach_m, quad_segs=segments).tolist()
     return shapely.union_all(pieces)

@@ -130,7 +130,7 @@ def _gates(
         for a, b in ((-reach_m, gate - gate_m / 2), (gate + gate_m / 2, reach_m)):
             wall = LineString([(a, y), (b, y + rng.uniform(-4, 4))]).buffer(0.6, cap_style="flat")
             wall = affinity.rotate(wall, turn_deg, origin=(0, 0)).intersection(outline.buffer(3))
-            walls += [part for part in shapely.get_parts(wall) if isinstance(part, Polygon)]
+            walls += [part for part in shapely.get_parts(wall) if isinstance(part, Polygon) and not part.is_empty]
     return walls, []
 
 
@@ -150,7 +150,7 @@ def _hairpins(
         walls += [
             part
             for part in shapely.get_parts(area.intersection(outline.buffer(3)))
-            if isinstance(part, Polygon)
+            if isinstance(part, Polygon) and not part.is_empty
         ]
     return walls, []
 

@@ -1,50 +1,52 @@
 """What the vehicle's own avoidance does to its corners: it slows down for a fence ahead, falls behind, and cuts more.
 
 ArduPilot's avoidance (AVOID_ENABLE, FENCE_MARGIN) limits the speed towards a fence to the position gain times the distance that is
-left to the margin. A rover that comes to a corner before a fence is slowed while its target point goes on round the corner; it then
-steers straight for that. Measured in the simulated rover, corners of 45 to 130 degrees at 2 and 5 m/s: up to 2.2 m more of both legs.
+left to the margin. A rover that comes to a corner before a fence is slowed while its target point goes on round the corner, and
+drives beside the line until the error dies away. The target point waits for it in part (AR_WPNav's time scaling). Target point and
+rover are followed here, the rover as a point without inertia, to see how far it gets behind.
 """
 
 from __future__ import annotations
 
+import cmath
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
-import shapely.ops
 
-from missions.drive_model.corner import INSIDE_BAND_M
+from missions.drive_model.corner import GRAVITY_MPS2, INSIDE_BAND_M
+from missions.drive_model.profile import LegProfile, Ramp
+from missions.vehicle import Steering
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
 
-    from missions.drive_model import Envelope
+    from missions.drive_model import Envelope, Leg
     from missions.vehicle import Vehicle
 
-    Edges = tuple[NDArray[np.float64], NDArray[np.float64]]
+LAG_RESERVE = 1.3
+"""So many times what it is reckoned to be behind counts."""
 
-SPEEDS_MPS = (1.0, 2.0, 5.0)
-MORE_M = (0.3, 2.6, 3.9)
-"""At these speeds: by so much more of both legs a rover cuts a corner when the margin lies right behind it."""
+NEGLIGIBLE_M = 0.1
+"""Less is within the band of any drive."""
 
-WITHIN_M = (2.0, 6.5, 8.0)
-"""It does not where the margin lies this far behind the corner."""
+ASIDE_DEG = 5.0
+"""It may look so far to either side of the way that it is meant to go."""
 
-ASIDE_M = (0.1, 1.0, 1.0)
-TAIL_M = 12.0
-"""So far inside the next leg it then still is, and so much farther along it comes back to it."""
-
+_STEP_S = 0.3
+_SETTLE_S = 1.0
+_LEAST_SCALE = 0.1
+_LEAST_MPS = 0.05
+_SAMPLES_A_PIECE = 3
+_SLOWED_SHARE = 0.97
+_NO_LAG_M = 0.1
 _LEAST_TURN_DEG = 8.0
-_NEGLIGIBLE_M = 0.1
-_SLOW_MPS = 0.7
-_OUT_DEG = 20.0
-"""It may look so far to the outside of its course when it comes to a corner."""
-
-_IN_THE_TURN = np.array([(0.25, 2.0), (0.5, 2.0), (0.75, 1.5), (1.0, 1.0)])
-"""Shares of the turn, and how much it tells when avoidance slows it there: speed missing of that meant, times this."""
+_ABOUT_CORNER_S = 7.0
+_SIDES = np.exp(1j * np.radians([0.0, ASIDE_DEG, -ASIDE_DEG]))
 
 
 def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry) -> Envelope:
@@ -62,143 +64,216 @@ def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry) -> Env
     Returns
     -------
     Envelope
-        The same where nothing is near, else with one more piece for each corner concerned.
+        The same where nothing is near, else with more pieces where the rover falls behind.
     """
-    if not vehicle.stops_within_m or fence.is_empty:
+    if not vehicle.stops_within_m or fence.is_empty or not band.legs:
         return band
-    edges = _edges(fence)
-    more = [
-        piece
-        for number, corner in enumerate(band.corners)
-        if not corner.stops and abs(corner.turn_deg) >= _LEAST_TURN_DEG
-        for piece in _pieces(band, number, vehicle, edges)
-    ]
-    if not more:
+    target = _Target(band, vehicle)
+    lags = target.lags(vehicle, _edges(fence, target.places, vehicle))
+    pieces = [piece for piece in target.pieces(lags) if piece is not None]
+    if not pieces:
         return band
+    cores, bands_m, waypoints = zip(*pieces, strict=True)
     return replace(
         band,
-        cores=np.array([*band.cores, *(piece.core for piece in more)], dtype=np.object_),
-        bands_m=np.array([*band.bands_m, *(piece.band_m for piece in more)]),
-        waypoints=np.array([*band.waypoints, *(piece.waypoint for piece in more)], dtype=np.int64),
+        cores=np.concatenate([band.cores, np.array(cores, dtype=np.object_)]),
+        bands_m=np.concatenate([band.bands_m, np.array(bands_m)]),
+        waypoints=np.concatenate([band.waypoints, np.array(waypoints, dtype=np.int64)]),
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _Piece:
-    """One more piece of an envelope."""
+class _Target:
+    """How the target point moves along all legs: each leg's motion begins while the one before still ends.
 
-    core: BaseGeometry
-    band_m: float
-    waypoint: int
+    Parameters
+    ----------
+    band : Envelope
+        The drive.
+    vehicle : Vehicle
+        Its limits.
+    """
 
+    def __init__(self, band: Envelope, vehicle: Vehicle) -> None:
+        self.band = band
+        profiles = [_profile(leg, vehicle) for leg in band.legs]
+        begins_s = [0.0]
+        self._passed_s = []
+        """When it passes each corner."""
+        for number, corner in enumerate(band.corners):
+            ramps = (profiles[number].ramp, profiles[number + 1].ramp)
+            half_s = min(ramps, key=lambda ramp: ramp.duration_s).time_s(corner.middle_m)
+            self._passed_s.append(begins_s[-1] + profiles[number].duration_s - half_s)
+            begins_s.append(self._passed_s[-1] - half_s)
+        whole_s = begins_s[-1] + profiles[-1].duration_s
+        self.times_s = np.arange(0.0, whole_s + _STEP_S, _STEP_S)
+        points = band.points[:, 0] + 1j * band.points[:, 1]
+        self.places: NDArray[np.complex128] = np.full(len(self.times_s), points[0])
+        for leg, profile, begin_s in zip(band.legs, profiles, begins_s, strict=True):
+            step = points[leg.first + 1] - points[leg.first]
+            leg_s = np.append(np.arange(0.0, profile.duration_s, _STEP_S), profile.duration_s)
+            shares = [profile.travelled_m(time_s) / leg.length_m for time_s in leg_s.tolist()]
+            self.places += np.interp(self.times_s - begin_s, leg_s, shares) * step
 
-def _pieces(band: Envelope, number: int, vehicle: Vehicle, edges: Edges) -> list[_Piece]:
-    """Give what a corner needs more: its cut, and the tail of it at the next corner."""
-    corner, before, after = band.corners[number], band.legs[number], band.legs[number + 1]
-    place = band.points[corner.waypoint]
-    bend = _Bend(band.points[before.first], place, band.points[after.first + 1], corner.turn_deg)
-    speed_mps = max(before.top_speed_mps, after.top_speed_mps)
-    within_m, more_m, aside_m = (
-        float(np.interp(speed_mps, SPEEDS_MPS, table)) for table in (WITHIN_M, MORE_M, ASIDE_M)
-    )
-    ahead = _Ahead(bend, corner.middle_m, vehicle, edges)
-    share = max(ahead.before(within_m), ahead.within())
-    if not share:
-        return []
-    band_m = min(before.half_width_m, INSIDE_BAND_M)
-    left_m, cut = bend.cut(2 * corner.middle_m + more_m * share, aside_m * share)
-    pieces = [_Piece(cut, band_m, corner.waypoint)]
-    if left_m > _NEGLIGIBLE_M and number + 2 < len(band.legs):
-        # The next leg ends before the rover is back on it: it comes to the next corner so far aside, and leaves it so.
-        first = band.legs[number + 2].first
-        leg = shapely.LineString(band.points[[first, first + 1]])
-        tail = shapely.ops.substring(leg, 0.0, min(TAIL_M * left_m / ASIDE_M[-1], leg.length))
-        pieces.append(_Piece(tail, band_m + left_m, band.corners[number + 1].waypoint))
-    return pieces
+    def lags(self, vehicle: Vehicle, edges: _Edges) -> list[complex]:
+        """Give at each time how far the rover is behind, east and north; an empty list where it never is."""
+        steps = np.diff(self.places)
+        moved_m = np.maximum(np.abs(steps), _LEAST_MPS * _STEP_S)
+        is_slowed = np.zeros(len(steps), dtype=np.bool_)
+        near = self._near_corners()[:-1]
+        for side in _SIDES:
+            allowed_mps = edges.speeds_mps(self.places[:-1][near], side * (steps / moved_m)[near])
+            is_slowed[near] |= allowed_mps < _SLOWED_SHARE * moved_m[near] / _STEP_S
+        if not is_slowed.any():
+            return []
+        return _followed(self.places.tolist(), is_slowed.tolist(), vehicle, edges)
 
+    def _near_corners(self) -> NDArray[np.bool_]:
+        """Tell when it is about a corner: falling behind on a straight line does not matter."""
+        near = np.zeros(len(self.times_s), dtype=np.bool_)
+        for corner, passed_s in zip(self.band.corners, self._passed_s, strict=True):
+            if not corner.stops and abs(corner.turn_deg) >= _LEAST_TURN_DEG:
+                near |= np.abs(self.times_s - passed_s) <= _ABOUT_CORNER_S
+        return near
 
-@dataclass(frozen=True, slots=True)
-class _Bend:
-    """A corner between two legs, in the plane."""
+    def pieces(self, lags: list[complex]) -> list[tuple[BaseGeometry, float, int] | None]:
+        """Give the ground between target point and rover where that is behind, piece by piece."""
+        return [self._piece(lags, begin) for begin in range(0, len(lags), _SAMPLES_A_PIECE)]
 
-    before: NDArray[np.float64]
-    place: NDArray[np.float64]
-    after: NDArray[np.float64]
-    turn_deg: float
+    def _piece(self, lags: list[complex], begin: int) -> tuple[BaseGeometry, float, int] | None:
+        span = range(begin, min(begin + _SAMPLES_A_PIECE + 1, len(lags)))
+        behind = np.array(lags[span.start : span.stop])
+        if np.abs(behind).max() < NEGLIGIBLE_M:
+            return None
+        targets = self.places[span.start : span.stop]
+        ground = np.concatenate([targets, targets - LAG_RESERVE * behind])
+        core = shapely.MultiPoint(np.column_stack((ground.real, ground.imag))).convex_hull
+        leg = int(np.searchsorted(self._passed_s, self.times_s[begin]))
+        return (
+            core,
+            min(self.band.legs[leg].half_width_m, INSIDE_BAND_M),
+            self._waypoint(float(self.times_s[begin])),
+        )
 
-    @property
-    def course_rad(self) -> float:
-        """The course to the corner."""
-        east_m, north_m = self.place - self.before
-        return math.atan2(east_m, north_m)
-
-    def cut(self, reach_m: float, aside_m: float) -> tuple[float, BaseGeometry]:
-        """Give the ground of a cut, and how far aside the rover still is where the next leg ends."""
-        back, back_m = _unit(self.before - self.place)
-        ahead, ahead_m = _unit(self.after - self.place)
-        inside = math.copysign(1.0, self.turn_deg) * np.array([ahead[1], -ahead[0]])
-        near_m, far_m = min(reach_m, ahead_m), min(reach_m + TAIL_M, ahead_m)
-        left_m = aside_m * (1 - (far_m - near_m) / TAIL_M)
-        corners = [
-            self.place,
-            self.place + min(reach_m, back_m) * back,
-            self.place + near_m * ahead + aside_m * inside,
-            self.place + far_m * ahead + left_m * inside,
-            self.place + far_m * ahead,
-        ]
-        return left_m, shapely.MultiPoint(corners).convex_hull
-
-
-def _unit(step: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-    length_m = float(np.hypot(*step))
-    return step / (length_m or 1.0), length_m
-
-
-@dataclass(frozen=True, slots=True)
-class _Ahead:
-    """What lies ahead of a rover at a corner; the answers are 1 where avoidance slows it most, 0 where it does not."""
-
-    bend: _Bend
-    middle_m: float
-    vehicle: Vehicle
-    edges: Edges
-
-    def before(self, within_m: float) -> float:
-        """Tell from how near the margin lies behind the corner."""
-        out_rad = -math.copysign(math.radians(_OUT_DEG), self.bend.turn_deg)
-        ways_rad = self.bend.course_rad + np.array([0.0, out_rad])
-        return max(0.0, 1 - float(self._spares_m(self.bend.place, ways_rad).min()) / within_m)
-
-    def within(self) -> float:
-        """Tell from the speed that avoidance allows in the turn, and the speed meant there."""
-        turn_rad = math.radians(self.bend.turn_deg)
-        half_mps = math.sqrt(2 * self.vehicle.accel_max_mps2 * self.middle_m)
-        meant_mps = 2 * half_mps * math.cos(turn_rad / 2)
-        if meant_mps <= _SLOW_MPS:
-            return 0.0
-        inside_rad = self.bend.course_rad + turn_rad / 2 + math.copysign(math.pi / 2, turn_rad)
-        inside_m = 2 * self.middle_m * abs(math.sin(turn_rad / 2))
-        middle = self.bend.place + inside_m * np.array([math.sin(inside_rad), math.cos(inside_rad)])
-        spares_m = self._spares_m(middle, self.bend.course_rad + _IN_THE_TURN[:, 0] * turn_rad)
-        allowed_mps = spares_m * self.vehicle.position_gain_per_s
-        return float(np.clip(_IN_THE_TURN[:, 1] * (1 - allowed_mps / meant_mps), 0.0, 1.0).max())
-
-    def _spares_m(self, place: NDArray[np.float64], ways_rad: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Give how far ahead of a place the margin of a fence begins, for each way; infinite where there is none."""
-        starts, steps = self.edges
-        ahead = np.column_stack((np.sin(ways_rad), np.cos(ways_rad)))[:, None, :]
-        off = starts - place
-        with np.errstate(divide="ignore", invalid="ignore"):  # an edge along the way is met at its neighbours
-            cross = ahead[..., 0] * steps[:, 1] - ahead[..., 1] * steps[:, 0]
-            away_m = (off[:, 0] * steps[:, 1] - off[:, 1] * steps[:, 0]) / cross
-            share = (off[:, 0] * ahead[..., 1] - off[:, 1] * ahead[..., 0]) / cross
-        met = (away_m >= 0) & (share >= 0) & (share <= 1)
-        found: NDArray[np.float64] = np.where(met, away_m, np.inf).min(axis=1, initial=np.inf)
-        return np.maximum(found - self.vehicle.stops_within_m, 0.0)
+    def _waypoint(self, time_s: float) -> int:
+        """Give the waypoint that a time is nearest to."""
+        if not self._passed_s:
+            return self.band.legs[-1].first + 1
+        nearest = min(range(len(self._passed_s)), key=lambda number: abs(self._passed_s[number] - time_s))
+        return self.band.corners[nearest].waypoint
 
 
-def _edges(fence: BaseGeometry) -> Edges:
-    """Give the straight pieces of lines: where they start, and the way to their ends."""
+def _profile(leg: Leg, vehicle: Vehicle) -> LegProfile:
+    return LegProfile(leg.length_m, Ramp(leg.top_speed_mps, vehicle.accel_max_mps2, vehicle.jerk_mps3))
+
+
+def _followed(places: list[complex], is_slowed: list[bool], vehicle: Vehicle, edges: _Edges) -> list[complex]:
+    """Follow a target point as AR_PosControl does, within the speed that is allowed at the rover's own place.
+
+    The target's acceleration is passed on as it is. A rover that is slowed turns too fast by it, and drives to the inside of the turn.
+    """
+    lags = [0j] * len(is_slowed)
+    velocities = [(after - before) / _STEP_S for before, after in pairwise(places)]
+    velocities.append(velocities[-1])
+    top_mps = max(map(abs, velocities))
+    behind, scale, at = 0j, 1.0, 0.0
+    rover = _Rover(vehicle)
+    while (sample := int(at)) < len(is_slowed):
+        velocity = velocities[sample]
+        if not is_slowed[sample] and abs(behind) < _NO_LAG_M:
+            behind, scale, at = 0j, 1.0, sample + 1.0
+            rover.velocity = velocity
+            continue
+        here = places[sample] + (at - sample) * _STEP_S * velocity - behind
+        wanted = velocity + vehicle.position_gain_per_s * behind
+        wanted_mps = abs(wanted) or 1.0
+        wanted *= min(1.0, top_mps / wanted_mps, edges.allowed_mps(here, wanted / wanted_mps) / wanted_mps)
+        rover.follow(wanted, (velocities[sample + 1] - velocity) / _STEP_S)
+        scale += (_scale(velocity, behind, rover.velocity, vehicle) - scale) * _STEP_S / _SETTLE_S
+        behind += (scale * velocity - rover.velocity) * _STEP_S
+        lags[sample] = max(lags[sample], behind, key=abs)
+        at += scale
+    return lags
+
+
+class _Rover:
+    """A rover that turns as its controllers tell it, and takes on the speed wanted at once."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        self.vehicle = vehicle
+        self.velocity = 0j
+
+    def follow(self, wanted: complex, accel: complex) -> None:
+        """Drive on for one step."""
+        vehicle = self.vehicle
+        heading = (
+            self.velocity / abs(self.velocity)
+            if abs(self.velocity) > _LEAST_MPS
+            else wanted / (abs(wanted) or 1.0)
+        )
+        speed_mps = max(abs(self.velocity), 1.0)
+        turn_radps = ((wanted + accel) * heading.conjugate()).imag / speed_mps
+        turn_mps = 0.0
+        if vehicle.steering is Steering.ACKERMANN:
+            most_radps = abs(self.velocity) / max(vehicle.turn_radius_m, 0.1)
+            turn_radps = min(max(turn_radps, -most_radps), most_radps)
+            turn_mps = math.sqrt(vehicle.turn_max_g * GRAVITY_MPS2 / 2 * vehicle.turn_radius_m)
+        heading *= cmath.rect(1.0, turn_radps * _STEP_S)
+        self.velocity = heading * max(min(abs(wanted), turn_mps), (wanted * heading.conjugate()).real, 0.0)
+
+
+def _scale(velocity: complex, behind: complex, driven: complex, vehicle: Vehicle) -> float:
+    """Give how fast time runs for the target point: it waits for a rover that cannot keep up (AR_WPNav)."""
+    target_mps = max(abs(velocity), _LEAST_MPS)
+    along_mps = ((driven - vehicle.position_gain_per_s * behind) * velocity.conjugate()).real / target_mps
+    return min(max(0.05 + along_mps / target_mps, _LEAST_SCALE), 1.0)
+
+
+def _edges(fence: BaseGeometry, places: NDArray[np.complex128], vehicle: Vehicle) -> _Edges:
+    """Give the edges that a drive over some places has to do with."""
     points, lines = shapely.get_coordinates(shapely.get_parts(fence), return_index=True)
     joined = lines[1:] == lines[:-1]
-    return points[:-1][joined], np.diff(points, axis=0)[joined]
+    corners = points[:, 0] + 1j * points[:, 1]
+    starts, ends = corners[:-1][joined], corners[1:][joined]
+    top_mps = vehicle.speed_mps
+    far_m = vehicle.stops_within_m + max(
+        top_mps / vehicle.position_gain_per_s, top_mps**2 / vehicle.accel_max_mps2
+    )
+    near = np.ones(len(starts), dtype=np.bool_)
+    for part in (np.real, np.imag):
+        low, high = part(places).min() - far_m, part(places).max() + far_m
+        near &= (np.maximum(part(starts), part(ends)) >= low) & (np.minimum(part(starts), part(ends)) <= high)
+    return _Edges(starts[near], ends[near] - starts[near], vehicle)
+
+
+class _Edges:
+    """The straight pieces of lines, for looking ahead."""
+
+    def __init__(
+        self, starts: NDArray[np.complex128], steps: NDArray[np.complex128], vehicle: Vehicle
+    ) -> None:
+        self._starts, self._steps = starts, steps
+        self._vehicle = vehicle
+
+    def allowed_mps(self, place: complex, way: complex) -> float:
+        """Give the speed that avoidance allows at one place, one way."""
+        return float(self.speeds_mps(np.array([place]), np.array([way]))[0])
+
+    def speeds_mps(self, places: NDArray[np.complex128], ways: NDArray[np.complex128]) -> NDArray[np.float64]:
+        """Give the speed that avoidance allows at each place, its own way (sqrt_controller of what is left to the margin)."""
+        vehicle = self._vehicle
+        left_m = np.maximum(self._ahead_m(places, ways) - vehicle.stops_within_m, 0.0)
+        gain_per_s, accel_mps2 = vehicle.position_gain_per_s, vehicle.accel_max_mps2
+        linear_m = accel_mps2 / gain_per_s**2
+        far_mps = np.sqrt(2 * accel_mps2 * np.maximum(left_m - linear_m / 2, 0.0))
+        return np.where(left_m <= linear_m, gain_per_s * left_m, far_mps)
+
+    def _ahead_m(self, places: NDArray[np.complex128], ways: NDArray[np.complex128]) -> NDArray[np.float64]:
+        """Give how far ahead the first edge lies; infinite where there is none."""
+        back = ways.conj()[:, None]
+        off = (self._starts - places[:, None]) * back
+        steps = self._steps * back
+        with np.errstate(divide="ignore", invalid="ignore"):  # an edge along the way is met at its neighbours
+            share = -off.imag / steps.imag
+            away_m = off.real + share * steps.real
+        met = (away_m >= 0) & (share >= 0) & (share <= 1)
+        return np.asarray(np.where(met, away_m, np.inf).min(axis=1, initial=np.inf))

@@ -5,6 +5,7 @@ Each means takes lines and the number of a point and yields lines that may do be
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -20,13 +21,16 @@ MOVES = (0.5, 1.0, 1.5, 2.5)
 
 PROLONGED_M = (3.0, 6.0, 10.0, 15.0)
 SPACINGS_M = (6.0, 10.0, 15.0, 20.0)
-SLOW_MPS = (2.0, 1.0)
-SLOW_BEFORE_M = {2.0: 10.0, 1.0: 5.0}
-SLOW_AFTER_M = 6.0
-"""Measured on corners: 1 m/s from 5 m before to 6 m after takes away the cut (docs/drive-model.md)."""
+SLOW_MPS = (3.0, 2.0, 1.0)
+SLOW_BEFORE_M = {3.0: 10.0, 2.0: 10.0, 1.0: 5.0}
+SLOW_AFTER_M = (6.0, 15.0)
+"""Measured on corners: 1 m/s from 5 m before to 6 m after takes away the cut (docs/drive-model.md); narrow lanes are longer."""
 
 APART_M = 3.0
 """Turns nearer to one another are one turn to a rover."""
+
+CHANGE_TURN_DEG, CHANGE_AWAY_M = 8.0, 4.0
+"""The speed changes on a straight line only, so far from a corner: so it was measured."""
 
 STOP_S = 1.0
 CRAWL_M = 18.0
@@ -55,8 +59,15 @@ def moved(drawing: Drawing, index: int, missing_m: float) -> Iterator[Drawing]:
 
 
 def eased(drawing: Drawing, index: int, step_m: float) -> Iterator[Drawing]:
-    """Move a corner a step back towards the straight line, or along its legs."""
-    out = None if drawn.is_end_or_fixed(drawing, index) else drawn.outward(drawing, index)
+    """Move a corner a step back towards the straight line, or along its legs; a change of speed along its line."""
+    if drawn.is_end_or_fixed(drawing, index):
+        return
+    out = drawn.outward(drawing, index)
+    if out is None or abs(drawn.turn_deg(drawing, index)) < CHANGE_TURN_DEG:
+        for other in (index - 1, index + 1):
+            if math.dist(drawing[index].place, drawing[other].place) > step_m + APART_M:
+                way = drawn.direction(drawing[index], drawing[other])
+                yield _with(drawing, index, shifted(drawing[index].place, way, step_m))
     if out is None:
         return
     along = (-out[1], out[0])
@@ -154,11 +165,11 @@ def slowed(drawing: Drawing, index: int, place: Vector, speed_mps: float) -> Ite
     """Drive a stretch slower than at a speed: from before a place near a point, or the leg to it, to behind it."""
     along = drawn.distances_m(drawing)
     at_m = _along_m(drawing, along, place, index)
-    for slow_mps in (slow for slow in SLOW_MPS if slow < speed_mps):
-        begin_m = max(at_m - SLOW_BEFORE_M[slow_mps], 0.0)
-        end_m = min(at_m + SLOW_AFTER_M, along[-1])
-        longer, first = drawn.with_point_at(drawing, begin_m, APART_M)
-        longer, last = drawn.with_point_at(longer, end_m, APART_M)
+    for slow_mps, after_m in itertools.product((slow for slow in SLOW_MPS if slow < speed_mps), SLOW_AFTER_M):
+        begin_m = max(at_m - max(SLOW_BEFORE_M[slow_mps], after_m - 1.0), 0.0)
+        end_m = min(at_m + after_m, along[-1])
+        longer, first = _with_change(drawing, begin_m, -1.0)
+        longer, last = _with_change(longer, end_m, 1.0)
         if last > first:
             yield tuple(
                 _slower(point, slow_mps) if first < number <= last else point
@@ -179,9 +190,10 @@ def crawling(drawing: Drawing, spots: list[Vector], speed_mps: float) -> Drawing
             key=lambda there_m: math.dist(drawn.place_at(drawing, there_m), spot),
         )
         begin_m, end_m = max(at_m - CRAWL_M, 0.0), min(at_m + CRAWL_M, along[-1])
-        drawing, _ = drawn.with_point_at(drawing, begin_m, APART_M)
-        drawing, _ = drawn.with_point_at(drawing, end_m, APART_M)
-        stretches.append((begin_m - APART_M, end_m + APART_M))
+        drawing, first = _with_change(drawing, begin_m, -1.0)
+        drawing, last = _with_change(drawing, end_m, 1.0)
+        along = drawn.distances_m(drawing)
+        stretches.append((along[first] - 0.01, along[last] + 0.01))
     along = drawn.distances_m(drawing)
     return tuple(
         _slower(point, slow_mps)
@@ -235,6 +247,25 @@ def _between(a: Vector, b: Vector) -> Vector:
 
 def _vector(bearing_deg: float) -> Vector:
     return (math.sin(math.radians(bearing_deg)), math.cos(math.radians(bearing_deg)))
+
+
+def _with_change(drawing: Drawing, along_m: float, way: float) -> tuple[Drawing, int]:
+    """Give the lines with a point where the speed may change, and its number: on a straight line, farther on than a corner nearby."""
+    for _ in drawing:
+        along = drawn.distances_m(drawing)
+        corner_m = next(
+            (
+                along[index]
+                for index in range(1, len(drawing) - 1)
+                if abs(along[index] - along_m) < CHANGE_AWAY_M
+                and abs(drawn.turn_deg(drawing, index)) > CHANGE_TURN_DEG
+            ),
+            None,
+        )
+        if corner_m is None:
+            break
+        along_m = corner_m + way * (CHANGE_AWAY_M + 0.01)
+    return drawn.with_point_at(drawing, min(max(along_m, 0.0), along[-1]), APART_M)
 
 
 def _slower(point: drawn.DrawnPoint, speed_mps: float) -> drawn.DrawnPoint:

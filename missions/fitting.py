@@ -17,10 +17,14 @@ import shapely
 from missions import corner_means, drawn
 from missions.avoidance import with_avoidance
 from missions.drive_model import envelope
+from missions.geo import rounded
+from missions.local_frame import LocalPoint
 from missions.neck import find_neck, straight_through
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
+
+    from numpy.typing import NDArray
 
     from missions.drawn import Drawing, Vector
     from missions.drive_model import Envelope
@@ -37,7 +41,7 @@ UNBOUNDED_EXTRA_M = 2.0
 TURN_BACK_DEG, TURN_BACK_EXTRA_M = 165.0, 4.0
 """A turn so sharp may be driven round either side; the model tells of one."""
 
-FIT_MEASUREMENTS, CRAWL_MEASUREMENTS, MOST_MEASUREMENTS = 600, 500, 2200
+FIT_MEASUREMENTS, CRAWL_MEASUREMENTS, MOST_MEASUREMENTS = 500, 350, 1500
 """Taken for one route, for a slow one, and for all that are tried: a search that is not done by then is given up."""
 
 _MISSING_COST_S_PER_M = 100.0
@@ -45,13 +49,15 @@ _CROSSING_COST_S = 10_000.0
 _POINT_COST_S = 0.3
 _NEAR_TURNS_COST_S = 3.0
 _TURN_DEG = 5.0
+_FAR_FROM_ENOUGH_M = 0.7
 _SHORT_LEG_M = 12.0
 _LEAST_GAIN_S = 0.05
 _CONTEXT = 3
 _MORE_TRIES = 12
-_EASING_STEPS_M = (1.6, 0.5)
+_EASING_STEPS_M = (6.0, 1.6, 0.5)
 _TINY_LEG_M = 2.5
 _JOINED_TURN_DEG = 80.0
+_GRID_TRIES, _GRID_MEASUREMENTS = 4, 150
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,13 +114,38 @@ class Fitting:
         drawing, measured = self._fitted(self._fewer(drawn_first))
         if not measured.is_enough:
             # Many small corners in little room: begin again, slowly all about them.
-            spots = [drawing[index].place for index, m in enumerate(measured.missing_m) if m > ENOUGH_M]
+            spots = [
+                drawing[index].place if math.isnan(place[0]) else place
+                for index, (missing_m, place) in enumerate(
+                    zip(measured.missing_m, measured.worst, strict=True)
+                )
+                if missing_m > ENOUGH_M
+            ]
             slow = corner_means.crawling(drawn_first, spots, self.vehicle.speed_mps)
             self._allow(CRAWL_MEASUREMENTS)
             other, found = self._fitted(slow)
             if sum(found.missing_m) < sum(measured.missing_m):
-                return other, found
+                drawing, measured = other, found
+        return self._on_grid(drawing, measured)
+
+    def _on_grid(self, drawing: Drawing, measured: Measured) -> tuple[Drawing, Measured]:
+        """Round lines as the mission's items will be: the model has steps, and a millimetre may be one too many."""
+        for _ in range(_GRID_TRIES):
+            if not measured.is_enough:
+                break
+            drawing = tuple(point.at(self._rounded(point.place)) for point in drawing)
+            measured = self.measure(drawing)
+            if measured.is_enough:
+                break
+            self._allow(_GRID_MEASUREMENTS)
+            drawing = self._descend(drawing, self._all)
+            measured = self.measure(drawing)
         return drawing, measured
+
+    def _rounded(self, place: Vector) -> Vector:
+        frame = self.ground.frame
+        east_m, north_m = frame.to_local(rounded(frame.to_lat_lon(LocalPoint(*place))))
+        return (east_m, north_m)
 
     def _allow(self, measurements: int) -> None:
         self._until = min(self.measurements + measurements, MOST_MEASUREMENTS)
@@ -127,16 +158,23 @@ class Fitting:
                 break
         return drawing, self.measure(drawing)
 
-    def foresee(self, drawing: Drawing, heading_deg: float | None) -> Envelope:
-        """Give the band of lines."""
-        band = envelope(
+    def _plain(self, drawing: Drawing, heading_deg: float | None) -> Envelope:
+        """Give the band of lines without the vehicle's avoidance."""
+        return envelope(
             drawn.places(drawing),
             self.vehicle,
             heading_deg=heading_deg,
             speeds=drawn.speeds(drawing),
             stops=drawn.stops(drawing),
         )
-        return with_avoidance(band, self.vehicle, self.ground.edge)
+
+    def _clearances_m(self, band: Envelope) -> NDArray[np.float64]:
+        """Give what each piece keeps; inside a fence less, the deeper it lies."""
+        clearances_m = band.clearances_m(self.ground.edge)
+        for piece in np.flatnonzero(clearances_m <= -band.bands_m):
+            inside = shapely.difference(band.cores[piece], self.ground.allowed)
+            clearances_m[piece] -= math.sqrt(inside.area) + inside.length / 10
+        return clearances_m
 
     def measure(self, drawing: Drawing) -> Measured:
         """Measure whole lines."""
@@ -147,11 +185,13 @@ class Fitting:
         self.measurements += 1
         part = drawing[begin:end]
         heading_deg = _course_deg(part) if begin or self.heading_deg is None else self.heading_deg
-        band = self.foresee(part, heading_deg)
-        clearances_m = band.clearances_m(self.ground.edge)
-        for piece in np.flatnonzero(clearances_m <= -band.bands_m):  # tell how deep in it lies
-            inside = shapely.difference(band.cores[piece], self.ground.allowed)
-            clearances_m[piece] -= math.sqrt(inside.area) + inside.length / 10
+        required_m = np.array([point.required_m for point in part])
+        band = self._plain(part, heading_deg)
+        clearances_m = self._clearances_m(band)
+        if (required_m[band.waypoints] - clearances_m).max() < _FAR_FROM_ENOUGH_M:
+            slowed = with_avoidance(band, self.vehicle, self.ground.edge)
+            if slowed is not band:
+                band, clearances_m = slowed, self._clearances_m(slowed)
         least_m, pieces = np.full(len(part), np.inf), np.full(len(part), -1)
         for piece in np.argsort(-clearances_m):
             least_m[band.waypoints[piece]] = clearances_m[piece]
@@ -159,7 +199,6 @@ class Fitting:
         legs = shapely.linestrings([[a.place, b.place] for a, b in pairwise(part)])
         lines_m = np.array([np.inf, *np.atleast_1d(shapely.distance(legs, self.ground.edge))])
         lines_m[np.isnan(lines_m)] = np.inf
-        required_m = np.array([point.required_m for point in part])
         asked_m = np.array([point.line_m for point in part])
         missing_m = np.maximum(np.maximum(required_m - least_m, asked_m - lines_m), 0.0)
         for corner in band.corners:

@@ -39,7 +39,8 @@ class Corner:
     time_lost_s : float
         Against driving on at full speed.
     bounded : bool
-        False at a sharp turn between short legs: measured rovers with steered wheels left the model's bounds there.
+        False at a sharp turn between short legs (measured rovers with steered wheels left the model's bounds there), and at a turn
+        where the speed changes, which was not measured.
     """
 
     waypoint: int

@@ -37,6 +37,7 @@ def plan_route(
     )
     turns_deg = [_turn_deg(before.direction, after.direction) for before, after in itertools.pairwise(legs)]
     runs_m = _runs_m(legs, turns_deg)
+    asked = [None if speeds is None else speeds[leg.first] for leg in legs]
     corners = []
     whole_deg = 0.0
     for number, (group, (before, after)) in enumerate(
@@ -44,7 +45,8 @@ def plan_route(
     ):
         turn_deg = turns_deg[number]
         whole_deg = turn_deg + (whole_deg if before.profile.length_m < at_corner.NEAR_M else 0.0)
-        bend = Bend(turn_deg, whole_deg, min(runs_m[number], runs_m[number + 1]))
+        changes_speed = asked[number] != asked[number + 1] and abs(turn_deg) > at_corner.STRAIGHT_ON_DEG
+        bend = Bend(turn_deg, whole_deg, min(runs_m[number], runs_m[number + 1]), changes_speed)
         corners.append(_corner(vehicle, group, (before, after), bend, stops))
     strays = [start]
     middle_s = at_corner.START_HOLD_S
@@ -132,7 +134,8 @@ def _corner(
         stops=stopped or pivots,
         pivots=pivots,
         doubtful=doubtful,
-        bounded=at_corner.is_bounded(vehicle, turn_deg, bend.shorter_run_m),
+        bounded=at_corner.is_bounded(vehicle, turn_deg, bend.shorter_run_m)
+        and (stopped or pivots or not bend.changes_speed),
         blend=blend,
         swing_m=swing_m,
         behind_m=behind_m,

@@ -138,11 +138,14 @@ class Bend:
         That of the corners close before it included.
     shorter_run_m : float
         How far the route goes nearly straight on before the corner or after it, whichever is less.
+    changes_speed : bool
+        Whether another speed is asked for after it, which was measured on straight lines only.
     """
 
     turn_deg: float
     whole_deg: float
     shorter_run_m: float
+    changes_speed: bool = False
 
     @property
     def widest_deg(self) -> float:

@@ -13,6 +13,7 @@ import numpy as np
 import shapely
 from shapely import LineString
 
+from missions.avoidance import with_avoidance
 from missions.drive_model import envelope
 from missions.errors import MissionError
 from missions.items import Command
@@ -286,6 +287,8 @@ class DriveGrader:
                 speeds=self.way.speeds,
                 stops=self.way.stops,
             )
+            if self._field.meter is not None:
+                forecast = with_avoidance(forecast, self._field.vehicle, self._field.meter.ground.edge)
         except MissionError as error:
             self._notes.append(f"nothing is foreseen: {error}")
             return None

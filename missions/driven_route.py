@@ -7,27 +7,28 @@ way round is drawn.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-import shapely
 from shapely import Point
 
-from missions import drawn
+from missions.departure import ROOM_M, departures
 from missions.drawn import Drawing, DrawnPoint
-from missions.drive_model import corner_forecast, envelope
-from missions.errors import NoRouteError, RouteError
-from missions.fitting import Fitting
+from missions.drive_model import corner_forecast
+from missions.errors import RouteError
+from missions.fitting import MOST_MEASUREMENTS, Fitting
 from missions.local_frame import LocalPoint
+from missions.refusal import block, refusal
 from missions.route import find_route
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from shapely import Polygon
 
+    from missions.departure import Departure
     from missions.fitting import Measured
     from missions.ground import Ground
     from missions.route import Route
@@ -37,11 +38,9 @@ SLOW_MPS = 1.0
 """The slowest that a stretch is driven, and the narrowest band."""
 
 _OTHER_WAYS = 5
-_DEPARTURES = 24
-_DEPARTURE_M = 15.0
+_DEPARTURES_TRIED = 8
 _DEPARTURE_SLACK_M = 0.05
-_BLOCK_M = 0.5
-_BLOCK_AWAY_M = 8.0
+_TURN_COST_M_PER_DEG = 0.1
 _SHORTER_SHARE = 0.97
 
 
@@ -99,6 +98,8 @@ class RouteSearch:
         Asked now and then; True ends the search.
     escape : bool
         Whether a start on forbidden ground may be left.
+    measurements : int, optional
+        How often the drive model may be asked.
     """
 
     ground: Ground
@@ -112,6 +113,7 @@ class RouteSearch:
     method: str = "optimal"
     should_stop: Callable[[], bool] | None = None
     escape: bool = False
+    measurements: int | None = None
 
     def find(self) -> DrivenRoute:
         """Find the quickest of the routes tried whose band keeps what is required.
@@ -121,7 +123,8 @@ class RouteSearch:
         StartBlockedError, TargetBlockedError, NoRouteError
             No route; with the fences or the corner to blame.
         """
-        fitting = Fitting(self.ground, self.vehicle, self.heading_deg, self.should_stop)
+        most = self.measurements or MOST_MEASUREMENTS
+        fitting = Fitting(self.ground, self.vehicle, self.heading_deg, self.should_stop, most)
         fast_m, slow_m = self._bands_m()
         refused: list[tuple[Drawing, Measured]] = []
         found: list[tuple[float, DrivenRoute]] = []
@@ -130,17 +133,23 @@ class RouteSearch:
             self._fit(fitting, route, found, refused)
             if found and route is routes[0][0] and len(routes) > 1 and not self._is_shorter(routes):
                 break
+        if not found and _starts_badly(*refused[-1]):
+            for route in self._departing_routes(slow_m):
+                self._fit(fitting, route, found, refused)
+                if found or self._is_stopped():
+                    break
         blocked: list[Polygon] = []
         while not found and len(blocked) < _OTHER_WAYS and not self._is_stopped():
             drawing, measured = refused[-1]
-            blocked.append(_block(route, drawing, measured))
+            blocked.append(block(route, drawing, measured))
             try:
                 route = self._draw(routes[-1][1], blocked)
             except RouteError:
                 break
             self._fit(fitting, route, found, refused)
         if not found:
-            raise self._refusal(*min(refused, key=lambda one: sum(one[1].missing_m)))
+            drawing, measured = min(refused, key=lambda one: sum(one[1].missing_m))
+            raise refusal(self.ground, self.required_m, self.reserve_m, drawing, measured)
         return min(found, key=lambda one: one[0])[1]
 
     def _bands_m(self) -> tuple[float, float]:
@@ -168,11 +177,11 @@ class RouteSearch:
     def _is_shorter(routes: list[tuple[Route, float]]) -> bool:
         return routes[1][0].length_m < _SHORTER_SHARE * routes[0][0].length_m
 
-    def _draw(self, band_m: float, blocked: Sequence[Polygon]) -> Route:
+    def _draw(self, band_m: float, blocked: Sequence[Polygon], start: LocalPoint | None = None) -> Route:
         clearance_m = self.required_m + band_m + self.reserve_m
         return find_route(
             self.ground,
-            self.start,
+            start or self.start,
             list(self.targets),
             clearance_m,
             promised_m=self.required_m,
@@ -229,19 +238,40 @@ class RouteSearch:
 
         A vehicle that stands near a fence, or faces it, can do no better than to leave by the best way.
         """
-        ways_rad = np.arange(_DEPARTURES) * (2 * math.pi / _DEPARTURES)
-        best_m = -math.inf
-        for east, north in np.column_stack((np.sin(ways_rad), np.cos(ways_rad))).tolist():
-            there = LocalPoint(
-                self.start.east_m + _DEPARTURE_M * east, self.start.north_m + _DEPARTURE_M * north
-            )
-            course_deg = math.degrees(math.atan2(east, north))
-            heading_deg = course_deg if self.heading_deg is None else self.heading_deg
-            band = envelope([self.start, there], self.vehicle, heading_deg=heading_deg)
-            best_m = max(best_m, float(band.clearances_m(self.ground.edge)[band.waypoints == 0].min()))
-            if best_m >= self.required_m + self.reserve_m:
-                return self.required_m
+        if self.ground.clearance_m(Point(self.start)) >= self.required_m + ROOM_M:
+            return self.required_m
+        best_m = self._departures[0].kept_m
+        if best_m >= self.required_m + self.reserve_m:
+            return self.required_m
         return min(self.required_m, best_m - 2 * self.reserve_m - _DEPARTURE_SLACK_M)
+
+    @cached_property
+    def _departures(self) -> list[Departure]:
+        return departures(self.ground, self.vehicle, self.start, self.heading_deg)
+
+    def _departing_routes(self, band_m: float) -> Iterator[Route]:
+        """Give routes by the first legs that the vehicle can drive as it faces, the shortest first."""
+        keeps_m = self.departure_m + self.reserve_m
+        routes = []
+        for departure in self._departures:
+            if departure.kept_m < keeps_m:
+                break
+            try:
+                onward = self._draw(band_m, (), departure.there)
+            except RouteError:
+                continue
+            if onward.lead_away:
+                continue
+            route = replace(
+                onward,
+                points=np.vstack([self.start, onward.points]),
+                lead_away=int(self.departure_m < self.required_m),
+                start_clearance_m=self.ground.clearance_m(Point(self.start)),
+                target_indices=tuple(index + 1 for index in onward.target_indices),
+            )
+            routes.append((route.length_m + _TURN_COST_M_PER_DEG * _turned_deg(route), route))
+        routes.sort(key=lambda one: one[0])
+        yield from (route for _, route in routes[:_DEPARTURES_TRIED])
 
     def _least_departing_m(self, route: Route) -> float:
         """Give what the band has to keep while the route leads away; nothing while it leaves forbidden ground."""
@@ -255,38 +285,14 @@ class RouteSearch:
     def _is_stopped(self) -> bool:
         return self.should_stop is not None and self.should_stop()
 
-    def _refusal(self, drawing: Drawing, measured: Measured) -> NoRouteError:
-        """Say which corner refused, by how much, and at which fence."""
-        index = max(range(len(drawing)), key=lambda number: measured.missing_m[number])
-        point = drawing[index]
-        position = self.ground.frame.to_lat_lon(LocalPoint(*point.place))
-        barrier, _ = self.ground.nearest(Point(measured.worst[index]))
-        fence = barrier.name if barrier else "no fence in particular"
-        turn_deg = drawn.turn_deg(drawing, index) if 0 < index < len(drawing) - 1 else 0.0
-        kept_m = point.required_m - self.reserve_m - measured.missing_m[index]
-        where = (
-            "the start"
-            if index == 0
-            else "the target"
-            if index == len(drawing) - 1
-            else f"the corner of {abs(turn_deg):.0f}° at {position}"
-        )
-        return NoRouteError(
-            f"no route keeps {self.required_m:.2f} m while driving: at {where} this vehicle would come as near as "
-            f"{max(kept_m, 0.0):.2f} m to {fence}, whatever was tried",
-            clearance_m=round(self.required_m, 3),
-            corner=list(position),
-            turn_deg=round(turn_deg, 1),
-            kept_m=round(max(kept_m, 0.0), 3),
-            fences=[fence],
-        )
+
+def _starts_badly(drawing: Drawing, measured: Measured) -> bool:
+    """Tell whether most is missing where the route begins."""
+    return max(range(len(drawing)), key=lambda number: measured.missing_m[number]) <= 2
 
 
-def _block(route: Route, drawing: Drawing, measured: Measured) -> Polygon:
-    """Give a small square on a route near where most is missing, to send the next one elsewhere."""
-    index = max(range(len(drawing)), key=lambda number: measured.missing_m[number])
-    place = measured.worst[index] if not math.isnan(measured.worst[index][0]) else drawing[index].place
-    line = shapely.LineString(route.points)
-    margin_m = min(_BLOCK_AWAY_M, line.length / 3)
-    along_m = min(max(line.project(Point(place)), margin_m), line.length - margin_m)
-    return line.interpolate(along_m).buffer(_BLOCK_M, cap_style="square")
+def _turned_deg(route: Route) -> float:
+    """Give how far the lines turn in all."""
+    east_m, north_m = np.diff(route.points, axis=0).T
+    turns_rad = np.diff(np.arctan2(east_m, north_m))
+    return float(np.degrees(np.abs((turns_rad + np.pi) % (2 * np.pi) - np.pi)).sum())

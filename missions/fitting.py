@@ -98,12 +98,15 @@ class Fitting:
         Where it faces at the start; None along its first leg.
     should_stop : callable, optional
         Asked now and then; True ends the search.
+    most_measurements : int
+        For all lines that are fitted.
     """
 
     ground: Ground
     vehicle: Vehicle
     heading_deg: float | None
     should_stop: Callable[[], bool] | None = None
+    most_measurements: int = MOST_MEASUREMENTS
     measurements: int = field(default=0, init=False)
     _until: int = field(default=0, init=False)
 
@@ -148,7 +151,7 @@ class Fitting:
         return (east_m, north_m)
 
     def _allow(self, measurements: int) -> None:
-        self._until = min(self.measurements + measurements, MOST_MEASUREMENTS)
+        self._until = min(self.measurements + measurements, self.most_measurements)
 
     def _fitted(self, drawing: Drawing) -> tuple[Drawing, Measured]:
         for means in (self._gentle, self._all):

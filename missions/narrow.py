@@ -37,14 +37,17 @@ class NarrowestPlace:
     between: tuple[str, ...]
     at: LatLon | None
 
-    def __str__(self) -> str:
+    @property
+    def where(self) -> str:
+        """Say where, after a comma; nothing where it is not known."""
+        if self.at is None:
+            return ""
         fences = " and ".join(dict.fromkeys(self.between))
-        where = f", narrowest {'between' if len(set(self.between)) > 1 else 'at'} {fences}" if fences else ""
-        return (
-            f"the widest keeps {self.clearance_m:.2f} m{where} at {self.at}"
-            if self.at
-            else "any width is free"
-        )
+        between = "between" if len(set(self.between)) > 1 else "at"
+        return f", narrowest {between} {fences} at {self.at}" if fences else f", narrowest at {self.at}"
+
+    def __str__(self) -> str:
+        return f"the widest keeps {self.clearance_m:.2f} m{self.where}" if self.at else "any width is free"
 
 
 def narrowest_place(

@@ -192,10 +192,10 @@ class TestRecordedLogs:
     )
     def test_the_defaults_promise_something(self, logs: Path, name: str) -> None:
         found = document("--log", logs / f"{name}.tlog")
-        assert found["clearance_m"] == 2.5
-        assert found["drawn_clearance_m"] >= 2.5
         leads_away = any("first leads away" in warning for warning in found["warnings"])
-        assert found["driven_clearance_m"] >= 2.5 or leads_away
+        assert found["clearance_m"] == 2.5 or (leads_away and 1.5 < found["clearance_m"] < 2.5)
+        assert found["drawn_clearance_m"] >= 2.5
+        assert found["driven_clearance_m"] >= found["clearance_m"]
 
     def test_the_widest_way(self, logs: Path, drawn: tuple) -> None:
         found = document("--log", logs / "guided-maze.tlog", "--clearance", "max", *drawn)

@@ -1,0 +1,123 @@
+"""A route whose driven band keeps the promise; where there is none, the widest one, or an error that tells of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+from missions.clearance import NARROWEST_BAND_M
+from missions.driven_route import DrivenRoute, RouteSearch
+from missions.errors import NoRouteError, RouteError
+from missions.lines import reserve_m
+from missions.narrow import narrowest_place, widest_clearance_m
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from missions.clearance import Promise
+    from missions.ground import Ground
+    from missions.local_frame import LocalPoint
+    from missions.request import Request
+    from missions.vehicle import Vehicle
+
+_SHARES = (1.0, 0.9, 0.8, 0.65, 0.5, 0.35, 0.2, 0.1, 0.0)
+"""What of the widest clearance is tried one after another."""
+
+_MEASUREMENTS = 600
+"""For each of them."""
+
+
+@dataclass(frozen=True, eq=False)
+class FittedRoute:
+    """What a route is sought with.
+
+    Parameters
+    ----------
+    ground : Ground
+        The field.
+    ends : sequence of LocalPoint
+        Start and targets.
+    request : Request
+        What is asked.
+    vehicle : Vehicle
+        What drives.
+    heading_deg : float or None
+        Where it faces.
+    should_stop : callable, optional
+        Asked now and then; True ends the search.
+    """
+
+    ground: Ground
+    ends: Sequence[LocalPoint]
+    request: Request
+    vehicle: Vehicle
+    heading_deg: float | None
+    should_stop: Callable[[], bool] | None = None
+
+    def find(self, asked: Promise) -> tuple[Promise, DrivenRoute]:
+        """Give a route and what is promised for it.
+
+        Raises
+        ------
+        StartBlockedError, TargetBlockedError, NoRouteError
+            No route; with what the widest one would keep.
+        """
+        if self.request.widest:
+            return self._widest(asked)
+        try:
+            return asked, self._search(asked.required_m).find()
+        except NoRouteError as error:
+            if "widest_m" not in error.details:
+                raise
+            raise self._told(error, asked) from None
+
+    def _widest(self, asked: Promise) -> tuple[Promise, DrivenRoute]:
+        widest_m = widest_clearance_m(self.ground, self.ends, self.should_stop)
+        refusal: RouteError | None = None
+        for share in _SHARES:
+            required_m = max(0.0, share * (widest_m - NARROWEST_BAND_M))
+            try:
+                found = self._search(required_m, _MEASUREMENTS).find()
+            except RouteError as error:
+                refusal = error
+                continue
+            promised_m = max(0.0, required_m - asked.error_m)
+            return replace(asked, promised_m=promised_m, error_m=required_m - promised_m), found
+        assert refusal is not None
+        raise refusal
+
+    def _told(self, error: NoRouteError, asked: Promise) -> NoRouteError:
+        """Give the error with what the widest route keeps while this vehicle drives it."""
+        found = (narrowest_place(self.ground, a, b, self.should_stop) for a, b in pairwise(self.ends))
+        place = min((place for place in found if place), key=lambda place: place.clearance_m)
+        try:
+            widest, _ = self._widest(asked)
+        except RouteError:
+            return error
+        return NoRouteError(
+            f"no route keeps {asked.promised_m:.2f} m while driving; the widest keeps {widest.promised_m:.2f} m "
+            f"({place.clearance_m:.2f} m drawn){place.where}",
+            **{
+                **error.details,
+                "widest_m": round(widest.promised_m, 3),
+                "widest_drawn_m": round(place.clearance_m, 3),
+            },
+        )
+
+    def _search(self, required_m: float, measurements: int | None = None) -> RouteSearch:
+        start, *targets = self.ends
+        return RouteSearch(
+            self.ground,
+            start,
+            targets,
+            required_m,
+            reserve_m(self.ground),
+            self.vehicle,
+            self.heading_deg,
+            self.request.snap_m,
+            self.request.method,
+            self.should_stop,
+            self.request.escape,
+            measurements,
+        )

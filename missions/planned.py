@@ -1,0 +1,82 @@
+"""What a planning gives: a mission and what it promises."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from missions.drive_model import Envelope
+    from missions.fence import Fence
+    from missions.geo import LatLon
+    from missions.ground import Ground
+    from missions.items import MissionItem
+    from missions.vehicle import Vehicle
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A mission and what it promises.
+
+    Parameters
+    ----------
+    items : tuple of MissionItem
+        For the autopilot, without the home item and without the start: waypoints, and changes of speed between them.
+    path : tuple of LatLon
+        The drawn lines as rounded into the items, start first.
+    seqs : tuple of int
+        For each point of the path the seq of its waypoint in the mission (home is 0, and stands for the start).
+    speeds : tuple of float or None
+        The speed asked for on each leg of the path in m/s; None is the vehicle's own.
+    clearance_m : float or None
+        Promised for the rover as it drives; None where only drawn lines were asked for.
+    asked_m : float
+        What the drawn lines have to keep (less where the first ones lead away from a fence nearby); where the route is fitted to the
+        drive model, the driven band too: the promise, the position's error and the owner's reserve.
+    drawn_clearance_m : float
+        The least distance of the drawn lines, as rounded and as the autopilot draws them, to any fence (infinite without a fence near).
+    driven_clearance_m : float
+        The least distance of the band that the vehicle is foreseen to drive in.
+    blocks : int
+        Blocks of the partition that was searched.
+    fence, ground : Fence, Ground
+        What was planned around.
+    vehicle : Vehicle
+        What was known of the vehicle.
+    envelope : Envelope
+        The band that the vehicle is foreseen to stay in, and its times.
+    home : LatLon or None
+        For the mission's home item.
+    """
+
+    items: tuple[MissionItem, ...]
+    path: tuple[LatLon, ...]
+    seqs: tuple[int, ...]
+    speeds: tuple[float | None, ...]
+    start: LatLon
+    targets: tuple[LatLon, ...]
+    method: str
+    length_m: float
+    straight_line_m: float
+    duration_s: float
+    clearance_m: float | None
+    asked_m: float
+    drawn_clearance_m: float
+    driven_clearance_m: float
+    blocks: int
+    fence: Fence
+    ground: Ground
+    vehicle: Vehicle
+    envelope: Envelope
+    home: LatLon | None
+    warnings: tuple[str, ...]
+
+    def path_index(self, seq: int, after: int = 0) -> int:
+        """Give which point of the path a mission item drives to; for a change of speed the one that it is for.
+
+        Of an item that is driven to several times the first time from point ``after`` on, else the first of all.
+        """
+        points = (*range(after, len(self.path)), *range(after))
+        exact = (point for point in points if self.seqs[point] == seq)
+        later = (point for point in points if self.seqs[point] > seq)
+        return next(exact, next(later, len(self.path) - 1))

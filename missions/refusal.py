@@ -1,0 +1,63 @@
+"""Where a route could not be fitted: said in words, and kept away from by the next one."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import shapely
+from shapely import Point
+
+from missions import drawn
+from missions.errors import NoRouteError
+from missions.local_frame import LocalPoint
+
+if TYPE_CHECKING:
+    from shapely import Polygon
+
+    from missions.drawn import Drawing
+    from missions.fitting import Measured
+    from missions.ground import Ground
+    from missions.route import Route
+
+_BLOCK_M = 0.5
+_BLOCK_AWAY_M = 8.0
+
+
+def refusal(
+    ground: Ground, required_m: float, reserve_m: float, drawing: Drawing, measured: Measured
+) -> NoRouteError:
+    """Say which corner refused, by how much, and at which fence."""
+    index = max(range(len(drawing)), key=lambda number: measured.missing_m[number])
+    point = drawing[index]
+    position = ground.frame.to_lat_lon(LocalPoint(*point.place))
+    barrier, _ = ground.nearest(Point(measured.worst[index]))
+    fence = barrier.name if barrier else "no fence in particular"
+    turn_deg = drawn.turn_deg(drawing, index) if 0 < index < len(drawing) - 1 else 0.0
+    kept_m = point.required_m - reserve_m - measured.missing_m[index]
+    where = (
+        "the start"
+        if index == 0
+        else "the target"
+        if index == len(drawing) - 1
+        else f"the corner of {abs(turn_deg):.0f}° at {position}"
+    )
+    return NoRouteError(
+        f"no route keeps {required_m:.2f} m while driving: at {where} this vehicle would come as near as "
+        f"{max(kept_m, 0.0):.2f} m to {fence}, whatever was tried",
+        clearance_m=round(required_m, 3),
+        corner=list(position),
+        turn_deg=round(turn_deg, 1),
+        kept_m=round(max(kept_m, 0.0), 3),
+        fences=[fence],
+    )
+
+
+def block(route: Route, drawing: Drawing, measured: Measured) -> Polygon:
+    """Give a small square on a route near where most is missing, to send the next one elsewhere."""
+    index = max(range(len(drawing)), key=lambda number: measured.missing_m[number])
+    place = measured.worst[index] if not math.isnan(measured.worst[index][0]) else drawing[index].place
+    line = shapely.LineString(route.points)
+    margin_m = min(_BLOCK_AWAY_M, line.length / 3)
+    along_m = min(max(line.project(Point(place)), margin_m), line.length - margin_m)
+    return line.interpolate(along_m).buffer(_BLOCK_M, cap_style="square")

@@ -46,6 +46,10 @@ LINKS = {
     "30 % loss": Faults(0.3, 0.0, 0.05, 0.1),
     "40 % loss": Faults(0.4, 0.0, 0.05, 0.1),
     "10 % loss, 200 to 250 ms": Faults(0.1, 0.0, 0.2, 0.25),
+    "2 % loss, 1.2 s round trip": Faults(0.02, 0.0, 0.6, 0.65),
+    "2 % loss, radio of 1000 bytes a second": Faults(
+        0.02, 0.0, 0.05, 0.1, bytes_per_s=1000, queue_bytes=2000
+    ),
     "5 % duplicates": Faults(0.0, 0.05, 0.05, 0.1),
     "10 % duplicates, reordered, 10 to 400 ms": Faults(0.0, 0.1, 0.01, 0.4, keeps_order=False),
     "10 % loss, 10 % duplicates, reordered, 10 to 400 ms": Faults(0.1, 0.1, 0.01, 0.4, keeps_order=False),

@@ -27,6 +27,7 @@ RIVAL_PATIENCE_S = 30.0
 _ASK_AGAIN_S = 0.5
 _RIVAL_AGAIN_S = 1.0
 _REFUSALS_BELIEVED = 3
+_STALE_PATIENCE_S = 30.0
 _OUT_OF_ORDER = (MissionResult.ERROR, MissionResult.INVALID_SEQUENCE)
 _OVERTAKEN_BY = 3
 _FLOAT_FORM_AFTER_S = 6.0
@@ -120,6 +121,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         self._float_form = False
         self._coarse_seqs: set[int] = set()
         self._heard_s = 0.0
+        self._counting_since_s = 0.0
         self._fetching_since_s = 0.0
         self._act_at_s = 0.0
         self._rival_since_s: float | None = None
@@ -161,7 +163,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
     def start(self, now_s: float) -> None:
         """Ask how many items there are."""
         if self._move(DownloadEvent.START):
-            self._heard_s = self._begun_s = now_s
+            self._heard_s = self._begun_s = self._counting_since_s = now_s
             self._limit_s = now_s + self.bound_s
             self._ask_count(now_s)
 
@@ -191,7 +193,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
                 self._move(DownloadEvent.RIVAL_STAYS)
                 return
             if self._move(DownloadEvent.RETRY):
-                self._heard_s = now_s
+                self._heard_s = self._counting_since_s = now_s
             self._ask_count(now_s)
 
     def _give_up(self) -> None:
@@ -213,9 +215,12 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
     def _take_count(self, count: int, now_s: float) -> None:
         if self.state is DownloadState.FETCHING and count == self._count:
             return
+        was_counting = self.state is DownloadState.COUNTING
         event = DownloadEvent.COUNT if count else DownloadEvent.COUNT_ZERO
         if not self._move(event):
             return
+        if was_counting:
+            self._round_trip.guess(now_s - self._counting_since_s)
         self._heard_s = self._fetching_since_s = now_s
         self._rival_since_s = None
         self._refusals = 0
@@ -276,15 +281,26 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
                 self._rival_since_s = now_s if self._rival_since_s is None else self._rival_since_s
                 self._act_at_s = now_s + _RIVAL_AGAIN_S
         elif self.state is DownloadState.COUNTING and result not in (None, MissionResult.ACCEPTED):
-            # An answer to items pushed just before may still be under way: a refusal counts once for each time we asked.
-            if self._refusal_counts:
-                self._refusal_counts = False
-                self._refusals += 1
-                self._result = result
-                if self._refusals >= _REFUSALS_BELIEVED:
-                    self._move(DownloadEvent.REFUSAL)
+            self._take_refusal(result, now_s)
         elif self.state is DownloadState.FETCHING and result in _OUT_OF_ORDER:
             self._check_list(now_s)
+
+    def _take_refusal(self, result: MissionResult, now_s: float) -> None:
+        """Count a refusal, once for each time we asked; the same one has to come again and again.
+
+        ERROR and INVALID_SEQUENCE also answer items pushed before, which a narrow link may carry long after: they are believed late.
+        """
+        is_about_items = result in _OUT_OF_ORDER
+        if is_about_items:
+            self._heard_s = now_s
+        if not self._refusal_counts:
+            return
+        self._refusal_counts = False
+        self._refusals = self._refusals + 1 if result is self._result else 1
+        self._result = result
+        patience_s = _STALE_PATIENCE_S if is_about_items else 0.0
+        if self._refusals >= _REFUSALS_BELIEVED and now_s >= self._counting_since_s + patience_s:
+            self._move(DownloadEvent.REFUSAL)
 
     def _check_list(self, now_s: float) -> None:
         """Find out what an error meant: a shorter list, an answer to items pushed before, or a vehicle that wants requests in order."""
@@ -296,6 +312,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
             self._most_in_flight, self._window = 1, 1.0  # PX4 serves requests in order only
             self._forget_items()
             self._move(DownloadEvent.LIST_CHANGED)
+            self._counting_since_s = now_s
         self._ask_count(now_s)
 
     def _fill_window(self, now_s: float) -> None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.messages import MissionType
+from missions.item_limit import MISSION_ITEMS, most_items
 from missions.items import Command
 
 if TYPE_CHECKING:
@@ -14,7 +15,6 @@ if TYPE_CHECKING:
 
     from missions.items import MissionItem
 
-_SD_MISSION_BYTES_PER_ITEM = 15
 _SD_FENCE_ITEMS = 4096
 _POLYGON = frozenset({Command.FENCE_POLYGON_VERTEX_INCLUSION, Command.FENCE_POLYGON_VERTEX_EXCLUSION})
 _CIRCLE = frozenset({Command.FENCE_CIRCLE_INCLUSION, Command.FENCE_CIRCLE_EXCLUSION})
@@ -32,18 +32,15 @@ class Limits:
         Storage for the fence: 4, 2 + 8 n for a polygon of n vertices, 13 for a circle, 9 for the return point.
     """
 
-    mission_items: int = 655
+    mission_items: int = MISSION_ITEMS
     fence_items: int = 84
     fence_bytes: int = 672
 
     @classmethod
     def from_parameters(cls, parameters: Mapping[str, float]) -> Limits:
         """Give a vehicle's limits from its parameters: BRD_SD_MISSION and BRD_SD_FENCE are storage on the SD card, in KB."""
-        limits = cls()
-        mission_bytes = int(parameters.get("BRD_SD_MISSION", 0)) * 1024
+        limits = cls(mission_items=most_items(parameters))
         fence_bytes = int(parameters.get("BRD_SD_FENCE", 0)) * 1024
-        if mission_bytes > 0:
-            limits = replace(limits, mission_items=(mission_bytes - 4) // _SD_MISSION_BYTES_PER_ITEM)
         if fence_bytes > 0:
             limits = replace(
                 limits, fence_items=min(fence_bytes // 8, _SD_FENCE_ITEMS), fence_bytes=fence_bytes

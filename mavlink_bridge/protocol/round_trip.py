@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 
 class RoundTrip:
     """Smoothed round-trip time and its variation; samples of repeated messages must be left out (Karn)."""
@@ -10,6 +12,12 @@ class RoundTrip:
         self._mean_s = first_guess_s
         self._variation_s = first_guess_s / 2
         self._is_guess = True
+        self._least_s = math.inf
+
+    @property
+    def least_s(self) -> float:
+        """Shortest round-trip time so far, infinite before the first."""
+        return self._least_s
 
     @property
     def mean_s(self) -> float:
@@ -21,8 +29,14 @@ class RoundTrip:
         """Smoothed deviation from the mean."""
         return self._variation_s
 
+    def guess(self, bound_s: float) -> None:
+        """Take a time within which an answer came, to one of several questions perhaps; the first sample replaces it."""
+        if self._is_guess:
+            self._mean_s, self._variation_s = bound_s, bound_s / 2
+
     def observe(self, sample_s: float) -> None:
         """Take one measured round trip."""
+        self._least_s = min(self._least_s, sample_s)
         if self._is_guess:
             self._mean_s, self._variation_s, self._is_guess = sample_s, sample_s / 2, False
             return

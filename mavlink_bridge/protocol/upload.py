@@ -29,7 +29,8 @@ WINDOW = 200
 
 _ANNOUNCE_AGAIN_S = 1.0
 _ECHO_S = 0.25  # a request repeated sooner than this is the same frame arriving twice
-_ASKED_AGAIN_S = 0.9  # ArduPilot asks again after 1 s
+_ASKED_AGAIN_S = 0.9  # ArduPilot asks again after 1 s: so long after the usual time it is no first request
+_QUEUE_S = 0.5  # so long an answer may be late before the link counts as full
 _PROBE_AFTER_S = 2.0  # it would have asked again by now
 _PROBE_END_AFTER_S = 1.2
 _GIVEN_UP_AFTER_S = 6.0  # ArduPilot gives an upload up after 8 s; its messages may be late
@@ -110,9 +111,11 @@ class Upload(TableMachine[UploadState, UploadEvent]):
         self._repeated: set[int] = set()
         self._result: MissionResult | None = None
         self._heard_s = 0.0
+        self._announced_s = 0.0
         self._act_at_s = 0.0
         self._gap_at_s: float | None = None
         self._advanced_s = math.inf  # when another item was asked for
+        self._asked_s = -math.inf  # when the item wanted was last asked for
         self._rival_since_s: float | None = None
         self._limit_s = 0.0
 
@@ -158,6 +161,7 @@ class Upload(TableMachine[UploadState, UploadEvent]):
         if self._move(UploadEvent.START):
             self._heard_s = now_s
             self._limit_s = now_s + self.bound_s
+            self._announced_s = now_s
             self._announce(now_s)
 
     def receive(self, frame: Frame, now_s: float) -> None:
@@ -191,7 +195,7 @@ class Upload(TableMachine[UploadState, UploadEvent]):
             self._move(UploadEvent.RIVAL_STAYS)
         else:
             if self._move(UploadEvent.RETRY):
-                self._heard_s = now_s
+                self._heard_s = self._announced_s = now_s
             self._announce(now_s)
 
     def _rival_stays(self, now_s: float) -> bool:
@@ -216,16 +220,21 @@ class Upload(TableMachine[UploadState, UploadEvent]):
         if not 0 <= seq < len(self._messages) or not self._move(UploadEvent.REQUEST):
             return
         self._heard_s = now_s
+        if self._wanted < 0:
+            self._round_trip.guess(now_s - self._announced_s)
         if seq != self._wanted:
             self._advanced_s = now_s
         self._rival_since_s = None
         if seq > self._wanted:
             self._keep_up(seq, now_s)
-        elif now_s - self._sent_s.get(seq, -math.inf) >= _ECHO_S:
+        elif now_s - max(self._sent_s.get(seq, -math.inf), self._asked_s) >= _ECHO_S:
             # Asked again, or from the front after a second MISSION_COUNT: this one is wanted, whatever came before.
             self._wanted = seq
-            self._narrow_window()
+            if now_s >= self._answered_at_s():
+                self._narrow_window()
             self._push_item(seq, now_s)
+        if seq == self._wanted:
+            self._asked_s = now_s
         self._push(now_s)
         self._act_at_s = now_s + self._probe_after_s()
 
@@ -236,22 +245,34 @@ class Upload(TableMachine[UploadState, UploadEvent]):
 
     def _keep_up(self, seq: int, now_s: float) -> None:
         """Follow the vehicle to a later item."""
-        before = seq - 1
-        if before in self._sent_s and before not in self._repeated:
-            self._round_trip.observe(now_s - self._sent_s[before])
-        steps = seq - self._wanted
-        if self._window < self._threshold:
-            self._window = self._threshold if self._is_recovering else self._window + steps
-        else:
-            self._window += steps / self._window
-        self._window = min(self._window, self._most_ahead)
-        self._is_recovering = False
+        late_s = self._sent_s.get(seq, now_s) + self._round_trip.mean_s + _ASKED_AGAIN_S
+        is_repeat = seq < self._next and now_s >= late_s  # its first request was lost, and so was the item
+        is_full = not is_repeat and self._measure(seq - 1, now_s)
+        self._grow_window(seq - self._wanted, is_full=is_full)
         self._wanted = seq
         self._gap_at_s = None
-        if seq < self._next and now_s - self._sent_s.get(seq, now_s) >= _ASKED_AGAIN_S:
+        if is_repeat:
             self._narrow_window()
             self._next = seq
         self._next = max(self._next, seq)
+
+    def _measure(self, seq: int, now_s: float) -> bool:
+        """Take the time in which an item sent once was answered; tell whether so long that it has waited in a queue."""
+        if seq not in self._sent_s or seq in self._repeated:
+            return False
+        took_s = now_s - self._sent_s[seq]
+        self._round_trip.observe(took_s)
+        return took_s > self._round_trip.least_s + _QUEUE_S
+
+    def _grow_window(self, steps: int, *, is_full: bool) -> None:
+        if is_full:  # a longer queue would only make repairs late
+            self._threshold = max((self._threshold if self._is_recovering else self._window) / 2, 1.0)
+        if self._is_recovering:
+            self._window = self._threshold
+        elif not is_full:
+            self._window += steps if self._window < self._threshold else steps / self._window
+        self._window = min(self._window, self._most_ahead)
+        self._is_recovering = False
 
     def _push(self, now_s: float) -> None:
         end = min(self._wanted + int(self._window), len(self._messages))
@@ -300,7 +321,12 @@ class Upload(TableMachine[UploadState, UploadEvent]):
         """Wait until it is clear whether an item is missing, or a frame only came twice or late."""
         if self._gap_at_s is None and self._next > self._wanted + 1:
             settle_s = 4 * self._round_trip.variation_s
-            self._gap_at_s = now_s + min(max(settle_s, _LEAST_SETTLE_S), _MOST_SETTLE_S)
+            begins_s = max(now_s, self._answered_at_s())
+            self._gap_at_s = begins_s + min(max(settle_s, _LEAST_SETTLE_S), _MOST_SETTLE_S)
+
+    def _answered_at_s(self) -> float:
+        """Give when the item wanted, as last sent, is answered; what is heard before is about copies sent before."""
+        return self._sent_s.get(self._wanted, -math.inf) + self._round_trip.mean_s
 
     def _fill_gap(self, now_s: float) -> None:
         self._gap_at_s = None

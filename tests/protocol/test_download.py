@@ -166,6 +166,33 @@ def test_a_refusal_is_believed_when_it_is_repeated():
     assert (outcome.state, outcome.result) == (DownloadState.REFUSED, MissionResult.UNSUPPORTED)
 
 
+@pytest.mark.parametrize("result", [MissionResult.ERROR, MissionResult.INVALID_SEQUENCE])
+def test_answers_to_items_pushed_before_are_no_refusal(result):
+    script = read()
+    for _ in range(50):
+        script.hear(ack(result), after_s=0.4)
+    assert script.hear(count(1)) == [MissionRequestInt(1, 1, 0, 0)]
+    script.hear(item(0))
+    assert script.machine.outcome.is_complete
+
+
+def test_an_error_that_never_ends_is_a_refusal():
+    script = read()
+    for _ in range(80):
+        script.hear(ack(MissionResult.ERROR), after_s=0.4)
+    outcome = script.machine.outcome
+    assert (outcome.state, outcome.result) == (DownloadState.REFUSED, MissionResult.ERROR)
+
+
+def test_different_refusals_are_not_added_up():
+    script = read()
+    for _ in range(2):
+        script.hear(ack(MissionResult.ERROR), after_s=0.6)
+    script.hear(ack(MissionResult.UNSUPPORTED), after_s=0.6)
+    script.hear(ack(MissionResult.UNSUPPORTED), after_s=0.6)
+    assert not script.machine.is_done
+
+
 def test_an_item_past_the_end_makes_it_ask_for_the_count():
     script = read()
     script.hear(count(3), item(0))

@@ -6,7 +6,7 @@ import pytest
 from protocol.campaign import Scenario, scenario_of, transfer
 from protocol.twin import PEER, RIVAL, Client, Faults, Twin, Vehicle, plain_fence, plain_mission
 
-from mavlink_bridge.messages import MissionType
+from mavlink_bridge.messages import MissionItemInt, MissionType
 from mavlink_bridge.protocol.download import Download
 from mavlink_bridge.protocol.verified_upload import Held, OutcomeKind, VerifiedUpload
 
@@ -55,6 +55,41 @@ def test_a_hundred_items_over_a_slow_and_lossy_link_take_less_than_eight_seconds
         assert client.machine.outcome.is_verified
         times.append(client.ended_s)
     assert max(times) <= 8.0
+
+
+@pytest.mark.parametrize("queue_bytes", [300, 1000, 16000])
+@pytest.mark.parametrize(("bytes_per_s", "within_s"), [(1000, 40.0), (5000, 15.0)])
+def test_a_narrow_link_takes_no_more_pushes_than_a_wide_one(bytes_per_s, within_s, queue_bytes):
+    # A telemetry radio: what is pushed ahead waits in its queue, or is dropped where that is full.
+    for seed in range(4):
+        faults = Faults(0.02, 0.0, 0.05, 0.1, bytes_per_s=bytes_per_s, queue_bytes=queue_bytes)
+        _, client = _run(MISSION, plain_mission(100), plain_mission(12, 1), faults, seed)
+        outcome = client.machine.outcome
+        assert (outcome.kind, outcome.pushes) == (OutcomeKind.VERIFIED, 1)
+        assert client.ended_s <= within_s
+
+
+@pytest.mark.parametrize(
+    "faults",
+    [
+        Faults(0.0, 0.0, 0.65, 0.65),
+        Faults(0.0, 0.0, 0.05, 0.1, bytes_per_s=1000, queue_bytes=4000),
+    ],
+    ids=["1.3 s round trip", "telemetry radio"],
+)
+def test_what_is_only_late_is_hardly_sent_again(faults):
+    _, client = _run(MISSION, plain_mission(100), plain_mission(12, 1), faults)
+    items = sum(isinstance(message, MissionItemInt) for _, message in client.sent)
+    assert client.machine.outcome.is_verified
+    assert items <= 105
+
+
+def test_answers_to_repeated_items_do_not_end_the_read_back():
+    # Half a minute of queue each way: the items sent twice are answered with ERROR while the list is asked for.
+    for seed in (0, 4):
+        faults = Faults(0.0, 0.0, 0.05, 0.1, bytes_per_s=800, queue_bytes=16000)
+        _, client = _run(MISSION, plain_mission(60), plain_mission(12, 1), faults, seed)
+        assert client.machine.outcome.is_verified
 
 
 def test_a_list_that_is_there_already_is_not_written_again():

@@ -12,7 +12,15 @@ import random
 from dataclasses import dataclass, field
 from itertools import count
 
-from mavlink_bridge.messages import Frame, Message, MissionCount, MissionItem, MissionItemInt, MissionType
+from mavlink_bridge.messages import (
+    Frame,
+    Message,
+    MissionCount,
+    MissionItem,
+    MissionItemInt,
+    MissionType,
+    Statustext,
+)
 from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.simulator.item_lists import FenceList, MissionList, RallyList
 from mavlink_bridge.simulator.mission_server import MissionServer
@@ -27,15 +35,21 @@ RIVAL = Peer(1, 1, 255, 190)
 WRITES = (MissionCount, MissionItem, MissionItemInt)
 
 
+BYTES = {Statustext: 66, MissionItemInt: 50, MissionItem: 50}
+OTHER_BYTES = 18
+
+
 @dataclass(frozen=True)
 class Faults:
-    """What a link does to single frames, each way."""
+    """What a link does to single frames, each way; a narrow one queues them up to so many bytes and drops the rest."""
 
     loss: float = 0.0
     duplicates: float = 0.0
     least_delay_s: float = 0.0005
     most_delay_s: float = 0.0005
     keeps_order: bool = True
+    bytes_per_s: float | None = None
+    queue_bytes: float = math.inf
 
 
 @dataclass
@@ -108,6 +122,7 @@ class Twin:
         self._events = []
         self._inbox = []
         self._last_arrival_s = {}
+        self._free_s = {}
         self._reboots = sorted(begin_s for begin_s, _ in vehicle.off)
 
     def run(self, limit_s=4000.0):
@@ -222,11 +237,26 @@ class Twin:
         for _ in range(copies):
             if self.random.random() < faults.loss:
                 continue
-            arrival_s = self.now_s + self.random.uniform(faults.least_delay_s, faults.most_delay_s)
+            left_s = self._leaves_at_s(direction[0], frame)
+            if left_s is None:
+                continue
+            arrival_s = left_s + self.random.uniform(faults.least_delay_s, faults.most_delay_s)
             if faults.keeps_order:
                 arrival_s = max(arrival_s, self._last_arrival_s.get(direction, 0.0))
                 self._last_arrival_s[direction] = arrival_s
             self._at(arrival_s, deliver, frame)
+
+    def _leaves_at_s(self, way, frame):
+        """Put a frame into the queue of a narrow link; give when it has left, None if there is no room."""
+        faults = self.faults
+        if faults.bytes_per_s is None:
+            return self.now_s
+        begins_s = max(self.now_s, self._free_s.get(way, 0.0))
+        size = BYTES.get(type(frame.message), OTHER_BYTES)
+        if (begins_s - self.now_s) * faults.bytes_per_s + size > faults.queue_bytes:
+            return None
+        self._free_s[way] = begins_s + size / faults.bytes_per_s
+        return self._free_s[way]
 
 
 def plain_mission(length, salt=0):

@@ -11,6 +11,7 @@ import shapely
 from shapely import LineString, Point
 from shapely.ops import nearest_points
 
+from missions.avoidance import with_avoidance
 from missions.clearance import known_vehicle, promise
 from missions.course import CIRCLE_M, Course, CourseLeg, follow_mission
 from missions.drive_model import Envelope, beyond_measured, envelope
@@ -230,7 +231,7 @@ def plan_of(check: MissionCheck, situation: Situation, *, method: str = "optimal
         straight_line_m=distance_m(path[0], path[-1]),
         duration_s=check.duration_s,
         clearance_m=check.clearance_m,
-        asked_m=check.clearance_m,
+        asked_m=max(leg.asked_m for leg in check.legs),
         drawn_clearance_m=check.drawn_clearance_m,
         driven_clearance_m=check.driven_clearance_m,
         blocks=0,
@@ -266,13 +267,14 @@ def _forecast(course: Course, ground: Ground, vehicle: Vehicle, heading_deg: flo
     points = ground.frame.to_local_array(places)
     if heading_deg is None:  # as plans do
         heading_deg = bearing_deg(*places[:2])
-    return envelope(
+    forecast = envelope(
         points,
         vehicle,
         heading_deg=heading_deg,
         speeds=[leg.speed_mps for leg in course.legs],
         stops={number: leg.stop_s for number, leg in enumerate(course.legs, 1) if leg.stop_s is not None},
     )
+    return with_avoidance(forecast, vehicle, ground.edge)
 
 
 def _checked_legs(

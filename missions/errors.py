@@ -13,7 +13,8 @@
     └── RouteError               no route
         ├── StartBlockedError    the vehicle stands where it must not be
         ├── TargetBlockedError   the target lies where the vehicle must not be
-        └── NoRouteError         start and target are not connected
+        ├── NoRouteError         start and target are not connected
+        └── MissionTooLongError  the vehicle cannot hold that many items
 """
 
 from __future__ import annotations
@@ -65,6 +66,10 @@ class TargetBlockedError(RouteError):
 
 class NoRouteError(RouteError):
     """Start and target are not connected; says which fences part them."""
+
+
+class MissionTooLongError(RouteError):
+    """The mission needs more items than the vehicle holds; says how many it needs and what it holds."""
 
 
 class PlanCheckError(MissionError):

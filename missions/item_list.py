@@ -24,12 +24,27 @@ _FOREVER = -1.0
 
 @dataclass(eq=False)
 class _Entry:
-    """One item; ``seq`` is its number in the mission as it was, ``leg`` the leg that it was put in for, ``goal`` where it jumps to."""
+    """One item, as it is and where it comes from.
+
+    Parameters
+    ----------
+    item : MissionItem
+        What it is.
+    seq : int or None
+        Its number in the mission as it was.
+    leg : tuple or None
+        The leg that it was put in for.
+    goal : _Entry or None
+        Where it jumps to.
+    is_after : bool
+        Whether it was put in after the place that the leg leads to.
+    """
 
     item: MissionItem
     seq: int | None = None
     leg: LegKey | None = None
     goal: _Entry | None = None
+    is_after: bool = False
 
 
 class ItemList:
@@ -55,6 +70,17 @@ class ItemList:
     def jumps(self) -> int:
         """How many jumps there are."""
         return sum(entry.item.command in (Command.DO_JUMP, _DO_JUMP_TAG) for entry in self._entries)
+
+    @property
+    def own_seqs(self) -> frozenset[int]:
+        """Give the seqs of the waypoints and changes of speed that routes have put in before the places of the mission."""
+        return frozenset(
+            seq
+            for seq, entry in enumerate(self._entries, 1)
+            if entry.leg is not None
+            and not entry.is_after
+            and entry.item.command in (Command.NAV_WAYPOINT, Command.DO_CHANGE_SPEED)
+        )
 
     def mission(self) -> Mission:
         """Give the mission as it is now, its jumps numbered anew."""
@@ -112,7 +138,7 @@ class ItemList:
         elif put:
             self._put_on_jump(self._old[jump - 1], put)
         here = self._entries.index(entry) + 1
-        self._entries[here:here] = [_Entry(item, leg=key) for item in after]
+        self._entries[here:here] = [_Entry(item, leg=key, is_after=True) for item in after]
 
     def _place_before(self, key: LegKey) -> int:
         """Tell where a leg's new places belong: just before the one it leads to.

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 from missions.check import MissionCheck, check_mission, plan_of
 from missions.errors import NoRouteError, RouteError, SituationError
 from missions.geo import bearing_deg, distance_m, to_e7
+from missions.item_limit import most_items
 from missions.item_list import ItemList
 from missions.items import change_speed
 from missions.lines import ROUNDING_RESERVE_M
 from missions.plan import Plan, plan
 from missions.situation import Known, Mission, Pose
+from missions.storage import shortened
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -120,7 +122,19 @@ def repair_mission(
     for _ in range(_ROUNDS):
         if checked.holds:
             _check_jumps(repaired)
-            return Repair(checked.mission, checked, _changes(repaired))
+            changes = _changes(repaired)
+            most = most_items(situation.parameters) - 1
+            if len(checked.mission.items) > most:
+                long = checked.mission
+                checked = shortened(
+                    long, repaired.own_seqs, situation, request, most=most, should_stop=should_stop
+                )
+                left_out = len(long.items) - len(checked.mission.items)
+                changes = (
+                    *changes,
+                    f"{left_out} items of the routes were left out so that the vehicle can hold it ({most + 1})",
+                )
+            return Repair(checked.mission, checked, changes)
         try:
             routed = _routed(asked, keys, situation, replace(request, clearance_m=clearance_m), should_stop)
         except RouteError:

@@ -10,17 +10,19 @@ import numpy as np
 from shapely import Point
 
 import pbpp
-from missions.check import check_mission
+from missions.check import check_mission, plan_of
 from missions.clearance import known_vehicle, promise
 from missions.drive_model import corner_forecast
 from missions.errors import NoRouteError, SituationError
 from missions.fence import ZoneKind
+from missions.item_limit import most_items
 from missions.local_frame import LocalPoint
 from missions.mission_end import End, ending
 from missions.narrow import widest_clearance_m
 from missions.plan import Plan, ground_for, plan
 from missions.repair import repaired_plan
 from missions.situation import Mission
+from missions.storage import shortened
 from missions.surroundings import route_ends
 from missions.visit_order import VisitOrder, length_of, shortest_order
 
@@ -84,6 +86,7 @@ def plan_tour(
     asked = replace(request, targets=targets) if len(targets) > 1 or request.targets else request
     planned = plan(situation, asked, should_stop=should_stop)
     planned = with_end(planned, situation, request)
+    planned = with_room(planned, situation, request, should_stop=should_stop)
     return replace(planned, warnings=(*said, *planned.warnings)) if said else planned
 
 
@@ -174,6 +177,48 @@ def _length_m(
         return float(planner.plan(a, b, should_stop=should_stop).length_m)
     except (pbpp.NoPathError, pbpp.StartBlockedError, pbpp.GoalBlockedError):
         return float("inf")
+
+
+def with_room(
+    planned: Plan, situation: Situation, request: Request, *, should_stop: Callable[[], bool] | None = None
+) -> Plan:
+    """Give a plan that fits into the vehicle's storage, with what can be left out of its route left out.
+
+    Raises
+    ------
+    MissionTooLongError
+        It cannot be shortened so far.
+    """
+    most = most_items(situation.parameters) - 1
+    if len(planned.items) <= most:
+        return planned
+    wanted = replace(request, clearance_m=planned.clearance_m, start=planned.start)
+    is_fitted = (
+        request.corner_allowance_m is None
+    )  # else drawn lines were asked for, which a check says nothing of
+    own = _own_items(planned, request) if is_fitted else ()
+    mission = Mission(planned.items, planned.home)
+    checked = shortened(mission, own, situation, wanted, most=most, may_slow=True, should_stop=should_stop)
+    said = f"{len(planned.items) - len(checked.mission.items)} items of the route were left out so that the vehicle can hold it ({most + 1})"
+    return replace(
+        plan_of(checked, situation, method=planned.method),
+        targets=planned.targets,
+        straight_line_m=planned.straight_line_m,
+        clearance_m=planned.clearance_m,
+        asked_m=planned.asked_m,
+        blocks=planned.blocks,
+        home=planned.home,
+        warnings=(*planned.warnings, said),
+    )
+
+
+def _own_items(planned: Plan, request: Request) -> frozenset[int]:
+    """Give the seqs of a plan's items that nobody asked for: all but the targets, and the speed that is set first."""
+    kept = {1} if request.speed_mps is not None else set()
+    points = iter(range(1, len(planned.path)))
+    for target in planned.targets:
+        kept.add(planned.seqs[next(point for point in points if planned.path[point] == target)])
+    return frozenset(range(1, len(planned.items) + 1)) - kept
 
 
 def with_end(planned: Plan, situation: Situation, request: Request) -> Plan:

@@ -36,9 +36,12 @@ from mavlink_bridge.cli.vehicle_options import (
 from mavlink_bridge.errors import LinkError, UsageError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from mavlink_bridge.cli.session import Address
     from mavlink_bridge.messages import Frame
     from missions.check import CheckedLeg, MissionCheck
+    from missions.items import MissionItem
     from missions.situation import Situation
 
 _TELEMETRY_PATIENCE_S = 5.0
@@ -101,7 +104,6 @@ def check(
     _check_options(mission, log, connect, home, plots)
     if json_output and Path("-") in plots:
         raise UsageError("--plot - and --json both want the standard output; give a file to --plot")
-    from mavlink_bridge.cli.plan import storage_warnings  # noqa: PLC0415 - quick help
     from missions.check import check_mission  # noqa: PLC0415
     from missions.geo import parse_lat_lon  # noqa: PLC0415
     from missions.request import Request  # noqa: PLC0415
@@ -130,7 +132,7 @@ def check(
     if begin is None and log is not None and situation.home is not None:
         begin = situation.home.value  # at a log's end the vehicle may stand anywhere on its way
     checked = check_mission(situation.mission.value, situation, replace(request, start=begin))
-    warnings = [*unknown, *checked.warnings, *storage_warnings(checked.mission.items, situation)]
+    warnings = [*unknown, *checked.warnings, *_storage_warnings(checked.mission.items, situation)]
     warn(warnings)
     _draw(checked, situation, plots)
     if json_output:
@@ -156,6 +158,15 @@ def _check_options(
 
         for path in plots:
             check_picture_format(path)
+
+
+def _storage_warnings(items: Sequence[MissionItem], situation: Situation) -> list[str]:
+    """Warn of a mission (its items without home) that the vehicle cannot hold."""
+    from missions.item_limit import most_items  # noqa: PLC0415 - quick help
+
+    most = most_items(situation.parameters)
+    count = len(items) + 1
+    return [f"{count} mission items with home; the vehicle holds {most}"] if count > most else []
 
 
 def _with_files(
@@ -222,7 +233,7 @@ def _live_situation(address: Address, *, quiet: bool) -> tuple[Situation, list[s
         session.listeners.append(listen)
         session.ask_telemetry()
         items, fence, rally = (read_list(session, what) for what in ("mission", "fence", "rally"))
-        machine = ReadParameters(session.vehicle, (*PARAMETER_NAMES, *END_NAMES))
+        machine = ReadParameters(session.vehicle, (*PARAMETER_NAMES, *END_NAMES, "BRD_SD_MISSION"))
         session.run(machine, "reading parameters")
         # What is promised rests on the fix: whether it is known must not be a matter of luck.
         session.listen_until(lambda: heard.pose is not None and heard.fix is not None, _TELEMETRY_PATIENCE_S)

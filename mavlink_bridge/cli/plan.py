@@ -39,9 +39,6 @@ from mavlink_bridge.cli.vehicle_options import (
 from mavlink_bridge.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from missions.items import MissionItem
     from missions.plan import Plan
     from missions.request import Request
     from missions.situation import Situation
@@ -185,7 +182,7 @@ def plan(
         situation = with_home_option(with_parameter_file(situation, vehicle), home)
         planned, planning_s = timed_plan(situation, request)
         uploaded = verified = False
-    warnings = [*planned.warnings, *storage_warnings(planned.items, situation)]
+    warnings = list(planned.warnings)
     warn(warnings)
     written = write_outputs(planned, situation, outputs, plots, blocks=blocks)
     document = {
@@ -211,15 +208,6 @@ def timed_plan(situation: Situation, request: Request) -> tuple[Plan, float]:
     begun_s = time.perf_counter()
     planned = plan_tour(situation, request)
     return planned, time.perf_counter() - begun_s
-
-
-def storage_warnings(items: Sequence[MissionItem], situation: Situation) -> list[str]:
-    """Warn of a mission (its items without home) that the vehicle cannot hold."""
-    from mavlink_bridge.protocol.limits import Limits  # noqa: PLC0415 - quick help
-
-    most = Limits.from_parameters(situation.parameters).mission_items
-    count = len(items) + 1
-    return [f"{count} mission items with home; the vehicle holds {most}"] if count > most else []
 
 
 def with_parameter_file(situation: Situation, vehicle: Path | None) -> Situation:

@@ -324,7 +324,7 @@ def test_the_vehicles_own_mission_is_repaired_and_driven(fields, yard):
     pause = MissionItem(Command.NAV_DELAY, CoordinateFrame.MISSION, (1.0, 0.0, 0.0, 0.0))
     back = MissionItem(Command.DO_JUMP, CoordinateFrame.MISSION, (1.0, 1.0, 0.0, 0.0))
     with Simulator(
-        held_by(fields, first, pause, wait, last, back), "tcpin:127.0.0.1:0", speedup=20.0
+        held_by(fields, first, pause, wait, last, back), "tcpin:127.0.0.1:0", speedup=10.0
     ) as simulator:
         armed(simulator)
         document = document_of(

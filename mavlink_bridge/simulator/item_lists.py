@@ -20,8 +20,12 @@ MISSION_LIMIT = 655
 FENCE_BYTES = 672
 """Bytes of fence the default storage holds."""
 
-FENCE_LIMIT = FENCE_BYTES // 8
-"""Fence items announced as the limit; most fences of that many do not fit."""
+SD_FENCE_LIMIT = 4096
+"""Fence items at most, however large the SD card's storage."""
+
+_BYTES_PER_FENCE_ITEM = 8
+_BYTES_PER_MISSION_ITEM = 15
+_HEADER_BYTES = 4
 
 RALLY_LIMIT = 50
 """Rally points the default storage holds (750 bytes, from the source; not measured)."""
@@ -101,14 +105,18 @@ class MissionList(_InPlaceList):
         Gives the vehicle's home.
     is_running : callable
         Tells whether the vehicle is armed in AUTO.
+    sd_kb : int
+        BRD_SD_MISSION: storage on the SD card instead of the default one.
     """
 
     mission_type = MissionType.MISSION
     limit = MISSION_LIMIT
     name = "Mission"
 
-    def __init__(self, home: Callable[[], LatLon], is_running: Callable[[], bool]) -> None:
+    def __init__(self, home: Callable[[], LatLon], is_running: Callable[[], bool], sd_kb: int = 0) -> None:
         super().__init__()
+        if sd_kb > 0:
+            self.limit = (sd_kb * 1024 - _HEADER_BYTES) // _BYTES_PER_MISSION_ITEM
         self._home = home
         self._is_running = is_running
         self.items.append(_home_item(home()))
@@ -150,14 +158,22 @@ class RallyList(_InPlaceList):
 
 
 class FenceList(ItemList):
-    """The fence: an upload is held in memory and written when the whole of it is found good."""
+    """The fence: an upload is held in memory and written when the whole of it is found good.
+
+    Parameters
+    ----------
+    sd_kb : int
+        BRD_SD_FENCE: storage on the SD card instead of the default one.
+    """
 
     mission_type = MissionType.FENCE
-    limit = FENCE_LIMIT
     name = "Fence"
 
-    def __init__(self) -> None:
+    def __init__(self, sd_kb: int = 0) -> None:
         super().__init__()
+        self._bytes = sd_kb * 1024 if sd_kb > 0 else FENCE_BYTES
+        # What is announced: most fences of that many items do not fit.
+        self.limit = min(self._bytes // _BYTES_PER_FENCE_ITEM, SD_FENCE_LIMIT)
         self._incoming: list[MissionItem] = []
 
     def begin(self, count: int) -> None:
@@ -183,7 +199,7 @@ class FenceList(ItemList):
         if problem is not None:
             self.texts += [problem, "Fence validation failed"]
             return MissionResult.ERROR
-        if item_rules.fence_bytes(self._incoming) > FENCE_BYTES:
+        if item_rules.fence_bytes(self._incoming) > self._bytes:
             self.texts.append("Fence exceeds storage size")
             return MissionResult.ERROR
         self.items = self._incoming

@@ -69,8 +69,12 @@ class SimulatedVehicle:
         self.config = config or SimulatorConfig()
         self.parameters = ParameterStore(self.config.parameters)
         self._home: LatLon = self.config.home
-        self._mission = MissionList(lambda: self._home, lambda: self.rover.is_running_mission)
-        self._fence, self._rally = FenceList(), RallyList()
+        self._mission = MissionList(
+            lambda: self._home,
+            lambda: self.rover.is_running_mission,
+            int(self.parameters["BRD_SD_MISSION"]),
+        )
+        self._fence, self._rally = FenceList(int(self.parameters["BRD_SD_FENCE"])), RallyList()
         self._lists: tuple[ItemList, ...] = (self._mission, self._fence, self._rally)
         if self.config.mission:
             _store(self._mission, with_home(self.config.mission, self._home))

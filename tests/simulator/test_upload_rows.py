@@ -232,6 +232,16 @@ def test_a_count_over_the_limit_has_no_space_and_the_old_list_is_kept(mission_ty
     assert requests(bench.count(limit, mission_type)) == [0]
 
 
+@pytest.mark.parametrize(
+    ("name", "mission_type", "limit"), [("BRD_SD_MISSION", 0, 4368), ("BRD_SD_FENCE", 1, 4096)]
+)
+def test_an_sd_card_holds_more(name, mission_type, limit):
+    bench = Bench(SimulatorConfig(streams=False, parameters={name: 64.0}))
+    assert acks(bench.count(limit + 1, mission_type)) == [MissionResult.NO_SPACE]
+    assert bench.texts() == [f"Only {limit} items are supported"]
+    assert requests(bench.count(limit, mission_type)) == [0]
+
+
 def test_655_items_fit():
     bench = Bench()
     items = [placed(Command.NAV_WAYPOINT, HOME), *line(654)]

@@ -1,7 +1,7 @@
 """Whether planned missions are driven as promised: seeded fields, three vehicles, the simulator's drive law in stepped time.
 
-``python benchmarks/drive.py [--fields N] [--first SEED] [--jobs N] [-o docs/drive-bench.md]``. Each run plans a mission, hands its items to the simulated
-rover, drives it in AUTO with the fence enabled, and measures the true track against the fence.
+``python benchmarks/drive.py [--fields N] [--first SEED] [--kinds usual|more] [--jobs N] [--progress] [-o FILE]``. Each run plans a mission, hands
+its items to the simulated rover, drives it in AUTO with the fence enabled, and measures the true track against the fence.
 """
 
 from __future__ import annotations
@@ -13,11 +13,13 @@ import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
 from drive_fields import Field, make_field
+from drive_more_fields import make_more
 
 from mavlink_bridge.simulator.config import Mode, SimulatorConfig
 from mavlink_bridge.simulator.rover import TICK_S
@@ -99,22 +101,29 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--fields", type=int, default=200)
     parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--kinds", choices=("usual", "more"), default="usual")
     parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--progress", action="store_true")
     parser.add_argument("-o", "--output", type=Path)
     options = parser.parse_args()
     seeds = range(options.first, options.first + options.fields)
     begun_s = time.perf_counter()
     with ProcessPoolExecutor(options.jobs) as pool:
-        runs = [run for found in pool.map(runs_of, seeds) for run in found]
+        runs = []
+        for found in pool.map(partial(runs_of, kinds=options.kinds), seeds):
+            runs += found
+            if options.progress:
+                for run in found:
+                    print(run, file=sys.stderr, flush=True)
     text = report(runs, time.perf_counter() - begun_s)
     print(text)
     if options.output:
         options.output.write_text(text + "\n", encoding="utf-8")
 
 
-def runs_of(seed: int) -> list[Run]:
+def runs_of(seed: int, kinds: str = "usual") -> list[Run]:
     """Plan and drive one field with each vehicle."""
-    field = make_field(seed)
+    field = make_field(seed) if kinds == "usual" else make_more(seed)
     return [_run(field, name) for name in VEHICLES]
 
 
@@ -151,7 +160,7 @@ def _run(field: Field, name: str) -> Run:
     return Run(
         **known,  # type: ignore[arg-type]
         planning_s=planning_s,
-        leads_away_m=planned.driven_clearance_m if planned.driven_clearance_m < field.clearance_m else None,
+        leads_away_m=planned.clearance_m if planned.clearance_m < field.clearance_m else None,
         length_m=planned.length_m,
         shortest_m=shortest.length_m,
         waypoints=len(planned.path) - 1,

@@ -54,17 +54,17 @@ def make_field(seed: int) -> Field:
     start, target = _ends(rng, outline, [*obstacles, *_round(circles)], size_m, clearance_m)
     frame = frame_around([CENTRE])
     zones = (
-        _polygon(frame, ZoneKind.INCLUSION, outline),
-        *(_polygon(frame, ZoneKind.EXCLUSION, obstacle) for obstacle in obstacles),
-        *(CircleZone(ZoneKind.EXCLUSION, _place(frame, x, y), radius_m) for x, y, radius_m in circles),
+        polygon_zone(frame, ZoneKind.INCLUSION, outline),
+        *(polygon_zone(frame, ZoneKind.EXCLUSION, obstacle) for obstacle in obstacles),
+        *(CircleZone(ZoneKind.EXCLUSION, place_of(frame, x, y), radius_m) for x, y, radius_m in circles),
     )
     return Field(
         seed,
         kind,
         Fence(zones),
-        _place(frame, *start),
+        place_of(frame, *start),
         rng.uniform(0.0, 360.0),
-        _place(frame, *target),
+        place_of(frame, *target),
         clearance_m,
     )
 
@@ -130,7 +130,9 @@ def _gates(
         for a, b in ((-reach_m, gate - gate_m / 2), (gate + gate_m / 2, reach_m)):
             wall = LineString([(a, y), (b, y + rng.uniform(-4, 4))]).buffer(0.6, cap_style="flat")
             wall = affinity.rotate(wall, turn_deg, origin=(0, 0)).intersection(outline.buffer(3))
-            walls += [part for part in shapely.get_parts(wall) if isinstance(part, Polygon) and not part.is_empty]
+            walls += [
+                part for part in shapely.get_parts(wall) if isinstance(part, Polygon) and not part.is_empty
+            ]
     return walls, []
 
 
@@ -188,10 +190,12 @@ def _crosses(obstacles: list[Polygon], a: tuple[float, float], b: tuple[float, f
     return any(obstacle.intersects(line) for obstacle in obstacles)
 
 
-def _place(frame: LocalFrame, east_m: float, north_m: float) -> LatLon:
+def place_of(frame: LocalFrame, east_m: float, north_m: float) -> LatLon:
+    """Give a place as a mission would hold it."""
     return rounded(frame.to_lat_lon(LocalPoint(east_m, north_m)))
 
 
-def _polygon(frame: LocalFrame, kind: ZoneKind, area: BaseGeometry) -> PolygonZone:
+def polygon_zone(frame: LocalFrame, kind: ZoneKind, area: BaseGeometry) -> PolygonZone:
+    """Give an area as a fence's zone."""
     ring = shapely.get_coordinates(area.exterior if isinstance(area, Polygon) else area)[:-1]
-    return PolygonZone(kind, tuple(_place(frame, float(x), float(y)) for x, y in ring))
+    return PolygonZone(kind, tuple(place_of(frame, float(x), float(y)) for x, y in ring))

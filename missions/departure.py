@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from missions.ground import Ground
     from missions.vehicle import Vehicle
 
-WAYS = 16
-LENGTHS_M = (16.0, 8.0)
+WAYS = 24
+LENGTHS_M = (16.0, 8.0, 4.0)
 ROOM_M = 6.5
 """With so much more room than it has to keep a vehicle can turn any way: measured swings reach 3.6 m."""
 

@@ -10,6 +10,7 @@ import plotly.graph_objects as go
 
 from missions.fence import ZoneKind
 from missions.picture import style
+from missions.picture.labels import short_name
 from missions.picture.scene import polygons
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ _HATCH = {
     "size": 8,
     "solidity": 0.25,
 }
+_BODY = '<body style="margin: 0; overflow: hidden">'
 _CONFIG = {
     "displaylogo": False,
     "scrollZoom": True,
@@ -36,6 +38,19 @@ _CONFIG = {
     # Nobody's field belongs on plotly's server: plotly 7 has a button for that by default.
     "showSendToCloud": False,
     "modeBarButtonsToRemove": ["sendChartToCloud", "sendDataToCloud", "select2d", "lasso2d"],
+}
+
+
+_NORTH = {
+    "text": "<b>N</b><br>↑",
+    "showarrow": False,
+    "xref": "paper",
+    "yref": "paper",
+    "x": 1,
+    "y": 1,
+    "xanchor": "right",
+    "yanchor": "bottom",
+    "font": {"size": 14, "color": "black"},
 }
 
 
@@ -52,9 +67,9 @@ def write_html(scene: Scene, path: Path, *, title: str | None = None, blocks: bo
         include_plotlyjs=True,
         full_html=True,
         div_id="plan",
-        default_height="94vh",
+        default_height="100vh",
         config=_CONFIG,
-    )
+    ).replace("<body>", _BODY, 1)
     path.write_text(page, encoding="utf-8", newline="\n")
 
 
@@ -76,7 +91,7 @@ def html_figure(scene: Scene, *, title: str | None = None, blocks: bool = False)
         In local metres.
     """
     west, south, east, north = scene.bounds_m
-    traces = [*_ground(scene, blocks=blocks), *_lines(scene)]
+    traces = [*_ground(scene, blocks=blocks), *_lines(scene), _names(scene), _scale(scene)]
     layout = go.Layout(
         title={"text": title or scene.title()},
         xaxis={
@@ -95,7 +110,9 @@ def html_figure(scene: Scene, *, title: str | None = None, blocks: bool = False)
         plot_bgcolor="white",
         hovermode="closest",
         dragmode="pan",
-        legend={"orientation": "h", "yanchor": "top", "y": -0.12},
+        margin={"l": 70, "r": 30, "t": 70, "b": 20},
+        legend={"orientation": "h", "yanchor": "top", "y": -0.09, "xanchor": "center", "x": 0.5},
+        annotations=[_NORTH],
     )
     return go.Figure(traces, layout)
 
@@ -172,6 +189,41 @@ def _leg_hovers(scene: Scene) -> go.Scatter:
         name="leg",
         text=texts,
         hoverinfo="text",
+        showlegend=False,
+    )
+
+
+def _names(scene: Scene) -> go.Scatter:
+    """Give the exclusions' names in short; hovering tells them in full."""
+    shown = [
+        (zone.area.intersection(scene.frame).representative_point(), short_name(zone.name))
+        for zone in scene.plan.ground.barriers
+        if zone.kind is ZoneKind.EXCLUSION and zone.area.intersects(scene.frame)
+    ]
+    return go.Scatter(
+        **_east_north(np.array([(point.x, point.y) for point, _ in shown]).reshape(-1, 2)),
+        mode="text",
+        name="name",
+        text=[f"<b>{name}</b>" for _, name in shown],
+        hoverinfo="skip",
+        showlegend=False,
+    )
+
+
+def _scale(scene: Scene) -> go.Scatter:
+    """Give a scale bar that grows with the picture, in its lower left corner."""
+    west, south, east, north = scene.bounds_m
+    length_m = scene.scale_m()
+    begin_m, height_m = west + (east - west) / 50, south + (north - south) / 50
+    ends = np.array([(begin_m, height_m), (begin_m + length_m, height_m)])
+    return go.Scatter(
+        **_east_north(ends),
+        mode="lines+text",
+        name="scale",
+        text=["", f" {length_m} m"],
+        textposition="middle right",
+        line={"color": "black", "width": 4},
+        hoverinfo="skip",
         showlegend=False,
     )
 

@@ -59,6 +59,11 @@ def _spellings(name: str) -> Iterator[str]:
         yield f"{shape[0].upper()}{number}"
 
 
+def short_name(name: str) -> str:
+    """Give a zone's name in the fewest letters."""
+    return list(_spellings(name))[-1]
+
+
 def _zones_with_room(scene: Scene, m_per_px: float) -> Iterator[tuple[Barrier, BaseGeometry]]:
     """Give the zones to name, each with the ground that its name may stand on."""
     zones = scene.plan.ground.barriers

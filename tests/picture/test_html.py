@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from shapely import LineString
+from shapely import LineString, Point
 
 from missions.geo import distance_m
 from missions.picture import draw_plan
@@ -46,7 +46,9 @@ def _library(page: str) -> str:
 
 def test_the_same_plan_gives_the_same_page(plans: dict[str, Plan], tmp_path: Path) -> None:
     for name in ("a.html", "b.HTML"):
-        draw_plan(plans["union"], str(tmp_path / name), title="A field", blocks=True, track=plans["union"].path)
+        draw_plan(
+            plans["union"], str(tmp_path / name), title="A field", blocks=True, track=plans["union"].path
+        )
     assert (tmp_path / "a.html").read_bytes() == (tmp_path / "b.HTML").read_bytes()
 
 
@@ -114,3 +116,19 @@ def test_without_a_fence_near(plans: dict[str, Plan]) -> None:
     )
     (legs,) = (trace for trace in html_figure(Scene(empty)).data if trace.name == "leg")
     assert all("no fence near" in text for text in legs.text)
+
+
+def test_zones_are_named_and_the_scale_is_true(plans: dict[str, Plan]) -> None:
+    scene = Scene(plans["yard"])
+    figure = html_figure(scene)
+    (names,) = (trace for trace in figure.data if trace.name == "name")
+    assert sorted(names.text) == ["<b>C1</b>", "<b>P1</b>", "<b>P2</b>"]
+    zones = [zone for zone in scene.plan.ground.barriers if zone.kind == "exclusion"]
+    for x, y, zone in zip(names.x, names.y, zones, strict=True):
+        assert zone.area.buffer(0.01).covers(Point(x, y))
+    (scale,) = (trace for trace in figure.data if trace.name == "scale")
+    assert scale.text[1] == f" {scale.x[1] - scale.x[0]:.0f} m"
+    west, south, east, north = scene.bounds_m
+    assert west < min(scale.x) < max(scale.x) < east
+    assert south < scale.y[0] < north
+    assert any("N" in one.text for one in figure.layout.annotations)

@@ -17,6 +17,7 @@ from missions.errors import FenceError, InvalidPositionError
 from missions.fence import fence_from_items, fence_to_items
 from missions.geo import LatLon, checked_lat_lon, from_e7
 from missions.items import Command, CoordinateFrame, MissionItem, without_home
+from missions.rally import rally_from_items
 from missions.situation import Fix, Known, ListKind, ListTransfer, Mission, Pose, Situation
 
 if TYPE_CHECKING:
@@ -345,8 +346,8 @@ def with_list(
     if kind is ListKind.FENCE:
         return _with_fence(situation, items, time_s, source)
     if kind is ListKind.RALLY:
-        places = (_place(item.lat_e7, item.lon_e7) for item in items)
-        return replace(situation, rally=Known(tuple(filter(None, places)), time_s, source))
+        placed = [item for item in items if _place(item.lat_e7, item.lon_e7)]
+        return replace(situation, rally=Known(rally_from_items(placed), time_s, source))
     return _with_mission(situation, items, time_s, source, tells_home=tells_home)
 
 

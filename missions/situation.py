@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from missions.fence import Fence
     from missions.geo import LatLon
     from missions.items import MissionItem
+    from missions.rally import RallyPoint
 
 T = TypeVar("T")
 
@@ -126,7 +127,7 @@ class Situation:
     armed: bool | None = None
     fence: Known[Fence] | None = None
     mission: Known[Mission] | None = None
-    rally: Known[tuple[LatLon, ...]] | None = None
+    rally: Known[tuple[RallyPoint, ...]] | None = None
     home: Known[LatLon] | None = None
     pose: Known[Pose] | None = None
     fix: Known[Fix] | None = None

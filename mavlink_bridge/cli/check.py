@@ -218,6 +218,7 @@ def _live_situation(address: Address, *, quiet: bool) -> tuple[Situation, list[s
     from missions.fence import fence_from_items  # noqa: PLC0415
     from missions.items import without_home  # noqa: PLC0415
     from missions.mission_end import PARAMETER_NAMES as END_NAMES  # noqa: PLC0415
+    from missions.rally import rally_from_items  # noqa: PLC0415
     from missions.situation import Known, Mission, Situation  # noqa: PLC0415
     from missions.vehicle import PARAMETER_NAMES  # noqa: PLC0415
 
@@ -248,7 +249,7 @@ def _live_situation(address: Address, *, quiet: bool) -> tuple[Situation, list[s
         heard,
         fence=Known(fence_from_items(fence), None, source) if fence else None,
         mission=Known(Mission(without_home(items), home), None, source),
-        rally=Known(tuple(item.position for item in rally), None, source) if rally else None,
+        rally=Known(rally_from_items(rally), None, source) if rally else None,
         home=Known(home, None, source) if home else heard.home,
         parameters={**heard.parameters, **machine.outcome.values},
     )

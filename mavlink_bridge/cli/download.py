@@ -173,6 +173,7 @@ def _write_plan(path: Path, what: str, items: tuple[MissionItem, ...]) -> None:
     from missions.fence import fence_from_items  # noqa: PLC0415
     from missions.formats import write_mission  # noqa: PLC0415
     from missions.items import without_home  # noqa: PLC0415
+    from missions.rally import rally_from_items  # noqa: PLC0415
     from missions.situation import Known, Mission, Situation  # noqa: PLC0415
 
     source = "read from the vehicle"
@@ -182,7 +183,7 @@ def _write_plan(path: Path, what: str, items: tuple[MissionItem, ...]) -> None:
     elif what == "fence":
         situation = Situation(fence=Known(fence_from_items(items), None, source))
     else:
-        situation = Situation(rally=Known(tuple(item.position for item in items), None, source))
+        situation = Situation(rally=Known(rally_from_items(items), None, source))
     write_mission(situation, path)
 
 

@@ -209,20 +209,16 @@ def _content(
 def _lists_of(file: Path) -> dict[str, tuple[MissionItem, ...]]:
     from missions.fence import fence_to_items  # noqa: PLC0415
     from missions.formats import read_situation  # noqa: PLC0415
-    from missions.geo import LatLon, to_e7  # noqa: PLC0415
-    from missions.items import Command, CoordinateFrame, MissionItem, with_home  # noqa: PLC0415
+    from missions.geo import LatLon  # noqa: PLC0415
+    from missions.items import with_home  # noqa: PLC0415
+    from missions.rally import rally_to_items  # noqa: PLC0415
 
     situation = read_situation(file)
     found: dict[str, tuple[MissionItem, ...]] = {}
     if situation.fence and situation.fence.value.zones:
         found["fence"] = fence_to_items(situation.fence.value)
     if situation.rally and situation.rally.value:
-        found["rally"] = tuple(
-            MissionItem(
-                Command.RALLY_POINT, CoordinateFrame.GLOBAL_RELATIVE_ALT, lat_e7=place[0], lon_e7=place[1]
-            )
-            for place in map(to_e7, situation.rally.value)
-        )
+        found["rally"] = rally_to_items(situation.rally.value)
     if situation.mission and situation.mission.value.items:
         mission = situation.mission.value
         # ArduPilot looks at the home item but keeps its own home.

@@ -15,6 +15,7 @@ from missions.formats.features import Role, Shape
 from missions.formats.numbers import place_e7
 from missions.geo import to_e7
 from missions.items import Command, CoordinateFrame, MissionItem, waypoint
+from missions.rally import RallyPoint
 from missions.situation import Known, Mission, Situation
 
 if TYPE_CHECKING:
@@ -51,13 +52,20 @@ def situation_of(features: Iterable[Feature], source: str) -> Situation:
     home = _lone(found[Role.HOME])
     fence = _fence(zones, _lone(found[Role.RETURN_POINT]))
     items = _items(found[Role.WAYPOINT], found[Role.ROUTE])
-    rally = tuple(feature.position for feature in found[Role.RALLY_POINT])
+    rally = tuple(map(_rally_point, found[Role.RALLY_POINT]))
     return Situation(
         fence=Known(fence, None, source) if fence != Fence() else None,
         mission=Known(Mission(items, home), None, source) if items else None,
         rally=Known(rally, None, source) if rally else None,
         home=Known(home, None, source) if home else None,
     )
+
+
+def _rally_point(feature: Feature) -> RallyPoint:
+    alt_m = feature.number("altitude_m", 0.0)
+    if not math.isfinite(alt_m):
+        raise feature.error(f"altitude_m {alt_m}; expected metres")
+    return RallyPoint(*feature.position, alt_m)
 
 
 def _lone(features: Sequence[Feature]) -> LatLon | None:

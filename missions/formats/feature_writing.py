@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING
 
 from missions.fence import Fence, PolygonZone, Zone
 from missions.formats.features import Feature, Role, Shape
+from missions.geo import LatLon
 from missions.items import file_frame
 from missions.situation import Mission
 
 if TYPE_CHECKING:
-    from missions.geo import LatLon
     from missions.items import MissionItem
+    from missions.rally import RallyPoint
     from missions.situation import Situation
 
 
@@ -29,7 +30,7 @@ def features_of(situation: Situation) -> tuple[list[Feature], list[Feature]]:
         others.append(_feature(Shape.LINE, (route,), {"role": Role.ROUTE.value}, "route"))
     others += [_item_feature(item, seq) for seq, item in enumerate(mission.items, start=1)]
     rally = situation.rally.value if situation.rally else ()
-    others += [_point_feature(Role.RALLY_POINT, point) for point in rally]
+    others += [_rally_feature(point) for point in rally]
     return zones, others
 
 
@@ -41,6 +42,11 @@ def _feature(
 
 def _point_feature(role: Role, position: LatLon) -> Feature:
     return _feature(Shape.POINT, ((position,),), {"role": role.value}, role.value)
+
+
+def _rally_feature(point: RallyPoint) -> Feature:
+    properties: dict[str, object] = {"role": Role.RALLY_POINT.value, "altitude_m": point.alt_m}
+    return _feature(Shape.POINT, ((LatLon(*point),),), properties, Role.RALLY_POINT.value)
 
 
 def _zone_feature(zone: Zone, name: str) -> Feature:

@@ -13,6 +13,7 @@ from missions.formats.json_node import parse_json
 from missions.formats.numbers import place_e7
 from missions.geo import LatLon
 from missions.items import Command, MissionItem, file_frame
+from missions.rally import RallyPoint
 from missions.situation import Known, Mission, Situation
 
 if TYPE_CHECKING:
@@ -75,7 +76,7 @@ def write(situation: Situation) -> str:
             "circles": [_circle_json(zone) for zone in fence.zones if isinstance(zone, CircleZone)],
             **({"breachReturn": [*_pair(fence.return_point), 0]} if fence.return_point else {}),
         },
-        "rallyPoints": {"version": 2, "points": [[*_pair(point), 0] for point in rally]},
+        "rallyPoints": {"version": 2, "points": [[*_pair(point), point.alt_m] for point in rally]},
     }
     return json.dumps(document, indent=4) + "\n"
 
@@ -85,9 +86,19 @@ def _check_version(node: JsonNode, expected: int) -> None:
         raise node["version"].error(f"version {node['version'].value!r}; expected {expected}")
 
 
-def _rally(node: JsonNode) -> tuple[LatLon, ...]:
+def _rally(node: JsonNode) -> tuple[RallyPoint, ...]:
     _check_version(node, 2)
-    return tuple(point.lat_lon() for point in node["points"].members())
+    return tuple(map(_rally_point, node["points"].members()))
+
+
+def _rally_point(node: JsonNode) -> RallyPoint:
+    position = node.lat_lon()
+    if len(node.value) < 3 or node[2].value is None:
+        return RallyPoint(*position)
+    alt_m = node[2].number()
+    if not math.isfinite(alt_m):
+        raise node[2].error(f"altitude {alt_m}; expected metres")
+    return RallyPoint(*position, alt_m)
 
 
 def _mission(node: JsonNode) -> Mission:

@@ -6,14 +6,14 @@ home; Mission Planner pads it with command 0.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from missions.errors import FenceError, InvalidPositionError, MissionFormatError
 from missions.fence import fence_from_items, fence_to_items
 from missions.formats.numbers import number, place_e7, whole
 from missions.geo import LatLon
-from missions.items import Command, MissionItem, file_frame, waypoint, with_home
+from missions.items import Command, MissionItem, file_frame, with_home
+from missions.rally import rally_from_items, rally_to_items
 from missions.situation import Known, Mission, Situation
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def write(situation: Situation) -> str:
     if fence is not None:
         return format_items(fence_to_items(fence.value))
     assert rally is not None
-    return format_items([_rally_item(point) for point in rally.value])
+    return format_items(rally_to_items(rally.value))
 
 
 def format_items(items: Sequence[MissionItem]) -> str:
@@ -76,10 +76,6 @@ def format_items(items: Sequence[MissionItem]) -> str:
         for seq, item in enumerate(items)
     ]
     return "\n".join([_HEADER, *rows]) + "\n"
-
-
-def _rally_item(point: LatLon) -> MissionItem:
-    return replace(waypoint(point), command=Command.RALLY_POINT)
 
 
 def _item(line: str, where: str) -> MissionItem:
@@ -119,7 +115,7 @@ def _situation(items: list[MissionItem], line_numbers: list[int], source: str) -
             raise MissionFormatError(f"{source}: line {line}: {error}", file=source, line=line) from None
         return Situation(fence=Known(fence, None, source), home=home_known)
     if rest and all(item.command == Command.RALLY_POINT for item in rest):
-        return Situation(rally=Known(tuple(item.position for item in rest), None, source), home=home_known)
+        return Situation(rally=Known(rally_from_items(rest), None, source), home=home_known)
     if len(rest) == len(items):
         raise MissionFormatError(
             f"{source}: line {line_numbers[0]}: command {items[0].command}; a mission's first line is its home (command 16)",

@@ -11,6 +11,7 @@ from strategies import fences, wire_lat_lons
 from missions.fence import CircleZone, Fence, Zone
 from missions.geo import LatLon
 from missions.items import Command, MissionItem
+from missions.rally import RallyPoint
 from missions.situation import Known, Mission, Situation
 
 mission_items = st.builds(
@@ -36,12 +37,17 @@ def missions(draw: st.DrawFn) -> Mission:
     return Mission(tuple(items), draw(homes))
 
 
+rally_points = st.builds(
+    lambda place, alt_m: RallyPoint(*place, alt_m), wire_lat_lons, st.integers(-500, 8000).map(float)
+)
+
+
 @st.composite
 def situations(draw: st.DrawFn) -> Situation:
     """Any of fence, mission and rally points; at least one of them."""
     fence, mission, rally = draw(st.tuples(st.booleans(), st.booleans(), st.booleans()).filter(any))
     made = draw(missions())
-    points = tuple(draw(st.lists(wire_lat_lons, min_size=1, max_size=3)))
+    points = tuple(draw(st.lists(rally_points, min_size=1, max_size=3)))
     return Situation(
         fence=known(draw(fences.filter(lambda fence: fence.zones))) if fence else None,
         mission=known(made) if mission else None,

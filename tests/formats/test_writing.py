@@ -30,6 +30,7 @@ from missions.formats import (
 )
 from missions.geo import LatLon
 from missions.items import MissionItem, waypoint
+from missions.rally import RallyPoint
 from missions.situation import Mission, Situation
 
 INCLUSION = PolygonZone(ZoneKind.INCLUSION, SQUARE)
@@ -38,7 +39,7 @@ MISSION = Mission((replace(waypoint(LatLon(40.0001, -104.9991)), frame=3),), Lat
 ALL = Situation(
     fence=known(Fence((INCLUSION, CIRCLE))),
     mission=known(MISSION),
-    rally=known((LatLon(40.0002, -104.9992),)),
+    rally=known((RallyPoint(40.0002, -104.9992, 30.0),)),
     home=known(MISSION.home),
     parameters={"CRUISE_SPEED": 3.5, "WP_RADIUS": 2.0},
 )

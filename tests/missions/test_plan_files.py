@@ -17,6 +17,7 @@ from missions.fence import CircleZone, Fence, PolygonZone, ZoneKind
 from missions.formats import qgc_plan
 from missions.geo import LatLon
 from missions.items import MissionItem, waypoint
+from missions.rally import RallyPoint
 from missions.situation import Known, Mission, Situation
 
 PLAN: dict[str, Any] = {
@@ -121,7 +122,7 @@ def test_a_plan_as_documented() -> None:
     assert situation.home is not None
     assert situation.home.value == situation.mission.value.home == LatLon(47.3977419, 8.545594)
     assert situation.rally is not None
-    assert situation.rally.value == (LatLon(47.39760401, 8.5509154),)
+    assert situation.rally.value == (RallyPoint(47.39760401, 8.5509154, 50.0),)
     assert situation.fence.source == "f.plan"
 
 
@@ -159,8 +160,8 @@ def test_params_5_and_6_of_commands_without_a_place_may_be_anything_that_fits() 
     assert mission.value.items[1].lat_e7 == 1_205_000_000
 
 
-@given(fences, st.lists(wire_lat_lons, max_size=3).map(tuple))
-def test_fences_and_rally_points_round_trip(fence: Fence, rally: tuple[LatLon, ...]) -> None:
+@given(fences, st.lists(wire_lat_lons.map(lambda place: RallyPoint(*place, 12.0)), max_size=3).map(tuple))
+def test_fences_and_rally_points_round_trip(fence: Fence, rally: tuple[RallyPoint, ...]) -> None:
     text = qgc_plan.write(Situation(fence=Known(fence, None, ""), rally=Known(rally, None, "")))
     again = qgc_plan.read(text, "f")
     if fence.zones:

@@ -17,8 +17,10 @@ from mavlink_bridge.cli.app import app
 from mavlink_bridge.messages import MissionType
 from mavlink_bridge.rover import AUTO_MODE, HOLD_MODE
 from mavlink_bridge.simulator import Simulator, SimulatorConfig
+from missions.formats import read_situation
 from missions.formats.waypoints import format_items
 from missions.items import MissionItem
+from missions.rally import RallyPoint, rally_to_items
 
 MISSION, FENCE = MissionType.MISSION, MissionType.FENCE
 OLD = plain_mission(25, salt=1)
@@ -120,6 +122,18 @@ def test_fences_and_rally_points(rover, tmp_path, fields, kind, name):
         code, document, _ = run(rover, "upload", down, "--only", kind, "--json")
         assert code == 0
         assert document["lists"][0]["pushes"] == 0
+
+
+def test_rally_points_keep_their_altitude(rover, tmp_path):
+    points = (RallyPoint(40.0714, -105.2299, 12.0), RallyPoint(40.0715, -105.2298, -3.0))
+    file = tmp_path / "rally.waypoints"
+    file.write_text(format_items(rally_to_items(points)))
+    assert run(rover, "upload", file)[0] == 0
+    for suffix in (".waypoints", ".plan"):
+        down = tmp_path / f"back{suffix}"
+        assert run(rover, "download", "rally", "-o", down)[0] == 0
+        assert read_situation(down).rally.value == points
+        assert run(rover, "upload", down, "--only", "rally", "--json")[1]["lists"][0]["pushes"] == 0
 
 
 def test_parameters(rover, tmp_path):

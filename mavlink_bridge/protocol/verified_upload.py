@@ -410,7 +410,10 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         )
         if settled:
             self._refusal = pushed
-        if not settled and self._pushes < MOST_PUSHES and self._move(VerifiedUploadEvent.PUSH_AGAIN):
+        # Somebody may have set it going meanwhile: the whole old list is driven on, a mix is put right all the same.
+        drives_old = self._held is Held.OLD and bool(self._is_active) and not self._replace_active
+        may_push = not settled and not drives_old and self._pushes < MOST_PUSHES
+        if may_push and self._move(VerifiedUploadEvent.PUSH_AGAIN):
             self._push_wanted(1 if refused else self._window, now_s)
         elif self._held is Held.OLD:
             self._move(VerifiedUploadEvent.READ_OLD)

@@ -239,6 +239,27 @@ def test_a_finished_or_unstarted_machine_ignores_everything():
     assert len(machine.messages_to_send()) == 1
 
 
+@pytest.mark.parametrize(("heartbeat", "pushes"), [(ARMED_HOLD, 4), (ARMED_AUTO, 1)])
+def test_a_list_that_is_driven_meanwhile_is_not_pushed_again(heartbeat, pushes):
+    # No announcement gets through; after the first push somebody switches to AUTO.
+    vehicle = Vehicle()
+    vehicle.hold(MISSION, plain_mission(12, salt=1))
+    machine = VerifiedUpload(PEER, MISSION, plain_mission(20), is_active=False)
+    twin = Twin(vehicle, [Client(machine, PEER)])
+    deliver = twin._to_vehicle
+
+    def drop_announcements(frame):
+        if isinstance(frame.message, MissionCount):
+            machine.receive(Frame(1, 1, heartbeat), twin.now_s)
+        else:
+            deliver(frame)
+
+    twin._to_vehicle = drop_announcements
+    twin.run()
+    assert (machine.outcome.kind, machine.outcome.held) == (OutcomeKind.UNCHANGED, Held.OLD)
+    assert machine.outcome.pushes == pushes
+
+
 def test_a_failed_restore_says_what_is_there():
     vehicle = Vehicle()
     vehicle.hold(MISSION, plain_mission(12, salt=1))

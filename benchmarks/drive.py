@@ -7,13 +7,16 @@ its items to the simulated rover, drives it in AUTO with the fence enabled, and 
 from __future__ import annotations
 
 import argparse
+import datetime
 import math
+import platform
 import statistics
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
+from importlib.metadata import version
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -96,6 +99,17 @@ class Run:
         return (self.promised_m if self.leads_away_m is None else self.leads_away_m) - self.driven_m
 
 
+HEAD = """# Planned, and driven
+
+`make bench-drive` plans 200 seeded fields for three vehicles, hands each mission to the simulated rover, drives it in AUTO with the fence
+and the vehicle's avoidance on (`FENCE_MARGIN` is the promise less 0.1 m), and measures the true track against the fence. The fields
+(`benchmarks/drive_fields.py`) are yards with buildings, circles, walls with gates and hairpins of 80 to 220 m; the promise is 1, 1.5, 2
+or 3 m, the start faces any way. The rover's drive law ([simulator](simulator.md)) was written apart from the [drive model](drive-model.md)
+that the plans rest on. `--first SEED` gives other fields of these kinds, `--kinds more` other kinds (starts near a fence, targets
+behind the vehicle, short routes, corridors, zigzag walls, mazes, woods of small circles, gates hardly wider than need be).
+"""
+
+
 def main() -> None:
     """Run the benchmark and print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -118,7 +132,7 @@ def main() -> None:
     text = report(runs, time.perf_counter() - begun_s)
     print(text)
     if options.output:
-        options.output.write_text(text + "\n", encoding="utf-8")
+        options.output.write_text(f"{HEAD}\n{_made()}\n\n{text}\n", encoding="utf-8")
 
 
 def runs_of(seed: int, kinds: str = "usual") -> list[Run]:
@@ -196,6 +210,12 @@ def _drive(field: Field, planned: Plan, parameters: dict[str, float]) -> tuple[f
         rover.step(now_s)
     near = distance_m(vehicle.position, planned.targets[-1]) < max(parameters["WP_RADIUS"], 1.5) + 1.0
     return now_s - 1.0, vehicle, rover.route.is_complete and near
+
+
+def _made() -> str:
+    versions = ", ".join(f"{name} {version(name)}" for name in ("numpy", "shapely"))
+    today = datetime.datetime.now(tz=datetime.UTC).date()
+    return f"Made on {today} by `benchmarks/drive.py`, Python {platform.python_version()}, {versions}, {platform.machine()}."
 
 
 def report(runs: list[Run], took_s: float) -> str:

@@ -539,6 +539,27 @@ def test_delays_and_speeds_take_their_time() -> None:
     assert slow.corners[0].inside_cut_m < plain.corners[0].inside_cut_m
 
 
+@pytest.mark.parametrize(
+    ("turn_deg", "speeds", "stops", "bounded"),
+    [
+        (0.0, [None, 1.0], {}, True),
+        (8.0, [None, 1.0], {}, True),
+        (30.0, [None, 1.0], {}, False),
+        (30.0, [1.0, None], {}, False),
+        (30.0, [1.0, 1.0], {}, True),
+        (30.0, None, {}, True),
+        (30.0, [None, 1.0], {1: 1.0}, True),
+    ],
+)
+def test_a_change_of_speed_at_a_corner_is_not_bounded(
+    turn_deg: float, speeds: list[float | None] | None, stops: dict[int, float], bounded: bool
+) -> None:
+    turn_rad = math.radians(turn_deg)
+    points = [(0.0, -50.0), (0.0, 0.0), (50.0 * math.sin(turn_rad), 50.0 * math.cos(turn_rad))]
+    (corner,) = envelope(points, Vehicle(speed_mps=5.0), heading_deg=0.0, speeds=speeds, stops=stops).corners
+    assert corner.bounded is bounded
+
+
 @given(vehicles, routes, st.floats(0.2, 6))
 def test_px4_may_take_the_whole_corner(vehicle: Vehicle, points: np.ndarray, radius_m: float) -> None:
     px4 = replace(vehicle, autopilot=Autopilot.PX4, waypoint_radius_m=radius_m)

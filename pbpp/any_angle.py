@@ -78,6 +78,8 @@ def shortest_path(
     start: Point,
     goal: Point,
     should_stop: Callable[[], bool] | None = None,
+    *,
+    compiled: bool = False,
 ) -> SearchResult:
     """Return the shortest path between two points of free space.
 
@@ -89,13 +91,27 @@ def shortest_path(
         Metres from the scene's origin, in free space or on its boundary.
     should_stop : callable, optional
         Asked now and then; when it returns True the search ends with the bound reached so far.
+    compiled : bool, default False
+        Search with the compiled form, which needs numba and gives the same result; it cannot ask ``should_stop``, so the plain one does
+        where there is one to ask.
 
     Returns
     -------
     SearchResult
         The path with its certificate.
     """
+    if compiled and should_stop is None:
+        return _compiled_search(slabs, start, goal)
     return _Search(slabs, start, goal).run(should_stop)
+
+
+def _compiled_search(slabs: Slabs, start: Point, goal: Point) -> SearchResult:
+    from .compiled_search import search  # noqa: PLC0415 - numba is an extra, and takes a while to load
+
+    blocks = slabs.locate(start)
+    neighbours = [vertex for block in blocks for vertex, _ in slabs.line_neighbours(start, block)]
+    turns, length_m, expanded = search(slabs.flat, start, goal, blocks, slabs.locate(goal), neighbours)
+    return SearchResult(None if turns is None else tuple(turns), length_m, expanded, stopped=False)
 
 
 class _Search:
@@ -270,33 +286,28 @@ class _Search:
     def _follow(self, root: int, cone: Cone) -> None:  # noqa: C901, PLR0912, PLR0915 - the inner loop: calls would double its time
         """Follow a cone through blocks as long as there is one way on; queue the cones where it divides."""
         root_x, root_y = self._root_x[root], self._root_y[root]
-        goal_x, goal_y = self._goal_x, self._goal_y
         block, direction, low, high = cone
-        portals = self._slabs.ways[direction]
+        portals, goal_blocks = self._slabs.ways[direction], self._goal_blocks
         # Looking east the turn around a portal's low end is to the right; looking west it is to the left.
         low_side, high_side = (_RIGHT, _LEFT) if direction == _EAST else (_LEFT, _RIGHT)
-        ways: list[tuple[PortalView, float, float]] = []
         steps = 0
         queue = self._queue
         while True:
-            if block in self._goal_blocks:
-                run = abs(goal_x - root_x)
-                rise = goal_y - root_y
-                if run <= 0.0:
-                    seen = high == inf if rise >= 0.0 else low == -inf
-                else:
-                    seen = low * run - _SLACK_M <= rise <= high * run + _SLACK_M
-                if seen:
-                    self._push_goal(root)
-            ways.clear()
+            if block in goal_blocks and self._sees_goal(root_x, root_y, low, high):
+                self._push_goal(root)
+            others: list[tuple[PortalView, float, float]] | None = None
+            only: PortalView | None = None
+            only_low = only_high = 0.0
             for way in portals[block]:
                 x, portal_low, portal_high, low_end, high_end, _ = way
                 run = x - root_x if direction else root_x - x
                 if run <= 0.0:
                     continue
-                rise_low, rise_high = portal_low - root_y, portal_high - root_y
-                ray_low, ray_high = low * run - _SLACK_M, high * run + _SLACK_M
-                if ray_low > rise_high or ray_high < rise_low:
+                rise_low, ray_high = portal_low - root_y, high * run + _SLACK_M
+                if ray_high < rise_low:
+                    continue
+                rise_high, ray_low = portal_high - root_y, low * run - _SLACK_M
+                if ray_low > rise_high:
                     continue
                 new_low, new_high = low, high
                 if low_end != -1 and rise_low >= ray_low:
@@ -311,18 +322,33 @@ class _Search:
                     slope = rise_high / run
                     if slope < high:
                         new_high = slope
-                if new_low <= new_high:
-                    ways.append((way, new_low, new_high))
-            if len(ways) != 1:
+                if new_low > new_high:
+                    continue
+                if only is None:
+                    only, only_low, only_high = way, new_low, new_high
+                elif others is None:
+                    others = [(way, new_low, new_high)]
+                else:
+                    others.append((way, new_low, new_high))
+            if only is None:
+                return
+            if others is not None:
                 break
-            way, low, high = ways[0]
-            block = way[5]
+            low, high, block = only_low, only_high, only[5]
             steps += 1
             # Looking at the bound now and then keeps a cone from running far ahead of better ones.
-            if steps % 8 == 0 and queue and self._bound(root, way, low, high) > queue[0][0]:
+            if steps % 8 == 0 and queue and self._bound(root, only, low, high) > queue[0][0]:
                 break
-        for way, new_low, new_high in ways:
+        for way, new_low, new_high in [(only, only_low, only_high), *(others or ())]:
             self._push(self._bound(root, way, new_low, new_high), way[5], direction, root, new_low, new_high)
+
+    def _sees_goal(self, root_x: float, root_y: float, low: float, high: float) -> bool:
+        """Return whether the goal, in the block that a cone has come to, lies in the cone."""
+        run = abs(self._goal_x - root_x)
+        rise = self._goal_y - root_y
+        if run <= 0.0:
+            return high == inf if rise >= 0.0 else low == -inf
+        return low * run - _SLACK_M <= rise <= high * run + _SLACK_M
 
     def _bound(self, root: int, way: PortalView, low: float, high: float) -> float:
         """Return the f-value of a cone on a portal: no path by way of both is shorter.

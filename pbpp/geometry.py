@@ -105,33 +105,32 @@ def parse_rings(rings: Sequence[Ring], kind: str) -> list[BaseGeometry]:
     InvalidGeometryError
         If a ring has fewer than three points or a coordinate that is not a finite number.
     """
-    found: list[BaseGeometry] = []
+    found: list[BaseGeometry | None] = [None] * len(rings)
     arrays: list[Floats] = []
     places: list[int] = []
     for index, ring in enumerate(rings):
         if isinstance(ring, Polygon | MultiPolygon):
             if ring.is_empty or not np.isfinite(shapely.get_coordinates(ring)).all():
                 raise InvalidGeometryError(f"{kind} {index} is empty or not finite", (kind, index))
-            found.append(shapely.force_2d(ring))
+            found[index] = shapely.force_2d(ring)
         else:
             arrays.append(_ring_array(ring, kind, index))
             places.append(index)
-            found.append(GeometryCollection())
     if arrays:
         owner = np.repeat(np.arange(len(arrays)), [len(array) for array in arrays])
         points = np.concatenate(arrays)
-        bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
-        if len(bad):
-            index = places[owner[bad[0]]]
+        if not np.isfinite(points).all():
+            index = places[owner[np.flatnonzero(~np.isfinite(points).all(axis=1))[0]]]
             raise InvalidGeometryError(
                 f"{kind} {index} has a coordinate that is not a finite number", (kind, index)
             )
         polygons = np.asarray(shapely.polygons(shapely.linearrings(points, indices=owner)), dtype=object)
         for place, polygon in zip(places, polygons.tolist(), strict=True):
             found[place] = polygon
-    for index in np.flatnonzero(~shapely.is_valid(found)).tolist():
-        found[index] = _repaired(found[index], kind)
-    return found
+    parts: list[BaseGeometry] = np.array(found, dtype=object).tolist()
+    for index in np.flatnonzero(~shapely.is_valid(parts)).tolist():
+        parts[index] = _repaired(parts[index], kind)
+    return parts
 
 
 def polygons_only(geometry: BaseGeometry) -> list[Polygon]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -94,14 +95,17 @@ def length_of(points: Floats) -> float:
 
 def straightened(points: Floats) -> Floats:
     """Return a polyline, (n, 2) array in metres, without repeated points and without those on the straight way between their neighbours."""
-    kept = [points[0]]
-    for point, after in itertools.pairwise(points):
-        before = kept[-1]
-        way, rest = point - before, after - point
-        length_m = np.hypot(*(after - before))
-        aside_m = abs(way[0] * rest[1] - way[1] * rest[0])
-        if not way.any() or (aside_m <= _STRAIGHT_M * length_m and np.dot(way, rest) >= 0.0):
-            continue
-        kept.append(point)
-    kept.append(points[-1])
-    return np.array(kept)
+    # On plain floats: paths are short, and arrays of two cost more than they spare.
+    rows = points.tolist()
+    kept = [0]
+    for index, ((east, north), (next_east, next_north)) in enumerate(itertools.pairwise(rows)):
+        before_east, before_north = rows[kept[-1]]
+        way_east, way_north = east - before_east, north - before_north
+        rest_east, rest_north = next_east - east, next_north - north
+        length_m = math.hypot(next_east - before_east, next_north - before_north)
+        aside_m = abs(way_east * rest_north - way_north * rest_east)
+        onwards = way_east * rest_east + way_north * rest_north >= 0.0
+        if (way_east or way_north) and not (onwards and aside_m <= _STRAIGHT_M * length_m):
+            kept.append(index)
+    kept.append(len(rows) - 1)
+    return points[kept]

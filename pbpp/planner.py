@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from importlib.util import find_spec
 from math import dist, isfinite
 from typing import TYPE_CHECKING
 
@@ -92,11 +93,17 @@ class Planner:
     partition : {"slabs", "blocks"}, optional
         What the block methods search: the paper's blocks if left out, or their merged form, which is much smaller. The exact search
         uses slabs whatever is said here; its answer depends on neither.
+    compiled : bool, default False
+        Whether the exact search runs in its compiled form: the same paths, many times faster once numba has compiled it, which takes some
+        seconds the first time and a good part of one in each later process. It pays for some hundred queries and more. Needs the
+        extra ``fast``. Where a query brings a ``should_stop``, the plain search answers.
 
     Raises
     ------
     InvalidGeometryError
         If a ring or the clearance cannot be used.
+    ImportError
+        If numba is asked for and not there.
     """
 
     def __init__(
@@ -107,11 +114,15 @@ class Planner:
         clearance_m: float = 0.0,
         union: bool = False,
         partition: str | None = None,
+        compiled: bool = False,
     ) -> None:
         if not (isfinite(clearance_m) and clearance_m >= 0.0):
             raise InvalidGeometryError(f"the clearance must be a length of at least 0 m, not {clearance_m!r}")
         if partition not in {None, "slabs", "blocks"}:
             raise ValueError(f'partition must be "slabs", "blocks" or None, not {partition!r}')
+        if compiled and find_spec("numba") is None:
+            raise ImportError('the compiled search needs numba: pip install "pbpp-rover[fast]"')
+        self._compiled = compiled
         scene = parse_scene(inclusions, exclusions, union=union)
         self._setup(scene, float(clearance_m), partition, Field(scene, float(clearance_m)))
 
@@ -167,6 +178,7 @@ class Planner:
 
     def _changed(self, scene: Scene, grown: Geometries) -> Planner:
         changed = Planner.__new__(Planner)
+        changed._compiled = self._compiled  # noqa: SLF001 - one of our own
         field = Field(scene, self._clearance_m, grown=grown)
         changed._setup(  # noqa: SLF001 - one of our own
             scene, self._clearance_m, self._partition, field
@@ -282,7 +294,7 @@ class Planner:
         graph = None if method == "optimal" else field.graph(self._partition or "blocks")
         start, goal = (field.onto(self._scene.to_local(end)) for end in ends)
         if graph is None:
-            found = _optimal(field, start, goal, should_stop)
+            found = _optimal(field, start, goal, should_stop, compiled=self._compiled)
         else:
             found = _over_blocks(graph, start, goal, taut=method == "pbpp-taut", should_stop=should_stop)
         if found is None:
@@ -313,8 +325,10 @@ class _Found:
     sequence: Sequence[int] = ()
 
 
-def _optimal(field: Field, start: Point, goal: Point, should_stop: ShouldStop | None) -> _Found | None:
-    result = shortest_path(field.slabs, start, goal, should_stop)
+def _optimal(
+    field: Field, start: Point, goal: Point, should_stop: ShouldStop | None, *, compiled: bool
+) -> _Found | None:
+    result = shortest_path(field.slabs, start, goal, should_stop, compiled=compiled)
     blocks = len(field.slabs)
     if result.vertices is not None:
         turns = field.slabs.vertices.points[list(result.vertices)].tolist()

@@ -51,6 +51,14 @@ def case_times(case: dict, clearance_m: float = 0.0) -> dict:
         except pbpp.PlanningError:
             continue
         query_s.append(least(lambda query=query: planner.plan(query[:2], query[2:]), 4))
+    compiled = pbpp.Planner([case["inclusion"]], case["exclusions"], clearance_m=clearance_m, compiled=True)
+    compiled_s = []
+    for query in case["queries"]:
+        try:
+            compiled.plan(query[:2], query[2:])
+        except pbpp.PlanningError:
+            continue
+        compiled_s.append(least(lambda query=query: compiled.plan(query[:2], query[2:]), 9))
     return {
         "vertices": int(shapely.get_num_coordinates(planner.free_space)),
         "triangles_ms": 1e3 * triangles_s,
@@ -58,6 +66,8 @@ def case_times(case: dict, clearance_m: float = 0.0) -> dict:
         "query_ms": 1e3 * statistics.median(query_s),
         "build_ratio": build_s / triangles_s,
         "query_ratio": statistics.median(query_s) / triangles_s,
+        "compiled_query_ms": 1e3 * statistics.median(compiled_s),
+        "compiled_query_ratio": statistics.median(compiled_s) / triangles_s,
     }
 
 
@@ -109,6 +119,20 @@ def reuse_ratio(case: dict) -> float:
     return least(lambda: planner.with_exclusion(case["exclusions"][-1]), 5) / scratch
 
 
+def compiled_start_s() -> float:
+    """Return the CPU time of the first compiled query of a new process in seconds, numba's cache being full."""
+    code = (
+        "import time, pbpp\n"
+        "planner = pbpp.Planner([[(0, 0), (1, 0), (1, 1)]], [], compiled=True)\n"
+        "t = time.process_time(); planner.plan((0.5, 0.1), (0.9, 0.5)); print(time.process_time() - t)"
+    )
+    runs = [
+        subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, text=True).stdout
+        for _ in range(5)
+    ]
+    return min(map(float, runs))
+
+
 def blocks_s(case: dict) -> float:
     """Return the time from polygons to the paper's path in seconds."""
     query = case["queries"][0]
@@ -136,6 +160,7 @@ def main() -> None:
         "operator's fence (196 vertices, 0.5 m) from polygons to path, ms": operator,
         "the same over the import of shapely": operator / shapely_ms,
         "adding one obstacle over building anew": reuse_ratio(cases["rand1000"]),
+        "first compiled query of a process, s": compiled_start_s(),
         "paper's path on rand100 from polygons, s": blocks_s(cases["rand100"]),
     }
     print(json.dumps(result, indent=1))

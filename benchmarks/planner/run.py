@@ -16,6 +16,7 @@ import platform
 import statistics
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -25,9 +26,11 @@ HERE = Path(__file__).parent
 DATA = HERE.parents[1] / "tests" / "pbpp" / "data"
 RESULTS = HERE.parent / "results"
 CASES = ("table1_1", "table1_2", "table1_3", "rand10", "rand100", "rand1000")
-OWN = ("pbpp", "pbpp_blocks", "pbpp_taut_blocks")
+OWN = ("pbpp", "pbpp_compiled", "pbpp_blocks", "pbpp_taut_blocks")
 LIMIT_S = 120
-SLOW_S = 1200
+SLOW_S = 3000
+RUNS = 3
+QUICK_S = 15
 FEW_QUERIES = {"ompl": 4, "pathplanning": 8}
 INSIDE_M = 1e-6
 
@@ -64,15 +67,20 @@ def measure(peer: str, name: str) -> dict:
         str(case_file),
         str(FEW_QUERIES.get(peer, 20)),
     ]
-    try:
-        done = subprocess.run(
-            command, capture_output=True, text=True, timeout=SLOW_S if slow else LIMIT_S, check=False
-        )
-    except subprocess.TimeoutExpired as error:
-        return {"failed": f"more than {error.timeout:.0f} s"}
-    if done.returncode:
-        return {"failed": (done.stderr.strip().splitlines() or ["crash"])[-1][:90]}
-    return judge(json.loads(done.stdout.strip().splitlines()[-1]), name)
+    limit_s = SLOW_S if slow and peer == "extremitypathfinder" else LIMIT_S
+    best: dict | None = None
+    for _ in range(RUNS):
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, timeout=limit_s, check=False)
+        except subprocess.TimeoutExpired as error:
+            return {"failed": f"more than {error.timeout:.0f} s"}
+        if done.returncode:
+            return {"failed": (done.stderr.strip().splitlines() or ["crash"])[-1][:90]}
+        row = judge(json.loads(done.stdout.strip().splitlines()[-1]), name)
+        best = row if best is None or row["total_s"] < best["total_s"] else best
+        if row["total_s"] > QUICK_S or peer in FEW_QUERIES:
+            break
+    return best
 
 
 def judge(run: dict, name: str) -> dict:
@@ -106,7 +114,10 @@ def table(results: dict, ratios: dict) -> str:
     lines = [
         "# Planners compared",
         "",
-        f"{results['date']}, {results['machine']}. Made by `benchmarks/planner/run.py`.",
+        (
+            f"{results['date']}, {results['machine']}; load average over 15 minutes {results['load'][0]:.1f} at the start, "
+            f"{results['load'][1]:.1f} at the end. Made by `benchmarks/planner/run.py`."
+        ),
         "",
     ]
     lines += [
@@ -116,8 +127,9 @@ def table(results: dict, ratios: dict) -> str:
         "",
     ]
     lines += [
-        "One process for each planner and case, build then queries one after the other; grids have cells of 1 m (200 m maps) or 2 m;",
-        "OMPL is BIT* with one second a query. An invalid path runs through an obstacle by more than 1e-6 m.",
+        "One process for each planner and case, build then queries one after the other, the best of three where it takes under 15 s; times are",
+        "CPU times. Grids have cells of 1 m (200 m maps) or 2 m; OMPL is BIT* with one second a query. An invalid path runs through an obstacle",
+        "by more than 1e-6 m. pbpp_compiled has loaded its compiled search before it builds.",
         "",
     ]
     for name, rows in results["cases"].items():
@@ -181,7 +193,7 @@ def plot(results: dict, target: Path) -> None:
                 ax.plot(
                     row["build_ms"] + row["query_ms"],
                     100 * (row["ratio_mean"] - 1),
-                    "ov^sDP*X<>"[number],
+                    "ov^sDP*X<>h"[number],
                     label=peer,
                     markersize=8,
                 )
@@ -206,10 +218,12 @@ def main() -> None:
             "pbpp": [
                 f"numpy=={np.__version__}",
                 f"shapely=={shapely.__version__}",
+                f"numba=={version('numba')}",
                 f"GEOS=={shapely.geos_version_string}",
             ],
             **pins,
         },
+        "load": [os.getloadavg()[2]],
         "cases": {},
     }
     if "--ratios" in sys.argv:
@@ -225,6 +239,7 @@ def main() -> None:
             [sys.executable, str(HERE / "ratios.py")], capture_output=True, check=True, text=True
         ).stdout
     )
+    results["load"] = [results["load"][0], os.getloadavg()[2]]
     RESULTS.mkdir(exist_ok=True)
     (RESULTS / "planner.json").write_text(json.dumps({**results, "ratios": ratios}, indent=1) + "\n")
     (RESULTS / "planner.md").write_text(table(results, ratios))

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from shapely.geometry import Polygon
 
+    from pbpp.compiled_search import FlatSlabs
     from pbpp.geometry import Floats, Point
 
 __all__ = ["Slabs"]
@@ -104,6 +105,13 @@ class Slabs:
         """Lowest and highest north of each block."""
         floor_west, floor_east, ceiling_west, ceiling_east = self._sides
         return np.minimum(floor_west, floor_east), np.maximum(ceiling_west, ceiling_east)
+
+    @cached_property
+    def flat(self) -> FlatSlabs:
+        """The same as arrays, for the compiled search."""
+        from pbpp.compiled_search import flatten  # noqa: PLC0415 - numba is an extra
+
+        return flatten(self)
 
     @cached_property
     def centers(self) -> Floats:

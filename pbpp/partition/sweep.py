@@ -134,24 +134,42 @@ class Sweep:
             self._unite(x, vertex, before)
 
     def _bend(self, x: float, vertex: int, before: int, *, floor: bool) -> None:
-        """Go on where a floor or a ceiling bends."""
+        """Go on where a floor or a ceiling bends: two in three vertices do, so its calls are written out."""
         y, end = self._y[vertex], self._end[vertex]
         slot = self._by_floor[before] if floor else self._by_ceiling[vertex]
         west = slot[2]
         self.east[west] = x
+        # As in _new_block.
+        slot[2] = east = len(self.west)
         if floor:
             slot[0] = vertex
             self._by_floor[vertex] = slot
+            other = slot[1]
+            self.floor.append(vertex)
+            self.ceiling.append(other)
+            low, high = y, self._left_y[other] + self._slope[other] * (x - self._left_x[other])
+            low_end, high_end = end, OPEN_END
+            self.west_above[vertex], self.east_above[vertex] = west, east
         else:
             slot[1] = before
             self._by_ceiling[before] = slot
-        slot[2] = east = self._new_block(x, slot[0], slot[1])
-        if floor:
-            self._new_portal((x, y, self._north(slot[1], x)), (end, OPEN_END), west, east)
-            self.west_above[vertex], self.east_above[vertex] = west, east
-        else:
-            self._new_portal((x, self._north(slot[0], x), y), (OPEN_END, end), west, east)
+            other = slot[0]
+            self.floor.append(other)
+            self.ceiling.append(before)
+            low, high = self._left_y[other] + self._slope[other] * (x - self._left_x[other]), y
+            low_end, high_end = OPEN_END, end
             self.west_below[vertex], self.east_below[vertex] = west, east
+        self.west.append(x)
+        self.east.append(x)
+        westwards, eastwards = self.ways
+        eastwards.append([])
+        # As in _new_portal.
+        if high - low > TOLERANCE_M:
+            self.portals.append((x, low, high, west, east))
+            eastwards[west].append((x, low, high, low_end, high_end, east))
+            westwards.append([(x, low, high, low_end, high_end, west)])
+        else:
+            westwards.append([])
 
     def _divide(self, x: float, vertex: int, before: int) -> None:
         """Split a block where an obstacle begins."""
@@ -271,10 +289,12 @@ class Sweep:
 
     def _find(self, x: float, y: float) -> int:
         """Return the place of the lowest open block whose ceiling lies above a point."""
-        low, high = 0, len(self._active)
+        active, left_x, left_y, slope = self._active, self._left_x, self._left_y, self._slope
+        low, high = 0, len(active)
         while low < high:
             middle = (low + high) // 2
-            if self._north(self._active[middle][1], x) > y:
+            edge = active[middle][1]
+            if left_y[edge] + slope[edge] * (x - left_x[edge]) > y:
                 high = middle
             else:
                 low = middle + 1

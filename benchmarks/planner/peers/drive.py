@@ -1,6 +1,6 @@
 """Run one planner on one case in its own process: ``python drive.py PLANNER CASE.json MOST_QUERIES``.
 
-Prints one line of JSON: import, build and query times, the paths, and the peak memory above that of the imports.
+Prints one line of JSON: import, build and query times (of the CPU: the machine may be shared), the paths, and the peak memory above that of the imports.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ def peak_mb() -> float:
 def main(planner: str, case_file: str, most: str) -> None:
     """Run the planner and print what it did."""
     case = json.loads(Path(case_file).read_text())
-    began = time.perf_counter()
+    began = time.process_time()
     module = importlib.import_module(f"peer_{planner}")
-    import_s = time.perf_counter() - began
+    import_s = time.process_time() - began
     idle_mb = peak_mb()
-    began = time.perf_counter()
+    began = time.process_time()
     state = module.build(case)
-    build_s = time.perf_counter() - began
+    build_s = time.process_time() - began
     query_s, paths = [], []
     for query in case["queries"][: int(most)]:
-        began = time.perf_counter()
+        began = time.process_time()
         path = module.query(state, tuple(query[:2]), tuple(query[2:]))
-        query_s.append(time.perf_counter() - began)
+        query_s.append(time.process_time() - began)
         paths.append(None if path is None else [[float(x), float(y)] for x, y in path])
     memory_mb = peak_mb() - idle_mb
     print(

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from mavlink_bridge import messages as m
 from mavlink_bridge.director.drive_watch import DriveWatch
 from mavlink_bridge.director.events import EventName
-from mavlink_bridge.director.mode_switch import AwaitHeartbeat, ModeSwitch, SwitchState
+from mavlink_bridge.director.mode_switch import AwaitHeartbeat, ModeSwitch
 from mavlink_bridge.director.operator_watch import OperatorWatch, mode_name
 from mavlink_bridge.director.orders import TargetSource
 from mavlink_bridge.director.route_maker import RouteMaker
@@ -42,8 +42,6 @@ _STILL_MPS = 0.3
 _STOP_AT_LEAST_S = 0.25
 _STOP_PATIENCE_S = 8.0
 _MOVED_M = 1.0
-_MAY_BE_IN_AUTO = frozenset({State.STARTING, State.DRIVING})
-"""Our AUTO may be on its way, or no heartbeat may have told of it yet."""
 
 
 class Director(RouteMaker):
@@ -68,7 +66,9 @@ class Director(RouteMaker):
         super().__init__(orders, situation, planner)
         self.drive: DriveWatch | None = None
         self._operator = OperatorWatch()
-        self._stopping: ModeSwitch | None = None  # our HOLD, until a heartbeat has shown it
+        self._stopping: ModeSwitch | None = None  # our HOLD, while it is under way
+        self._stopped_s = -math.inf  # when the vehicle took it
+        self._may_be_in_auto = False  # our AUTO may be on its way, or no heartbeat may have told of it yet
         self._taken_over: OutcomeError | None = None
         self._is_first_time = True
         self._speed_mps = 0.0
@@ -204,6 +204,18 @@ class Director(RouteMaker):
         if has_forgotten:
             self._ours = None
             self._waiting_target = None
+        self._watch_while_waiting()
+
+    def _learn(self, now_s: float) -> None:
+        super()._learn(now_s)
+        is_wanted = self._is_first_time and bool(self.orders.request.targets)
+        self._watch_while_waiting(is_wanted=is_wanted)
+
+    def _watch_while_waiting(self, *, is_wanted: bool = False) -> None:
+        """Notice a takeover while a target has to wait: it revokes the target."""
+        has_target = is_wanted or self._waiting_target is not None
+        if has_target and self.orders.drive and not self.orders.once and not self._operator.is_on:
+            self._operator.expect(self.situation.mode, set(), is_armed=bool(self.situation.armed))
 
     @property
     def _item(self) -> int:
@@ -219,6 +231,7 @@ class Director(RouteMaker):
             return
         self._let_loose()
         self._waiting_target = None
+        self._is_first_time = False
         is_withdrawing = self.state is State.WITHDRAWING
         then = "the upload is finished first" if is_withdrawing else "waiting for a new target"
         mode = what.rpartition(" ")[2] if "switched" in what else mode_name(self.situation.mode)
@@ -235,6 +248,7 @@ class Director(RouteMaker):
         self._targets.let_go()
         self._answers.settle(m.MavResult.CANCELLED)
         self._stopping = None
+        self._may_be_in_auto = False
         self.drive = None
         self._target = None
         if self.state not in (State.WITHDRAWING, State.LEARNING):
@@ -256,7 +270,7 @@ class Director(RouteMaker):
     def _may_stop_it(self) -> bool:
         if not self.orders.drive or self._peer is None:
             return False
-        if self.state in _MAY_BE_IN_AUTO:
+        if self.state in (State.STARTING, State.DRIVING):
             return True
         return not self.orders.once and self._may_move
 
@@ -279,7 +293,7 @@ class Director(RouteMaker):
         if target.source is not TargetSource.REPOSITION or not self._operator.is_on or self.orders.once:
             return
         self._operator.take_target(now_s, is_click=True)
-        if self.state in _MAY_BE_IN_AUTO:
+        if self.state in (State.STARTING, State.DRIVING):
             self._cue_target(now_s)
         else:
             self._command_hold(now_s)
@@ -291,6 +305,7 @@ class Director(RouteMaker):
             reason = "a target came; it is gone into in a moment"
             self._voice.tell(now_s, EventName.HOLDING, f"HOLD: {reason}", reason)
             self._command_hold(now_s)
+        self._watch_while_waiting()
 
     def _hold(self, reason: str, now_s: float) -> None:
         self.drive = None
@@ -303,13 +318,11 @@ class Director(RouteMaker):
     def _command_hold(self, now_s: float) -> None:
         """Switch to HOLD, and expect nothing but what was and what will be."""
         assert self._peer is not None
-        # Our own AUTO may be on its way still, and so may a click's GUIDED.
-        self._operator.expect(
-            HOLD_MODE,
-            {self.situation.mode, AUTO_MODE, GUIDED_MODE},
-            is_armed=bool(self.situation.armed),
-        )
-        self._stopping = ModeSwitch(self._peer, HOLD_MODE, insists=True)
+        before = {self.situation.mode}
+        if self._may_be_in_auto:
+            before.add(AUTO_MODE)
+        self._operator.expect(HOLD_MODE, before, is_armed=bool(self.situation.armed))
+        self._stopping = ModeSwitch(self._peer, HOLD_MODE, is_urgent=True, until_seen=self._may_be_in_auto)
         self._stopping.start(now_s)
 
     def _look_after_hold(self, now_s: float) -> None:
@@ -323,17 +336,19 @@ class Director(RouteMaker):
             return
         self._outgoing += stopping.messages_to_send()
         self._stopping = None
+        self._may_be_in_auto = False
+        self._stopped_s = now_s
         self._operator.settle(now_s)
-        if stopping.state is SwitchState.UNANSWERED:
-            self._voice.tell(
-                now_s, EventName.COMMAND_FAILED, "the vehicle does not go to HOLD", "DO_SET_MODE", "no answer"
-            )
+        if not stopping.is_granted:
+            text = "the vehicle does not go to HOLD"
+            self._voice.tell(now_s, EventName.COMMAND_FAILED, text, "DO_SET_MODE", stopping.result_name)
             if self.state is State.HOLDING:
                 self._fail_step(OutcomeError("the vehicle does not go to HOLD; nothing was written"))
 
     def _is_mode_known(self, now_s: float) -> bool:
         # A heartbeat from before our HOLD still tells the mode before it.
-        return self._stopping is None and super()._is_mode_known(now_s)
+        is_news = self._stopping is None and self._heartbeat_s > self._stopped_s
+        return is_news and super()._is_mode_known(now_s)
 
     def _await_standstill(self, now_s: float) -> None:
         """Plan from where the vehicle has come to rest."""
@@ -365,7 +380,13 @@ class Director(RouteMaker):
 
     def _looked(self, _machine: AwaitHeartbeat, now_s: float) -> None:
         is_outdated = self._changes is not None and bool(self._changes.suspects)
-        if is_outdated or self._stopping is not None:
+        if is_outdated or self._stopping is not None or not self._operator.is_ours(self.situation.mode):
+            self._look_once_more(now_s)
+            return
+        if (
+            self.situation.mode != HOLD_MODE
+        ):  # it starts from HOLD: any other mode is then known for somebody else's
+            self._command_hold(now_s)
             self._look_once_more(now_s)
             return
         found = self._recheck(1)
@@ -382,8 +403,9 @@ class Director(RouteMaker):
 
     def _switch_to_auto(self, now_s: float) -> None:
         assert self._peer is not None
+        self._may_be_in_auto = True
         self._operator.expect(AUTO_MODE, {self.situation.mode}, is_armed=bool(self.situation.armed))
-        self._steps.run([(ModeSwitch(self._peer, AUTO_MODE, insists=False), self._in_auto)], now_s)
+        self._steps.run([(ModeSwitch(self._peer, AUTO_MODE), self._in_auto)], now_s)
 
     def _in_auto(self, machine: ModeSwitch, now_s: float) -> None:
         if not machine.is_granted:

@@ -1,8 +1,9 @@
 """Switching the vehicle's mode, and nothing against what it tells meanwhile.
 
-DO_SET_MODE may be lost, and so may its COMMAND_ACK; which mode the vehicle is in its HEARTBEAT tells for certain. HOLD is insisted on: it is
-sent again until a heartbeat shows it. Any other mode is sent again only after a heartbeat that shows the vehicle where it was when we asked,
-and never once it was accepted: what is shown afterwards is somebody else's doing.
+DO_SET_MODE may be lost, and so may its COMMAND_ACK; which mode the vehicle is in its HEARTBEAT tells for certain. HOLD is urgent: it is sent
+again every second. Any other mode is sent again only after a heartbeat that shows the vehicle where it was when we asked. Nothing is sent again
+once it was accepted, for what is shown afterwards is somebody else's doing; only where the answer may be that to a command of ours before, a
+heartbeat has to show it.
 """
 
 from __future__ import annotations
@@ -59,9 +60,8 @@ _ASKING: dict[SwitchState, dict[SwitchEvent, SwitchState]] = {
     SwitchState.REFUSED: {},
     SwitchState.UNANSWERED: {},
 }
-_INSISTING: dict[SwitchState, dict[SwitchEvent, SwitchState]] = {
+_UNTIL_SEEN: dict[SwitchState, dict[SwitchEvent, SwitchState]] = {
     **_ASKING,
-    # The answer may be that to a command of ours before: only a heartbeat counts.
     SwitchState.SENT: {
         SwitchEvent.ACCEPTED: SwitchState.ACCEPTED,
         SwitchEvent.SEEN: SwitchState.SEEN,
@@ -83,15 +83,17 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
         The vehicle and our identity.
     mode : int
         HEARTBEAT.custom_mode.
-    insists : bool
-        Send it again until a heartbeat shows it (HOLD), whatever was answered.
+    is_urgent : bool
+        Send it again every second until it is answered.
+    until_seen : bool
+        Send it again until a heartbeat shows it: the answer may be that to another command.
     """
 
-    def __init__(self, peer: Peer, mode: int, *, insists: bool) -> None:
-        super().__init__(_INSISTING if insists else _ASKING, SwitchState.IDLE)
+    def __init__(self, peer: Peer, mode: int, *, is_urgent: bool = False, until_seen: bool = False) -> None:
+        super().__init__(_UNTIL_SEEN if until_seen else _ASKING, SwitchState.IDLE)
         self._peer = peer
         self._mode = mode
-        self._insists = insists
+        self._is_urgent = is_urgent
         self._sends = 0
         self._sent_s = 0.0
         self._result: MavResult | None = None
@@ -148,7 +150,7 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
 
     @property
     def _may_send_blindly(self) -> bool:
-        return self._insists and self.state is SwitchState.SENT
+        return self._is_urgent and self.state is SwitchState.SENT
 
     def _take_ack(self, result: int) -> None:
         known = {int(one): one for one in MavResult}.get(result)

@@ -20,6 +20,7 @@ _STALE_S = 1.5
 """For so long after a mode change was accepted a heartbeat may still show what was before."""
 
 _ON_ITS_WAY_S = 0.5
+"""What is overheard so soon after a target was typed may have been said before it."""
 
 _CLICK_S = 1.5
 """A ground station's GUIDED within this time of its go-to click is part of the click."""
@@ -49,6 +50,10 @@ class OperatorWatch:
         """Whether anything is watched for."""
         return self._ours is not None
 
+    def is_ours(self, mode: int | None) -> bool:
+        """Tell whether a mode is the one that the vehicle is in by our doing."""
+        return mode == self._ours
+
     def expect(self, mode: int | None, fading: set[int | None], *, is_armed: bool) -> None:
         """Watch for anything but a mode; the fading ones may show until it was seen or `settle` says how long."""
         self._ours = mode
@@ -66,10 +71,11 @@ class OperatorWatch:
         self._was_armed = False
 
     def take_target(self, now_s: float, *, is_click: bool) -> None:
-        """Take notice of a target, a new one or one said again: what was on its way before it does not revoke it."""
-        self._asked_s = now_s
+        """Take notice of a target, a new one or one said again: what was on its way before it was typed does not revoke it."""
         if is_click:
             self._clicked_s = now_s
+        else:
+            self._asked_s = now_s
 
     def take_heartbeat(self, heartbeat: m.Heartbeat, now_s: float) -> str | None:
         """Give what somebody did, as the vehicle's heartbeat tells; None where it is as we left it."""

@@ -86,6 +86,7 @@ TRANSITIONS: dict[State, dict[Cue, State]] = {
         Cue.GIVE_UP: State.FAILED,
     },
     State.WITHDRAWING: {
+        Cue.TAKEN_OVER: State.WITHDRAWING,
         Cue.UPLOAD_VERIFIED: State.LET_GO,
         Cue.TROUBLE: State.LET_GO,
         Cue.GIVE_UP: State.FAILED,

@@ -68,8 +68,8 @@ class Conductor:
             vehicle.handle_timer(self.now_s)
             for message in vehicle.messages_to_send():
                 self.down.push(Frame(vehicle.config.system, vehicle.config.component, message), self.now_s)
-        if not self.is_cut:
-            for frame in self.down.due(self.now_s):
+        for frame in self.down.due(self.now_s):
+            if not self.is_cut:  # what comes meanwhile is lost
                 self.director.receive(frame, self.now_s)
         deadline_s = self.director.deadline_s
         if deadline_s is not None and deadline_s <= self.now_s:

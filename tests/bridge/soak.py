@@ -18,12 +18,13 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from bridge.conducting import Conductor
+from bridge.promises import Promises
 
 from mavlink_bridge import messages as m
-from mavlink_bridge.director import Director, EventName, Orders, State
+from mavlink_bridge.director import Director, Orders, State
 from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.protocol.upload import Upload
-from mavlink_bridge.rover import AUTO_MODE, HOLD_MODE
+from mavlink_bridge.rover import HOLD_MODE
 from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig
 from mavlink_bridge.simulator.faults import Faults
 from missions.fence import CircleZone, Fence, ZoneKind, fence_to_items
@@ -48,9 +49,6 @@ PLACES = (
     LatLon(40.0740000, -105.2286152),  # outside
 )
 OPERATOR_MODES = (0, HOLD_MODE, 11)
-NOTICE_S = 3.0
-"""A mode change may be noticed by a heartbeat a second later, more on a bad link."""
-
 MOST_GROWTH = 1.05
 """How far apart the sizes of memory may be, once it has settled."""
 
@@ -58,26 +56,47 @@ SAMPLE_S = 900.0
 
 
 class Soak:
-    """One long run and its promises."""
+    """One long run and its promises.
 
-    def __init__(self, seed: int) -> None:
+    Parameters
+    ----------
+    seed : int
+        Of everything that happens.
+    pace_s : tuple of float
+        Shortest and longest time between what others do.
+    """
+
+    def __init__(self, seed: int, pace_s: tuple[float, float] = (3.0, 45.0), **orders: bool) -> None:
         self.random = random.Random(seed)
+        self.pace_s = pace_s
         config = SimulatorConfig(
             home=HOME, fence=fence_to_items(YARD), parameters={"FENCE_ENABLE": 1.0, "WP_SPEED": 4.0}
         )
-        orders = Orders(request=Request(clearance_m=2.5), upload=True, drive=True, arm=True, announce=True)
+        given = {"upload": True, "drive": True, "arm": True, "announce": True, **orders}
         self.vehicle = SimulatedVehicle(config)
-        self.run = Conductor(Director(orders), [self.vehicle], Faults())
+        self.run = Conductor(
+            Director(Orders(request=Request(clearance_m=2.5), **given)), [self.vehicle], Faults()
+        )
         self.run.meddle = self._step
+        self.promises = Promises(self.run)
         self.counts: Counter[str] = Counter()
-        self.violations: list[str] = []
         self.sizes_kb: list[float] = []
         self._rival: Upload | None = None
         self._next_s = 10.0
         self._restore_link_s = 0.0
-        self._operator_s = -1e9
-        self._target_since = True
-        self._sent = 0
+        receive = self.run.director.receive
+
+        def listen(frame: m.Frame, now_s: float) -> None:
+            if self._rival is not None:  # the rival's answers come by the same link as the director's
+                self._rival.receive(frame, now_s)
+            receive(frame, now_s)
+
+        self.run.director.receive = listen
+
+    @property
+    def violations(self) -> list[str]:
+        """Promises that were broken."""
+        return self.promises.broken
 
     def go(self, until_s: float, wall_s: float = 1e9) -> None:
         """Run until a time of the stepped clock, or for so many real seconds."""
@@ -92,52 +111,34 @@ class Soak:
 
     def _step(self, run: Conductor) -> None:
         self._serve_rival()
-        self._check_sent(run.sent[self._sent :])
         run.sent.clear()
-        self._sent = 0
         for event in run.events:
             self.counts[event.name] += 1
-            if event.name is EventName.TARGET:
-                self._target_since = True
         run.events.clear()
         run.backups.clear()
         if self._restore_link_s and run.now_s >= self._restore_link_s:
             run.is_cut = False
             self._restore_link_s = 0.0
         if run.now_s >= self._next_s:
-            self._next_s = run.now_s + self.random.uniform(3, 45)
+            self._next_s = run.now_s + self.random.uniform(*self.pace_s)
             self._act()
-
-    def _check_sent(self, messages: list[m.Message]) -> None:
-        vehicle, now_s = self.vehicle, self.run.now_s
-        for message in messages:
-            is_mission = isinstance(message, m.MissionCount) and message.mission_type == m.MissionType.MISSION
-            if (
-                is_mission
-                and vehicle.is_armed
-                and vehicle.mode == AUTO_MODE
-                and now_s - self._operator_s > NOTICE_S
-            ):
-                self.violations.append(f"{now_s:.1f}: upload under a driving vehicle")
-            is_mode = isinstance(message, m.CommandLong) and message.command == Command.DO_SET_MODE
-            if is_mode and not self._target_since and now_s - self._operator_s > NOTICE_S:
-                self.violations.append(f"{now_s:.1f}: mode change after the operator took over")
 
     def _act(self) -> None:
         acts = (
             (self._type, 5), (self._click, 5), (self._change_fence, 3), (self._change_mission, 1),
-            (self._take_over, 3), (self._cut, 2), (self._spoil, 2), (self._reboot, 1),
+            (self._take_over, 3), (self._disarm, 1), (self._cut, 2), (self._spoil, 2), (self._reboot, 1),
         )  # fmt: skip
         act = self.random.choices([act for act, _ in acts], [weight for _, weight in acts])[0]
         self.counts[act.__name__.strip("_")] += 1
         act()
 
     def _type(self) -> None:
+        self.promises.asked()
         self.run.director.take_target(self.random.choice(PLACES), self.run.now_s)
 
     def _click(self) -> None:
         lat_e7, lon_e7 = to_e7(self.random.choice(PLACES))
-        self._target_since = True
+        self.promises.asked()
         self.run.ground_station(
             m.CommandInt(1, 1, 0, Command.DO_REPOSITION, param1=-1.0, param2=1.0, x=lat_e7, y=lon_e7)
         )
@@ -164,9 +165,20 @@ class Soak:
             self._rival = None
 
     def _take_over(self) -> None:
-        self._operator_s = self.run.now_s
-        self._target_since = False
-        self.run.ground_station(m.SetMode(1, 1, self.random.choice(OPERATOR_MODES)))
+        mode = self.random.choice(OPERATOR_MODES)
+        self.promises.taken_over(mode)
+        self._operate(m.SetMode(1, 1, mode))
+
+    def _disarm(self) -> None:
+        self.promises.taken_over(None)
+        self._operate(m.CommandLong(1, 1, Command.COMPONENT_ARM_DISARM, param1=0.0))
+
+    def _operate(self, message: m.Message) -> None:
+        """Let the operator act, heard by the bridge or by remote control."""
+        if self.random.random() < 0.5:
+            self.run.ground_station(message)
+        else:
+            self.vehicle.receive(m.Frame(255, 190, message), self.run.now_s)
 
     def _cut(self) -> None:
         self.run.is_cut = True
@@ -179,20 +191,15 @@ class Soak:
             setattr(self.run, name, type(self.run.up)(faults, self.random.randrange(1000) + side))
 
     def _reboot(self) -> None:
+        self.promises.taken_over(None)
         self.vehicle.reboot(self.run.now_s)
 
 
-def soak(seed: int, hours: float, wall_s: float = 1e9) -> Soak:
-    """Run; the rival's answers come by the same link as the director's."""
-    run = Soak(seed)
-    receive = run.run.director.receive
-
-    def listen(frame: m.Frame, now_s: float) -> None:
-        if run._rival is not None:
-            run._rival.receive(frame, now_s)
-        receive(frame, now_s)
-
-    run.run.director.receive = listen
+def soak(
+    seed: int, hours: float, wall_s: float = 1e9, pace_s: tuple[float, float] = (3.0, 45.0), **orders: bool
+) -> Soak:
+    """Run."""
+    run = Soak(seed, pace_s, **orders)
     run.go(hours * 3600, wall_s)
     return run
 

@@ -50,6 +50,8 @@ class SimulatorConfig:
         When after boot it can be armed (35 s on the measured autopilot).
     streams : bool
         Whether telemetry flows unasked; without it only HEARTBEAT does.
+    list_ids : bool
+        Whether MISSION_CURRENT carries ids of the lists, as PX4's does and ArduPilot's does not.
     """
 
     system: int = 1
@@ -62,3 +64,4 @@ class SimulatorConfig:
     parameters: Mapping[str, float] = field(default_factory=dict)
     ready_after_s: float = 0.0
     streams: bool = True
+    list_ids: bool = False

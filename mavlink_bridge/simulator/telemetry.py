@@ -41,12 +41,16 @@ _BOUNDARY = 3
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """What telemetry is about: the rover, the items in its mission (home included), its time since boot, whether it has a position."""
+    """What telemetry is about: the rover, the items in its mission (home included), its time since boot, whether it has a position.
+
+    The ids are those of mission, fence and rally points, 0 where none are told.
+    """
 
     rover: Rover
     mission_count: int
     boot_s: float
     is_ready: bool
+    list_ids: tuple[int, int, int] = (0, 0, 0)
 
 
 def telemetry(message_id: int, state: State) -> m.Message | None:
@@ -111,7 +115,11 @@ def _mission_current(state: State) -> m.Message:
     else:
         progress = _ACTIVE_MISSION if state.rover.mode == Mode.AUTO else _PAUSED
     return m.MissionCurrent(
-        state.rover.route.seq, max(0, state.mission_count - 1), progress, int(state.rover.mode == Mode.AUTO)
+        state.rover.route.seq,
+        max(0, state.mission_count - 1),
+        progress,
+        int(state.rover.mode == Mode.AUTO),
+        *state.list_ids,
     )
 
 

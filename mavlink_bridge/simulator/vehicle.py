@@ -7,6 +7,7 @@ the measured pace of transfers comes from (20 ms an item when each answer is wai
 from __future__ import annotations
 
 import math
+import zlib
 from typing import TYPE_CHECKING
 
 from mavlink_bridge import messages as m
@@ -333,8 +334,14 @@ class SimulatedVehicle:
     _known_fence: Sequence[MissionItem] | None = None
 
     def _report(self, message_id: int, now_s: float) -> m.Message | None:
-        state = State(self.rover, len(self._mission), now_s - self._boot_s, self._is_ready(now_s))
+        ids = tuple(_id_of(stored.items) for stored in self._lists) if self.config.list_ids else (0, 0, 0)
+        state = State(self.rover, len(self._mission), now_s - self._boot_s, self._is_ready(now_s), ids)
         return telemetry(message_id, state)
+
+
+def _id_of(items: Sequence[MissionItem]) -> int:
+    """Give a list's id: another one for other items, 0 for none."""
+    return zlib.crc32(repr(tuple(items)).encode()) if items else 0
 
 
 def _store(stored: ItemList, items: Sequence[MissionItem]) -> None:

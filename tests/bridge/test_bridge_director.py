@@ -269,6 +269,52 @@ def test_a_new_route_right_after_the_start_does_not_believe_the_heartbeat_before
     assert distance_m(run.vehicles[0].position, NEAR) < 4.0
 
 
+@pytest.mark.parametrize("list_ids", [True, False])
+def test_the_ids_in_mission_current_tell_of_a_fence_that_changed_unheard(list_ids):
+    config = SimulatorConfig(
+        home=HOME, fence=fence_to_items(FENCE), parameters={"FENCE_ENABLE": 1.0}, list_ids=list_ids
+    )
+    run = ready(conductor(vehicle=SimulatedVehicle(config), drive=False))
+    run.run_until(lambda: run.now_s > 5)
+    push = run.down.push
+
+    def deaf(frame: m.Frame, now_s: float) -> None:
+        """Lose every other sign of it."""
+        is_theirs = getattr(frame.message, "target_component", 195) == 190
+        if not is_theirs and not isinstance(frame.message, m.ParamValue | m.Statustext):
+            push(frame, now_s)
+
+    run.down.push = deaf
+    fence = fence_to_items(wall_across_the_route())
+    vehicle = run.vehicles[0]
+    vehicle.receive(m.Frame(255, 190, m.MissionCount(1, 1, len(fence), m.MissionType.FENCE)), run.now_s)
+    for seq, item in enumerate(fence):
+        for _ in range(3):
+            run.step()
+        values = (*item.params, item.lat_e7, item.lon_e7, 0.0, m.MissionType.FENCE)
+        vehicle.receive(
+            m.Frame(255, 190, m.MissionItemInt(1, 1, seq, 3, item.command, 0, 1, *values)), run.now_s
+        )
+    changed_s = run.now_s
+    noticed_s = run.run_until(run.happened(EventName.FENCE_CHANGED), 70) - changed_s
+    assert noticed_s < 2.0 if list_ids else noticed_s > 30.0  # without ids the slow poll finds it
+
+
+def test_the_id_of_a_mission_tells_of_one_that_somebody_changed():
+    config = SimulatorConfig(
+        home=HOME, fence=fence_to_items(FENCE), parameters={"FENCE_ENABLE": 1.0}, list_ids=True
+    )
+    run = ready(conductor(vehicle=SimulatedVehicle(config), drive=False))
+    run.director.take_target(FAR, run.now_s)
+    run.run_until(lambda: run.director.state is State.VERIFIED, 10)
+    run.run_until(lambda: run.now_s > 15)
+    assert not run.happened(EventName.MISSION_CHANGED)()  # our own change is no news
+    theirs = (*run.vehicles[0].mission[1:-1], waypoint(NEAR))  # as many items as before
+    upload(run, m.MissionType.MISSION, with_home(theirs, HOME))
+    run.run_until(run.happened(EventName.MISSION_CHANGED), 3)
+    assert run.director.state is State.LET_GO
+
+
 def test_a_fence_that_leaves_the_route_alone_is_only_reported():
     run = driving(conductor())
     aside = Fence((*FENCE.zones, CircleZone(ZoneKind.EXCLUSION, LatLon(40.0721500, -105.2301500), 3.0)))

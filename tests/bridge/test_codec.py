@@ -9,9 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from pymavlink.generator.mavcrc import x25crc
 
 from mavlink_bridge.codec import DIALECT, Codec
-from mavlink_bridge.messages import MESSAGES, Frame, Heartbeat, Message, Statustext, wire_name
+from mavlink_bridge.messages import MESSAGES, Frame, Heartbeat, Message, MissionCurrent, Statustext, wire_name
 
 CLASSES = {one.msgname: one for one in DIALECT.values()}
 RANGES = {
@@ -99,3 +100,13 @@ def test_types_nobody_speaks_are_left_out() -> None:
     decoded = Codec(1, 1).decode_with_bytes(data)
     assert decoded == [(bytes(data), None)]
     assert struct.unpack("<B", bytes(data)[:1]) == (0xFD,)
+
+
+@pytest.mark.parametrize("kept_bytes", [2, 6, 7, 13, 14, 18])
+def test_the_ids_in_mission_current_which_pymavlink_leaves_out(kept_bytes: int) -> None:
+    payload = struct.pack("<HHBBIII", 3, 7, 2, 1, 0x11223344, 0x55667788, 0x99AABBCC)[:kept_bytes]
+    header = struct.pack("<BBBBBBBHB", 0xFD, len(payload), 0, 0, 0, 1, 1, 42, 0)
+    crc = x25crc(header[1:] + payload + bytes([28]))
+    (frame,) = Codec(255, 190).decode(header + payload + struct.pack("<H", crc.crc))
+    whole = payload.ljust(18, b"\0")
+    assert frame == Frame(1, 1, MissionCurrent(*struct.unpack("<HHBBIII", whole)))

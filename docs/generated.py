@@ -132,11 +132,18 @@ def parameters() -> str:
             read(reading, None)
         if autopilot == "ArduPilot":
             asked = {name: asked.get(name) for name in dict.fromkeys((*PARAMETER_NAMES, *asked))}
+        servos = [name for name in asked if re.fullmatch(r"SERVO\d+_FUNCTION", name)]
         rows += [
-            f"| `{name}` | {autopilot} | {'—' if default is None else f'{default:g}'} |"
+            f"| {_span(servos) if name in servos else f'`{name}`'} | {autopilot} | {'—' if default is None else f'{default:g}'} |"
             for name, default in asked.items()
+            if name not in servos[1:]
         ]
     return "\n".join(["| parameter | autopilot | taken where it is not told |", "|---|---|---|", *rows])
+
+
+def _span(names: list[str]) -> str:
+    """Give the first and the last of a row of names."""
+    return f"`{names[0]}` … `{names[-1]}`"
 
 
 def _planners(case: str) -> str:

@@ -39,3 +39,19 @@ def test_every_relative_link_leads_somewhere(page):
     for target in re.findall(r"\]\(([^)\s]+)\)", text):
         if "://" not in target and not target.startswith("#"):
             assert (page.parent / target.partition("#")[0]).exists(), target
+
+
+def test_ci_runs_what_the_readme_tells_to_make():
+    readme = (DOCS.parent / "README.md").read_text(encoding="utf-8")
+    wanted = re.findall(r"^(make \w+)", readme, re.MULTILINE)
+    assert len(wanted) == 2
+    lines = (DOCS.parent / ".ci" / "run").read_text(encoding="utf-8").splitlines()
+    assert set(wanted) <= set(lines)
+
+
+def test_the_workflow_runs_the_same_and_trusts_no_moving_tag():
+    text = (DOCS.parent / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8")
+    assert "- run: .ci/run\n" in text
+    actions = re.findall(r"uses: (\S+)", text)
+    assert actions
+    assert all(re.fullmatch(r"[\w/-]+@[0-9a-f]{40}", action) for action in actions)

@@ -95,7 +95,8 @@ def bridge(
 
     Type targets as `LAT,LON`; `yes` confirms a plan. Without `--upload` and `--drive` it only reports.
 
-    Examples:
+    For example:
+
     `pbpp bridge --connect udpin:0.0.0.0:14550`
 
     `pbpp bridge --connect /dev/ttyAMA0,921600 --upload --drive --log run.tlog --json`

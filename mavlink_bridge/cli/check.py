@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mavlink_bridge.cli.common import (
+    OUTPUT_PANEL,
     AnyVehicleOption,
     ConnectOption,
     ExitCode,
@@ -23,6 +24,7 @@ from mavlink_bridge.cli.common import (
     warn,
 )
 from mavlink_bridge.cli.upload import SigningKeyOption
+from mavlink_bridge.cli.vehicle_options import PANEL as VEHICLE_PANEL
 from mavlink_bridge.cli.vehicle_options import (
     GpsOption,
     HomeOption,
@@ -65,7 +67,12 @@ def check(
     ] = None,
     home: HomeOption = None,
     vehicle: Annotated[
-        Path | None, typer.Option(metavar="FILE.parm", help="Parameters that log or link do not tell.")
+        Path | None,
+        typer.Option(
+            metavar="FILE.parm",
+            help="Parameters that log or link do not tell.",
+            rich_help_panel=VEHICLE_PANEL,
+        ),
     ] = None,
     clearance: Annotated[
         float | None,
@@ -75,7 +82,11 @@ def check(
     ] = None,
     plot: Annotated[
         list[Path] | None,
-        typer.Option(metavar="FILE", help="Draw it: .png, .svg, .pdf, .html; - in the terminal."),
+        typer.Option(
+            metavar="FILE",
+            help="Draw it: .png, .svg, .pdf, .html; - in the terminal.",
+            rich_help_panel=OUTPUT_PANEL,
+        ),
     ] = None,
     reserve: ReserveOption = 0.0,
     position_error: PositionErrorOption = None,
@@ -93,7 +104,8 @@ def check(
 ) -> None:
     """Check every leg of a mission, whoever wrote it: what it keeps to the fence drawn and driven. Exit 8 if one breaks the promise.
 
-    Examples:
+    For example:
+
     `pbpp check --mission mission.waypoints --fence fence.waypoints --clearance 2`
 
     `pbpp check --mission field.plan --vehicle rover.parm --plot check.png`

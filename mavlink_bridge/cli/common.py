@@ -49,6 +49,9 @@ __all__ = [
     "warn",
 ]
 
+LINK_PANEL, OUTPUT_PANEL = "Link", "Output"
+"""How help groups what many commands have."""
+
 ConnectOption = Annotated[
     str | None,
     typer.Option(
@@ -59,16 +62,37 @@ ConnectOption = Annotated[
 ]
 SystemOption = Annotated[
     int | None,
-    typer.Option("--system", metavar="N", min=1, max=255, help="Which vehicle, when several are heard."),
+    typer.Option(
+        "--system",
+        metavar="N",
+        min=1,
+        max=255,
+        help="Which vehicle, when several are heard.",
+        rich_help_panel=LINK_PANEL,
+    ),
 ]
-SourceSystemOption = Annotated[int, typer.Option(min=1, max=255, help="The system id we speak as.")]
-SourceComponentOption = Annotated[int, typer.Option(min=1, max=255, help="The component id we speak as.")]
-TimeoutOption = Annotated[float, typer.Option(metavar="S", min=0.1, help="How long to wait for the vehicle.")]
+SourceSystemOption = Annotated[
+    int, typer.Option(min=1, max=255, help="The system id we speak as.", rich_help_panel=LINK_PANEL)
+]
+SourceComponentOption = Annotated[
+    int, typer.Option(min=1, max=255, help="The component id we speak as.", rich_help_panel=LINK_PANEL)
+]
+TimeoutOption = Annotated[
+    float,
+    typer.Option(metavar="S", min=0.1, help="How long to wait for the vehicle.", rich_help_panel=LINK_PANEL),
+]
 AnyVehicleOption = Annotated[
-    bool, typer.Option("--any-vehicle", help="Take vehicles that are neither rover nor boat too.")
+    bool,
+    typer.Option(
+        "--any-vehicle", help="Take vehicles that are neither rover nor boat too.", rich_help_panel=LINK_PANEL
+    ),
 ]
-JsonOption = Annotated[bool, typer.Option("--json", help="One JSON document on stdout.")]
-QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no report.")]
+JsonOption = Annotated[
+    bool, typer.Option("--json", help="One JSON document on stdout.", rich_help_panel=OUTPUT_PANEL)
+]
+QuietOption = Annotated[
+    bool, typer.Option("--quiet", "-q", help="No progress and no report.", rich_help_panel=OUTPUT_PANEL)
+]
 
 
 ConfigOption = Annotated[
@@ -79,12 +103,19 @@ ConfigOption = Annotated[
         is_eager=True,
         callback=take_options,
         help="Options from a file; those given here count more. `pbpp config` tells of yours.",
+        rich_help_panel=OUTPUT_PANEL,
     ),
 ]
 
 
 VerboseOption = Annotated[
-    bool, typer.Option("--verbose", "-v", help="Tell more: details of errors, progress without a terminal.")
+    bool,
+    typer.Option(
+        "--verbose",
+        "-v",
+        help="Tell more: details of errors, progress without a terminal.",
+        rich_help_panel=OUTPUT_PANEL,
+    ),
 ]
 
 _FOR_EVERY_COMMAND: Mapping[str, tuple[Any, object]] = {

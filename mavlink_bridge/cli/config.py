@@ -44,7 +44,8 @@ def config(
 
     The command line counts most, then `--config FILE`, then your own file, then the defaults in `--help`.
 
-    Examples:
+    For example:
+
     `pbpp config`
 
     `pbpp config --config bridge.toml --json`

@@ -38,7 +38,8 @@ def convert(
 ) -> None:
     """Convert a file with a fence, a mission, rally points or parameters; the suffixes choose the formats.
 
-    Examples:
+    For example:
+
     `pbpp convert field.kml field.plan`
 
     `pbpp convert field.plan fence.waypoints --only fence`

@@ -55,7 +55,8 @@ def doctor(
 
     Nothing is opened and nothing is sent. Exit 8 if something is wrong.
 
-    Examples:
+    For example:
+
     `pbpp doctor`
 
     `pbpp doctor --signing-key rover.key --json`

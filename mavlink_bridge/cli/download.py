@@ -54,7 +54,8 @@ def download(
 ) -> None:
     """Download a mission, fence, rally points or all parameters; nothing is written to the vehicle.
 
-    Examples:
+    For example:
+
     `pbpp download fence --connect udpin:0.0.0.0:14550 -o field.waypoints`
 
     `pbpp download parameters --connect /dev/ttyACM0 -o rover.parm`

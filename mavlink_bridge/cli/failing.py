@@ -47,12 +47,14 @@ _EXIT_CODES: tuple[tuple[type[Exception], ExitCode], ...] = (
 )
 
 _ADVICE: Mapping[type[Exception], str] = {
-    mission_errors.InvalidPositionError: "positions are LAT,LON in decimal degrees, such as 40.0713,-105.2299",
+    mission_errors.InvalidPositionError: "latitude comes first: LAT,LON in decimal degrees, such as 40.0713,-105.2299",
     mission_errors.FenceMissingError: "upload a fence to the vehicle, or give a file that holds one",
     mission_errors.FenceError: "mend the fence where it was drawn, and save or upload it again",
+    mission_errors.MissionFormatError: "mend the file there, or save it anew with the program it comes from",
     mission_errors.VehicleError: "correct the parameter on the vehicle or in the file",
     mission_errors.StartBlockedError: "drive it to free ground by hand, or ask for less with --clearance",
     mission_errors.TargetBlockedError: "choose another target, or let --snap M move it to free ground",
+    mission_errors.MissionTooLongError: "give fewer targets, or drive in parts; --vehicle FILE tells of more storage (BRD_SD_MISSION)",
     mission_errors.NoRouteError: "ask for less with --clearance; --clearance max looks for the widest way",
     mission_errors.PlanCheckError: "nothing was written; please report this with the command and its input files",
     bridge_errors.IdentityTakenError: "speak as somebody else: --source-component",

@@ -47,7 +47,8 @@ def log(
 
     Drives of a mission (AUTO) are graded: least clearance, deviation and time against what the drive model foresees.
 
-    Examples:
+    For example:
+
     `pbpp log flight.tlog --plot flight.png`
 
     `pbpp log *.tlog --json`

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mavlink_bridge.cli.common import (
+    OUTPUT_PANEL,
     AnyVehicleOption,
     ConnectOption,
     JsonOption,
@@ -24,6 +25,7 @@ from mavlink_bridge.cli.common import (
     warn,
 )
 from mavlink_bridge.cli.upload import SigningKeyOption
+from mavlink_bridge.cli.vehicle_options import PANEL as VEHICLE_PANEL
 from mavlink_bridge.cli.vehicle_options import (
     EscapeOption,
     GpsOption,
@@ -47,6 +49,7 @@ _METHODS = ("optimal", "pbpp-taut", "pbpp")
 _ORDERS = ("given", "best")
 _ENDS = ("hold", "loiter", "rtl")
 _OWN = "own"
+_TOURS = "Several targets, and missions to repair"
 
 
 def plan(
@@ -76,7 +79,12 @@ def plan(
     ] = "auto",
     home: HomeOption = None,
     vehicle: Annotated[
-        Path | None, typer.Option(metavar="FILE.parm", help="Parameters that the source does not tell.")
+        Path | None,
+        typer.Option(
+            metavar="FILE.parm",
+            help="Parameters that the source does not tell.",
+            rich_help_panel=VEHICLE_PANEL,
+        ),
     ] = None,
     snap: Annotated[
         float,
@@ -90,20 +98,33 @@ def plan(
     gps: GpsOption = "0,0",
     escape: EscapeOption = False,
     order: Annotated[
-        str, typer.Option(metavar="|".join(_ORDERS), help="best: the targets in the shortest order.")
+        str,
+        typer.Option(
+            metavar="|".join(_ORDERS), help="best: the targets in the shortest order.", rich_help_panel=_TOURS
+        ),
     ] = "given",
     come_back: Annotated[
-        bool, typer.Option("--return", help="Come home after the last target (home not known: to the start).")
+        bool,
+        typer.Option(
+            "--return",
+            help="Come home after the last target (home not known: to the start).",
+            rich_help_panel=_TOURS,
+        ),
     ] = False,
     end: Annotated[
         str,
-        typer.Option(metavar="|".join(_ENDS), help="At the end; rtl only where its straight line is free."),
+        typer.Option(
+            metavar="|".join(_ENDS),
+            help="At the end; rtl only where its straight line is free.",
+            rich_help_panel=_TOURS,
+        ),
     ] = "hold",
     via_mission: Annotated[
         str | None,
         typer.Option(
             metavar="FILE|own",
             help="Repair this mission: replace the legs that break the clearance; own: the one in the SOURCE.",
+            rich_help_panel=_TOURS,
         ),
     ] = None,
     method: Annotated[str, typer.Option(metavar="|".join(_METHODS), help="How to search.")] = "optimal",
@@ -114,13 +135,21 @@ def plan(
             "--output",
             metavar="FILE",
             help="Write the mission: .waypoints, .plan, .geojson, .kml, .gpx.",
+            rich_help_panel=OUTPUT_PANEL,
         ),
     ] = None,
     plot: Annotated[
         list[Path] | None,
-        typer.Option(metavar="FILE", help="Draw the plan: .png, .svg, .pdf, .html; - in the terminal."),
+        typer.Option(
+            metavar="FILE",
+            help="Draw the plan: .png, .svg, .pdf, .html; - in the terminal.",
+            rich_help_panel=OUTPUT_PANEL,
+        ),
     ] = None,
-    blocks: Annotated[bool, typer.Option("--blocks", help="Draw the blocks of the free space too.")] = False,
+    blocks: Annotated[
+        bool,
+        typer.Option("--blocks", help="Draw the blocks of the free space too.", rich_help_panel=OUTPUT_PANEL),
+    ] = False,
     upload: Annotated[bool, typer.Option("--upload", help="Upload to the vehicle and verify.")] = False,
     drive: Annotated[bool, typer.Option("--drive", help="Then switch to AUTO; arms nothing.")] = False,
     system: SystemOption = None,
@@ -134,7 +163,8 @@ def plan(
 ) -> None:
     """Plan a mission around the fences of a SOURCE: `--fence FILE`, `--log FILE.tlog` or `--connect CONNECTION`.
 
-    Examples:
+    For example:
+
     `pbpp plan --log field.tlog -o mission.waypoints --plot mission.png`
 
     `pbpp plan --fence field.plan --start 40.0713,-105.2299 --target 40.0726,-105.2290 -o mission.plan`

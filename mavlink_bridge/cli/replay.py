@@ -71,7 +71,8 @@ def replay(
 
     A log that `pbpp bridge --log` recorded is replayed with its journal: the same decisions come again. Over other logs the director only listens.
 
-    Examples:
+    For example:
+
     `pbpp replay sitl_logs/guided-maze.tlog`
 
     `pbpp replay field.tlog --record; pbpp replay field.tlog --expect field.events.jsonl`

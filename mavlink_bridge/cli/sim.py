@@ -51,7 +51,8 @@ def sim(
     It answers MAVLink 2 as ArduPilot Rover does: missions, fences, rally points, parameters, modes, arming; it drives AUTO and GUIDED.
     Prints the connection string to open as soon as it listens.
 
-    Examples:
+    For example:
+
     `pbpp sim --fence field.plan --home 40.0713,-105.2299`
 
     `pbpp sim --listen udpout:127.0.0.1:14550 --loss 0.1 --latency 0.2`

@@ -116,7 +116,8 @@ def upload(
 ) -> None:
     """Upload FILE to the vehicle: back up the old list, send the new one, read it back and compare.
 
-    Examples:
+    For example:
+
     `pbpp upload mission.waypoints --connect udpin:0.0.0.0:14550`
 
     `pbpp upload field.plan --connect /dev/ttyACM0 --only fence`

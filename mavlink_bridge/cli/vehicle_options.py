@@ -14,15 +14,25 @@ if TYPE_CHECKING:
     from missions.request import Request
     from missions.situation import Situation
 
+PANEL = "Vehicle"
+
 SpeedOption = Annotated[
-    float | None, typer.Option(metavar="M/S", help="Drive at this speed. Default: the vehicle's own.")
+    float | None,
+    typer.Option(
+        metavar="M/S", help="Drive at this speed. Default: the vehicle's own.", rich_help_panel=PANEL
+    ),
 ]
 ReserveOption = Annotated[
-    float, typer.Option(metavar="M", help="Kept on top of the clearance, for wind and slip.")
+    float,
+    typer.Option(metavar="M", help="Kept on top of the clearance, for wind and slip.", rich_help_panel=PANEL),
 ]
 PositionErrorOption = Annotated[
     float | None,
-    typer.Option(metavar="M", help="Of the vehicle's position, kept on top too. Default: from its fix."),
+    typer.Option(
+        metavar="M",
+        help="Of the vehicle's position, kept on top too. Default: from its fix.",
+        rich_help_panel=PANEL,
+    ),
 ]
 HomeOption = Annotated[
     str | None,
@@ -32,13 +42,24 @@ HomeOption = Annotated[
     ),
 ]
 EscapeOption = Annotated[
-    bool, typer.Option("--escape", help="Let a vehicle that stands on forbidden ground drive out.")
+    bool,
+    typer.Option(
+        "--escape", help="Let a vehicle that stands on forbidden ground drive out.", rich_help_panel=PANEL
+    ),
 ]
-LengthOption = Annotated[float, typer.Option(metavar="M", help="The vehicle's length, tools included.")]
-WidthOption = Annotated[float, typer.Option(metavar="M", help="The vehicle's width, tools included.")]
+LengthOption = Annotated[
+    float, typer.Option(metavar="M", help="The vehicle's length, tools included.", rich_help_panel=PANEL)
+]
+WidthOption = Annotated[
+    float, typer.Option(metavar="M", help="The vehicle's width, tools included.", rich_help_panel=PANEL)
+]
 GpsOption = Annotated[
     str,
-    typer.Option(metavar="FORWARD,RIGHT", help="The GPS antenna from the middle of the vehicle, metres."),
+    typer.Option(
+        metavar="FORWARD,RIGHT",
+        help="The GPS antenna from the middle of the vehicle, metres.",
+        rich_help_panel=PANEL,
+    ),
 ]
 
 

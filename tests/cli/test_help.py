@@ -52,7 +52,7 @@ def test_help_of_a_command_shows_examples(name):
     result = CliRunner().invoke(app, [name, "--help"])
     assert result.exit_code == 0
     if name != "demo":
-        assert "Examples" in result.stdout
+        assert "For example:" in result.stdout
         assert f"pbpp {name}" in result.stdout
     assert all(parameter.help for parameter in load(name).params)
 

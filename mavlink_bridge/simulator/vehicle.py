@@ -334,8 +334,16 @@ class SimulatedVehicle:
     _known_fence: Sequence[MissionItem] | None = None
 
     def _report(self, message_id: int, now_s: float) -> m.Message | None:
-        ids = tuple(_id_of(stored.items) for stored in self._lists) if self.config.list_ids else (0, 0, 0)
-        state = State(self.rover, len(self._mission), now_s - self._boot_s, self._is_ready(now_s), ids)
+        mission_id, fence_id, rally_id = (
+            _id_of(stored.items) if self.config.list_ids else 0 for stored in self._lists
+        )
+        state = State(
+            self.rover,
+            len(self._mission),
+            now_s - self._boot_s,
+            self._is_ready(now_s),
+            (mission_id, fence_id, rally_id),
+        )
         return telemetry(message_id, state)
 
 

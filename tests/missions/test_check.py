@@ -373,6 +373,7 @@ def test_the_points_of_a_path_are_found_by_items_also_where_they_are_driven_to_t
     assert planned.seqs == (0, 1, 3, 4, 1, 3, 4)
     assert [planned.path_index(seq) for seq in (1, 3, 4)] == [1, 2, 3]
     assert [planned.path_index(seq, 4) for seq in (1, 3, 4)] == [4, 5, 6]
-    assert (planned.path_index(2), planned.path_index(2, 4)) == (2, 5)  # the delay belongs to the place after it
+    # The delay belongs to the place after it.
+    assert (planned.path_index(2), planned.path_index(2, 4)) == (2, 5)
     assert planned.path_index(3, 6) == 2  # set back by somebody
     assert planned.path_index(9) == 6

@@ -27,7 +27,9 @@ def read_text(path: Path) -> str:
         data = _unzipped(path) if path.suffix.lower() == ".kmz" else path.read_bytes()
     except OSError as error:
         raise MissionFormatError(
-            f"{path} cannot be read: {error.strerror}", file=str(path), advice="look at the path and its spelling"
+            f"{path} cannot be read: {error.strerror}",
+            file=str(path),
+            advice="look at the path and its spelling",
         ) from None
     is_utf16 = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))  # Notepad's "Unicode"
     try:

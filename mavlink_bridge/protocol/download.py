@@ -31,6 +31,8 @@ _STALE_PATIENCE_S = 30.0
 _OUT_OF_ORDER = (MissionResult.ERROR, MissionResult.INVALID_SEQUENCE)
 _OVERTAKEN_BY = 3
 _FLOAT_FORM_AFTER_S = 6.0
+_DOUBT_S = 8.0
+"""So long the exact form is asked for before a list in the old form is believed: it may only have been lost."""
 _LEAST_OVERDUE_S = 0.15
 _MOST_OVERDUE_S = 2.0
 
@@ -120,6 +122,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         self._may_use_floats = float_form
         self._float_form = False
         self._coarse_seqs: set[int] = set()
+        self._believed_at_s: float | None = None  # when a whole list in the old form will be
         self._heard_s = 0.0
         self._counting_since_s = 0.0
         self._fetching_since_s = 0.0
@@ -149,7 +152,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
     @property
     def bound_s(self) -> float:
         """Longest time from the start to the end, whatever the link does (it grows when the count is known)."""
-        return 40.0 + self._rival_patience_s + 0.5 * self._most_count
+        return 50.0 + self._rival_patience_s + 0.5 * self._most_count
 
     @property
     def deadline_s(self) -> float | None:
@@ -157,7 +160,8 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         if self.is_done or self.state is DownloadState.IDLE:
             return None
         if self.state is DownloadState.FETCHING:
-            return min(self._overdue_at_s(), self._heard_s + PATIENCE_S, self._limit_s)
+            due_s = min(self._overdue_at_s(), self._heard_s + PATIENCE_S, self._limit_s)
+            return due_s if self._believed_at_s is None else min(due_s, self._believed_at_s)
         return min(self._act_at_s, self._limit_s)
 
     def start(self, now_s: float) -> None:
@@ -187,7 +191,10 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         if now_s >= self._limit_s or (not is_waiting and now_s >= self._heard_s + PATIENCE_S):
             self._give_up()
         elif self.state is DownloadState.FETCHING:
-            self._repeat_overdue(now_s)
+            if self._believed_at_s is not None and now_s >= self._believed_at_s:
+                self._finish()
+            else:
+                self._repeat_overdue(now_s)
         elif now_s >= self._act_at_s:
             if is_waiting and not self._rival_may_go_on(now_s):
                 self._move(DownloadEvent.RIVAL_STAYS)
@@ -237,6 +244,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         self._items.clear()
         self._in_flight.clear()
         self._coarse_seqs.clear()
+        self._believed_at_s = None
         self._next = 0
 
     def _take_item(self, message: messages.MissionItemInt | messages.MissionItem, now_s: float) -> None:
@@ -260,19 +268,35 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
             self._coarse_seqs.add(message.seq)
         self._window = min(self._window + 1.0, self._most_in_flight)
         if len(self._items) == self._count:
-            self._move(DownloadEvent.ALL_ITEMS)
-            self._thank()
+            if self._coarse_seqs:
+                self._doubt(now_s)
+            else:
+                self._finish()
             return
         self._repeat_overtaken(now_s)
         self._fill_window(now_s)
 
+    def _finish(self) -> None:
+        self._move(DownloadEvent.ALL_ITEMS)
+        self._thank()
+
+    def _doubt(self, now_s: float) -> None:
+        """Ask for the exact form once more, of everything."""
+        self._believed_at_s = now_s + _DOUBT_S
+        self._float_form = False
+        for seq in sorted(self._coarse_seqs)[: int(self._window)]:
+            self._request(seq, now_s, is_repeat=True)
+
     def _forget_coarse(self, now_s: float) -> None:
         """Use the exact form from now on: the vehicle knows it."""
         self._may_use_floats = self._float_form = False
-        coarse, self._coarse_seqs = sorted(self._coarse_seqs), set()
-        for seq in coarse:
-            del self._items[seq]
-            self._request(seq, now_s, is_repeat=True)
+        self._believed_at_s = None
+        if self._coarse_seqs:
+            for seq in self._coarse_seqs:
+                del self._items[seq]
+            self._coarse_seqs.clear()
+            self._next = 0
+            self._fill_window(now_s)
 
     def _take_ack(self, result_number: int, now_s: float) -> None:
         result = mission_result(result_number)
@@ -317,7 +341,8 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
 
     def _fill_window(self, now_s: float) -> None:
         while self._next < self._count and len(self._in_flight) < int(self._window):
-            self._request(self._next, now_s, is_repeat=False)
+            if self._next not in self._items and self._next not in self._in_flight:
+                self._request(self._next, now_s, is_repeat=False)
             self._next += 1
 
     def _request(self, seq: int, now_s: float, *, is_repeat: bool) -> None:

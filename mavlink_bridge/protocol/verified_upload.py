@@ -32,6 +32,7 @@ ROVER_AUTO_MODE = 10
 MOST_PUSHES = 4
 MOST_RESTORES = 3
 _HEARTBEAT_PATIENCE_S = 10.0
+_FRESH_S = 3.0  # a heartbeat comes every second
 _MOST_TEXTS = 12
 
 
@@ -150,6 +151,7 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         self._wanted = tuple(items)
         self._limits = limits or Limits()
         self._is_active = is_active
+        self._active_known_s = 0.0
         self._replace_active = replace_active
         self._window = window
         self._rival_patience_s = rival_patience_s
@@ -234,7 +236,7 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
     def bound_s(self) -> float:
         """Longest time from the start to the end, whatever the link does; the wait for the backup is left out."""
         longest = max(len(self._wanted), len(self._old or ()))
-        read_s = 40.0 + self._rival_patience_s + 0.5 * longest
+        read_s = 50.0 + self._rival_patience_s + 0.5 * longest
         push_s = 60.0 + self._rival_patience_s + 1.5 * longest
         return _HEARTBEAT_PATIENCE_S + read_s + (MOST_PUSHES + MOST_RESTORES) * (push_s + 2 * read_s)
 
@@ -254,6 +256,7 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
             return
         self._problem = self._limits.problem(self._wanted, self._mission_type)
         self._held = Held.OLD  # whatever it is: nothing was written yet
+        self._active_known_s = now_s
         if self._problem:
             self._move(VerifiedUploadEvent.TOO_LARGE)
         elif self._move(VerifiedUploadEvent.START):
@@ -271,6 +274,7 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
             return
         if isinstance(frame.message, Heartbeat):
             self._is_active = _is_armed_in_auto(frame.message)
+            self._active_known_s = now_s
             self._check_vehicle(now_s)
         elif isinstance(frame.message, Statustext):
             if self._pushes and len(self._texts) < _MOST_TEXTS and frame.message.text not in self._texts:
@@ -326,7 +330,8 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         self._advance(now_s)
 
     def _check_vehicle(self, now_s: float) -> None:
-        if self.state is not VerifiedUploadState.CHECKING_VEHICLE or self._is_active is None:
+        is_known = self._is_active is not None and now_s <= self._active_known_s + _FRESH_S
+        if self.state is not VerifiedUploadState.CHECKING_VEHICLE or not is_known:
             return
         if self._is_active and not self._replace_active:
             self._move(VerifiedUploadEvent.NOT_CLEAR)

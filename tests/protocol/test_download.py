@@ -218,10 +218,26 @@ def test_an_old_vehicle_is_read_by_the_old_messages():
     script.hear(count(2))
     sent = script.pass_time(9.0)
     assert MissionRequest(1, 1, 0, 0) in sent
-    script.hear(float_item(0), float_item(1))
+    sent = script.hear(float_item(0), float_item(1))
+    assert sent == [MissionRequestInt(1, 1, 0, 0), MissionRequestInt(1, 1, 1, 0)]
+    sent = script.pass_time(8.1)
     outcome = script.machine.outcome
     assert outcome.is_complete
     assert outcome.is_coarse
+    assert not any(isinstance(message, MissionRequest) for message in sent)
+
+
+def test_a_whole_list_of_coarse_items_is_given_up_for_an_exact_one():
+    script = read()
+    script.hear(count(2))
+    script.pass_time(9.0)
+    script.hear(float_item(0), float_item(1))
+    script.pass_time(5.0)
+    script.hear(item(1), item(0))
+    outcome = script.machine.outcome
+    assert outcome.is_complete
+    assert not outcome.is_coarse
+    assert [entry.lat_e7 for entry in outcome.items] == [entry.lat_e7 for entry in plain_mission(2)]
 
 
 def test_an_exact_item_puts_an_end_to_coarse_ones():

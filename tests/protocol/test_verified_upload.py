@@ -52,7 +52,7 @@ def test_nothing_is_written_before_the_backup_is_stored():
     assert not any(isinstance(message, MissionCount) for message in script.sent + script.pass_time(100.0))
     script.machine.backup_stored(script.now_s)
     assert script.machine.pending_backup is None
-    assert script.machine.messages_to_send() == [MissionCount(1, 1, 3, 0)]
+    assert script.hear(ARMED_HOLD) == [MissionCount(1, 1, 3, 0)]
 
 
 @pytest.mark.parametrize(
@@ -91,6 +91,14 @@ def test_without_a_heartbeat_nothing_is_written():
 def test_a_heartbeat_is_waited_for():
     script = at_backup()
     script.machine.backup_stored(script.now_s)
+    assert script.hear(ARMED_HOLD, after_s=0.7) == [MissionCount(1, 1, 3, 0)]
+
+
+def test_an_old_heartbeat_is_not_believed():
+    script = at_backup(is_active=False)
+    script.pass_time(3.1)
+    script.machine.backup_stored(script.now_s)
+    assert script.machine.messages_to_send() == []
     assert script.hear(ARMED_HOLD, after_s=0.7) == [MissionCount(1, 1, 3, 0)]
 
 
@@ -239,8 +247,8 @@ def test_a_finished_or_unstarted_machine_ignores_everything():
     assert len(machine.messages_to_send()) == 1
 
 
-@pytest.mark.parametrize(("heartbeat", "pushes"), [(ARMED_HOLD, 4), (ARMED_AUTO, 1)])
-def test_a_list_that_is_driven_meanwhile_is_not_pushed_again(heartbeat, pushes):
+@pytest.mark.parametrize(("is_running", "pushes"), [(False, 4), (True, 1)])
+def test_a_list_that_is_driven_meanwhile_is_not_pushed_again(is_running, pushes):
     # No announcement gets through; after the first push somebody switches to AUTO.
     vehicle = Vehicle()
     vehicle.hold(MISSION, plain_mission(12, salt=1))
@@ -250,7 +258,7 @@ def test_a_list_that_is_driven_meanwhile_is_not_pushed_again(heartbeat, pushes):
 
     def drop_announcements(frame):
         if isinstance(frame.message, MissionCount):
-            machine.receive(Frame(1, 1, heartbeat), twin.now_s)
+            vehicle.is_running = is_running
         else:
             deliver(frame)
 

@@ -14,6 +14,7 @@ from itertools import count
 
 from mavlink_bridge.messages import (
     Frame,
+    Heartbeat,
     Message,
     MissionCount,
     MissionItem,
@@ -30,6 +31,7 @@ from missions.items import MissionItem as Item
 
 HOME = LatLon(40.071374, -105.229930)
 TICK_S = 0.02
+HEARTBEAT_EVERY_S = 1.0
 PEER = Peer(1, 1, 245, 190)
 RIVAL = Peer(1, 1, 255, 190)
 WRITES = (MissionCount, MissionItem, MissionItemInt)
@@ -151,6 +153,15 @@ class Twin:
             self._at(client.begins_s, self._begin, client)
         for reboot_s in self._reboots:
             self._at(reboot_s, self.vehicle.server.reboot)
+
+        self._at(HEARTBEAT_EVERY_S / 2, self._beat)
+
+    def _beat(self):
+        self._at(self.now_s + HEARTBEAT_EVERY_S, self._beat)
+        if not self.vehicle.is_off(self.now_s):
+            mode = (129, 10) if self.vehicle.is_running else (1, 4)
+            heartbeat = Heartbeat(10, 3, base_mode=mode[0], custom_mode=mode[1])
+            self._carry(("down",), self._to_clients, Frame(1, 1, heartbeat))
 
     def _step(self, limit_s):
         wake = min(

@@ -37,6 +37,12 @@ if TYPE_CHECKING:
 SLOW_MPS = 1.0
 """The slowest that a stretch is driven, and the narrowest band."""
 
+SLOW_ALL_THE_WAY_MPS = (2.0, 1.0)
+"""Where stretches do not do: the whole route at such a speed, so that nothing changes at corners."""
+
+LATER_MEASUREMENTS = 500
+"""For each kind of route that is tried after the first ones."""
+
 _OTHER_WAYS = 5
 _DEPARTURES_TRIED = 8
 _DEPARTURE_SLACK_M = 0.05
@@ -123,8 +129,7 @@ class RouteSearch:
         StartBlockedError, TargetBlockedError, NoRouteError
             No route; with the fences or the corner to blame.
         """
-        most = self.measurements or MOST_MEASUREMENTS
-        fitting = Fitting(self.ground, self.vehicle, self.heading_deg, self.should_stop, most)
+        fitting = self._fitting(MOST_MEASUREMENTS)
         fast_m, slow_m = self._bands_m()
         refused: list[tuple[Drawing, Measured]] = []
         found: list[tuple[float, DrivenRoute]] = []
@@ -134,10 +139,15 @@ class RouteSearch:
             if found and route is routes[0][0] and len(routes) > 1 and not self._is_shorter(routes):
                 break
         if not found and _starts_badly(*refused[-1]):
-            for route in self._departing_routes(slow_m):
-                self._fit(fitting, route, found, refused)
+            fitting = self._fitting(LATER_MEASUREMENTS)
+            for departing in self._departing_routes(slow_m):
+                self._fit(fitting, departing, found, refused)
                 if found or self._is_stopped():
                     break
+        for speed_mps in SLOW_ALL_THE_WAY_MPS:
+            if not found and speed_mps < self.vehicle.speed_mps and not self._is_stopped():
+                self._fit(self._fitting(LATER_MEASUREMENTS), routes[-1][0], found, refused, speed_mps)
+        fitting = self._fitting(LATER_MEASUREMENTS)
         blocked: list[Polygon] = []
         while not found and len(blocked) < _OTHER_WAYS and not self._is_stopped():
             drawing, measured = refused[-1]
@@ -151,6 +161,10 @@ class RouteSearch:
             drawing, measured = min(refused, key=lambda one: sum(one[1].missing_m))
             raise refusal(self.ground, self.required_m, self.reserve_m, drawing, measured)
         return min(found, key=lambda one: one[0])[1]
+
+    def _fitting(self, measurements: int) -> Fitting:
+        most = min(measurements, self.measurements or measurements)
+        return Fitting(self.ground, self.vehicle, self.heading_deg, self.should_stop, most)
 
     def _bands_m(self) -> tuple[float, float]:
         fast_m = corner_forecast(0.0, self.vehicle).outside_overshoot_m
@@ -198,8 +212,11 @@ class RouteSearch:
         route: Route,
         found: list[tuple[float, DrivenRoute]],
         refused: list[tuple[Drawing, Measured]],
+        speed_mps: float | None = None,
     ) -> None:
-        drawing, measured = fitting.fit(self._drawing(route))
+        drawing, measured = fitting.fit(
+            tuple(replace(point, speed_mps=speed_mps) for point in self._drawing(route))
+        )
         if not measured.is_enough:
             refused.append((drawing, measured))
             return

@@ -133,9 +133,13 @@ def test_a_corner_that_refuses_is_named() -> None:
     situation = facing(
         situation_of(box(IN, -60, -60, 60, 60), *walls, WP_SPEED=5.0, WP_RADIUS=3.0), -40, -4, 90.0
     )
-    with pytest.raises(NoRouteError, match=r"no route keeps 2\.40 m while driving") as caught:
-        plan(situation, Request(targets=(place(-40, 4),), clearance_m=2.4))
-    assert caught.value.details["clearance_m"] == 2.4
+    with pytest.raises(NoRouteError, match=r"no route keeps 2\.62 m while driving") as caught:
+        plan(situation, Request(targets=(place(-40, 4),), clearance_m=2.62))
+    assert caught.value.details["clearance_m"] == 2.62
+    details = caught.value.details
+    assert details["kept_m"] < 2.62
+    assert details["fences"]
+    assert Point(Chart(HOME).points([LatLon(*details["corner"])])[0]).distance(Point(57, 0)) < 15.0
 
 
 @settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))

@@ -129,13 +129,14 @@ class _Search:
         self._root_g = [0.0]
         self._root_before = [-1]
         self._root_turn = [-1]
-        self._best: dict[int, float] = {}  # 2 * vertex + side: the least length known up to this turn
+        # At 2 * vertex + side the least length known up to this turn; at the end, for the start, which no turn reaches, none.
+        self._best = [inf] * (2 * len(self._fans) + 1)
         self._queue: list[Node] = []
         self._ties = 0
 
     def run(self, should_stop: Callable[[], bool] | None) -> SearchResult:
         """Search until the goal is taken from the queue, the queue is empty or the caller stops."""
-        queue = self._queue
+        queue, best, root_g, root_turn = self._queue, self._best, self._root_g, self._root_turn
         self._begin()
         expanded = 0
         while queue:
@@ -147,7 +148,7 @@ class _Search:
             expanded += 1
             if block == _GOAL:
                 return SearchResult(self._trace(root), f_m, expanded, stopped=False)
-            if self._root_g[root] > self._best.get(self._root_turn[root], inf):
+            if root_g[root] > best[root_turn[root]]:
                 continue  # the corner has been reached on a shorter way since
             if block == _TURN:
                 for cone in self._turn_cones(root):
@@ -205,7 +206,7 @@ class _Search:
         g_m = self._root_g[root] + sqrt(east * east + north * north)
         turn = 2 * vertex + side
         best = self._best
-        if g_m >= best.get(turn, inf) or g_m > best.get(turn ^ 1, inf) + _SLACK_M:
+        if g_m >= best[turn] or g_m > best[turn ^ 1] + _SLACK_M:
             return
         best[turn] = g_m
         number = len(self._root_x)
@@ -215,7 +216,9 @@ class _Search:
         self._root_before.append(root)
         self._root_turn.append(turn)
         east, north = self._goal_x - x, self._goal_y - y
-        self._push(g_m + sqrt(east * east + north * north), _TURN, 0, number, 0.0, 0.0)
+        self._ties += 1
+        f_m = g_m + sqrt(east * east + north * north)
+        heappush(self._queue, (f_m, self._ties, _TURN, 0, number, 0.0, 0.0))
 
     def _turn_cones(self, root: int) -> list[Cone]:
         """Return the cones between the way a path came to a corner and the boundary it turns towards.

@@ -7,8 +7,6 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 if TYPE_CHECKING:
     from .field import Field
     from .geometry import Floats
@@ -90,7 +88,7 @@ class PlannedPath:
 
 def length_of(points: Floats) -> float:
     """Return the length of a polyline, (n, 2) array, in the unit of its coordinates."""
-    return float(np.sqrt((np.diff(points, axis=0) ** 2).sum(axis=1)).sum())
+    return math.fsum(itertools.starmap(math.dist, itertools.pairwise(points.tolist())))
 
 
 def straightened(points: Floats) -> Floats:

@@ -132,7 +132,7 @@ def repair_mission(
                 left_out = len(long.items) - len(checked.mission.items)
                 changes = (
                     *changes,
-                    f"{left_out} items of the routes were left out so that the vehicle can hold it ({most + 1})",
+                    f"{left_out} item{'s' * (left_out != 1)} of the routes left out so that the vehicle can hold it ({most + 1})",
                 )
             return Repair(checked.mission, checked, changes)
         try:

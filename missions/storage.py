@@ -1,8 +1,8 @@
 """Missions longer than the vehicle holds: what a route has put in itself is left out again, as far as its clearance allows.
 
-Waypoints that hardly bend the line go first, then changes of speed: a quick stretch between two slow ones is driven slowly too. Each
-step is checked as any mission is, its driven band included; what breaks then is put back. Places, commands and speeds that were
-asked for are never touched.
+Waypoints that hardly bend the line go first; then two corners one after the other become one, where their outer lines meet; then
+changes of speed: a quick stretch between two slow ones is driven slowly too. Each step is checked as any mission is, its driven band
+included; what breaks then is put back. Places, commands and speeds that were asked for are never touched.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ from typing import TYPE_CHECKING
 
 from missions.check import check_mission
 from missions.errors import MissionTooLongError
-from missions.geo import bearing_deg, distance_m
+from missions.geo import distance_m, to_e7
 from missions.items import Command
-from missions.situation import Mission
+from missions.shorter_lines import deviation_m, length_m, meeting_place, runs, without
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Sequence
+    from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
     from missions.check import CheckedLeg, MissionCheck
     from missions.items import MissionItem
     from missions.request import Request
-    from missions.situation import Situation
+    from missions.situation import Mission, Situation
 
 _JUMPS = (Command.DO_JUMP, 601)
 _WORSE_M = 0.01
@@ -69,8 +69,10 @@ def shortened(
     """
     search = _Search(mission, frozenset(own), situation, request, most, may_slow, should_stop)
     search.leave_out(search.waypoints)
+    search.leave_out(search.corners)
     search.leave_out(search.quick_stretches)
-    search.leave_out(search.waypoints)  # some stood between changes of speed
+    for again in (search.waypoints, search.corners):  # some stood between changes of speed
+        search.leave_out(again)
     if search.count > most:
         raise MissionTooLongError(
             f"the mission needs {search.count + 1} items with home, and the vehicle holds {most + 1}: {len(mission.items) - search.count} of "
@@ -82,8 +84,16 @@ def shortened(
     return search.check
 
 
-_Group = tuple[int, ...]
-"""Seqs of items that are left out together."""
+@dataclass(frozen=True, slots=True)
+class _Step:
+    """Seqs of items that are left out together; where ``put`` is given, it stands in the place of the last of them."""
+
+    seqs: tuple[int, ...]
+    put: MissionItem | None = None
+
+    @property
+    def out(self) -> tuple[int, ...]:
+        return self.seqs if self.put is None else self.seqs[:-1]
 
 
 @dataclass
@@ -100,47 +110,78 @@ class _Search:
 
     def __post_init__(self) -> None:
         self.out: frozenset[int] = frozenset()
+        self.put: dict[int, MissionItem] = {}
         self.check = check_mission(self.mission, self.situation, self.request)
         self._tolerated = {
             (leg.leg.first_item, leg.leg.last_item): leg.driven_clearance_m for leg in self.check.broken
         }
         near = {seq for key in self._tolerated for seq in range(key[0], key[1] + 2)}
-        self._kept: set[_Group] = {(seq,) for seq in near}  # what must not be left out
+        self._near = near
+        self._kept: set[tuple[int, ...]] = {(seq,) for seq in near}  # what must not be left out
 
     @property
     def count(self) -> int:
         """How many items there are now."""
         return len(self.mission.items) - len(self.out)
 
-    def leave_out(self, candidates: Callable[[], list[_Group]]) -> None:
-        """Leave out the best candidates, as many as are needed, until it fits or there are no more."""
+    def leave_out(self, candidates: Callable[[], list[_Step]]) -> None:
+        """Take the best candidates, as many as are needed, until it fits or there are no more."""
         while self.count > self.most and not (self.should_stop and self.should_stop()):
-            groups = self._needed(candidates())
-            if not groups:
+            steps = self._needed(candidates())
+            if not steps:
                 return
-            while groups:
-                out = self.out.union(*groups)
-                mission, seqs = without(self.mission, out)
+            while steps:
+                out = self.out.union(*(step.out for step in steps))
+                put = {**self.put, **{step.seqs[-1]: step.put for step in steps if step.put is not None}}
+                mission, seqs = without(self._with(put), out)
                 check = check_mission(mission, self.situation, self.request)
                 worse = [leg for leg in check.broken if self._is_worse(leg, seqs)]
                 if not worse and not check.troubles:
-                    self.out, self.check = out, check
+                    self.out, self.put, self.check = out, put, check
                     break
-                guilty = self._guilty(groups, worse, seqs) or set(groups)
-                self._kept |= guilty
-                groups = [group for group in groups if group not in guilty]
+                guilty = self._guilty(steps, worse, seqs) or set(steps)
+                self._kept |= {step.seqs for step in guilty}
+                steps = [step for step in steps if step not in guilty]
 
-    def waypoints(self) -> list[_Group]:
+    def _with(self, put: Mapping[int, MissionItem]) -> Mission:
+        items = (put.get(seq, item) for seq, item in enumerate(self.mission.items, 1))
+        return replace(self.mission, items=tuple(items))
+
+    def waypoints(self) -> list[_Step]:
         """Give waypoints that may be left out, those first whose leaving moves the line the least."""
-        rest = self._rest()
         found = []
-        for before, seq, after in zip(rest, rest[1:], rest[2:], strict=False):
-            items = [self.mission.items[one - 1] for one in (before, seq, after)]
+        for before, seq, after in runs(self._rest(), 3):
+            items = [self._item(one) for one in (before, seq, after)]
             if self._may_go(seq, Command.NAV_WAYPOINT) and all(item.is_placed for item in items):
-                found.append((_deviation_m(*items), (seq,)))
-        return [group for _, group in sorted(found)]
+                found.append((deviation_m(*items), seq))
+        return [_Step((seq,)) for _, seq in sorted(found)]
 
-    def quick_stretches(self) -> list[_Group]:
+    def corners(self) -> list[_Step]:
+        """Give pairs of corners that may become one, those first that lengthen the way the least."""
+        found = []
+        for before, first, last, after in runs(self._rest(), 4):
+            a, b, c, d = (self._item(one) for one in (before, first, last, after))
+            if not (a.is_placed and d.is_placed) or not all(self._is_corner(one) for one in (first, last)):
+                continue
+            meeting = meeting_place(a.position, b.position, c.position, d.position)
+            if meeting is not None:
+                lat_e7, lon_e7 = to_e7(meeting)
+                there_m = distance_m(b.position, meeting) + distance_m(meeting, c.position)
+                put = replace(c, lat_e7=lat_e7, lon_e7=lon_e7)
+                found.append((there_m - distance_m(b.position, c.position), first, last, put))
+        return [_Step((first, last), put) for _, first, last, put in sorted(found, key=lambda one: one[:3])]
+
+    def _is_corner(self, seq: int) -> bool:
+        """Tell whether it may be moved: only the second of two is left where it may not be left out by itself."""
+        item = self.mission.items[seq - 1]
+        return (
+            seq in self.own
+            and item.command == Command.NAV_WAYPOINT
+            and not item.params[0] > 0
+            and seq not in self._near
+        )
+
+    def quick_stretches(self) -> list[_Step]:
         """Give changes to a higher speed, with the change back where that has nothing left to do; those first that save the least time."""
         goals = {int(item.params[0]) for item in self.mission.items if item.command in _JUMPS}
         found = []
@@ -156,10 +197,13 @@ class _Search:
                 and all(self._may_go(one) for one in (seq, last))
                 and all((self.may_slow or one in self.own) and one not in goals for one in between)
             ):
-                group = (seq, last) if next_mps == before_mps else (seq,)
-                found.append((_length_m([self.mission.items[one - 1] for one in between]), group))
+                seqs = (seq, last) if next_mps == before_mps else (seq,)
+                found.append((length_m([self._item(one) for one in between]), seqs))
             before_mps = mps
-        return [group for _, group in sorted(found)]
+        return [_Step(seqs) for _, seqs in sorted(found)]
+
+    def _item(self, seq: int) -> MissionItem:
+        return self.put.get(seq, self.mission.items[seq - 1])
 
     def _rest(self) -> list[int]:
         return [seq for seq in range(1, len(self.mission.items) + 1) if seq not in self.out]
@@ -179,22 +223,22 @@ class _Search:
             and not (command == Command.NAV_WAYPOINT and item.params[0] > 0)
         )
 
-    def _needed(self, groups: Sequence[_Group]) -> list[_Group]:
+    def _needed(self, steps: Sequence[_Step]) -> list[_Step]:
         """Give so many of the better half as are needed, no two of them beside one another."""
-        taken: list[_Group] = []
+        taken: list[_Step] = []
         blocked: set[int] = set()
-        rest = self._rest()
-        place = {seq: number for number, seq in enumerate(rest)}
+        place = {seq: number for number, seq in enumerate(self._rest())}
         missing = self.count - self.most
-        for group in groups[: (len(groups) + 1) // 2]:
+        steps = [step for step in steps if step.seqs not in self._kept]
+        for step in steps[: (len(steps) + 1) // 2]:
             if missing <= 0:
                 break
-            around = range(place[group[0]] - 1, place[group[-1]] + 2)
-            if group in self._kept or not blocked.isdisjoint(around):
+            around = range(place[step.seqs[0]] - 1, place[step.seqs[-1]] + 2)
+            if not blocked.isdisjoint(around):
                 continue
             blocked.update(around)
-            taken.append(group)
-            missing -= len(group)
+            taken.append(step)
+            missing -= len(step.out)
         return taken
 
     def _is_worse(self, leg: CheckedLeg, seqs: Sequence[int]) -> bool:
@@ -202,49 +246,16 @@ class _Search:
         key = (_seq(seqs, leg.leg.first_item), _seq(seqs, leg.leg.last_item))
         return leg.driven_clearance_m < self._tolerated.get(key, math.inf) - _WORSE_M
 
-    def _guilty(
-        self, groups: Iterable[_Group], worse: Iterable[CheckedLeg], seqs: Sequence[int]
-    ) -> set[_Group]:
-        """Give the groups that lie on the legs that broke, or on those beside them."""
+    def _guilty(self, steps: Iterable[_Step], worse: Iterable[CheckedLeg], seqs: Sequence[int]) -> set[_Step]:
+        """Give the steps that lie on the legs that broke, or on those beside them."""
         guilty = set()
         for leg in worse:
             first, last = sorted((leg.leg.first_item, leg.leg.last_item))
             begin, end = _seq(seqs, max(0, first - 2)), _seq(seqs, min(len(seqs), last + 2))
-            guilty |= {group for group in groups if any(begin <= seq <= end for seq in group)}
+            guilty |= {step for step in steps if any(begin <= seq <= end for seq in step.seqs)}
         return guilty
-
-
-def without(mission: Mission, out: Collection[int]) -> tuple[Mission, tuple[int, ...]]:
-    """Give a mission without some of its items, its jumps numbered anew, and the seqs that its items had.
-
-    A jump to an item that is left out leads to the next one that is there.
-    """
-    seqs = tuple(seq for seq in range(1, len(mission.items) + 1) if seq not in out)
-    number = {seq: new for new, seq in enumerate(seqs, 1)}
-    items = []
-    for seq in seqs:
-        item = mission.items[seq - 1]
-        if item.command == Command.DO_JUMP and 1 <= item.params[0] <= len(mission.items):
-            goal = next(one for one in range(int(item.params[0]), len(mission.items) + 1) if one in number)
-            item = replace(item, params=(float(number[goal]), *item.params[1:]))
-        items.append(item)
-    return Mission(tuple(items), mission.home), seqs
 
 
 def _seq(seqs: Sequence[int], number: int) -> int:
     """Give the seq that an item had; 0 is the start."""
     return seqs[number - 1] if number else 0
-
-
-def _deviation_m(before: MissionItem, item: MissionItem, after: MissionItem) -> float:
-    """Give how far an item is from the line between its neighbours, or from the nearer of them."""
-    along_deg = bearing_deg(before.position, after.position)
-    turn_rad = math.radians(bearing_deg(before.position, item.position) - along_deg)
-    leg_m = distance_m(before.position, item.position)
-    beyond_m = distance_m(item.position, after.position)
-    return min(leg_m, beyond_m) if math.cos(turn_rad) <= 0 else abs(leg_m * math.sin(turn_rad))
-
-
-def _length_m(items: Iterable[MissionItem]) -> float:
-    places = [item.position for item in items if item.is_placed]
-    return sum(distance_m(a, b) for a, b in pairwise(places))

@@ -199,7 +199,8 @@ def with_room(
     own = _own_items(planned, request) if is_fitted else ()
     mission = Mission(planned.items, planned.home)
     checked = shortened(mission, own, situation, wanted, most=most, may_slow=True, should_stop=should_stop)
-    said = f"{len(planned.items) - len(checked.mission.items)} items of the route were left out so that the vehicle can hold it ({most + 1})"
+    left_out = len(planned.items) - len(checked.mission.items)
+    said = f"{left_out} item{'s' * (left_out != 1)} of the route left out so that the vehicle can hold it ({most + 1})"
     return replace(
         plan_of(checked, situation, method=planned.method),
         targets=planned.targets,

@@ -25,7 +25,7 @@ from mavlink_bridge.cli.common import (
     print_json,
     warn,
 )
-from mavlink_bridge.cli.plan import request_from_options
+from mavlink_bridge.cli.plan_request import request_from_options
 from mavlink_bridge.cli.upload import RequiredConnectOption, SigningKeyOption
 from mavlink_bridge.errors import IdentityTakenError, LinkError, UsageError
 

@@ -271,7 +271,7 @@ def _live_situation(address: Address, *, quiet: bool) -> tuple[Situation, list[s
 def _draw(checked: MissionCheck, situation: Situation, plots: list[Path]) -> None:
     if not plots:
         return
-    from mavlink_bridge.cli.plan import draw  # noqa: PLC0415 - quick help
+    from mavlink_bridge.cli.plan_results import draw  # noqa: PLC0415 - quick help
     from missions.check import plan_of  # noqa: PLC0415
 
     broken = len(checked.broken)

@@ -46,7 +46,7 @@ def demo(
 ) -> None:
     """Show the whole loop: simulated rover, fence, target, plan, upload, verify, drive, picture, report."""
     from mavlink_bridge.cli.live import LiveResult, conduct  # noqa: PLC0415 - quick help
-    from mavlink_bridge.cli.plan import write_outputs  # noqa: PLC0415
+    from mavlink_bridge.cli.plan_results import write_outputs  # noqa: PLC0415
     from mavlink_bridge.director import Orders  # noqa: PLC0415
     from mavlink_bridge.link import open_link  # noqa: PLC0415
     from mavlink_bridge.tlog import TlogWriter  # noqa: PLC0415

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -24,6 +22,8 @@ from mavlink_bridge.cli.common import (
     print_json,
     warn,
 )
+from mavlink_bridge.cli.plan_request import ENDS, METHODS, ORDERS, request_from_options, with_tour
+from mavlink_bridge.cli.plan_results import plan_document, report_plan, write_outputs
 from mavlink_bridge.cli.upload import SigningKeyOption
 from mavlink_bridge.cli.vehicle_options import PANEL as VEHICLE_PANEL
 from mavlink_bridge.cli.vehicle_options import (
@@ -45,10 +45,6 @@ if TYPE_CHECKING:
     from missions.request import Request
     from missions.situation import Situation
 
-_METHODS = ("optimal", "pbpp-taut", "pbpp")
-_ORDERS = ("given", "best")
-_ENDS = ("hold", "loiter", "rtl")
-_OWN = "own"
 _TOURS = "Several targets, and missions to repair"
 
 
@@ -100,7 +96,7 @@ def plan(
     order: Annotated[
         str,
         typer.Option(
-            metavar="|".join(_ORDERS), help="best: the targets in the shortest order.", rich_help_panel=_TOURS
+            metavar="|".join(ORDERS), help="best: the targets in the shortest order.", rich_help_panel=_TOURS
         ),
     ] = "given",
     come_back: Annotated[
@@ -114,7 +110,7 @@ def plan(
     end: Annotated[
         str,
         typer.Option(
-            metavar="|".join(_ENDS),
+            metavar="|".join(ENDS),
             help="At the end; rtl only where its straight line is free.",
             rich_help_panel=_TOURS,
         ),
@@ -127,7 +123,7 @@ def plan(
             rich_help_panel=_TOURS,
         ),
     ] = None,
-    method: Annotated[str, typer.Option(metavar="|".join(_METHODS), help="How to search.")] = "optimal",
+    method: Annotated[str, typer.Option(metavar="|".join(METHODS), help="How to search.")] = "optimal",
     output: Annotated[
         list[Path] | None,
         typer.Option(
@@ -181,7 +177,7 @@ def plan(
         size=(length, width, gps),
         escape=escape,
     )
-    request = _with_tour(request, order, end, via_mission, comes_back=come_back)
+    request = with_tour(request, order, end, via_mission, comes_back=come_back)
     _check_options(fence, log, connect, upload=upload or drive, outputs=outputs, plots=plots)
     if home is not None and connect is not None:
         raise UsageError("--home goes with --fence and --log: a live vehicle tells its own home")
@@ -228,7 +224,7 @@ def plan(
     if json_output:
         print_json(document)
     elif not quiet:
-        _report(planned, written, verified=verified)
+        report_plan(planned, written, verified=verified)
 
 
 def timed_plan(situation: Situation, request: Request) -> tuple[Plan, float]:
@@ -247,143 +243,6 @@ def with_parameter_file(situation: Situation, vehicle: Path | None) -> Situation
     from missions.formats import read_parameters  # noqa: PLC0415 - quick help
 
     return replace(situation, parameters={**read_parameters(vehicle), **situation.parameters})
-
-
-def write_outputs(
-    planned: Plan, situation: Situation, outputs: list[Path], plots: list[Path], *, blocks: bool = False
-) -> list[Path]:
-    """Write the mission and draw the plan; give the files."""
-    from missions.formats import write_mission  # noqa: PLC0415 - quick help
-    from missions.situation import Known, Mission  # noqa: PLC0415
-
-    mission = Mission(planned.items, planned.home or planned.start)
-    to_write = replace(
-        situation, mission=Known(mission, None, "pbpp plan"), fence=Known(planned.fence, None, "pbpp plan")
-    )
-    for path in outputs:
-        write_mission(to_write, path)
-    return [*outputs, *draw(planned, plots, blocks=blocks)]
-
-
-def draw(planned: Plan, plots: list[Path], *, title: str | None = None, blocks: bool = False) -> list[Path]:
-    """Draw the plan to files, and to the terminal where ``-`` is among them; give the files."""
-    if not plots:
-        return []
-    from missions.picture import TERMINAL, draw_plan, sketch_plan  # noqa: PLC0415 - quick help
-
-    for path in plots:
-        if str(path) == TERMINAL:
-            columns = min(80, shutil.get_terminal_size().columns)
-            typer.echo(sketch_plan(planned, columns=columns, encoding=sys.stdout.encoding), nl=False)
-        else:
-            draw_plan(planned, path, title=title, blocks=blocks)
-    return [path for path in plots if str(path) != TERMINAL]
-
-
-def plan_document(planned: Plan) -> dict[str, object]:
-    """Give what the JSON document tells of a plan."""
-    from missions.fence import CircleZone, PolygonZone, ZoneKind  # noqa: PLC0415 - quick help
-
-    fence = planned.fence
-    return {
-        "status": "ok",
-        "command": "plan",
-        "method": planned.method,
-        "start": list(planned.start),
-        "targets": [list(target) for target in planned.targets],
-        "path": [list(position) for position in planned.path],
-        "length_m": round(planned.length_m, 3),
-        "straight_line_m": round(planned.straight_line_m, 3),
-        "duration_s": round(planned.duration_s, 1),
-        "clearance_m": planned.clearance_m,
-        "drawn_clearance_m": _finite(planned.drawn_clearance_m),
-        "driven_clearance_m": _finite(planned.driven_clearance_m),
-        "fence": {
-            "inclusion_polygons": fence.count(ZoneKind.INCLUSION, PolygonZone),
-            "exclusion_polygons": fence.count(ZoneKind.EXCLUSION, PolygonZone),
-            "inclusion_circles": fence.count(ZoneKind.INCLUSION, CircleZone),
-            "exclusion_circles": fence.count(ZoneKind.EXCLUSION, CircleZone),
-            "vertices": fence.vertex_count,
-            "union": planned.ground.union,
-        },
-        "blocks": planned.blocks,
-        "mission_items": len(planned.items) + 1,
-        "warnings": list(planned.warnings),
-    }
-
-
-def _finite(value_m: float | None) -> float | None:
-    return None if value_m is None or value_m == float("inf") else round(value_m, 4)
-
-
-def request_from_options(
-    start: str | None, targets: list[str], clearance: str | None, allowance: str, snap: float, method: str
-) -> Request:
-    """Read what is asked of plans from a command's options.
-
-    Raises
-    ------
-    UsageError, InvalidPositionError
-        An option is not what it has to be.
-    """
-    from missions.geo import parse_lat_lon  # noqa: PLC0415 - quick help
-    from missions.request import Request  # noqa: PLC0415
-
-    if method not in _METHODS:
-        raise UsageError(f"--method {method!r}: expected one of {', '.join(_METHODS)}")
-    return Request(
-        start=parse_lat_lon(start) if start is not None else None,
-        targets=tuple(parse_lat_lon(target) for target in targets),
-        clearance_m=None if clearance == "max" else _metres("--clearance", clearance, "max"),
-        widest=clearance == "max",
-        corner_allowance_m=None if allowance == "auto" else _metres("--corner-allowance", allowance, "auto"),
-        snap_m=_metres("--snap", str(snap), "leave it out") or 0.0,
-        method=method,
-    )
-
-
-def _with_tour(request: Request, order: str, end: str, via: str | None, *, comes_back: bool) -> Request:
-    """Add order, way home, end or a mission to repair.
-
-    Raises
-    ------
-    UsageError
-        An option is not what it has to be, or does not go with another.
-    """
-    for option, value, known in (("--order", order, _ORDERS), ("--end", end, _ENDS)):
-        if value not in known:
-            raise UsageError(f"{option} {value!r}: expected one of {', '.join(known)}")
-    if via is None:
-        return replace(request, order=order, comes_back=comes_back, end=end)
-    if request.targets or comes_back or (order, end) != ("given", "hold"):
-        raise UsageError(
-            "--via-mission keeps the mission's own places, order and end; it does not go with --target, --order, --return, --end"
-        )
-    if request.widest:
-        raise UsageError("--via-mission needs a clearance in metres, not max")
-    if request.speed_mps is not None or request.corner_allowance_m is not None or request.escape:
-        raise UsageError(
-            "--via-mission keeps the mission's own speeds and goes by the drive model; it does not go with --speed, "
-            "--corner-allowance, --escape"
-        )
-    if via == _OWN:
-        return replace(request, via_own=True)
-    from missions.formats import read_mission  # noqa: PLC0415 - quick help
-
-    return replace(request, via=read_mission(Path(via)))
-
-
-def _metres(option: str, text: str | None, word: str) -> float | None:
-    """Read an option that is metres, 0 or more, or one word."""
-    if text is None:
-        return None
-    try:
-        value_m = float(text)
-    except ValueError:
-        value_m = -1.0
-    if not 0 <= value_m < float("inf"):
-        raise UsageError(f"{option} {text!r}: expected metres (0 or more) or {word}")
-    return value_m
 
 
 def _check_options(
@@ -434,22 +293,3 @@ def _offline_situation(
     if situation.fence is None:
         raise FenceMissingError(f"{fence} holds no fence", file=str(fence))
     return situation
-
-
-def _report(planned: Plan, written: list[Path], *, verified: bool) -> None:
-    promise = (
-        f"{planned.clearance_m:g} m promised while driving"
-        if planned.clearance_m is not None
-        else "nothing promised for the driven track"
-    )
-    waypoints = sum(item.is_placed for item in planned.items)
-    turns = max(0, waypoints - len(planned.targets))
-    typer.echo(
-        f"Route: {planned.length_m:.1f} m ({planned.straight_line_m:.1f} m as the crow flies), "
-        f"about {planned.duration_s:.0f} s, {waypoints} waypoints ({turns} turns)"
-    )
-    typer.echo(f"Clearance: {planned.drawn_clearance_m:.2f} m drawn, {promise}")
-    for path in written:
-        typer.echo(f"Wrote {path}")
-    if verified:
-        typer.echo("Uploaded and verified")

@@ -21,7 +21,7 @@ from mavlink_bridge.cli.common import (
     print_json,
     progress_bar,
 )
-from mavlink_bridge.cli.plan import request_from_options
+from mavlink_bridge.cli.plan_request import request_from_options
 from mavlink_bridge.errors import LogError, UsageError
 
 if TYPE_CHECKING:

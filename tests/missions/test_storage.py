@@ -8,20 +8,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from pyproj import Proj
-from shapely import LineString, Point
+from shapely import LineString, Point, Polygon
 from strategies import offset
 
 from mavlink_bridge.protocol.limits import Limits
 from missions.check import check_mission
 from missions.errors import MissionTooLongError
 from missions.fence import CircleZone, Fence, PolygonZone, Zone, ZoneKind
-from missions.geo import LatLon, rounded
+from missions.geo import LatLon, distance_m, rounded
 from missions.item_limit import most_items
 from missions.items import Command, CoordinateFrame, MissionItem, change_speed, waypoint
 from missions.repair import repair_mission
 from missions.request import Request
+from missions.shorter_lines import meeting_place, without
 from missions.situation import Known, Mission, Situation
-from missions.storage import shortened, without
+from missions.storage import shortened
 from missions.tour import plan_tour
 
 HOME = LatLon(40.071374, -105.22993)
@@ -156,24 +157,25 @@ def field_of_posts():
     return (box(ZoneKind.INCLUSION, -100, -60, 170, 60), *posts)
 
 
-def test_a_long_tour_fits_or_says_why_not():
+def test_a_long_tour_fits_or_says_why_not(monkeypatch):
     spots = [(20.0 * column + 10.0, 20.0 * row + 10.0) for column in range(-4, 7) for row in (-2, -1, 0, 1)]
-    targets = tuple(place(*spots[7 * number % len(spots)]) for number in range(30))
+    targets = tuple(place(*spots[7 * number % len(spots)]) for number in range(14))
     situation = situation_of(*field_of_posts(), WP_SPEED=2.0)
     request = Request(start=place(-95.0, 0.0), targets=targets, clearance_m=1.0)
     whole = plan_tour(situation, request)
-    assert len(whole.items) + 1 > ONE_KB
-    small = replace(situation, parameters={**situation.parameters, "BRD_SD_MISSION": 1.0})
-    fitted = plan_tour(small, request)
-    assert len(fitted.items) + 1 <= ONE_KB
+    most = len(whole.items)  # one less, with home
+    monkeypatch.setattr("missions.tour.plan", lambda *_arguments, **_options: whole)
+    monkeypatch.setattr("missions.tour.most_items", lambda _parameters: most)
+    fitted = plan_tour(situation, request)
+    assert len(fitted.items) + 1 <= most
     assert fitted.targets == whole.targets
     assert set(fitted.targets) <= set(fitted.path)
-    assert any(f"so that the vehicle can hold it ({ONE_KB})" in text for text in fitted.warnings)
+    assert any(f"so that the vehicle can hold it ({most})" in text for text in fitted.warnings)
     assert fitted.driven_clearance_m >= 1.0 - 0.01
     assert_clear_of_posts(fitted.path, 1.0)
-    assert check_mission(Mission(fitted.items), small, request).holds
-    with pytest.raises(MissionTooLongError, match=f"the vehicle holds {ONE_KB}: 0 of 0 items"):
-        plan_tour(small, replace(request, corner_allowance_m=1.0))
+    assert check_mission(Mission(fitted.items), situation, request).holds
+    with pytest.raises(MissionTooLongError, match=f"the vehicle holds {most}: 0 of 0 items"):
+        plan_tour(situation, replace(request, corner_allowance_m=1.0))
 
 
 def assert_clear_of_posts(path, least_m: float) -> None:
@@ -194,20 +196,29 @@ def test_a_repaired_mission_is_shortened_by_its_routes_only(monkeypatch):
     count = len(whole.mission.items)
     assert count == 5
     monkeypatch.setattr("missions.repair.most_items", lambda _parameters: count)  # one less, with home
+    short = repair_mission(Mission(items, HOME), situation, request)
+    assert short.check.holds
+    assert [item for item in short.mission.items if item in items] == list(items)
+    assert len(short.mission.items) == count - 1  # two corners of the barn became one
+    assert short.changes[-1] == "1 item of the routes left out so that the vehicle can hold it (5)"
+    barn_at = Polygon([MAP(*place(*corner)[::-1]) for corner in ((40, 20), (60, 20), (60, 40), (40, 40))])
+    line = LineString(
+        np.column_stack(MAP(*np.array([HOME, *(one.position for one in short.mission.items)]).T[::-1]))
+    )
+    assert line.distance(barn_at) >= 2.0
+    monkeypatch.setattr("missions.repair.most_items", lambda _parameters: count - 1)
     with pytest.raises(
-        MissionTooLongError, match="needs 6 items with home, and the vehicle holds 5: 0 of 2 items"
+        MissionTooLongError, match="needs 5 items with home, and the vehicle holds 4: 1 of 2 items"
     ):
         repair_mission(Mission(items, HOME), situation, request)
-    taken = []
 
-    def shortened_too(mission, own, *_arguments, **_options):
-        taken.append(own)
-        return replace(whole.check, mission=Mission(mission.items[1:], HOME))
 
-    monkeypatch.setattr("missions.repair.shortened", shortened_too)
-    found = repair_mission(Mission(items, HOME), situation, request)
-    assert taken == [frozenset({2, 3})]
-    assert found.changes[-1] == "1 items of the routes were left out so that the vehicle can hold it (5)"
+def test_where_two_corners_meet():
+    found = meeting_place(place(0, 0), place(0, 10), place(5, 20), place(15, 20))
+    assert distance_m(found, place(0, 20)) < 0.01
+    assert meeting_place(place(0, 0), place(0, 10), place(5, 20), place(5, 30)) is None  # one turns back
+    assert meeting_place(place(0, 0), place(0, 10), place(5, 12), place(5, 0)) is None  # nearly a whole turn
+    assert meeting_place(place(0, 0), place(0, 0), place(5, 12), place(5, 0)) is None
 
 
 def test_rtl_at_the_end_needs_an_item_too(monkeypatch):

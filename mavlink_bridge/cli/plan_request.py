@@ -1,0 +1,87 @@
+"""What is asked of a plan, read from a command's options."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mavlink_bridge.errors import UsageError
+
+if TYPE_CHECKING:
+    from missions.request import Request
+
+METHODS = ("optimal", "pbpp-taut", "pbpp")
+ORDERS = ("given", "best")
+ENDS = ("hold", "loiter", "rtl")
+_OWN = "own"
+
+
+def request_from_options(
+    start: str | None, targets: list[str], clearance: str | None, allowance: str, snap: float, method: str
+) -> Request:
+    """Read what is asked of plans from a command's options.
+
+    Raises
+    ------
+    UsageError, InvalidPositionError
+        An option is not what it has to be.
+    """
+    from missions.geo import parse_lat_lon  # noqa: PLC0415 - quick help
+    from missions.request import Request  # noqa: PLC0415
+
+    if method not in METHODS:
+        raise UsageError(f"--method {method!r}: expected one of {', '.join(METHODS)}")
+    return Request(
+        start=parse_lat_lon(start) if start is not None else None,
+        targets=tuple(parse_lat_lon(target) for target in targets),
+        clearance_m=None if clearance == "max" else _metres("--clearance", clearance, "max"),
+        widest=clearance == "max",
+        corner_allowance_m=None if allowance == "auto" else _metres("--corner-allowance", allowance, "auto"),
+        snap_m=_metres("--snap", str(snap), "leave it out") or 0.0,
+        method=method,
+    )
+
+
+def with_tour(request: Request, order: str, end: str, via: str | None, *, comes_back: bool) -> Request:
+    """Add order, way home, end or a mission to repair.
+
+    Raises
+    ------
+    UsageError
+        An option is not what it has to be, or does not go with another.
+    """
+    for option, value, known in (("--order", order, ORDERS), ("--end", end, ENDS)):
+        if value not in known:
+            raise UsageError(f"{option} {value!r}: expected one of {', '.join(known)}")
+    if via is None:
+        return replace(request, order=order, comes_back=comes_back, end=end)
+    if request.targets or comes_back or (order, end) != ("given", "hold"):
+        raise UsageError(
+            "--via-mission keeps the mission's own places, order and end; it does not go with --target, --order, --return, --end"
+        )
+    if request.widest:
+        raise UsageError("--via-mission needs a clearance in metres, not max")
+    if request.speed_mps is not None or request.corner_allowance_m is not None or request.escape:
+        raise UsageError(
+            "--via-mission keeps the mission's own speeds and goes by the drive model; it does not go with --speed, "
+            "--corner-allowance, --escape"
+        )
+    if via == _OWN:
+        return replace(request, via_own=True)
+    from missions.formats import read_mission  # noqa: PLC0415 - quick help
+
+    return replace(request, via=read_mission(Path(via)))
+
+
+def _metres(option: str, text: str | None, word: str) -> float | None:
+    """Read an option that is metres, 0 or more, or one word."""
+    if text is None:
+        return None
+    try:
+        value_m = float(text)
+    except ValueError:
+        value_m = -1.0
+    if not 0 <= value_m < float("inf"):
+        raise UsageError(f"{option} {text!r}: expected metres (0 or more) or {word}")
+    return value_m

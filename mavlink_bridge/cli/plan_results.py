@@ -1,0 +1,102 @@
+"""What is done with a plan: files, pictures, the JSON document, the report for people."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+if TYPE_CHECKING:
+    from missions.plan import Plan
+    from missions.situation import Situation
+
+
+def write_outputs(
+    planned: Plan, situation: Situation, outputs: list[Path], plots: list[Path], *, blocks: bool = False
+) -> list[Path]:
+    """Write the mission and draw the plan; give the files."""
+    from missions.formats import write_mission  # noqa: PLC0415 - quick help
+    from missions.situation import Known, Mission  # noqa: PLC0415
+
+    mission = Mission(planned.items, planned.home or planned.start)
+    to_write = replace(
+        situation, mission=Known(mission, None, "pbpp plan"), fence=Known(planned.fence, None, "pbpp plan")
+    )
+    for path in outputs:
+        write_mission(to_write, path)
+    return [*outputs, *draw(planned, plots, blocks=blocks)]
+
+
+def draw(planned: Plan, plots: list[Path], *, title: str | None = None, blocks: bool = False) -> list[Path]:
+    """Draw the plan to files, and to the terminal where ``-`` is among them; give the files."""
+    if not plots:
+        return []
+    from missions.picture import TERMINAL, draw_plan, sketch_plan  # noqa: PLC0415 - quick help
+
+    for path in plots:
+        if str(path) == TERMINAL:
+            columns = min(80, shutil.get_terminal_size().columns)
+            typer.echo(sketch_plan(planned, columns=columns, encoding=sys.stdout.encoding), nl=False)
+        else:
+            draw_plan(planned, path, title=title, blocks=blocks)
+    return [path for path in plots if str(path) != TERMINAL]
+
+
+def plan_document(planned: Plan) -> dict[str, object]:
+    """Give what the JSON document tells of a plan."""
+    from missions.fence import CircleZone, PolygonZone, ZoneKind  # noqa: PLC0415 - quick help
+
+    fence = planned.fence
+    return {
+        "status": "ok",
+        "command": "plan",
+        "method": planned.method,
+        "start": list(planned.start),
+        "targets": [list(target) for target in planned.targets],
+        "path": [list(position) for position in planned.path],
+        "length_m": round(planned.length_m, 3),
+        "straight_line_m": round(planned.straight_line_m, 3),
+        "duration_s": round(planned.duration_s, 1),
+        "clearance_m": planned.clearance_m,
+        "drawn_clearance_m": _finite(planned.drawn_clearance_m),
+        "driven_clearance_m": _finite(planned.driven_clearance_m),
+        "fence": {
+            "inclusion_polygons": fence.count(ZoneKind.INCLUSION, PolygonZone),
+            "exclusion_polygons": fence.count(ZoneKind.EXCLUSION, PolygonZone),
+            "inclusion_circles": fence.count(ZoneKind.INCLUSION, CircleZone),
+            "exclusion_circles": fence.count(ZoneKind.EXCLUSION, CircleZone),
+            "vertices": fence.vertex_count,
+            "union": planned.ground.union,
+        },
+        "blocks": planned.blocks,
+        "mission_items": len(planned.items) + 1,
+        "warnings": list(planned.warnings),
+    }
+
+
+def _finite(value_m: float | None) -> float | None:
+    return None if value_m is None or value_m == float("inf") else round(value_m, 4)
+
+
+def report_plan(planned: Plan, written: list[Path], *, verified: bool) -> None:
+    """Tell people of a plan, and of what was done with it."""
+    promise = (
+        f"{planned.clearance_m:g} m promised while driving"
+        if planned.clearance_m is not None
+        else "nothing promised for the driven track"
+    )
+    waypoints = sum(item.is_placed for item in planned.items)
+    turns = max(0, waypoints - len(planned.targets))
+    typer.echo(
+        f"Route: {planned.length_m:.1f} m ({planned.straight_line_m:.1f} m as the crow flies), "
+        f"about {planned.duration_s:.0f} s, {waypoints} waypoints ({turns} turns)"
+    )
+    typer.echo(f"Clearance: {planned.drawn_clearance_m:.2f} m drawn, {promise}")
+    for path in written:
+        typer.echo(f"Wrote {path}")
+    if verified:
+        typer.echo("Uploaded and verified")

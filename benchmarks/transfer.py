@@ -15,6 +15,7 @@ import sys
 import time
 from collections import Counter
 from datetime import UTC, datetime
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -93,7 +94,8 @@ def main() -> int:
 def _conditions(trials: int, transfers: int) -> str:
     today = datetime.now(UTC).date().isoformat()
     return (
-        f"Measured on {today} by `benchmarks/transfer.py`, Python {platform.python_version()} on {platform.machine()}; "
+        f"Measured on {today} by `benchmarks/transfer.py`, Python {platform.python_version()} on {platform.machine()}, "
+        f"pymavlink {version('pymavlink')}; "
         f"{trials} uploads a row, {transfers} transfers in the campaign."
     )
 

@@ -8,7 +8,7 @@ PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; 
 BIN := .venv/bin
 OUT ?= demo-out
 
-.PHONY: package bench bench-drive bench-transfer test-foreign docs soak bench-tlog fuzz demo test lint format types walls check lock clean
+.PHONY: package bench bench-bridge bench-drive bench-transfer test-foreign docs soak bench-tlog fuzz demo test lint format types walls check lock clean
 
 demo: .venv/run.stamp
 	$(BIN)/pbpp demo --out $(OUT)
@@ -68,6 +68,9 @@ bench-drive: .venv/dev.stamp
 
 bench-transfer: .venv/dev.stamp
 	$(BIN)/python benchmarks/transfer.py
+
+bench-bridge: .venv/dev.stamp
+	$(BIN)/python benchmarks/bridge.py
 
 test-foreign: .venv/dev.stamp
 	$(BIN)/python tests/foreign/run.py

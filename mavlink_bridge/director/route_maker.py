@@ -114,7 +114,7 @@ class RouteMaker(Keeper):
 
     def receive(self, frame: Frame, now_s: float) -> None:
         """Take a frame."""
-        super().receive(frame, now_s)
+        super().receive(self._as_to_vehicle(frame), now_s)
         old = self.pending_backup
         if old is not None and self._is_own_idea and self._ours is not None and old[1:] != self._ours[1:]:
             self._drop_steps()  # nothing was written yet
@@ -122,6 +122,16 @@ class RouteMaker(Keeper):
             self._mission_taken_over(len(old), now_s)
 
     # Targets
+
+    def _as_to_vehicle(self, frame: Frame) -> Frame:
+        """Take a command to our own system for one to the vehicle's, whose place it asks for."""
+        peer, message = self._peer, frame.message
+        if peer is None or peer.own_system == peer.system or self.identity is None:
+            return frame
+        if not is_command_to(frame, self.identity, peer.own_system):
+            return frame
+        assert isinstance(message, m.CommandInt | m.CommandLong)
+        return replace(frame, message=replace(message, target_system=peer.system))
 
     def _take_any_frame(self, frame: Frame, before: Situation, now_s: float) -> None:
         super()._take_any_frame(frame, before, now_s)

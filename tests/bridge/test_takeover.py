@@ -470,6 +470,14 @@ def test_a_command_to_our_component_is_denied_where_it_is_not_heeded():
     assert run.director.state is State.READY
 
 
+def test_a_bridge_with_a_system_id_of_its_own_is_commanded_by_it():
+    run = ready(conductor(drive=False, identity=(2, 195)))
+    run.ground_station(replace(reposition(FAR, component=195), target_system=2))
+    run.run_until(lambda: run.director.state is State.VERIFIED, 5)
+    answers = [message.result for message in run.sent if isinstance(message, m.CommandAck)]
+    assert answers == [m.MavResult.IN_PROGRESS, m.MavResult.ACCEPTED]
+
+
 def test_another_askers_target_cancels_the_one_before():
     run = ready(conductor(drive=False, confirm=True))
     run.ground_station(reposition(IN_BARN, component=195))

@@ -201,7 +201,7 @@ def test_two_bridges_over_sockets(hub):
             assert directors[system].situation.fence.value == FENCES[system]
 
 
-def wait_for(condition, within_s: float = 30.0) -> None:
+def wait_for(condition, within_s: float = 120.0) -> None:
     until_s = time.monotonic() + within_s
     while not condition():
         assert time.monotonic() < until_s

@@ -47,6 +47,8 @@ _OTHER_WAYS = 5
 _DEPARTURES_TRIED = 8
 _DEPARTURE_SLACK_M = 0.05
 _TURN_COST_M_PER_DEG = 0.1
+_MOST_TURN_DEG = 100.0
+"""At the end of a first leg: tried with less, rovers that came back the way they went left the band."""
 _SHORTER_SHARE = 0.97
 
 
@@ -277,7 +279,7 @@ class RouteSearch:
                 onward = self._draw(band_m, (), departure.there)
             except RouteError:
                 continue
-            if onward.lead_away:
+            if onward.lead_away or _turn_at_deg(self.start, onward) > _MOST_TURN_DEG:
                 continue
             route = replace(
                 onward,
@@ -306,6 +308,13 @@ class RouteSearch:
 def _starts_badly(drawing: Drawing, measured: Measured) -> bool:
     """Tell whether most is missing where the route begins."""
     return max(range(len(drawing)), key=lambda number: measured.missing_m[number]) <= 2
+
+
+def _turn_at_deg(start: LocalPoint, onward: Route) -> float:
+    """Give how far a route turns where a first leg from the start ends."""
+    here, after = onward.points[0], onward.points[1]
+    turn_rad = math.atan2(*(after - here)) - math.atan2(*(here - np.array(start)))
+    return abs(math.degrees((turn_rad + math.pi) % (2 * math.pi) - math.pi))
 
 
 def _turned_deg(route: Route) -> float:

@@ -29,7 +29,7 @@ class Plan:
     speeds : tuple of float or None
         The speed asked for on each leg of the path in m/s; None is the vehicle's own.
     clearance_m : float or None
-        Promised for the rover as it drives; None where only drawn lines were asked for.
+        Promised for the rover as it drives: what was asked for, or less where the start leaves less; None where only drawn lines were asked for.
     asked_m : float
         What the drawn lines have to keep (less where the first ones lead away from a fence nearby); where the route is fitted to the
         drive model, the driven band too: the promise, the position's error and the owner's reserve.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -76,7 +77,7 @@ class FittedRoute:
         widest_m = widest_clearance_m(self.ground, self.ends, self.should_stop)
         refusal: RouteError | None = None
         for share in _SHARES:
-            required_m = max(0.0, share * (widest_m - NARROWEST_BAND_M))
+            required_m = max(0.0, math.floor(100 * share * (widest_m - NARROWEST_BAND_M)) / 100)
             try:
                 found = self._search(required_m, _MEASUREMENTS).find()
             except RouteError as error:

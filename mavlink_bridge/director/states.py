@@ -20,16 +20,12 @@ class State(StrEnum):
     PLANNING = auto()
     PROPOSED = auto()  # a plan stands; it is reported, or waits for a yes
     UPLOADING = auto()
-    WITHDRAWING = (
-        auto()
-    )  # taken over in the middle of an upload: no half mission is left behind, and nothing more is done
+    WITHDRAWING = auto()  # taken over in mid-upload: no half mission is left behind, nothing more is done
     VERIFIED = auto()  # the mission is on the vehicle
     STARTING = auto()  # looking once more, arming where asked, switching to AUTO, to the first item
     DRIVING = auto()
     ARRIVED = auto()
-    LET_GO = (
-        auto()
-    )  # the operator took over, or somebody changed the mission: nothing is done until a new target comes
+    LET_GO = auto()  # the operator took over, or somebody changed the mission: waits for a new target
     LOST = auto()  # the vehicle's heartbeat is missing
     DONE = auto()  # a single job has come to its end
     FAILED = auto()  # a single job could not be done

@@ -44,6 +44,8 @@ LATER_MEASUREMENTS = 500
 """For each kind of route that is tried after the first ones."""
 
 _OTHER_WAYS = 5
+_AT_START = 2
+"""Points where most is missing because of how the route begins."""
 _DEPARTURES_TRIED = 8
 _DEPARTURE_SLACK_M = 0.05
 _TURN_COST_M_PER_DEG = 0.1
@@ -140,7 +142,7 @@ class RouteSearch:
             self._fit(fitting, route, found, refused)
             if found and route is routes[0][0] and len(routes) > 1 and not self._is_shorter(routes):
                 break
-        if not found and _starts_badly(*refused[-1]):
+        if not found and refused[-1][1].worst_index <= _AT_START:
             fitting = self._fitting(LATER_MEASUREMENTS)
             for departing in self._departing_routes(slow_m):
                 self._fit(fitting, departing, found, refused)
@@ -303,11 +305,6 @@ class RouteSearch:
 
     def _is_stopped(self) -> bool:
         return self.should_stop is not None and self.should_stop()
-
-
-def _starts_badly(drawing: Drawing, measured: Measured) -> bool:
-    """Tell whether most is missing where the route begins."""
-    return max(range(len(drawing)), key=lambda number: measured.missing_m[number]) <= 2
 
 
 def _turn_at_deg(start: LocalPoint, onward: Route) -> float:

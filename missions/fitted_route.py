@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from missions.clearance import NARROWEST_BAND_M
 from missions.driven_route import DrivenRoute, RouteSearch
 from missions.errors import NoRouteError, RouteError
 from missions.lines import reserve_m
-from missions.narrow import narrowest_place, widest_clearance_m
+from missions.narrow import kept_m, narrowest_places
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -19,6 +18,7 @@ if TYPE_CHECKING:
     from missions.clearance import Promise
     from missions.ground import Ground
     from missions.local_frame import LocalPoint
+    from missions.narrow import NarrowestPlace
     from missions.request import Request
     from missions.vehicle import Vehicle
 
@@ -65,7 +65,7 @@ class FittedRoute:
             No route; with what the widest one would keep.
         """
         if self.request.widest:
-            return self._widest(asked)
+            return self._widest(asked, self._places())
         try:
             return asked, self._search(asked.required_m).find()
         except NoRouteError as error:
@@ -73,8 +73,11 @@ class FittedRoute:
                 raise
             raise self._told(error, asked) from None
 
-    def _widest(self, asked: Promise) -> tuple[Promise, DrivenRoute]:
-        widest_m = widest_clearance_m(self.ground, self.ends, self.should_stop)
+    def _places(self) -> list[NarrowestPlace | None]:
+        return narrowest_places(self.ground, self.ends, self.should_stop)
+
+    def _widest(self, asked: Promise, places: Sequence[NarrowestPlace | None]) -> tuple[Promise, DrivenRoute]:
+        widest_m = kept_m(places)
         refusal: RouteError | None = None
         for share in _SHARES:
             required_m = max(0.0, math.floor(100 * share * (widest_m - NARROWEST_BAND_M)) / 100)
@@ -90,10 +93,10 @@ class FittedRoute:
 
     def _told(self, error: NoRouteError, asked: Promise) -> NoRouteError:
         """Give the error with what the widest route keeps while this vehicle drives it."""
-        found = (narrowest_place(self.ground, a, b, self.should_stop) for a, b in pairwise(self.ends))
-        place = min((place for place in found if place), key=lambda place: place.clearance_m)
+        places = self._places()
+        place = min((place for place in places if place), key=lambda place: place.clearance_m)
         try:
-            widest, _ = self._widest(asked)
+            widest, _ = self._widest(asked, places)
         except RouteError:
             return error
         return NoRouteError(

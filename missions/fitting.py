@@ -79,6 +79,11 @@ class Measured:
     cost_s: float
 
     @property
+    def worst_index(self) -> int:
+        """The point where most is missing; the first of several."""
+        return max(range(len(self.missing_m)), key=lambda number: self.missing_m[number])
+
+    @property
     def is_enough(self) -> bool:
         """Whether the band keeps what is required."""
         return max(self.missing_m) <= ENOUGH_M

@@ -69,11 +69,22 @@ def narrowest_place(
     return NarrowestPlace(way.clearance_m, tuple(_part_name(ground, part) for part in way.parts), at)
 
 
+def narrowest_places(
+    ground: Ground, points: Sequence[LocalPoint], should_stop: Callable[[], bool] | None = None
+) -> list[NarrowestPlace | None]:
+    """Find the narrowest place on the way from each point to the next."""
+    return [narrowest_place(ground, a, b, should_stop) for a, b in itertools.pairwise(points)]
+
+
 def widest_clearance_m(
     ground: Ground, points: Sequence[LocalPoint], should_stop: Callable[[], bool] | None = None
 ) -> float:
     """Give the most clearance a route over all points keeps; 0 where there is no route."""
-    places = [narrowest_place(ground, a, b, should_stop) for a, b in itertools.pairwise(points)]
+    return kept_m(narrowest_places(ground, points, should_stop))
+
+
+def kept_m(places: Sequence[NarrowestPlace | None]) -> float:
+    """Give what a route by all these places keeps; 0 where there is no route."""
     return min((place.clearance_m if place else 0.0 for place in places), default=0.0)
 
 

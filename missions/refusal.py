@@ -28,7 +28,7 @@ def refusal(
     ground: Ground, required_m: float, reserve_m: float, drawing: Drawing, measured: Measured
 ) -> NoRouteError:
     """Say which corner refused, by how much, and at which fence."""
-    index = max(range(len(drawing)), key=lambda number: measured.missing_m[number])
+    index = measured.worst_index
     point = drawing[index]
     position = ground.frame.to_lat_lon(LocalPoint(*point.place))
     barrier, _ = ground.nearest(Point(measured.worst[index]))
@@ -55,7 +55,7 @@ def refusal(
 
 def block(route: Route, drawing: Drawing, measured: Measured) -> Polygon:
     """Give a small square on a route near where most is missing, to send the next one elsewhere."""
-    index = max(range(len(drawing)), key=lambda number: measured.missing_m[number])
+    index = measured.worst_index
     place = measured.worst[index] if not math.isnan(measured.worst[index][0]) else drawing[index].place
     line = shapely.LineString(route.points)
     margin_m = min(_BLOCK_AWAY_M, line.length / 3)

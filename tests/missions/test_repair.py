@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from pyproj import Proj
+from charts import HOME, IN, OUT, Chart, box, place
 from shapely import LineString, Polygon
-from strategies import offset
 
 from missions.check import check_mission
 from missions.course import follow_mission
 from missions.errors import NoRouteError, RouteError, SituationError, TargetBlockedError
-from missions.fence import Fence, PolygonZone, Zone, ZoneKind
+from missions.fence import Fence, Zone
 from missions.formats import read_fence, read_mission
-from missions.geo import LatLon, rounded
 from missions.items import CoordinateFrame, MissionItem, change_speed, waypoint
 from missions.plan import plan
 from missions.repair import MOST_TRACKED_JUMPS, Repair, repair_mission, repaired_plan
@@ -23,18 +22,10 @@ from missions.request import Request
 from missions.situation import Known, Mission, Pose, Situation
 from missions.tour import plan_tour
 
-HOME = LatLon(40.071374, -105.22993)
-IN, OUT = ZoneKind.INCLUSION, ZoneKind.EXCLUSION
-MAP = Proj(proj="tmerc", ellps="WGS84", lat_0=HOME.lat_deg, lon_0=HOME.lon_deg, k=1)
+if TYPE_CHECKING:
+    from missions.geo import LatLon
 
-
-def place(east_m: float, north_m: float) -> LatLon:
-    return rounded(offset(HOME, east_m, north_m))
-
-
-def box(kind: ZoneKind, west_m: float, south_m: float, east_m: float, north_m: float) -> PolygonZone:
-    corners = ((west_m, south_m), (east_m, south_m), (east_m, north_m), (west_m, north_m))
-    return PolygonZone(kind, tuple(place(*corner) for corner in corners))
+MAP = Chart(HOME)
 
 
 FIELD = box(IN, -60, -60, 160, 160)
@@ -80,13 +71,9 @@ def assert_holds(found: Repair, situation: Situation) -> None:
 
 def assert_clear_of_barns(found: Repair, situation: Situation, start: LatLon) -> None:
     """Measure the drawn lines in the test's own map."""
-    barns = [
-        Polygon(np.column_stack(MAP(*np.array(zone.vertices).T[::-1])))
-        for zone in situation.fence.value.zones
-        if zone.kind is OUT
-    ]
+    barns = [Polygon(MAP.points(zone.vertices)) for zone in situation.fence.value.zones if zone.kind is OUT]
     for leg in follow_mission(found.mission, start, home=HOME).legs:
-        line = LineString(np.column_stack(MAP(*np.array([leg.start, leg.end]).T[::-1])))
+        line = LineString(MAP.points([leg.start, leg.end]))
         assert all(line.distance(barn) >= 2.0 for barn in barns)
 
 

@@ -5,17 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
-from pyproj import Proj
+from charts import HOME, OUT, Chart, box, place
 from shapely import LineString, Point, Polygon
-from strategies import offset
 
 from mavlink_bridge.protocol.limits import Limits
 from missions.check import check_mission
 from missions.errors import MissionTooLongError
-from missions.fence import CircleZone, Fence, PolygonZone, Zone, ZoneKind
-from missions.geo import LatLon, distance_m, rounded
+from missions.fence import CircleZone, Fence, Zone, ZoneKind
+from missions.geo import distance_m
 from missions.item_limit import most_items
 from missions.items import Command, CoordinateFrame, MissionItem, change_speed, waypoint
 from missions.repair import repair_mission
@@ -25,18 +23,7 @@ from missions.situation import Known, Mission, Situation
 from missions.storage import shortened
 from missions.tour import plan_tour
 
-HOME = LatLon(40.071374, -105.22993)
-OUT = ZoneKind.EXCLUSION
-MAP = Proj(proj="tmerc", ellps="WGS84", lat_0=HOME.lat_deg, lon_0=HOME.lon_deg, k=1)
-
-
-def place(east_m: float, north_m: float) -> LatLon:
-    return rounded(offset(HOME, east_m, north_m))
-
-
-def box(kind: ZoneKind, west_m: float, south_m: float, east_m: float, north_m: float) -> PolygonZone:
-    corners = ((west_m, south_m), (east_m, south_m), (east_m, north_m), (west_m, north_m))
-    return PolygonZone(kind, tuple(place(*corner) for corner in corners))
+MAP = Chart(HOME)
 
 
 def situation_of(*zones: Zone, **parameters: float) -> Situation:
@@ -180,10 +167,10 @@ def test_a_long_tour_fits_or_says_why_not(monkeypatch):
 
 def assert_clear_of_posts(path, least_m: float) -> None:
     """Measure the lines in the test's own map."""
-    line = LineString(np.column_stack(MAP(*np.array(path).T[::-1])))
+    line = LineString(MAP.points(path))
     for column in range(-4, 8):
         for row in range(-2, 3):
-            centre = Point(MAP(*place(20.0 * column, 20.0 * row)[::-1]))
+            centre = Point(MAP.points([place(20.0 * column, 20.0 * row)])[0])
             assert line.distance(centre) - 2.0 >= least_m - 0.01
 
 
@@ -201,10 +188,8 @@ def test_a_repaired_mission_is_shortened_by_its_routes_only(monkeypatch):
     assert [item for item in short.mission.items if item in items] == list(items)
     assert len(short.mission.items) == count - 1  # two corners of the barn became one
     assert short.changes[-1] == "1 item of the routes left out so that the vehicle can hold it (5)"
-    barn_at = Polygon([MAP(*place(*corner)[::-1]) for corner in ((40, 20), (60, 20), (60, 40), (40, 40))])
-    line = LineString(
-        np.column_stack(MAP(*np.array([HOME, *(one.position for one in short.mission.items)]).T[::-1]))
-    )
+    barn_at = Polygon(MAP.points([place(*corner) for corner in ((40, 20), (60, 20), (60, 40), (40, 40))]))
+    line = LineString(MAP.points([HOME, *(one.position for one in short.mission.items)]))
     assert line.distance(barn_at) >= 2.0
     monkeypatch.setattr("missions.repair.most_items", lambda _parameters: count - 1)
     with pytest.raises(

@@ -4,35 +4,26 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise, permutations
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 import shapely
-from pyproj import Proj
+from charts import HOME, IN, OUT, Chart, box, place
 from shapely import LineString, Polygon
-from strategies import offset
 
 from missions.errors import NoRouteError, SituationError, TargetBlockedError
-from missions.fence import Fence, PolygonZone, Zone, ZoneKind
-from missions.geo import LatLon, rounded
+from missions.fence import Fence, Zone
 from missions.items import Command
 from missions.plan import plan
 from missions.request import Request
 from missions.situation import Known, Situation
 from missions.tour import plan_tour, route_lengths_m, target_order
 
-HOME = LatLon(40.071374, -105.22993)
-IN, OUT = ZoneKind.INCLUSION, ZoneKind.EXCLUSION
-MAP = Proj(proj="tmerc", ellps="WGS84", lat_0=HOME.lat_deg, lon_0=HOME.lon_deg, k=1)
+if TYPE_CHECKING:
+    from missions.geo import LatLon
 
-
-def place(east_m: float, north_m: float) -> LatLon:
-    return rounded(offset(HOME, east_m, north_m))
-
-
-def box(kind: ZoneKind, west_m: float, south_m: float, east_m: float, north_m: float) -> PolygonZone:
-    corners = ((west_m, south_m), (east_m, south_m), (east_m, north_m), (west_m, north_m))
-    return PolygonZone(kind, tuple(place(*corner) for corner in corners))
+MAP = Chart(HOME)
 
 
 FIELD = box(IN, -60, -60, 160, 160)
@@ -50,7 +41,7 @@ def situation_of(*zones: Zone, home: LatLon | None = HOME, **parameters: float) 
 
 def plane(places: list[LatLon]) -> np.ndarray:
     lat_lon = np.array(places)
-    return np.column_stack(MAP(lat_lon[:, 1], lat_lon[:, 0]))
+    return MAP.points(lat_lon)
 
 
 WALLED = situation_of(FIELD, WALL)

@@ -106,20 +106,31 @@ def replay(
 
 
 class _Teller:
-    """Puts events on stdout, as they come."""
+    """Puts events on stdout, as they come: JSON with the log's own times, lines for people with seconds since its begin."""
 
     def __init__(self, *, wants_json: bool, quiet: bool, names_logs: bool) -> None:
         self.is_quiet = quiet or wants_json
         self._wants_json = wants_json
         self._is_silent = quiet and not wants_json
         self._names_logs = names_logs
+        self._begin_s = 0.0
+
+    def begin(self, log: Path) -> None:
+        """Tell when a log begins; what is told from now on is of this log."""
+        if self._wants_json or self._is_silent:
+            return
+        from mavlink_bridge.cli.log_times import log_begin  # noqa: PLC0415 - quick help
+
+        begin = log_begin(log)
+        self._begin_s = begin.time_s
+        typer.echo(f"{log.name}: {begin}")
 
     def tell(self, event: _Told) -> None:
         if self._wants_json:
             print_json(event)
         elif not self._is_silent:
             prefix = f"{event['log']}: " if self._names_logs else ""
-            typer.echo(f"{prefix}{event['time_s']:.2f} {event['event']}: {event['text']}")
+            typer.echo(f"{prefix}{event['time_s'] - self._begin_s:8.2f} s  {event['event']}: {event['text']}")
 
     def fail(self, log: Path, error: LogError) -> None:
         """Tell of a log among several that cannot be used; the others are replayed all the same."""
@@ -149,6 +160,7 @@ def _one_after_the_other(logs: list[Path], orders: Orders, speed: float | None, 
         wait = None if speed is None else _Pace(speed).wait
         told: list[_Told] = []
         try:
+            teller.begin(log)
             for event in replay_log(log, orders, wait):
                 told.append({"log": log.name, **event.as_json()})
                 teller.tell(told[-1])
@@ -179,6 +191,7 @@ def _side_by_side(logs: list[Path], orders: Orders, workers: int, teller: _Telle
                     teller.fail(log, error)
                     results[log] = error
                     continue
+                teller.begin(log)
                 for event in results[log]:  # type: ignore[union-attr]
                     teller.tell(event)
     finally:

@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-_FORMAT = 1
+_FORMAT = 2
 
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """A call of the director: ``start``, ``timer``, ``target``, ``confirm`` or ``backup_stored``.
+    """A call of the director: ``start``, ``timer``, ``target``, ``confirm``, ``backup_stored`` or ``plan_made``.
 
     Parameters
     ----------

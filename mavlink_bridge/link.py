@@ -30,6 +30,7 @@ DEFAULT_BAUD = 57600
 _HEARTBEAT_EVERY_S = 1.0
 _RECEIVE_BYTES = 65536
 _LINK_SENT = 3
+_SERIAL_WAIT_S = 0.01
 
 
 _EPOCH_S = time.time() - time.monotonic()
@@ -227,6 +228,7 @@ class Link:
         on_frames: Callable[[list[Frame]], None] | None = None,
         on_step: Callable[[], None] | None = None,
         until: Callable[[], bool] = lambda: False,
+        longest_wait_s: Callable[[], float] = lambda: 0.5,
     ) -> None:
         """Run a machine to its outcome.
 
@@ -242,6 +244,8 @@ class Link:
             Called before each step's messages are sent, for progress bars and for what the machine hands out.
         until : callable, optional
             Ends the run early when it gives True.
+        longest_wait_s : callable, optional
+            Gives the longest time between two steps.
 
         Raises
         ------
@@ -259,7 +263,9 @@ class Link:
             if timeout_s is not None and now_s() - begun_s > timeout_s:
                 raise LinkError(f"no outcome within {timeout_s:g} s")
             deadline_s = machine.deadline_s
-            wait_s = 0.5 if deadline_s is None else min(0.5, max(0.0, deadline_s - now_s()))
+            wait_s = longest_wait_s()
+            if deadline_s is not None:
+                wait_s = min(wait_s, max(0.0, deadline_s - now_s()))
             came_s, frames = self.receive_at(wait_s)
             if frames and on_frames:
                 on_frames(frames)
@@ -392,7 +398,8 @@ class _Serial:
     def __init__(self, address: Address, _timeout_s: float) -> None:
         import serial  # noqa: PLC0415 - only where there is a serial port
 
-        self._port = serial.Serial(address.host, address.port, timeout=0)
+        # Set once: some drivers set up the whole port anew with every other time-out.
+        self._port = serial.Serial(address.host, address.port, timeout=_SERIAL_WAIT_S)
 
     def send(self, data: bytes) -> None:
         try:
@@ -402,10 +409,11 @@ class _Serial:
 
     def receive(self, timeout_s: float) -> bytes:
         try:
-            self._port.timeout = timeout_s
-            first = self._port.read(1)
-            self._port.timeout = 0
-            return first + self._port.read(_RECEIVE_BYTES) if first else b""
+            until_s = time.monotonic() + timeout_s
+            while not (first := self._port.read(1)):
+                if time.monotonic() >= until_s:
+                    return b""
+            return bytes(first + self._port.read(self._port.in_waiting))
         except OSError as error:
             raise LinkError(f"the serial port broke: {error}") from None
 

@@ -96,6 +96,7 @@ def replay_foreign(entries: Iterable[LogEntry], orders: Orders) -> Iterator[Even
         yield from _at_log_time(_spoken(director), clock)
     if before_s is not None:
         director.handle_timer(before_s)
+        _make_plan(director, before_s)
         yield from _at_log_time(_spoken(director), clock)
 
 
@@ -117,6 +118,7 @@ def _timers(director: Director, now_s: float, until_s: float) -> Iterator[Event]
     while (deadline_s := director.deadline_s) is not None and deadline_s <= until_s:
         now_s = max(now_s, deadline_s)
         director.handle_timer(now_s)
+        _make_plan(director, now_s)
         yield from _spoken(director)
 
 
@@ -131,7 +133,15 @@ def _call(director: Director, call: Call) -> Iterator[Event]:
         director.confirm(call.time_s)
     elif call.name == "backup_stored":
         director.backup_stored(call.time_s)
+    elif call.name == "plan_made":
+        _make_plan(director, call.time_s)
     yield from _spoken(director)
+
+
+def _make_plan(director: Director, now_s: float) -> None:
+    """Make the plan that the director waits for, if it does."""
+    if (task := director.pending_plan) is not None:
+        director.plan_made(task, task.made(), now_s)
 
 
 def _spoken(director: Director) -> list[Event]:

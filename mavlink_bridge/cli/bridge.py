@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.tlog import TlogWriter
 
 _BACKOFF_S = (0.5, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0)
-_LONGEST_WAIT_S = 0.25
+_LINK_LOOK_S = 0.25
 
 
 def bridge(
@@ -180,7 +180,7 @@ class _Shell:
         recorder: TlogWriter | None,
         journal: JournalWriter | None,
     ) -> None:
-        from mavlink_bridge.cli.live import BackupKeeper  # noqa: PLC0415 - quick help
+        from mavlink_bridge.cli.live import BackupKeeper, PlanMaker  # noqa: PLC0415 - quick help
 
         self.director = director
         self._view = view
@@ -189,6 +189,7 @@ class _Shell:
         self._recorder = recorder
         self._journal = journal
         self._backups = BackupKeeper(self.director)
+        self._plans = PlanMaker(self.director)
         self._typed = _typed_lines()
 
     def run(self, connection: str, signing: Signing | None, timeout_s: float) -> None:
@@ -224,16 +225,15 @@ class _Shell:
         while not self.director.is_done:
             self._listen_to_keyboard(now_s())
             self._keep_backup(now_s())
+            self._hand_over_plan(now_s())
             if self.director.identity is not None and link.identity != self.director.identity:
                 link.speak_as(self.director.identity)
             link.send_all(self.director.messages_to_send())
             self._tell_all()
             deadline_s = self.director.deadline_s
-            wait_s = (
-                _LONGEST_WAIT_S
-                if deadline_s is None
-                else min(_LONGEST_WAIT_S, max(0.0, deadline_s - now_s()))
-            )
+            wait_s = self._plans.longest_wait_s()
+            if deadline_s is not None:
+                wait_s = min(wait_s, max(0.0, deadline_s - now_s()))
             came_s, frames = link.receive_at(wait_s)
             for frame in frames:
                 self.director.receive(frame, came_s)
@@ -260,12 +260,17 @@ class _Shell:
             self._listen_to_keyboard(now_s())
             self._run_timer(now_s())
             self._tell_all()
-            time.sleep(min(_LONGEST_WAIT_S, max(0.0, until_s - now_s())))
+            time.sleep(min(_LINK_LOOK_S, max(0.0, until_s - now_s())))
 
     def _keep_backup(self, now: float) -> None:
         if self.director.pending_backup is not None:
             self._written.call("backup_stored", now)
         warn(self._backups.step(now))
+
+    def _hand_over_plan(self, now: float) -> None:
+        if (made := self._plans.take()) is not None:
+            self._written.call("plan_made", now)
+            self.director.plan_made(*made, now)
 
     def _listen_to_keyboard(self, now: float) -> None:
         from missions.errors import InvalidPositionError  # noqa: PLC0415 - quick help

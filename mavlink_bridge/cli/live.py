@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Future
 from dataclasses import dataclass, replace
+from threading import Thread
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.backup import BackupStore
@@ -19,17 +21,21 @@ from missions.course import follow_mission
 from missions.errors import SituationError
 from missions.formats import read_parameters
 from missions.items import Command
+from missions.plan import plan as make_plan
 from missions.situation import Mission, Situation
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    from mavlink_bridge.director.plan_task import PlanTask
     from mavlink_bridge.link import Link
     from mavlink_bridge.messages import Frame
     from missions.errors import MissionError
     from missions.plan import Plan
     from missions.request import Request
+
+_IDLE_S, _BUSY_S = 0.25, 0.02
 
 _STATE_TEXTS = {
     State.LISTENING: "listening for the vehicle",
@@ -107,7 +113,8 @@ def conduct(
         planning_s.append(seconds)
         return planned
 
-    director = Director(replace(orders, once=True), situation, timed)
+    director = Director(replace(orders, once=True), situation)
+    plans = PlanMaker(director, timed)
     backups = BackupKeeper(director)
     with progress_bar(quiet=quiet) as show:
 
@@ -116,8 +123,10 @@ def conduct(
             has_driven = has_driven or director.state is State.DRIVING
             show(_STATE_TEXTS[director.state], *director.progress)
             warn(backups.step(now_s()))
+            if (made := plans.take()) is not None:
+                director.plan_made(*made, now_s())
 
-        link.run(director, on_frames=on_frames, on_step=step)
+        link.run(director, on_frames=on_frames, on_step=step, longest_wait_s=plans.longest_wait_s)
     if director.trouble is not None or director.plan is None:
         raise backups.explained(director.trouble or LinkError("the director ended without a plan"))
     outcome = director.upload_outcome
@@ -150,6 +159,53 @@ def _check_drivable(planned: Plan) -> None:
                 "upload it (--upload), and start it yourself",
                 item=seq,
             )
+
+
+class PlanMaker:
+    """Makes the plans a director waits for, beside the link, so that messages go on meanwhile.
+
+    Parameters
+    ----------
+    director : Director
+        Who waits for them.
+    planner : callable, optional
+        Makes one; `missions.plan.plan` if not given.
+    """
+
+    def __init__(self, director: Director, planner: Callable[[Situation, Request], Plan] = make_plan) -> None:
+        self._director = director
+        self._planner = planner
+        self._task: PlanTask | None = None  # in the making, also when nobody waits for it any more
+        self._made: Future[Plan | MissionError] = Future()
+
+    def longest_wait_s(self) -> float:
+        """Give how long the shell may wait for messages before it looks here again."""
+        return _IDLE_S if self._task is None else _BUSY_S
+
+    def take(self) -> tuple[PlanTask, Plan | MissionError] | None:
+        """Give what was made for the director and was not given yet; begin what it waits for."""
+        task = self._task
+        if task is not None and self._made.done():
+            self._task = None
+            made = self._made.result()  # also raises what nobody expected
+            if task is self._director.pending_plan:
+                return task, made
+        if self._task is None:
+            self._begin(self._director.pending_plan)
+        return None
+
+    def _begin(self, task: PlanTask | None) -> None:
+        if task is None:
+            return
+        self._task, self._made = task, Future()
+        # No executor: its threads are waited for when the program is interrupted.
+        Thread(target=self._make, args=(task, self._made), name="planner", daemon=True).start()
+
+    def _make(self, task: PlanTask, future: Future[Plan | MissionError]) -> None:
+        try:
+            future.set_result(task.made(self._planner))
+        except BaseException as error:  # noqa: BLE001 - raised again where the result is taken
+            future.set_exception(error)
 
 
 class BackupKeeper:

@@ -35,6 +35,9 @@ POLL_EVERY_S = 60.0
 FENCE_EVERY_S = 8.0
 """How often the fence is, while the vehicle drives: the one message that tells of a change may be lost."""
 
+WRITTEN_AFTER_S = 1.5
+"""So long after the vehicle last asked somebody for an item of a list, that is taken for written: the word that it is may be lost."""
+
 
 class ChangeWatch:
     """Looks at the vehicle's frames for signs of change, and suspects every list now and then.
@@ -53,16 +56,19 @@ class ChangeWatch:
         self._identity = identity
         self._kinds = kinds
         self._totals: dict[str, float] = {}
+        self._asked_for_s: dict[ListKind, float] = {}  # lists that somebody is writing
 
     def deadline_s(self, *, is_driving: bool) -> float:
         """When lists are to be read again."""
         if self.suspects:
             return -math.inf
-        return min(self._poll_due_s, self._fence_due_s) if is_driving else self._poll_due_s
+        written_s = min(self._asked_for_s.values(), default=math.inf) + WRITTEN_AFTER_S
+        return min(self._poll_due_s, self._fence_due_s if is_driving else math.inf, written_s)
 
     def settle(self, now_s: float) -> None:
         """Take notice that all lists were just read."""
         self.suspects.clear()
+        self._asked_for_s.clear()
         self._poll_due_s = now_s + POLL_EVERY_S
         self._fence_due_s = now_s + FENCE_EVERY_S
 
@@ -73,20 +79,33 @@ class ChangeWatch:
             self.suspects |= self._kinds
         if is_driving and now_s >= self._fence_due_s:
             self.suspects.add(ListKind.FENCE)
+        written = {one for one, asked_s in self._asked_for_s.items() if now_s >= asked_s + WRITTEN_AFTER_S}
+        for kind in written:
+            del self._asked_for_s[kind]
+        self.suspects |= written
         if ListKind.FENCE in self.suspects:
             self._fence_due_s = now_s + FENCE_EVERY_S
         suspects, self.suspects = self.suspects, set()
         return suspects
 
-    def look(self, frame: Frame) -> None:
-        """Suspect the lists that a frame says may have changed."""
-        self.suspects |= self._signs(frame) & self._kinds
-
-    def _signs(self, frame: Frame) -> set[ListKind]:
+    def look(self, frame: Frame, now_s: float) -> None:
+        """Suspect the lists that a frame of the vehicle says may have changed."""
         message = frame.message
+        signs = self._signs(message) & self._kinds
+        self.suspects |= signs
+        for kind in signs:
+            self._asked_for_s.pop(kind, None)
+        if isinstance(message, m.MissionRequest | m.MissionRequestInt) and not self._is_to_us(message):
+            asked_for = KINDS.get(message.mission_type)
+            if asked_for in self._kinds:
+                self._asked_for_s[asked_for] = now_s
+
+    def _is_to_us(self, message: m.MissionAck | m.MissionRequest | m.MissionRequestInt) -> bool:
+        return (message.target_system, message.target_component) == self._identity
+
+    def _signs(self, message: Message) -> set[ListKind]:
         if isinstance(message, m.MissionAck):
-            is_ours = (message.target_system, message.target_component) == self._identity
-            if is_ours or message.type != m.MissionResult.ACCEPTED:
+            if self._is_to_us(message) or message.type != m.MissionResult.ACCEPTED:
                 return set()
             kind = KINDS.get(message.mission_type)
             return set(ListKind) if message.mission_type == m.MissionType.ALL else {kind} if kind else set()

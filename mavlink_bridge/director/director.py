@@ -26,7 +26,6 @@ from mavlink_bridge.errors import OutcomeError, RefusedError
 from mavlink_bridge.protocol.command import SendCommand
 from mavlink_bridge.rover import AUTO_MODE, GUIDED_MODE, HOLD_MODE
 from missions.items import Command
-from missions.plan import plan as make_plan
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -34,8 +33,6 @@ if TYPE_CHECKING:
     from mavlink_bridge.director.orders import Orders
     from mavlink_bridge.director.steps import Step
     from mavlink_bridge.messages import Frame, Message
-    from missions.plan import Plan
-    from missions.request import Request
     from missions.situation import Situation
 
 _STILL_MPS = 0.3
@@ -53,17 +50,10 @@ class Director(RouteMaker):
         What it may do.
     situation : Situation, optional
         What is known beforehand (parameters of a file).
-    planner : callable, optional
-        Makes the plans; `missions.plan.plan` unless a test says otherwise.
     """
 
-    def __init__(
-        self,
-        orders: Orders,
-        situation: Situation | None = None,
-        planner: Callable[[Situation, Request], Plan] = make_plan,
-    ) -> None:
-        super().__init__(orders, situation, planner)
+    def __init__(self, orders: Orders, situation: Situation | None = None) -> None:
+        super().__init__(orders, situation)
         self.drive: DriveWatch | None = None
         self._operator = OperatorWatch()
         self._stopping: ModeSwitch | None = None  # our HOLD, while it is under way
@@ -104,7 +94,7 @@ class Director(RouteMaker):
             times.append(self._stopping.deadline_s)
         if self.state is State.HOLDING:
             times.append(self._standstill_due_s)
-        if self.state is State.PLANNING and not self._steps:
+        if self._planning_due or (self.state is State.HOLDING and self._is_outdated and not self._steps):
             times.append(-math.inf)
         if self.drive is not None:
             times.append(self.drive.progress_due_s)
@@ -116,11 +106,10 @@ class Director(RouteMaker):
             self._look_after_hold(now_s)
         if self.state is State.HOLDING:
             self._await_standstill(now_s)
-        elif self.state is State.PLANNING and not self._steps:
-            if self._is_outdated and self._changes is not None:
-                self._reread(self._changes.due(now_s, is_driving=False), now_s)
-            else:
-                self._plan_route(now_s)
+        if self.state is State.HOLDING:
+            self._reread_suspects(now_s)  # while it comes to rest
+        elif self.state is State.PLANNING:
+            self._go_on_planning(now_s)
         elif self.drive is not None and now_s >= self.drive.progress_due_s:
             self.drive.tell_progress(now_s)
 

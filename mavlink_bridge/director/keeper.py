@@ -88,7 +88,7 @@ class Keeper(Acquaintance):
     def _take_vehicle_frame(self, frame: Frame, now_s: float) -> None:
         super()._take_vehicle_frame(frame, now_s)
         if self._changes is not None:
-            self._changes.look(frame)
+            self._changes.look(frame, now_s)
             if self.state in _WRITING:  # it is we who change it, and it is read back
                 self._changes.suspects.discard(ListKind.MISSION)
 
@@ -98,6 +98,11 @@ class Keeper(Acquaintance):
             self._notice_grounds(now_s)
 
     # Reading again
+
+    def _reread_suspects(self, now_s: float) -> None:
+        """Read again what was changed, unless something is under way."""
+        if self._is_outdated and not self._steps and self._changes is not None:
+            self._reread(self._changes.due(now_s, is_driving=False), now_s)
 
     def _reread(self, kinds: set[ListKind], now_s: float) -> None:
         """Read again what somebody may have changed."""

@@ -1,7 +1,7 @@
 """Switching the vehicle's mode, and nothing against what it tells meanwhile.
 
 DO_SET_MODE may be lost, and so may its COMMAND_ACK; which mode the vehicle is in its HEARTBEAT tells for certain. HOLD is urgent: it is sent
-again every second. Any other mode is sent again only after a heartbeat that shows the vehicle where it was when we asked. Nothing is sent again
+again every half second. Any other mode is sent again only after a heartbeat that shows the vehicle where it was when we asked. Nothing is sent again
 once it was accepted, for what is shown afterwards is somebody else's doing; only where the answer may be that to a command of ours before, a
 heartbeat has to show it.
 """
@@ -19,11 +19,13 @@ if TYPE_CHECKING:
     from mavlink_bridge.messages import Frame
     from mavlink_bridge.protocol.peer import Peer
 
-_SEND_AGAIN_S = 1.0
+_HURRY_S = 0.5
+_PATIENCE_S = 8.0
 _SETTLE_S = 0.5
 """A heartbeat that comes sooner after a command may have been sent before it."""
 
-_MOST_SENDS = 8
+_MOST_SENDS = 16
+_HEARTBEAT_ID = 0.0
 
 
 class SwitchState(StrEnum):
@@ -84,7 +86,7 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
     mode : int
         HEARTBEAT.custom_mode.
     is_urgent : bool
-        Send it again every second until it is answered.
+        Send it again every half second until it is answered.
     until_seen : bool
         Send it again until a heartbeat shows it: the answer may be that to another command.
     """
@@ -118,7 +120,7 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
         """When `handle_timer` wants to be called."""
         if self.is_done or self.state is SwitchState.IDLE:
             return None
-        return self._sent_s + (_SEND_AGAIN_S if self._may_send_blindly else _MOST_SENDS * _SEND_AGAIN_S)
+        return self._sent_s + (_HURRY_S if self._may_send_blindly else _PATIENCE_S)
 
     def start(self, now_s: float) -> None:
         """Send the command."""
@@ -182,10 +184,14 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
 
 
 class AwaitHeartbeat:
-    """Waits for the vehicle's next heartbeat: what it tells is no older than our wish to act on it."""
+    """Asks for a heartbeat and waits for the vehicle's next: what it tells is no older than our wish to act on it.
+
+    One comes every second also unasked, so nothing is asked twice.
+    """
 
     def __init__(self, peer: Peer) -> None:
         self._peer = peer
+        self._outgoing: list[CommandLong] = []
         self.is_done = False
 
     @property
@@ -198,8 +204,12 @@ class AwaitHeartbeat:
         """Whether it is done, as steps."""
         return int(self.is_done), 1
 
-    def start(self, now_s: float) -> None:
-        """Begin."""
+    def start(self, _now_s: float) -> None:
+        """Ask."""
+        peer = self._peer
+        self._outgoing.append(
+            CommandLong(peer.system, peer.component, Command.REQUEST_MESSAGE, param1=_HEARTBEAT_ID)
+        )
 
     def receive(self, frame: Frame, _now_s: float) -> None:
         """Take a frame."""
@@ -209,5 +219,6 @@ class AwaitHeartbeat:
         """Take notice that time has passed."""
 
     def messages_to_send(self) -> list[CommandLong]:
-        """Give nothing: it only listens."""
-        return []
+        """Give and forget what is to be sent now."""
+        outgoing, self._outgoing = self._outgoing, []
+        return outgoing

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 _STALE_S = 1.5
 """For so long after a mode change was accepted a heartbeat may still show what was before."""
 
+_OVERTAKEN_S = 0.3
+"""For so long after our mode was first shown a heartbeat from before may still come: one that was overtaken on the way."""
+
 _ON_ITS_WAY_S = 0.5
 """What is overheard so soon after a target was typed may have been said before it."""
 
@@ -87,7 +90,7 @@ class OperatorWatch:
         self._was_armed = is_armed
         mode = heartbeat.custom_mode
         if mode == self._ours:
-            self._fading = frozenset()
+            self._fading_until_s = min(self._fading_until_s, now_s + _OVERTAKEN_S)
             return None
         is_stale = mode in self._fading and now_s <= self._fading_until_s
         if is_stale or self.is_late_click(heartbeat, now_s):

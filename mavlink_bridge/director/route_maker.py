@@ -11,6 +11,7 @@ from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.grounds import Grounds
 from mavlink_bridge.director.keeper import Keeper
 from mavlink_bridge.director.orders import Orders, TargetSource
+from mavlink_bridge.director.plan_task import PlanTask
 from mavlink_bridge.director.states import Cue, State
 from mavlink_bridge.director.targets import Target, TargetWatch
 from mavlink_bridge.errors import RefusedError
@@ -22,12 +23,9 @@ from missions.errors import MissionError
 from missions.geo import distance_m
 from missions.items import Command, last_place, with_home
 from missions.plan import asked_clearance
-from missions.plan import plan as make_plan
 from missions.recheck import recheck, straight_line
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from mavlink_bridge.errors import BridgeError
     from mavlink_bridge.messages import Frame
     from missions.geo import LatLon
@@ -61,20 +59,14 @@ class RouteMaker(Keeper):
         What it may do.
     situation : Situation, optional
         What is known beforehand (parameters of a file).
-    planner : callable, optional
-        Makes the plans; `missions.plan.plan` unless a test says otherwise.
     """
 
-    def __init__(
-        self,
-        orders: Orders,
-        situation: Situation | None = None,
-        planner: Callable[[Situation, Request], Plan] = make_plan,
-    ) -> None:
+    def __init__(self, orders: Orders, situation: Situation | None = None) -> None:
         super().__init__(orders, situation)
         self.upload_outcome: VerifiedUploadOutcome | None = None
         self.plan: Plan | None = None
-        self._planner = planner
+        self._task: PlanTask | None = None
+        self._made: Plan | MissionError | None = None
         self._targets = TargetWatch(orders.target_sources)
         self._answers = Answers(self._send)
         self._target: Target | None = None
@@ -94,6 +86,17 @@ class RouteMaker(Keeper):
         """The vehicle's old mission, while it waits to be stored; nothing is written before `backup_stored`."""
         upload = self._steps.current
         return upload.pending_backup if isinstance(upload, VerifiedUpload) else None
+
+    @property
+    def pending_plan(self) -> PlanTask | None:
+        """The plan that is waited for; nothing follows before `plan_made`."""
+        return self._task if self.state is State.PLANNING and self._made is None else None
+
+    def plan_made(self, task: PlanTask, made: Plan | MissionError, now_s: float) -> None:
+        """Take a plan, or why there is none; what is not waited for any more is left."""
+        if task is self.pending_plan:
+            self._made = made
+            self._go_on_planning(now_s)
 
     def take_target(self, position: LatLon, now_s: float) -> None:
         """Take a target that was typed."""
@@ -239,21 +242,45 @@ class RouteMaker(Keeper):
 
     # Plans
 
-    def _plan_route(self, now_s: float) -> None:
-        request = self._route_request()
-        self._planned_on = Grounds.of(self.situation)
-        try:
-            self.plan = self._planner(self.situation, request)
-        except MissionError as error:
+    def _move(self, event: Cue) -> bool:
+        has_moved = super()._move(event)
+        if has_moved:
+            self._forget_task()
+        return has_moved
+
+    def _forget_task(self) -> None:
+        self._task = self._made = None
+
+    @property
+    def _planning_due(self) -> bool:
+        """Whether there is something to do for the plan, but to wait for it."""
+        is_waiting = self.pending_plan is not None and not self._is_outdated
+        return self.state is State.PLANNING and not self._steps and not is_waiting
+
+    def _go_on_planning(self, now_s: float) -> None:
+        """Have a plan made around what is known by now, and go on with the one that was."""
+        if self._steps:
+            return
+        if self._is_outdated:
+            self._reread_suspects(now_s)
+        elif self._task is None:
+            self._planned_on = Grounds.of(self.situation)
+            self._task = PlanTask(self.situation, self._route_request())
+        elif self._made is not None:
+            self._take_plan(self._made, now_s)
+
+    def _take_plan(self, made: Plan | MissionError, now_s: float) -> None:
+        if isinstance(made, MissionError):
             self.plan = None
             self._answers.settle(m.MavResult.DENIED)
             self._move(Cue.NO_PLAN)
-            self._voice.no_plan(now_s, error)
-            self._give_up(error)
+            self._voice.no_plan(now_s, made)
+            self._give_up(made)
             return
+        self.plan = made
         self._move(Cue.PLANNED)
         self._answers.settle(m.MavResult.ACCEPTED)
-        self._voice.planned(now_s, self.plan)
+        self._voice.planned(now_s, made)
         self._go_on(now_s)
 
     def _route_request(self) -> Request:
@@ -273,6 +300,7 @@ class RouteMaker(Keeper):
         return recheck(replace(self.plan, vehicle=vehicle), self.situation, item)
 
     def _fence_changed(self, now_s: float) -> None:
+        self._forget_task()
         if self.state is State.READY and self._target is not None:
             self._cue_target(now_s, is_own_idea=True)
         if self.plan is None or self.state in _MAKING_A_ROUTE or self.state is State.ARRIVED:

@@ -15,6 +15,11 @@ class RoundTrip:
         self._least_s = math.inf
 
     @property
+    def is_known(self) -> bool:
+        """Whether one was measured."""
+        return self._least_s < math.inf
+
+    @property
     def least_s(self) -> float:
         """Shortest round-trip time so far, infinite before the first."""
         return self._least_s

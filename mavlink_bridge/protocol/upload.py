@@ -33,6 +33,9 @@ _ASKED_AGAIN_S = 0.9  # ArduPilot asks again after 1 s: so long after the usual 
 _QUEUE_S = 0.5  # so long an answer may be late before the link counts as full
 _PROBE_AFTER_S = 2.0  # it would have asked again by now
 _PROBE_END_AFTER_S = 1.2
+_SOON_S = 0.4
+"""The least of both where it is known how long answers take on this link."""
+
 _GIVEN_UP_AFTER_S = 6.0  # ArduPilot gives an upload up after 8 s; its messages may be late
 _LEAST_SETTLE_S = 0.03
 _MOST_SETTLE_S = 1.0
@@ -202,7 +205,8 @@ class Upload(TableMachine[UploadState, UploadEvent]):
         return self._rival_since_s is not None and now_s >= self._rival_since_s + self._rival_patience_s
 
     def _announce(self, now_s: float) -> None:
-        self._act_at_s = now_s + self._round_trip.timeout_s(_ANNOUNCE_AGAIN_S, 2 * _ANNOUNCE_AGAIN_S)
+        least_s = _SOON_S if self._round_trip.is_known else _ANNOUNCE_AGAIN_S
+        self._act_at_s = now_s + self._round_trip.timeout_s(least_s, 2 * _ANNOUNCE_AGAIN_S)
         self._send(
             messages.MissionCount(
                 self._peer.system, self._peer.component, len(self._messages), int(self._mission_type)
@@ -241,7 +245,10 @@ class Upload(TableMachine[UploadState, UploadEvent]):
     def _probe_after_s(self) -> float:
         """Give the silence that is worth a question: sooner when only the final word is missing."""
         at_end = self._wanted == len(self._messages) - 1
-        return max(_PROBE_END_AFTER_S, 2 * self._round_trip.mean_s) if at_end else _PROBE_AFTER_S
+        if not at_end:
+            return _PROBE_AFTER_S
+        least_s = _SOON_S if self._round_trip.is_known else _PROBE_END_AFTER_S
+        return max(least_s, 2 * self._round_trip.mean_s)
 
     def _keep_up(self, seq: int, now_s: float) -> None:
         """Follow the vehicle to a later item."""

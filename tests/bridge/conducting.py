@@ -7,13 +7,18 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.messages import Frame
 from mavlink_bridge.simulator.faults import Faults, FaultyLink
+from missions.plan import plan as make_plan
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from mavlink_bridge.director import Director, Event, EventName, State
+    from mavlink_bridge.director.plan_task import PlanTask
     from mavlink_bridge.messages import Message
     from mavlink_bridge.simulator import SimulatedVehicle
+    from missions.plan import Plan
+    from missions.request import Request
+    from missions.situation import Situation
 
 
 @dataclass
@@ -30,6 +35,9 @@ class Conductor:
     is_cut: bool = False
     is_started: bool = False
     meddle: Callable[[Conductor], None] | None = None
+    planner: Callable[[Situation, Request], Plan] = make_plan
+    planning_s: float = 0.0
+    _task: tuple[float, PlanTask] = (0.0, None)
 
     def __post_init__(self) -> None:
         self.up = FaultyLink(self.faults, 1)
@@ -58,6 +66,7 @@ class Conductor:
         if (old := self.director.pending_backup) is not None:
             self.backups.append(old)
             self.director.backup_stored(self.now_s)
+        self.make_plan()
         for message in self.director.messages_to_send():
             self.sent.append(message)
             self.up.push(Frame(*(self.director.identity or (245, 190)), message), self.now_s)
@@ -78,6 +87,14 @@ class Conductor:
         if self.meddle:
             self.meddle(self)
         self.now_s += 0.02
+
+    def make_plan(self) -> None:
+        """Make the plan that is waited for, once the time has passed that planning takes."""
+        task = self.director.pending_plan
+        if task is not self._task[1]:
+            self._task = (self.now_s + self.planning_s, task)
+        if task is not None and self.now_s >= self._task[0]:
+            self.director.plan_made(task, task.made(self.planner), self.now_s)
 
     def ground_station(self, message: Message) -> None:
         """Let a ground station send to the vehicles; the director hears it too, as on a shared radio."""

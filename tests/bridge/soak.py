@@ -124,6 +124,7 @@ class Soak:
             self._act()
 
     def _act(self) -> None:
+        self.run.planning_s = self.random.choice((0.0, 0.0, 0.5, 4.0))
         acts = (
             (self._type, 5), (self._click, 5), (self._change_fence, 3), (self._change_mission, 1),
             (self._take_over, 3), (self._disarm, 1), (self._cut, 2), (self._spoil, 2), (self._reboot, 1),

@@ -39,7 +39,7 @@ def conductor(*items: MissionItem) -> tuple[Conductor, SimulatedVehicle]:
         once=True,
         target_sources=frozenset(),
     )
-    return Conductor(Director(orders, planner=plan_tour), [vehicle]), vehicle
+    return Conductor(Director(orders), [vehicle], planner=plan_tour), vehicle
 
 
 def test_the_vehicles_own_mission_with_a_jump_a_delay_and_a_condition():

@@ -118,7 +118,15 @@ def test_a_journal_reads_back_as_written(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "text", ["", "no json\n", '{"journal": 7}\n', '{"journal": 1, "orders": {}}\n', "[]\n"]
+    "text",
+    [
+        "",
+        "no json\n",
+        '{"journal": 7}\n',
+        '{"journal": 1, "orders": {}}\n',
+        '{"journal": 2, "orders": {}}\n',
+        "[]\n",
+    ],
 )
 def test_what_is_no_journal_is_one_clear_error(tmp_path, text):
     path = tmp_path / "run.journal.jsonl"

@@ -55,6 +55,10 @@ def armings_sent(run: Conductor, since: int = 0) -> int:
     )
 
 
+def is_holding(message: m.Message) -> bool:
+    return isinstance(message, m.Heartbeat) and message.custom_mode == HOLD_MODE
+
+
 def wait(run: Conductor, seconds: float) -> None:
     until_s = run.now_s + seconds
     while run.now_s < until_s:
@@ -535,3 +539,50 @@ def test_it_drives_only_after_a_heartbeat_that_is_younger_than_the_upload():
     assert AUTO_MODE not in modes_sent(run)
     hearing_all(run)
     run.run_until(lambda: run.director.state is State.DRIVING, 5)
+
+
+def test_the_heartbeat_before_the_drive_is_asked_for():
+    run = ready(conductor())
+    arm(run)
+    run.director.take_target(FAR, run.now_s)
+    verified_s = run.run_until(run.happened(EventName.VERIFIED), 20)
+    assert run.run_until(lambda: AUTO_MODE in modes_sent(run), 5) - verified_s <= 0.2
+
+
+def test_hold_is_sent_again_each_half_second_until_it_is_answered():
+    run = driving(conductor())
+    wait(run, 6)
+    run.up.push = lambda _frame, _now_s: None
+    begun = len(run.sent)
+    run.director.take_target(NEAR, run.now_s)
+    wait(run, 1.9)
+    assert modes_sent(run, begun) == [HOLD_MODE] * 4
+
+
+def test_a_heartbeat_that_was_overtaken_is_no_takeover():
+    run = ready(conductor())
+    arm(run)
+    heard, push = [], run.down.push
+    run.down.push = lambda frame, now_s: (heard.append(frame), push(frame, now_s))
+    run.director.take_target(FAR, run.now_s)
+    run.run_until(lambda: AUTO_MODE in modes_sent(run), 20)
+    held = next(frame for frame in heard if is_holding(frame.message))
+    run.run_until(lambda: run.director.situation.mode == AUTO_MODE, 5)
+    run.director.receive(held, run.now_s + 0.1)
+    run.run_until(lambda: run.director.state is State.ARRIVED)
+
+
+def test_a_fence_whose_writing_is_never_confirmed_is_read_again_all_the_same():
+    """The word that somebody's list is accepted may be lost on its way to us: the vehicle asked for its items."""
+    run = driving(conductor())
+    receive = run.director.receive
+
+    def without_words(frame: m.Frame, now_s: float) -> None:
+        if not isinstance(frame.message, m.MissionAck | m.Statustext):
+            receive(frame, now_s)
+
+    run.director.receive = without_words
+    upload(run, m.MissionType.FENCE, fence_to_items(wall_across_the_route()))
+    run.director.receive = receive
+    written_s = run.now_s
+    assert run.run_until(run.happened(EventName.FENCE_CHANGED), 10) - written_s <= 2.0

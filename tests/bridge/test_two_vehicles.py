@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from mavlink_bridge import messages as m
+from mavlink_bridge.cli.live import PlanMaker
 from mavlink_bridge.director import Director, EventName, Orders, State
 from mavlink_bridge.link import Link, open_link
 from mavlink_bridge.simulator import SimulatedVehicle, Simulator, SimulatorConfig
@@ -65,6 +66,8 @@ class Ether:
         for system, one in self.directors.items():
             if one.pending_backup is not None:
                 one.backup_stored(self.now_s)
+            if (task := one.pending_plan) is not None:
+                one.plan_made(task, task.made(), self.now_s)
             for message in one.messages_to_send():
                 assert one.identity == (system, 195)
                 self.send(m.Frame(system, 195, message))
@@ -167,12 +170,15 @@ def hub():
 
 def serve(link: Link, one: Director, stop: threading.Event) -> None:
     """Do what the shell of `pbpp bridge` does."""
+    plans = PlanMaker(one)
 
     def step() -> None:
         if one.pending_backup is not None:
             one.backup_stored(time.time())
+        if (made := plans.take()) is not None:
+            one.plan_made(*made, time.time())
 
-    link.run(one, on_step=step, until=stop.is_set)
+    link.run(one, on_step=step, until=stop.is_set, longest_wait_s=plans.longest_wait_s)
 
 
 def test_two_bridges_over_sockets(hub):

@@ -18,6 +18,7 @@ from mavlink_bridge.messages import (
     MissionType,
 )
 from mavlink_bridge.protocol.peer import Peer
+from mavlink_bridge.protocol.round_trip import RoundTrip
 from mavlink_bridge.protocol.transitions import UploadState
 from mavlink_bridge.protocol.upload import Upload
 
@@ -40,6 +41,19 @@ def test_the_count_is_announced_and_repeated_until_an_answer_comes():
     script = push(3)
     assert script.sent == [MissionCount(1, 1, 3, 0)]
     assert script.pass_time(3.5) == [MissionCount(1, 1, 3, 0)] * 3
+
+
+def test_where_the_link_is_known_what_was_lost_is_noticed_sooner():
+    round_trip = RoundTrip()
+    round_trip.observe(0.2)
+    script = push(2, round_trip=round_trip)
+    assert script.pass_time(0.55) == []
+    assert script.pass_time(0.1) == [MissionCount(1, 1, 2, 0)]
+    script.hear(ask(0))
+    script.pass_time(0.2)
+    script.hear(ask(1))
+    assert not any(isinstance(message, MissionRequestList) for message in script.pass_time(0.35))
+    assert MissionRequestList(1, 1, 0) in script.pass_time(0.2)
 
 
 def test_silence_ends_it_unconfirmed():

@@ -16,6 +16,6 @@ html_theme_options = {"top_of_page_buttons": []}
 myst_enable_extensions = ["colon_fence"]
 myst_heading_anchors = 3
 autodoc_typehints = "none"
-# Links into the repository: a test checks every relative link. Mermaid is drawn by the forges that show the pages.
+# Links into the repository: a test checks every relative link.
 # Errors of the same name in two packages are told apart by their module.
-suppress_warnings = ["myst.xref_missing", "misc.highlighting_failure", "ref.python"]
+suppress_warnings = ["myst.xref_missing", "ref.python"]

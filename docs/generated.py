@@ -1,12 +1,13 @@
-"""The parts of the documentation that are made from the code: `python docs/generated.py` brings them up to date.
+"""The parts and pictures of the documentation that are made from the code: `python docs/generated.py` brings them up to date.
 
-A part stands between ``<!-- made: NAME -->`` and ``<!-- end -->``; a test checks that each is as the code says.
+A part stands between ``<!-- made: NAME -->`` and ``<!-- end -->``; a test checks that each, and each picture, is as the code says.
 """
 
 from __future__ import annotations
 
 import inspect
 import re
+import sys
 from collections import defaultdict
 from functools import partial
 from pathlib import Path
@@ -23,6 +24,9 @@ from missions.vehicle.px4 import px4_vehicle
 from missions.vehicle.reader import ParameterReader
 
 DOCS = Path(__file__).parent
+sys.path.insert(0, str(DOCS))
+from state_picture import draw, lanes  # noqa: E402 - beside this file
+
 _PART = re.compile(r"(<!-- made: ([a-z0-9-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
@@ -35,17 +39,14 @@ def event_table() -> str:
     return "\n".join(["| event | severity | data |", "|---|---|---|", *rows])
 
 
-def director_diagram() -> str:
-    """Give the director's state diagram, in Mermaid's language."""
-    lines = ["```mermaid", "stateDiagram-v2", "    [*] --> listening"]
-    for state, row in TRANSITIONS.items():
-        cues = defaultdict(list)
-        for cue, after in row.items():
-            cues[after].append(str(cue))
-        lines += [f"    {state} --> {after}: {', '.join(names)}" for after, names in cues.items()]
-        if not row:
-            lines.append(f"    {state} --> [*]")
-    return "\n".join([*lines, "```"])
+def director_table() -> str:
+    """Give the director's transitions as a table, in the order of the picture."""
+    few, many = lanes(TRANSITIONS)
+    rows = [
+        f"| `{lane.cue}` | {', '.join(f'`{state}`' for state in lane.begins)} | `{lane.end}` |"
+        for lane in (*few, *many)
+    ]
+    return "\n".join(["| cue | in | leads to |", "|---|---|---|", *rows])
 
 
 def commands() -> str:
@@ -157,11 +158,18 @@ def _planners(case: str) -> str:
 PARTS = {
     "bridge-events": event_table,
     "commands": commands,
-    "director-states": director_diagram,
+    "director-states": director_table,
     "exit-codes": exit_codes,
     "parameters": parameters,
     "planners-100": partial(_planners, "rand100"),
     "planners-1000": partial(_planners, "rand1000"),
+}
+
+
+PICTURES = {
+    "figures/states-director.svg": partial(
+        draw, TRANSITIONS, "The states of the live bridge, and what leads from one to another"
+    ),
 }
 
 
@@ -174,3 +182,5 @@ if __name__ == "__main__":
     for page in sorted(DOCS.rglob("*.md")):
         text = page.read_text(encoding="utf-8")
         page.write_text(renewed(text), encoding="utf-8")
+    for name, picture in PICTURES.items():
+        (DOCS / name).write_text(picture(), encoding="utf-8", newline="\n")

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import importlib.util
 import re
+from collections import Counter
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import pytest
 
+from mavlink_bridge.director import TRANSITIONS
+
 DOCS = Path(__file__).parents[1] / "docs"
+SVG = "{http://www.w3.org/2000/svg}"
 
 
 @pytest.fixture(scope="module")
@@ -28,6 +33,22 @@ def test_made_parts_are_up_to_date(generated, page):
 def test_every_part_stands_somewhere(generated):
     text = "".join(page.read_text(encoding="utf-8") for page in DOCS.rglob("*.md"))
     assert all(f"<!-- made: {name} -->" in text for name in generated.PARTS)
+
+
+def test_made_pictures_are_up_to_date(generated):
+    assert generated.PICTURES
+    for name, picture in generated.PICTURES.items():
+        assert (DOCS / name).read_text(encoding="utf-8") == picture()
+
+
+def test_the_directors_picture_shows_every_transition(generated):
+    svg = ET.parse(DOCS / "figures" / "states-director.svg").getroot()
+    texts = [node.text for node in svg.iter(f"{SVG}text")]
+    transitions = [(state, cue, after) for state, row in TRANSITIONS.items() for cue, after in row.items()]
+    assert len(list(svg.iter(f"{SVG}circle"))) == len(transitions)
+    assert texts[: len(TRANSITIONS)] == [state.replace("_", " ") for state in TRANSITIONS]
+    cues = Counter(cue.replace("_", " ") for cue, _ in {(cue, after) for _, cue, after in transitions})
+    assert Counter(texts[len(TRANSITIONS) :]) == cues
 
 
 PAGES = sorted([*DOCS.rglob("*.md"), *DOCS.parent.glob("*.md"), *DOCS.parent.glob("sitl_logs/*.md")])

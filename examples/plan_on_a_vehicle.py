@@ -4,6 +4,7 @@
 import sys
 
 from mavlink_bridge import Director, Orders, open_link
+from mavlink_bridge.link import now_s
 from missions import Plan, Request
 from missions.geo import parse_lat_lon
 
@@ -12,8 +13,13 @@ def plan_to(connection: str, target: str) -> Plan:
     """Give the plan; what goes wrong is raised as a BridgeError or MissionError."""
     orders = Orders(identity=(245, 190), request=Request(targets=(parse_lat_lon(target),)), once=True)
     director = Director(orders)
+
+    def step() -> None:
+        if (task := director.pending_plan) is not None:  # made in between; the bridge has a thread for it
+            director.plan_made(task, task.made(), now_s())
+
     with open_link(connection, orders.identity) as link:
-        link.run(director)
+        link.run(director, on_step=step)
     if director.trouble is not None:
         raise director.trouble
     return director.plan

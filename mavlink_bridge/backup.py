@@ -13,12 +13,13 @@ import math
 import os
 import re
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mavlink_bridge.errors import BackupError
 from mavlink_bridge.messages import MissionType
+from mavlink_bridge.user_folders import state_folder
 from missions.items import MissionItem
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ class BackupStore:
     """
 
     def __init__(self, folder: Path | None = None) -> None:
-        self.folder = folder or _state_folder()
+        self.folder = folder or state_folder() / "backups"
 
     def keep(self, system: int, mission_type: MissionType, items: Sequence[MissionItem]) -> Path:
         """Write a backup; give its path once it is safe on disk.
@@ -75,6 +76,8 @@ class BackupStore:
             It cannot be written; nothing should be uploaded then.
         """
         now = datetime.now(UTC)
+        while (path := self._backup(system, mission_type, now)).exists():  # clocks may be coarse
+            now += timedelta(microseconds=1)
         content = {
             "format": _FORMAT,
             "time": now.isoformat(),
@@ -83,8 +86,6 @@ class BackupStore:
             "items": [_item_to_json(item) for item in items],
         }
         content["sha256"] = _checksum(content)
-        stamp = now.strftime("%Y%m%dT%H%M%S.%fZ")
-        path = self.folder / f"system-{system}-{mission_type.name.lower()}-{stamp}.json"
         self._write(path, content)
         for old in self._paths(system, mission_type)[:-_KEPT_BACKUPS]:
             old.unlink(missing_ok=True)
@@ -148,6 +149,9 @@ class BackupStore:
             return []
         return sorted(path for path in self.folder.glob(f"{prefix}*.json") if _NAME.fullmatch(path.name))
 
+    def _backup(self, system: int, mission_type: MissionType, time: datetime) -> Path:
+        return self.folder / f"system-{system}-{mission_type.name.lower()}-{time:%Y%m%dT%H%M%S.%fZ}.json"
+
     def _note(self, system: int, mission_type: MissionType) -> Path:
         return self.folder / f"upload-under-way-system-{system}-{mission_type.name.lower()}.json"
 
@@ -195,12 +199,6 @@ def read_backup(path: Path) -> Backup:
     if claimed != _checksum(content):
         raise BackupError(f"the backup {path} is damaged: its checksum does not match", path=str(path))
     return backup
-
-
-def _state_folder() -> Path:
-    import platformdirs  # noqa: PLC0415 - only where something is stored
-
-    return Path(platformdirs.user_state_dir("pbpp-rover", appauthor=False)) / "backups"
 
 
 def _checksum(content: dict[str, Any]) -> str:

@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from mavlink_bridge.cli.failing import ExitCode, drop_stdout, report, report_defect, says_no_colour
+from mavlink_bridge.cli.failing import (
+    ExitCode,
+    drop_stdout,
+    is_reader_gone,
+    report,
+    report_defect,
+    says_no_colour,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -89,9 +96,9 @@ def _exit_code(run: Any, words: list[str]) -> int:  # noqa: ANN401 - a function 
     except typer.Abort:
         report(command, "Interrupted", "aborted", ExitCode.INTERRUPTED, wants_json=wants_json)
         return ExitCode.INTERRUPTED
-    except BrokenPipeError:
-        return drop_stdout()
     except Exception as error:  # noqa: BLE001 - the last place where one can be told
+        if is_reader_gone(error):
+            return drop_stdout()
         if getattr(error, "exit_code", None) == ExitCode.USAGE and hasattr(error, "format_message"):
             _report_usage(error, command, wants_json=wants_json)
             return ExitCode.USAGE

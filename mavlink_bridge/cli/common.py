@@ -18,6 +18,7 @@ from mavlink_bridge.cli.failing import (
     begin_telling,
     drop_stdout,
     exit_code_of,
+    is_reader_gone,
     print_json,
     report,
     report_defect,
@@ -44,6 +45,7 @@ __all__ = [
     "TimeoutOption",
     "exit_code_of",
     "guarded",
+    "is_same_file",
     "print_json",
     "progress_bar",
     "warn",
@@ -155,9 +157,9 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
             raise typer.Exit(ExitCode.INTERRUPTED) from None
         except (typer.Exit, typer.Abort, typer.BadParameter):
             raise
-        except BrokenPipeError:
-            raise typer.Exit(drop_stdout()) from None
         except Exception as error:
+            if is_reader_gone(error):
+                raise typer.Exit(drop_stdout()) from None
             if isinstance(error, OSError) and error.filename is not None:
                 message = f"{error.filename}: {error.strerror or error}"
                 report(name, "FileError", message, ExitCode.INPUT, wants_json=wants_json)
@@ -175,6 +177,11 @@ def warn(texts: Iterable[str]) -> None:
         if text not in told:
             told.add(text)
             say(f"warning: {text}", typer.colors.YELLOW)
+
+
+def is_same_file(one: Path, other: Path) -> bool:
+    """Tell whether two paths lead to one file that is there, however they are written: Windows and macOS heed no capitals."""
+    return one.exists() and other.exists() and one.samefile(other)
 
 
 @contextmanager

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mavlink_bridge.cli.common import JsonOption, QuietOption, print_json, warn
+from mavlink_bridge.cli.common import JsonOption, QuietOption, is_same_file, print_json, warn
 from mavlink_bridge.errors import UsageError
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def convert(
     """
     from missions.formats import parts_of, read_situation, write_situation  # noqa: PLC0415 - quick help
 
-    if source.exists() and output.exists() and output.samefile(source):
+    if is_same_file(source, output):
         raise UsageError(f"{output} would be written over what it is made of; give another OUT")
     part = _part(only)
     situation = _with_return_point(read_situation(source), return_point)

@@ -6,6 +6,7 @@ import os
 import platform
 import sys
 import tempfile
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -131,11 +132,10 @@ def _ports() -> Iterator[_Finding]:
 
 
 def _permission_advice(device: Path) -> str:
-    try:
-        group = device.group()
-    except (KeyError, OSError):
-        return f"ask the administrator for access to {device}"
-    return f"sudo usermod -aG {group} $USER, then log in anew"
+    if sys.platform.startswith("linux"):  # elsewhere there is no such command, or no such group
+        with suppress(KeyError, OSError):
+            return f"sudo usermod -aG {device.group()} $USER, then log in anew"
+    return f"ask the administrator for access to {device}"
 
 
 def _options() -> Iterator[_Finding]:

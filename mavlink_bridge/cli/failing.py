@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
@@ -17,6 +18,8 @@ import typer
 
 from mavlink_bridge import errors as bridge_errors
 from missions import errors as mission_errors
+
+_IS_WINDOWS = os.name == "nt"
 
 
 class ExitCode(IntEnum):
@@ -99,6 +102,19 @@ def exit_code_of(error: Exception) -> ExitCode:
 def says_no_colour() -> bool:
     """Tell whether the user wants no colour (https://no-color.org), or the terminal has none."""
     return bool(os.environ.get("NO_COLOR")) or os.environ.get("TERM") == "dumb"
+
+
+def is_reader_gone(error: Exception) -> bool:
+    """Tell whether nobody reads the standard output any more; Windows calls that an invalid argument."""
+    if isinstance(error, BrokenPipeError):
+        return True
+    if not _IS_WINDOWS or not isinstance(error, OSError) or error.errno != errno.EINVAL:
+        return False
+    try:
+        sys.stdout.flush()  # what could not be written is still there
+    except OSError:
+        return True
+    return False
 
 
 def drop_stdout() -> int:

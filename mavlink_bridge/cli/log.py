@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 Row = TypeVar("Row")
 _MOST_ROWS = 40
+_EPOCH = dt.datetime(1970, 1, 1, tzinfo=dt.UTC)
 _UNION_BIT = 2
 """FENCE_OPTIONS: inside one inclusion is enough."""
 
@@ -144,12 +145,15 @@ def _print(book: Logbook) -> None:
 
 
 def _length(book: Logbook) -> str:
-    begin = (
-        f" from {dt.datetime.fromtimestamp(book.begins_s, dt.UTC):%Y-%m-%d %H:%M:%S} UTC"
-        if book.has_timestamps
-        else ", raw: without times of its own"
-    )
+    begin = f" from {_date(book.begins_s)}" if book.has_timestamps else ", raw: without times of its own"
     return f"{_duration(book.duration_s)}{begin}, {book.damage.frames} messages"
+
+
+def _date(time_s: float) -> str:
+    try:
+        return f"{_EPOCH + dt.timedelta(seconds=time_s):%Y-%m-%d %H:%M:%S} UTC"
+    except OverflowError:
+        return f"{time_s:.4g} s after 1970, by a clock that was wrong"
 
 
 def _senders(book: Logbook) -> Table:

@@ -11,6 +11,8 @@ from typing import Any
 
 import typer
 
+from mavlink_bridge.user_folders import config_folder
+
 FILE_NAME = "pbpp.toml"
 FOR_ALL = "all"
 DARING = ("upload", "drive", "arm", "replace_active", "hold", "restore")
@@ -19,9 +21,7 @@ DARING = ("upload", "drive", "arm", "replace_active", "hold", "restore")
 
 def user_file() -> Path:
     """Give the path of the user's options, whether there are any or not."""
-    import platformdirs  # noqa: PLC0415 - quick help
-
-    return platformdirs.user_config_path("pbpp-rover", appauthor=False) / FILE_NAME
+    return config_folder() / FILE_NAME
 
 
 def is_there(path: Path) -> bool:
@@ -47,7 +47,9 @@ def read_tables(path: Path) -> dict[str, dict[str, Any]]:
     except OSError as error:
         raise typer.BadParameter(f"{path} cannot be read: {error.strerror}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise typer.BadParameter(f"{path}: not TOML: {error}") from None
+        is_escape = "'\\'" in str(error) or "hex" in str(error)
+        hint = "; in TOML a path with \\ stands in 'single quotes'" if is_escape else ""
+        raise typer.BadParameter(f"{path}: not TOML: {error}{hint}") from None
     for name, table in document.items():
         if not isinstance(table, dict):
             raise typer.BadParameter(

@@ -19,6 +19,7 @@ from mavlink_bridge.cli.common import (
     SourceSystemOption,
     SystemOption,
     TimeoutOption,
+    is_same_file,
     print_json,
     warn,
 )
@@ -264,7 +265,7 @@ def _check_options(
         raise UsageError("--upload and --drive need a live link: --connect CONNECTION")
     for path in outputs:
         check_writable_format(path)
-        if path.suffix != ".plan" and fence is not None and path.resolve() == fence.resolve():
+        if path.suffix.lower() != ".plan" and fence is not None and is_same_file(path, fence):
             raise UsageError(f"-o {path} would overwrite the fence with a mission")
     for path in (*outputs, *plots):
         if not path.parent.is_dir():

@@ -73,8 +73,9 @@ def sim(
     except LinkError as error:
         raise typer.BadParameter(str(error), param_hint="--listen") from None
     with simulator:
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, lambda *_: stop.set())
+        for name in ("SIGINT", "SIGTERM", "SIGBREAK"):  # the last is Ctrl-Break on Windows
+            if hasattr(signal, name):
+                signal.signal(getattr(signal, name), lambda *_: stop.set())
         if json_output:
             print_json({"status": "ok", "command": "sim", "connection": simulator.connection})
         else:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import selectors
 import socket
 import threading
@@ -150,7 +151,7 @@ class Simulator:
             if self._kind == "udpout":
                 self._peer(self._address)
             else:
-                if self._kind == "tcpin":
+                if self._kind == "tcpin" and os.name == "posix":  # Windows would share a port that is in use
                     self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
                 self._socket.bind(self._address)
                 self._address = self._socket.getsockname()[:2]

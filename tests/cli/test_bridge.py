@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 
+import processes
 import pytest
 from typer.testing import CliRunner
 
@@ -47,7 +48,12 @@ def start_bridge(connection: str, *arguments: str) -> subprocess.Popen:
         *arguments,
     ]
     return subprocess.Popen(
-        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        command,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        **processes.APART,
     )
 
 
@@ -161,11 +167,11 @@ def test_options_from_a_file(config, tmp_path):
     assert run("bridge", "--config", str(tmp_path / "none.toml")).exit_code == 2
 
 
-def test_ends_cleanly_on_sigterm(config):
+def test_ends_cleanly_when_asked(config):
     with Simulator(config, "tcpin:127.0.0.1:0") as simulator:
         process = start_bridge(simulator.connection)
         wait_for(process, "learnt")
-        process.terminate()
+        processes.end(process)
         output, errors = process.communicate(timeout=10)
     assert process.returncode == 130
     assert "Traceback" not in errors

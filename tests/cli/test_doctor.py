@@ -5,7 +5,9 @@ from __future__ import annotations
 import importlib.util
 import json
 import os
+import shutil
 import subprocess
+import sysconfig
 from importlib import metadata
 from pathlib import Path
 from types import SimpleNamespace
@@ -91,6 +93,7 @@ class TestDoctor:
         found = findings()["test plan"]
         assert (found["verdict"], found["found"]) == ("wrong", "OSError: no such library")
 
+    @pytest.mark.skipif(os.name != "posix", reason="Windows does not say who may use a port")
     def test_ports_and_who_may_use_them(self, monkeypatch):
         ports = [
             SimpleNamespace(device="/dev/ttyACM0", description="Pixhawk"),
@@ -104,6 +107,7 @@ class TestDoctor:
         assert refused["verdict"] == "wrong"
         assert "/dev/ttyUSB9" in refused["advice"]
 
+    @pytest.mark.skipif(os.name != "posix", reason="Windows has other permissions")
     def test_a_signing_key_that_others_may_read(self, tmp_path):
         key = tmp_path / "rover.key"
         key.write_bytes(bytes(range(1, 33)))
@@ -212,8 +216,13 @@ class TestConfig:
 
 def test_completion_is_offered_for_three_shells(tmp_path, monkeypatch):
     """As the shells ask for it: `--show-completion` gives a script, and the script's question is answered."""
-    environment = {**os.environ, "HOME": str(tmp_path), "_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"}
-    pbpp = Path(os.sys.executable).with_name("pbpp")
+    environment = {
+        **os.environ,
+        "HOME": str(tmp_path),
+        "USERPROFILE": str(tmp_path),
+        "_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1",
+    }
+    pbpp = shutil.which("pbpp", path=sysconfig.get_path("scripts"))
     for shell in ("bash", "zsh", "fish"):
         shown = subprocess.run(
             [pbpp, "--show-completion", shell], env=environment, capture_output=True, text=True, check=True

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 import re
-import signal
 import subprocess
 import sys
 from dataclasses import replace
 
+import processes
 import pytest
 from typer.testing import CliRunner
 
@@ -118,10 +118,13 @@ def test_drives_only_a_vehicle_that_is_armed(config):
     assert "not armed" in document["message"]
 
 
-def test_sim_says_where_it_listens_and_ends_on_sigterm(fields):
+def test_sim_says_where_it_listens_and_ends_when_asked(fields):
     arguments = ["sim", "--listen", "tcpin:127.0.0.1:0", "--fence", str(fields / "maze-fence.waypoints")]
     with subprocess.Popen(
-        [sys.executable, "-m", "mavlink_bridge.cli", *arguments], stdout=subprocess.PIPE, text=True
+        [sys.executable, "-m", "mavlink_bridge.cli", *arguments],
+        stdout=subprocess.PIPE,
+        text=True,
+        **processes.APART,
     ) as process:
         try:
             line = process.stdout.readline()
@@ -132,7 +135,7 @@ def test_sim_says_where_it_listens_and_ends_on_sigterm(fields):
             )
             assert json.loads(result.stdout)["verified"] is True
         finally:
-            process.send_signal(signal.SIGTERM)
+            processes.end(process)
         assert process.wait(10) == 0
 
 

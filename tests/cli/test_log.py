@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
-from logbook.making import FIELD, Log
+from logbook.making import BEGIN_S, FIELD, Log
 from typer.testing import CliRunner
 
 from mavlink_bridge.cli.app import app
@@ -110,6 +110,18 @@ def test_strange_names_and_clocks_are_told_plainly(tmp_path):
     assert "[bold]odd.tlog" in result.stdout
     assert "clock was set 1 times" in result.stdout
     assert "Damage passed over" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("begins_s", "told"), [(3.3e10, "3015-09-24 10:40:00 UTC"), (2.6e11, "2.6e+11 s after 1970")]
+)
+def test_a_clock_that_was_far_off_is_told_too(tmp_path, begins_s, told):
+    """Some systems know no dates after the year 3000, Python none after 9999."""
+    log = Log(now_s=begins_s - BEGIN_S)
+    log.heartbeat()
+    result = run(str(log.write(tmp_path / "odd.tlog")))
+    assert result.exit_code == 0
+    assert told in result.stdout
 
 
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".html"])

@@ -8,6 +8,7 @@ import shutil
 import socket
 import subprocess
 import sys
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import pytest
@@ -488,11 +489,15 @@ class TestColour:
         environment = {name: value for name, value in os.environ.items() if name not in ("NO_COLOR", "TERM")}
         command = [sys.executable, "-m", "mavlink_bridge.cli", "plan", "--fence", "missing.waypoints"]
         environment |= {"PYTHONPATH": os.pathsep.join(sys.path), "TERM": "xterm", **more}
-        subprocess.run(command, stderr=theirs, env=environment, timeout=60, check=False)
+        process = subprocess.Popen(command, stderr=theirs, env=environment)
         os.close(theirs)
-        text = os.read(ours, 4096).decode()
+        data = b""
+        with suppress(OSError):  # how Linux tells the end
+            while more := os.read(ours, 4096):
+                data += more
         os.close(ours)
-        return text
+        process.wait()
+        return data.decode()
 
     def test_on_a_terminal(self):
         assert "\x1b[31merror" in self.on_a_terminal()

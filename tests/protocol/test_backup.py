@@ -102,6 +102,21 @@ def test_after_an_interruption_the_older_backup_counts(tmp_path):
     assert len(store.newest(1, MISSION).items) == 6
 
 
+def test_two_backups_within_a_tick_of_the_clock_are_both_kept(tmp_path, monkeypatch):
+    """Windows' clock ticks every 16 ms before Python 3.13."""
+
+    class Coarse(datetime):
+        @classmethod
+        def now(cls, tz=None):
+            return cls(2026, 11, 22, 12, tzinfo=tz)
+
+    monkeypatch.setattr("mavlink_bridge.backup.datetime", Coarse)
+    store = BackupStore(tmp_path)
+    kept = [store.keep(1, MISSION, plain_mission(count)) for count in (4, 5, 6)]
+    assert [len(read_backup(path).items) for path in kept] == [4, 5, 6]
+    assert store.newest(1, MISSION).path == kept[-1]
+
+
 @pytest.mark.parametrize("note", ["", "[]", '{"time": 1}', '{"backup": 5}'])
 def test_an_unreadable_note_is_said(tmp_path, note):
     store = BackupStore(tmp_path)

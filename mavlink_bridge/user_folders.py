@@ -1,0 +1,28 @@
+"""Where a user's own files lie: the options and the backups."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+_NAME = "pbpp-rover"
+
+
+def config_folder() -> Path:
+    """Give the folder of the user's options: below ``XDG_CONFIG_HOME`` if that is set, else where the system keeps such files."""
+    import platformdirs  # noqa: PLC0415 - quick help
+
+    return _below("XDG_CONFIG_HOME") or platformdirs.user_config_path(_NAME, appauthor=False)
+
+
+def state_folder() -> Path:
+    """Give the folder of what is kept between runs: below ``XDG_STATE_HOME`` if that is set, else where the system keeps such files."""
+    import platformdirs  # noqa: PLC0415 - only where something is stored
+
+    return _below("XDG_STATE_HOME") or platformdirs.user_state_path(_NAME, appauthor=False)
+
+
+def _below(variable: str) -> Path | None:
+    """Give our folder below the one that a variable names: on Windows and macOS too, where nothing else heeds it."""
+    place = Path(os.environ.get(variable, "").strip())
+    return place / _NAME if place.is_absolute() else None

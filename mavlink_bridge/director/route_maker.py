@@ -2,33 +2,29 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from mavlink_bridge import messages as m
-from mavlink_bridge.director.answers import Answers, is_command_to
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.grounds import Grounds
-from mavlink_bridge.director.keeper import Keeper
-from mavlink_bridge.director.orders import Orders, TargetSource
 from mavlink_bridge.director.plan_task import PlanTask
 from mavlink_bridge.director.states import Cue, State
-from mavlink_bridge.director.targets import Target, TargetWatch
-from mavlink_bridge.errors import RefusedError
+from mavlink_bridge.director.target_taker import TargetTaker
 from mavlink_bridge.outcomes import upload_trouble
 from mavlink_bridge.protocol.limits import Limits
 from mavlink_bridge.protocol.verified_upload import VerifiedUpload, VerifiedUploadOutcome
 from mavlink_bridge.rover import AUTO_MODE
 from missions.errors import MissionError
-from missions.geo import distance_m
-from missions.items import Command, last_place, with_home
+from missions.items import with_home
 from missions.plan import asked_clearance
-from missions.recheck import recheck, straight_line
+from missions.recheck import recheck
 
 if TYPE_CHECKING:
+    from mavlink_bridge.director.orders import Orders
     from mavlink_bridge.errors import BridgeError
     from mavlink_bridge.messages import Frame
-    from missions.geo import LatLon
     from missions.items import MissionItem
     from missions.plan import Plan
     from missions.recheck import Recheck
@@ -38,19 +34,13 @@ if TYPE_CHECKING:
 FRESH_S = 1.5
 """How old a heartbeat may be to tell what the vehicle does now."""
 
-_NOT_NOW = frozenset({State.LISTENING, State.LEARNING, State.LOST, State.UPLOADING, State.WITHDRAWING})
-"""States that have to end before another target is gone into."""
-
 _MAKING_A_ROUTE = frozenset({State.HOLDING, State.PLANNING})
 """States whose plan is yet to come: it is made around the fence as it is then."""
 
-
 _ON_OUR_MISSION = frozenset({State.VERIFIED, State.STARTING, State.DRIVING})
 
-_SAME_M = 0.2
 
-
-class RouteMaker(Keeper):
+class RouteMaker(TargetTaker):
     """Takes targets to verified missions.
 
     Parameters
@@ -67,14 +57,9 @@ class RouteMaker(Keeper):
         self.plan: Plan | None = None
         self._task: PlanTask | None = None
         self._made: Plan | MissionError | None = None
-        self._targets = TargetWatch(orders.target_sources)
-        self._answers = Answers(self._send)
-        self._target: Target | None = None
-        self._waiting_target: Target | None = None
-        self._listed: dict[TargetSource, LatLon | None] = {}
         self._planned_on = Grounds.of(self.situation)
         self._is_own_idea = (
-            False  # the route is made anew because the one before broke, not because somebody asked
+            False  # the route is made because the one before broke, not because somebody asked
         )
         self._ours: tuple[MissionItem, ...] | None = None  # the mission that is on the vehicle by us
         self._confirmed = False
@@ -98,11 +83,6 @@ class RouteMaker(Keeper):
             self._made = made
             self._go_on_planning(now_s)
 
-    def take_target(self, position: LatLon, now_s: float) -> None:
-        """Take a target that was typed."""
-        self._targets.take(position, now_s)
-        self._take_target(Target(position, TargetSource.TYPED), now_s)
-
     def confirm(self, now_s: float) -> None:
         """Take the operator's yes to the plan that stands; a yes to none is forgotten."""
         if self.state is State.PROPOSED:
@@ -117,87 +97,12 @@ class RouteMaker(Keeper):
 
     def receive(self, frame: Frame, now_s: float) -> None:
         """Take a frame."""
-        super().receive(self._as_to_vehicle(frame), now_s)
+        super().receive(frame, now_s)
         old = self.pending_backup
         if old is not None and self._is_own_idea and self._ours is not None and old[1:] != self._ours[1:]:
             self._drop_steps()  # nothing was written yet
             self._move(Cue.TROUBLE)
             self._mission_taken_over(len(old), now_s)
-
-    # Targets
-
-    def _as_to_vehicle(self, frame: Frame) -> Frame:
-        """Take a command to our own system for one to the vehicle's, whose place it asks for."""
-        peer, message = self._peer, frame.message
-        if peer is None or peer.own_system == peer.system or self.identity is None:
-            return frame
-        if not is_command_to(frame, self.identity, peer.own_system):
-            return frame
-        assert isinstance(message, m.CommandInt | m.CommandLong)
-        return replace(frame, message=replace(message, target_system=peer.system))
-
-    def _take_any_frame(self, frame: Frame, before: Situation, now_s: float) -> None:
-        super()._take_any_frame(frame, before, now_s)
-        if self.identity is None:
-            return
-        target = self._targets.look(frame, before, self.situation, now_s, self.identity)
-        is_to_us = is_command_to(frame, self.identity, self.situation.system)
-        if target is None:
-            if is_to_us:
-                self._refuse_command(frame, now_s)
-        elif not target.is_again:
-            self._take_target(target, now_s)
-        elif is_to_us:
-            self._answers.repeat(frame)
-        else:
-            self._take_again(target, now_s)
-
-    def _refuse_command(self, frame: Frame, now_s: float) -> None:
-        """Answer a command to our own component that asks for no place we could take the vehicle to."""
-        message = frame.message
-        assert isinstance(message, m.CommandInt | m.CommandLong)
-        if message.command != Command.DO_REPOSITION:
-            self._answers.refuse(frame, m.MavResult.UNSUPPORTED)
-            return
-        self._answers.refuse(frame, m.MavResult.DENIED)
-        is_heeded = TargetSource.REPOSITION in self.orders.target_sources
-        why = "it names no place" if is_heeded else "targets by reposition are not heeded"
-        self._voice.error(now_s, EventName.TROUBLE, RefusedError(f"DO_REPOSITION denied: {why}"), {})
-
-    def _take_target(self, target: Target, now_s: float) -> None:
-        if self.state in _NOT_NOW:
-            self._waiting_target = target
-            self._stop_at_once(target, now_s)
-            return
-        self._target = target
-        self._voice.tell(
-            now_s,
-            EventName.TARGET,
-            f"target {target.position} by {target.source}",
-            list(target.position),
-            str(target.source),
-        )
-        self._answers.begin(target)
-        if not self.orders.drive:
-            self._warn_of_straight_line(target, now_s)
-        self._cue_target(now_s)
-
-    def _take_waiting_target(self, now_s: float) -> bool:
-        """Go into a target that came at an inconvenient time, if one did."""
-        target, self._waiting_target = self._waiting_target, None
-        if target is not None:
-            self._take_target(target, now_s)
-        return target is not None
-
-    def _warn_of_straight_line(self, target: Target, now_s: float) -> None:
-        """Warn at once: a go-to click makes the vehicle drive straight, before any plan exists."""
-        if not self.situation.armed or not self._sets_it_going(target):
-            return
-        found = straight_line(self.situation, self.orders.request, target.position)
-        if found is not None and not found.holds:
-            self._voice.rechecked(
-                now_s, EventName.STRAIGHT_LINE_UNSAFE, "the straight line to the target", found
-            )
 
     def _cue_target(self, now_s: float, *, is_own_idea: bool = False) -> None:
         self._is_own_idea = is_own_idea
@@ -207,38 +112,6 @@ class RouteMaker(Keeper):
         elif self._move(Cue.TARGET):
             self._confirmed = False
             self._stand_by()
-
-    def _take_listed_target(self, place: LatLon | None, source: TargetSource, now_s: float) -> None:
-        """Take the last place of a list on the vehicle for a target, where that is asked for and it is a new one."""
-        if source not in self.orders.target_sources or not self._note_listed(place, source):
-            return
-        if place is not None and not _is_same(place, self._target.position if self._target else None):
-            self._take_target(Target(place, source), now_s)
-
-    def _note_listed(self, place: LatLon | None, source: TargetSource) -> bool:
-        """Remember the last place of a list; tell whether it is another one than before."""
-        before, self._listed[source] = self._listed.get(source), place
-        return not _is_same(place, before)
-
-    def _note_lists(self) -> None:
-        """Take the lists on the vehicle for known: nothing in them is a new target."""
-        mission, rally = self.situation.mission, self.situation.rally
-        self._note_listed(last_place(mission.value.items) if mission else None, TargetSource.MISSION)
-        self._note_listed(rally.value[-1] if rally and rally.value else None, TargetSource.RALLY)
-
-    def _take_mission_target(self, now_s: float) -> None:
-        mission = self.situation.mission
-        place = last_place(mission.value.items) if mission else None
-        self._take_listed_target(place, TargetSource.MISSION, now_s)
-
-    def _rally_read(self, now_s: float) -> None:
-        rally = self.situation.rally
-        self._take_listed_target(
-            rally.value[-1] if rally and rally.value else None, TargetSource.RALLY, now_s
-        )
-
-    def _mission_heard(self, now_s: float) -> None:
-        self._take_mission_target(now_s)
 
     # Plans
 
@@ -250,6 +123,13 @@ class RouteMaker(Keeper):
 
     def _forget_task(self) -> None:
         self._task = self._made = None
+
+    def _own_deadlines_s(self) -> list[float | None]:
+        return [-math.inf] if self._planning_due else []
+
+    def _handle_own_timer(self, now_s: float) -> None:
+        if self.state is State.PLANNING:
+            self._go_on_planning(now_s)
 
     @property
     def _planning_due(self) -> bool:
@@ -422,20 +302,8 @@ class RouteMaker(Keeper):
         """Whether the vehicle may be on its way and is ours to stop."""
         raise NotImplementedError
 
-    def _sets_it_going(self, target: Target) -> bool:
-        """Tell whether a target has made the vehicle drive straight to it."""
-        raise NotImplementedError
-
     def _hold(self, reason: str, now_s: float) -> None:
         """Stop the vehicle, to plan from where it stands."""
-        raise NotImplementedError
-
-    def _stop_at_once(self, target: Target, now_s: float) -> None:
-        """Stop a vehicle that a target has set going, though the target itself has to wait."""
-        raise NotImplementedError
-
-    def _take_again(self, target: Target, now_s: float) -> None:
-        """Act on a target that was said again."""
         raise NotImplementedError
 
     def _stand_by(self) -> None:
@@ -449,8 +317,3 @@ class RouteMaker(Keeper):
     def _let_loose(self) -> None:
         """Do nothing more with the vehicle until a new target comes."""
         raise NotImplementedError
-
-
-def _is_same(a: LatLon | None, b: LatLon | None) -> bool:
-    """Tell whether two places are one, but for the rounding of the wire."""
-    return a is b or (a is not None and b is not None and distance_m(a, b) < _SAME_M)

@@ -1,6 +1,7 @@
 """What `pbpp bridge` costs, and how quickly it acts: against the simulated rover over TCP, in real time.
 
-Run ``python benchmarks/bridge.py`` (about five minutes); ``--seconds`` sets how long each stream is watched. It exits with 1 where a bound is
+Run ``python benchmarks/bridge.py`` (about ten minutes); ``--seconds`` sets how long each stream is watched, ``--repeats`` how often the bad link
+is tried, which loses other messages each time. It exits with 1 where a bound is
 not kept.
 
 - At rest: CPU time of the process with every message at 4 Hz, over wall time.
@@ -311,6 +312,7 @@ def main() -> int:
     """Run from the command line."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--seconds", type=float, default=60.0, help="how long each stream is watched")
+    parser.add_argument("--repeats", type=int, default=5, help="how often the bad link is tried")
     options = parser.parse_args()
     print(
         f"{datetime.now(UTC):%Y-%m-%d}, Python {platform.python_version()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}"
@@ -335,18 +337,23 @@ def main() -> int:
         f"maze, target to verified mission of {items} items: {took_s:.2f} s (bound 1 s)",
         is_kept=took_s <= 1.0,
     )
-    for name, faults, bound_s in (
-        ("clean link", Faults(), 0.5),
-        ("5 % loss, 200 ms round trip", Faults(loss=0.05, latency_s=0.1), 10.0),
-    ):
-        times = fence_across_the_route(faults)
-        is_quick = (times["hold_after_known"] if bound_s < 1 else times["driving"]) <= bound_s
-        told = ", ".join(f"{what} {value:.2f} s" for what, value in times.items() if what != "breaches")
+    times = fence_across_the_route(Faults())
+    tell(
+        f"fence across the route, clean link: {_told(times)} (bound of HOLD after known 0.5 s)",
+        is_kept=times["hold_after_known"] <= 0.5 and not times["breaches"],
+    )
+    for _ in range(options.repeats):
+        times = fence_across_the_route(Faults(loss=0.05, latency_s=0.1))
         tell(
-            f"fence across the route, {name}: {told}; breaches {times['breaches']}",
-            is_kept=is_quick and not times["breaches"],
+            f"the same, 5 % loss, 200 ms round trip: {_told(times)} (bound of driving 10 s)",
+            is_kept=times["driving"] <= 10.0 and not times["breaches"],
         )
     return 0 if all(kept) else 1
+
+
+def _told(times: dict[str, float]) -> str:
+    seconds = ", ".join(f"{what} {value:.2f} s" for what, value in times.items() if what != "breaches")
+    return f"{seconds}; breaches {times['breaches']}"
 
 
 if __name__ == "__main__":

@@ -96,7 +96,7 @@ class Reader:
     def close(self) -> None:
         for process in self._processes:
             process.send_signal(signal.SIGINT)
-            process.communicate(timeout=10)
+            process.communicate(timeout=60)
         if self._simulator is not None:
             self._simulator.__exit__(None, None, None)
 
@@ -165,7 +165,7 @@ class Reader:
             if events[-1] == "learnt":
                 break
         process.send_signal(signal.SIGINT)
-        _, errors = process.communicate(timeout=20)
+        _, errors = process.communicate(timeout=60)
         assert (process.returncode, events[-1]) == (130, "learnt"), errors
         return ""
 
@@ -188,6 +188,7 @@ def _bare(line: str) -> str:
     return re.sub(r"\d+(?:\.\d+)?", "#", line.strip())
 
 
+@pytest.mark.timeout(900)  # a page is many commands, each with a limit of its own
 @pytest.mark.parametrize("page", RUNNABLE, ids=lambda page: str(page.relative_to(ROOT)))
 def test_what_a_page_says_can_be_done(page, place):
     reader = Reader()

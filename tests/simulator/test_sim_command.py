@@ -43,16 +43,18 @@ def test_it_runs_until_told_to_stop(stop, fields):
             counts = []
             for kind in (0, 1):
                 link.mav.mission_request_list_send(7, 1, kind)
-                counts.append(link.recv_match(type="MISSION_COUNT", blocking=True, timeout=5).count)
+                counts.append(
+                    link.recv_match(type="MISSION_COUNT", blocking=True, timeout=FIRST_LINE_S).count
+                )
             assert counts == [3, 39]
             link.mav.param_request_read_send(7, 1, b"WP_SPEED", -1)
-            assert link.recv_match(type="PARAM_VALUE", blocking=True, timeout=5).param_value == 2.0
-            position = link.recv_match(type="GLOBAL_POSITION_INT", blocking=True, timeout=5)
+            assert link.recv_match(type="PARAM_VALUE", blocking=True, timeout=FIRST_LINE_S).param_value == 2.0
+            position = link.recv_match(type="GLOBAL_POSITION_INT", blocking=True, timeout=FIRST_LINE_S)
             assert (position.lat, position.lon, position.hdg) == (400715000, -1052299000, 9000)
             link.close()
         finally:
             run.send_signal(stop)
-            out, err = run.communicate(timeout=20)
+            out, err = run.communicate(timeout=FIRST_LINE_S)
     assert (run.returncode, out, err) == (0, "", "")
 
 

@@ -122,6 +122,8 @@ class Link:
         Everything that comes and goes is written there.
     signing : Signing, optional
         Sends signed frames and believes no others.
+    clock : callable, optional
+        Gives the time by which everything on the link runs, in seconds; `now_s` if not given. A simulated vehicle may bring its own.
 
     Raises
     ------
@@ -137,7 +139,9 @@ class Link:
         identity: tuple[int, int] = ONE_SHOT_IDENTITY,
         recorder: TlogWriter | None = None,
         signing: Signing | None = None,
+        clock: Callable[[], float] = now_s,
     ) -> None:
+        self.now_s = clock
         self._transport = transport
         self._codec = Codec(*identity, signing)
         self._recorder = recorder
@@ -176,7 +180,7 @@ class Link:
         self._transport.send(data)
         self._has_spoken = True
         if self._recorder:
-            self._recorder.write(now_s(), data, _LINK_SENT)
+            self._recorder.write(self.now_s(), data, _LINK_SENT)
 
     def send_all(self, messages: Sequence[Message]) -> None:
         """Send messages in order; on a stream as one piece, which is far quicker for long lists."""
@@ -190,23 +194,24 @@ class Link:
             self._has_spoken = True
         if self._recorder:
             for packet in packets:
-                self._recorder.write(now_s(), packet, _LINK_SENT)
+                self._recorder.write(self.now_s(), packet, _LINK_SENT)
 
     def receive(self, timeout_s: float) -> list[Frame]:
         """Give the frames that come within a time, as soon as there are any; our heartbeat goes out when it is due."""
         return self.receive_at(timeout_s)[1]
 
     def receive_at(self, timeout_s: float) -> tuple[float, list[Frame]]:
-        """As `receive`, with the time at which the frames came and under which they are recorded."""
-        begun_s = now_s()
+        """As `receive`, with the time at which the frames came and under which they are recorded: up to then all was heard."""
+        begun_s = self.now_s()
         if begun_s >= self._heartbeat_due_s:
             self._heartbeat_due_s = begun_s + _HEARTBEAT_EVERY_S
             self.send(Heartbeat(MavType.ONBOARD_CONTROLLER, Autopilot.INVALID))
         until_heartbeat_s = self._heartbeat_due_s - begun_s
-        data = self._transport.receive(max(0.0, min(timeout_s, until_heartbeat_s)))
-        came_s = now_s()
-        if not data:
-            return came_s, []
+        wait_s = max(0.0, min(timeout_s, until_heartbeat_s))
+        data = self._transport.receive(wait_s)
+        came_s = self.now_s()
+        if not data:  # so far nothing came; if our own computer paused since, what came then is still unread
+            return min(came_s, begun_s + wait_s), []
         decoded = self._codec.decode_with_bytes(data)
         if self._recorder:
             for frame_bytes, _ in decoded:
@@ -252,7 +257,7 @@ class Link:
         LinkError
             The time is over, or the link is gone.
         """
-        begun_s = now_s()
+        begun_s = self.now_s()
         machine.start(begun_s)
         while True:
             if on_step:
@@ -260,18 +265,18 @@ class Link:
             self.send_all(machine.messages_to_send())
             if machine.is_done or until():
                 return
-            if timeout_s is not None and now_s() - begun_s > timeout_s:
+            if timeout_s is not None and self.now_s() - begun_s > timeout_s:
                 raise LinkError(f"no outcome within {timeout_s:g} s")
             deadline_s = machine.deadline_s
             wait_s = longest_wait_s()
             if deadline_s is not None:
-                wait_s = min(wait_s, max(0.0, deadline_s - now_s()))
+                wait_s = min(wait_s, max(0.0, deadline_s - self.now_s()))
             came_s, frames = self.receive_at(wait_s)
             if frames and on_frames:
                 on_frames(frames)
             for frame in frames:
                 machine.receive(frame, came_s)
-            machine.handle_timer(now_s())
+            machine.handle_timer(came_s)  # not a later time: what came while we were busy is still unread
 
 
 def open_link(

@@ -75,6 +75,7 @@ def place(tmp_path, monkeypatch) -> Path:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
     monkeypatch.setattr("shellingham.detect_shell", lambda *_: ("bash", "/bin/bash"))  # which the reader uses
+    monkeypatch.setattr("serial.tools.list_ports.comports", list)  # whoever may use this computer's
     monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
     for name in ("field.plan", "field.kml"):
         assert CliRunner().invoke(app, ["convert", "fence.waypoints", name]).exit_code == 0

@@ -238,7 +238,7 @@ class _Shell:
             for frame in frames:
                 self.director.receive(frame, came_s)
                 self._written.frames += 1
-            self._run_timer(now_s())
+            self._run_timer(came_s)  # not a later time: what came while we were busy is still unread
             if self._view is not None:
                 self._view.show(now_s())
         link.send_all(self.director.messages_to_send())

@@ -123,10 +123,10 @@ def _ports() -> Iterator[_Finding]:
     for port in ports:
         told = f"{port.description}" if port.description not in (None, "n/a", port.device) else "present"
         if os.name == "posix" and not os.access(port.device, os.R_OK | os.W_OK):
+            # Something on USB was plugged in to be used; a computer's own ports are often wired to nothing.
+            verdict = _Verdict.NOTE if port.vid is None else _Verdict.WRONG
             advice = _permission_advice(Path(port.device))
-            yield _Finding(
-                _Verdict.WRONG, f"serial port {port.device}", f"{told}, but you may not use it", advice
-            )
+            yield _Finding(verdict, f"serial port {port.device}", f"{told}, but you may not use it", advice)
         else:
             yield _Finding(_Verdict.OK, f"serial port {port.device}", told)
 
@@ -134,7 +134,9 @@ def _ports() -> Iterator[_Finding]:
 def _permission_advice(device: Path) -> str:
     if sys.platform.startswith("linux"):  # elsewhere there is no such command, or no such group
         with suppress(KeyError, OSError):
-            return f"sudo usermod -aG {device.group()} $USER, then log in anew"
+            group = device.group()
+            if group != "root":  # nobody should be in that one for the sake of a port
+                return f"sudo usermod -aG {group} $USER, then log in anew"
     return f"ask the administrator for access to {device}"
 
 

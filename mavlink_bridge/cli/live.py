@@ -14,7 +14,7 @@ from mavlink_bridge.cli.session import signing_of
 from mavlink_bridge.cli.upload import interrupted_warnings, with_backup
 from mavlink_bridge.director import Director, Orders, State
 from mavlink_bridge.errors import BridgeError, LinkError
-from mavlink_bridge.link import ONE_SHOT_IDENTITY, now_s, open_link
+from mavlink_bridge.link import ONE_SHOT_IDENTITY, open_link
 from mavlink_bridge.messages import MissionType
 from mavlink_bridge.protocol.verified_upload import Held
 from missions.course import follow_mission
@@ -122,9 +122,9 @@ def conduct(
             nonlocal has_driven
             has_driven = has_driven or director.state is State.DRIVING
             show(_STATE_TEXTS[director.state], *director.progress)
-            warn(backups.step(now_s()))
+            warn(backups.step(link.now_s()))
             if (made := plans.take()) is not None:
-                director.plan_made(*made, now_s())
+                director.plan_made(*made, link.now_s())
 
         link.run(director, on_frames=on_frames, on_step=step, longest_wait_s=plans.longest_wait_s)
     if director.trouble is not None or director.plan is None:

@@ -147,9 +147,19 @@ def _replayed(
 ) -> _Results:
     """Replay the logs; tell each one's events in the order in which the logs were given."""
     workers = min(jobs or os.cpu_count() or 1, len(logs))
-    if len(logs) == 1 or speed is not None or workers == 1:
+    pool = None if len(logs) == 1 or speed is not None or workers == 1 else _pool(workers)
+    if pool is None:
         return _one_after_the_other(logs, orders, speed, teller)
-    return _side_by_side(logs, orders, workers, teller)
+    return _side_by_side(logs, orders, pool, teller)
+
+
+def _pool(workers: int) -> ProcessPoolExecutor | None:
+    """Give worker processes; None where there can be none, as in a sandbox without shared memory."""
+    context = multiprocessing.get_context("spawn")  # a fork would copy the progress bar's thread half alive
+    try:
+        return ProcessPoolExecutor(workers, mp_context=context)
+    except (ImportError, NotImplementedError, OSError):
+        return None
 
 
 def _one_after_the_other(logs: list[Path], orders: Orders, speed: float | None, teller: _Teller) -> _Results:
@@ -174,12 +184,10 @@ def _one_after_the_other(logs: list[Path], orders: Orders, speed: float | None, 
     return results
 
 
-def _side_by_side(logs: list[Path], orders: Orders, workers: int, teller: _Teller) -> _Results:
+def _side_by_side(logs: list[Path], orders: Orders, pool: ProcessPoolExecutor, teller: _Teller) -> _Results:
     from mavlink_bridge.replay import replay_to_json  # noqa: PLC0415 - quick help
 
     results: _Results = {}
-    context = multiprocessing.get_context("spawn")  # a fork would copy the progress bar's thread half alive
-    pool = ProcessPoolExecutor(workers, mp_context=context)
     try:
         futures = {log: pool.submit(replay_to_json, log, orders) for log in logs}
         with progress_bar(quiet=teller.is_quiet) as show:

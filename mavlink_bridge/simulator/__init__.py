@@ -2,6 +2,7 @@
 
 from mavlink_bridge.simulator.config import SimulatorConfig
 from mavlink_bridge.simulator.shell import Simulator
+from mavlink_bridge.simulator.stepped import SteppedRover
 from mavlink_bridge.simulator.vehicle import SimulatedVehicle
 
-__all__ = ["SimulatedVehicle", "Simulator", "SimulatorConfig"]
+__all__ = ["SimulatedVehicle", "Simulator", "SimulatorConfig", "SteppedRover"]

@@ -96,8 +96,8 @@ class TestDoctor:
     @pytest.mark.skipif(os.name != "posix", reason="Windows does not say who may use a port")
     def test_ports_and_who_may_use_them(self, monkeypatch):
         ports = [
-            SimpleNamespace(device="/dev/ttyACM0", description="Pixhawk"),
-            SimpleNamespace(device="/dev/ttyUSB9", description="n/a"),
+            SimpleNamespace(device="/dev/ttyACM0", description="Pixhawk", vid=0x2DAE),
+            SimpleNamespace(device="/dev/ttyUSB9", description="n/a", vid=0x10C4),
         ]
         monkeypatch.setattr("serial.tools.list_ports.comports", lambda: ports)
         monkeypatch.setattr(os, "access", lambda path, _mode: path == "/dev/ttyACM0")
@@ -106,6 +106,27 @@ class TestDoctor:
         refused = found["serial port /dev/ttyUSB9"]
         assert refused["verdict"] == "wrong"
         assert "/dev/ttyUSB9" in refused["advice"]
+
+    @pytest.mark.skipif(os.name != "posix", reason="Windows does not say who may use a port")
+    def test_a_computers_own_port_that_may_not_be_used_is_only_noted(self, monkeypatch):
+        port = SimpleNamespace(device="/dev/ttyS0", description="n/a", vid=None)
+        monkeypatch.setattr("serial.tools.list_ports.comports", lambda: [port])
+        monkeypatch.setattr(os, "access", lambda *_: False)
+        found = findings()["serial port /dev/ttyS0"]
+        assert (found["verdict"], found["found"]) == ("note", "present, but you may not use it")
+        assert found["advice"]
+
+    @pytest.mark.parametrize(
+        ("group", "advice"),
+        [
+            ("dialout", "sudo usermod -aG dialout $USER, then log in anew"),
+            ("root", "ask the administrator for access to /dev/ttyS0"),
+        ],
+    )
+    def test_nobody_is_told_to_join_the_group_root(self, monkeypatch, group, advice):
+        monkeypatch.setattr("sys.platform", "linux")
+        monkeypatch.setattr(Path, "group", lambda _: group)
+        assert doctor_command._permission_advice(Path("/dev/ttyS0")) == advice
 
     @pytest.mark.skipif(os.name != "posix", reason="Windows has other permissions")
     def test_a_signing_key_that_others_may_read(self, tmp_path):

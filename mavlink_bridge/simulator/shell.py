@@ -28,6 +28,7 @@ DEFAULT_LISTEN = "tcpin:127.0.0.1:5760"
 _READ_BYTES = 65_536
 _MAX_BACKLOG_BYTES = 4_000_000
 _LONGEST_WAIT_S = 0.5
+_MOST_AT_ONCE_S, _MOST_REAL_AT_ONCE_S = 1.0, 0.1
 
 Address = tuple[str, int]
 
@@ -68,7 +69,7 @@ class Simulator:
     faults : Faults, optional
         How bad the link is, the same in both directions; times of latency and silence are real ones.
     speedup : float
-        How many times faster than real the rover's time runs.
+        How many times faster than real the rover's time runs, where the computer keeps up.
     seed : int
         Seed of the faults.
 
@@ -98,6 +99,8 @@ class Simulator:
         self._stopping = False
         self._failure: BaseException | None = None
         self._start_s = 0.0
+        self._turned_s = 0.0
+        self._vehicle_s = 0.0
 
     @property
     def connection(self) -> str:
@@ -170,6 +173,7 @@ class Simulator:
         self._selector.register(self._woken, selectors.EVENT_READ)
         self._stopping = False
         self._start_s = time.monotonic()
+        self._turned_s = 0.0
 
     def _run(self) -> None:
         try:
@@ -190,7 +194,7 @@ class Simulator:
                 if events & selectors.EVENT_READ:
                     self._read_stream(key.fileobj)
         real_s = self._real_s()
-        now_s = real_s * self._speedup
+        now_s = self._advance(real_s)
         for peer, client in list(self._clients.items()):
             for data in client.inbound.due(real_s):
                 for frame in client.codec.decode(data):
@@ -206,8 +210,20 @@ class Simulator:
     def _wait_s(self) -> float:
         links = [link for client in self._clients.values() for link in (client.inbound, client.outbound)]
         deadlines_s = [link.deadline_s for link in links if link.deadline_s is not None]
-        next_s = min([self.vehicle.deadline_s / self._speedup, *deadlines_s])
+        vehicle_due_s = self._turned_s + (self.vehicle.deadline_s - self._vehicle_s) / self._speedup
+        next_s = min([vehicle_due_s, *deadlines_s])
         return max(0.0, min(next_s - self._real_s(), _LONGEST_WAIT_S))
+
+    def _advance(self, real_s: float) -> float:
+        """Give the rover's time.
+
+        Where the computer does not keep up, or stood still, the rover's time falls behind: made up for at once, more would pass with
+        each turn than in the one before, and the rover would fall silent.
+        """
+        most_s = max(_MOST_AT_ONCE_S, _MOST_REAL_AT_ONCE_S * self._speedup)
+        self._vehicle_s += min((real_s - self._turned_s) * self._speedup, most_s)
+        self._turned_s = real_s
+        return self._vehicle_s
 
     def _real_s(self) -> float:
         return time.monotonic() - self._start_s

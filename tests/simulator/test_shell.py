@@ -123,6 +123,25 @@ def test_the_rovers_time_runs_faster():
         assert time.monotonic() - begin_s < 15.0  # of 20 s
 
 
+def test_time_in_which_the_computer_stood_still_is_not_made_up_for():
+    simulator = Simulator(QUIET, LOOPBACK, speedup=4.0)
+    turns_s = [simulator._advance(real_s) for real_s in (0.0, 0.1, 0.2, 60.2, 60.3)]
+    assert turns_s == pytest.approx([0.0, 0.4, 0.8, 1.8, 2.2])
+    fast = Simulator(QUIET, LOOPBACK, speedup=100.0)
+    assert [fast._advance(real_s) for real_s in (0.01, 1.0)] == pytest.approx([1.0, 11.0])
+
+
+def test_a_rover_that_was_held_up_goes_on_telling():
+    with Simulator(QUIET, LOOPBACK, speedup=20.0) as simulator, client(simulator) as link:
+        heard(link, "HEARTBEAT")
+        simulator._start_s -= 3600.0  # as if the computer had slept for an hour
+        begin_s = time.monotonic()
+        for _ in range(5):
+            heard(link, "HEARTBEAT")
+        assert time.monotonic() - begin_s < 60.0
+        assert simulator._vehicle_s < 3600.0
+
+
 def test_faults_hold_both_ways():
     with Simulator(QUIET, LOOPBACK, Faults(latency_s=0.2)) as simulator, client(simulator) as link:
         heard(link, "HEARTBEAT")

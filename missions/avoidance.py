@@ -11,6 +11,7 @@ from __future__ import annotations
 import cmath
 import math
 from dataclasses import replace
+from functools import lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -19,6 +20,7 @@ import shapely
 
 from missions.drive_model.corner import GRAVITY_MPS2, INSIDE_BAND_M
 from missions.drive_model.profile import LegProfile, Ramp
+from missions.fence_ahead import FenceAhead
 from missions.vehicle import Steering
 
 if TYPE_CHECKING:
@@ -69,8 +71,8 @@ def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry) -> Env
     if not vehicle.stops_within_m or fence.is_empty or not band.legs:
         return band
     target = _Target(band, vehicle)
-    lags = target.lags(vehicle, _edges(fence, target.places, vehicle))
-    pieces = [piece for piece in target.pieces(lags) if piece is not None]
+    lags = target.lags(vehicle, FenceAhead(fence, target.places, vehicle))
+    pieces = target.pieces(lags)
     if not pieces:
         return band
     cores, bands_m, waypoints = zip(*pieces, strict=True)
@@ -110,22 +112,20 @@ class _Target:
         self.places: NDArray[np.complex128] = np.full(len(self.times_s), points[0])
         for leg, profile, begin_s in zip(band.legs, profiles, begins_s, strict=True):
             step = points[leg.first + 1] - points[leg.first]
-            leg_s = np.append(np.arange(0.0, profile.duration_s, _STEP_S), profile.duration_s)
-            shares = [profile.travelled_m(time_s) / leg.length_m for time_s in leg_s.tolist()]
-            self.places += np.interp(self.times_s - begin_s, leg_s, shares) * step
+            self.places += np.interp(self.times_s - begin_s, *_shares(profile)) * step
 
-    def lags(self, vehicle: Vehicle, edges: _Edges) -> list[complex]:
+    def lags(self, vehicle: Vehicle, fence: FenceAhead) -> list[complex]:
         """Give at each time how far the rover is behind, east and north; an empty list where it never is."""
         steps = np.diff(self.places)
         moved_m = np.maximum(np.abs(steps), _LEAST_MPS * _STEP_S)
         is_slowed = np.zeros(len(steps), dtype=np.bool_)
         near = self._near_corners()[:-1]
         for side in _SIDES:
-            allowed_mps = edges.speeds_mps(self.places[:-1][near], side * (steps / moved_m)[near])
+            allowed_mps = fence.speeds_mps(self.places[:-1][near], side * (steps / moved_m)[near])
             is_slowed[near] |= allowed_mps < _SLOWED_SHARE * moved_m[near] / _STEP_S
         if not is_slowed.any():
             return []
-        return _followed(self.places.tolist(), is_slowed.tolist(), vehicle, edges)
+        return _followed(self.places.tolist(), is_slowed.tolist(), vehicle, fence)
 
     def _near_corners(self) -> NDArray[np.bool_]:
         """Tell when it is about a corner: falling behind on a straight line does not matter."""
@@ -135,17 +135,19 @@ class _Target:
                 near |= np.abs(self.times_s - passed_s) <= _ABOUT_CORNER_S
         return near
 
-    def pieces(self, lags: list[complex]) -> list[tuple[BaseGeometry, float, int] | None]:
+    def pieces(self, lags: list[complex]) -> list[tuple[BaseGeometry, float, int]]:
         """Give the ground between target point and rover where that is behind, piece by piece."""
-        return [self._piece(lags, begin) for begin in range(0, len(lags), _SAMPLES_A_PIECE)]
+        behind = np.array(lags)
+        far = np.flatnonzero(np.abs(behind) >= NEGLIGIBLE_M)
+        # A piece holds the first sample of the next one too.
+        whole, ends = far - far % _SAMPLES_A_PIECE, far[far % _SAMPLES_A_PIECE == 0] - _SAMPLES_A_PIECE
+        begins = np.union1d(whole, ends[ends >= 0])
+        return [self._piece(behind, begin) for begin in begins.tolist()]
 
-    def _piece(self, lags: list[complex], begin: int) -> tuple[BaseGeometry, float, int] | None:
-        span = range(begin, min(begin + _SAMPLES_A_PIECE + 1, len(lags)))
-        behind = np.array(lags[span.start : span.stop])
-        if np.abs(behind).max() < NEGLIGIBLE_M:
-            return None
-        targets = self.places[span.start : span.stop]
-        ground = np.concatenate([targets, targets - LAG_RESERVE * behind])
+    def _piece(self, behind: NDArray[np.complex128], begin: int) -> tuple[BaseGeometry, float, int]:
+        span = slice(begin, min(begin + _SAMPLES_A_PIECE + 1, len(behind)))
+        targets = self.places[span]
+        ground = np.concatenate([targets, targets - LAG_RESERVE * behind[span]])
         core = shapely.MultiPoint(np.column_stack((ground.real, ground.imag))).convex_hull
         leg = int(np.searchsorted(self._passed_s, self.times_s[begin]))
         return (
@@ -166,7 +168,16 @@ def _profile(leg: Leg, vehicle: Vehicle) -> LegProfile:
     return LegProfile(leg.length_m, Ramp(leg.top_speed_mps, vehicle.accel_max_mps2, vehicle.jerk_mps3))
 
 
-def _followed(places: list[complex], is_slowed: list[bool], vehicle: Vehicle, edges: _Edges) -> list[complex]:
+@lru_cache(maxsize=512)
+def _shares(profile: LegProfile) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Give times since a leg's start, and what share of it is driven by then: the same legs come again and again."""
+    leg_s = np.append(np.arange(0.0, profile.duration_s, _STEP_S), profile.duration_s)
+    return leg_s, np.array([profile.travelled_m(time_s) / profile.length_m for time_s in leg_s.tolist()])
+
+
+def _followed(
+    places: list[complex], is_slowed: list[bool], vehicle: Vehicle, fence: FenceAhead
+) -> list[complex]:
     """Follow a target point as AR_PosControl does, within the speed that is allowed at the rover's own place.
 
     The target's acceleration is passed on as it is. A rover that is slowed turns too fast by it, and drives to the inside of the turn.
@@ -186,7 +197,8 @@ def _followed(places: list[complex], is_slowed: list[bool], vehicle: Vehicle, ed
         here = places[sample] + (at - sample) * _STEP_S * velocity - behind
         wanted = velocity + vehicle.position_gain_per_s * behind
         wanted_mps = abs(wanted) or 1.0
-        wanted *= min(1.0, top_mps / wanted_mps, edges.allowed_mps(here, wanted / wanted_mps) / wanted_mps)
+        allowed_mps = fence.speed_mps(here, wanted / wanted_mps, top_mps)
+        wanted *= min(1.0, top_mps / wanted_mps, allowed_mps / wanted_mps)
         rover.follow(wanted, (velocities[sample + 1] - velocity) / _STEP_S)
         scale += (_scale(velocity, behind, rover.velocity, vehicle) - scale) * _STEP_S / _SETTLE_S
         behind += (scale * velocity - rover.velocity) * _STEP_S
@@ -199,26 +211,25 @@ class _Rover:
     """A rover that turns as its controllers tell it, and takes on the speed wanted at once."""
 
     def __init__(self, vehicle: Vehicle) -> None:
-        self.vehicle = vehicle
         self.velocity = 0j
+        self._is_steered = vehicle.steering is Steering.ACKERMANN
+        self._turn_radius_m = max(vehicle.turn_radius_m, 0.1)
+        self._turn_mps = 0.0
+        if self._is_steered:
+            self._turn_mps = math.sqrt(vehicle.turn_max_g * GRAVITY_MPS2 / 2 * vehicle.turn_radius_m)
 
     def follow(self, wanted: complex, accel: complex) -> None:
         """Drive on for one step."""
-        vehicle = self.vehicle
-        heading = (
-            self.velocity / abs(self.velocity)
-            if abs(self.velocity) > _LEAST_MPS
-            else wanted / (abs(wanted) or 1.0)
-        )
-        speed_mps = max(abs(self.velocity), 1.0)
-        turn_radps = ((wanted + accel) * heading.conjugate()).imag / speed_mps
-        turn_mps = 0.0
-        if vehicle.steering is Steering.ACKERMANN:
-            most_radps = abs(self.velocity) / max(vehicle.turn_radius_m, 0.1)
+        now_mps, wanted_mps = abs(self.velocity), abs(wanted)
+        heading = self.velocity / now_mps if now_mps > _LEAST_MPS else wanted / (wanted_mps or 1.0)
+        turn_radps = ((wanted + accel) * heading.conjugate()).imag / max(now_mps, 1.0)
+        if self._is_steered:
+            most_radps = now_mps / self._turn_radius_m
             turn_radps = min(max(turn_radps, -most_radps), most_radps)
-            turn_mps = math.sqrt(vehicle.turn_max_g * GRAVITY_MPS2 / 2 * vehicle.turn_radius_m)
         heading *= cmath.rect(1.0, turn_radps * _STEP_S)
-        self.velocity = heading * max(min(abs(wanted), turn_mps), (wanted * heading.conjugate()).real, 0.0)
+        self.velocity = heading * max(
+            min(wanted_mps, self._turn_mps), (wanted * heading.conjugate()).real, 0.0
+        )
 
 
 def _scale(velocity: complex, behind: complex, driven: complex, vehicle: Vehicle) -> float:
@@ -226,54 +237,3 @@ def _scale(velocity: complex, behind: complex, driven: complex, vehicle: Vehicle
     target_mps = max(abs(velocity), _LEAST_MPS)
     along_mps = ((driven - vehicle.position_gain_per_s * behind) * velocity.conjugate()).real / target_mps
     return min(max(0.05 + along_mps / target_mps, _LEAST_SCALE), 1.0)
-
-
-def _edges(fence: BaseGeometry, places: NDArray[np.complex128], vehicle: Vehicle) -> _Edges:
-    """Give the edges that a drive over some places has to do with."""
-    points, lines = shapely.get_coordinates(shapely.get_parts(fence), return_index=True)
-    joined = lines[1:] == lines[:-1]
-    corners = points[:, 0] + 1j * points[:, 1]
-    starts, ends = corners[:-1][joined], corners[1:][joined]
-    top_mps = vehicle.speed_mps
-    far_m = vehicle.stops_within_m + max(
-        top_mps / vehicle.position_gain_per_s, top_mps**2 / vehicle.accel_max_mps2
-    )
-    near = np.ones(len(starts), dtype=np.bool_)
-    for part in (np.real, np.imag):
-        low, high = part(places).min() - far_m, part(places).max() + far_m
-        near &= (np.maximum(part(starts), part(ends)) >= low) & (np.minimum(part(starts), part(ends)) <= high)
-    return _Edges(starts[near], ends[near] - starts[near], vehicle)
-
-
-class _Edges:
-    """The straight pieces of lines, for looking ahead."""
-
-    def __init__(
-        self, starts: NDArray[np.complex128], steps: NDArray[np.complex128], vehicle: Vehicle
-    ) -> None:
-        self._starts, self._steps = starts, steps
-        self._vehicle = vehicle
-
-    def allowed_mps(self, place: complex, way: complex) -> float:
-        """Give the speed that avoidance allows at one place, one way."""
-        return float(self.speeds_mps(np.array([place]), np.array([way]))[0])
-
-    def speeds_mps(self, places: NDArray[np.complex128], ways: NDArray[np.complex128]) -> NDArray[np.float64]:
-        """Give the speed that avoidance allows at each place, its own way (sqrt_controller of what is left to the margin)."""
-        vehicle = self._vehicle
-        left_m = np.maximum(self._ahead_m(places, ways) - vehicle.stops_within_m, 0.0)
-        gain_per_s, accel_mps2 = vehicle.position_gain_per_s, vehicle.accel_max_mps2
-        linear_m = accel_mps2 / gain_per_s**2
-        far_mps = np.sqrt(2 * accel_mps2 * np.maximum(left_m - linear_m / 2, 0.0))
-        return np.where(left_m <= linear_m, gain_per_s * left_m, far_mps)
-
-    def _ahead_m(self, places: NDArray[np.complex128], ways: NDArray[np.complex128]) -> NDArray[np.float64]:
-        """Give how far ahead the first edge lies; infinite where there is none."""
-        back = ways.conj()[:, None]
-        off = (self._starts - places[:, None]) * back
-        steps = self._steps * back
-        with np.errstate(divide="ignore", invalid="ignore"):  # an edge along the way is met at its neighbours
-            share = -off.imag / steps.imag
-            away_m = off.real + share * steps.real
-        met = (away_m >= 0) & (share >= 0) & (share <= 1)
-        return np.asarray(np.where(met, away_m, np.inf).min(axis=1, initial=np.inf))

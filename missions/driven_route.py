@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from shapely import Polygon
 
     from missions.departure import Departure
-    from missions.fitting import Measured
     from missions.ground import Ground
+    from missions.measuring import Measured
     from missions.route import Route
     from missions.vehicle import Vehicle
 
@@ -46,6 +46,7 @@ LATER_MEASUREMENTS = 500
 _OTHER_WAYS = 5
 _AT_START = 2
 """Points where most is missing because of how the route begins."""
+_HELD_M = 0.05
 _DEPARTURES_TRIED = 8
 _DEPARTURE_SLACK_M = 0.05
 _TURN_COST_M_PER_DEG = 0.1
@@ -148,23 +149,53 @@ class RouteSearch:
                 self._fit(fitting, departing, found, refused)
                 if found or self._is_stopped():
                     break
+        if not found and not self._is_held_at_start(refused, fast_m - slow_m):
+            self._fit_slowly(routes[-1][0], found, refused)
+            self._fit_other_ways(routes[-1], found, refused)
+        if not found:
+            drawing, measured = min(refused, key=lambda one: sum(one[1].missing_m))
+            raise refusal(self.ground, self.required_m, self.reserve_m, drawing, measured)
+        return min(found, key=lambda one: one[0])[1]
+
+    def _is_held_at_start(self, refused: Sequence[tuple[Drawing, Measured]], narrower_m: float) -> bool:
+        """Tell whether nothing more is worth trying, as the vehicle cannot turn at its start.
+
+        However slowly it drives it swings as far where it starts with its heading wrong; only its band becomes narrower.
+        """
+        return all(
+            measured.worst_index <= _AT_START and measured.missing_m[0] > narrower_m + _HELD_M
+            for _, measured in refused
+        )
+
+    def _fit_slowly(
+        self,
+        route: Route,
+        found: list[tuple[float, DrivenRoute]],
+        refused: list[tuple[Drawing, Measured]],
+    ) -> None:
+        """Drive a route slowly all the way, so that nothing changes at corners."""
         for speed_mps in SLOW_ALL_THE_WAY_MPS:
             if not found and speed_mps < self.vehicle.speed_mps and not self._is_stopped():
-                self._fit(self._fitting(LATER_MEASUREMENTS), routes[-1][0], found, refused, speed_mps)
+                self._fit(self._fitting(LATER_MEASUREMENTS), route, found, refused, speed_mps)
+
+    def _fit_other_ways(
+        self,
+        refusing: tuple[Route, float],
+        found: list[tuple[float, DrivenRoute]],
+        refused: list[tuple[Drawing, Measured]],
+    ) -> None:
+        """Keep away from where routes were refused, and draw others with the same band."""
+        route, band_m = refusing
         fitting = self._fitting(LATER_MEASUREMENTS)
         blocked: list[Polygon] = []
         while not found and len(blocked) < _OTHER_WAYS and not self._is_stopped():
             drawing, measured = refused[-1]
             blocked.append(block(route, drawing, measured))
             try:
-                route = self._draw(routes[-1][1], blocked)
+                route = self._draw(band_m, blocked)
             except RouteError:
                 break
             self._fit(fitting, route, found, refused)
-        if not found:
-            drawing, measured = min(refused, key=lambda one: sum(one[1].missing_m))
-            raise refusal(self.ground, self.required_m, self.reserve_m, drawing, measured)
-        return min(found, key=lambda one: one[0])[1]
 
     def _fitting(self, measurements: int) -> Fitting:
         most = min(measurements, self.measurements or measurements)

@@ -6,87 +6,42 @@ is measured decides, not the means.
 
 from __future__ import annotations
 
+import heapq
+import itertools
 import math
 from dataclasses import dataclass, field
-from itertools import pairwise
+from functools import cached_property
 from typing import TYPE_CHECKING
 
-import numpy as np
 import shapely
 
 from missions import corner_means, drawn
-from missions.avoidance import with_avoidance
-from missions.drive_model import envelope
 from missions.geo import rounded
 from missions.local_frame import LocalPoint
+from missions.measuring import ENOUGH_M, Gauge
 from missions.neck import find_neck, straight_through
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
-    from numpy.typing import NDArray
-
     from missions.drawn import Drawing, Vector
-    from missions.drive_model import Envelope
     from missions.ground import Ground
+    from missions.measuring import Measured, Trial
     from missions.vehicle import Vehicle
 
-
-ENOUGH_M = 0.002
-"""What may be missing: less than rounding to degE7 adds, which is required on top."""
-
-UNBOUNDED_EXTRA_M = 2.0
-"""What corners that left the model when measured (by up to 1.6 m) have to keep on top."""
-
-TURN_BACK_DEG, TURN_BACK_EXTRA_M = 165.0, 4.0
-"""A turn so sharp may be driven round either side; the model tells of one."""
 
 FIT_MEASUREMENTS, CRAWL_MEASUREMENTS, MOST_MEASUREMENTS = 500, 350, 1500
 """Taken for one route, for a slow one, and for all that are tried: a search that is not done by then is given up."""
 
-_MISSING_COST_S_PER_M = 100.0
-_CROSSING_COST_S = 10_000.0
-_POINT_COST_S = 0.3
-_NEAR_TURNS_COST_S = 3.0
-_TURN_DEG = 5.0
-_FAR_FROM_ENOUGH_M = 0.7
 _SHORT_LEG_M = 12.0
 _LEAST_GAIN_S = 0.05
 _CONTEXT = 3
 _MORE_TRIES = 12
+_TRIED_WHOLE = 3
 _EASING_STEPS_M = (6.0, 1.6, 0.5)
 _TINY_LEG_M = 2.5
 _JOINED_TURN_DEG = 80.0
 _GRID_TRIES, _GRID_MEASUREMENTS = 4, 150
-
-
-@dataclass(frozen=True, slots=True)
-class Measured:
-    """What the drive model says of lines.
-
-    Parameters
-    ----------
-    missing_m : tuple of float
-        What is missing of the required clearance at each point, 0 where nothing is.
-    worst : tuple of (float, float)
-        Where the band comes nearest to a fence, for each point.
-    cost_s : float
-        Time, and what is missing as time.
-    """
-
-    missing_m: tuple[float, ...]
-    worst: tuple[Vector, ...]
-    cost_s: float
-
-    @property
-    def worst_index(self) -> int:
-        """The point where most is missing; the first of several."""
-        return max(range(len(self.missing_m)), key=lambda number: self.missing_m[number])
-
-    @property
-    def is_enough(self) -> bool:
-        """Whether the band keeps what is required."""
-        return max(self.missing_m) <= ENOUGH_M
 
 
 @dataclass(eq=False)
@@ -166,77 +121,14 @@ class Fitting:
                 break
         return drawing, self.measure(drawing)
 
-    def _plain(self, drawing: Drawing, heading_deg: float | None) -> Envelope:
-        """Give the band of lines without the vehicle's avoidance."""
-        return envelope(
-            drawn.places(drawing),
-            self.vehicle,
-            heading_deg=heading_deg,
-            speeds=drawn.speeds(drawing),
-            stops=drawn.stops(drawing),
-        )
-
-    def _clearances_m(self, band: Envelope) -> NDArray[np.float64]:
-        """Give what each piece keeps; inside a fence less, the deeper it lies."""
-        clearances_m = band.clearances_m(self.ground.edge)
-        for piece in np.flatnonzero(clearances_m <= -band.bands_m):
-            inside = shapely.difference(band.cores[piece], self.ground.allowed)
-            clearances_m[piece] -= math.sqrt(inside.area) + inside.length / 10
-        return clearances_m
-
     def measure(self, drawing: Drawing) -> Measured:
         """Measure whole lines."""
-        return self._measure(drawing, 0, len(drawing))
-
-    def _measure(self, drawing: Drawing, begin: int, end: int) -> Measured:
-        """Measure the points from ``begin`` to before ``end``; ends of it that are no ends of the lines do not count."""
         self.measurements += 1
-        part = drawing[begin:end]
-        heading_deg = _course_deg(part) if begin or self.heading_deg is None else self.heading_deg
-        required_m = np.array([point.required_m for point in part])
-        band = self._plain(part, heading_deg)
-        clearances_m = self._clearances_m(band)
-        if (required_m[band.waypoints] - clearances_m).max() < _FAR_FROM_ENOUGH_M:
-            slowed = with_avoidance(band, self.vehicle, self.ground.edge)
-            if slowed is not band:
-                band, clearances_m = slowed, self._clearances_m(slowed)
-        least_m, pieces = np.full(len(part), np.inf), np.full(len(part), -1)
-        for piece in np.argsort(-clearances_m):
-            least_m[band.waypoints[piece]] = clearances_m[piece]
-            pieces[band.waypoints[piece]] = piece
-        legs = shapely.linestrings([[a.place, b.place] for a, b in pairwise(part)])
-        lines_m = np.array([np.inf, *np.atleast_1d(shapely.distance(legs, self.ground.edge))])
-        lines_m[np.isnan(lines_m)] = np.inf
-        asked_m = np.array([point.line_m for point in part])
-        missing_m = np.maximum(np.maximum(required_m - least_m, asked_m - lines_m), 0.0)
-        for corner in band.corners:
-            turns_back = abs(corner.turn_deg) > TURN_BACK_DEG and not corner.pivots
-            if not corner.bounded or turns_back:
-                here = slice(corner.waypoint, corner.waypoint + 2)
-                extra_m = TURN_BACK_EXTRA_M if turns_back else UNBOUNDED_EXTRA_M
-                room_m = required_m[here] + extra_m - least_m[here]
-                missing_m[here] = np.maximum(missing_m[here], room_m)
-        if begin:
-            missing_m[0] = 0.0
-        if end < len(drawing):
-            missing_m[-1] = 0.0
-        cost_s = (
-            band.duration_s
-            + _POINT_COST_S * len(part)
-            + _NEAR_TURNS_COST_S * _near_turns(part)
-            + _MISSING_COST_S_PER_M * float(missing_m.sum())
-            + _CROSSING_COST_S * int(((lines_m <= 0) & np.isfinite(asked_m)).sum())
-        )
-        worst = [
-            self._nearest(band, int(piece)) if missing > ENOUGH_M and piece >= 0 else (math.nan, math.nan)
-            for piece, missing in zip(pieces, missing_m, strict=True)
-        ]
-        return Measured(tuple(missing_m.tolist()), tuple(worst), cost_s)
+        return self._gauge.measure(drawing)
 
-    def _nearest(self, band: Envelope, piece: int) -> Vector:
-        line = shapely.shortest_line(band.cores[piece], self.ground.edge)
-        east_m, north_m = shapely.get_coordinates(line)[0].tolist()
-        return (east_m, north_m)
+    @cached_property
+    def _gauge(self) -> Gauge:
+        return Gauge(self.ground, self.vehicle, self.heading_deg)
 
     def _away(self, place: Vector) -> Vector:
         """Give the unit vector from the nearest fence to a place."""
@@ -324,27 +216,29 @@ class Fitting:
         self, drawing: Drawing, measured: Measured, candidates: Iterable[Drawing]
     ) -> tuple[Drawing, Measured] | None:
         """Give the lines that gain most, if any do, judged by the part that changes and then on the whole."""
-        known: dict[tuple[int, int], float] = {}
-        gains: list[tuple[float, int, Drawing]] = []
+        trials: list[_Tried] = []
+        known_s: dict[tuple[int, int], float] = {}
         solved_at = None
         for number, candidate in enumerate(candidates):
             begin, kept = _changed(drawing, candidate)
             span = (begin, len(drawing) - kept)
-            if span not in known:
-                known[span] = self._measure(drawing, *span).cost_s
-            found = self._measure(candidate, begin, len(candidate) - kept)
-            gain_s = known[span] - found.cost_s
-            if gain_s > _LEAST_GAIN_S:
-                gains.append((gain_s, -number, candidate))
-                solved_at = number if found.is_enough and solved_at is None else solved_at
+            if span not in known_s:
+                self.measurements += 1
+                known_s[span] = self._gauge.trial(drawing, *span).finish().cost_s
+            self.measurements += 1
+            trial = self._gauge.trial(candidate, begin, len(candidate) - kept)
+            tried = _Tried(known_s[span], number, trial, candidate)
+            if tried.is_enough() and solved_at is None:
+                solved_at = number
+            trials.append(tried)
             # The means come with the cheapest first: once one has done it, a few more are looked at.
             if self._is_over() or (solved_at is not None and number >= solved_at + _MORE_TRIES):
                 break
-        for _, _, candidate in sorted(gains, reverse=True)[:3]:
-            found = self.measure(candidate)
+        for tried in itertools.islice(_best_first(trials), _TRIED_WHOLE):
+            found = self.measure(tried.drawing)
             more_m = sum(found.missing_m) - sum(measured.missing_m)
             if found.cost_s < measured.cost_s - _LEAST_GAIN_S and more_m <= ENOUGH_M:
-                return candidate, found
+                return tried.drawing, found
         return None
 
     def _is_over(self) -> bool:
@@ -373,19 +267,53 @@ def _is_corner(drawing: Drawing, index: int) -> bool:
     return 0 < index < len(drawing) - 1
 
 
-def _course_deg(drawing: Drawing) -> float:
-    east, north = drawn.direction(drawing[0], drawing[1])
-    return math.degrees(math.atan2(east, north))
+@dataclass(frozen=True, slots=True)
+class _Tried:
+    """Lines tried in the place of others, as far as they were measured.
+
+    Parameters
+    ----------
+    known_s : float
+        What the part costs that changes.
+    number : int
+        Which of those that are tried.
+    trial : Trial
+        What the part becomes.
+    drawing : tuple of DrawnPoint
+        The whole lines.
+    """
+
+    known_s: float
+    number: int
+    trial: Trial
+    drawing: Drawing
+
+    @property
+    def gain_s(self) -> float:
+        """What is gained, or less."""
+        return self.known_s - self.trial.cost_s
+
+    def is_enough(self) -> bool:
+        """Measure as far as need be to tell whether the part gains and its band keeps what is required."""
+        while self.gain_s > _LEAST_GAIN_S and self.trial.may_be_enough:
+            if not self.trial.refine():
+                return self.gain_s > _LEAST_GAIN_S and self.trial.may_be_enough
+        return False
 
 
-def _near_turns(drawing: Drawing) -> int:
-    """Count turns so near to the next that a rover drives them as one."""
-    turns = [abs(drawn.turn_deg(drawing, index)) > _TURN_DEG for index in range(1, len(drawing) - 1)]
-    return sum(
-        math.dist(drawing[index + 1].place, drawing[index + 2].place) < corner_means.APART_M
-        for index, (turn, following) in enumerate(pairwise(turns))
-        if turn and following
-    )
+def _best_first(trials: Iterable[_Tried]) -> Iterator[_Tried]:
+    """Give those that gain, the one that gains most first; the others are measured only as far as it takes to know."""
+    waiting = [(-tried.gain_s, tried.number, tried) for tried in trials]
+    heapq.heapify(waiting)
+    while waiting:
+        lost_s, number, tried = heapq.heappop(waiting)
+        if -lost_s <= _LEAST_GAIN_S:
+            return
+        if tried.trial.is_finished:
+            yield tried
+        else:
+            tried.trial.refine()
+            heapq.heappush(waiting, (-tried.gain_s, number, tried))
 
 
 def _changed(old: Drawing, new: Drawing) -> tuple[int, int]:

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from shapely import Polygon
 
     from missions.drawn import Drawing
-    from missions.fitting import Measured
     from missions.ground import Ground
+    from missions.measuring import Measured
     from missions.route import Route
 
 _BLOCK_M = 0.5

@@ -2,8 +2,19 @@
 
 from __future__ import annotations
 
-from missions.drive_model.build import corner_forecast, envelope
+from missions.drive_model.band import convex
+from missions.drive_model.build import Drive, corner_forecast, envelope, plan_drive
 from missions.drive_model.envelope import Corner, Envelope, Leg
 from missions.drive_model.measured import beyond_measured
 
-__all__ = ["Corner", "Envelope", "Leg", "beyond_measured", "corner_forecast", "envelope"]
+__all__ = [
+    "Corner",
+    "Drive",
+    "Envelope",
+    "Leg",
+    "beyond_measured",
+    "convex",
+    "corner_forecast",
+    "envelope",
+    "plan_drive",
+]

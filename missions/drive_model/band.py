@@ -10,15 +10,15 @@ import numpy as np
 import shapely
 
 from missions.drive_model import corner as at_corner
-from missions.drive_model.route import Stray
+from missions.drive_model.route import Stray, Vector
 from missions.vehicle import Autopilot
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
-    from missions.drive_model.route import Route, Vector
+    from missions.drive_model.route import Route
 
 BLEND_SAMPLES = 6
 NEGLIGIBLE_M = 0.03
@@ -26,27 +26,31 @@ TAIL_TIMES_S = (2.0, 4.5, 8.0, 14.0)
 """Where a leg's band is cut, in seconds since its corner; between them a tail is taken as straight, which is never too narrow."""
 
 
+Hull = tuple[Vector, ...]
+
+
 class Pieces:
     """Collects the corner points of convex pieces."""
 
     def __init__(self) -> None:
-        self.vertices: list[Vector] = []
-        self.owners: list[int] = []
+        self.hulls: list[Hull] = []
         self.bands_m: list[float] = []
         self.waypoints: list[int] = []
 
     def add(self, vertices: Iterable[Vector], band_m: float, waypoint: int) -> None:
         """Add the hull of some places, to be grown by a band."""
-        before = len(self.vertices)
-        self.vertices.extend(vertices)
-        self.owners.extend([len(self.bands_m)] * (len(self.vertices) - before))
+        self.hulls.append(tuple(vertices))
         self.bands_m.append(band_m)
         self.waypoints.append(waypoint)
 
-    def cores(self) -> NDArray[np.object_]:
-        """Give all hulls."""
-        places = shapely.multipoints(np.asarray(self.vertices), indices=self.owners)
-        return np.asarray(shapely.convex_hull(places), dtype=np.object_)
+
+def convex(hulls: Sequence[Hull]) -> NDArray[np.object_]:
+    """Give the convex hulls of places."""
+    pairs = [hull if len(hull) > 1 else (*hull, *hull) for hull in hulls]
+    owners = np.repeat(np.arange(len(pairs)), [len(hull) for hull in pairs])
+    # Lines take far less to make than as many points, and their hulls are the same.
+    lines = shapely.linestrings(list(itertools.chain.from_iterable(pairs)), indices=owners)
+    return np.asarray(shapely.convex_hull(lines), dtype=np.object_)
 
 
 def _beside(place: Vector, direction: Vector, stray: Stray) -> list[Vector]:

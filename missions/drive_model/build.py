@@ -3,27 +3,28 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from missions.drive_model import corner as at_corner
-from missions.drive_model.band import Pieces, add_corner, add_end, add_leg, add_start
-from missions.drive_model.envelope import Corner, Envelope, Leg
+from missions.drive_model.band import Pieces, add_corner, add_end, add_leg, add_start, convex
+from missions.drive_model.envelope import Envelope
 from missions.drive_model.plan import SAME_PLACE_M, plan_route
-from missions.drive_model.route import Route, Stray
+from missions.drive_model.route import Stray
+from missions.drive_model.told import arrivals_s, told_corner, told_leg
 from missions.errors import InvalidPositionError, VehicleError
-from missions.vehicle import Autopilot
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
-    from missions.drive_model.route import LegPlan
+    from missions.drive_model.envelope import Corner
+    from missions.drive_model.route import Route
     from missions.vehicle import Vehicle
-
-START_AND_END_LAG_S = 2.0
 
 
 def envelope(
@@ -61,25 +62,76 @@ def envelope(
     VehicleError
         A speed that is not positive, or not one for each leg.
     """
+    return plan_drive(points, vehicle, heading_deg=heading_deg, speeds=speeds, stops=stops).envelope
+
+
+def plan_drive(
+    points: ArrayLike,
+    vehicle: Vehicle,
+    *,
+    heading_deg: float | None = None,
+    speeds: Sequence[float | None] | None = None,
+    stops: Mapping[int, float] | None = None,
+) -> Drive:
+    """Foresee a drive step by step: first its time, and only if need be its band; see `envelope`."""
     array = _checked(points)
     _check_speeds(speeds, len(array) - 1)
-    start, behind_m = _start(array, vehicle, heading_deg)
-    route = plan_route(array, vehicle, speeds, stops or {}, start)
-    pieces = Pieces()
-    _add_route(pieces, route, array, behind_m)
+    starts = [_start(array, vehicle, heading_deg)]
     if heading_deg is None and len(array) > 1:
         # Starting straight on it is sooner at speed, and then strays further from short legs than after the worst start.
-        along, behind_m = _start(array, vehicle, _bearing_deg(array))
-        _add_route(pieces, plan_route(array, vehicle, speeds, stops or {}, along), array, behind_m)
-    return Envelope(
-        points=array,
-        cores=pieces.cores(),
-        bands_m=np.asarray(pieces.bands_m),
-        waypoints=np.asarray(pieces.waypoints, dtype=np.int64),
-        corners=tuple(_corner(route, number) for number in range(len(route.corners))),
-        legs=tuple(_leg(route, number) for number in range(len(route.legs))),
-        arrivals_s=_arrivals_s(route, len(array)),
-    )
+        starts.append(_start(array, vehicle, _bearing_deg(array)))
+    routes = tuple(plan_route(array, vehicle, speeds, stops or {}, stray) for stray, _ in starts)
+    return Drive(array, routes, tuple(behind_m for _, behind_m in starts))
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """A drive whose band is made when it is asked for.
+
+    Parameters
+    ----------
+    points : ndarray of float, shape (n, 2)
+        What is driven, east and north in metres.
+    routes : tuple of Route
+        Legs and corners; the second one, where there is one, for another heading at the start.
+    behind_m : tuple of float
+        How far behind its place each start takes the rover.
+    """
+
+    points: NDArray[np.float64]
+    routes: tuple[Route, ...]
+    behind_m: tuple[float, ...]
+
+    @cached_property
+    def arrivals_s(self) -> NDArray[np.float64]:
+        """When the rover passes each point, from its start on, shape (n,)."""
+        return arrivals_s(self.routes[0], len(self.points))
+
+    @cached_property
+    def pieces(self) -> Pieces:
+        """The pieces of the band, as the places about which they lie."""
+        pieces = Pieces()
+        for route, behind_m in zip(self.routes, self.behind_m, strict=True):
+            _add_route(pieces, route, self.points, behind_m)
+        return pieces
+
+    @property
+    def envelope(self) -> Envelope:
+        """The band, with what is told of corners and legs."""
+        return self.with_cores(convex(self.pieces.hulls))
+
+    def with_cores(self, cores: NDArray[np.object_]) -> Envelope:
+        """Give the band, the convex hulls of its pieces being known already."""
+        route = self.routes[0]
+        return Envelope(
+            points=self.points,
+            cores=cores,
+            bands_m=np.asarray(self.pieces.bands_m),
+            waypoints=np.asarray(self.pieces.waypoints, dtype=np.int64),
+            corners=tuple(told_corner(route, number) for number in range(len(route.corners))),
+            legs=tuple(told_leg(route, number) for number in range(len(route.legs))),
+            arrivals_s=self.arrivals_s,
+        )
 
 
 def _add_route(pieces: Pieces, route: Route, points: NDArray[np.float64], behind_m: float) -> None:
@@ -133,7 +185,7 @@ def corner_forecast(
         ]
     )
     stops = {} if stop_s is None else {1: stop_s}
-    return _corner(plan_route(points, vehicle, [speed_mps, speed_mps], stops, Stray()), 0)
+    return told_corner(plan_route(points, vehicle, [speed_mps, speed_mps], stops, Stray()), 0)
 
 
 def _checked(points: ArrayLike) -> NDArray[np.float64]:
@@ -175,71 +227,3 @@ def _start(array: NDArray[np.float64], vehicle: Vehicle, heading_deg: float | No
 
 
 EITHER_SIDE_DEG = 165.0
-
-
-def _corner(route: Route, number: int) -> Corner:
-    plan, before, after = route.corners[number], route.legs[number], route.legs[number + 1]
-    band_m = max(before.band_m, after.band_m)
-    blend_s = before.profile.duration_s - plan.blend.duration_s
-    coming_m = route.stray_at(number, blend_s).widest_m
-    midway = route.stray_at(number, before.profile.duration_s / 2).seen_from(plan.turn_deg)
-    going = route.strays[number + 1].seen_from(plan.turn_deg)
-    return Corner(
-        waypoint=plan.waypoint,
-        turn_deg=plan.turn_deg,
-        stops=plan.stops,
-        pivots=plan.pivots,
-        inside_cut_m=max(
-            _cut_m(route, number) + coming_m + min(band_m, at_corner.INSIDE_BAND_M),
-            max(going.right_m, midway.right_m) + band_m,
-        ),
-        outside_overshoot_m=max(coming_m, going.left_m, midway.left_m) + band_m,
-        reach_m=before.profile.length_m - before.profile.travelled_m(blend_s),
-        middle_m=plan.blend.reach_m,
-        time_lost_s=plan.time_lost_s,
-        bounded=plan.bounded,
-    )
-
-
-def _cut_m(route: Route, number: int) -> float:
-    plan = route.corners[number]
-    sine = abs(math.sin(math.radians(plan.turn_deg)))
-    if route.vehicle.autopilot is Autopilot.PX4 and not plan.stops:
-        return route.vehicle.waypoint_radius_m * (sine if abs(plan.turn_deg) < 90 else 1.0)
-    return plan.blend.reach_m * sine
-
-
-def _leg(route: Route, number: int) -> Leg:
-    leg: LegPlan = route.legs[number]
-    begin_s, _ = route.span_s(number)
-    stray = route.stray_at(number, begin_s)
-    return Leg(
-        first=leg.first,
-        length_m=leg.profile.length_m,
-        top_speed_mps=leg.profile.top_speed_mps,
-        half_width_m=leg.band_m,
-        left_m=leg.band_m + stray.left_m,
-        right_m=leg.band_m + stray.right_m,
-    )
-
-
-def _arrivals_s(route: Route, count: int) -> NDArray[np.float64]:
-    """Give when each point is passed: the motions of the legs one after another, less what they overlap."""
-    arrivals_s = np.zeros(count)
-    clock_s = (
-        START_AND_END_LAG_S / 2 + at_corner.swing_time_s(route.strays[0].widest_m, route.vehicle.speed_mps)
-        if route.legs
-        else 0.0
-    )
-    for number, leg in enumerate(route.legs):
-        clock_s += leg.profile.duration_s
-        if number == len(route.corners):
-            clock_s += START_AND_END_LAG_S / 2
-            arrivals_s[leg.first + 1 :] = clock_s
-            break
-        corner = route.corners[number]
-        ramps_s = (leg.profile.ramp.duration_s + route.legs[number + 1].profile.ramp.duration_s) / 2
-        extra_s = corner.time_lost_s - ramps_s  # negative by the overlap of the two motions
-        arrivals_s[leg.first + 1 : corner.waypoint + 1] = clock_s - corner.blend.duration_s / 2
-        clock_s += extra_s
-    return arrivals_s

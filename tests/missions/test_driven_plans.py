@@ -15,6 +15,7 @@ from shapely import LineString, Point
 from strategies import RandomField, random_fields
 
 from missions.drive_model import envelope
+from missions.driven_route import RouteSearch
 from missions.errors import NoRouteError, RouteError, StartBlockedError, VehicleError
 from missions.fence import CircleZone
 from missions.geo import LatLon
@@ -312,3 +313,17 @@ def test_few_waypoints_round_a_circle() -> None:
     legs_m = [math.dist(a, b) for a, b in itertools.pairwise(Chart(HOME).points(result.path))]
     assert min(legs_m) > 3.0
     assert np.isfinite(result.duration_s)
+
+
+def test_a_start_that_nothing_mends_is_refused_without_trying_it_slowly(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def never(*_: object) -> None:
+        raise AssertionError("a vehicle swings as far when it turns slowly")
+
+    lane = box(IN, -2.9, -60, 2.9, 60)
+    situation = facing(situation_of(lane, **VEHICLES[1]), 0, 40, 0.0)
+    monkeypatch.setattr(RouteSearch, "_fit_slowly", never)
+    monkeypatch.setattr(RouteSearch, "_fit_other_ways", never)
+    with pytest.raises(NoRouteError, match="at the start this vehicle would come as near as"):
+        plan(situation, Request(targets=(place(0, -50),), clearance_m=1.0))

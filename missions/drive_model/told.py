@@ -1,0 +1,89 @@
+"""What is told of a drive: its corners, its legs, and when it comes to each point."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from missions.drive_model import corner as at_corner
+from missions.drive_model.envelope import Corner, Leg
+from missions.vehicle import Autopilot
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from missions.drive_model.route import LegPlan, Route
+
+START_AND_END_LAG_S = 2.0
+
+
+def told_corner(route: Route, number: int) -> Corner:
+    """Give what is foreseen at a corner."""
+    plan, before, after = route.corners[number], route.legs[number], route.legs[number + 1]
+    band_m = max(before.band_m, after.band_m)
+    blend_s = before.profile.duration_s - plan.blend.duration_s
+    coming_m = route.stray_at(number, blend_s).widest_m
+    midway = route.stray_at(number, before.profile.duration_s / 2).seen_from(plan.turn_deg)
+    going = route.strays[number + 1].seen_from(plan.turn_deg)
+    return Corner(
+        waypoint=plan.waypoint,
+        turn_deg=plan.turn_deg,
+        stops=plan.stops,
+        pivots=plan.pivots,
+        inside_cut_m=max(
+            _cut_m(route, number) + coming_m + min(band_m, at_corner.INSIDE_BAND_M),
+            max(going.right_m, midway.right_m) + band_m,
+        ),
+        outside_overshoot_m=max(coming_m, going.left_m, midway.left_m) + band_m,
+        reach_m=before.profile.length_m - before.profile.travelled_m(blend_s),
+        middle_m=plan.blend.reach_m,
+        time_lost_s=plan.time_lost_s,
+        bounded=plan.bounded,
+    )
+
+
+def _cut_m(route: Route, number: int) -> float:
+    plan = route.corners[number]
+    sine = abs(math.sin(math.radians(plan.turn_deg)))
+    if route.vehicle.autopilot is Autopilot.PX4 and not plan.stops:
+        return route.vehicle.waypoint_radius_m * (sine if abs(plan.turn_deg) < 90 else 1.0)
+    return plan.blend.reach_m * sine
+
+
+def told_leg(route: Route, number: int) -> Leg:
+    """Give what is foreseen on a leg."""
+    leg: LegPlan = route.legs[number]
+    begin_s, _ = route.span_s(number)
+    stray = route.stray_at(number, begin_s)
+    return Leg(
+        first=leg.first,
+        length_m=leg.profile.length_m,
+        top_speed_mps=leg.profile.top_speed_mps,
+        half_width_m=leg.band_m,
+        left_m=leg.band_m + stray.left_m,
+        right_m=leg.band_m + stray.right_m,
+    )
+
+
+def arrivals_s(route: Route, count: int) -> NDArray[np.float64]:
+    """Give when each point is passed: the motions of the legs one after another, less what they overlap."""
+    times_s = np.zeros(count)
+    clock_s = (
+        START_AND_END_LAG_S / 2 + at_corner.swing_time_s(route.strays[0].widest_m, route.vehicle.speed_mps)
+        if route.legs
+        else 0.0
+    )
+    for number, leg in enumerate(route.legs):
+        clock_s += leg.profile.duration_s
+        if number == len(route.corners):
+            clock_s += START_AND_END_LAG_S / 2
+            times_s[leg.first + 1 :] = clock_s
+            break
+        corner = route.corners[number]
+        ramps_s = (leg.profile.ramp.duration_s + route.legs[number + 1].profile.ramp.duration_s) / 2
+        extra_s = corner.time_lost_s - ramps_s  # negative by the overlap of the two motions
+        times_s[leg.first + 1 : corner.waypoint + 1] = clock_s - corner.blend.duration_s / 2
+        clock_s += extra_s
+    return times_s

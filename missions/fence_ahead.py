@@ -1,0 +1,127 @@
+"""What the vehicle's avoidance sees: how far ahead a fence lies, and what speed that leaves it (AC_Avoid, AR_PosControl)."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+    from shapely.geometry.base import BaseGeometry
+
+    from missions.vehicle import Vehicle
+
+_MOVED_M = 5.0
+"""So far a place may move until the edges near it are looked for again."""
+
+_SPARE_M = 0.1
+_TOUCHING_M2 = 1e-9
+_FEW = 24
+
+
+class FenceAhead:
+    """The straight edges of a fence that a drive has to do with.
+
+    Numbers are complex: east is the real part, north the imaginary one.
+
+    Parameters
+    ----------
+    fence : shapely geometry
+        The lines it avoids, metres.
+    places : ndarray of complex
+        Where it drives.
+    vehicle : Vehicle
+        What drives.
+    """
+
+    def __init__(self, fence: BaseGeometry, places: NDArray[np.complex128], vehicle: Vehicle) -> None:
+        self._stops_within_m = vehicle.stops_within_m
+        self._gain_per_s, self._accel_mps2 = vehicle.position_gain_per_s, vehicle.accel_max_mps2
+        self._linear_m = self._accel_mps2 / self._gain_per_s**2
+        points, lines = shapely.get_coordinates(shapely.get_parts(fence), return_index=True)
+        joined = lines[1:] == lines[:-1]
+        corners = points[:, 0] + 1j * points[:, 1]
+        self._starts, self._ends = corners[:-1][joined], corners[1:][joined]
+        near = self._touch(_corners(places), self.counts_within_m(vehicle.speed_mps))
+        self._starts, self._ends = self._starts[near], self._ends[near]
+        self._steps = self._ends - self._starts
+        self._centre, self._reach_m = 0j, -math.inf
+        self._near = self._starts, self._steps
+        self._near_edges: list[tuple[complex, complex]] = []
+
+    def counts_within_m(self, top_mps: float) -> float:
+        """Give the distance beyond which an edge lets a rover drive at a speed."""
+        return self._stops_within_m + max(top_mps / self._gain_per_s, top_mps**2 / self._accel_mps2)
+
+    def speeds_mps(self, places: NDArray[np.complex128], ways: NDArray[np.complex128]) -> NDArray[np.float64]:
+        """Give the speed that is allowed at each place, its own way (sqrt_controller of what is left to the margin)."""
+        left_m = np.maximum(self._ahead_m(places, ways) - self._stops_within_m, 0.0)
+        far_mps = np.sqrt(2 * self._accel_mps2 * np.maximum(left_m - self._linear_m / 2, 0.0))
+        return np.where(left_m <= self._linear_m, self._gain_per_s * left_m, far_mps)
+
+    def speed_mps(self, place: complex, way: complex, top_mps: float) -> float:
+        """Give the speed that is allowed at one place, one way; the same for speeds up to ``top_mps``, and above that no less."""
+        self._look_about(place, self.counts_within_m(top_mps) + _SPARE_M)
+        left_m = max(self._one_ahead_m(place, way) - self._stops_within_m, 0.0)
+        if left_m <= self._linear_m:
+            return self._gain_per_s * left_m
+        return math.sqrt(2 * self._accel_mps2 * max(left_m - self._linear_m / 2, 0.0))
+
+    def _look_about(self, place: complex, reach_m: float) -> None:
+        """Leave for one place's own use only the edges within reach of it."""
+        if abs(place - self._centre) <= _MOVED_M and reach_m <= self._reach_m:
+            return
+        self._centre, self._reach_m = place, reach_m
+        near = self._touch((place, place), reach_m + _MOVED_M)
+        self._near = self._starts[near], self._steps[near]
+        self._near_edges = list(zip(*(part.tolist() for part in self._near), strict=True))
+
+    def _touch(self, box: tuple[complex, complex], reach_m: float) -> NDArray[np.bool_]:
+        """Tell which edges may come within reach of a box."""
+        near = np.ones(len(self._starts), dtype=np.bool_)
+        for part, (low, high) in (
+            (np.real, (box[0].real, box[1].real)),
+            (np.imag, (box[0].imag, box[1].imag)),
+        ):
+            starts, ends = part(self._starts), part(self._ends)
+            near &= (np.maximum(starts, ends) >= low - reach_m) & (np.minimum(starts, ends) <= high + reach_m)
+        return near
+
+    def _ahead_m(self, places: NDArray[np.complex128], ways: NDArray[np.complex128]) -> NDArray[np.float64]:
+        """Give how far ahead the first edge lies; infinite where there is none."""
+        back = ways.conj()[:, None]
+        off = (self._starts - places[:, None]) * back
+        steps = self._steps * back
+        with np.errstate(divide="ignore", invalid="ignore"):  # an edge along the way is met at its neighbours
+            share = -off.imag / steps.imag
+            away_m = off.real + share * steps.real
+        met = (away_m >= 0) & (share >= 0) & (share <= 1)
+        return np.asarray(np.where(met, away_m, np.inf).min(axis=1, initial=np.inf))
+
+    def _one_ahead_m(self, place: complex, way: complex) -> float:
+        """Give the same for one place, of the edges near it: this is asked so often that a few edges are best looked at one by one."""
+        back = way.conjugate()
+        edges = self._near_edges
+        if len(edges) > _FEW:
+            starts, steps = self._near
+            aside_m = ((starts - place) * back).imag
+            crossing = aside_m * (aside_m + (steps * back).imag) <= _TOUCHING_M2
+            edges = [edges[edge] for edge in np.flatnonzero(crossing).tolist()]
+        first_m = math.inf
+        for start, step in edges:
+            off, turned = (start - place) * back, step * back
+            if turned.imag:  # an edge along the way is met at its neighbours
+                share = -off.imag / turned.imag
+                if 0 <= share <= 1:
+                    away_m = off.real + share * turned.real
+                    if 0 <= away_m < first_m:
+                        first_m = away_m
+        return first_m
+
+
+def _corners(places: NDArray[np.complex128]) -> tuple[complex, complex]:
+    low = complex(places.real.min(), places.imag.min())
+    return low, complex(places.real.max(), places.imag.max())

@@ -1,7 +1,9 @@
 """Reading parameters, some or all, and setting one with confirmation.
 
 ArduPilot sends every parameter as a 32-bit float, whole numbers too. It does not answer when asked for a parameter it does not have:
-a name counts as missing when it was asked for so often that, as the link loses messages, an answer would have come.
+a name counts as missing when it was asked for so often that, as the link loses messages, an answer would have come. A question counts
+only where the vehicle has answered a later one: a link or a vehicle that stands still for a while tells nothing of its parameters. So
+that there is a later one, a parameter that is there is asked for again after each repeated question.
 """
 
 from __future__ import annotations
@@ -33,7 +35,8 @@ _SET_AGAIN_S = 0.7
 _ANSWERS_BELIEVED = 3
 _LEAST_OVERDUE_S, _MOST_OVERDUE_S = 0.2, 2.0
 _LEAST_TRIES, _MOST_TRIES = 3, 14
-_WRONGLY_MISSING = 1e-3  # how likely a parameter may be called missing that is there
+_PATIENT_ROUNDS = 2  # of repeated questions without any answer, until they are asked ever more seldom
+_WRONGLY_MISSING = 1e-4  # how likely a parameter may be called missing that is there
 _NO_INDEX = 65535
 
 
@@ -63,8 +66,13 @@ class ParametersOutcome:
 
 @dataclass(slots=True)
 class _Ask:
+    """A question under way: when it was last sent, how often, which questions its first and last sending were, and how many count."""
+
     sent_s: float
     tries: int
+    first: int
+    last: int
+    passed_over: int = 0
 
 
 class ReadParameters(TableMachine[ParameterState, ParameterEvent]):
@@ -91,6 +99,10 @@ class ReadParameters(TableMachine[ParameterState, ParameterEvent]):
         self._round_trip = RoundTrip(0.3)
         self._answered = 0
         self._answered_tries = 0
+        self._sent = 0
+        self._answered_to = 0  # the latest question that was surely heard
+        self._control = (0, "")  # which question it was, and for what; after each repeated one
+        self._quiet_rounds = 0
         self._heard_s = 0.0
         self._list_at_s = 0.0
 
@@ -142,6 +154,7 @@ class ReadParameters(TableMachine[ParameterState, ParameterEvent]):
             return
         if self.state is ParameterState.IDLE:
             return
+        self._hear_control(message, now_s)
         if self._names is None:
             self._values[message.param_id] = message.param_value
             if 0 <= message.param_index < message.param_count and message.param_index != _NO_INDEX:
@@ -196,10 +209,32 @@ class ReadParameters(TableMachine[ParameterState, ParameterEvent]):
             self._move(ParameterEvent.GIVEN_UP if self._missing else ParameterEvent.ALL_HERE)
 
     def _ask(self, key: str | int, tries: int, now_s: float) -> None:
-        self._asks.pop(key, None)
-        self._asks[key] = _Ask(now_s, tries)
+        before = self._asks.pop(key, None)
+        self._sent += 1
+        self._asks[key] = _Ask(now_s, tries, self._sent, self._sent)
+        if before is not None:
+            self._asks[key].first, self._asks[key].passed_over = before.first, before.passed_over
+        self._request(key)
+
+    def _request(self, key: str | int) -> None:
         name, index = ("", key) if isinstance(key, int) else (key, -1)
         self._send(ParamRequestRead(self._peer.system, self._peer.component, name, index))
+
+    def _ask_control(self) -> None:
+        """Ask for what is surely there: a parameter that was answered, else the first one of the vehicle's list."""
+        self._sent += 1
+        self._answered_tries += 1
+        name = next(iter(self._values), "")
+        self._control = (self._sent, name)
+        self._request(name or 0)
+
+    def _hear_control(self, message: ParamValue, now_s: float) -> None:
+        number, name = self._control
+        if number and (message.param_id == name if name else message.param_index == 0):
+            self._answered_to = max(self._answered_to, number)
+            self._answered += 1
+            self._control = (0, "")
+            self._heard_s, self._quiet_rounds = now_s, 0
 
     def _settle(self, key: str | int, now_s: float) -> None:
         ask = self._asks.pop(key, None)
@@ -207,42 +242,48 @@ class ReadParameters(TableMachine[ParameterState, ParameterEvent]):
             if key in self._waiting:
                 self._waiting.remove(key)
             return
+        self._quiet_rounds = 0
+        self._answered_to = max(
+            self._answered_to, ask.first
+        )  # which of its sendings was answered is not known
         if ask.tries == 1:
             self._round_trip.observe(now_s - ask.sent_s)
         self._answered += 1
         self._answered_tries += ask.tries
 
     def _overdue_s(self) -> float:
-        return self._round_trip.timeout_s(_LEAST_OVERDUE_S, _MOST_OVERDUE_S)
+        overdue_s = self._round_trip.timeout_s(_LEAST_OVERDUE_S, _MOST_OVERDUE_S)
+        return min(overdue_s * 2.0 ** max(self._quiet_rounds - _PATIENT_ROUNDS, 0), _MOST_OVERDUE_S)
 
     def _repeat_overdue(self, now_s: float) -> None:
         if now_s >= self._heard_s + PATIENCE_S:
-            # Names that are all unknown look like silence; only an answer to something tells them apart.
-            if self._answered or self._values:
-                self._missing += self._asks
-                self._asks.clear()
-                self._missing += reversed(self._waiting)
-                self._waiting.clear()
-            else:
-                self._move(ParameterEvent.SILENCE)
+            self._move(ParameterEvent.SILENCE)
             return
         overdue_s = self._overdue_s()
         enough = self._tries_enough()
+        repeated = False
         for key, ask in list(self._asks.items()):
             if now_s < ask.sent_s + overdue_s:
                 break
+            ask.passed_over += ask.last < self._answered_to
             # What is asked by number is in the list: only names can be unknown.
-            if ask.tries >= (_MOST_TRIES if isinstance(key, int) else enough):
+            is_unknown = isinstance(key, str) and ask.passed_over >= enough
+            if is_unknown or ask.tries >= _MOST_TRIES:
                 del self._asks[key]
                 self._missing.append(key)
             else:
                 self._ask(key, ask.tries + 1, now_s)
+                repeated = True
+        if repeated:
+            still_open, _ = self._control
+            self._quiet_rounds += bool(still_open)
+            self._ask_control()
 
     def _tries_enough(self) -> int:
         """Give how often one must ask until an unanswered name is a missing one, judged by what others needed."""
         if not self._answered:
             return _MOST_TRIES
-        failures = (self._answered_tries - self._answered + 1) / (self._answered_tries + 4)
+        failures = (max(self._answered_tries - self._answered, 0) + 1) / (self._answered_tries + 4)
         return min(max(math.ceil(math.log(_WRONGLY_MISSING) / math.log(failures)), _LEAST_TRIES), _MOST_TRIES)
 
 

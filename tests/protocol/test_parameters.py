@@ -24,8 +24,9 @@ def value(name, number=1.0, index=65535, count=60, kind=9):
 class Store:
     """A vehicle's parameters behind a lossy link, in stepped time."""
 
-    def __init__(self, machine, loss=0.0, seed=0, delay_s=0.05):
+    def __init__(self, machine, loss=0.0, seed=0, delay_s=0.05, stalls=()):
         self.machine, self.loss, self.delay_s = machine, loss, delay_s
+        self.stalls = stalls
         self.random = random.Random(seed)
         self.values = {name: float(index) for index, name in enumerate(NAMES)}
         self.asked = 0
@@ -34,9 +35,10 @@ class Store:
         now_s, arriving = 0.0, []
         self.machine.start(now_s)
         while not self.machine.is_done and now_s < limit_s:
+            stalled = any(begin_s <= now_s < end_s for begin_s, end_s in self.stalls)
             for message in self.machine.messages_to_send():
                 self.asked += 1
-                if self.random.random() >= self.loss:
+                if self.random.random() >= self.loss and not stalled:
                     arriving += [(now_s + self.delay_s, answer) for answer in self._answers(message)]
             now_s += 0.01
             due = [answer for time_s, answer in arriving if time_s <= now_s]
@@ -72,6 +74,36 @@ def test_names_come_or_are_missing(loss, seed):
     assert took_s < (2.0 if loss == 0 else 25.0)
 
 
+@pytest.mark.parametrize("stall_s", [0.6, 1.0, 3.0, 8.0])
+@pytest.mark.parametrize("begins_s", [0.0, 0.04, 0.1, 0.2])
+@pytest.mark.parametrize("loss", [0.0, 0.2])
+def test_a_link_that_stands_still_tells_nothing_of_a_name(stall_s, begins_s, loss):
+    store = Store(ReadParameters(PEER, [*NAMES, "NONE"]), loss, 1, stalls=[(begins_s, begins_s + stall_s)])
+    store.run()
+    outcome = store.machine.outcome
+    assert not outcome.is_silent
+    assert outcome.missing == ("NONE",)
+    assert len(outcome.values) == len(NAMES)
+
+
+@pytest.mark.parametrize("stall_s", [0.7, 4.0])
+def test_names_that_are_all_unknown_are_missing_where_the_vehicle_answers_to_others(stall_s):
+    store = Store(ReadParameters(PEER, ["NONE1", "NONE2"]), stalls=[(0.0, stall_s)])
+    took_s = store.run()
+    assert sorted(store.machine.outcome.missing) == ["NONE1", "NONE2"]
+    assert not store.machine.outcome.is_silent
+    assert took_s < 15.0
+
+
+def test_a_silent_link_is_not_asked_again_and_again():
+    store = Store(ReadParameters(PEER, NAMES), stalls=[(0.1, 60.0)])
+    took_s = store.run()
+    assert store.machine.outcome.is_silent
+    assert len(store.machine.outcome.values) + len(store.machine.outcome.missing) == len(NAMES)
+    assert took_s < 11.0
+    assert store.asked < 10 * len(NAMES)
+
+
 @pytest.mark.parametrize("loss", [0.0, 0.1, 0.3])
 def test_all_parameters_come(loss):
     store = Store(ReadParameters(PEER), loss, seed=1)
@@ -104,6 +136,7 @@ def test_a_vehicle_that_falls_silent_leaves_the_rest_missing():
     script.hear(value("P000"))
     script.pass_time(30.0)
     assert script.machine.outcome.missing == ("P001", "P002")
+    assert script.machine.outcome.is_silent
 
 
 def test_the_list_is_asked_for_again_when_nothing_comes():

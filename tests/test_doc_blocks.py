@@ -23,7 +23,7 @@ from typer.testing import CliRunner
 from mavlink_bridge.cli.app import app
 from mavlink_bridge.simulator import Simulator, SimulatorConfig
 from missions.fence import fence_to_items
-from missions.formats import read_fence, read_parameters
+from missions.formats import read_fence, read_parameters, read_situation
 from missions.geo import LatLon
 
 ROOT = Path(__file__).parents[1]
@@ -38,7 +38,18 @@ _EXIT = re.compile(r"#(?:.*:)?\s*exit (\d+)\s*$")
 _SHELL = re.compile(r"[|;&<>*$`~]")
 PADDOCK = '{"type": "Polygon", "coordinates": [[[-105.23, 40.071], [-105.228, 40.071], [-105.228, 40.072], [-105.23, 40.071]]]}'
 HOME = LatLon(40.071374, -105.229930)
-PARAMETERS = "FENCE_ENABLE,1\nFENCE_TYPE,6\nFENCE_MARGIN,2\nWP_RADIUS,2\nWP_SPEED,2\nTURN_RADIUS,0.9\nSERVO1_FUNCTION,26\nAVOID_ENABLE,0\nOA_TYPE,0\n"
+
+
+def test_the_files_to_practise_with_are_of_one_yard():
+    yard, fields = ROOT / "examples" / "yard", ROOT / "tests" / "fields"
+    fence = read_fence(fields / "yard-fence.waypoints")
+    assert read_fence(yard / "fence.waypoints") == fence
+    planned = read_situation(yard / "field.plan")
+    assert planned.home.value == HOME
+    assert [zone.kind for zone in planned.fence.value.zones] == [zone.kind for zone in fence.zones]
+    drawn, wanted = yard / "drawn.waypoints", fields / "yard-mission.waypoints"
+    assert drawn.read_text(encoding="utf-8") == wanted.read_text(encoding="utf-8")
+    assert read_parameters(yard / "rover.parm")["FENCE_MARGIN"] == 2.0
 
 
 def blocks(page: Path) -> list[re.Match]:
@@ -63,25 +74,20 @@ def place(tmp_path, monkeypatch) -> Path:
     shutil.copytree(fields, tmp_path / "tests" / "fields")
     shutil.copytree(ROOT / "sitl_logs", tmp_path / "sitl_logs")
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
-    shutil.copy(fields / "yard-fence.waypoints", tmp_path / "fence.waypoints")
+    for path in (ROOT / "examples" / "yard").iterdir():  # where pages send those who have no field at hand
+        shutil.copy(path, tmp_path)
     shutil.copy(fields / "maze-fence.waypoints", tmp_path / "maze.waypoints")
-    shutil.copy(fields / "yard-mission.waypoints", tmp_path / "drawn.waypoints")
     shutil.copy(fields / "yard-mission.waypoints", tmp_path / "mission.waypoints")
     for name in ("field.tlog", "flight.tlog"):
         shutil.copy(ROOT / "sitl_logs" / "guided-maze.tlog", tmp_path / name)
     (tmp_path / "paddock.geojson").write_text(PADDOCK)
-    (tmp_path / "rover.parm").write_text(PARAMETERS)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
     monkeypatch.setattr("shellingham.detect_shell", lambda *_: ("bash", "/bin/bash"))  # which the reader uses
     monkeypatch.setattr("serial.tools.list_ports.comports", list)  # whoever may use this computer's
     monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
-    for name in ("field.plan", "field.kml"):
-        assert CliRunner().invoke(app, ["convert", "fence.waypoints", name]).exit_code == 0
-    plan = json.loads((tmp_path / "field.plan").read_text())
-    plan["mission"]["plannedHomePosition"] = [*HOME, 0]
-    (tmp_path / "field.plan").write_text(json.dumps(plan))
+    assert CliRunner().invoke(app, ["convert", "fence.waypoints", "field.kml"]).exit_code == 0
     return tmp_path
 
 
@@ -96,8 +102,7 @@ class Reader:
 
     def close(self) -> None:
         for process in self._processes:
-            process.send_signal(signal.SIGINT)
-            process.communicate(timeout=60)
+            _interrupted(process)
         if self._simulator is not None:
             self._simulator.__exit__(None, None, None)
 
@@ -161,14 +166,25 @@ class Reader:
             command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.PIPE, text=True
         )
         events = []
-        for line in process.stdout:
-            events.append(json.loads(line).get("event"))
-            if events[-1] == "learnt":
-                break
-        process.send_signal(signal.SIGINT)
-        _, errors = process.communicate(timeout=60)
+        try:
+            for line in process.stdout:
+                events.append(json.loads(line).get("event"))
+                if events[-1] == "learnt":
+                    break
+        finally:
+            errors = _interrupted(process)
         assert (process.returncode, events[-1]) == (130, "learnt"), errors
         return ""
+
+
+def _interrupted(process: subprocess.Popen) -> str:
+    """Press Ctrl-C; give what it told last. Whatever happens, nothing goes on running beside the next page."""
+    process.send_signal(signal.SIGINT)
+    try:
+        return process.communicate(timeout=60)[1]
+    finally:
+        process.kill()
+        process.communicate()
 
 
 def _commands(text: str) -> list[str]:

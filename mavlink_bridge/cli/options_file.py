@@ -104,6 +104,13 @@ def take_options(context: typer.Context, path: Path | None) -> Path | None:
         options |= options_for(own, command, known, is_asked_for=False)
     if path is not None:
         options |= options_for(path, command, known, is_asked_for=True)
+    repeatable = {
+        parameter.name for parameter in context.command.params if getattr(parameter, "multiple", False)
+    }
+    options = {
+        name: [value] if name in repeatable and not isinstance(value, list) else value
+        for name, value in options.items()
+    }
     if options:
         context.default_map = {**(context.default_map or {}), **options}
     return path

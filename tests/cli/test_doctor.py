@@ -211,6 +211,17 @@ class TestConfig:
         told = {one["option"]: one["value"] for one in document["settings"]}
         assert told == {"--clearance": "1.5", "--corner-allowance": "0"}
 
+    @pytest.mark.parametrize("target", ['"40.0720926,-105.2286152"', '["40.0720926,-105.2286152"]'])
+    def test_an_option_that_may_be_repeated_may_stand_alone(self, fields, tmp_path, target):
+        given = tmp_path / "given.toml"
+        given.write_text(f"[plan]\ntarget = {target}\n")
+        told = run(
+            "plan", "--config", given, "--fence", fields / "yard-fence.waypoints",
+            "--start", "40.071374,-105.229930", "--json",
+        )  # fmt: skip
+        assert told.exit_code == 0
+        assert json.loads(told.stdout)["targets"]
+
     @pytest.mark.parametrize("daring", ["upload", "drive", "arm", "replace-active"])
     def test_no_file_read_unasked_changes_a_vehicle(self, daring):
         write_options(f"[all]\n{daring} = true\n")

@@ -10,8 +10,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.director import Director, Orders
+from mavlink_bridge.errors import LogError
 from mavlink_bridge.journal import journal_path, read_journal
-from mavlink_bridge.logbook.clock import SteadyClock
+from mavlink_bridge.logbook.clock import Pulse, SteadyClock
 from mavlink_bridge.tlog import TlogReader
 from missions.situation import Situation
 
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
 
 SENT_LINK = 3
 """MAVProxy's link number, and ours, for what the recording side sent."""
+
+
+_STILL_ADVICE = "fence, mission and targets are in it all the same: `pbpp log FILE`, `pbpp plan --log FILE`"
 
 
 def replay_log(log: Path, orders: Orders, wait: Callable[[float], None] | None = None) -> Iterator[Event]:
@@ -82,11 +86,18 @@ def replay_foreign(entries: Iterable[LogEntry], orders: Orders) -> Iterator[Even
     """Let the director listen to a log that somebody else recorded; give its events, at the log's times.
 
     The director's own time only goes forward: where the log's clock was set, it goes on from where it was.
+
+    Raises
+    ------
+    LogError
+        The log's clock stands still: the director, who waits for seconds to pass, can tell nothing of it.
     """
     director = Director(replace(orders, passive=True, upload=False, drive=False, arm=False, once=False))
     clock = SteadyClock()
+    pulse = Pulse()
     before_s: float | None = None
     for entry, now_s in clock.over(entries):
+        pulse.take(entry.frame, now_s)
         if before_s is None:
             director.start(now_s)
             before_s = now_s
@@ -98,6 +109,8 @@ def replay_foreign(entries: Iterable[LogEntry], orders: Orders) -> Iterator[Even
         director.handle_timer(before_s)
         _make_plan(director, before_s)
         yield from _at_log_time(_spoken(director), clock)
+    if pulse.trouble is not None:
+        raise LogError(f"{pulse.trouble}; it cannot be replayed", advice=_STILL_ADVICE)
 
 
 def _at_log_time(events: Iterable[Event], clock: SteadyClock) -> Iterator[Event]:

@@ -149,12 +149,15 @@ class RouteSearch:
                 self._fit(fitting, departing, found, refused)
                 if found or self._is_stopped():
                     break
-        if not found and not self._is_held_at_start(refused, fast_m - slow_m):
+        is_held = not found and self._is_held_at_start(refused, fast_m - slow_m)
+        if not found and not is_held:
             self._fit_slowly(routes[-1][0], found, refused)
             self._fit_other_ways(routes[-1], found, refused)
         if not found:
             drawing, measured = min(refused, key=lambda one: sum(one[1].missing_m))
-            raise refusal(self.ground, self.required_m, self.reserve_m, drawing, measured)
+            raise refusal(
+                self.ground, self.required_m, self.reserve_m, drawing, measured, held_at_start=is_held
+            )
         return min(found, key=lambda one: one[0])[1]
 
     def _is_held_at_start(self, refused: Sequence[tuple[Drawing, Measured]], narrower_m: float) -> bool:

@@ -28,6 +28,11 @@ _SHARES = (1.0, 0.9, 0.8, 0.65, 0.5, 0.35, 0.2, 0.1, 0.0)
 _MEASUREMENTS = 600
 """For each of them."""
 
+_NOTHING_ADVICE = (
+    "less clearance does not help this vehicle: turn it by hand to face its way, let it drive slower (--speed), or widen the "
+    "narrowest place"
+)
+
 
 @dataclass(frozen=True, eq=False)
 class FittedRoute:
@@ -84,12 +89,23 @@ class FittedRoute:
             try:
                 found = self._search(required_m, _MEASUREMENTS).find()
             except RouteError as error:
-                refusal = error
+                is_first, refusal = refusal is None, error
+                if is_first and error.details.get("held_at_start") and self._is_held_at_any():
+                    break
                 continue
             promised_m = max(0.0, required_m - asked.error_m)
             return replace(asked, promised_m=promised_m, error_m=required_m - promised_m), found
         assert refusal is not None
+        refusal.details["advice"] = _NOTHING_ADVICE
         raise refusal
+
+    def _is_held_at_any(self) -> bool:
+        """Tell whether the vehicle cannot turn where it stands though nothing more than no touch is asked: then nothing between helps."""
+        try:
+            self._search(0.0, _MEASUREMENTS).find()
+        except RouteError as error:
+            return bool(error.details.get("held_at_start"))
+        return False
 
     def _told(self, error: NoRouteError, asked: Promise) -> NoRouteError:
         """Give the error with what the widest route keeps while this vehicle drives it."""
@@ -98,7 +114,10 @@ class FittedRoute:
         try:
             widest, _ = self._widest(asked, places)
         except RouteError:
-            return error
+            return NoRouteError(
+                f"{error}, and none of those tried can be driven by this vehicle at any clearance",
+                **{**error.details, "advice": _NOTHING_ADVICE},
+            )
         return NoRouteError(
             f"no route keeps {asked.promised_m:.2f} m while driving; the widest keeps {widest.promised_m:.2f} m "
             f"({place.clearance_m:.2f} m drawn){place.where}",

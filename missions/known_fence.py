@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from missions.situation import Situation
     from missions.vehicle import Vehicle
 
+_TOTAL = "FENCE_TOTAL"
 _ADVICE = (
     "Let the ground station read the fence from the vehicle (MAVProxy: fence list; Mission Planner, QGroundControl: "
     "download in the plan view) while the stream is recorded, or give a fence file (--fence)"
@@ -28,11 +29,22 @@ def known_fence(situation: Situation) -> Fence:
     """
     known = situation.fence
     if known is None:
-        trouble = fence_trouble(situation) or "no fence was transferred"
+        trouble = fence_trouble(situation) or _never_seen(situation)
         raise FenceMissingError(f"{trouble}: there is nothing to plan around. {_ADVICE}")
     if not known.value.zones:
         raise FenceMissingError(f"the fence from {known.source} is empty: there is nothing to plan around")
     return known.value
+
+
+def _never_seen(situation: Situation) -> str:
+    """Say that no fence was seen; that the vehicle holds one all the same, where it says so."""
+    total = situation.parameters.get(_TOTAL, 0.0)
+    if not total > 0:
+        return "no fence was transferred"
+    return (
+        f"the vehicle holds a fence of {total:g} points ({_TOTAL}), but none was transferred as mission items "
+        "(older autopilots and stations use FENCE_POINT messages, which are not read)"
+    )
 
 
 def fence_trouble(situation: Situation) -> str | None:

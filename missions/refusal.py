@@ -20,14 +20,21 @@ if TYPE_CHECKING:
     from missions.measuring import Measured
     from missions.route import Route
 
+_START_ADVICE = "the vehicle has no room to turn where it stands: turn it by hand to face its way, or move it, or ask for less with --clearance"
 _BLOCK_M = 0.5
 _BLOCK_AWAY_M = 8.0
 
 
 def refusal(
-    ground: Ground, required_m: float, reserve_m: float, drawing: Drawing, measured: Measured
+    ground: Ground,
+    required_m: float,
+    reserve_m: float,
+    drawing: Drawing,
+    measured: Measured,
+    *,
+    held_at_start: bool,
 ) -> NoRouteError:
-    """Say which corner refused, by how much, and at which fence."""
+    """Say which corner refused, by how much, and at which fence; and whether it is that the vehicle cannot turn where it stands."""
     index = measured.worst_index
     point = drawing[index]
     position = ground.frame.to_lat_lon(LocalPoint(*point.place))
@@ -42,6 +49,7 @@ def refusal(
         if index == len(drawing) - 1
         else f"the corner of {abs(turn_deg):.0f}° at {position}"
     )
+    advice = {"advice": _START_ADVICE} if index == 0 or held_at_start else {}
     return NoRouteError(
         f"no route keeps {required_m:.2f} m while driving: at {where} this vehicle would come as near as "
         f"{max(kept_m, 0.0):.2f} m to {fence}, whatever was tried",
@@ -50,6 +58,8 @@ def refusal(
         turn_deg=round(turn_deg, 1),
         kept_m=round(max(kept_m, 0.0), 3),
         fences=[fence],
+        held_at_start=held_at_start,
+        **advice,
     )
 
 

@@ -362,6 +362,9 @@ class _Search:
             clearance_m=round(self.clearance_m, 3),
             walled_in=walled,
             fences=names,
+            advice=f"no clearance helps: open a way through {_names(names)}, or choose another target"
+            if walled == "target"
+            else f"no clearance helps: open a way through {_names(names)}, or drive it out by hand",
         )
 
     def _way(self, point: LocalPoint, to: Point) -> tuple[float, float, LatLon]:

@@ -61,7 +61,7 @@ _ADVICE: Mapping[type[Exception], str] = {
     mission_errors.NoRouteError: "ask for less with --clearance; --clearance max looks for the widest way",
     mission_errors.PlanCheckError: "nothing was written; please report this with the command and its input files",
     bridge_errors.IdentityTakenError: "speak as somebody else: --source-component",
-    bridge_errors.VehicleNotFoundError: "choose the vehicle with --system N, or take one of any kind with --any-vehicle",
+    bridge_errors.VehicleNotFoundError: "choose another vehicle with --system N",
     bridge_errors.LinkError: "is the vehicle on, and nobody else using the port? `pbpp doctor` lists the serial ports",
     bridge_errors.RefusedError: "the vehicle's own messages in the ground station may say more",
     bridge_errors.OutcomeError: "look at what the vehicle holds (`pbpp download`) before it drives",

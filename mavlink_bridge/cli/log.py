@@ -134,6 +134,8 @@ def _print(book: Logbook) -> None:
             f"The log's clock was set {book.clock_jumps} times while it was written: rates are off",
             soft_wrap=True,
         )
+    if book.clock_trouble:
+        console.print(f"{book.clock_trouble}: no time, rate or speed below means anything", soft_wrap=True)
     console.print(_senders(book))
     for vehicle in book.vehicles:
         console.print(f"\n[bold]Vehicle {vehicle.system}[/bold]: {_driven(vehicle)}", soft_wrap=True)

@@ -1,6 +1,6 @@
 """What a log holds, as data: who speaks, which lists went over the link, what was driven and how near to the fence."""
 
-from mavlink_bridge.logbook.clock import SteadyClock
+from mavlink_bridge.logbook.clock import Pulse, SteadyClock
 from mavlink_bridge.logbook.facts import (
     Ending,
     Intrusion,
@@ -24,6 +24,7 @@ __all__ = [
     "ModeSpan",
     "Nearest",
     "ParameterChange",
+    "Pulse",
     "ReportedBreach",
     "SteadyClock",
     "TargetSeen",

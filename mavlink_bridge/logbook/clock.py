@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from mavlink_bridge.messages import Heartbeat
+from mavlink_bridge.vehicles import is_vehicle
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
+    from mavlink_bridge.messages import Frame
     from mavlink_bridge.tlog import LogEntry
 
 NEAR_S: Final = 5.0
@@ -14,6 +18,46 @@ NEAR_S: Final = 5.0
 
 SILENCE_S: Final = 86_400.0
 """A step forward by at most this is time that passed; by more, or backwards, the clock was set."""
+
+
+LEAST_BEATS: Final = 10
+LEAST_BEAT_S: Final = 0.1
+"""Autopilots send a HEARTBEAT a second; so many that come faster than this were not timed."""
+
+
+class Pulse:
+    """Tells a log whose clock stands still, by its heartbeats: nothing in it can be timed.
+
+    Attributes
+    ----------
+    beats : int
+        The most heartbeats that one autopilot sent.
+    """
+
+    def __init__(self) -> None:
+        self.beats = 0
+        self._counts: dict[tuple[int, int], int] = {}
+        self._first_s: float | None = None
+        self._elapsed_s = 0.0
+
+    def take(self, frame: Frame, now_s: float) -> None:
+        """Take a frame and the time that the log gives it."""
+        self._first_s = now_s if self._first_s is None else self._first_s
+        self._elapsed_s = now_s - self._first_s
+        if isinstance(frame.message, Heartbeat) and is_vehicle(frame.message):
+            sender = (frame.system, frame.component)
+            self._counts[sender] = self._counts.get(sender, 0) + 1
+            self.beats = max(self.beats, self._counts[sender])
+
+    @property
+    def trouble(self) -> str | None:
+        """Say that the clock stands still; None where it runs."""
+        if self.beats < LEAST_BEATS or self._elapsed_s >= LEAST_BEAT_S * self.beats:
+            return None
+        return (
+            f"the log's clock stands still: {self.beats} heartbeats of one vehicle, which sends about one a second, "
+            f"within {self._elapsed_s:.2f} s"
+        )
 
 
 class SteadyClock:

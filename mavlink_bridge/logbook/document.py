@@ -22,6 +22,7 @@ def as_document(book: Logbook) -> dict[str, Any]:
         "duration_s": round(book.duration_s, 3),
         "has_timestamps": book.has_timestamps,
         "clock_jumps": book.clock_jumps,
+        "clock_trouble": book.clock_trouble,
         "damage": asdict(book.damage),
         "messages": [
             {

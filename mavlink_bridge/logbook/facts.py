@@ -227,6 +227,8 @@ class Logbook:
         False for a raw log.
     clock_jumps : int
         How often the log's clock was set while it was written; rates are then not to be trusted.
+    clock_trouble : str or None
+        That the clock stands still: no time, rate or speed of this log means anything.
     traffic : tuple of Traffic
         Messages by sender and type.
     damage : Damage
@@ -238,6 +240,7 @@ class Logbook:
     duration_s: float
     has_timestamps: bool
     clock_jumps: int
+    clock_trouble: str | None
     traffic: tuple[Traffic, ...]
     damage: Damage
     vehicles: tuple[VehicleLog, ...]

@@ -10,7 +10,7 @@ import numpy as np
 from mavlink_bridge import messages as m
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.fold import FOLDED, fold
-from mavlink_bridge.logbook.clock import NEAR_S, SILENCE_S, SteadyClock
+from mavlink_bridge.logbook.clock import NEAR_S, SILENCE_S, Pulse, SteadyClock
 from mavlink_bridge.logbook.facts import Logbook, VehicleLog
 from mavlink_bridge.logbook.recorder import RECORDED, Recorder
 from mavlink_bridge.tlog import TlogReader, survey
@@ -48,7 +48,9 @@ def read_logbook(path: Path, system: int | None = None) -> Logbook:
     clock = SteadyClock()
     clock.advance(begins_s, None)
     reader = TlogReader(path, RECORDED)
+    pulse = Pulse()
     for entry, now_s in clock.over(reader):
+        pulse.take(entry.frame, now_s)
         for recorder in recorders:
             recorder.take(entry.frame, now_s - begins_s)
     logs: tuple[VehicleLog, ...] = tuple(recorder.finish(duration_s) for recorder in recorders)
@@ -58,6 +60,7 @@ def read_logbook(path: Path, system: int | None = None) -> Logbook:
         duration_s=duration_s,
         has_timestamps=reader.has_timestamps,
         clock_jumps=jumps,
+        clock_trouble=pulse.trouble,
         traffic=tuple(traffic),
         damage=replace(damage, bad_crcs=reader.damage.bad_crcs),
         vehicles=logs,

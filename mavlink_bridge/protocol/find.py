@@ -17,6 +17,13 @@ LISTEN_S = 1.2
 """How long further vehicles are listened for: a heartbeat comes every second."""
 
 
+_SILENT_ADVICE = (
+    "is the vehicle on, the wiring right, and nobody else using the port? Do port and baud rate fit the vehicle's SERIALn_BAUD "
+    "(/dev/ttyUSB0,57600), and does it send to this address? `pbpp doctor` lists the serial ports"
+)
+_FORWARD_ADVICE = "MAVLink comes, but from no autopilot: let the ground station or router forward the vehicle's messages to this port too"
+
+
 class FindVehicle(TableMachine[FindState, FindEvent]):
     """Listens for heartbeats; when `is_done`, `trouble` is set, or `vehicle`, its newest `heartbeat` and when it came, `heard_s`.
 
@@ -39,6 +46,7 @@ class FindVehicle(TableMachine[FindState, FindEvent]):
         self._patience_s = patience_s
         self._until_s = 0.0
         self._heard: dict[tuple[int, int], tuple[Vehicle, Heartbeat, float]] = {}
+        self._senders: set[tuple[int, int]] = set()
         self.vehicle: Vehicle | None = None
         self.heartbeat: Heartbeat | None = None
         self.heard_s = 0.0
@@ -72,6 +80,7 @@ class FindVehicle(TableMachine[FindState, FindEvent]):
     def receive(self, frame: Frame, now_s: float) -> None:
         """Take a frame; only autopilots' heartbeats count."""
         heartbeat = frame.message
+        self._senders.add((frame.system, frame.component))
         if not isinstance(heartbeat, Heartbeat) or not is_vehicle(heartbeat) or self.is_done:
             return
         was_listening = self.state is FindState.LISTENING
@@ -95,8 +104,18 @@ class FindVehicle(TableMachine[FindState, FindEvent]):
         try:
             chosen = choose_vehicle(heard, self._system, any_vehicle=self._any_vehicle)
         except VehicleNotFoundError as error:
-            self.trouble = error
+            self.trouble = error if heard else self._unheard()
             self._move(FindEvent.CHOICE_FAILED)
             return
         self.vehicle, self.heartbeat, self.heard_s = self._heard[chosen.system, chosen.component]
         self._move(event)
+
+    def _unheard(self) -> VehicleNotFoundError:
+        """Say that no vehicle was heard, and whether anybody else was: that is another trouble than a dead line."""
+        within = f"no vehicle's HEARTBEAT was heard within {self._patience_s:g} s"
+        if not self._senders:
+            return VehicleNotFoundError(f"{within}, nor anything else", advice=_SILENT_ADVICE)
+        names = ", ".join(
+            f"system {system} component {component}" for system, component in sorted(self._senders)
+        )
+        return VehicleNotFoundError(f"{within}, only {names}", advice=_FORWARD_ADVICE)

@@ -112,6 +112,18 @@ def test_strange_names_and_clocks_are_told_plainly(tmp_path):
     assert "Damage passed over" in result.stdout
 
 
+def test_a_clock_that_stands_still_is_told(tmp_path):
+    log = Log()
+    for _ in range(12):
+        log.heartbeat()
+    log.rows = [(0.0, sender, message) for _, sender, message in log.rows]
+    path = log.write(tmp_path / "still.tlog")
+    told = "the log's clock stands still: 12 heartbeats of one vehicle"
+    assert told in run(str(path)).stdout.replace("\n", " ")
+    document = json.loads(run(str(path), "--json").stdout)
+    assert document["logs"][0]["clock_trouble"].startswith(told)
+
+
 @pytest.mark.parametrize(
     ("begins_s", "told"), [(3.3e10, "3015-09-24 10:40:00 UTC"), (2.6e11, "2.6e+11 s after 1970")]
 )

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mavlink_bridge.logbook import SteadyClock
+from mavlink_bridge.logbook import Pulse, SteadyClock
 from mavlink_bridge.messages import Frame, Heartbeat
 from mavlink_bridge.tlog import LogEntry
 
@@ -54,3 +54,18 @@ def test_never_runs_backwards_and_never_leaps_a_day(times_s):
 def test_times_that_go_forward_stay_as_they_are(steps_s):
     times_s = [sum(steps_s[:count], 1.7e9) for count in range(len(steps_s) + 1)]
     assert run(times_s)[1] == times_s
+
+
+@pytest.mark.parametrize(
+    ("beats", "every_s", "stands_still"),
+    [(9, 0.0, False), (10, 0.0, True), (40, 0.05, True), (40, 0.25, False)],
+)
+def test_heartbeats_tell_a_clock_that_stands_still(beats, every_s, stands_still):
+    pulse = Pulse()
+    assert pulse.trouble is None
+    for number in range(beats):
+        pulse.take(Frame(1, 1, Heartbeat(10, 3)), 100.0 + number * every_s)
+        pulse.take(Frame(255, 190, Heartbeat(6, 8)), 100.0 + number * every_s)
+    assert (pulse.trouble is not None) is stands_still
+    if pulse.trouble is not None:
+        assert f"{beats} heartbeats" in pulse.trouble

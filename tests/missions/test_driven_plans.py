@@ -18,6 +18,7 @@ from missions.drive_model import envelope
 from missions.driven_route import RouteSearch
 from missions.errors import NoRouteError, RouteError, StartBlockedError, VehicleError
 from missions.fence import CircleZone
+from missions.fitted_route import FittedRoute
 from missions.geo import LatLon
 from missions.items import Command
 from missions.plan import Plan, plan
@@ -325,5 +326,40 @@ def test_a_start_that_nothing_mends_is_refused_without_trying_it_slowly(
     situation = facing(situation_of(lane, **VEHICLES[1]), 0, 40, 0.0)
     monkeypatch.setattr(RouteSearch, "_fit_slowly", never)
     monkeypatch.setattr(RouteSearch, "_fit_other_ways", never)
-    with pytest.raises(NoRouteError, match="at the start this vehicle would come as near as"):
+    with pytest.raises(NoRouteError, match="at the start this vehicle would come as near as") as caught:
         plan(situation, Request(targets=(place(0, -50),), clearance_m=1.0))
+    assert "turn it by hand" in str(caught.value.details["advice"])
+
+
+def test_where_no_clearance_helps_the_advice_is_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A lane too narrow to turn in, and the vehicle faces the wrong end of it: asked once for the most, and once for none."""
+    asked_m = []
+    search = FittedRoute._search
+
+    def counted(self: FittedRoute, required_m: float, measurements: int | None = None) -> RouteSearch:
+        asked_m.append(required_m)
+        return search(self, required_m, measurements)
+
+    monkeypatch.setattr(FittedRoute, "_search", counted)
+    lane = box(IN, -1.6, -60, 1.6, 60)
+    situation = facing(situation_of(lane, **VEHICLES[0]), 0, 40, 0.0)
+    with pytest.raises(NoRouteError) as caught:
+        plan(situation, Request(targets=(place(0, -50),), widest=True))
+    assert str(caught.value.details["advice"]).startswith(
+        "less clearance does not help this vehicle: turn it"
+    )
+    assert asked_m == [pytest.approx(1.3, abs=0.02), 0.0]
+
+
+def test_a_gap_that_no_clearance_lets_this_vehicle_through_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: object) -> None:
+        raise NoRouteError("none of the shares")
+
+    monkeypatch.setattr(FittedRoute, "_widest", refused)
+    walls = [box(OUT, -3, -60, 3, -2.5), box(OUT, -3, 2.5, 3, 60)]
+    situation = facing(situation_of(box(IN, -60, -60, 60, 60), *walls, WP_SPEED=5.0), -50, 0, 90.0)
+    with pytest.raises(
+        NoRouteError, match=r"the widest keeps 2.50 m.*, and none .* at any clearance"
+    ) as caught:
+        plan(situation, Request(targets=(place(50, 0),), clearance_m=2.4))
+    assert "widen the narrowest place" in str(caught.value.details["advice"])

@@ -519,6 +519,10 @@ class TestUnreachable:
         ) as caught:
             drawn(situation_of(FIELD, *court, box(OUT, -50, -50, -40, -40)), place(-50, 0), place(50, 50))
         assert caught.value.details["walled_in"] == "target"
+        assert "no clearance helps: open a way through exclusion polygon 1" in str(
+            caught.value.details["advice"]
+        )
+        assert "another target" in str(caught.value.details["advice"])
         assert caught.value.details["fences"] == [f"exclusion polygon {i}" for i in (1, 2, 3, 4)]
 
     def test_a_closed_courtyard_around_the_start_and_against_the_edge(self) -> None:
@@ -528,6 +532,7 @@ class TestUnreachable:
         ) as caught:
             drawn(situation_of(FIELD, wall), place(-80, -50), place(50, 50))
         assert caught.value.details["walled_in"] == "start"
+        assert "drive it out by hand" in str(caught.value.details["advice"])
 
     def test_a_gap_too_narrow(self) -> None:
         zones = (box(OUT, -5, -100, 5, -1.5), box(OUT, -5, 1.5, 5, 100))
@@ -603,6 +608,11 @@ class TestWhatIsNotKnown:
             match=r"^no fence was transferred: there is nothing to plan around\. Let .*--fence",
         ):
             plan(Situation(), request)
+        with pytest.raises(
+            FenceMissingError,
+            match=r"^the vehicle holds a fence of 9 points \(FENCE_TOTAL\), but .*FENCE_POINT",
+        ):
+            plan(Situation(parameters={"FENCE_TOTAL": 9.0}), request)
         with pytest.raises(FenceMissingError, match="the fence from test is empty"):
             plan(Situation(fence=Known(Fence(), None, "test")), request)
 

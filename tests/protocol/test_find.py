@@ -46,7 +46,19 @@ def test_ground_stations_and_companions_are_no_vehicles():
     script.hear(STATION, COMPANION, MissionCount(0, 0, 1))
     script.pass_time(5.1)
     assert script.machine.outcome is script.machine.trouble
-    assert "no vehicle's HEARTBEAT" in str(script.machine.trouble)
+    assert (
+        str(script.machine.trouble)
+        == "no vehicle's HEARTBEAT was heard within 5 s, only system 1 component 1"
+    )
+    assert "forward" in script.machine.trouble.details["advice"]
+
+
+def test_a_dead_line_is_told_from_one_without_a_vehicle():
+    script = Script(FindVehicle(patience_s=5.0))
+    script.pass_time(5.1)
+    assert str(script.machine.trouble) == "no vehicle's HEARTBEAT was heard within 5 s, nor anything else"
+    assert "baud" in script.machine.trouble.details["advice"]
+    assert "--system" not in script.machine.trouble.details["advice"]
 
 
 def test_a_copter_is_taken_only_when_asked_for():

@@ -83,9 +83,12 @@ def bridge(
     system: SystemOption = None,
     any_vehicle: AnyVehicleOption = False,
     source_system: Annotated[
-        int | None, typer.Option(min=1, max=255, help="Our system id. Default: the vehicle's own.")
+        int | None,
+        typer.Option(metavar="N", min=1, max=255, help="Our system id. Default: the vehicle's own."),
     ] = None,
-    source_component: Annotated[int, typer.Option(min=1, max=255, help="Our component id.")] = 195,
+    source_component: Annotated[
+        int, typer.Option(metavar="N", min=1, max=255, help="Our component id.")
+    ] = 195,
     signing_key: SigningKeyOption = None,
     timeout: TimeoutOption = 30.0,
     json_output: JsonOption = False,

@@ -74,10 +74,14 @@ SystemOption = Annotated[
     ),
 ]
 SourceSystemOption = Annotated[
-    int, typer.Option(min=1, max=255, help="The system id we speak as.", rich_help_panel=LINK_PANEL)
+    int,
+    typer.Option(metavar="N", min=1, max=255, help="The system id we speak as.", rich_help_panel=LINK_PANEL),
 ]
 SourceComponentOption = Annotated[
-    int, typer.Option(min=1, max=255, help="The component id we speak as.", rich_help_panel=LINK_PANEL)
+    int,
+    typer.Option(
+        metavar="N", min=1, max=255, help="The component id we speak as.", rich_help_panel=LINK_PANEL
+    ),
 ]
 TimeoutOption = Annotated[
     float,

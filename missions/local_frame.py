@@ -98,8 +98,10 @@ class LocalFrame:
 
     def to_local_array(self, positions: Sequence[LatLon]) -> NDArray[np.float64]:
         """Give positions as an (n, 2) array, east and north in metres."""
-        lat_lon_deg = np.array(positions, dtype=float).reshape(-1, 2)
-        return np.column_stack(self._proj(lat_lon_deg[:, 1], lat_lon_deg[:, 0]))
+        # Lists: of an array of one older pyproj and numpy warn that it is taken for a number.
+        lons_deg = [lon_deg for _, lon_deg in positions]
+        lats_deg = [lat_deg for lat_deg, _ in positions]
+        return np.column_stack(self._proj(lons_deg, lats_deg)).reshape(-1, 2)
 
     def to_lat_lons(self, points: NDArray[np.float64]) -> list[LatLon]:
         """Give the positions of an (n, 2) array, east and north in metres."""

@@ -131,3 +131,13 @@ def test_the_autopilots_line_across_the_antimeridian() -> None:
 def test_a_line_of_no_length() -> None:
     a = LatLon(1, 2)
     assert autopilot_line(a, a, 1) == [a, a]
+
+
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_a_few_positions_are_an_array_too(count: int) -> None:
+    """One as well: some versions of pyproj take an array of one for a number."""
+    frame = LocalFrame(LatLon(40.0, -105.0))
+    places = [LatLon(40.001, -105.002), LatLon(39.999, -104.998)][:count]
+    points = frame.to_local_array(places)
+    assert points.shape == (count, 2)
+    assert [LocalPoint(*point) for point in points.tolist()] == [frame.to_local(place) for place in places]

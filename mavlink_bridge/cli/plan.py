@@ -269,7 +269,10 @@ def _check_options(
             raise UsageError(f"-o {path} would overwrite the fence with a mission")
     for path in (*outputs, *plots):
         if not path.parent.is_dir():
-            raise MissionFormatError(f"{path} cannot be written: there is no folder {path.parent}")
+            raise MissionFormatError(
+                f"{path} cannot be written: there is no folder {path.parent}",
+                advice=f"make {path.parent} first, or choose another place",
+            )
     if plots:
         from missions.picture import check_picture_format  # noqa: PLC0415 - quick help
 

@@ -81,4 +81,8 @@ def write_text(path: Path, text: str) -> None:
     except OSError as error:
         with suppress(OSError):
             whole.unlink()
-        raise MissionFormatError(f"{path} cannot be written: {error.strerror}", file=str(path)) from None
+        raise MissionFormatError(
+            f"{path} cannot be written: {error.strerror}",
+            file=str(path),
+            advice="choose another place, or make this one writable",
+        ) from None

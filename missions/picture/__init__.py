@@ -94,7 +94,11 @@ def draw_plan(
 
             write_figure(scene, path, title=title, blocks=blocks)
     except OSError as error:
-        raise MissionFormatError(f"{path} cannot be written: {error.strerror}", file=str(path)) from None
+        raise MissionFormatError(
+            f"{path} cannot be written: {error.strerror}",
+            file=str(path),
+            advice="choose another place, or make this one writable",
+        ) from None
 
 
 def sketch_plan(

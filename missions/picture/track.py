@@ -139,7 +139,11 @@ def draw_track(picture: TrackPicture, path: Path) -> None:
         else:
             _write_figure(picture, path)
     except OSError as error:
-        raise MissionFormatError(f"{path} cannot be written: {error.strerror}", file=str(path)) from None
+        raise MissionFormatError(
+            f"{path} cannot be written: {error.strerror}",
+            file=str(path),
+            advice="choose another place, or make this one writable",
+        ) from None
 
 
 def _write_figure(picture: TrackPicture, path: Path) -> None:

@@ -377,6 +377,18 @@ def check_lines(stderr: str) -> str:
     return message
 
 
+@pytest.mark.parametrize(
+    ("arguments", "advice"),
+    [
+        ((*FROM_TO, "-o", "missing/mission.plan"), "make missing first, or choose another place"),
+        ((*FROM_TO, "-o", "folder.plan"), "choose another place, or make this one writable"),
+        ((*FROM_TO, "--plot", "folder.png"), "choose another place, or make this one writable"),
+    ],
+)
+def test_nobody_is_told_to_mend_a_file_that_could_not_be_written(arguments, advice):
+    assert f"advice: {advice}\n" in run(*arguments).stderr
+
+
 def test_the_table_is_long_and_has_every_command():
     assert len(WRONG) >= 200
     assert {arguments[0] for arguments, _, _ in WRONG if arguments} >= set(COMMANDS)

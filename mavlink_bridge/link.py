@@ -279,6 +279,9 @@ class Link:
             machine.handle_timer(came_s)  # not a later time: what came while we were busy is still unread
 
 
+_NETWORK_ADVICE = "are address and port right, does the other side run (tcp), and does nobody else listen on this port (udpin, tcpin)?"
+
+
 def open_link(
     connection: str,
     identity: tuple[int, int] = ONE_SHOT_IDENTITY,
@@ -310,7 +313,8 @@ def open_transport(connection: str, *, timeout_s: float = 10.0) -> Transport:
         return _OPENERS[address.kind](address, timeout_s)
     except (OSError, UnicodeError) as error:  # a host's name may be none
         reason = getattr(error, "strerror", None) or error
-        raise LinkError(f"{address} cannot be opened: {reason}", connection=str(address)) from None
+        advice = {} if address.kind == "serial" else {"advice": _NETWORK_ADVICE}
+        raise LinkError(f"{address} cannot be opened: {reason}", connection=str(address), **advice) from None
 
 
 class _Udp:

@@ -20,7 +20,7 @@ from missions.drive_model import corner_forecast
 from missions.errors import RouteError
 from missions.fitting import MOST_MEASUREMENTS, Fitting
 from missions.local_frame import LocalPoint
-from missions.refusal import block, refusal
+from missions.refusal import AT_START, block, refusal
 from missions.route import find_route
 
 if TYPE_CHECKING:
@@ -44,8 +44,6 @@ LATER_MEASUREMENTS = 500
 """For each kind of route that is tried after the first ones."""
 
 _OTHER_WAYS = 5
-_AT_START = 2
-"""Points where most is missing because of how the route begins."""
 _HELD_M = 0.05
 _DEPARTURES_TRIED = 8
 _DEPARTURE_SLACK_M = 0.05
@@ -143,7 +141,7 @@ class RouteSearch:
             self._fit(fitting, route, found, refused)
             if found and route is routes[0][0] and len(routes) > 1 and not self._is_shorter(routes):
                 break
-        if not found and refused[-1][1].worst_index <= _AT_START:
+        if not found and refused[-1][1].worst_index <= AT_START:
             fitting = self._fitting(LATER_MEASUREMENTS)
             for departing in self._departing_routes(slow_m):
                 self._fit(fitting, departing, found, refused)
@@ -166,7 +164,7 @@ class RouteSearch:
         However slowly it drives it swings as far where it starts with its heading wrong; only its band becomes narrower.
         """
         return all(
-            measured.worst_index <= _AT_START and measured.missing_m[0] > narrower_m + _HELD_M
+            measured.worst_index <= AT_START and measured.missing_m[0] > narrower_m + _HELD_M
             for _, measured in refused
         )
 

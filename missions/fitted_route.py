@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from missions.clearance import NARROWEST_BAND_M
@@ -60,6 +60,7 @@ class FittedRoute:
     vehicle: Vehicle
     heading_deg: float | None
     should_stop: Callable[[], bool] | None = None
+    _known: dict[float, DrivenRoute | RouteError] = field(default_factory=dict, init=False)
 
     def find(self, asked: Promise) -> tuple[Promise, DrivenRoute]:
         """Give a route and what is promised for it.
@@ -86,26 +87,31 @@ class FittedRoute:
         refusal: RouteError | None = None
         for share in _SHARES:
             required_m = max(0.0, math.floor(100 * share * (widest_m - NARROWEST_BAND_M)) / 100)
-            try:
-                found = self._search(required_m, _MEASUREMENTS).find()
-            except RouteError as error:
-                is_first, refusal = refusal is None, error
-                if is_first and error.details.get("held_at_start") and self._is_held_at_any():
-                    break
+            found = self._tried(required_m)
+            if isinstance(found, RouteError):
+                is_first, refusal = refusal is None, found
+                if is_first and found.details.get("at_start"):
+                    # Where the least asks too much of the start, what lies between does.
+                    least = self._tried(0.0)
+                    if isinstance(least, RouteError) and least.details.get("at_start"):
+                        refusal = least
+                        break
                 continue
             promised_m = max(0.0, required_m - asked.error_m)
             return replace(asked, promised_m=promised_m, error_m=required_m - promised_m), found
         assert refusal is not None
-        refusal.details["advice"] = _NOTHING_ADVICE
+        if "corner" in refusal.details:
+            refusal.details["advice"] = _NOTHING_ADVICE
         raise refusal
 
-    def _is_held_at_any(self) -> bool:
-        """Tell whether the vehicle cannot turn where it stands though nothing more than no touch is asked: then nothing between helps."""
-        try:
-            self._search(0.0, _MEASUREMENTS).find()
-        except RouteError as error:
-            return bool(error.details.get("held_at_start"))
-        return False
+    def _tried(self, required_m: float) -> DrivenRoute | RouteError:
+        """Give the route that keeps so much, or why there is none; what was tried once is known."""
+        if required_m not in self._known:
+            try:
+                self._known[required_m] = self._search(required_m, _MEASUREMENTS).find()
+            except RouteError as error:
+                self._known[required_m] = error
+        return self._known[required_m]
 
     def _told(self, error: NoRouteError, asked: Promise) -> NoRouteError:
         """Give the error with what the widest route keeps while this vehicle drives it."""

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from missions.route import Route
 
 _START_ADVICE = "the vehicle has no room to turn where it stands: turn it by hand to face its way, or move it, or ask for less with --clearance"
+AT_START = 2
+"""Points where most is missing because of how the route begins."""
+
 _BLOCK_M = 0.5
 _BLOCK_AWAY_M = 8.0
 
@@ -58,7 +61,7 @@ def refusal(
         turn_deg=round(turn_deg, 1),
         kept_m=round(max(kept_m, 0.0), 3),
         fences=[fence],
-        held_at_start=held_at_start,
+        at_start=index <= AT_START,
         **advice,
     )
 

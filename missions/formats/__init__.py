@@ -112,8 +112,15 @@ def read_fence(path: Path | str) -> Fence:
     """
     fence = read_situation(path).fence
     if fence is None or not fence.value.zones:
-        raise FenceMissingError(f"{path} holds no fence", file=str(path))
+        raise FenceMissingError(
+            f"{path} holds no fence",
+            file=str(path),
+            advice="give a file that holds one (--fence), such as a QGroundControl .plan",
+        )
     return fence.value
+
+
+_SUFFIX_ADVICE = "the suffix tells the format: name the file by one of these"
 
 
 def read_mission(path: Path | str) -> Mission:
@@ -126,7 +133,11 @@ def read_mission(path: Path | str) -> Mission:
     """
     mission = read_situation(path).mission
     if mission is None:
-        raise MissionFormatError(f"{path} holds no mission", file=str(path))
+        raise MissionFormatError(
+            f"{path} holds no mission",
+            file=str(path),
+            advice="give a file that holds one, such as a .plan or .waypoints",
+        )
     return mission.value
 
 
@@ -162,6 +173,7 @@ def write_situation(situation: Situation, path: Path | str, part: Part | None = 
             f"{path}: there is no {part or held} to write" if part in (None, *format_.holds)
             else f"{path}: a {path.suffix} file holds no {part}; it holds {held}",
             file=str(path),
+            advice="choose another suffix, or another file to write from",
         )  # fmt: skip
     if len(wanted) > 1 and not format_.together:
         raise MissionFormatError(
@@ -222,7 +234,9 @@ def check_writable_format(path: Path, part: Part = Part.MISSION) -> None:
     """
     if part not in format_of(path, "write", part).holds:
         raise MissionFormatError(
-            f"{path}: a {path.suffix} file holds no {part}; known for it are {_known(part)}", file=str(path)
+            f"{path}: a {path.suffix} file holds no {part}; known for it are {_known(part)}",
+            file=str(path),
+            advice=_SUFFIX_ADVICE,
         )
 
 
@@ -240,6 +254,7 @@ def format_of(path: Path, verb: str = "read", part: Part | None = None) -> Forma
             f"{path}: no format to {verb} for the suffix {path.suffix!r}; "
             f"known are {_known(part, reading=verb == 'read')}",
             file=str(path),
+            advice=_SUFFIX_ADVICE,
         )
     return found
 

@@ -16,7 +16,7 @@ from strategies import RandomField, random_fields
 
 from missions.drive_model import envelope
 from missions.driven_route import RouteSearch
-from missions.errors import NoRouteError, RouteError, StartBlockedError, VehicleError
+from missions.errors import NoRouteError, RouteError, StartBlockedError, TargetBlockedError, VehicleError
 from missions.fence import CircleZone
 from missions.fitted_route import FittedRoute
 from missions.geo import LatLon
@@ -363,3 +363,10 @@ def test_a_gap_that_no_clearance_lets_this_vehicle_through_is_told(monkeypatch: 
     ) as caught:
         plan(situation, Request(targets=(place(50, 0),), clearance_m=2.4))
     assert "widen the narrowest place" in str(caught.value.details["advice"])
+
+
+def test_a_target_that_no_clearance_frees_has_its_own_advice() -> None:
+    situation = facing(situation_of(FIELD, WALL), -50, 0, 90.0)
+    with pytest.raises(TargetBlockedError) as caught:
+        plan(situation, Request(targets=(place(0, 0),), widest=True))
+    assert "advice" not in caught.value.details

@@ -41,7 +41,8 @@ class Chart:
 
     def points(self, places: Sequence[tuple[float, float]]) -> np.ndarray:
         lat_lon = np.array(places)
-        return np.column_stack(self._proj(lat_lon[:, 1], lat_lon[:, 0]))
+        # Lists: older versions take an array of one for a number, and warn.
+        return np.column_stack(self._proj(lat_lon[:, 1].tolist(), lat_lon[:, 0].tolist()))
 
     def line(self, path: Sequence[LatLon]) -> LineString:
         return LineString(self.points([place for a, b in pairwise(path) for place in straight(a, b)]))

@@ -44,9 +44,10 @@ def test_there_and_back(origin: LatLon, east_m: float, north_m: float) -> None:
     frame = LocalFrame(origin)
     position = frame.to_lat_lon(LocalPoint(east_m, north_m))
     assert -180 <= position.lon_deg < 180
-    assert frame.to_local(position) == pytest.approx((east_m, north_m), abs=1e-6)
+    # PROJ 9.2 puts what is nearer than 0.64 mm (1e-10 rad) at the origin itself.
+    assert frame.to_local(position) == pytest.approx((east_m, north_m), abs=1e-3)
     array = np.array([[east_m, north_m], [0, 0]])
-    np.testing.assert_allclose(frame.to_local_array(frame.to_lat_lons(array)), array, atol=1e-6)
+    np.testing.assert_allclose(frame.to_local_array(frame.to_lat_lons(array)), array, atol=1e-3)
 
 
 def test_no_positions_give_an_empty_array() -> None:

@@ -36,7 +36,7 @@ MAP = Proj(proj="tmerc", ellps="WGS84", lat_0=HOME.lat_deg, lon_0=HOME.lon_deg, 
 
 def plane(places: Sequence[LatLon]) -> np.ndarray:
     lat_lon = np.array(places)
-    return np.column_stack(MAP(lat_lon[:, 1], lat_lon[:, 0]))
+    return np.column_stack(MAP(lat_lon[:, 1].tolist(), lat_lon[:, 0].tolist()))
 
 
 def place(east_m: float, north_m: float) -> LatLon:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from hypothesis import assume, given
+from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from shapely import LineString, Point, Polygon
 
@@ -316,6 +316,9 @@ def at_a_threshold(points: np.ndarray, heading_deg: float) -> bool:
     return min(*off_deg, np.abs(np.hypot(*steps.T) - 3).min()) < 1e-6
 
 
+@settings(
+    suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow]
+)  # older draws like thresholds
 @given(vehicles, routes, st.floats(-180, 180), st.floats(-180, 180))
 def test_the_same_drive_elsewhere_and_turned(
     vehicle: Vehicle, points: np.ndarray, heading_deg: float, turned_deg: float

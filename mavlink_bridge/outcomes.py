@@ -1,10 +1,11 @@
-"""Outcomes of safe uploads in words: what people are told, and which error it is."""
+"""Outcomes of transfers in words: what people are told, and which error it is."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.errors import BridgeError, LinkError, OutcomeError, RefusedError
+from mavlink_bridge.messages import MissionResult
 from mavlink_bridge.protocol.verified_upload import Held, OutcomeKind
 
 if TYPE_CHECKING:
@@ -43,3 +44,12 @@ def upload_trouble(outcome: VerifiedUploadOutcome) -> BridgeError | None:
         return LinkError("the vehicle does not answer; nothing was written", **details)
     differences = "".join(f"; {difference}" for difference in outcome.differences[:3])
     return OutcomeError(f"the upload ended {outcome.kind}: {held}{differences}{texts}", **details)
+
+
+def download_refusal(what: str, result: MissionResult) -> RefusedError:
+    """Give the error that a refused download of a list is; an autopilot that does not know such lists may hold one all the same."""
+    why = ""
+    if what != "mission" and result is MissionResult.UNSUPPORTED:
+        older = "; one that it has by the older FENCE_POINT messages is not read" if what == "fence" else ""
+        why = f" (this autopilot transfers no {what} as mission items{older})"
+    return RefusedError(f"the vehicle refused to give its {what}: {result.name}{why}", result=result.name)

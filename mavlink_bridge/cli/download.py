@@ -115,6 +115,7 @@ def read_list(session: Session, what: str) -> tuple[MissionItem, ...]:
         It fell silent.
     """
     from mavlink_bridge.messages import MissionType  # noqa: PLC0415
+    from mavlink_bridge.outcomes import download_refusal  # noqa: PLC0415
     from mavlink_bridge.protocol.download import Download  # noqa: PLC0415
     from mavlink_bridge.protocol.transitions import DownloadState  # noqa: PLC0415
 
@@ -129,19 +130,8 @@ def read_list(session: Session, what: str) -> tuple[MissionItem, ...]:
     if outcome.state is DownloadState.BUSY:
         raise RefusedError(f"another ground station keeps the {what} busy (DENIED)", result="DENIED")
     if outcome.result is not None:
-        raise RefusedError(
-            f"the vehicle refused to give its {what}: {outcome.result.name}{_why(what, outcome.result.name)}",
-            result=outcome.result.name,
-        )
+        raise download_refusal(what, outcome.result)
     raise LinkError(f"the {what} could not be read: the vehicle fell silent")
-
-
-def _why(what: str, result: str) -> str:
-    """Say what it means where an autopilot does not know a kind of list: not that it holds none."""
-    if what == "mission" or result != "UNSUPPORTED":
-        return ""
-    older = "; one that it has by the older FENCE_POINT messages is not read" if what == "fence" else ""
-    return f" (this autopilot transfers no {what} as mission items{older})"
 
 
 def _read_parameters(session: Session) -> dict[str, float]:

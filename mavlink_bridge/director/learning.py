@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge import messages as m
 from mavlink_bridge.director.steps import Steps
-from mavlink_bridge.errors import BridgeError, LinkError, RefusedError
+from mavlink_bridge.errors import BridgeError, LinkError
 from mavlink_bridge.fold import with_list
+from mavlink_bridge.outcomes import download_refusal
 from mavlink_bridge.protocol.command import SendCommand
 from mavlink_bridge.protocol.download import Download
 from mavlink_bridge.protocol.parameters import ReadParameters
@@ -188,5 +189,5 @@ def list_of(machine: Download, kind: ListKind) -> tuple[MissionItem, ...] | Brid
     if outcome is not None and outcome.is_complete:
         return outcome.items
     if outcome is not None and outcome.result is not None:
-        return RefusedError(f"the vehicle refused to give its {kind}: {outcome.result.name}")
+        return download_refusal(str(kind), outcome.result)
     return LinkError(f"the vehicle's {kind} could not be read ({outcome.state if outcome else 'no outcome'})")

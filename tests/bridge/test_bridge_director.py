@@ -483,6 +483,22 @@ def test_another_autopilot_is_refused_with_a_clear_word():
     assert not run.sent
 
 
+def test_a_fence_by_older_messages_is_no_missing_fence():
+    run = conductor(once=True)
+    push = run.down.push
+
+    def without_fence_lists(frame: m.Frame, now_s: float) -> None:
+        if isinstance(frame.message, m.MissionCount) and frame.message.mission_type == m.MissionType.FENCE:
+            answer = m.MissionAck(1, 195, m.MissionResult.UNSUPPORTED, m.MissionType.FENCE)
+            frame = replace(frame, message=answer)
+        push(frame, now_s)
+
+    run.down.push = without_fence_lists
+    run.run_until(lambda: run.director.is_done, 30)
+    assert "FENCE_POINT" in str(run.director.trouble)
+    assert run.director.trouble.details["result"] == "UNSUPPORTED"
+
+
 def test_every_event_follows_its_schema():
     run = driving(conductor())
     run.run_until(lambda: run.director.state is State.ARRIVED)

@@ -52,9 +52,9 @@ def polyline(legs_m: list[float], turns_deg: list[float], bearing_deg: float = 0
     return np.array(points)
 
 
-def _to_microdegrees(turn_deg: float) -> float:
-    """No bend of 1e-292 degrees: GEOS warns of dividing by zero there, and no mission has one."""
-    return round(turn_deg, 6)
+def _to_microdegrees(angle_deg: float) -> float:
+    """No bend or bearing of 1e-292 degrees: GEOS warns of dividing by zero there, and no mission has one."""
+    return round(angle_deg, 6)
 
 
 routes = st.integers(1, 7).flatmap(
@@ -62,7 +62,7 @@ routes = st.integers(1, 7).flatmap(
         polyline,
         st.lists(st.floats(2, 60), min_size=n, max_size=n),
         st.lists(turns.map(_to_microdegrees), min_size=n, max_size=n),
-        st.floats(-180, 180),
+        st.floats(-180, 180).map(_to_microdegrees),
     )
 )
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 import cmath
 import math
 from dataclasses import replace
-from functools import lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -168,9 +167,8 @@ def _profile(leg: Leg, vehicle: Vehicle) -> LegProfile:
     return LegProfile(leg.length_m, Ramp(leg.top_speed_mps, vehicle.accel_max_mps2, vehicle.jerk_mps3))
 
 
-@lru_cache(maxsize=512)
 def _shares(profile: LegProfile) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Give times since a leg's start, and what share of it is driven by then: the same legs come again and again."""
+    """Give times since a leg's start, and what share of it is driven by then."""
     leg_s = np.append(np.arange(0.0, profile.duration_s, _STEP_S), profile.duration_s)
     return leg_s, np.array([profile.travelled_m(time_s) / profile.length_m for time_s in leg_s.tolist()])
 

@@ -17,6 +17,7 @@ from mavlink_bridge import errors as bridge_errors
 from mavlink_bridge.cli.app import COMMANDS, load
 from mavlink_bridge.cli.common import ExitCode, exit_code_of
 from mavlink_bridge.director import SCHEMA, TRANSITIONS
+from mavlink_bridge.protocol.transitions import TABLES
 from missions import errors as mission_errors
 from missions.vehicle import PARAMETER_NAMES
 from missions.vehicle.ardupilot import ardupilot_vehicle
@@ -170,6 +171,12 @@ PICTURES = {
     "figures/states-director.svg": partial(
         draw, TRANSITIONS, "The states of the live bridge, and what leads from one to another"
     ),
+    **{
+        f"figures/states-{name.replace('_', '-')}.svg": partial(
+            draw, table, f"The states of {name.replace('_', ' ')}, and what leads from one to another"
+        )
+        for name, table in TABLES.items()
+    },
 }
 
 

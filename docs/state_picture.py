@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     Table = Mapping[str, Mapping[str, str]]
 
 _MANY = 5
-_ROW, _LANE, _BOX, _HEAD, _EDGE = 26, 21, 104, 128, 10
+_ROW, _LANE, _BOX, _HEAD, _EDGE = 26, 21, 112, 128, 10
 _GAP, _RING = 24, 6
 _DARK, _LIGHT, _LINE, _GUIDE, _SHADE = "#37474f", "#e3f2fd", "#455a64", "#cfd8dc", "#f5f7f8"
 
@@ -47,7 +47,7 @@ def draw(table: Table, title: str) -> str:
     few, many = lanes(table)
     row_y = {state: _EDGE + _HEAD + _ROW * (number + 0.5) for number, state in enumerate(table)}
     left = _EDGE + _BOX + _LANE
-    many_left = left + _LANE * len(few) + _GAP
+    many_left = left + _LANE * len(few) + (_GAP if many else 0)
     lanes_right = many_left + _LANE * len(many)
     width, height = lanes_right + 76, 2 * _EDGE + _HEAD + _ROW * len(table)
     parts = [
@@ -55,8 +55,12 @@ def draw(table: Table, title: str) -> str:
         '<g font-family="sans-serif" font-size="12">',
         f"<title>{escape(title)}</title>",
         f'<rect width="{width}" height="{height}" fill="white"/>',
-        f'<path d="M{many_left - _GAP / 2:g} {_EDGE + _HEAD}H{lanes_right}v{_ROW * len(table)}H{many_left - _GAP / 2:g}z" fill="{_SHADE}"/>',
     ]
+    if many:
+        edge = many_left - _GAP / 2
+        parts.append(
+            f'<path d="M{edge:g} {_EDGE + _HEAD}H{lanes_right}v{_ROW * len(table)}H{edge:g}z" fill="{_SHADE}"/>'
+        )
     for state, y in row_y.items():
         parts += _state(str(state), y, lanes_right, is_end=not table[state])
     for begin_x, group in ((left, few), (many_left, many)):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime as dt
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeVar
@@ -29,7 +28,6 @@ if TYPE_CHECKING:
 
 Row = TypeVar("Row")
 _MOST_ROWS = 40
-_EPOCH = dt.datetime(1970, 1, 1, tzinfo=dt.UTC)
 _UNION_BIT = 2
 """FENCE_OPTIONS: inside one inclusion is enough."""
 
@@ -147,15 +145,10 @@ def _print(book: Logbook) -> None:
 
 
 def _length(book: Logbook) -> str:
-    begin = f" from {_date(book.begins_s)}" if book.has_timestamps else ", raw: without times of its own"
+    from mavlink_bridge.cli.log_times import date_text  # noqa: PLC0415 - quick help
+
+    begin = f" from {date_text(book.begins_s)}" if book.has_timestamps else ", raw: without times of its own"
     return f"{_duration(book.duration_s)}{begin}, {book.damage.frames} messages"
-
-
-def _date(time_s: float) -> str:
-    try:
-        return f"{_EPOCH + dt.timedelta(seconds=time_s):%Y-%m-%d %H:%M:%S} UTC"
-    except OverflowError:
-        return f"{time_s:.4g} s after 1970, by a clock that was wrong"
 
 
 def _senders(book: Logbook) -> Table:

@@ -230,13 +230,15 @@ class Director(Stopper):
     def _look_once_more(self, now_s: float) -> None:
         """Read again what somebody may have changed, and wait for a heartbeat: it shows a takeover that was on its way."""
         assert self._peer is not None
-        if self._changes is not None and self._changes.suspects:
-            self._reread(self._changes.due(now_s, is_driving=False), now_s)
+        self._reread_suspects(now_s)
         self._steps.run([(AwaitHeartbeat(self._peer), self._looked)], now_s)
 
     def _looked(self, _machine: AwaitHeartbeat, now_s: float) -> None:
-        is_outdated = self._changes is not None and bool(self._changes.suspects)
-        if is_outdated or self._stopping is not None or not self._operator.is_ours(self.situation.mode):
+        if (
+            self._has_suspects
+            or self._stopping is not None
+            or not self._operator.is_ours(self.situation.mode)
+        ):
             self._look_once_more(now_s)
             return
         if (

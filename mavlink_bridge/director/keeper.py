@@ -63,8 +63,12 @@ class Keeper(Acquaintance):
 
     @property
     def _is_outdated(self) -> bool:
-        """Whether something on the vehicle was changed that was not read again yet."""
-        return self._may_ask and self._changes is not None and bool(self._changes.suspects)
+        """Whether something on the vehicle was changed that was not read again yet, and may be."""
+        return self._may_ask and self._has_suspects
+
+    @property
+    def _has_suspects(self) -> bool:
+        return self._changes is not None and bool(self._changes.suspects)
 
     @property
     def _may_ask(self) -> bool:
@@ -100,8 +104,8 @@ class Keeper(Acquaintance):
     # Reading again
 
     def _reread_suspects(self, now_s: float) -> None:
-        """Read again what was changed, unless something is under way."""
-        if self._is_outdated and not self._steps and self._changes is not None:
+        """Read again what was changed."""
+        if self._changes is not None and self._changes.suspects:
             self._reread(self._changes.due(now_s, is_driving=False), now_s)
 
     def _reread(self, kinds: set[ListKind], now_s: float) -> None:

@@ -66,7 +66,7 @@ class Stopper(RouteMaker):
         if self._stopping is not None:
             times.append(self._stopping.deadline_s)
         if self.state is State.HOLDING:
-            times.append(-math.inf if self._is_outdated and not self._steps else self._standstill_due_s)
+            times.append(-math.inf if self._rereading_due else self._standstill_due_s)
         return times
 
     def _handle_own_timer(self, now_s: float) -> None:
@@ -75,9 +75,13 @@ class Stopper(RouteMaker):
             self._look_after_hold(now_s)
         if self.state is State.HOLDING:
             self._await_standstill(now_s)
-        if self.state is State.HOLDING:
+        if self.state is State.HOLDING and self._rereading_due:
             self._reread_suspects(now_s)  # while it comes to rest
         super()._handle_own_timer(now_s)
+
+    @property
+    def _rereading_due(self) -> bool:
+        return self._is_outdated and not self._steps
 
     def _take_vehicle_frame(self, frame: Frame, now_s: float) -> None:
         if isinstance(frame.message, m.GlobalPositionInt):

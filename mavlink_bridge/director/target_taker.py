@@ -143,20 +143,24 @@ class TargetTaker(Keeper):
 
     def _note_lists(self) -> None:
         """Take the lists on the vehicle for known: nothing in them is a new target."""
-        mission, rally = self.situation.mission, self.situation.rally
-        self._note_listed(last_place(mission.value.items) if mission else None, TargetSource.MISSION)
-        self._note_listed(rally.value[-1] if rally and rally.value else None, TargetSource.RALLY)
+        self._note_listed(self._mission_place, TargetSource.MISSION)
+        self._note_listed(self._rally_place, TargetSource.RALLY)
+
+    @property
+    def _mission_place(self) -> LatLon | None:
+        mission = self.situation.mission
+        return last_place(mission.value.items) if mission else None
+
+    @property
+    def _rally_place(self) -> LatLon | None:
+        rally = self.situation.rally
+        return rally.value[-1] if rally and rally.value else None
 
     def _take_mission_target(self, now_s: float) -> None:
-        mission = self.situation.mission
-        place = last_place(mission.value.items) if mission else None
-        self._take_listed_target(place, TargetSource.MISSION, now_s)
+        self._take_listed_target(self._mission_place, TargetSource.MISSION, now_s)
 
     def _rally_read(self, now_s: float) -> None:
-        rally = self.situation.rally
-        self._take_listed_target(
-            rally.value[-1] if rally and rally.value else None, TargetSource.RALLY, now_s
-        )
+        self._take_listed_target(self._rally_place, TargetSource.RALLY, now_s)
 
     def _mission_heard(self, now_s: float) -> None:
         self._take_mission_target(now_s)

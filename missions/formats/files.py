@@ -81,8 +81,13 @@ def write_text(path: Path, text: str) -> None:
     except OSError as error:
         with suppress(OSError):
             whole.unlink()
-        raise MissionFormatError(
-            f"{path} cannot be written: {error.strerror}",
-            file=str(path),
-            advice="choose another place, or make this one writable",
-        ) from None
+        raise unwritable(path, error) from None
+
+
+def unwritable(path: Path, error: OSError) -> MissionFormatError:
+    """Give the error that a file is which cannot be written."""
+    return MissionFormatError(
+        f"{path} cannot be written: {error.strerror}",
+        file=str(path),
+        advice="choose another place, or make this one writable",
+    )

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from missions.errors import MissionFormatError
+from missions.formats.files import unwritable
 from missions.picture.scene import Scene
 
 if TYPE_CHECKING:
@@ -94,11 +95,7 @@ def draw_plan(
 
             write_figure(scene, path, title=title, blocks=blocks)
     except OSError as error:
-        raise MissionFormatError(
-            f"{path} cannot be written: {error.strerror}",
-            file=str(path),
-            advice="choose another place, or make this one writable",
-        ) from None
+        raise unwritable(path, error) from None
 
 
 def sketch_plan(

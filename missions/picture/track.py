@@ -11,6 +11,7 @@ import shapely
 
 from missions.errors import MissionFormatError
 from missions.fence import PolygonZone, ZoneKind
+from missions.formats.files import unwritable
 from missions.ground import lay_out
 from missions.local_frame import frame_around
 from missions.picture import check_picture_format, style
@@ -139,11 +140,7 @@ def draw_track(picture: TrackPicture, path: Path) -> None:
         else:
             _write_figure(picture, path)
     except OSError as error:
-        raise MissionFormatError(
-            f"{path} cannot be written: {error.strerror}",
-            file=str(path),
-            advice="choose another place, or make this one writable",
-        ) from None
+        raise unwritable(path, error) from None
 
 
 def _write_figure(picture: TrackPicture, path: Path) -> None:

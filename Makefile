@@ -7,11 +7,12 @@ PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; 
 	"$$p" -c '$(USABLE)' >/dev/null 2>&1 && { echo "$$p"; break; }; done)
 BIN := .venv/bin
 OUT ?= demo-out
+COVERAGE_PERCENT := 98
 # A lock is complete: nothing is resolved, so that what a registry publishes tomorrow does not matter.
 LOCKED := --quiet --disable-pip-version-check --require-hashes --no-deps
 quoted = '$(subst ','\'',$(1))'
 
-.PHONY: locks package bench bench-bridge bench-drive bench-transfer test-foreign docs soak bench-tlog fuzz demo test lint format types walls check lock clean
+.PHONY: coverage locks package bench bench-bridge bench-drive bench-transfer test-foreign docs soak bench-tlog fuzz demo test lint format types walls check lock clean
 
 demo: .venv/run.stamp
 	$(BIN)/pbpp demo --out $(call quoted,$(OUT))
@@ -31,6 +32,15 @@ test: .venv/dev.stamp
 .venv/dev.stamp: requirements/dev.lock .venv/run.stamp
 	$(BIN)/python -m pip install $(LOCKED) -r requirements/dev.lock
 	@touch $@
+
+# The parts that promises rest on: the planner, missions, and all that decides or speaks a protocol without sockets.
+PROMISING := pbpp/*,missions/*,mavlink_bridge/protocol/*,mavlink_bridge/director/*,mavlink_bridge/tlog/*,mavlink_bridge/logbook/*,mavlink_bridge/fold.py
+COVERING := tests/pbpp tests/missions tests/formats tests/picture tests/protocol tests/bridge tests/tlog tests/logbook
+
+coverage: .venv/dev.stamp
+	rm -f .coverage .coverage.*
+	$(BIN)/pytest -q -n 2 --dist worksteal --cov --cov-report= $(COVERING)
+	$(BIN)/coverage report --include "$(PROMISING)" --precision 1 --fail-under $(COVERAGE_PERCENT)
 
 lint: .venv/dev.stamp
 	$(BIN)/ruff check .

@@ -391,11 +391,12 @@ def _recorders(
 ) -> tuple[TlogWriter | None, JournalWriter | None]:
     if log is None:
         return None, None
-    from mavlink_bridge.journal import JournalWriter, journal_path  # noqa: PLC0415 - quick help
+    from mavlink_bridge.cli.kept_files import open_kept  # noqa: PLC0415 - quick help
+    from mavlink_bridge.journal import JournalWriter, journal_path  # noqa: PLC0415
     from mavlink_bridge.tlog import TlogWriter  # noqa: PLC0415
 
     if log.exists():
         raise UsageError(f"--log {log}: the file is there already; a journal belongs to one run")
     recorder = stack.enter_context(TlogWriter(log))
-    file = stack.enter_context(journal_path(log).open("w", encoding="utf-8"))
+    file = stack.enter_context(open_kept(journal_path(log)))
     return recorder, JournalWriter(file, orders, parameters)

@@ -46,14 +46,15 @@ def convert(
 
     `pbpp convert mission.waypoints route.gpx`
     """
-    from missions.formats import parts_of, read_situation, write_situation  # noqa: PLC0415 - quick help
+    from mavlink_bridge.cli.kept_files import write_kept  # noqa: PLC0415 - quick help
+    from missions.formats import parts_of, read_situation, write_situation  # noqa: PLC0415
 
     if is_same_file(source, output):
         raise UsageError(f"{output} would be written over what it is made of; give another OUT")
     part = _part(only)
     situation = _with_return_point(read_situation(source), return_point)
     _check_choice(situation, source, output, part)
-    written = write_situation(situation, output, part)
+    written = write_situation(situation, output, part, write=write_kept)
     warnings = _left_out(situation, written, output) if part is None else []
     warn(warnings)
     document = {

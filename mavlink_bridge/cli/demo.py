@@ -51,7 +51,8 @@ def demo(
     quiet: QuietOption = False,
 ) -> None:
     """Show the whole loop: simulated rover, fence, target, plan, upload, verify, drive, picture, report."""
-    from mavlink_bridge.cli.live import LiveResult, conduct  # noqa: PLC0415 - quick help
+    from mavlink_bridge.cli.kept_files import make_room, remember, write_kept  # noqa: PLC0415 - quick help
+    from mavlink_bridge.cli.live import LiveResult, conduct  # noqa: PLC0415
     from mavlink_bridge.cli.plan_results import write_outputs  # noqa: PLC0415
     from mavlink_bridge.director import Orders  # noqa: PLC0415
     from mavlink_bridge.link import Link  # noqa: PLC0415
@@ -61,7 +62,7 @@ def demo(
     from missions.request import Request  # noqa: PLC0415
 
     out.mkdir(parents=True, exist_ok=True)
-    (out / "demo.tlog").unlink(missing_ok=True)
+    make_room(out / "demo.tlog")
     drive = _Drive()
     begun_s = time.monotonic()
     with ExitStack() as stack:
@@ -73,11 +74,12 @@ def demo(
         result: LiveResult = conduct(
             link, orders, quiet=quiet or json_output, on_frames=lambda frames: _observe(drive, frames)
         )
+    remember(out / "demo.tlog")
     warn(result.plan.warnings)
     written = write_outputs(
         result.plan, result.situation, [out / "mission.waypoints", out / "mission.plan"], []
     )
-    draw_plan(result.plan, out / "plan.png", track=drive.track)
+    draw_plan(result.plan, out / "plan.png", track=drive.track, write=write_kept)
     driven_m, length_m = _driven(result.plan, drive.track)
     document = {
         "status": "ok",

@@ -151,6 +151,8 @@ def _read_parameters(session: Session) -> dict[str, float]:
 
 
 def _write(path: Path, what: str, items: tuple[MissionItem, ...], parameters: Mapping[str, float]) -> None:
+    from mavlink_bridge.cli.kept_files import write_kept  # noqa: PLC0415 - quick help
+
     if path.suffix.lower() == ".plan":
         _write_plan(path, what, items)
         return
@@ -161,15 +163,11 @@ def _write(path: Path, what: str, items: tuple[MissionItem, ...], parameters: Ma
         from missions.formats.waypoints import format_items  # noqa: PLC0415
 
         text = format_items(items)
-    whole = path.with_name(f".{path.name}.part")  # so that nobody ever finds half a file
-    try:
-        whole.write_text(text, encoding="utf-8", newline="\n")
-        whole.replace(path)
-    except OSError as error:
-        raise UsageError(f"{path} cannot be written: {error.strerror or error}") from None
+    write_kept(path, text.encode())
 
 
 def _write_plan(path: Path, what: str, items: tuple[MissionItem, ...]) -> None:
+    from mavlink_bridge.cli.kept_files import write_kept  # noqa: PLC0415
     from missions.fence import fence_from_items  # noqa: PLC0415
     from missions.formats import write_mission  # noqa: PLC0415
     from missions.items import without_home  # noqa: PLC0415
@@ -184,7 +182,7 @@ def _write_plan(path: Path, what: str, items: tuple[MissionItem, ...]) -> None:
         situation = Situation(fence=Known(fence_from_items(items), None, source))
     else:
         situation = Situation(rally=Known(rally_from_items(items), None, source))
-    write_mission(situation, path)
+    write_mission(situation, path, write=write_kept)
 
 
 def _details(what: str, items: tuple[MissionItem, ...], parameters: Mapping[str, float]) -> dict[str, Any]:

@@ -95,6 +95,7 @@ def log(
 
 
 def _draw(book: Logbook, path: Path) -> None:
+    from mavlink_bridge.cli.kept_files import write_kept  # noqa: PLC0415 - quick help
     from missions.picture.track import TrackPicture, draw_track  # noqa: PLC0415 - slow to come
 
     if not book.vehicles:
@@ -114,7 +115,7 @@ def _draw(book: Logbook, path: Path) -> None:
         title=f"{book.name}: {_driven(vehicle)}",
         union=bool(int(bits) & _UNION_BIT),
     )
-    draw_track(picture, path)
+    draw_track(picture, path, write=write_kept)
 
 
 # Tables for people

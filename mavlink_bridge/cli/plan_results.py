@@ -19,7 +19,8 @@ def write_outputs(
     planned: Plan, situation: Situation, outputs: list[Path], plots: list[Path], *, blocks: bool = False
 ) -> list[Path]:
     """Write the mission and draw the plan; give the files."""
-    from missions.formats import write_mission  # noqa: PLC0415 - quick help
+    from mavlink_bridge.cli.kept_files import write_kept  # noqa: PLC0415 - quick help
+    from missions.formats import write_mission  # noqa: PLC0415
     from missions.situation import Known, Mission  # noqa: PLC0415
 
     mission = Mission(planned.items, planned.home or planned.start)
@@ -27,7 +28,7 @@ def write_outputs(
         situation, mission=Known(mission, None, "pbpp plan"), fence=Known(planned.fence, None, "pbpp plan")
     )
     for path in outputs:
-        write_mission(to_write, path)
+        write_mission(to_write, path, write=write_kept)
     return [*outputs, *draw(planned, plots, blocks=blocks)]
 
 
@@ -35,14 +36,15 @@ def draw(planned: Plan, plots: list[Path], *, title: str | None = None, blocks: 
     """Draw the plan to files, and to the terminal where ``-`` is among them; give the files."""
     if not plots:
         return []
-    from missions.picture import TERMINAL, draw_plan, sketch_plan  # noqa: PLC0415 - quick help
+    from mavlink_bridge.cli.kept_files import write_kept  # noqa: PLC0415 - quick help
+    from missions.picture import TERMINAL, draw_plan, sketch_plan  # noqa: PLC0415
 
     for path in plots:
         if str(path) == TERMINAL:
             columns = min(80, shutil.get_terminal_size().columns)
             typer.echo(sketch_plan(planned, columns=columns, encoding=sys.stdout.encoding), nl=False)
         else:
-            draw_plan(planned, path, title=title, blocks=blocks)
+            draw_plan(planned, path, title=title, blocks=blocks, write=write_kept)
     return [path for path in plots if str(path) != TERMINAL]
 
 

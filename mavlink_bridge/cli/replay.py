@@ -234,16 +234,14 @@ def _is_as_expected(expected: dict[Path | None, list[_Told]], results: _Results)
 
 
 def _record(results: _Results, *, quiet: bool) -> None:
-    from mavlink_bridge.expectations import expectation_path, to_expect  # noqa: PLC0415 - quick help
+    from mavlink_bridge.cli.kept_files import write_kept  # noqa: PLC0415 - quick help
+    from mavlink_bridge.expectations import expectation_path, to_expect  # noqa: PLC0415
 
     for log, told in results.items():
         if isinstance(told, LogError):
             continue
         path = expectation_path(log)
-        try:
-            path.write_text(to_expect(told), encoding="utf-8")
-        except OSError as error:
-            raise LogError(f"{path} cannot be written: {error.strerror}", file=str(path)) from None
+        write_kept(path, to_expect(told).encode())
         if not quiet:
             typer.echo(f"Wrote {path}")
 

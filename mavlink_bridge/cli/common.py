@@ -25,7 +25,7 @@ from mavlink_bridge.cli.failing import (
     telling,
 )
 from mavlink_bridge.cli.options_file import take_options
-from mavlink_bridge.cli.terminal import console, echo, print_json, say
+from mavlink_bridge.cli.terminal import console, print_json, say
 from missions import errors as mission_errors
 from missions.harmless import harmless
 
@@ -43,13 +43,11 @@ __all__ = [
     "SourceSystemOption",
     "SystemOption",
     "TimeoutOption",
-    "echo",
     "exit_code_of",
     "guarded",
     "is_same_file",
     "print_json",
     "progress_bar",
-    "say",
     "warn",
 ]
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mavlink_bridge.cli.common import JsonOption, QuietOption, is_same_file, print_json, warn
+from mavlink_bridge.cli.terminal import echo
 from mavlink_bridge.errors import UsageError
 
 if TYPE_CHECKING:
@@ -69,7 +70,7 @@ def convert(
     if json_output:
         print_json(document)
     elif not quiet:
-        typer.echo(f"Wrote {output}: {', '.join(_count(situation, one) for one in written)}")
+        echo(f"Wrote {output}: {', '.join(_count(situation, one) for one in written)}")
 
 
 def _part(only: str | None) -> Part | None:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mavlink_bridge.cli.common import JsonOption, QuietOption, print_json, warn
+from mavlink_bridge.cli.terminal import echo
 
 if TYPE_CHECKING:
     from mavlink_bridge.messages import Frame
@@ -144,15 +145,15 @@ def _driven(plan: Plan, track: list[LatLon]) -> tuple[float, float]:
 
 
 def _report(document: dict[str, object], plan: Plan) -> None:
-    typer.echo(
+    echo(
         f"Arrived after {document['driven_length_m']} m (drawn {document['length_m']} m, {len(plan.items)} waypoints)"
     )
-    typer.echo(
+    echo(
         f"Clearance: {document['clearance_m']} m promised, {document['driven_clearance_m']} m driven; "
         f"breaches {document['breaches']}"
     )
-    typer.echo(f"The mission was verified on the vehicle; all of it took {document['time_s']} s")
+    echo(f"The mission was verified on the vehicle; all of it took {document['time_s']} s")
     outputs = document["outputs"]
     assert isinstance(outputs, list)
     for path in outputs:
-        typer.echo(f"Wrote {path}")
+        echo(f"Wrote {path}")

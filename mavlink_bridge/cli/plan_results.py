@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import typer
+from mavlink_bridge.cli.terminal import echo, echo_lines
 
 if TYPE_CHECKING:
     from missions.plan import Plan
@@ -42,7 +42,7 @@ def draw(planned: Plan, plots: list[Path], *, title: str | None = None, blocks: 
     for path in plots:
         if str(path) == TERMINAL:
             columns = min(80, shutil.get_terminal_size().columns)
-            typer.echo(sketch_plan(planned, columns=columns, encoding=sys.stdout.encoding), nl=False)
+            echo_lines(sketch_plan(planned, columns=columns, encoding=sys.stdout.encoding).splitlines())
         else:
             draw_plan(planned, path, title=title, blocks=blocks, write=write_kept)
     return [path for path in plots if str(path) != TERMINAL]
@@ -93,12 +93,12 @@ def report_plan(planned: Plan, written: list[Path], *, verified: bool) -> None:
     )
     waypoints = sum(item.is_placed for item in planned.items)
     turns = max(0, waypoints - len(planned.targets))
-    typer.echo(
+    echo(
         f"Route: {planned.length_m:.1f} m ({planned.straight_line_m:.1f} m as the crow flies), "
         f"about {planned.duration_s:.0f} s, {waypoints} waypoints ({turns} turns)"
     )
-    typer.echo(f"Clearance: {planned.drawn_clearance_m:.2f} m drawn, {promise}")
+    echo(f"Clearance: {planned.drawn_clearance_m:.2f} m drawn, {promise}")
     for path in written:
-        typer.echo(f"Wrote {path}")
+        echo(f"Wrote {path}")
     if verified:
-        typer.echo("Uploaded and verified")
+        echo("Uploaded and verified")

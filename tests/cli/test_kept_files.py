@@ -61,7 +61,7 @@ def run(*arguments):
 
 
 def names(folder):
-    return sorted(os.listdir(folder))
+    return sorted(path.name for path in folder.iterdir())
 
 
 def test_a_mission_drawn_by_hand_is_kept_once(hand_made, tmp_path):

@@ -21,7 +21,7 @@ def test_a_file_is_new_or_replaced_and_nothing_else_stays(tmp_path):
     write_file(path, b"one")
     write_file(path, b"two")
     assert path.read_bytes() == b"two"
-    assert os.listdir(tmp_path) == ["a.plan"]
+    assert names(tmp_path) == ["a.plan"]
 
 
 @posix
@@ -84,7 +84,7 @@ def test_what_is_no_file_is_not_replaced(tmp_path):
     for name, why in (("folder.plan", "Is a directory"), ("pipe.plan", "it is no regular file")):
         with pytest.raises(MissionFormatError, match=f"{name} cannot be written: {why}"):
             write_file(tmp_path / name, b"new")
-    assert sorted(os.listdir(tmp_path)) == ["folder.plan", "pipe.plan"]
+    assert names(tmp_path) == ["folder.plan", "pipe.plan"]
 
 
 @pytest.mark.parametrize("failing", ["write", "make_way"])
@@ -99,7 +99,7 @@ def test_what_fails_leaves_the_old_file_and_no_other(tmp_path, monkeypatch, fail
         monkeypatch.setattr(files.os, "fsync", fail)
     with pytest.raises(MissionFormatError, match="No space left"):
         write_file(path, b"two", fail)
-    assert (path.read_bytes(), os.listdir(tmp_path)) == (b"one", ["a.plan"])
+    assert (path.read_bytes(), names(tmp_path)) == (b"one", ["a.plan"])
 
 
 def test_an_interrupt_leaves_no_unfinished_file(tmp_path):
@@ -108,7 +108,7 @@ def test_an_interrupt_leaves_no_unfinished_file(tmp_path):
 
     with pytest.raises(KeyboardInterrupt):
         write_file(tmp_path / "a.plan", b"two", interrupt)
-    assert os.listdir(tmp_path) == []
+    assert names(tmp_path) == []
 
 
 @pytest.mark.parametrize("links", [True, False])
@@ -139,3 +139,7 @@ def test_second_names_are_free_ones(tmp_path, monkeypatch, links):
 
 def mode_of(path):
     return stat.S_IMODE(path.stat().st_mode)
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())

@@ -17,7 +17,7 @@ from mavlink_bridge.cli.common import warn
 from mavlink_bridge.cli.failing import telling
 from mavlink_bridge.user_folders import state_folder
 from missions.errors import MissionError
-from missions.formats.files import create_exclusively, keep_aside, unwritable, write_file
+from missions.formats.files import create_exclusively, keep_aside, mode_of, unwritable, write_file
 
 if TYPE_CHECKING:
     from missions.situation import Situation
@@ -71,6 +71,7 @@ def make_room(path: Path) -> None:
         It can be neither kept nor taken away.
     """
     try:
+        mode_of(path)  # which refuses folders, devices and pipes
         _make_way(path, b"")
         path.unlink(missing_ok=True)
     except OSError as error:

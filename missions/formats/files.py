@@ -97,7 +97,7 @@ def write_file(path: Path, data: bytes, make_way: Callable[[], object] = lambda:
         The file cannot be written.
     """
     try:
-        mode = _mode_of(path)
+        mode = mode_of(path)
         # Beside it, so that nobody ever finds half a mission; by a name that nobody can foresee.
         unfinished = path.with_name(f".pbpp-{secrets.token_hex(8)}.part")
         descriptor = create_exclusively(unfinished)
@@ -180,7 +180,7 @@ def _put_beside(path: Path, aside: Path) -> None:
             raise
 
 
-def _mode_of(path: Path) -> int | None:
+def mode_of(path: Path) -> int | None:
     """Return the permissions of the file that is there; None where none is.
 
     Raises

@@ -14,6 +14,7 @@ from mavlink_bridge.cli import kept_files
 from mavlink_bridge.cli.app import app
 from mavlink_bridge.simulator.config import SimulatorConfig
 from mavlink_bridge.simulator.shell import Simulator
+from missions.errors import MissionFormatError
 from missions.fence import fence_to_items
 from missions.formats import Part, read_fence, read_situation, write_situation
 from missions.geo import LatLon
@@ -280,3 +281,11 @@ def test_a_file_that_grows_follows_no_link(tmp_path):
         file.write("this run")
     assert precious.read_text() == "precious"
     assert path.read_text() == "this run"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes in folders are POSIX's")
+def test_a_file_that_grows_takes_no_pipe_away(tmp_path):
+    os.mkfifo(tmp_path / "demo.tlog")
+    with pytest.raises(MissionFormatError, match="it is no regular file"):
+        kept_files.make_room(tmp_path / "demo.tlog")
+    assert (tmp_path / "demo.tlog").is_fifo()

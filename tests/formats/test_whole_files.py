@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import stat
 from pathlib import Path
 
@@ -135,6 +136,30 @@ def test_second_names_are_free_ones(tmp_path, monkeypatch, links):
     assert not (tmp_path / "nowhere").exists()
     if os.name == "posix":
         assert mode_of(aside) == 0o640
+
+
+ROOT = Path(__file__).parents[2]
+WRITERS = ("missions/formats/files.py", "mavlink_bridge/backup.py", "mavlink_bridge/tlog/writer.py")
+WRITING = re.compile(
+    r"\.write_text\(|\.write_bytes\(|savefig\((?!image)|mkstemp|NamedTemporaryFile|os\.open\(|shutil\.(copy|move)"
+    r"|open\([^)]*[\"'][rb]*[wax][b+]*[\"']"
+)
+
+
+@pytest.mark.parametrize("package", ["pbpp", "missions", "mavlink_bridge"])
+def test_nothing_else_creates_files(package):
+    found = {
+        f"{path.relative_to(ROOT).as_posix()}: {line.strip()}"
+        for path in (ROOT / package).rglob("*.py")
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if WRITING.search(line) and path.relative_to(ROOT).as_posix() not in WRITERS
+    }
+    assert found <= {
+        # What is handed a descriptor that was created exclusively, the list of our own in the state folder, and no file at all.
+        'mavlink_bridge/cli/kept_files.py: return os.fdopen(create_exclusively(path), "w", encoding="utf-8", newline="\\n")',
+        'mavlink_bridge/cli/kept_files.py: with known.open("a", encoding="utf-8") as file:',
+        "mavlink_bridge/cli/failing.py: os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())",
+    }
 
 
 def mode_of(path):

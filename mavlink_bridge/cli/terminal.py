@@ -35,9 +35,9 @@ def echo(line: str, colour: str | None = None) -> None:
     _put(line, colour, is_error=False)
 
 
-def say(line: str, colour: str | None = None) -> None:
-    """Put a line on stderr, in colour if that is a terminal."""
-    _put(line, colour, is_error=True)
+def say(line: str, colour: str | None = None, *, nl: bool = True) -> None:
+    """Put a line on stderr, in colour if that is a terminal; without its end where an answer is to stand behind it."""
+    _put(line, colour, is_error=True, nl=nl)
 
 
 def echo_lines(lines: Iterable[str]) -> None:
@@ -77,8 +77,8 @@ def cell(text: object, style: str = "") -> Text:
     return Text(harmless(str(text)), style=style)
 
 
-def _put(line: str, colour: str | None, *, is_error: bool) -> None:
-    typer.secho(harmless(line), err=is_error, fg=colour, color=_colour_wanted())
+def _put(line: str, colour: str | None, *, is_error: bool, nl: bool = True) -> None:
+    typer.secho(harmless(line), err=is_error, nl=nl, fg=colour, color=_colour_wanted())
 
 
 def _colour_wanted() -> bool | None:

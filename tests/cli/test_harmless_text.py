@@ -99,6 +99,10 @@ class TestTheOneWay:
         put(f"the vehicle says {NASTY}")
         assert "".join(capsys.readouterr()) == f"the vehicle says {SHOWN}\n"
 
+    def test_questions(self, capsys):
+        terminal.say(f"{TITLE}? [Y/n] ", nl=False)
+        assert capsys.readouterr().err == r"\x1b]0;PWNED\x07? [Y/n] "
+
     def test_several_lines_and_labels(self, capsys):
         terminal.echo_lines(["one", NASTY])
         terminal.echo_labelled("ok", "green", NASTY)

@@ -142,7 +142,7 @@ ROOT = Path(__file__).parents[2]
 WRITERS = ("missions/formats/files.py", "mavlink_bridge/backup.py", "mavlink_bridge/tlog/writer.py")
 WRITING = re.compile(
     r"\.write_text\(|\.write_bytes\(|savefig\((?!image)|mkstemp|NamedTemporaryFile|os\.open\(|shutil\.(copy|move)"
-    r"|open\([^)]*[\"'][rb]*[wax][b+]*[\"']"
+    r"|open\([^)]*[\"'][rb]*[wa][b+]*[\"']"
 )
 
 

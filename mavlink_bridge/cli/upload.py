@@ -21,6 +21,7 @@ from mavlink_bridge.cli.common import (
     progress_bar,
     warn,
 )
+from mavlink_bridge.cli.terminal import echo
 from mavlink_bridge.errors import BridgeError, OutcomeError, RefusedError, UsageError
 
 if TYPE_CHECKING:
@@ -392,10 +393,10 @@ def _report(
         how = "was there already" if entry.outcome.pushes == 0 else f"uploaded in {entry.took_s:.1f} s"
         coarse = " (positions read back to about 1 m only)" if entry.outcome.is_coarse else ""
         name = entry.mission_type.name.lower()
-        typer.echo(f"{name}: {len(entry.outcome.found or ())} items, {how}, read back and verified{coarse}")
+        echo(f"{name}: {len(entry.outcome.found or ())} items, {how}, read back and verified{coarse}")
         if entry.backup:
-            typer.echo(f"  the list before is kept in {entry.backup}")
+            echo(f"  the list before is kept in {entry.backup}")
     for name, (old, new) in changed.items():
-        typer.echo(f"{name}: {old:g} -> {new:g}, confirmed")
+        echo(f"{name}: {old:g} -> {new:g}, confirmed")
     if not done and not changed:
-        typer.echo("all parameters have these values already")
+        echo("all parameters have these values already")

@@ -160,8 +160,12 @@ class Stopper(RouteMaker):
         if not stopping.is_granted:
             text = "the vehicle does not go to HOLD"
             self._voice.tell(now_s, EventName.COMMAND_FAILED, text, "DO_SET_MODE", stopping.result_name)
-            if self.state is State.HOLDING:
-                self._fail_step(OutcomeError("the vehicle does not go to HOLD; nothing was written"))
+        self._hold_ended(is_granted=stopping.is_granted, now_s=now_s)
+
+    def _hold_ended(self, *, is_granted: bool, now_s: float) -> None:  # noqa: ARG002 - those above go on from there
+        """Go on from a HOLD that was taken, or was not."""
+        if not is_granted and self.state is State.HOLDING:
+            self._fail_step(OutcomeError("the vehicle does not go to HOLD; nothing was written"))
 
     def _is_mode_known(self, now_s: float) -> bool:
         # A heartbeat from before our HOLD still tells the mode before it.

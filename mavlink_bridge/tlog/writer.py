@@ -33,9 +33,9 @@ class TlogWriter:
     """
 
     def __init__(self, path: Path | str) -> None:
-        path = Path(path)
+        self._path = Path(path)
         try:
-            self._file = path.open("ab", buffering=0)
+            self._file = self._path.open("ab", buffering=0)
         except OSError as error:
             raise LogError(f"{path}: {error.strerror}", path=str(path)) from error
         self._pending: dict[int, bytes] = {}
@@ -57,13 +57,24 @@ class TlogWriter:
         ------
         ValueError
             `link` is not 0 to 3.
+        LogError
+            It cannot be written, or only in part: the disk is full.
         """
         if not 0 <= link <= 3:
             raise ValueError(f"link must be 0 to 3, not {link}")
         stamp = struct.pack(">Q", round(time_s * 1e6) & ~3 | link)
         frames, self._pending[link] = _split(self._pending.get(link, b"") + data)
         if frames:
-            self._file.write(b"".join(stamp + frame for frame in frames))
+            self._write(b"".join(stamp + frame for frame in frames))
+
+    def _write(self, records: bytes) -> None:
+        try:
+            written = self._file.write(records)
+        except OSError as error:
+            raise LogError(f"{self._path}: {error.strerror}", path=str(self._path)) from error
+        if written != len(records):
+            text = f"only {written or 0} of {len(records)} bytes could be written; is the disk full?"
+            raise LogError(f"{self._path}: {text}", path=str(self._path))
 
     def close(self) -> None:
         """Close the file."""

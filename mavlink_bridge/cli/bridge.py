@@ -112,9 +112,9 @@ def bridge(
     ):  # the latter is Ctrl-Break on Windows, where nothing sends the former
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), _end)
-    from mavlink_bridge.cli.run_log import RunLog  # noqa: PLC0415
+    from mavlink_bridge.cli.run_log import RunLog, SafeTeller  # noqa: PLC0415
     from mavlink_bridge.cli.session import signing_of  # noqa: PLC0415
-    from mavlink_bridge.director import Director, Orders  # noqa: PLC0415 - quick help
+    from mavlink_bridge.director import AT_WORK, Director, Orders  # noqa: PLC0415 - quick help
     from mavlink_bridge.director.orders import DEFAULT_SOURCES, TargetSource  # noqa: PLC0415
     from missions.formats import read_parameters  # noqa: PLC0415
     from missions.situation import Situation  # noqa: PLC0415
@@ -145,6 +145,7 @@ def bridge(
         view = _view(stack, director, is_wanted=not (json_output or quiet))
         tell = view.tell if view else _teller(wants_json=json_output, quiet=quiet)
         log_of_run = RunLog(recorder, journal) if recorder is not None and journal is not None else None
+        tell = SafeTeller(tell, lambda: director.state not in AT_WORK)
         shell = _Shell(director, tell, view, log_of_run, is_quiet=quiet)
         shell.run(connect, signing_of(signing_key), timeout)
     trouble = shell.director.trouble

@@ -1,4 +1,4 @@
-"""The bridge's log and its journal: what cannot be written is told once, and the drive goes on."""
+"""What the bridge writes beside what it does: where it cannot be written, that is told once, and the drive goes on."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import contextlib
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.cli.common import warn
+from mavlink_bridge.cli.failing import drop_stdout, is_reader_gone
 from mavlink_bridge.errors import LogError
 
 if TYPE_CHECKING:
@@ -63,3 +64,36 @@ class RunLog:
                 with contextlib.suppress(OSError):  # what still waits to be written cannot be either
                     writer.close()
             self._tell(f"{error}; nothing more is recorded, the bridge goes on")
+
+
+class SafeTeller:
+    """Tells events on the standard output as long as they can be written there.
+
+    Parameters
+    ----------
+    tell : callable
+        Tells one.
+    may_end : callable
+        Whether the bridge may end where nobody reads any more (``pbpp bridge --json | head``): nothing is under way on the vehicle.
+    """
+
+    def __init__(self, tell: Callable[[Event], None], may_end: Callable[[], bool]) -> None:
+        self._tell = tell
+        self._may_end = may_end
+
+    def __call__(self, event: Event) -> None:
+        """Tell an event.
+
+        Raises
+        ------
+        OSError
+            Nobody reads any more, and the bridge may end.
+        """
+        try:
+            self._tell(event)
+        except OSError as error:
+            if is_reader_gone(error) and self._may_end():
+                raise
+            drop_stdout()
+            with contextlib.suppress(OSError):
+                warn([f"events cannot be told any more ({error.strerror}); the bridge goes on"])

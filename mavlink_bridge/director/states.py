@@ -120,3 +120,15 @@ TRANSITIONS: dict[State, dict[Cue, State]] = {
     State.DONE: {},
     State.FAILED: {},
 }
+
+AT_WORK = frozenset(
+    {
+        State.HOLDING,
+        State.UPLOADING,
+        State.WITHDRAWING,
+        State.CLASHING,
+        State.STARTING,
+        State.DRIVING,
+    }
+)
+"""States in which something is under way on the vehicle that should not be left in the middle."""

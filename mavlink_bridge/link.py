@@ -38,6 +38,8 @@ _MOST_DATAGRAMS = 256
 
 _LINK_SENT = 3
 _SERIAL_WAIT_S = 0.01
+_SERIAL_SEND_S = 30.0
+"""As patient as TCP by default: a radio that takes nothing for so long is broken, and the bridge opens it again."""
 
 
 _EPOCH_S = time.time() - time.monotonic()
@@ -188,8 +190,9 @@ class Link:
         self.close()
 
     def close(self) -> None:
-        """Close the device."""
-        self._transport.close()
+        """Close the device; one that is gone already is closed."""
+        with contextlib.suppress(OSError):
+            self._transport.close()
 
     def speak_as(self, identity: tuple[int, int]) -> None:
         """Speak with other ids from now on."""
@@ -375,12 +378,15 @@ class _Udp:
         if not select.select([self._socket], [], [], timeout_s)[0]:
             return []
         received: list[tuple[Hashable, bytes]] = []
-        with contextlib.suppress(
-            BlockingIOError, ConnectionError
-        ):  # Windows says "reset" of a port that refused
+        try:
             for _ in range(_MOST_DATAGRAMS):
                 data, source = self._socket.recvfrom(_DATAGRAM_BYTES)
                 received.append((source, data))
+        except (BlockingIOError, ConnectionError):  # all is read; Windows says "reset" of a port that refused
+            pass
+        except OSError as error:
+            if not received:
+                raise LinkError(f"the link broke: {error.strerror or error}") from None
         return received
 
     def heard(self, source: Hashable) -> None:
@@ -438,7 +444,9 @@ class _Serial:
         import serial  # noqa: PLC0415 - only where there is a serial port
 
         # Set once: some drivers set up the whole port anew with every other time-out.
-        self._port = serial.Serial(address.host, address.port, timeout=_SERIAL_WAIT_S)
+        self._port = serial.Serial(
+            address.host, address.port, timeout=_SERIAL_WAIT_S, write_timeout=_SERIAL_SEND_S
+        )
 
     def send(self, data: bytes) -> None:
         try:

@@ -13,7 +13,7 @@ from mavlink_bridge.errors import LinkError, OutcomeError, RefusedError
 from mavlink_bridge.link import open_link
 from mavlink_bridge.messages import Autopilot, CommandLong, Heartbeat, ModeFlag, RequestDataStream
 from mavlink_bridge.protocol.command import SendCommand
-from mavlink_bridge.protocol.find import FindVehicle, identity_taken
+from mavlink_bridge.protocol.find import FindVehicle, identity_shared, identity_taken
 from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.rover import AUTO_MODE, MODE_NAMES
 from missions.items import Command
@@ -92,7 +92,7 @@ class Session:
         self._show = show
         self._notes = LinkNotes(is_silent=False)
         self._machine: Machine | None = None
-        self._has_written = self._is_refused = False
+        self._has_written = self._is_refused = self._has_clashed = False
         finder = FindVehicle(
             address.system,
             any_vehicle=address.any_vehicle,
@@ -158,9 +158,13 @@ class Session:
         RefusedError
             The vehicle refused.
         OutcomeError
-            It accepted but does not show the mode, or did not answer.
+            It accepted but does not show the mode, or did not answer; or it is to drive, and somebody else has our ids.
         """
         name = MODE_NAMES[mode]
+        if mode == AUTO_MODE and self._has_clashed:
+            raise identity_shared(
+                self._link.identity, "the vehicle is not switched to AUTO; what was uploaded is on it"
+            )
         peer = self.vehicle
         flags = float(ModeFlag.CUSTOM_MODE_ENABLED)
         message = CommandLong(
@@ -209,6 +213,7 @@ class Session:
 
     def _take_clash(self) -> None:
         """End before anything is written; later go on, for what is under way is checked against what the vehicle holds, and say so."""
+        self._has_clashed = True
         is_going_to_write = not getattr(self._machine, "has_written", True)
         self._is_refused = is_going_to_write and not self._has_written
         if not self._is_refused:

@@ -13,7 +13,6 @@ from enum import Enum, auto
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.director.states import State
-from mavlink_bridge.errors import OutcomeError
 
 if TYPE_CHECKING:
     from mavlink_bridge.messages import Frame
@@ -90,14 +89,3 @@ def account(identity: tuple[int, int], answer: Answer, state: State, *, is_singl
     if not is_single_job:
         parts.append("nothing more is done until a target is typed; clicks are not heeded")
     return "; ".join(parts)
-
-
-def trouble(identity: tuple[int, int], then: str) -> OutcomeError:
-    """Return the error that a single job ends with."""
-    text = f"somebody else has our ids (system {identity[0]} component {identity[1]}): {then}"
-    return OutcomeError(
-        text,
-        system=identity[0],
-        component=identity[1],
-        advice="find out who it is; choose other ids with --source-system and --source-component, or sign the link",
-    )

@@ -25,7 +25,7 @@ from mavlink_bridge.director.stopper import Stopper
 from mavlink_bridge.director.targets import Target
 from mavlink_bridge.errors import OutcomeError, RefusedError
 from mavlink_bridge.protocol.command import SendCommand
-from mavlink_bridge.protocol.find import identity_taken
+from mavlink_bridge.protocol.find import identity_shared, identity_taken
 from mavlink_bridge.rover import AUTO_MODE, HOLD_MODE
 from missions.items import Command
 
@@ -276,7 +276,7 @@ class Director(Stopper):
         if self._waiting_target is not None:
             self._take_waiting_target(now_s)
         elif self.orders.once and (self.orders.drive or self.upload_outcome is None):
-            self._give_up(clash.trouble(self.identity or (0, 0), then))
+            self._give_up(identity_shared(self.identity or (0, 0), then))
         else:
             self._end()
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.errors import IdentityTakenError, LinkError, VehicleNotFoundError
+from mavlink_bridge.errors import IdentityTakenError, LinkError, OutcomeError, VehicleNotFoundError
 from mavlink_bridge.messages import Heartbeat
 from mavlink_bridge.protocol.table_machine import TableMachine
 from mavlink_bridge.protocol.transitions import FIND, FindEvent, FindState
@@ -152,4 +152,14 @@ def identity_taken(identity: tuple[int, int]) -> IdentityTakenError:
     return IdentityTakenError(
         f"somebody on the link already speaks as system {identity[0]} component {identity[1]}; "
         "choose others with --source-system and --source-component"
+    )
+
+
+def identity_shared(identity: tuple[int, int], then: str) -> OutcomeError:
+    """Return the error that what was begun is not gone on with, because somebody else speaks with our ids by now."""
+    return OutcomeError(
+        f"somebody else has our ids (system {identity[0]} component {identity[1]}): {then}",
+        system=identity[0],
+        component=identity[1],
+        advice="find out who it is; choose other ids with --source-system and --source-component, or sign the link",
     )

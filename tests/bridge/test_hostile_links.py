@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import random
 import socket
 import time
@@ -11,6 +12,7 @@ import pytest
 
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.echoes import SentFrames
+from mavlink_bridge.errors import LinkError
 from mavlink_bridge.link import Link, open_link, open_transport
 from mavlink_bridge.messages import Frame, Heartbeat, MissionCount, Statustext
 from mavlink_bridge.signing import Signing, SigningKey
@@ -251,3 +253,39 @@ def test_a_call_ends_under_a_flood():
             kept, transport._socket = transport._socket, Flood()
             assert len(transport.receive(0.0)) == 256
             transport._socket = kept
+
+
+def test_a_datagram_socket_that_fails_is_a_broken_link_but_what_came_before_is_handed_out():
+    with closing(open_transport(f"udpin:127.0.0.1:{free_port()}")) as transport:
+        ready, filling = socket.socketpair()
+
+        class Failing:
+            pieces = (b"x",)
+
+            def recvfrom(self, _size: int) -> tuple[bytes, tuple[str, int]]:
+                if self.pieces:
+                    data, *self.pieces = self.pieces
+                    return data, ("10.0.0.1", 1)
+                raise OSError(errno.ENETDOWN, "Network is down")
+
+            def fileno(self) -> int:
+                return ready.fileno()
+
+        with ready, filling:
+            filling.send(b"x")
+            kept, transport._socket = transport._socket, Failing()
+            assert transport.receive(0.0) == [(("10.0.0.1", 1), b"x")]
+            with pytest.raises(LinkError, match="the link broke: Network is down"):
+                transport.receive(0.0)
+            transport._socket = kept
+
+
+def test_a_device_that_cannot_be_closed_is_closed_all_the_same():
+    wire = Wire()
+
+    def close() -> None:
+        raise OSError(errno.EIO, "gone")
+
+    wire.close = close
+    with Link(wire, (1, 195)) as link:
+        assert link.receive(0.0) == []

@@ -21,6 +21,7 @@ from mavlink_bridge.messages import (
     MissionRequestInt,
     MissionRequestList,
 )
+from mavlink_bridge.rover import AUTO_MODE
 from mavlink_bridge.simulator import Simulator, SimulatorConfig
 from missions.fence import fence_to_items
 from missions.formats import read_fence
@@ -106,6 +107,18 @@ def test_an_upload_that_has_begun_goes_on_to_its_verified_end_and_says_so_once(r
     assert is_held(rover, NEW)
     assert result.stderr.count(WARNING) == 1
     assert "warning: somebody else on the link has our ids (system 245 component 190)" in result.stderr
+
+
+def test_an_upload_is_not_driven_then(rover, forge, mission_file):
+    forge(MissionItemInt)
+    result = run(rover, "upload", mission_file, "--drive")
+    document = json.loads(result.stdout)
+    assert (result.exit_code, document["error"]) == (7, "OutcomeError")
+    assert document["message"] == (
+        "somebody else has our ids (system 245 component 190): the vehicle is not switched to AUTO; what was uploaded is on it"
+    )
+    assert is_held(rover, NEW)
+    assert rover.vehicle.mode != AUTO_MODE
 
 
 def test_a_download_goes_on(rover, forge, tmp_path):

@@ -7,11 +7,11 @@ import json
 import os
 import subprocess
 import sys
-import time
+from pathlib import Path
 
 import processes
 import pytest
-from cli.test_bridge import FAR, HOME, config  # noqa: F401 - a fixture
+from cli.test_bridge import FAR, config  # noqa: F401 - a fixture
 
 from mavlink_bridge.cli.run_log import RunLog, SafeTeller
 from mavlink_bridge.codec import Codec
@@ -103,11 +103,13 @@ def test_a_journal_that_cannot_be_written_ends_the_log_too(writers, tmp_path):
 def test_writers_say_which_file_cannot_be_written(writers):
     recorder, journal = writers
     kept, recorder._file = recorder._file, FullDisk(recorder._file, 0, 7)
-    with pytest.raises(LogError, match=rf"only 7 of {len(FRAME) + 8} bytes could be written; is the disk full\?"):
+    with pytest.raises(
+        LogError, match=rf"only 7 of {len(FRAME) + 8} bytes could be written; is the disk full\?"
+    ):
         recorder.write(1.0, FRAME)
     recorder._file = kept
     journal._file = FullDisk(journal._file, 0)
-    with pytest.raises(LogError, match="run.file"):
+    with pytest.raises(LogError, match=r"^run\.file: "):
         journal.event(EVENT)
 
 
@@ -140,29 +142,27 @@ def test_a_reader_who_is_gone_ends_a_bridge_only_where_nothing_is_under_way(monk
         SafeTeller(tell, may_end=lambda: True)(EVENT)
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="/dev/full, and limits of file sizes")
+@pytest.mark.skipif(sys.platform != "linux", reason="/dev/full, and the shell's limit of file sizes")
 def test_a_drive_goes_on_where_log_and_output_are_full(config, tmp_path):  # noqa: F811 - the fixture
-    import resource
-
     log = tmp_path / "run.tlog"
     arguments = ["--target", FAR, "--upload", "--drive", "--arm", "--once", "--log", str(log), "--json"]
-    with Simulator(config, "tcpin:127.0.0.1:0", speedup=10) as simulator, open("/dev/full", "wb") as full:
+    with (
+        Simulator(config, "tcpin:127.0.0.1:0", speedup=10) as simulator,
+        Path("/dev/full").open("wb") as full,
+    ):
+        bridge = [sys.executable, "-m", "mavlink_bridge.cli", "bridge", "--connect", simulator.connection]
         process = subprocess.Popen(
-            [sys.executable, "-m", "mavlink_bridge.cli", "bridge", "--connect", simulator.connection, *arguments],
+            ["sh", "-c", 'ulimit -f 20 && exec "$0" "$@"', *bridge, *arguments],
             stdin=subprocess.DEVNULL,
             stdout=full,
             stderr=subprocess.PIPE,
             text=True,
-            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000)),
             **processes.APART,
         )
-        begun_s = time.monotonic()
         _, errors = process.communicate(timeout=120)
         assert process.returncode == 0, errors
         assert distance_m(simulator.vehicle.position, LatLon(40.0720926, -105.2286152)) < 4.0
-        assert distance_m(HOME, simulator.vehicle.position) > 50
-    assert time.monotonic() - begun_s < 120
     assert errors.count("nothing more is recorded, the bridge goes on") == 1
     assert errors.count("events cannot be told any more (No space left on device)") == 1
     assert "Traceback" not in errors
-    assert log.stat().st_size <= 20_000
+    assert log.stat().st_size <= 20 * 1024

@@ -33,8 +33,9 @@ _DATAGRAM_BYTES = 65536
 _STREAM_BYTES = 16384
 """What is taken of a stream at once: a third of a second of the quickest serial port, and little enough to be soon done with."""
 
-_MOST_DATAGRAMS = 256
-"""Datagrams that are taken at once: about as many as Linux keeps by default (208 KiB); under a flood no call lasts for ever."""
+_MOST_DATAGRAMS, _MOST_DATAGRAM_BYTES = 256, 65536
+"""What is taken of datagrams at once: about as many small ones as Linux keeps by default (208 KiB), or a few huge ones; the worst garbage takes
+a third of a second to look through, so that no flood keeps timers from running."""
 
 _LINK_SENT = 3
 _SERIAL_WAIT_S = 0.01
@@ -379,9 +380,11 @@ class _Udp:
             return []
         received: list[tuple[Hashable, bytes]] = []
         try:
-            for _ in range(_MOST_DATAGRAMS):
+            left = _MOST_DATAGRAM_BYTES
+            while left > 0 and len(received) < _MOST_DATAGRAMS:
                 data, source = self._socket.recvfrom(_DATAGRAM_BYTES)
                 received.append((source, data))
+                left -= len(data)
         except (BlockingIOError, ConnectionError):  # all is read; Windows says "reset" of a port that refused
             pass
         except OSError as error:

@@ -234,12 +234,13 @@ def test_receive_buffers_do_not_grow():
     assert len(codec._parsers[None].buf) < 300
 
 
-def test_a_call_ends_under_a_flood():
+@pytest.mark.parametrize(("size", "count"), [(0, 256), (1, 256), (280, 235), (60_000, 2)])
+def test_a_call_ends_under_a_flood(size, count):
     with closing(open_transport(f"udpin:127.0.0.1:{free_port()}")) as transport:
 
         class Flood:
             def recvfrom(self, _size: int) -> tuple[bytes, tuple[str, int]]:
-                return b"x", ("10.0.0.1", 1)
+                return b"x" * size, ("10.0.0.1", 1)
 
             def fileno(self) -> int:
                 return ready.fileno()
@@ -251,7 +252,7 @@ def test_a_call_ends_under_a_flood():
         with ready, filling:
             filling.send(b"x")
             kept, transport._socket = transport._socket, Flood()
-            assert len(transport.receive(0.0)) == 256
+            assert len(transport.receive(0.0)) == count
             transport._socket = kept
 
 

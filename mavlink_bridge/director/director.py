@@ -97,6 +97,7 @@ class Director(Stopper):
 
     def _take_heartbeat(self, heartbeat: m.Heartbeat, now_s: float) -> None:
         if self.state in clash.CLASHES:
+            self._watch_hold(heartbeat, now_s)
             return
         taken = self._operator.take_heartbeat(heartbeat, now_s)
         if taken is not None:
@@ -262,12 +263,20 @@ class Director(Stopper):
         self._waiting_target = None
         self._stopping, self._may_be_in_auto = hold, may_be_in_auto  # a HOLD on its way gets there
         is_held = answer is clash.Answer.HOLD
-        if is_held and hold is None:
+        if hold is not None:
+            self._expect_hold()
+        elif is_held:
             self._command_hold(now_s)
         text = clash.account(identity, answer, self.state, is_single_job=self.orders.once)
         self._voice.tell(now_s, EventName.IDENTITY_CLASH, text, *identity, is_held or hold is not None)
         if self.state is State.CLASHED:
             self._settle_clash("nothing more is done", now_s)
+
+    def _watch_hold(self, heartbeat: m.Heartbeat, now_s: float) -> None:
+        """Leave the vehicle to whoever takes it while our HOLD is under way."""
+        if self._stopping is not None and self._operator.take_heartbeat(heartbeat, now_s) is not None:
+            self._stopping = None
+            self._settle_clash("somebody has taken the vehicle over; the mission is on it", now_s)
 
     def _settle_clash(self, then: str, now_s: float) -> None:
         """Go on from a clash once nothing is under way any more: to the end of a single job, else to a target that is typed."""

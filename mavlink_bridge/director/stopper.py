@@ -134,14 +134,18 @@ class Stopper(RouteMaker):
         self._command_hold(now_s)
 
     def _command_hold(self, now_s: float) -> None:
-        """Switch to HOLD, and expect nothing but what was and what will be."""
+        """Switch to HOLD."""
         assert self._peer is not None
+        self._expect_hold()
+        self._stopping = ModeSwitch(self._peer, HOLD_MODE, is_urgent=True, until_seen=self._may_be_in_auto)
+        self._stopping.start(now_s)
+
+    def _expect_hold(self) -> None:
+        """Expect nothing but what was and what will be once our HOLD is taken."""
         before = {self.situation.mode}
         if self._may_be_in_auto:
             before.add(AUTO_MODE)
         self._operator.expect(HOLD_MODE, before, is_armed=bool(self.situation.armed))
-        self._stopping = ModeSwitch(self._peer, HOLD_MODE, is_urgent=True, until_seen=self._may_be_in_auto)
-        self._stopping.start(now_s)
 
     def _look_after_hold(self, now_s: float) -> None:
         stopping = self._stopping

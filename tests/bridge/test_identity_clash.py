@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 from bridge.test_bridge_director import FAR, HOME, NEAR, arm, conductor, driving, ready, reposition
-from bridge.test_takeover import deaf_to, modes_sent, wait
+from bridge.test_takeover import deaf_to, modes_sent, unheard, wait
 
 from mavlink_bridge import messages as m
 from mavlink_bridge.director import EventName, Severity, State
 from mavlink_bridge.errors import IdentityTakenError, OutcomeError
-from mavlink_bridge.rover import AUTO_MODE, HOLD_MODE
+from mavlink_bridge.rover import AUTO_MODE, GUIDED_MODE, HOLD_MODE
 from mavlink_bridge.simulator.faults import Faults
 from missions.geo import distance_m, to_e7
 from missions.items import Command
@@ -193,6 +193,25 @@ def test_a_hold_that_does_not_get_through_is_sent_again():
     assert set(modes_sent(run, -10)) == {HOLD_MODE}
     wait(run, 2)
     assert is_left_alone(run)
+
+
+@pytest.mark.parametrize("has_target", [False, True])
+@pytest.mark.parametrize("is_disarming", [False, True])
+def test_who_takes_the_vehicle_while_our_hold_is_under_way_has_it(has_target, is_disarming):
+    run = driving(conductor())
+    wait(run, 3)
+    deaf_to(run, m.CommandAck)
+    if has_target:
+        run.director.take_target(NEAR, run.now_s)
+    spoof(run)
+    run.step()
+    if is_disarming:
+        unheard(run, m.CommandLong(1, 1, Command.COMPONENT_ARM_DISARM, param1=0.0))
+    unheard(run, m.SetMode(1, 1, 0))
+    wait(run, 1.5)
+    assert is_left_alone(run)
+    assert run.vehicles[0].mode in (0, GUIDED_MODE)  # by the clicks
+    assert run.director.state is State.CLASHED
 
 
 def test_a_hold_that_is_refused_is_told():

@@ -146,7 +146,7 @@ def bridge(
         tell = view.tell if view else _teller(wants_json=json_output, quiet=quiet)
         log_of_run = RunLog(recorder, journal) if recorder is not None and journal is not None else None
         tell = SafeTeller(tell, lambda: director.state not in AT_WORK)
-        shell = _Shell(director, tell, view, log_of_run, is_quiet=quiet)
+        shell = _Shell(director, tell, view, log_of_run)
         shell.run(connect, signing_of(signing_key), timeout)
     trouble = shell.director.trouble
     if trouble is not None and shell.director.is_done:
@@ -185,8 +185,6 @@ class _Shell:
         tell: Callable[[Event], None],
         view: LiveView | None,
         log: RunLog | None,
-        *,
-        is_quiet: bool = False,
     ) -> None:
         from mavlink_bridge.cli.link_notes import LinkNotes  # noqa: PLC0415 - quick help
         from mavlink_bridge.cli.live import BackupKeeper, PlanMaker  # noqa: PLC0415
@@ -196,7 +194,7 @@ class _Shell:
         self._written = _Journaled(self.director, log)
         self._tell = tell
         self._log = log
-        self._notes = LinkNotes(is_silent=is_quiet)
+        self._notes = LinkNotes()
         self._backups = BackupKeeper(self.director)
         self._plans = PlanMaker(self.director)
         self._typed = _typed_lines()

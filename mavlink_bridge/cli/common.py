@@ -148,6 +148,7 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
         wants_json = bool(options.get("json_output"))
         verbose = bool(options.get("verbose"))
         begin_telling(verbose=verbose)
+        telling().quiet = bool(options.get("quiet"))
         for parameter in added:
             options.pop(parameter.name, None)
         name = command.__name__

@@ -6,23 +6,17 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from mavlink_bridge.cli.failing import say
+from mavlink_bridge.cli.failing import say, telling
 
 if TYPE_CHECKING:
     from mavlink_bridge.link import Link
 
 
 class LinkNotes:
-    """Tells of a link's echoes, once, also where it is opened again.
+    """Tells of a link's echoes, once, also where it is opened again; not where little is to be told (``-q``)."""
 
-    Parameters
-    ----------
-    is_silent : bool
-        Whether notes are left out.
-    """
-
-    def __init__(self, *, is_silent: bool) -> None:
-        self._was_told = is_silent
+    def __init__(self) -> None:
+        self._was_told = telling().quiet
 
     def tell(self, link: Link) -> None:
         """Tell what there is to tell of a link and was not told yet."""

@@ -119,7 +119,7 @@ def conduct(
     director = Director(replace(orders, once=True), situation)
     plans = PlanMaker(director, timed)
     backups = BackupKeeper(director)
-    notes = LinkNotes(is_silent=quiet)
+    notes = LinkNotes()
     with progress_bar(quiet=quiet) as show:
 
         def step() -> None:

@@ -90,7 +90,7 @@ class Session:
     def __init__(self, link: Link, address: Address, show: Callable[[str, int, int], None]) -> None:
         self._link = link
         self._show = show
-        self._notes = LinkNotes(is_silent=False)
+        self._notes = LinkNotes()
         self._machine: Machine | None = None
         self._has_written = self._is_refused = self._has_clashed = False
         finder = FindVehicle(

@@ -138,6 +138,12 @@ def test_what_comes_back_of_ours_is_noted_once(rover, forge, mission_file, after
     assert result.stderr.count("note: our own messages come back on this link; they are left out") == 1
 
 
+def test_a_note_is_left_out_where_little_is_to_be_told(rover, forge, mission_file):
+    forge(reflects=True)
+    result = run(rover, "upload", mission_file, "-q")
+    assert (result.exit_code, result.stderr) == (0, "")
+
+
 @pytest.mark.parametrize(("after", "code"), [(MissionRequestList, 5), (MissionItemInt, 0)])
 def test_a_plan_that_is_uploaded(rover, forge, after, code):
     forge(after)

@@ -10,7 +10,7 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, Self
 
-from mavlink_bridge.callers import Callers
+from mavlink_bridge.callers import FORGOTTEN_AFTER_S, Callers
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import LinkError
 from mavlink_bridge.messages import Autopilot, Heartbeat, MavType
@@ -400,19 +400,21 @@ class _Udp:
 
 
 class _Tcp:
-    """TCP: ``tcp`` connects, ``tcpin`` waits for one to connect; others are refused as long as it stays."""
+    """One TCP connection."""
 
     is_stream = True
 
-    def __init__(self, address: Address, timeout_s: float) -> None:
-        if address.kind == "tcp":
-            self._socket = socket.create_connection((address.host, address.port), timeout_s)
-        else:
-            with socket.create_server((address.host, address.port)) as server:
-                server.settimeout(timeout_s)
-                self._socket = server.accept()[0]
+    def __init__(self, connection: socket.socket, timeout_s: float) -> None:
+        self._socket = connection
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._socket.settimeout(timeout_s)
+
+    @classmethod
+    def connect(cls, address: Address, timeout_s: float) -> Self:
+        return cls(socket.create_connection((address.host, address.port), timeout_s), timeout_s)
+
+    def fileno(self) -> int:
+        return self._socket.fileno()
 
     def send(self, data: bytes) -> None:
         try:
@@ -436,6 +438,52 @@ class _Tcp:
 
     def close(self) -> None:
         self._socket.close()
+
+
+class _TcpServer:
+    """``tcpin``: waits for one to connect; others are turned away as long as that one speaks MAVLink now and then."""
+
+    is_stream = True
+
+    def __init__(self, address: Address, timeout_s: float) -> None:
+        self._timeout_s = timeout_s
+        self._server = socket.create_server((address.host, address.port))
+        try:
+            self._server.settimeout(timeout_s)
+            self._client = _Tcp(self._server.accept()[0], timeout_s)
+        except OSError:
+            self._server.close()
+            raise
+        self._server.setblocking(False)
+        self._heard_s = time.monotonic()
+
+    def send(self, data: bytes) -> None:
+        self._client.send(data)
+
+    def receive(self, timeout_s: float) -> list[tuple[Hashable, bytes]]:
+        ends = [self._server.fileno(), self._client.fileno()]
+        ready = select.select(ends, [], [], timeout_s)[0]
+        if self._server.fileno() in ready:
+            self._meet()
+        return self._client.receive(0.0) if ready else []
+
+    def _meet(self) -> None:
+        """Let somebody in who connects after the one before has been silent; turn him away otherwise."""
+        with contextlib.suppress(OSError):  # he is gone again
+            connection = self._server.accept()[0]
+            if time.monotonic() - self._heard_s <= FORGOTTEN_AFTER_S:
+                connection.close()
+                return
+            self._client.close()
+            self._client = _Tcp(connection, self._timeout_s)
+            self._heard_s = time.monotonic()
+
+    def heard(self, source: Hashable) -> None:  # noqa: ARG002 - there is one at a time
+        self._heard_s = time.monotonic()
+
+    def close(self) -> None:
+        self._client.close()
+        self._server.close()
 
 
 class _Serial:
@@ -477,7 +525,7 @@ class _Serial:
 _OPENERS: dict[str, Callable[[Address, float], Transport]] = {
     "udpin": _Udp,
     "udpout": _Udp,
-    "tcp": _Tcp,
-    "tcpin": _Tcp,
+    "tcp": _Tcp.connect,
+    "tcpin": _TcpServer,
     "serial": _Serial,
 }

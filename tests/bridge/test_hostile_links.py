@@ -5,11 +5,13 @@ from __future__ import annotations
 import errno
 import random
 import socket
+import threading
 import time
 from contextlib import ExitStack, closing
 
 import pytest
 
+from mavlink_bridge import link as links
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.echoes import SentFrames
 from mavlink_bridge.errors import LinkError
@@ -290,3 +292,58 @@ def test_a_device_that_cannot_be_closed_is_closed_all_the_same():
     wire.close = close
     with Link(wire, (1, 195)) as link:
         assert link.receive(0.0) == []
+
+
+# TCP servers
+
+
+@pytest.fixture
+def opened():
+    """A server, the one that connected to it, and how to connect to it."""
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        port = probe.getsockname()[1]
+    held: list[Link] = []
+    server = threading.Thread(
+        target=lambda: held.append(open_link(f"tcpin:127.0.0.1:{port}", (245, 190), timeout_s=60))
+    )
+    server.start()
+
+    def connect() -> socket.socket:
+        until_s = time.monotonic() + 60
+        while True:
+            try:
+                return socket.create_connection(("127.0.0.1", port), 60)
+            except ConnectionError:
+                assert time.monotonic() < until_s
+
+    with connect() as first:
+        server.join(60)
+        with held[0] as link:
+            yield link, first, connect
+
+
+def test_a_second_client_is_turned_away_as_long_as_the_first_speaks(opened):
+    link, vehicle, connect = opened
+    vehicle.sendall(Codec(1, 1).encode(VEHICLE))
+    while not link.receive(1.0):
+        pass
+    with connect() as stranger:
+        assert link.receive(1.0) == []
+        assert stranger.recv(100) == b""
+    vehicle.sendall(Codec(1, 1).encode(VEHICLE))
+    while not link.receive(1.0):
+        pass
+
+
+def test_a_client_that_never_speaks_makes_room_for_one_that_does(opened, monkeypatch):
+    link, scanner, connect = opened
+    later_s = time.monotonic() + 11
+    monkeypatch.setattr(links.time, "monotonic", lambda: later_s)
+    with connect() as vehicle:
+        vehicle.sendall(Codec(1, 1).encode(VEHICLE))
+        while not (heard := link.receive(1.0)):
+            pass
+        assert heard == [Frame(1, 1, VEHICLE)]
+        link.send(Statustext(6, "hello"))
+        assert vehicle.recv(100) != b""
+    assert scanner.recv(100)[:1] in (b"", b"\xfd")

@@ -8,13 +8,18 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from mavlink_bridge.echoes import SentFrames
 from mavlink_bridge.messages import MESSAGES, Frame, Message, MissionCurrent
 
 if TYPE_CHECKING:
+    from collections.abc import Hashable
+
     from mavlink_bridge.signing import Signing
 
 
 _HEADER_BYTES_V1, _HEADER_BYTES_V2 = 6, 10
+_MOST_SOURCES = 64
+"""Receive buffers that are kept: twice as many as there are sources that are answered."""
 
 
 class _MissionCurrent(dialect.MAVLink_mission_current_message):  # type: ignore[misc]  # pymavlink ships no types
@@ -78,7 +83,7 @@ _DIALECT_CLASSES: dict[str, Any] = {
 
 
 class Codec:
-    """One direction-less end of a MAVLink link: its own sequence counter and receive buffer.
+    """One direction-less end of a MAVLink link: its own sequence counter and receive buffers.
 
     Parameters
     ----------
@@ -86,33 +91,39 @@ class Codec:
         The identity stamped on what is sent.
     signing : Signing, optional
         Signs what is sent; what is received unsigned, wrongly signed or replayed is left out.
+    sent : SentFrames, optional
+        What another end before this one sent, to which this one adds; what comes back of it is left out.
 
     Attributes
     ----------
     bad_bytes : int
         Received bytes that belong to no sound frame.
+    echoes : int
+        Frames left out that were ours, come back byte for byte.
     untrusted_frames : int
         Sound frames left out for their signature.
     """
 
-    def __init__(self, system: int, component: int, signing: Signing | None = None) -> None:
-        self._mavlink = dialect.MAVLink(None, srcSystem=system, srcComponent=component)
-        self._mavlink.robust_parsing = True
-        self._signing = signing
+    def __init__(
+        self, system: int, component: int, signing: Signing | None = None, sent: SentFrames | None = None
+    ) -> None:
         # pymavlink's own check takes a stream's time from frames before it has verified them: it only packs.
-        self._packer = self._mavlink if signing is None else _signing_packer(system, component, signing)
+        self._packer = _packer(system, component, signing)
+        self._parsers: dict[Hashable, Any] = {}
+        self._signing = signing
+        self._sent = SentFrames() if sent is None else sent
         self.bad_bytes = 0
+        self.echoes = 0
         self.untrusted_frames = 0
 
     @property
     def identity(self) -> tuple[int, int]:
         """System and component id stamped on what is sent."""
-        return self._mavlink.srcSystem, self._mavlink.srcComponent
+        return self._packer.srcSystem, self._packer.srcComponent
 
     @identity.setter
     def identity(self, identity: tuple[int, int]) -> None:
-        for end in (self._mavlink, self._packer):
-            end.srcSystem, end.srcComponent = identity
+        self._packer.srcSystem, self._packer.srcComponent = identity
 
     def encode(self, message: Message) -> bytes:
         """Give the bytes of one MAVLink 2 frame and count the sequence number up."""
@@ -120,32 +131,74 @@ class Codec:
             self._packer.signing.timestamp = self._signing.next_timestamp()
         packed: bytes = _to_dialect(message).pack(self._packer)
         self._packer.seq = (self._packer.seq + 1) % 256
+        self._sent.remember(packed)
+        if self._signing is not None:
+            self._signing.sent(packed)
         return packed
 
     def decode(self, data: bytes) -> list[Frame]:
         """Take received bytes; give the complete frames of known types in them, damaged ones left out."""
         return [frame for _, frame in self.decode_with_bytes(data) if frame is not None]
 
-    def decode_with_bytes(self, data: bytes) -> list[tuple[bytes, Frame | None]]:
-        """Take received bytes; give each sound frame's bytes and, where its type is known, the frame."""
+    def decode_with_bytes(self, data: bytes, source: Hashable = None) -> list[tuple[bytes, Frame | None]]:
+        """Return each sound frame's bytes in what was received and, where its type is known, the frame.
+
+        Parameters
+        ----------
+        data : bytes
+            What came.
+        source : hashable, optional
+            Where from, for datagrams: the begin of a frame waits for its end from there, so that one sender's garbage spoils no other's
+            frames; and for nothing where a datagram is whole by itself.
+        """
         decoded = []
-        for raw in self._mavlink.parse_buffer(data) or []:
+        for raw in self._parse(data, source):
             if raw.get_type() == "BAD_DATA":
                 self.bad_bytes += len(raw.data)
                 continue
             frame_bytes = bytes(raw.get_msgbuf())
-            if self._signing is not None and not self._signing.accepts(frame_bytes):
+            if frame_bytes in self._sent:
+                self.echoes += 1
+            elif self._signing is not None and not self._signing.accepts(frame_bytes):
                 self.untrusted_frames += 1
-                continue
-            decoded.append((frame_bytes, to_frame(raw)))
+            else:
+                decoded.append((frame_bytes, to_frame(raw)))
         return decoded
 
+    def _parse(self, data: bytes, source: Hashable) -> list[Any]:
+        parser = self._parsers.pop(source, None) or _parser()
+        raws = None
+        if source is not None and parser.buf_len():
+            alone = _parser()
+            raws = alone.parse_buffer(data)
+            if raws and raws[0].get_type() != "BAD_DATA":
+                self.bad_bytes += parser.buf_len()
+                parser = alone
+            else:
+                raws = None
+        if raws is None:
+            raws = parser.parse_buffer(data) or []
+        # pymavlink keeps all that ever came for as long as a frame's begin is left at its end.
+        del parser.buf[: parser.buf_index]
+        parser.buf_index = 0
+        self._parsers[source] = parser  # of too many the one that was silent longest is forgotten
+        if len(self._parsers) > _MOST_SOURCES:
+            del self._parsers[next(iter(self._parsers))]
+        return raws
 
-def _signing_packer(system: int, component: int, signing: Signing) -> Any:  # noqa: ANN401 - pymavlink ships no types
+
+def _parser() -> Any:  # noqa: ANN401 - pymavlink ships no types
+    parser = dialect.MAVLink(None)
+    parser.robust_parsing = True
+    return parser
+
+
+def _packer(system: int, component: int, signing: Signing | None) -> Any:  # noqa: ANN401 - pymavlink ships no types
     packer = dialect.MAVLink(None, srcSystem=system, srcComponent=component)
-    packer.signing.sign_outgoing = True
-    packer.signing.link_id = signing.link_id
-    signing.key.hand_to(lambda secret: setattr(packer.signing, "secret_key", secret))
+    if signing is not None:
+        packer.signing.sign_outgoing = True
+        packer.signing.link_id = signing.link_id
+        signing.key.hand_to(lambda secret: setattr(packer.signing, "secret_key", secret))
     return packer
 
 

@@ -6,7 +6,7 @@
     ├── UsageError               options that do not fit together
     ├── LogError                 a log cannot be used
     ├── LinkError                no connection, no heartbeat, silence
-    ├── IdentityTakenError       our system and component id is already heard on the link
+    ├── IdentityTakenError       somebody else had our system and component id before anything was written
     ├── VehicleNotFoundError     nobody there is the vehicle asked for
     ├── RefusedError             the vehicle said no
     └── OutcomeError             what is on the vehicle is not what was wanted, or unknown

@@ -66,6 +66,11 @@ class JournalWriter:
         What the director may do.
     parameters : mapping of str to float
         Parameters that were known beforehand.
+
+    Raises
+    ------
+    LogError
+        From every method: it cannot be written.
     """
 
     def __init__(self, file: TextIO, orders: Orders, parameters: Mapping[str, float]) -> None:
@@ -83,9 +88,16 @@ class JournalWriter:
         """Write an event."""
         self._write({"told": event.as_json()})
 
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
     def _write(self, entry: Mapping[str, Any]) -> None:
-        self._file.write(json.dumps(entry) + "\n")
-        self._file.flush()
+        try:
+            self._file.write(json.dumps(entry) + "\n")
+            self._file.flush()
+        except OSError as error:
+            raise LogError(f"{self._file.name}: {error.strerror}", path=self._file.name) from error
 
 
 def journal_path(log: Path) -> Path:

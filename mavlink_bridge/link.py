@@ -10,27 +10,37 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, Self
 
+from mavlink_bridge.callers import FORGOTTEN_AFTER_S, Callers
 from mavlink_bridge.codec import Codec
-from mavlink_bridge.errors import IdentityTakenError, LinkError
+from mavlink_bridge.errors import LinkError
 from mavlink_bridge.messages import Autopilot, Heartbeat, MavType
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Hashable, Sequence
     from types import TracebackType
 
+    from mavlink_bridge.echoes import SentFrames
     from mavlink_bridge.messages import Frame, Message
     from mavlink_bridge.protocol.machine import Machine
     from mavlink_bridge.signing import Signing
-    from mavlink_bridge.tlog import TlogWriter
 
 ONE_SHOT_IDENTITY = (245, 190)
 """System and component id of one-shot commands: nobody else's by custom."""
 
 DEFAULT_BAUD = 57600
 _HEARTBEAT_EVERY_S = 1.0
-_RECEIVE_BYTES = 65536
+_DATAGRAM_BYTES = 65536
+_STREAM_BYTES = 16384
+"""What is taken of a stream at once: a third of a second of the quickest serial port, and little enough to be soon done with."""
+
+_MOST_DATAGRAMS, _MOST_DATAGRAM_BYTES = 256, 65536
+"""What is taken of datagrams at once: about as many small ones as Linux keeps by default (208 KiB), or a few huge ones; the worst garbage takes
+a third of a second to look through, so that no flood keeps timers from running."""
+
 _LINK_SENT = 3
 _SERIAL_WAIT_S = 0.01
+_SERIAL_SEND_S = 30.0
+"""As patient as TCP by default: a radio that takes nothing for so long is broken, and the bridge opens it again."""
 
 
 _EPOCH_S = time.time() - time.monotonic()
@@ -90,9 +100,6 @@ _DEVICE = re.compile(r"(/dev/[^,]+|COM[0-9]+)(?:,([1-9][0-9]{0,7}))?", re.IGNORE
 class Transport(Protocol):
     """Bytes out and in."""
 
-    echoes: bool
-    """Whether what is sent may come back (half-duplex radios)."""
-
     is_stream: bool
     """Whether several frames may be sent as one piece (datagrams hold one each)."""
 
@@ -100,12 +107,24 @@ class Transport(Protocol):
         """Send, or do nothing while nobody is there to send to."""
         ...
 
-    def receive(self, timeout_s: float) -> bytes:
-        """Wait for bytes, at most so long; empty when none came."""
+    def receive(self, timeout_s: float) -> Sequence[tuple[Hashable, bytes]]:
+        """Wait for bytes, at most so long, and return them, each piece with where it came from; not all at once under a flood."""
+        ...
+
+    def heard(self, source: Hashable) -> None:
+        """Take notice that MAVLink came from there, and is to be believed: whoever is answered on an open port is answered there."""
         ...
 
     def close(self) -> None:
         """Let go of the device."""
+        ...
+
+
+class Recorder(Protocol):
+    """Takes what goes over a link, as `TlogWriter` does."""
+
+    def write(self, time_s: float, data: bytes, link: int = 0) -> None:
+        """Take what was received or sent at a time."""
         ...
 
 
@@ -118,17 +137,17 @@ class Link:
         The open device.
     identity : tuple of int
         System and component id to speak as.
-    recorder : TlogWriter, optional
+    recorder : Recorder, optional
         Everything that comes and goes is written there.
     signing : Signing, optional
         Sends signed frames and believes no others.
     clock : callable, optional
         Gives the time by which everything on the link runs, in seconds; `now_s` if not given. A simulated vehicle may bring its own.
+    sent : SentFrames, optional
+        What was sent on the link before this one, where that is opened again: its echoes are left out too.
 
     Raises
     ------
-    IdentityTakenError
-        From `receive`: somebody else on the link speaks with our ids.
     LinkError
         From `receive` and `send`: the other end is gone.
     """
@@ -137,16 +156,16 @@ class Link:
         self,
         transport: Transport,
         identity: tuple[int, int] = ONE_SHOT_IDENTITY,
-        recorder: TlogWriter | None = None,
+        recorder: Recorder | None = None,
         signing: Signing | None = None,
         clock: Callable[[], float] = now_s,
+        sent: SentFrames | None = None,
     ) -> None:
         self.now_s = clock
         self._transport = transport
-        self._codec = Codec(*identity, signing)
+        self._codec = Codec(*identity, signing, sent)
         self._recorder = recorder
         self._heartbeat_due_s = 0.0
-        self._has_spoken = False
 
     @property
     def identity(self) -> tuple[int, int]:
@@ -158,6 +177,11 @@ class Link:
         """How many frames were left out because they were not signed with our key."""
         return self._codec.untrusted_frames
 
+    @property
+    def echoes(self) -> int:
+        """How many frames were left out because they were ours, come back byte for byte."""
+        return self._codec.echoes
+
     def __enter__(self) -> Self:
         return self
 
@@ -167,8 +191,9 @@ class Link:
         self.close()
 
     def close(self) -> None:
-        """Close the device."""
-        self._transport.close()
+        """Close the device; one that is gone already is closed."""
+        with contextlib.suppress(OSError):
+            self._transport.close()
 
     def speak_as(self, identity: tuple[int, int]) -> None:
         """Speak with other ids from now on."""
@@ -178,7 +203,6 @@ class Link:
         """Send one message."""
         data = self._codec.encode(message)
         self._transport.send(data)
-        self._has_spoken = True
         if self._recorder:
             self._recorder.write(self.now_s(), data, _LINK_SENT)
 
@@ -191,13 +215,15 @@ class Link:
         packets = [self._codec.encode(message) for message in messages]
         if packets:
             self._transport.send(b"".join(packets))
-            self._has_spoken = True
         if self._recorder:
             for packet in packets:
                 self._recorder.write(self.now_s(), packet, _LINK_SENT)
 
     def receive(self, timeout_s: float) -> list[Frame]:
-        """Give the frames that come within a time, as soon as there are any; our heartbeat goes out when it is due."""
+        """Return the frames that come within a time, as soon as there are any; our heartbeat goes out when it is due.
+
+        Frames with our own ids that we did not send are handed out too: what they mean is decided where it is known what is under way.
+        """
         return self.receive_at(timeout_s)[1]
 
     def receive_at(self, timeout_s: float) -> tuple[float, list[Frame]]:
@@ -208,22 +234,27 @@ class Link:
             self.send(Heartbeat(MavType.ONBOARD_CONTROLLER, Autopilot.INVALID))
         until_heartbeat_s = self._heartbeat_due_s - begun_s
         wait_s = max(0.0, min(timeout_s, until_heartbeat_s))
-        data = self._transport.receive(wait_s)
+        received = self._transport.receive(wait_s)
         came_s = self.now_s()
-        if not data:  # so far nothing came; if our own computer paused since, what came then is still unread
+        if (
+            not received
+        ):  # so far nothing came; if our own computer paused since, what came then is still unread
             return min(came_s, begun_s + wait_s), []
-        decoded = self._codec.decode_with_bytes(data)
+        decoded = [one for source, data in received for one in self._decode(source, data)]
         if self._recorder:
             for frame_bytes, _ in decoded:
                 self._recorder.write(came_s, frame_bytes)
-        frames = [frame for _, frame in decoded if frame is not None]
-        ours = [frame for frame in frames if (frame.system, frame.component) == self.identity]
-        if ours and not (self._transport.echoes and self._has_spoken):
-            raise IdentityTakenError(
-                f"somebody on the link already speaks as system {self.identity[0]} component {self.identity[1]}; "
-                "choose others with --source-system and --source-component"
-            )
-        return came_s, frames
+        return came_s, [frame for _, frame in decoded if frame is not None]
+
+    def _decode(self, source: Hashable, data: bytes) -> list[tuple[bytes, Frame | None]]:
+        decoded = self._codec.decode_with_bytes(data, source)
+        if any(frame is None or not self.is_ours(frame) for _, frame in decoded):
+            self._transport.heard(source)
+        return decoded
+
+    def is_ours(self, frame: Frame) -> bool:
+        """Return whether a frame has our own ids; a received one that has is somebody else's."""
+        return (frame.system, frame.component) == self.identity
 
     def run(
         self,
@@ -248,7 +279,7 @@ class Link:
         on_step : callable, optional
             Called before each step's messages are sent, for progress bars and for what the machine hands out.
         until : callable, optional
-            Ends the run early when it gives True.
+            Ends the run early when it gives True; nothing more is sent then.
         longest_wait_s : callable, optional
             Gives the longest time between two steps.
 
@@ -259,11 +290,11 @@ class Link:
         """
         begun_s = self.now_s()
         machine.start(begun_s)
-        while True:
+        while not until():
             if on_step:
                 on_step()
             self.send_all(machine.messages_to_send())
-            if machine.is_done or until():
+            if machine.is_done:
                 return
             if timeout_s is not None and self.now_s() - begun_s > timeout_s:
                 raise LinkError(f"no outcome within {timeout_s:g} s")
@@ -286,9 +317,10 @@ def open_link(
     connection: str,
     identity: tuple[int, int] = ONE_SHOT_IDENTITY,
     *,
-    recorder: TlogWriter | None = None,
+    recorder: Recorder | None = None,
     signing: Signing | None = None,
     timeout_s: float = 10.0,
+    sent: SentFrames | None = None,
 ) -> Link:
     """Open a link by its connection string.
 
@@ -297,7 +329,7 @@ def open_link(
     LinkError
         The string is none, or the device cannot be opened; says why.
     """
-    return Link(open_transport(connection, timeout_s=timeout_s), identity, recorder, signing)
+    return Link(open_transport(connection, timeout_s=timeout_s), identity, recorder, signing, sent=sent)
 
 
 def open_transport(connection: str, *, timeout_s: float = 10.0) -> Transport:
@@ -318,64 +350,71 @@ def open_transport(connection: str, *, timeout_s: float = 10.0) -> Transport:
 
 
 class _Udp:
-    """UDP: ``udpout`` speaks first to one address, ``udpin`` answers everybody it has heard."""
+    """UDP: ``udpout`` speaks to one address, and first; ``udpin`` answers whoever speaks MAVLink (`Callers`)."""
 
-    echoes = False
     is_stream = False
 
     def __init__(self, address: Address, _timeout_s: float) -> None:
         family, _, _, _, target = socket.getaddrinfo(address.host, address.port, type=socket.SOCK_DGRAM)[0]
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
-        self._peers: dict[Any, None] = {}
-        if address.kind == "udpin":
+        self._target = None if address.kind == "udpin" else target
+        self._callers: Callers[Any] = Callers()
+        if self._target is None:
             try:
                 self._socket.bind(target)
             except OSError:
                 self._socket.close()
                 raise
-        else:
-            self._peers[target] = None
         self._socket.setblocking(False)
 
     def send(self, data: bytes) -> None:
-        for peer in self._peers:
+        to = self._callers.answered(time.monotonic()) if self._target is None else (self._target,)
+        for place in to:
             with contextlib.suppress(
                 OSError
             ):  # a peer that is not there yet refuses; datagrams may be lost anyway
-                self._socket.sendto(data, peer)
+                self._socket.sendto(data, place)
 
-    def receive(self, timeout_s: float) -> bytes:
+    def receive(self, timeout_s: float) -> list[tuple[Hashable, bytes]]:
         if not select.select([self._socket], [], [], timeout_s)[0]:
-            return b""
-        received = []
-        with contextlib.suppress(
-            BlockingIOError, ConnectionError
-        ):  # Windows says "reset" of a port that refused
-            while True:
-                data, peer = self._socket.recvfrom(_RECEIVE_BYTES)
-                self._peers.setdefault(peer)
-                received.append(data)
-        return b"".join(received)
+            return []
+        received: list[tuple[Hashable, bytes]] = []
+        try:
+            left = _MOST_DATAGRAM_BYTES
+            while left > 0 and len(received) < _MOST_DATAGRAMS:
+                data, source = self._socket.recvfrom(_DATAGRAM_BYTES)
+                received.append((source, data))
+                left -= len(data)
+        except (BlockingIOError, ConnectionError):  # all is read; Windows says "reset" of a port that refused
+            pass
+        except OSError as error:
+            if not received:
+                raise LinkError(f"the link broke: {error.strerror or error}") from None
+        return received
+
+    def heard(self, source: Hashable) -> None:
+        self._callers.heard(source, time.monotonic())
 
     def close(self) -> None:
         self._socket.close()
 
 
 class _Tcp:
-    """TCP: ``tcp`` connects, ``tcpin`` waits for one to connect."""
+    """One TCP connection."""
 
-    echoes = False
     is_stream = True
 
-    def __init__(self, address: Address, timeout_s: float) -> None:
-        if address.kind == "tcp":
-            self._socket = socket.create_connection((address.host, address.port), timeout_s)
-        else:
-            with socket.create_server((address.host, address.port)) as server:
-                server.settimeout(timeout_s)
-                self._socket = server.accept()[0]
+    def __init__(self, connection: socket.socket, timeout_s: float) -> None:
+        self._socket = connection
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._socket.settimeout(timeout_s)
+
+    @classmethod
+    def connect(cls, address: Address, timeout_s: float) -> Self:
+        return cls(socket.create_connection((address.host, address.port), timeout_s), timeout_s)
+
+    def fileno(self) -> int:
+        return self._socket.fileno()
 
     def send(self, data: bytes) -> None:
         try:
@@ -383,32 +422,82 @@ class _Tcp:
         except OSError as error:
             raise LinkError(f"the link broke while sending: {error.strerror or error}") from None
 
-    def receive(self, timeout_s: float) -> bytes:
+    def receive(self, timeout_s: float) -> list[tuple[Hashable, bytes]]:
         if not select.select([self._socket], [], [], timeout_s)[0]:
-            return b""
+            return []
         try:
-            data = self._socket.recv(_RECEIVE_BYTES)
+            data = self._socket.recv(_STREAM_BYTES)
         except OSError as error:
             raise LinkError(f"the link broke: {error.strerror or error}") from None
         if not data:
             raise LinkError("the other end closed the link")
-        return data
+        return [(None, data)]
+
+    def heard(self, source: Hashable) -> None:
+        """Do nothing: there is one other end."""
 
     def close(self) -> None:
         self._socket.close()
 
 
+class _TcpServer:
+    """``tcpin``: waits for one to connect; others are turned away as long as that one speaks MAVLink now and then."""
+
+    is_stream = True
+
+    def __init__(self, address: Address, timeout_s: float) -> None:
+        self._timeout_s = timeout_s
+        self._server = socket.create_server((address.host, address.port))
+        try:
+            self._server.settimeout(timeout_s)
+            self._client = _Tcp(self._server.accept()[0], timeout_s)
+        except OSError:
+            self._server.close()
+            raise
+        self._server.setblocking(False)
+        self._heard_s = time.monotonic()
+
+    def send(self, data: bytes) -> None:
+        self._client.send(data)
+
+    def receive(self, timeout_s: float) -> list[tuple[Hashable, bytes]]:
+        ends = [self._server.fileno(), self._client.fileno()]
+        ready = select.select(ends, [], [], timeout_s)[0]
+        if self._server.fileno() in ready:
+            self._meet()
+        return self._client.receive(0.0) if ready else []
+
+    def _meet(self) -> None:
+        """Let somebody in who connects after the one before has been silent; turn him away otherwise."""
+        with contextlib.suppress(OSError):  # he is gone again
+            connection = self._server.accept()[0]
+            if time.monotonic() - self._heard_s <= FORGOTTEN_AFTER_S:
+                connection.close()
+                return
+            self._client.close()
+            self._client = _Tcp(connection, self._timeout_s)
+            self._heard_s = time.monotonic()
+
+    def heard(self, source: Hashable) -> None:  # noqa: ARG002 - there is one at a time
+        self._heard_s = time.monotonic()
+
+    def close(self) -> None:
+        self._client.close()
+        self._server.close()
+
+
 class _Serial:
     """A serial port, by pyserial."""
 
-    echoes = True
     is_stream = True
 
     def __init__(self, address: Address, _timeout_s: float) -> None:
         import serial  # noqa: PLC0415 - only where there is a serial port
 
         # Set once: some drivers set up the whole port anew with every other time-out.
-        self._port = serial.Serial(address.host, address.port, timeout=_SERIAL_WAIT_S)
+        self._port = serial.Serial(
+            address.host, address.port, timeout=_SERIAL_WAIT_S, write_timeout=_SERIAL_SEND_S
+        )
 
     def send(self, data: bytes) -> None:
         try:
@@ -416,15 +505,18 @@ class _Serial:
         except OSError as error:
             raise LinkError(f"the serial port broke: {error}") from None
 
-    def receive(self, timeout_s: float) -> bytes:
+    def receive(self, timeout_s: float) -> list[tuple[Hashable, bytes]]:
         try:
             until_s = time.monotonic() + timeout_s
             while not (first := self._port.read(1)):
                 if time.monotonic() >= until_s:
-                    return b""
-            return bytes(first + self._port.read(self._port.in_waiting))
+                    return []
+            return [(None, bytes(first + self._port.read(min(self._port.in_waiting, _STREAM_BYTES))))]
         except OSError as error:
             raise LinkError(f"the serial port broke: {error}") from None
+
+    def heard(self, source: Hashable) -> None:
+        """Do nothing: there is one other end."""
 
     def close(self) -> None:
         self._port.close()
@@ -433,7 +525,7 @@ class _Serial:
 _OPENERS: dict[str, Callable[[Address, float], Transport]] = {
     "udpin": _Udp,
     "udpout": _Udp,
-    "tcp": _Tcp,
-    "tcpin": _Tcp,
+    "tcp": _Tcp.connect,
+    "tcpin": _TcpServer,
     "serial": _Serial,
 }

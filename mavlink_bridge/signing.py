@@ -128,14 +128,17 @@ class Signing:
         self._ticks = max(self._ticks + 1, self._clock_ticks())
         return self._ticks
 
+    def sent(self, frame: bytes) -> None:
+        """Take notice of a signed frame of ours: nothing as old in our own stream is news, however late it comes back."""
+        self._streams[_stream(frame)] = _ticks(frame)
+
     def accepts(self, frame: bytes) -> bool:
         """Tell whether a received frame is signed with our key and not a replay; an accepted one is remembered."""
         if len(frame) < _SIGNATURE_BYTES or frame[0] != _MAVLINK_2 or not frame[2] & _FLAG_SIGNED:
             return False
         if not hmac.compare_digest(self.key.signature(frame[:-6]), frame[-6:]):
             return False
-        ticks = int.from_bytes(frame[-12:-6], "little")
-        stream = frame[-13], frame[5], frame[6]
+        ticks, stream = _ticks(frame), _stream(frame)
         newest = self._streams.get(stream)
         if newest is None:
             # A stream not heard before may lag a minute behind us, as the protocol allows.
@@ -148,6 +151,15 @@ class Signing:
 
     def _clock_ticks(self) -> int:
         return int((self._clock() - _EPOCH_2015_S) * _TICKS_PER_S)
+
+
+def _ticks(frame: bytes) -> int:
+    return int.from_bytes(frame[-12:-6], "little")
+
+
+def _stream(frame: bytes) -> tuple[int, int, int]:
+    """Return link id, system and component of a signed frame."""
+    return frame[-13], frame[5], frame[6]
 
 
 def _content(path: Path) -> bytes:

@@ -28,12 +28,13 @@ from mavlink_bridge.cli.common import (
 from mavlink_bridge.cli.plan_request import request_from_options
 from mavlink_bridge.cli.terminal import echo, say
 from mavlink_bridge.cli.upload import RequiredConnectOption, SigningKeyOption
-from mavlink_bridge.errors import IdentityTakenError, LinkError, UsageError
+from mavlink_bridge.errors import LinkError, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
     from mavlink_bridge.cli.bridge_view import LiveView
+    from mavlink_bridge.cli.run_log import RunLog
     from mavlink_bridge.director import Director, Event, Orders
     from mavlink_bridge.journal import JournalWriter
     from mavlink_bridge.link import Link
@@ -112,8 +113,9 @@ def bridge(
     ):  # the latter is Ctrl-Break on Windows, where nothing sends the former
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), _end)
+    from mavlink_bridge.cli.run_log import RunLog, SafeTeller  # noqa: PLC0415
     from mavlink_bridge.cli.session import signing_of  # noqa: PLC0415
-    from mavlink_bridge.director import Director, Orders  # noqa: PLC0415 - quick help
+    from mavlink_bridge.director import AT_WORK, Director, Orders  # noqa: PLC0415 - quick help
     from mavlink_bridge.director.orders import DEFAULT_SOURCES, TargetSource  # noqa: PLC0415
     from missions.formats import read_parameters  # noqa: PLC0415
     from missions.situation import Situation  # noqa: PLC0415
@@ -143,7 +145,9 @@ def bridge(
         director = Director(orders, Situation(parameters=parameters))
         view = _view(stack, director, is_wanted=not (json_output or quiet))
         tell = view.tell if view else _teller(wants_json=json_output, quiet=quiet)
-        shell = _Shell(director, tell, view, recorder, journal)
+        log_of_run = RunLog(recorder, journal) if recorder is not None and journal is not None else None
+        tell = SafeTeller(tell, lambda: director.state not in AT_WORK)
+        shell = _Shell(director, tell, view, log_of_run)
         shell.run(connect, signing_of(signing_key), timeout)
     trouble = shell.director.trouble
     if trouble is not None and shell.director.is_done:
@@ -161,7 +165,7 @@ class _Journaled:
     """The director, with every call that is no frame written down."""
 
     director: Director
-    writer: JournalWriter | None
+    writer: RunLog | None
     frames: int = 0
 
     def call(self, name: str, now_s: float, target: object = None) -> None:
@@ -181,26 +185,28 @@ class _Shell:
         director: Director,
         tell: Callable[[Event], None],
         view: LiveView | None,
-        recorder: TlogWriter | None,
-        journal: JournalWriter | None,
+        log: RunLog | None,
     ) -> None:
-        from mavlink_bridge.cli.live import BackupKeeper, PlanMaker  # noqa: PLC0415 - quick help
+        from mavlink_bridge.cli.link_notes import LinkNotes  # noqa: PLC0415 - quick help
+        from mavlink_bridge.cli.live import BackupKeeper, PlanMaker  # noqa: PLC0415
 
         self.director = director
         self._view = view
-        self._written = _Journaled(self.director, journal)
+        self._written = _Journaled(self.director, log)
         self._tell = tell
-        self._recorder = recorder
-        self._journal = journal
+        self._log = log
+        self._notes = LinkNotes()
         self._backups = BackupKeeper(self.director)
         self._plans = PlanMaker(self.director)
         self._typed = _typed_lines()
 
     def run(self, connection: str, signing: Signing | None, timeout_s: float) -> None:
         """Run until the single job is done, or for ever; a link that breaks is opened again."""
-        from mavlink_bridge.link import ONE_SHOT_IDENTITY, now_s, open_link, parse_connection  # noqa: PLC0415 - quick help
+        from mavlink_bridge.echoes import SentFrames  # noqa: PLC0415 - quick help
+        from mavlink_bridge.link import ONE_SHOT_IDENTITY, now_s, open_link, parse_connection  # noqa: PLC0415
 
         parse_connection(connection)
+        sent = SentFrames()
         begun_s = now_s()
         self._written.call("start", begun_s)
         self.director.start(begun_s)
@@ -209,12 +215,15 @@ class _Shell:
             try:
                 identity = self.director.identity or ONE_SHOT_IDENTITY
                 with open_link(
-                    connection, identity, recorder=self._recorder, signing=signing, timeout_s=timeout_s
+                    connection,
+                    identity,
+                    recorder=self._log,
+                    signing=signing,
+                    timeout_s=timeout_s,
+                    sent=sent,
                 ) as link:
                     failures = 0
                     self._run_link(link)
-            except IdentityTakenError:
-                raise
             except LinkError as error:
                 if self.director.orders.once:
                     raise
@@ -227,6 +236,7 @@ class _Shell:
         from mavlink_bridge.link import now_s  # noqa: PLC0415 - quick help
 
         while not self.director.is_done:
+            self._notes.tell(link)
             self._listen_to_keyboard(now_s())
             self._keep_backup(now_s())
             self._hand_over_plan(now_s())
@@ -297,8 +307,8 @@ class _Shell:
 
     def _tell_all(self) -> None:
         for event in self.director.take_events():
-            if self._journal is not None:
-                self._journal.event(event)
+            if self._log is not None:
+                self._log.event(event)
             self._tell(event)
 
 

@@ -149,6 +149,7 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
         verbose = bool(options.get("verbose"))
         name = command.__name__
         begin_telling(name, verbose=verbose)
+        telling().quiet = bool(options.get("quiet"))
         for parameter in added:
             options.pop(parameter.name, None)
         try:

@@ -77,6 +77,7 @@ class Telling:
     command: str = ""
     verbose: bool = False
     warned: set[str] = field(default_factory=set)
+    quiet: bool = False
 
 
 _telling: ContextVar[Telling | None] = ContextVar("telling", default=None)

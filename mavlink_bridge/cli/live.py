@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.backup import BackupStore
 from mavlink_bridge.cli.common import progress_bar, warn
+from mavlink_bridge.cli.link_notes import LinkNotes
 from mavlink_bridge.cli.plan import timed_plan
 from mavlink_bridge.cli.session import signing_of
 from mavlink_bridge.cli.upload import interrupted_warnings, with_backup
-from mavlink_bridge.director import Director, Orders, State
+from mavlink_bridge.director import Director, EventName, Orders, State
 from mavlink_bridge.errors import BridgeError, LinkError
 from mavlink_bridge.link import ONE_SHOT_IDENTITY, open_link
 from mavlink_bridge.messages import MissionType
@@ -51,6 +52,8 @@ _STATE_TEXTS = {
     State.DRIVING: "driving",
     State.ARRIVED: "arrived",
     State.LET_GO: "let go",
+    State.CLASHING: "somebody speaks with our ids; ending the upload",
+    State.CLASHED: "somebody speaks with our ids",
     State.LOST: "no heartbeat",
     State.DONE: "done",
     State.FAILED: "failed",
@@ -116,6 +119,7 @@ def conduct(
     director = Director(replace(orders, once=True), situation)
     plans = PlanMaker(director, timed)
     backups = BackupKeeper(director)
+    notes = LinkNotes()
     with progress_bar(quiet=quiet) as show:
 
         def step() -> None:
@@ -123,6 +127,8 @@ def conduct(
             has_driven = has_driven or director.state is State.DRIVING
             show(_STATE_TEXTS[director.state], *director.progress)
             warn(backups.step(link.now_s()))
+            warn(event.text for event in director.take_events() if event.name is EventName.IDENTITY_CLASH)
+            notes.tell(link)
             if (made := plans.take()) is not None:
                 director.plan_made(*made, link.now_s())
 

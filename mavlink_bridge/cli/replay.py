@@ -266,18 +266,31 @@ class _Pace:
 def _send(
     log: Path, connection: str, speed: float, system: int | None, *, any_vehicle: bool, quiet: bool
 ) -> None:
-    """Play the vehicle's side of a log; what the client sends is read and left alone."""
-    from mavlink_bridge.link import open_transport, parse_connection  # noqa: PLC0415 - quick help
+    """Play the vehicle's side of a log; what the client sends tells only that it is there."""
+    from mavlink_bridge.codec import Codec  # noqa: PLC0415 - quick help
+    from mavlink_bridge.link import open_transport, parse_connection  # noqa: PLC0415
     from mavlink_bridge.logbook.playback import vehicle_frames  # noqa: PLC0415
 
     is_called = parse_connection(connection).kind == "udpin"
     frames = vehicle_frames(log, system, any_vehicle=any_vehicle)
+    codec = Codec(1, 1)  # it only listens: the frames go out as they are in the log
     with closing(open_transport(connection)) as transport, progress_bar(quiet=quiet) as show:
+
+        def listen(timeout_s: float) -> bool:
+            heard = [
+                source
+                for source, data in transport.receive(timeout_s)
+                if codec.decode_with_bytes(data, source)
+            ]
+            for source in heard:
+                transport.heard(source)
+            return bool(heard)
+
         if is_called:
             show(f"waiting for a client on {connection}", 0, 0)
-            while not transport.receive(0.5):
+            while not listen(0.5):
                 pass
-        count = _play(frames, speed, transport.send, transport.receive, show)
+        count = _play(frames, speed, transport.send, listen, show)
     if not quiet:
         echo(f"Sent {count} messages")
 
@@ -286,14 +299,14 @@ def _play(
     frames: Iterable[tuple[float, bytes]],
     speed: float,
     send: Callable[[bytes], None],
-    receive: Callable[[float], bytes],
+    listen: Callable[[float], bool],
     show: Callable[[str, int, int], None],
 ) -> int:
     pace = _Pace(speed)
     count = 0
     for elapsed_s, data in _elapsed(frames):
         while (left_s := pace.left_s(elapsed_s)) > 0:
-            receive(min(left_s, 0.5))
+            listen(min(left_s, 0.5))
         send(data)
         count += 1
         if count % 50 == 0:

@@ -7,11 +7,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from mavlink_bridge.cli.common import warn
+from mavlink_bridge.cli.link_notes import LinkNotes
 from mavlink_bridge.errors import LinkError, OutcomeError, RefusedError
 from mavlink_bridge.link import open_link
 from mavlink_bridge.messages import Autopilot, CommandLong, Heartbeat, ModeFlag, RequestDataStream
 from mavlink_bridge.protocol.command import SendCommand
-from mavlink_bridge.protocol.find import FindVehicle
+from mavlink_bridge.protocol.find import FindVehicle, identity_shared, identity_taken
 from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.rover import AUTO_MODE, MODE_NAMES
 from missions.items import Command
@@ -75,18 +77,28 @@ class Session:
     Attributes
     ----------
     listeners : list of callable
-        Told of every batch of frames.
+        Told of every batch of frames, but for those of somebody else who has our ids.
 
     Raises
     ------
     LinkError
         The vehicle is not there.
+    IdentityTakenError
+        Somebody else on the link speaks with our ids.
     """
 
     def __init__(self, link: Link, address: Address, show: Callable[[str, int, int], None]) -> None:
         self._link = link
         self._show = show
-        finder = FindVehicle(address.system, any_vehicle=address.any_vehicle, patience_s=address.timeout_s)
+        self._notes = LinkNotes()
+        self._machine: Machine | None = None
+        self._has_written = self._is_refused = self._has_clashed = False
+        finder = FindVehicle(
+            address.system,
+            any_vehicle=address.any_vehicle,
+            patience_s=address.timeout_s,
+            identity=link.identity,
+        )
         self._heartbeat: Heartbeat | None = None
         self._heartbeat_s = 0.0
         self.peer: Peer | None = None
@@ -118,14 +130,25 @@ class Session:
         return is_armed and self._heartbeat.custom_mode == AUTO_MODE
 
     def run(self, machine: Machine, text: str, on_step: Callable[[], None] | None = None) -> None:
-        """Run a machine to its outcome, with progress."""
+        """Run a machine to its outcome, with progress.
+
+        Raises
+        ------
+        IdentityTakenError
+            Somebody else on the link speaks with our ids, and nothing was written yet of what is going to be.
+        """
 
         def step() -> None:
             self._show(text, *machine.progress)
+            self._notes.tell(self._link)
             if on_step:
                 on_step()
 
-        self._link.run(machine, on_frames=self._listen, on_step=step)
+        self._machine = machine
+        self._link.run(machine, on_frames=self._listen, on_step=step, until=lambda: self._is_refused)
+        if self._is_refused:
+            raise identity_taken(self._link.identity)
+        self._has_written = self._has_written or getattr(machine, "has_written", False)
 
     def change_mode(self, mode: int) -> None:
         """Switch the vehicle's mode and wait until its heartbeat says so.
@@ -135,9 +158,13 @@ class Session:
         RefusedError
             The vehicle refused.
         OutcomeError
-            It accepted but does not show the mode, or did not answer.
+            It accepted but does not show the mode, or did not answer; or it is to drive, and somebody else has our ids.
         """
         name = MODE_NAMES[mode]
+        if mode == AUTO_MODE and self._has_clashed:
+            raise identity_shared(
+                self._link.identity, "the vehicle is not switched to AUTO; what was uploaded is on it"
+            )
         peer = self.vehicle
         flags = float(ModeFlag.CUSTOM_MODE_ENABLED)
         message = CommandLong(
@@ -171,15 +198,31 @@ class Session:
         return self._heartbeat is not None and self._heartbeat.custom_mode == mode
 
     def _listen(self, frames: list[Frame]) -> None:
+        others = [frame for frame in frames if not self._link.is_ours(frame)]
+        if len(others) < len(frames) and self.peer is not None:
+            self._take_clash()
         for listener in self.listeners:
-            listener(frames)
-        for frame in frames:
+            listener(others)
+        for frame in others:
             if (
                 self.peer is not None
                 and isinstance(frame.message, Heartbeat)
                 and (frame.system, frame.component) == (self.peer.system, self.peer.component)
             ):
                 self._heartbeat, self._heartbeat_s = frame.message, time.monotonic()
+
+    def _take_clash(self) -> None:
+        """End before anything is written; later go on, for what is under way is checked against what the vehicle holds, and say so."""
+        self._has_clashed = True
+        is_going_to_write = not getattr(self._machine, "has_written", True)
+        self._is_refused = is_going_to_write and not self._has_written
+        if not self._is_refused:
+            system, component = self._link.identity
+            text = (
+                f"somebody else on the link has our ids (system {system} component {component}): what the vehicle answers may be meant for "
+                "him; choose others with --source-system and --source-component"
+            )
+            warn([text])
 
     def _with_signing_hint(self, trouble: LinkError) -> LinkError:
         if not self._link.untrusted_frames:

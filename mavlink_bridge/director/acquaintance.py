@@ -31,9 +31,11 @@ if TYPE_CHECKING:
 
 _SILENCE_S = 5.0
 _MAY_FALL_SILENT = frozenset(
-    set(State) - {State.LISTENING, State.UPLOADING, State.WITHDRAWING, State.LOST, State.DONE, State.FAILED}
+    set(State)
+    - {State.LISTENING, State.UPLOADING, State.WITHDRAWING, State.CLASHING, State.CLASHED}
+    - {State.LOST, State.DONE, State.FAILED}
 )
-"""An upload has patience of its own, and leaves no half mission behind where it can help it."""
+"""An upload has patience of its own, and leaves no half mission behind where it can help it; after a clash of identities all is read anew anyway."""
 
 
 class Acquaintance(TableMachine[State, Cue]):
@@ -53,8 +55,14 @@ class Acquaintance(TableMachine[State, Cue]):
         self.situation = situation or Situation()
         self.trouble: BridgeError | MissionError | None = None
         patience_s = orders.patience_s if orders.once else math.inf
-        self._find = FindVehicle(orders.system, any_vehicle=orders.any_vehicle, patience_s=patience_s)
         self._peer: Peer | None = None
+        self._find = FindVehicle(
+            orders.system,
+            any_vehicle=orders.any_vehicle,
+            patience_s=patience_s,
+            identity=None if orders.passive else self.identity,
+            own_component=None if orders.passive else orders.own_component,
+        )
         self._steps = Steps()
         self._voice = Voice(announce=orders.announce)
         self._reboots = RebootWatch()
@@ -130,12 +138,12 @@ class Acquaintance(TableMachine[State, Cue]):
         """Go on from listening, once it is clear who is meant."""
         find = self._find
         if find.trouble is not None:
-            self._refuse_vehicle(find.trouble, now_s)
+            self._refuse(find.trouble, now_s)
         if find.vehicle is None or find.heartbeat is None:
             return
         vehicle = find.vehicle
         if find.heartbeat.autopilot != m.Autopilot.ARDUPILOTMEGA and not self.orders.passive:
-            self._refuse_vehicle(_no_ardupilot(vehicle.system, find.heartbeat.autopilot), now_s)
+            self._refuse(_no_ardupilot(vehicle.system, find.heartbeat.autopilot), now_s)
             return
         identity = self.orders.identity or (vehicle.system, self.orders.own_component)
         self._peer = Peer(vehicle.system, vehicle.component, *identity)
@@ -149,7 +157,8 @@ class Acquaintance(TableMachine[State, Cue]):
         self._heartbeat_s = find.heard_s
         self._learn(now_s)
 
-    def _refuse_vehicle(self, error: VehicleNotFoundError, now_s: float) -> None:
+    def _refuse(self, error: LinkError, now_s: float) -> None:
+        """End before anything was done, whatever the orders."""
         self._voice.error(now_s, EventName.TROUBLE, error, dict(error.details))
         self.trouble = error
         self._move(Cue.GIVE_UP)

@@ -14,6 +14,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from mavlink_bridge import messages as m
+from mavlink_bridge.director import clash
 from mavlink_bridge.director.drive_watch import DriveWatch
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.mode_switch import AwaitHeartbeat, ModeSwitch
@@ -24,6 +25,7 @@ from mavlink_bridge.director.stopper import Stopper
 from mavlink_bridge.director.targets import Target
 from mavlink_bridge.errors import OutcomeError, RefusedError
 from mavlink_bridge.protocol.command import SendCommand
+from mavlink_bridge.protocol.find import identity_shared, identity_taken
 from mavlink_bridge.rover import AUTO_MODE, HOLD_MODE
 from missions.items import Command
 
@@ -63,6 +65,15 @@ class Director(Stopper):
         progress: tuple[int, int] = self._steps.current.progress if self._steps else (0, 0)
         return progress
 
+    def receive(self, frame: Frame, now_s: float) -> None:
+        """Take a frame; one with our own ids that we did not send says nothing but that it is there."""
+        is_heeded = self.state is State.LISTENING or self.orders.passive
+        if is_heeded or not clash.is_clash(frame, self.identity):
+            super().receive(frame, now_s)
+            return
+        self._identity_clash(now_s)
+        self._steps.receive(frame, now_s)  # a list that is read back may not be what we have written any more
+
     # What the vehicle and others do
 
     def _own_deadlines_s(self) -> list[float | None]:
@@ -85,6 +96,9 @@ class Director(Stopper):
             self._watch_drive(self.drive, frame, now_s)
 
     def _take_heartbeat(self, heartbeat: m.Heartbeat, now_s: float) -> None:
+        if self.state in clash.CLASHES:
+            self._watch_hold(heartbeat, now_s)
+            return
         taken = self._operator.take_heartbeat(heartbeat, now_s)
         if taken is not None:
             self._let_go(taken, now_s)
@@ -98,6 +112,8 @@ class Director(Stopper):
             )
 
     def _take_any_frame(self, frame: Frame, before: Situation, now_s: float) -> None:
+        if self.state in clash.CLASHES:
+            return
         peer = self._peer
         is_anothers = (frame.system, frame.component) != self.identity and not self._is_from_vehicle(frame)
         if peer is not None and is_anothers:
@@ -199,22 +215,85 @@ class Director(Stopper):
         self._may_be_in_auto = False
         self.drive = None
         self._target = None
-        if self.state not in (State.WITHDRAWING, State.LEARNING):
+        if self.state not in (State.WITHDRAWING, State.CLASHING, State.LEARNING):
             self._drop_steps()
 
     def _after_upload(self, now_s: float) -> None:
-        if self._learn_now(now_s):
+        was_rebooted = self._learn_now(now_s)
+        if was_rebooted:
             self._ours = None
-            return
         taken_over, self._taken_over = self._taken_over, None
         if taken_over is not None:
             self._give_up(taken_over)
-        if not self.is_done:
+        if self.state is State.CLASHED:
+            self._settle_clash("the mission is verified on the vehicle, but it is not driven", now_s)
+        elif not was_rebooted and not self.is_done:
             super()._after_upload(now_s)
 
     def _take_target(self, target: Target, now_s: float) -> None:
+        if self._move(Cue.TYPED):
+            self._operator.stop()
+            self._learn(now_s)
         self._operator.take_target(now_s, is_click=target.is_click)
         super()._take_target(target, now_s)
+
+    # Somebody else with our ids
+
+    def _identity_clash(self, now_s: float) -> None:
+        """Do what a clash asks for, once until it is settled by a typed target."""
+        identity, upload = self.identity, self._steps.current
+        if identity is None or self.is_done:
+            return
+        answer = clash.Circumstances(
+            self.state,
+            is_start=self._is_first_time,
+            is_single_job=self.orders.once,
+            has_written=self.upload_outcome is not None or getattr(upload, "has_written", False),
+            may_drive=self.orders.drive,
+            drives_ours=self._is_driving_ours,
+        ).answer
+        if answer is clash.Answer.REFUSE:
+            self._drop_steps()
+            self._refuse(identity_taken(identity), now_s)
+            return
+        if not self._move(Cue.CLASH):
+            return
+        hold, may_be_in_auto = self._stopping, self._may_be_in_auto
+        self._let_loose()
+        self._waiting_target = None
+        self._stopping, self._may_be_in_auto = hold, may_be_in_auto  # a HOLD on its way gets there
+        is_held = answer is clash.Answer.HOLD
+        if hold is not None:
+            self._expect_hold()
+        elif is_held:
+            self._command_hold(now_s)
+        text = clash.account(identity, answer, self.state, is_single_job=self.orders.once)
+        self._voice.tell(now_s, EventName.IDENTITY_CLASH, text, *identity, is_held or hold is not None)
+        if self.state is State.CLASHED:
+            self._settle_clash("nothing more is done", now_s)
+
+    def _watch_hold(self, heartbeat: m.Heartbeat, now_s: float) -> None:
+        """Leave the vehicle to whoever takes it while our HOLD is under way."""
+        if self._stopping is not None and self._operator.take_heartbeat(heartbeat, now_s) is not None:
+            self._stopping = None
+            self._settle_clash("somebody has taken the vehicle over; the mission is on it", now_s)
+
+    def _settle_clash(self, then: str, now_s: float) -> None:
+        """Go on from a clash once nothing is under way any more: to the end of a single job, else to a target that is typed."""
+        if self._stopping is not None:
+            return
+        if self._waiting_target is not None:
+            self._take_waiting_target(now_s)
+        elif self.orders.once and (self.orders.drive or self.upload_outcome is None):
+            self._give_up(identity_shared(self.identity or (0, 0), then))
+        else:
+            self._end()
+
+    def _hold_ended(self, *, is_granted: bool, now_s: float) -> None:
+        super()._hold_ended(is_granted=is_granted, now_s=now_s)
+        if self.state is State.CLASHED:
+            done = "was switched to HOLD" if is_granted else "does not go to HOLD"
+            self._settle_clash(f"the vehicle {done}; the mission is on it", now_s)
 
     def _stand_by(self) -> None:
         self.drive = None

@@ -42,6 +42,7 @@ class EventName(StrEnum):
     BREACH = auto()
     ARRIVED = auto()
     TAKEN_OVER = auto()
+    IDENTITY_CLASH = auto()
     MISSION_CHANGED = auto()
     LINK_LOST = auto()
     LINK_BACK = auto()
@@ -75,6 +76,7 @@ SCHEMA: dict[EventName, tuple[Severity, tuple[str, ...]]] = {
     EventName.BREACH: (Severity.CRITICAL, ("breaches",)),
     EventName.ARRIVED: (Severity.NOTICE, ("driven_m", "took_s", "least_clearance_m", "breaches")),
     EventName.TAKEN_OVER: (Severity.NOTICE, ("mode",)),
+    EventName.IDENTITY_CLASH: (Severity.CRITICAL, ("system", "component", "held")),
     EventName.MISSION_CHANGED: (Severity.WARNING, ("mission_items",)),
     EventName.LINK_LOST: (Severity.ERROR, ("silent_s",)),
     EventName.LINK_BACK: (Severity.NOTICE, ()),

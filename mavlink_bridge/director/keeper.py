@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 _AT_REST = frozenset(
     {State.READY, State.PROPOSED, State.VERIFIED, State.DRIVING, State.ARRIVED, State.LET_GO}
 )
-_WRITING = frozenset({State.UPLOADING, State.WITHDRAWING})
+_WRITING = frozenset({State.UPLOADING, State.WITHDRAWING, State.CLASHING})
 
 
 class Keeper(Acquaintance):

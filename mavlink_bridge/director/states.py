@@ -26,6 +26,10 @@ class State(StrEnum):
     DRIVING = auto()
     ARRIVED = auto()
     LET_GO = auto()  # the operator took over, or somebody changed the mission: waits for a new target
+    CLASHING = (
+        auto()
+    )  # somebody spoke with our ids in mid-upload: no half mission is left behind, nothing more is done
+    CLASHED = auto()  # somebody speaks with our ids: waits for a target that is typed, and heeds nothing else
     LOST = auto()  # the vehicle's heartbeat is missing
     DONE = auto()  # a single job has come to its end
     FAILED = auto()  # a single job could not be done
@@ -49,6 +53,8 @@ class Cue(StrEnum):
     STARTED = auto()
     REACHED = auto()
     TAKEN_OVER = auto()  # somebody else switched the mode, disarmed, or changed the mission
+    CLASH = auto()  # a frame with our own ids that we did not send
+    TYPED = auto()  # after that a target was typed: all is read anew, then it is gone into
     SILENCE = auto()
     HEARD = auto()
     REBOOTED = auto()
@@ -57,7 +63,12 @@ class Cue(StrEnum):
     GIVE_UP = auto()  # the single job cannot be done
 
 
-_ALWAYS = {Cue.SILENCE: State.LOST, Cue.REBOOTED: State.LEARNING, Cue.GIVE_UP: State.FAILED}
+_ALWAYS = {
+    Cue.SILENCE: State.LOST,
+    Cue.REBOOTED: State.LEARNING,
+    Cue.CLASH: State.CLASHED,
+    Cue.GIVE_UP: State.FAILED,
+}
 _WANTED = {Cue.TARGET: State.PLANNING, Cue.TARGET_WHILE_MOVING: State.HOLDING}
 _OURS = {**_ALWAYS, **_WANTED, Cue.TAKEN_OVER: State.LET_GO}
 
@@ -78,11 +89,13 @@ TRANSITIONS: dict[State, dict[Cue, State]] = {
         Cue.UPLOAD_VERIFIED: State.VERIFIED,
         Cue.TAKEN_OVER: State.WITHDRAWING,
         Cue.REBOOTED: State.WITHDRAWING,
+        Cue.CLASH: State.CLASHING,
         Cue.TROUBLE: State.READY,
         Cue.GIVE_UP: State.FAILED,
     },
     State.WITHDRAWING: {
         Cue.TAKEN_OVER: State.WITHDRAWING,
+        Cue.CLASH: State.CLASHING,
         Cue.UPLOAD_VERIFIED: State.LET_GO,
         Cue.TROUBLE: State.LET_GO,
         Cue.GIVE_UP: State.FAILED,
@@ -92,7 +105,30 @@ TRANSITIONS: dict[State, dict[Cue, State]] = {
     State.DRIVING: {**_OURS, Cue.REACHED: State.ARRIVED},
     State.ARRIVED: {**_OURS, Cue.END: State.DONE},
     State.LET_GO: {**_ALWAYS, **_WANTED},
-    State.LOST: {Cue.HEARD: State.LEARNING, Cue.REBOOTED: State.LEARNING, Cue.GIVE_UP: State.FAILED},
+    State.CLASHING: {
+        Cue.UPLOAD_VERIFIED: State.CLASHED,
+        Cue.TROUBLE: State.CLASHED,
+        Cue.GIVE_UP: State.FAILED,
+    },
+    State.CLASHED: {Cue.TYPED: State.LEARNING, Cue.END: State.DONE, Cue.GIVE_UP: State.FAILED},
+    State.LOST: {
+        Cue.HEARD: State.LEARNING,
+        Cue.REBOOTED: State.LEARNING,
+        Cue.CLASH: State.CLASHED,
+        Cue.GIVE_UP: State.FAILED,
+    },
     State.DONE: {},
     State.FAILED: {},
 }
+
+AT_WORK = frozenset(
+    {
+        State.HOLDING,
+        State.UPLOADING,
+        State.WITHDRAWING,
+        State.CLASHING,
+        State.STARTING,
+        State.DRIVING,
+    }
+)
+"""States in which something is under way on the vehicle that should not be left in the middle."""

@@ -134,14 +134,18 @@ class Stopper(RouteMaker):
         self._command_hold(now_s)
 
     def _command_hold(self, now_s: float) -> None:
-        """Switch to HOLD, and expect nothing but what was and what will be."""
+        """Switch to HOLD."""
         assert self._peer is not None
+        self._expect_hold()
+        self._stopping = ModeSwitch(self._peer, HOLD_MODE, is_urgent=True, until_seen=self._may_be_in_auto)
+        self._stopping.start(now_s)
+
+    def _expect_hold(self) -> None:
+        """Expect nothing but what was and what will be once our HOLD is taken."""
         before = {self.situation.mode}
         if self._may_be_in_auto:
             before.add(AUTO_MODE)
         self._operator.expect(HOLD_MODE, before, is_armed=bool(self.situation.armed))
-        self._stopping = ModeSwitch(self._peer, HOLD_MODE, is_urgent=True, until_seen=self._may_be_in_auto)
-        self._stopping.start(now_s)
 
     def _look_after_hold(self, now_s: float) -> None:
         stopping = self._stopping
@@ -160,8 +164,12 @@ class Stopper(RouteMaker):
         if not stopping.is_granted:
             text = "the vehicle does not go to HOLD"
             self._voice.tell(now_s, EventName.COMMAND_FAILED, text, "DO_SET_MODE", stopping.result_name)
-            if self.state is State.HOLDING:
-                self._fail_step(OutcomeError("the vehicle does not go to HOLD; nothing was written"))
+        self._hold_ended(is_granted=stopping.is_granted, now_s=now_s)
+
+    def _hold_ended(self, *, is_granted: bool, now_s: float) -> None:  # noqa: ARG002 - those above go on from there
+        """Go on from a HOLD that was taken, or was not."""
+        if not is_granted and self.state is State.HOLDING:
+            self._fail_step(OutcomeError("the vehicle does not go to HOLD; nothing was written"))
 
     def _is_mode_known(self, now_s: float) -> bool:
         # A heartbeat from before our HOLD still tells the mode before it.

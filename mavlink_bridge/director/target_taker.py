@@ -22,7 +22,9 @@ if TYPE_CHECKING:
     from missions.geo import LatLon
     from missions.situation import Situation
 
-_NOT_NOW = frozenset({State.LISTENING, State.LEARNING, State.LOST, State.UPLOADING, State.WITHDRAWING})
+_NOT_NOW = frozenset(
+    {State.LISTENING, State.LEARNING, State.LOST, State.UPLOADING, State.WITHDRAWING, State.CLASHING}
+)
 """States that have to end before another target is gone into."""
 
 _SAME_M = 0.2

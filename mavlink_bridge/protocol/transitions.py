@@ -324,6 +324,7 @@ class FindEvent(StrEnum):
     NAMED_ONE_HEARD = auto()
     TIME_IS_UP = auto()
     CHOICE_FAILED = auto()
+    IDENTITY_TAKEN = auto()  # somebody else speaks with our ids
 
 
 FIND = {
@@ -334,12 +335,14 @@ FIND = {
         FindEvent.HEARD: FindState.COMPARING,
         FindEvent.NAMED_ONE_HEARD: FindState.FOUND,
         FindEvent.CHOICE_FAILED: FindState.NOT_FOUND,
+        FindEvent.IDENTITY_TAKEN: FindState.NOT_FOUND,
     },
     FindState.COMPARING: {
         FindEvent.HEARD: FindState.COMPARING,
         FindEvent.NAMED_ONE_HEARD: FindState.FOUND,
         FindEvent.TIME_IS_UP: FindState.FOUND,
         FindEvent.CHOICE_FAILED: FindState.NOT_FOUND,
+        FindEvent.IDENTITY_TAKEN: FindState.NOT_FOUND,
     },
     FindState.FOUND: {},
     FindState.NOT_FOUND: {},

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 from mavlink_bridge.codec import Codec
 
 if TYPE_CHECKING:
+    from collections.abc import Hashable
+
     from mavlink_bridge.simulator.vehicle import SimulatedVehicle
 
 _CATCH_UP_S = 0.1
@@ -34,7 +36,6 @@ class SteppedRover:
     vehicle : SimulatedVehicle
     """
 
-    echoes = False
     is_stream = True
 
     def __init__(self, vehicle: SimulatedVehicle, speedup: float) -> None:
@@ -54,7 +55,7 @@ class SteppedRover:
         for frame in self._codec.decode(data):
             self.vehicle.receive(frame, self._vehicle_s)
 
-    def receive(self, timeout_s: float) -> bytes:
+    def receive(self, timeout_s: float) -> list[tuple[Hashable, bytes]]:
         """Let time pass until the rover says something, at most so long."""
         until_s = self._vehicle_s + timeout_s
         while True:
@@ -62,7 +63,10 @@ class SteppedRover:
             self.vehicle.handle_timer(self._vehicle_s)
             messages = self.vehicle.messages_to_send()
             if messages or self._vehicle_s >= until_s:
-                return b"".join(map(self._codec.encode, messages))
+                return [(None, b"".join(map(self._codec.encode, messages)))] if messages else []
+
+    def heard(self, source: Hashable) -> None:
+        """Do nothing: there is one other end."""
 
     def close(self) -> None:
         """Do nothing: there is no device."""

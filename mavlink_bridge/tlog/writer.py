@@ -35,12 +35,12 @@ class TlogWriter:
     """
 
     def __init__(self, path: Path | str) -> None:
-        path = Path(path)
+        self._path = Path(path)
         try:
-            self._file = open(path, "ab", buffering=0, opener=_open_no_link)  # noqa: SIM115 - Path.open knows no opener
+            self._file = open(self._path, "ab", buffering=0, opener=_open_no_link)  # noqa: SIM115 - Path.open knows no opener
         except OSError as error:
             trouble = "it is a link; give the file itself" if error.errno == errno.ELOOP else error.strerror
-            raise LogError(f"{path}: {trouble}", path=str(path)) from error
+            raise LogError(f"{self._path}: {trouble}", path=str(self._path)) from error
         self._pending: dict[int, bytes] = {}
 
     def write(self, time_s: float, data: bytes, link: int = 0) -> None:
@@ -60,13 +60,24 @@ class TlogWriter:
         ------
         ValueError
             `link` is not 0 to 3.
+        LogError
+            It cannot be written, or only in part: the disk is full.
         """
         if not 0 <= link <= 3:
             raise ValueError(f"link must be 0 to 3, not {link}")
         stamp = struct.pack(">Q", round(time_s * 1e6) & ~3 | link)
         frames, self._pending[link] = _split(self._pending.get(link, b"") + data)
         if frames:
-            self._file.write(b"".join(stamp + frame for frame in frames))
+            self._write(b"".join(stamp + frame for frame in frames))
+
+    def _write(self, records: bytes) -> None:
+        try:
+            written = self._file.write(records)
+        except OSError as error:
+            raise LogError(f"{self._path}: {error.strerror}", path=str(self._path)) from error
+        if written != len(records):
+            text = f"only {written or 0} of {len(records)} bytes could be written; is the disk full?"
+            raise LogError(f"{self._path}: {text}", path=str(self._path))
 
     def close(self) -> None:
         """Close the file."""

@@ -34,6 +34,7 @@ class Promises:
         self._mode: int | None = None
         self._is_armed = False
         self._heartbeats = 0
+        self._has_clashed = False
         self._took: tuple[float, int | None] | None = None  # when, and to which mode
         self._knows = False
         self._asked_s = -1e9
@@ -55,6 +56,14 @@ class Promises:
         run.director.messages_to_send = send
 
     # What others do
+
+    def clashed(self) -> None:
+        """Take notice that somebody speaks with our ids: from now on HOLD, and an upload's end, are all there may be until a target is typed."""
+        self._has_clashed = True
+
+    def typed(self) -> None:
+        """Take notice that somebody types a target."""
+        self._has_clashed = False
 
     def asked(self) -> None:
         """Take notice that somebody gives a target: it is the bridge's turn again."""
@@ -89,6 +98,7 @@ class Promises:
 
     def _check(self, message: m.Message) -> None:
         orders = self._run.director.orders
+        self._check_clashed(message)
         if isinstance(message, m.Statustext):
             if self._run.now_s - self._texts_s < 0.99:
                 self._break("two texts within a second")
@@ -104,6 +114,17 @@ class Promises:
                     self._break("disarmed")
             elif message.command == Command.DO_SET_MODE:
                 self._check_mode(int(message.param2))
+
+    def _check_clashed(self, message: m.Message) -> None:
+        if not self._has_clashed or isinstance(message, m.Statustext | m.CommandAck):
+            return
+        is_hold = isinstance(message, m.CommandLong) and (message.command, message.param2) == (
+            Command.DO_SET_MODE,
+            HOLD_MODE,
+        )
+        if isinstance(message, m.MissionAck) or self._run.director.state is State.CLASHING or is_hold:
+            return
+        self._break(f"{type(message).__name__} after somebody spoke with our ids")
 
     def _check_mode(self, mode: int) -> None:
         self._check_taken_over(f"mode {mode}")

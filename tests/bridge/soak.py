@@ -127,7 +127,7 @@ class Soak:
         self.run.planning_s = self.random.choice((0.0, 0.0, 0.5, 4.0))
         acts = (
             (self._type, 5), (self._click, 5), (self._change_fence, 3), (self._change_mission, 1),
-            (self._take_over, 3), (self._disarm, 1), (self._cut, 2), (self._spoil, 2), (self._reboot, 1),
+            (self._take_over, 3), (self._disarm, 1), (self._cut, 2), (self._spoil, 2), (self._reboot, 1), (self._spoof, 1),
         )  # fmt: skip
         act = self.random.choices([act for act, _ in acts], [weight for _, weight in acts])[0]
         self.counts[act.__name__.strip("_")] += 1
@@ -135,6 +135,7 @@ class Soak:
 
     def _type(self) -> None:
         self.promises.asked()
+        self.promises.typed()
         self.run.director.take_target(self.random.choice(PLACES), self.run.now_s)
 
     def _click(self) -> None:
@@ -190,6 +191,12 @@ class Soak:
         faults = Faults(loss=loss, duplicate=loss / 2, latency_s=loss, jitter_s=loss / 2)
         for side, name in enumerate(("up", "down")):
             setattr(self.run, name, type(self.run.up)(faults, self.random.randrange(1000) + side))
+
+    def _spoof(self) -> None:
+        """Let somebody speak with the bridge's own ids: once, or in a flood."""
+        for _ in range(self.random.choice((1, 100))):
+            self.run.director.receive(m.Frame(1, 195, m.Heartbeat(6, 8)), self.run.now_s)
+        self.promises.clashed()
 
     def _reboot(self) -> None:
         self.promises.taken_over(None)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from mavlink_bridge.errors import IdentityTakenError, LinkError
+from mavlink_bridge.errors import LinkError
 from mavlink_bridge.link import DEFAULT_BAUD, Address, Link, open_link, parse_connection
 from mavlink_bridge.messages import Frame, Heartbeat, ParamRequestList, Statustext
 from mavlink_bridge.tlog import TlogReader, TlogWriter
@@ -137,17 +137,17 @@ def talk_on(link: Link) -> None:
         link.receive(0.05)
 
 
-def test_somebody_with_our_own_ids_is_refused() -> None:
+def test_somebody_with_our_own_ids_is_heard_as_anybody() -> None:
     port = free_port(socket.SOCK_DGRAM)
     with (
         open_link(f"udpin:127.0.0.1:{port}", (245, 190)) as one,
         open_link(f"udpout:127.0.0.1:{port}", (245, 190)) as other,
     ):
-        other.send(Heartbeat(6, 8))
-        with pytest.raises(
-            IdentityTakenError, match=r"system 245 component 190; choose others with --source-system"
-        ):
-            heard(one, Heartbeat)
+        other.send(Statustext(6, "it is I"))
+        frame = heard(one, Statustext)
+        assert frame == Frame(245, 190, Statustext(6, "it is I"))
+        assert one.is_ours(frame)
+        assert not one.is_ours(Frame(245, 191, Statustext(6, "")))
 
 
 class OneAnswer:

@@ -19,7 +19,6 @@ class Clock:
 class Transport:
     """A vehicle that tells a heartbeat each second; what was not read yet waits."""
 
-    echoes = False
     is_stream = True
 
     def __init__(self, clock, pause_after_waiting_s=0.0) -> None:
@@ -31,15 +30,18 @@ class Transport:
     def send(self, data) -> None:
         """Take it."""
 
-    def receive(self, timeout_s: float) -> bytes:
+    def receive(self, timeout_s: float) -> list:
         due_s = self.told_s + 1.0
         self.clock.now_s = max(self.clock.now_s, min(due_s, self.clock.now_s + timeout_s))
         if self.clock.now_s < due_s:
             self.clock.now_s += self.pause_after_waiting_s
             self.pause_after_waiting_s = 0.0
-            return b""
+            return []
         self.told_s = self.clock.now_s
-        return self.codec.encode(Heartbeat(10, 3))
+        return [(None, self.codec.encode(Heartbeat(10, 3)))]
+
+    def heard(self, source) -> None:
+        """There is one other end."""
 
     def close(self) -> None:
         """Nothing to close."""

@@ -186,7 +186,8 @@ def test_a_client_that_calls_is_waited_for(logs):
         heard = b""
         until_s = time.monotonic() + 60
         while not heard and time.monotonic() < until_s:
-            client.sendto(b"\xfd", ("127.0.0.1", port))
+            client.sendto(b"\xfd", ("127.0.0.1", port))  # not MAVLink: nobody to play to
+            client.sendto(Codec(255, 190).encode(Heartbeat(6, 8)), ("127.0.0.1", port))
             try:
                 heard = client.recv(65536)
             except (TimeoutError, ConnectionError):

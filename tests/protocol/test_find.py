@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from protocol.scripted import Script
 
+from mavlink_bridge.errors import IdentityTakenError
 from mavlink_bridge.messages import Frame, Heartbeat, MissionCount
 from mavlink_bridge.protocol.find import FindVehicle
 from mavlink_bridge.protocol.transitions import FindState
@@ -85,3 +86,38 @@ def test_an_unstarted_or_finished_machine_ignores_everything():
     script.hear(ROVER)
     script.machine.receive(Frame(1, 1, COPTER), 9.0)
     assert script.machine.vehicle.type == 10
+
+
+def test_whoever_has_our_ids_is_refused_at_once():
+    script = Script(FindVehicle(identity=(245, 190)))
+    script.hear(ROVER)
+    script.hear(MissionCount(1, 1, 3), system=245, component=190)
+    assert script.machine.state is FindState.NOT_FOUND
+    assert isinstance(script.machine.trouble, IdentityTakenError)
+    assert str(script.machine.trouble) == (
+        "somebody on the link already speaks as system 245 component 190; choose others with --source-system and --source-component"
+    )
+    assert script.machine.vehicle is None
+
+
+def test_the_vehicle_itself_may_have_our_ids():
+    script = Script(FindVehicle(1, identity=(1, 1)))
+    script.hear(ROVER)
+    assert isinstance(script.machine.trouble, IdentityTakenError)
+
+
+def test_ids_that_follow_from_the_vehicle_are_looked_at_once_it_is_chosen():
+    script = Script(FindVehicle(own_component=195))
+    script.hear(COMPANION, component=195)
+    assert not script.machine.is_done
+    script.hear(ROVER)
+    script.pass_time(1.3)
+    assert isinstance(script.machine.trouble, IdentityTakenError)
+    assert "system 1 component 195" in str(script.machine.trouble)
+
+
+def test_who_had_our_ids_and_is_gone_is_no_trouble():
+    script = Script(FindVehicle(1, own_component=195))
+    script.hear(COMPANION, component=195)
+    script.hear(ROVER, after_s=5.1)
+    assert script.machine.vehicle.system == 1

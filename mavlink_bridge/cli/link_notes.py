@@ -1,0 +1,26 @@
+"""What people are told of a link that is odd, but works."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import typer
+
+from mavlink_bridge.cli.failing import telling
+from mavlink_bridge.cli.terminal import say
+
+if TYPE_CHECKING:
+    from mavlink_bridge.link import Link
+
+
+class LinkNotes:
+    """Tells of a link's echoes, once, also where it is opened again; not where little is to be told (``-q``)."""
+
+    def __init__(self) -> None:
+        self._was_told = telling().quiet
+
+    def tell(self, link: Link) -> None:
+        """Tell what there is to tell of a link and was not told yet."""
+        if link.echoes and not self._was_told:
+            self._was_told = True
+            say("note: our own messages come back on this link; they are left out", typer.colors.BRIGHT_BLACK)

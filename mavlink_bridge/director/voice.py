@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from missions.recheck import Recheck
     from missions.situation import Situation
 
+_NOT_ANNOUNCED = frozenset({EventName.PROGRESS, EventName.FAILSAFE})
+"""What the ground stations hear from the vehicle itself, or far too often."""
+
 
 class Voice:
     """Collects events, and the texts that follow from them.
@@ -50,7 +53,7 @@ class Voice:
         """Tell an event; the values are those of its schema, in order."""
         event = Event.of(now_s, name, text, values)
         self._events.append(event)
-        if self._announce and name is not EventName.PROGRESS:
+        if self._announce and name not in _NOT_ANNOUNCED:
             self._announcer.say(event.severity, text)
 
     def error(self, now_s: float, name: EventName, error: Exception, details: object) -> None:

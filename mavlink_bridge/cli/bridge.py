@@ -77,7 +77,10 @@ def bridge(
     once: Annotated[bool, typer.Option("--once", help="End after one job.")] = False,
     log: Annotated[
         Path | None,
-        typer.Option(metavar="FILE.tlog", help="Record both directions, and a journal beside it."),
+        typer.Option(
+            metavar="FILE.tlog",
+            help="Record both directions, and a journal beside it; a restart goes on in run.2.tlog, run.3.tlog …",
+        ),
     ] = None,
     config: ConfigOption = None,
     system: SystemOption = None,
@@ -138,7 +141,7 @@ def bridge(
     )
     parameters = read_parameters(vehicle) if vehicle else {}
     with contextlib.ExitStack() as stack:
-        recorder, journal = _recorders(stack, log, orders, parameters)
+        recorder, journal = _recorders(stack, log, orders, parameters, quiet=quiet)
         director = Director(orders, Situation(parameters=parameters))
         view = _view(stack, director, is_wanted=not (json_output or quiet))
         tell = view.tell if view else _teller(wants_json=json_output, quiet=quiet)
@@ -387,15 +390,18 @@ def _tell_people(event: Event) -> None:
 
 
 def _recorders(
-    stack: contextlib.ExitStack, log: Path | None, orders: Orders, parameters: Mapping[str, float]
+    stack: contextlib.ExitStack,
+    log: Path | None,
+    orders: Orders,
+    parameters: Mapping[str, float],
+    *,
+    quiet: bool,
 ) -> tuple[TlogWriter | None, JournalWriter | None]:
     if log is None:
         return None, None
-    from mavlink_bridge.journal import JournalWriter, journal_path  # noqa: PLC0415 - quick help
-    from mavlink_bridge.tlog import TlogWriter  # noqa: PLC0415
+    from mavlink_bridge.cli.recording import open_recording  # noqa: PLC0415 - quick help
 
-    if log.exists():
-        raise UsageError(f"--log {log}: the file is there already; a journal belongs to one run")
-    recorder = stack.enter_context(TlogWriter(log))
-    file = stack.enter_context(journal_path(log).open("w", encoding="utf-8"))
-    return recorder, JournalWriter(file, orders, parameters)
+    part, recorder, journal = open_recording(stack, log, orders, parameters)
+    if part != log and not quiet:
+        typer.echo(f"{log} is there already: this run is recorded in {part}", err=True)
+    return recorder, journal

@@ -77,6 +77,11 @@ class Acquaintance(TableMachine[State, Cue]):
         return self._peer
 
     @property
+    def heard_s(self) -> float | None:
+        """When the vehicle's newest heartbeat was heard; None before the first."""
+        return self._heartbeat_s if math.isfinite(self._heartbeat_s) else None
+
+    @property
     def deadline_s(self) -> float | None:
         """When `handle_timer` wants to be called."""
         times = [self._steps.deadline_s, self._voice.deadline_s, *self._own_deadlines_s()]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.director.announcer import Announcer
 from mavlink_bridge.director.events import Event, EventName
+from missions.words import metres as metres_text
 
 if TYPE_CHECKING:
     from mavlink_bridge.director.drive_watch import DriveWatch
@@ -97,7 +98,9 @@ class Voice:
 
     def rechecked(self, now_s: float, name: EventName, what: str, found: Recheck) -> None:
         """Tell that lines do not keep what they have to."""
-        text = f"{what} keeps {found.clearance_m:.2f} m of {found.asked_m:.2f} m ({found.fence})"
+        text = (
+            f"{what} keeps {metres_text(found.clearance_m)} of {metres_text(found.asked_m)} ({found.fence})"
+        )
         self.tell(now_s, name, text, metres(found.clearance_m), round(found.asked_m, 3), found.fence)
 
     def progress(self, now_s: float, drive: DriveWatch, position: LatLon) -> None:

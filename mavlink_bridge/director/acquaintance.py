@@ -224,7 +224,8 @@ class Acquaintance(TableMachine[State, Cue]):
         if self._move(Cue.SILENCE):
             self._drop_steps()
             self._vehicle_gone(has_forgotten=False)
-            self._voice.tell(now_s, EventName.LINK_LOST, f"no heartbeat for {_SILENCE_S:g} s", _SILENCE_S)
+            text = f"link lost: no heartbeat for {_SILENCE_S:g} s"
+            self._voice.tell(now_s, EventName.LINK_LOST, text, _SILENCE_S)
             self._give_up(LinkError(f"the vehicle fell silent: no heartbeat for {_SILENCE_S:g} s"))
 
     def _is_from_vehicle(self, frame: Frame) -> bool:

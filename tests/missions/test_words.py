@@ -7,9 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from missions.errors import MissionError
+from missions.errors import FenceError, MissionError
+from missions.fence import fence_from_items
 from missions.formats import read_fence
 from missions.geo import LatLon
+from missions.items import Command, MissionItem
 from missions.plan import plan
 from missions.recheck import straight_line
 from missions.request import Request
@@ -40,3 +42,11 @@ def test_a_margin_beyond_all_measure_is_refused_shortly(margin_m):
     assert len(str(refusal.value)) < 200
     found = straight_line(situation, Request(), FAR)
     assert found is None or len(f"{metres(found.asked_m)}") < 16
+
+
+@pytest.mark.parametrize("count", [3.4e38, 1e15, 84.0])
+def test_a_polygon_of_more_vertices_than_there_are_is_refused_shortly(count):
+    vertex = MissionItem(Command.FENCE_POLYGON_VERTEX_INCLUSION, 0, (count, 0.0, 0.0, 0.0), 400_000_000, 10)
+    with pytest.raises(FenceError, match=r"has only 0 of them|has only 3 of them") as refusal:
+        fence_from_items([vertex] * 3)
+    assert not re.search(r"\d{10}", str(refusal.value))

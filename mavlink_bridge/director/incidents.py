@@ -33,6 +33,9 @@ _ANSWERED_WITHIN_S = 1.5
 _SAME_S = 2.0
 """A text and a FENCE_STATUS, or two texts on one failsafe, that come so soon after another tell of the same."""
 
+_AT_MOST_EVERY_S = 1.0
+"""A vehicle on a fence's line, or one that means harm, may count many breaches a second."""
+
 _OLD_S = 2.0
 """A position older than this is said to be: it comes four times a second."""
 
@@ -181,7 +184,10 @@ class Incidents:
         if new and now_s <= self._breach_text_s + _SAME_S:  # its text has told of it
             self._breach_text_s = -math.inf
             new -= 1
-        if new:
+        if new and now_s < self._breach_told_s + _AT_MOST_EVERY_S:  # counted with the next status after that
+            self._count, self._is_breached = before, was_breached
+            self._note(Cause(_BREACH, now_s, _actions(situation.parameters, "FENCE_ACTION")))
+        elif new:
             self._tell_breach(new, status.breach_type, situation, now_s)
 
     def _take_breach_text(self, situation: Situation, now_s: float) -> None:

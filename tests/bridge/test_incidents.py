@@ -195,6 +195,15 @@ def test_a_text_then_its_status_are_one_breach_and_the_next_is_another():
     assert breaches == [1, 2]
 
 
+def test_breaches_are_told_once_a_second_and_all_are_counted():
+    run = ready(conductor(upload=False, drive=False))
+    for number in range(1, 13):
+        run.now_s += 0.3
+        told(run, m.FenceStatus(1, number, 3, 5000))
+    breaches = [event.data["breaches"] for event in run.events if event.name is EventName.BREACH]
+    assert breaches == [1, 5, 9]
+
+
 def test_a_breach_of_a_fence_that_is_not_known_names_none_as_broken():
     run = ready(conductor(upload=False, drive=False))
     told(run, BREACHED)

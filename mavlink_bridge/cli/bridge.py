@@ -145,7 +145,7 @@ def bridge(
     )
     parameters = read_parameters(vehicle) if vehicle else {}
     with contextlib.ExitStack() as stack:
-        recorder, journal = _recorders(stack, log, orders, parameters, quiet=quiet)
+        recorder, journal = _recorders(stack, log, orders, parameters)
         director = Director(orders, Situation(parameters=parameters))
         view = _view(stack, director, is_wanted=not (json_output or quiet))
         tell = view.tell if view else _teller(wants_json=json_output, quiet=quiet)
@@ -440,18 +440,13 @@ def _tell_people(event: Event) -> None:
 
 
 def _recorders(
-    stack: contextlib.ExitStack,
-    log: Path | None,
-    orders: Orders,
-    parameters: Mapping[str, float],
-    *,
-    quiet: bool,
+    stack: contextlib.ExitStack, log: Path | None, orders: Orders, parameters: Mapping[str, float]
 ) -> tuple[TlogWriter | None, JournalWriter | None]:
     if log is None:
         return None, None
     from mavlink_bridge.cli.recording import open_recording  # noqa: PLC0415 - quick help
 
     part, recorder, journal = open_recording(stack, log, orders, parameters)
-    if part != log and not quiet:
-        typer.echo(f"{log} is there already: this run is recorded in {part}", err=True)
+    if part != log:
+        warn((f"{log} is there already: this run is recorded in {part}",))
     return recorder, journal

@@ -24,6 +24,7 @@ from missions.mission_end import crossed_zones, end_warnings, return_place, retu
 from missions.plan import Plan, drawn_leg, ground_for
 from missions.request import Request
 from missions.situation import Known
+from missions.words import metres
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -406,7 +407,7 @@ def _start_warnings(
         warnings.append("where the vehicle heads at the start is not known: taken along its first leg")
     if first.asked_m < required_m and not first.crosses:
         warnings.append(
-            f"the start stands nearer to a fence than {required_m:.2f} m: its first leg has to keep {first.asked_m:.2f} m, "
+            f"the start stands nearer to a fence than {metres(required_m)}: its first leg has to keep {metres(first.asked_m)}, "
             "as much as the vehicle has now"
         )
     return warnings

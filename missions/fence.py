@@ -150,7 +150,7 @@ def _polygon(items: Sequence[MissionItem], first: int) -> PolygonZone:
             break
     if len(run) < count:
         raise FenceError(
-            f"fence item {first}: an {kind} polygon of {count} vertices has only {len(run)} of them",
+            f"fence item {first}: an {kind} polygon of {param1:g} vertices has only {len(run)} of them",
             item=first,
         )
     return PolygonZone(kind, tuple(_position(item, first + offset) for offset, item in enumerate(run)))

@@ -11,6 +11,7 @@ from missions.driven_route import DrivenRoute, RouteSearch
 from missions.errors import NoRouteError, RouteError
 from missions.lines import reserve_m
 from missions.narrow import kept_m, narrowest_places
+from missions.words import metres
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -125,8 +126,8 @@ class FittedRoute:
                 **{**error.details, "advice": _NOTHING_ADVICE},
             )
         return NoRouteError(
-            f"no route keeps {asked.promised_m:.2f} m while driving; the widest keeps {widest.promised_m:.2f} m "
-            f"({place.clearance_m:.2f} m drawn){place.where}",
+            f"no route keeps {metres(asked.promised_m)} while driving; the widest keeps {metres(widest.promised_m)} "
+            f"({metres(place.clearance_m)} drawn){place.where}",
             **{
                 **error.details,
                 "widest_m": round(widest.promised_m, 3),

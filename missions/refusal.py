@@ -11,6 +11,7 @@ from shapely import Point
 from missions import drawn
 from missions.errors import NoRouteError
 from missions.local_frame import LocalPoint
+from missions.words import metres
 
 if TYPE_CHECKING:
     from shapely import Polygon
@@ -54,8 +55,8 @@ def refusal(
     )
     advice = {"advice": _START_ADVICE} if index == 0 or held_at_start else {}
     return NoRouteError(
-        f"no route keeps {required_m:.2f} m while driving: at {where} this vehicle would come as near as "
-        f"{max(kept_m, 0.0):.2f} m to {fence}, whatever was tried",
+        f"no route keeps {metres(required_m)} while driving: at {where} this vehicle would come as near as "
+        f"{metres(max(kept_m, 0.0))} to {fence}, whatever was tried",
         clearance_m=round(required_m, 3),
         corner=list(position),
         turn_deg=round(turn_deg, 1),

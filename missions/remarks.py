@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from missions.drive_model import beyond_measured
 from missions.geo import distance_m
 from missions.lines import ROUNDING_RESERVE_M
+from missions.words import metres
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -43,9 +44,11 @@ def lead_away_remarks(found: DrivenRoute, least_m: float) -> list[str]:
             f"the start is on forbidden ground, {-found.start_clearance_m:.2f} m from free ground: the first leg drives out of it"
         ]
     if found.lead_away_m is None:
-        distance = f"{found.start_clearance_m:.2f} m from a fence, nearer than {least_m:.2f} m"
+        distance = f"{metres(found.start_clearance_m)} from a fence, nearer than {metres(least_m)}"
         return [f"the start stands {distance}: the route first leads away, never nearer than that"]
-    distance = f"{found.start_clearance_m:.2f} m from a fence, too near to leave it with {least_m:.2f} m kept"
+    distance = (
+        f"{metres(found.start_clearance_m)} from a fence, too near to leave it with {metres(least_m)} kept"
+    )
     nearest_m = max(found.lead_away_m, 0.0)
     return [
         f"the start stands {distance}: the route first leads away; turning there the vehicle may come as near as {nearest_m:.2f} m"
@@ -75,7 +78,7 @@ def drive_remarks(
         warnings.append(f"how the vehicle drives is not told in full; taken as {', '.join(assumed)}")
     if asked.allowance_m and driven_m < asked.promised_m - 0.005 and not found.lead_away:
         warnings.append(
-            f"the drive model foresees {driven_m:.2f} m at the nearest while driving, less than the {asked.promised_m:.2f} m promised "
+            f"the drive model foresees {metres(driven_m)} at the nearest while driving, less than the {metres(asked.promised_m)} promised "
             f"with an allowance of {asked.allowance_m:g} m"
         )
     return warnings

@@ -15,6 +15,7 @@ from missions.lines import ROUNDING_RESERVE_M
 from missions.plan import Plan, plan
 from missions.situation import Known, Mission, Pose
 from missions.storage import shortened
+from missions.words import metres
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -152,7 +153,7 @@ def repair_mission(
     worst = min(checked.broken, key=lambda leg: leg.driven_clearance_m - leg.asked_m)
     raise NoRouteError(
         f"the mission cannot be repaired: about {_names(repaired.origin(worst.leg))} the vehicle would still come "
-        f"{worst.driven_clearance_m:.2f} m near {worst.fence} at {worst.at}; {worst.asked_m:.2f} m are to be kept",
+        f"{metres(worst.driven_clearance_m)} near {worst.fence} at {worst.at}; {metres(worst.asked_m)} are to be kept",
         driven_clearance_m=round(worst.driven_clearance_m, 3),
         fences=[worst.fence],
     )

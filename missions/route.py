@@ -16,6 +16,7 @@ from missions.fence import ZoneKind
 from missions.geo import bearing_deg, distance_m
 from missions.local_frame import LocalPoint
 from missions.narrow import narrowest_place
+from missions.words import metres
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -172,8 +173,8 @@ class _Search:
     def asked(self) -> str:
         """The clearance in words."""
         if self.promised_m is None:
-            return f"{self.clearance_m:.2f} m"
-        return f"{self.promised_m:.2f} m while driving ({self.clearance_m:.2f} m drawn)"
+            return metres(self.clearance_m)
+        return f"{metres(self.promised_m)} while driving ({metres(self.clearance_m)} drawn)"
 
     def is_free(self, point: LocalPoint) -> bool:
         """Whether the planner takes a point: mitred offsets hold it, or its true distance is what round ones hold."""
@@ -196,7 +197,7 @@ class _Search:
         parts: list[Polygon] = [part for part in shapely.get_parts(inner) if not part.is_empty]
         if not parts:
             raise NoRouteError(
-                f"nowhere in the field is {self.clearance_m:.2f} m away from every fence",
+                f"nowhere in the field is {metres(self.clearance_m)} away from every fence",
                 clearance_m=self.clearance_m,
             )
         return parts
@@ -245,7 +246,7 @@ class _Search:
             problem = f"the target is on forbidden ground ({self._position(target)}): {_names(names)}"
         else:
             names = [nearest.name] if nearest else []
-            problem = f"the target is {gap_m:.2f} m from {_names(names)}, nearer than {self.asked}"
+            problem = f"the target is {metres(gap_m)} from {_names(names)}, nearer than {self.asked}"
         raise TargetBlockedError(
             f"{problem}; the nearest free point is {distance:.2f} m away, bearing {round(bearing) % 360}°, at {position}",
             fences=names,

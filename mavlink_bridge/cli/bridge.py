@@ -9,6 +9,7 @@ import signal
 import sys
 import time
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -34,15 +35,18 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
     from mavlink_bridge.cli.bridge_view import LiveView
+    from mavlink_bridge.cli.opening import Opening
     from mavlink_bridge.cli.run_log import RunLog
     from mavlink_bridge.director import Director, Event, Orders
     from mavlink_bridge.journal import JournalWriter
     from mavlink_bridge.link import Link
     from mavlink_bridge.signing import Signing
     from mavlink_bridge.tlog import TlogWriter
+    from missions.plan import Plan
 
 _BACKOFF_S = (0.5, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0)
 _LINK_LOOK_S = 0.25
+_OPENING_LOOK_S = 0.05
 
 
 def bridge(
@@ -79,7 +83,10 @@ def bridge(
     once: Annotated[bool, typer.Option("--once", help="End after one job.")] = False,
     log: Annotated[
         Path | None,
-        typer.Option(metavar="FILE.tlog", help="Record both directions, and a journal beside it."),
+        typer.Option(
+            metavar="FILE.tlog",
+            help="Record both directions, and a journal beside it; a restart goes on in run.2.tlog, run.3.tlog …",
+        ),
     ] = None,
     config: ConfigOption = None,
     system: SystemOption = None,
@@ -147,7 +154,7 @@ def bridge(
         tell = view.tell if view else _teller(wants_json=json_output, quiet=quiet)
         log_of_run = RunLog(recorder, journal) if recorder is not None and journal is not None else None
         tell = SafeTeller(tell, lambda: director.state not in AT_WORK)
-        shell = _Shell(director, tell, view, log_of_run)
+        shell = _Shell(director, tell, view, log_of_run, quiet=quiet)
         shell.run(connect, signing_of(signing_key), timeout)
     trouble = shell.director.trouble
     if trouble is not None and shell.director.is_done:
@@ -186,6 +193,8 @@ class _Shell:
         tell: Callable[[Event], None],
         view: LiveView | None,
         log: RunLog | None,
+        *,
+        quiet: bool = False,
     ) -> None:
         from mavlink_bridge.cli.link_notes import LinkNotes  # noqa: PLC0415 - quick help
         from mavlink_bridge.cli.live import BackupKeeper, PlanMaker  # noqa: PLC0415
@@ -199,10 +208,13 @@ class _Shell:
         self._backups = BackupKeeper(self.director)
         self._plans = PlanMaker(self.director)
         self._typed = _typed_lines()
+        self._quiet = quiet
+        self._asked_for: Plan | None = None  # the plan that was said to wait for a yes
 
     def run(self, connection: str, signing: Signing | None, timeout_s: float) -> None:
         """Run until the single job is done, or for ever; a link that breaks is opened again."""
-        from mavlink_bridge.echoes import SentFrames  # noqa: PLC0415 - quick help
+        from mavlink_bridge.cli.opening import Opening  # noqa: PLC0415 - quick help
+        from mavlink_bridge.echoes import SentFrames  # noqa: PLC0415
         from mavlink_bridge.link import ONE_SHOT_IDENTITY, now_s, open_link, parse_connection  # noqa: PLC0415
 
         parse_connection(connection)
@@ -214,23 +226,37 @@ class _Shell:
         while not self.director.is_done:
             try:
                 identity = self.director.identity or ONE_SHOT_IDENTITY
-                with open_link(
-                    connection,
-                    identity,
-                    recorder=self._log,
-                    signing=signing,
-                    timeout_s=timeout_s,
-                    sent=sent,
-                ) as link:
+                opening = Opening(
+                    partial(
+                        open_link,
+                        connection,
+                        identity,
+                        recorder=self._log,
+                        signing=signing,
+                        timeout_s=timeout_s,
+                        sent=sent,
+                    )
+                )
+                if not self._is_opened(opening):
+                    return
+                with opening.link() as link:
                     failures = 0
+                    if self._view is not None:
+                        self._view.link_trouble = None
                     self._run_link(link)
             except LinkError as error:
                 if self.director.orders.once:
                     raise
                 wait_s = _BACKOFF_S[min(failures, len(_BACKOFF_S) - 1)]
                 failures += 1
-                say(f"link: {error}; trying again in {wait_s:g} s", typer.colors.YELLOW)
+                self._link_closed(f"{error}; trying again in {wait_s:g} s")
                 self._idle(wait_s)
+
+    def _is_opened(self, opening: Opening) -> bool:
+        """Wait until a link is open or cannot be; return whether that came before the director's end."""
+        while not opening.is_over and not self.director.is_done:
+            self._idle(_OPENING_LOOK_S)
+        return opening.is_over
 
     def _run_link(self, link: Link) -> None:
         from mavlink_bridge.link import now_s  # noqa: PLC0415 - quick help
@@ -265,6 +291,11 @@ class _Shell:
             self._written.call("timer", now)
             self.director.handle_timer(now)
 
+    def _link_closed(self, why: str) -> None:
+        self._note(f"link: {why}", is_warning=True)
+        if self._view is not None:
+            self._view.link_trouble = why
+
     def _idle(self, wait_s: float) -> None:
         """Let time pass without a link, so that the director notices."""
         from mavlink_bridge.link import now_s  # noqa: PLC0415 - quick help
@@ -274,6 +305,8 @@ class _Shell:
             self._listen_to_keyboard(now_s())
             self._run_timer(now_s())
             self._tell_all()
+            if self._view is not None:
+                self._view.show(now_s())
             time.sleep(min(_LINK_LOOK_S, max(0.0, until_s - now_s())))
 
     def _keep_backup(self, now: float) -> None:
@@ -287,29 +320,45 @@ class _Shell:
             self.director.plan_made(*made, now)
 
     def _listen_to_keyboard(self, now: float) -> None:
-        from missions.errors import InvalidPositionError  # noqa: PLC0415 - quick help
-        from missions.geo import parse_lat_lon  # noqa: PLC0415
+        from mavlink_bridge.cli.typed import understood  # noqa: PLC0415 - quick help
 
         line = next(self._typed)
         if not line:
             return
-        if line.lower() in ("yes", "y", "go"):
+        typed = understood(line, self.director)
+        if self._view is not None:
+            self._view.answer(typed.answer, is_warning=not typed.is_taken)
+        else:
+            self._note(typed.answer, is_warning=not typed.is_taken)
+        if typed.confirms:
             self._written.call("confirm", now)
             self.director.confirm(now)
-            return
-        try:
-            target = parse_lat_lon(line)
-        except InvalidPositionError as error:
-            say(f"typed: {error}", typer.colors.YELLOW)
-            return
-        self._written.call("target", now, target)
-        self.director.take_target(target, now)
+        elif typed.target is not None:
+            self._written.call("target", now, typed.target)
+            self.director.take_target(typed.target, now)
+
+    def _note(self, text: str, *, is_warning: bool) -> None:
+        """Say something that is no event, where it does not disturb: above the view, else on stderr."""
+        if self._view is not None:
+            self._view.note(text, is_warning=is_warning)
+        elif is_warning or not self._quiet:
+            say(text, typer.colors.YELLOW if is_warning else None)
+
+    def _ask_for_yes(self) -> None:
+        """Say once of each plan that it waits for a yes."""
+        from mavlink_bridge.cli.typed import CONFIRM  # noqa: PLC0415 - quick help
+
+        plan = self.director.plan if self.director.awaits_confirmation else None
+        if plan is not None and plan is not self._asked_for:
+            self._note(CONFIRM, is_warning=False)
+        self._asked_for = plan
 
     def _tell_all(self) -> None:
         for event in self.director.take_events():
             if self._log is not None:
                 self._log.event(event)
             self._tell(event)
+        self._ask_for_yes()
 
 
 def _typed_lines() -> Iterator[str]:
@@ -402,12 +451,9 @@ def _recorders(
 ) -> tuple[TlogWriter | None, JournalWriter | None]:
     if log is None:
         return None, None
-    from mavlink_bridge.cli.kept_files import open_kept  # noqa: PLC0415 - quick help
-    from mavlink_bridge.journal import JournalWriter, journal_path  # noqa: PLC0415
-    from mavlink_bridge.tlog import TlogWriter  # noqa: PLC0415
+    from mavlink_bridge.cli.recording import open_recording  # noqa: PLC0415 - quick help
 
-    if log.exists():
-        raise UsageError(f"--log {log}: the file is there already; a journal belongs to one run")
-    recorder = stack.enter_context(TlogWriter(log))
-    file = stack.enter_context(open_kept(journal_path(log)))
-    return recorder, JournalWriter(file, orders, parameters)
+    part, recorder, journal = open_recording(stack, log, orders, parameters)
+    if part != log:
+        warn((f"{log} is there already: this run is recorded in {part}",))
+    return recorder, journal

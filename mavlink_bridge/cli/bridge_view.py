@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from typing import TYPE_CHECKING
 
 from rich.console import Console, Group  # the type: `terminal.console` makes one
+from rich.control import Control
 from rich.live import Live
+from rich.segment import ControlType
 from rich.table import Table
 from rich.text import Text
 
 from mavlink_bridge.cli.terminal import cell
 from mavlink_bridge.cli.terminal import console as terminal_console
-from mavlink_bridge.director import Severity
-from mavlink_bridge.rover import MODE_NAMES
+from mavlink_bridge.cli.typed import CONFIRM
+from mavlink_bridge.director import Severity, State
+from mavlink_bridge.rover import mode_name
 from missions.picture import sketch_plan
 
 if TYPE_CHECKING:
@@ -27,6 +31,9 @@ _TABLE_EVERY_S = 0.5
 _MAP_EVERY_S = 10.0
 _MAP_COLUMNS = 72
 _MOST_PLACES = 2000
+_OLD_S = 3.0
+"""A heartbeat comes every second, positions more often: what is older than this is said to be old."""
+
 _STYLES = {
     Severity.CRITICAL: "bold red",
     Severity.ERROR: "red",
@@ -54,6 +61,10 @@ class LiveView:
         self._map = ""
         self._mapped: object = None
         self._table_due_s = self._map_due_s = 0.0
+        self._state: State | None = None
+        self._state_since_s = 0.0
+        self._answer: Text | None = None
+        self.link_trouble: str | None = None  # why the link is closed, while it is
 
     def __enter__(self) -> Self:
         self._live.__enter__()
@@ -69,6 +80,18 @@ class LiveView:
         if event.name != "progress":
             clock = time.strftime("%H:%M:%S", time.localtime(event.time_s))
             self._live.console.print(cell(f"{clock} {event.text}", _STYLES.get(event.severity, "")))
+
+    def note(self, text: str, *, is_warning: bool) -> None:
+        """Show news that are no event, above the view."""
+        self._live.console.print(_styled(text, is_warning=is_warning))
+        self._table_due_s = 0.0
+
+    def answer(self, text: str, *, is_warning: bool) -> None:
+        """Show the answer to a typed line, above the view and as the last one in it."""
+        if sys.stdin.isatty():  # whose Enter has moved the cursor a line below the view
+            self._console.control(Control((ControlType.CURSOR_UP, 1)))
+        self._answer = _styled(text, is_warning=is_warning)
+        self.note(text, is_warning=is_warning)
 
     def show(self, now_s: float) -> None:
         """Bring the view up to date, a few times a second at most, the map more rarely."""
@@ -86,27 +109,60 @@ class LiveView:
             self._map_due_s = now_s + _MAP_EVERY_S
             encoding = self._console.encoding
             self._map = sketch_plan(plan, track=self._track, columns=_MAP_COLUMNS, encoding=encoding)
-        self._live.update(Group(self._table(), Text(self._map)), refresh=True)
+        self._live.update(Group(self._table(now_s), Text(self._map)), refresh=True)
 
-    def _table(self) -> Table:
+    def _table(self, now_s: float) -> Table:
         director, situation = self._director, self._director.situation
+        if director.state is not self._state:
+            self._state, self._state_since_s = director.state, now_s
         table = Table.grid(padding=(0, 2))
-        rows = [("state", director.state.replace("_", " "))]
+        rows = self._link_rows(now_s)
+        since_s = now_s - self._state_since_s
+        rows.append(("state", f"{director.state.replace('_', ' ')}, for {_age(since_s)}"))
         if situation.mode is not None:
             armed = "armed" if situation.armed else "disarmed"
-            rows.append(
-                (
-                    "vehicle",
-                    f"system {situation.system}, {MODE_NAMES.get(situation.mode, situation.mode)}, {armed}",
-                )
-            )
-        if situation.pose is not None:
-            rows.append(("position", str(situation.pose.value.position)))
+            vehicle = f"system {situation.system}, {mode_name(situation.mode)}, {armed}"
+            rows.append(("vehicle", _of_then(vehicle, director.heard_s, now_s)))
+        if (pose := situation.pose) is not None:
+            rows.append(("position", _of_then(str(pose.value.position), pose.time_s, now_s)))
         if (drive := director.drive) is not None and director.plan is not None:
             rows.append(("left", f"{drive.distance_left_m:.0f} m, about {drive.time_left_s:.0f} s"))
             rows.append(("clearance", f"{drive.least_clearance_m:.1f} m at the nearest so far"))
         elif director.plan is not None:
             rows.append(("route", f"{director.plan.length_m:.0f} m, {len(director.plan.items)} items"))
+        if director.awaits_confirmation:
+            rows.append(("plan", cell(CONFIRM, "bold")))
+        if self._answer is not None:
+            rows.append(("answer", self._answer))
         for name, value in rows:
             table.add_row(cell(name, "dim"), cell(value))
         return table
+
+    def _link_rows(self, now_s: float) -> list[tuple[str, str | Text]]:
+        """Say that the vehicle is not heard, since when, and what is done about it."""
+        heard_s, why = self._director.heard_s, self.link_trouble
+        silent_s = None if heard_s is None else max(0.0, now_s - heard_s)
+        is_lost = why is not None or self._director.state is State.LOST
+        if not is_lost and (silent_s is None or silent_s < _OLD_S):
+            return []
+        last = "no vehicle heard yet" if silent_s is None else f"last heard {_age(silent_s)} ago"
+        if not is_lost:
+            return [("link", cell(last, "yellow"))]
+        return [("link", cell(f"LINK LOST: {last}" + (f" ({why})" if why else ""), "bold red"))]
+
+
+def _of_then(text: str, time_s: float | None, now_s: float) -> Text:
+    """Return a text that says how old it is, where it is not of now."""
+    if time_s is None or now_s - time_s < _OLD_S:
+        return cell(text)
+    return cell(f"{text} (old: {_age(now_s - time_s)} ago)", "yellow")
+
+
+def _styled(text: str, *, is_warning: bool) -> Text:
+    return cell(text, "yellow" if is_warning else "bold")
+
+
+def _age(seconds: float) -> str:
+    if seconds < 100:
+        return f"{max(0.0, seconds):.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.0f} h"

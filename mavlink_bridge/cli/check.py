@@ -326,11 +326,13 @@ def _metres(value_m: float) -> str:
 
 
 def _sentence(leg: CheckedLeg) -> str:
+    from missions.words import metres  # noqa: PLC0415 - quick help
+
     if leg.crosses:
         return f"leg {leg.name} crosses {', '.join(leg.crosses)}, first at {leg.at}"
     return (
         f"leg {leg.name} comes {leg.driven_clearance_m:.2f} m near {leg.fence} while driving "
-        f"({leg.drawn_clearance_m:.2f} m drawn, at {leg.at}); {leg.asked_m:.2f} m are to be kept"
+        f"({metres(leg.drawn_clearance_m)} drawn, at {leg.at}); {metres(leg.asked_m)} are to be kept"
     )
 
 

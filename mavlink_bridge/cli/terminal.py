@@ -71,10 +71,10 @@ def console(*, err: bool = False) -> Console:
 
 
 def cell(text: object, style: str = "") -> Text:
-    """Return what rich shows of a text: as it stands, without markup and without control characters."""
+    """Return what rich shows of a text: as it stands, without markup and without control characters; a cell as it is."""
     from rich.text import Text  # noqa: PLC0415 - quick help
 
-    return Text(harmless(str(text)), style=style)
+    return text if isinstance(text, Text) else Text(harmless(str(text)), style=style)
 
 
 def _put(line: str, colour: str | None, *, is_error: bool, nl: bool = True) -> None:

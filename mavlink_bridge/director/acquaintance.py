@@ -85,6 +85,11 @@ class Acquaintance(TableMachine[State, Cue]):
         return self._peer
 
     @property
+    def heard_s(self) -> float | None:
+        """When the vehicle's newest heartbeat was heard; None before the first."""
+        return self._heartbeat_s if math.isfinite(self._heartbeat_s) else None
+
+    @property
     def deadline_s(self) -> float | None:
         """When `handle_timer` wants to be called."""
         times = [self._steps.deadline_s, self._voice.deadline_s, *self._own_deadlines_s()]
@@ -228,7 +233,8 @@ class Acquaintance(TableMachine[State, Cue]):
         if self._move(Cue.SILENCE):
             self._drop_steps()
             self._vehicle_gone(has_forgotten=False)
-            self._voice.tell(now_s, EventName.LINK_LOST, f"no heartbeat for {_SILENCE_S:g} s", _SILENCE_S)
+            text = f"link lost: no heartbeat for {_SILENCE_S:g} s"
+            self._voice.tell(now_s, EventName.LINK_LOST, text, _SILENCE_S)
             self._give_up(LinkError(f"the vehicle fell silent: no heartbeat for {_SILENCE_S:g} s"))
 
     def _is_from_vehicle(self, frame: Frame) -> bool:

@@ -17,16 +17,17 @@ from mavlink_bridge import messages as m
 from mavlink_bridge.director import clash
 from mavlink_bridge.director.drive_watch import DriveWatch
 from mavlink_bridge.director.events import EventName
+from mavlink_bridge.director.incidents import Incidents
 from mavlink_bridge.director.mode_switch import AwaitHeartbeat, ModeSwitch
-from mavlink_bridge.director.operator_watch import mode_name
 from mavlink_bridge.director.orders import TargetSource
 from mavlink_bridge.director.states import Cue, State
 from mavlink_bridge.director.stopper import Stopper
+from mavlink_bridge.director.takeover import account_of
 from mavlink_bridge.director.targets import Target
 from mavlink_bridge.errors import OutcomeError, RefusedError
 from mavlink_bridge.protocol.command import SendCommand
 from mavlink_bridge.protocol.find import identity_shared, identity_taken
-from mavlink_bridge.rover import AUTO_MODE, HOLD_MODE
+from mavlink_bridge.rover import AUTO_MODE, HOLD_MODE, mode_name
 from missions.items import Command
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 
     from mavlink_bridge.director.orders import Orders
     from mavlink_bridge.director.steps import Step
+    from mavlink_bridge.director.takeover import Takeover
     from mavlink_bridge.messages import Frame
     from missions.situation import Situation
 
@@ -53,6 +55,7 @@ class Director(Stopper):
 
     def __init__(self, orders: Orders, situation: Situation | None = None) -> None:
         super().__init__(orders, situation)
+        self._incidents = Incidents(self._voice, orders.request)
         self._taken_over: OutcomeError | None = None
         self._is_first_time = True
         self._item_now = 1
@@ -89,6 +92,7 @@ class Director(Stopper):
         message = frame.message
         if isinstance(message, m.MissionCurrent) and message.seq:
             self._item_now = message.seq
+        self._incidents.receive(message, self.situation, now_s)
         super()._take_vehicle_frame(frame, now_s)
         if isinstance(message, m.Heartbeat):
             self._take_heartbeat(message, now_s)
@@ -117,7 +121,7 @@ class Director(Stopper):
         peer = self._peer
         is_anothers = (frame.system, frame.component) != self.identity and not self._is_from_vehicle(frame)
         if peer is not None and is_anothers:
-            taken = self._operator.overhear(frame.message, peer.system, peer.component, now_s)
+            taken = self._operator.overhear(frame, peer.system, peer.component, now_s)
             if taken is not None:
                 self._let_go(taken, now_s)
         super()._take_any_frame(frame, before, now_s)
@@ -166,6 +170,7 @@ class Director(Stopper):
     def _vehicle_gone(self, *, has_forgotten: bool) -> None:
         self._let_loose()
         if has_forgotten:
+            self._incidents.forget()
             self._ours = None
             self._waiting_target = None
         self._watch_while_waiting()
@@ -189,7 +194,7 @@ class Director(Stopper):
 
     # The operator's word
 
-    def _let_go(self, what: str, now_s: float) -> None:
+    def _let_go(self, taken: Takeover, now_s: float) -> None:
         """Leave the vehicle to the operator, until a new target comes."""
         if not self._move(Cue.TAKEN_OVER):
             return
@@ -198,9 +203,12 @@ class Director(Stopper):
         self._is_first_time = False
         is_withdrawing = self.state is State.WITHDRAWING
         then = "the upload is finished first" if is_withdrawing else "waiting for a new target"
-        mode = what.rpartition(" ")[2] if "switched" in what else mode_name(self.situation.mode)
-        self._voice.tell(now_s, EventName.TAKEN_OVER, f"somebody {what}; {then}", mode)
-        trouble = OutcomeError(f"somebody {what} before it arrived", mode=mode)
+        cause = self._incidents.cause_of(taken, now_s)
+        account = account_of(taken, cause, self._incidents.heard_before(now_s))
+        mode = mode_name(self.situation.mode if taken.mode is None else taken.mode)
+        text = f"{account.text}; {then}"
+        self._voice.tell(now_s, EventName.TAKEN_OVER, text, mode, str(account.by), account.reason)
+        trouble = OutcomeError(f"{account.text}, before it arrived", mode=mode)
         if is_withdrawing:
             self._taken_over = trouble
         else:

@@ -88,7 +88,7 @@ class DriveWatch:
         elif isinstance(message, m.MissionItemReached):
             self._take_reached(message.seq)
         elif isinstance(message, m.FenceStatus):
-            self._count_breaches(message, now_s)
+            self._count_breaches(message)
 
     def tell_progress(self, now_s: float) -> None:
         """Tell how far the drive is."""
@@ -141,10 +141,8 @@ class DriveWatch:
         elif now_s - self._standing_since_s >= _STANDING_S:
             self.has_arrived = True
 
-    def _count_breaches(self, status: m.FenceStatus, now_s: float) -> None:
+    def _count_breaches(self, status: m.FenceStatus) -> None:
+        """Count the breaches of this drive; `incidents` tells of each."""
         if self._breaches_before is None:
             self._breaches_before = status.breach_count
-        breaches = status.breach_count - self._breaches_before
-        if breaches > self.breaches:
-            self._voice.tell(now_s, EventName.BREACH, f"fence breach {breaches}", breaches)
-        self.breaches = max(self.breaches, breaches)
+        self.breaches = max(self.breaches, status.breach_count - self._breaches_before)

@@ -40,6 +40,7 @@ class EventName(StrEnum):
     PROGRESS = auto()
     LEFT_ENVELOPE = auto()
     BREACH = auto()
+    FAILSAFE = auto()
     ARRIVED = auto()
     TAKEN_OVER = auto()
     IDENTITY_CLASH = auto()
@@ -73,9 +74,13 @@ SCHEMA: dict[EventName, tuple[Severity, tuple[str, ...]]] = {
         ("item", "distance_left_m", "time_left_s", "least_clearance_m", "deviation_m", "position"),
     ),
     EventName.LEFT_ENVELOPE: (Severity.WARNING, ("outside_m", "position")),
-    EventName.BREACH: (Severity.CRITICAL, ("breaches",)),
+    EventName.BREACH: (
+        Severity.CRITICAL,
+        ("breaches", "position", "fence", "beyond_m", "breach_type", "mode"),
+    ),
+    EventName.FAILSAFE: (Severity.ERROR, ("reason", "mode")),
     EventName.ARRIVED: (Severity.NOTICE, ("driven_m", "took_s", "least_clearance_m", "breaches")),
-    EventName.TAKEN_OVER: (Severity.NOTICE, ("mode",)),
+    EventName.TAKEN_OVER: (Severity.NOTICE, ("mode", "by", "reason")),
     EventName.IDENTITY_CLASH: (Severity.CRITICAL, ("system", "component", "held")),
     EventName.MISSION_CHANGED: (Severity.WARNING, ("mission_items",)),
     EventName.LINK_LOST: (Severity.ERROR, ("silent_s",)),

@@ -10,11 +10,12 @@ import math
 from typing import TYPE_CHECKING
 
 from mavlink_bridge import messages as m
-from mavlink_bridge.rover import AUTO_MODE, GUIDED_MODE, HOLD_MODE, MODE_NAMES, RTL_MODE
+from mavlink_bridge.director.takeover import Takeover
+from mavlink_bridge.rover import AUTO_MODE, GUIDED_MODE, HOLD_MODE, RTL_MODE, mode_of
 from missions.items import Command
 
 if TYPE_CHECKING:
-    from mavlink_bridge.messages import Message
+    from mavlink_bridge.messages import Frame, Message
 
 _STALE_S = 1.5
 """For so long after a mode change was accepted a heartbeat may still show what was before."""
@@ -80,13 +81,13 @@ class OperatorWatch:
         else:
             self._asked_s = now_s
 
-    def take_heartbeat(self, heartbeat: m.Heartbeat, now_s: float) -> str | None:
-        """Give what somebody did, as the vehicle's heartbeat tells; None where it is as we left it."""
+    def take_heartbeat(self, heartbeat: m.Heartbeat, now_s: float) -> Takeover | None:
+        """Return what was done, as the vehicle's heartbeat tells; None where it is as we left it."""
         if self._ours is None:
             return None
         is_armed = bool(heartbeat.base_mode & m.ModeFlag.SAFETY_ARMED)
         if self._was_armed and not is_armed:
-            return "disarmed the vehicle"
+            return Takeover(None)
         self._was_armed = is_armed
         mode = heartbeat.custom_mode
         if mode == self._ours:
@@ -95,34 +96,30 @@ class OperatorWatch:
         is_stale = mode in self._fading and now_s <= self._fading_until_s
         if is_stale or self.is_late_click(heartbeat, now_s):
             return None
-        return f"switched the vehicle to {mode_name(mode)}"
+        return Takeover(mode)
 
     def is_late_click(self, heartbeat: m.Heartbeat, now_s: float) -> bool:
         """Tell whether a click has set the vehicle going after our HOLD, having come to it by a slower way than to us."""
         is_guided = heartbeat.custom_mode == GUIDED_MODE
         return is_guided and self._ours == HOLD_MODE and now_s - self._clicked_s <= _LATE_CLICK_S
 
-    def overhear(self, message: Message, system: int, component: int, now_s: float) -> str | None:
-        """Give what somebody asks of the vehicle; None where it takes nothing out of our hands."""
+    def overhear(self, frame: Frame, system: int, component: int, now_s: float) -> Takeover | None:
+        """Return what somebody asks of the vehicle; None where it takes nothing out of our hands."""
         if self._ours is None or now_s - self._asked_s <= _ON_ITS_WAY_S:
             return None
+        message, asker = frame.message, (frame.system, frame.component)
         if getattr(message, "target_system", None) not in (0, system):
             return None
         if getattr(message, "target_component", component) not in (0, component):
             return None
         if _is_disarming(message):
-            return "disarmed the vehicle"
+            return Takeover(None, asker)
         mode = _mode_asked_for(message)
         if mode is None or (mode == AUTO_MODE and self._ours == AUTO_MODE):
             return None
         if mode == GUIDED_MODE and now_s - self._clicked_s <= _CLICK_S:
             return None
-        return f"switched the vehicle to {mode_name(mode)}"
-
-
-def mode_name(mode: int | None) -> str:
-    """Give a mode's name, its number where it has none here."""
-    return MODE_NAMES.get(mode, f"mode {mode}") if mode is not None else "another mode"
+        return Takeover(mode, asker)
 
 
 def _is_disarming(message: Message) -> bool:
@@ -138,6 +135,6 @@ def _mode_asked_for(message: Message) -> int | None:
         return message.custom_mode
     if not isinstance(message, m.CommandLong | m.CommandInt):
         return None
-    if message.command == Command.DO_SET_MODE and math.isfinite(message.param2):
-        return int(message.param2)
+    if message.command == Command.DO_SET_MODE:
+        return mode_of(message.param2)
     return _MODE_OF_COMMAND.get(message.command)  # type: ignore[call-overload, no-any-return]

@@ -83,6 +83,12 @@ class RouteMaker(TargetTaker):
             self._made = made
             self._go_on_planning(now_s)
 
+    @property
+    def awaits_confirmation(self) -> bool:
+        """Whether a plan stands that is uploaded only after `confirm`."""
+        orders = self.orders
+        return self.state is State.PROPOSED and orders.upload and orders.confirm and not self._confirmed
+
     def confirm(self, now_s: float) -> None:
         """Take the operator's yes to the plan that stands; a yes to none is forgotten."""
         if self.state is State.PROPOSED:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.director.announcer import Announcer
 from mavlink_bridge.director.events import Event, EventName
+from missions.words import metres as metres_text
 
 if TYPE_CHECKING:
     from mavlink_bridge.director.drive_watch import DriveWatch
@@ -16,6 +17,9 @@ if TYPE_CHECKING:
     from missions.plan import Plan
     from missions.recheck import Recheck
     from missions.situation import Situation
+
+_NOT_ANNOUNCED = frozenset({EventName.PROGRESS, EventName.FAILSAFE})
+"""What the ground stations hear from the vehicle itself, or far too often."""
 
 
 class Voice:
@@ -50,7 +54,7 @@ class Voice:
         """Tell an event; the values are those of its schema, in order."""
         event = Event.of(now_s, name, text, values)
         self._events.append(event)
-        if self._announce and name is not EventName.PROGRESS:
+        if self._announce and name not in _NOT_ANNOUNCED:
             self._announcer.say(event.severity, text)
 
     def error(self, now_s: float, name: EventName, error: Exception, details: object) -> None:
@@ -94,7 +98,9 @@ class Voice:
 
     def rechecked(self, now_s: float, name: EventName, what: str, found: Recheck) -> None:
         """Tell that lines do not keep what they have to."""
-        text = f"{what} keeps {found.clearance_m:.2f} m of {found.asked_m:.2f} m ({found.fence})"
+        text = (
+            f"{what} keeps {metres_text(found.clearance_m)} of {metres_text(found.asked_m)} ({found.fence})"
+        )
         self.tell(now_s, name, text, metres(found.clearance_m), round(found.asked_m, 3), found.fence)
 
     def progress(self, now_s: float, drive: DriveWatch, position: LatLon) -> None:

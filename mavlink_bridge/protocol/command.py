@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.messages import CommandAck, CommandLong, MavResult, Statustext
+from mavlink_bridge.messages import CommandAck, CommandLong, MavResult
 from mavlink_bridge.protocol.table_machine import TableMachine
+from mavlink_bridge.protocol.texts import Reasons
 from mavlink_bridge.protocol.transitions import COMMAND, CommandEvent, CommandState
 
 if TYPE_CHECKING:
@@ -17,7 +18,6 @@ _SEND_AGAIN_S = 1.0
 _MOST_SENDS = 6
 _PROGRESS_PATIENCE_S = 10.0
 _PROGRESS_UNKNOWN = 255
-_MOST_TEXTS = 8
 _RESULTS = {int(result): result for result in MavResult}
 
 
@@ -32,7 +32,7 @@ class CommandOutcome:
     result : MavResult, optional
         None if no answer came.
     texts : tuple of str
-        STATUSTEXTs that came meanwhile.
+        STATUSTEXTs that came meanwhile and may be the reason of a refusal.
     """
 
     command: int
@@ -63,7 +63,7 @@ class SendCommand(TableMachine[CommandState, CommandEvent]):
         self._sends = 0
         self._result: MavResult | None = None
         self._percent = 0
-        self._texts: list[str] = []
+        self._reasons = Reasons(peer)
         self._deadline_s = 0.0
 
     @property
@@ -71,7 +71,7 @@ class SendCommand(TableMachine[CommandState, CommandEvent]):
         """How it ended; None while it runs."""
         if not self.is_done:
             return None
-        return CommandOutcome(self._message.command, self._result, tuple(self._texts))
+        return CommandOutcome(self._message.command, self._result, self._reasons.texts)
 
     @property
     def progress(self) -> tuple[int, int]:
@@ -91,6 +91,7 @@ class SendCommand(TableMachine[CommandState, CommandEvent]):
     def start(self, now_s: float) -> None:
         """Send the command."""
         if self._move(CommandEvent.START):
+            self._reasons.ask()
             self._send_once(now_s)
 
     def receive(self, frame: Frame, now_s: float) -> None:
@@ -98,9 +99,8 @@ class SendCommand(TableMachine[CommandState, CommandEvent]):
         if self.is_done or not self._peer.accepts(frame):
             return
         message = frame.message
-        if isinstance(message, Statustext) and len(self._texts) < _MOST_TEXTS:
-            self._texts.append(message.text)
-        elif isinstance(message, CommandAck) and message.command == self._message.command:
+        self._reasons.take(frame, now_s)
+        if isinstance(message, CommandAck) and message.command == self._message.command:
             self._take_ack(message, now_s)
 
     def handle_timer(self, now_s: float) -> None:

@@ -62,6 +62,23 @@ def _turn_radius(value: float) -> _Stored:
     return math.copysign(10.0 * math.trunc(min(_MOST_EXACT_RADIUS_M, abs(value) * 0.1)), value)
 
 
+def _hundredths(value: float) -> _Stored:
+    return float(math.trunc(value * 100.0)) if math.isfinite(value) else str(value)
+
+
+def _odd(value: float) -> _Stored:
+    return float(math.trunc(abs(value)) % 2) if math.isfinite(value) else str(value)
+
+
+def _float16(value: float) -> _Stored:
+    if not math.isfinite(value):
+        return str(value)
+    try:
+        return float(struct.unpack("<e", struct.pack("<e", value))[0])
+    except OverflowError:
+        return math.copysign(math.inf, value)
+
+
 def _dropped(value: float) -> _Stored:  # noqa: ARG001 - one of a family
     return None
 
@@ -86,13 +103,58 @@ _KEPT_PARAMS: dict[int, tuple[Callable[[float], _Stored], ...]] = {
     Command.DO_SET_REVERSE: (_whole, _dropped, _dropped, _dropped),
     Command.DO_FENCE_ENABLE: (_whole, _dropped, _dropped, _dropped),
     Command.NAV_SET_YAW_SPEED: (_float32, _float32, _whole, _dropped),
+    30: (_whole, _dropped, _dropped, _dropped),  # NAV_CONTINUE_AND_CHANGE_ALT
+    31: (_dropped, _whole, _dropped, _flag),  # NAV_LOITER_TO_ALT
+    82: (_whole, _dropped, _dropped, _dropped),  # NAV_SPLINE_WAYPOINT
+    83: (_float32, _float32, _whole, _dropped),  # NAV_ALTITUDE_WAIT
+    84: (_dropped, _dropped, _dropped, _dropped),  # NAV_VTOL_TAKEOFF
+    85: (_whole, _dropped, _dropped, _dropped),  # NAV_VTOL_LAND
+    94: (_hundredths, _dropped, _dropped, _dropped),  # NAV_PAYLOAD_PLACE
     115: (_float32, _float32, _whole, _whole),  # CONDITION_YAW
     181: (_whole, _whole, _dropped, _dropped),  # DO_SET_RELAY
     182: (_whole, _whole, _float32, _dropped),  # DO_REPEAT_RELAY
     183: (_whole, _whole, _dropped, _dropped),  # DO_SET_SERVO
     184: (_whole, _whole, _whole, _float32),  # DO_REPEAT_SERVO
+    188: (_dropped, _dropped, _dropped, _dropped),  # DO_RETURN_PATH_START
+    189: (_dropped, _dropped, _dropped, _dropped),  # DO_LAND_START
+    191: (_dropped, _dropped, _dropped, _dropped),  # DO_GO_AROUND
+    193: (_whole, _dropped, _dropped, _dropped),  # DO_PAUSE_CONTINUE
+    195: (_whole, _dropped, _dropped, _dropped),  # DO_SET_ROI_LOCATION
+    197: (_whole, _dropped, _dropped, _dropped),  # DO_SET_ROI_NONE
     201: (_whole, _dropped, _dropped, _dropped),  # DO_SET_ROI
+    202: (_whole, _whole, _whole, _whole),  # DO_DIGICAM_CONFIGURE
+    203: (_whole, _whole, _whole, _whole),  # DO_DIGICAM_CONTROL
+    205: (_float32, _float32, _float32, _dropped),  # DO_MOUNT_CONTROL
+    206: (
+        _float32,
+        _dropped,
+        _dropped,
+        _dropped,
+    ),  # DO_SET_CAM_TRIGG_DIST; newer firmware keeps the third, too
+    208: (_whole, _dropped, _dropped, _dropped),  # DO_PARACHUTE
+    210: (_whole, _dropped, _dropped, _dropped),  # DO_INVERTED_FLIGHT
     211: (_whole, _whole, _dropped, _dropped),  # DO_GRIPPER
+    212: (_whole, _dropped, _dropped, _dropped),  # DO_AUTOTUNE_ENABLE
+    215: (_whole, _dropped, _dropped, _dropped),  # DO_SET_RESUME_REPEAT_DIST
+    216: (_whole, _dropped, _dropped, _dropped),  # DO_SPRAYER
+    217: (_whole, _float32, _float32, _float32),  # DO_SEND_SCRIPT_MESSAGE
+    218: (_whole, _whole, _dropped, _dropped),  # DO_AUX_FUNCTION
+    222: (_whole, _float32, _float32, _float32),  # DO_GUIDED_LIMITS
+    223: (_flag, _flag, _hundredths, _odd),  # DO_ENGINE_CONTROL
+    531: (_whole, _float32, _dropped, _dropped),  # SET_CAMERA_ZOOM
+    532: (_whole, _float32, _dropped, _dropped),  # SET_CAMERA_FOCUS
+    534: (_whole, _whole, _whole, _dropped),  # SET_CAMERA_SOURCE
+    600: (_whole, _dropped, _dropped, _dropped),  # JUMP_TAG
+    601: (_whole, _whole, _dropped, _dropped),  # DO_JUMP_TAG
+    1000: (_whole, _whole, _whole, _whole),  # DO_GIMBAL_MANAGER_PITCHYAW
+    2000: (_whole, _float32, _whole, _whole),  # IMAGE_START_CAPTURE
+    2001: (_whole, _dropped, _dropped, _dropped),  # IMAGE_STOP_CAPTURE
+    2500: (_whole, _dropped, _dropped, _dropped),  # VIDEO_START_CAPTURE
+    2501: (_whole, _dropped, _dropped, _dropped),  # VIDEO_STOP_CAPTURE
+    3000: (_whole, _dropped, _dropped, _dropped),  # DO_VTOL_TRANSITION
+    42600: (_whole, _whole, _float32, _float32),  # DO_WINCH
+    42702: (_whole, _whole, _float16, _float16),  # NAV_SCRIPT_TIME
+    42703: (_whole, _whole, _whole, _whole),  # NAV_ATTITUDE_TIME
 }
 _WITH_PLACE = frozenset(
     {
@@ -110,8 +172,10 @@ _WITH_PLACE = frozenset(
         84,  # NAV_VTOL_TAKEOFF
         85,  # NAV_VTOL_LAND
         94,  # NAV_PAYLOAD_PLACE
+        188,  # DO_RETURN_PATH_START
         189,  # DO_LAND_START
         191,  # DO_GO_AROUND
+        195,  # DO_SET_ROI_LOCATION
         201,  # DO_SET_ROI
     }
 )

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from enum import StrEnum, auto
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.messages import Heartbeat, MissionResult, ModeFlag, Statustext
+from mavlink_bridge.messages import Heartbeat, MissionResult, ModeFlag
 from mavlink_bridge.protocol.download import RIVAL_PATIENCE_S, Download, DownloadOutcome
 from mavlink_bridge.protocol.limits import Limits
 from mavlink_bridge.protocol.round_trip import RoundTrip
 from mavlink_bridge.protocol.stored_form import Difference, differences, is_unfinished_write
 from mavlink_bridge.protocol.table_machine import TableMachine
+from mavlink_bridge.protocol.texts import Reasons
 from mavlink_bridge.protocol.transitions import (
     VERIFIED_UPLOAD,
     DownloadState,
@@ -33,7 +34,6 @@ MOST_PUSHES = 4
 MOST_RESTORES = 3
 _HEARTBEAT_PATIENCE_S = 10.0
 _FRESH_S = 3.0  # a heartbeat comes every second
-_MOST_TEXTS = 12
 
 
 class OutcomeKind(StrEnum):
@@ -77,7 +77,7 @@ class VerifiedUploadOutcome:
     item : int, optional
         The item it refused, for missions with home at 0.
     texts : tuple of str
-        STATUSTEXTs that came while items were sent, or the limit that the list breaks.
+        STATUSTEXTs that came while items were sent and may be the reason of a refusal, or the limit that the list breaks.
     differences : tuple of Difference
         Where what is on the vehicle differs from what was wanted, as last read.
     backup : tuple of MissionItem, optional
@@ -170,7 +170,7 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         self._pushes = 0
         self._restores = 0
         self._failed_read: DownloadOutcome | None = None
-        self._texts: list[str] = []
+        self._reasons = Reasons(peer, is_about_list=True)
         self._problem: str | None = None
         self._check_until_s = 0.0
         self._held = Held.UNKNOWN
@@ -212,7 +212,7 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
             if refusal
             else self._read_result(),
             item=refusal.item if refusal else None,
-            texts=(self._problem,) if self._problem else tuple(self._texts),
+            texts=(self._problem,) if self._problem else self._reasons.texts,
             differences=() if found is None else self._differences(self._wanted, found),
             backup=self._old,
             found=found,
@@ -277,13 +277,11 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         """Take a frame; what is not for this machine is ignored."""
         if self.is_done or not self._peer.accepts(frame):
             return
+        self._reasons.take(frame, now_s)
         if isinstance(frame.message, Heartbeat):
             self._is_active = _is_armed_in_auto(frame.message)
             self._active_known_s = now_s
             self._check_vehicle(now_s)
-        elif isinstance(frame.message, Statustext):
-            if self._pushes and len(self._texts) < _MOST_TEXTS and frame.message.text not in self._texts:
-                self._texts.append(frame.message.text)
         elif part := self._download or self._upload:
             part.receive(frame, now_s)
             self._advance(now_s)
@@ -345,10 +343,11 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
 
     def _push_wanted(self, window: int, now_s: float) -> None:
         self._pushes += 1
-        self._texts.clear()
+        self._reasons.ask()
         self._start_pushing(self._wanted, window, now_s)
 
     def _take_push(self, pushed: UploadOutcome, now_s: float) -> None:
+        self._reasons.answered(now_s)
         self._pushed_before, self._pushed = self._pushed, pushed
         if self._move(VerifiedUploadEvent.PUSH_ENDED):
             self._start_reading(now_s)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.messages import CommandInt, CommandLong, MavResult, Message
@@ -18,6 +19,16 @@ if TYPE_CHECKING:
 
 REQUEST_AUTOPILOT_CAPABILITIES = 520
 """MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES, the old way to ask for AUTOPILOT_VERSION."""
+
+_WHOLE: dict[int, tuple[str, ...]] = {
+    Command.DO_SET_MODE: ("param2",),
+    Command.DO_SET_MISSION_CURRENT: ("param1",),
+    Command.SET_MESSAGE_INTERVAL: ("param1", "param2"),
+    Command.REQUEST_MESSAGE: ("param1",),
+    Command.DO_REPOSITION: ("param2",),
+    Command.DO_CHANGE_SPEED: ("param2",),
+}
+"""The parameters that have to be a number."""
 
 _CHANGE_MODE = 1
 _LOCAL_FRAMES = (CoordinateFrame.LOCAL_NED, CoordinateFrame.MISSION)
@@ -56,6 +67,8 @@ class Commands:
 
     def execute(self, command: CommandLong | CommandInt, now_s: float) -> tuple[MavResult, list[Message]]:
         """Do a command; give its result and what else is to be sent."""
+        if not all(math.isfinite(getattr(command, name)) for name in _WHOLE.get(command.command, ())):
+            return MavResult.DENIED, []  # what a microcontroller makes of NaN as a whole number is its own
         if command.command == Command.DO_REPOSITION:
             if isinstance(command, CommandLong):
                 return MavResult.UNSUPPORTED, []

@@ -4,16 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from mavlink_bridge.messages import MissionResult
 from mavlink_bridge.simulator.parameters import float32
+from mavlink_bridge.simulator.stored_commands import KEPT, NAN_ALLOWED, PLACED, kept_beyond_params, uint8
 from missions.items import Command, CoordinateFrame, MissionItem
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-Params = tuple[float, float, float, float]
 
 MAX_ALT_M = 83_000.0
 """Beyond it ArduPilot's Location cannot hold an altitude."""
@@ -22,7 +17,6 @@ _RELATIVE_FRAMES = (CoordinateFrame.GLOBAL_RELATIVE_ALT, CoordinateFrame.GLOBAL_
 _ABSOLUTE_FRAMES = (CoordinateFrame.GLOBAL, CoordinateFrame.GLOBAL_INT, CoordinateFrame.MISSION)
 _TERRAIN_FRAMES = (CoordinateFrame.GLOBAL_TERRAIN_ALT, CoordinateFrame.GLOBAL_TERRAIN_ALT_INT)
 _FENCE_FRAMES = (*_RELATIVE_FRAMES, *_TERRAIN_FRAMES, CoordinateFrame.GLOBAL, CoordinateFrame.GLOBAL_INT)
-_NAN_IN_PARAM4 = (Command.NAV_WAYPOINT, Command.NAV_LAND, Command.NAV_TAKEOFF)
 _FENCE_VERTICES = (Command.FENCE_POLYGON_VERTEX_INCLUSION, Command.FENCE_POLYGON_VERTEX_EXCLUSION)
 _FENCE_CIRCLES = (Command.FENCE_CIRCLE_INCLUSION, Command.FENCE_CIRCLE_EXCLUSION)
 _STORED_AS: dict[int, int] = {
@@ -34,6 +28,9 @@ _STORED_AS: dict[int, int] = {
 }
 """The numbers by which ArduPilot's texts name fence items (AC_PolyFence_loader; not measured)."""
 
+_RESERVED = (0, 1)
+"""ArduPilot marks 16-bit command numbers in its storage with them."""
+
 _RESULT_OF_PARAM = (
     MissionResult.INVALID_PARAM1,
     MissionResult.INVALID_PARAM2,
@@ -41,97 +38,13 @@ _RESULT_OF_PARAM = (
     MissionResult.INVALID_PARAM4,
 )
 
-PLACED = frozenset(
-    {
-        Command.NAV_WAYPOINT,
-        Command.NAV_LOITER_UNLIM,
-        Command.NAV_LOITER_TURNS,
-        Command.NAV_LOITER_TIME,
-        Command.NAV_LAND,
-        Command.NAV_TAKEOFF,
-        Command.NAV_GUIDED_ENABLE,
-        Command.DO_SET_HOME,
-    }
-)
-"""Mission commands that ArduPilot keeps with a place."""
-
-
-def _kept_none(_: Params) -> Params:
-    return (0.0, 0.0, 0.0, 0.0)
-
-
-def _kept_first(params: Params) -> Params:
-    return (float(_uint16(params[0])), 0.0, 0.0, 0.0)
-
-
-def _kept_float(params: Params) -> Params:
-    return (float32(params[0]), 0.0, 0.0, 0.0)
-
-
-def _kept_three(params: Params) -> Params:
-    return (float(int(params[0])), float32(params[1]), float32(params[2]), 0.0)
-
-
-def _kept_radius(params: Params) -> Params:
-    return (0.0, 0.0, math.copysign(_uint16(abs(params[2])), params[2]), 0.0)
-
-
-def _kept_turns(params: Params) -> Params:
-    # Turns and radius share 16 bits: parts of one turn count in 256ths, a radius beyond 255 m in tens of metres.
-    turns = int(params[0] * 256) / 256 if 0 < params[0] < 1 else float(min(255, _uint16(params[0])))
-    radius_m = abs(params[2])
-    kept_m = int(radius_m) if radius_m <= 255 else 10 * int(min(255.0, radius_m * 0.1))
-    return (turns, 0.0, math.copysign(kept_m, params[2]), float(params[3] > 0))
-
-
-def _kept_time(params: Params) -> Params:
-    return (float(_uint16(params[0])), 0.0, -1.0 if params[2] < 0 else 1.0, float(params[3] > 0))
-
-
-def _kept_land(params: Params) -> Params:
-    return (float(_uint16(params[0])), 0.0, 0.0, -1.0 if params[3] < 0 else 1.0)
-
-
-def _kept_yaw_speed(params: Params) -> Params:
-    return (float32(params[0]), float32(params[1]), float(_uint8(params[2])), 0.0)
-
-
-def _kept_jump(params: Params) -> Params:
-    return (float(_uint16(params[0])), float(int(params[1])), 0.0, 0.0)
-
-
-def _kept_all(params: Params) -> Params:
-    return (float32(params[0]), float32(params[1]), float32(params[2]), float32(params[3]))
-
-
-_KEPT: dict[int, Callable[[Params], Params]] = {
-    Command.NAV_WAYPOINT: _kept_first,
-    Command.NAV_LOITER_UNLIM: _kept_radius,
-    Command.NAV_LOITER_TURNS: _kept_turns,
-    Command.NAV_LOITER_TIME: _kept_time,
-    Command.NAV_RETURN_TO_LAUNCH: _kept_none,
-    Command.NAV_LAND: _kept_land,
-    Command.NAV_TAKEOFF: _kept_first,
-    Command.NAV_GUIDED_ENABLE: _kept_first,
-    Command.NAV_DELAY: _kept_all,
-    Command.NAV_SET_YAW_SPEED: _kept_yaw_speed,
-    Command.CONDITION_DELAY: _kept_float,
-    Command.CONDITION_DISTANCE: _kept_float,
-    Command.DO_JUMP: _kept_jump,
-    Command.DO_CHANGE_SPEED: _kept_three,
-    Command.DO_SET_HOME: _kept_first,
-    Command.DO_SET_REVERSE: _kept_first,
-    Command.DO_FENCE_ENABLE: _kept_first,
-}
-"""What ArduPilot keeps of a mission command's four parameters; a command that is not here is unsupported."""
-
 
 def mission_item_result(item: MissionItem, count: int) -> MissionResult:
     """Tell whether a mission item is taken into a list that will have ``count`` items, home included."""
-    if item.command not in _KEPT:
-        return MissionResult.UNSUPPORTED
+    if item.command not in KEPT:
+        return MissionResult.INVALID if item.command in _RESERVED else MissionResult.UNSUPPORTED
     for index, param in enumerate(item.params):
-        nan_allowed = index == 3 and item.command in _NAN_IN_PARAM4
+        nan_allowed = (item.command, index) in NAN_ALLOWED
         if math.isinf(param) or (math.isnan(param) and not nan_allowed):
             return _RESULT_OF_PARAM[index]
     if item.command == Command.DO_JUMP and not 0 < item.params[0] < count:
@@ -144,9 +57,9 @@ def mission_item_result(item: MissionItem, count: int) -> MissionResult:
 
 def kept_mission_item(item: MissionItem) -> MissionItem:
     """Give a mission item as it reads back: frame 3, 0 or 10, altitude in whole centimetres, unused parameters 0."""
-    params = _KEPT[item.command](item.params)
+    params = KEPT[item.command](item.params)
     if item.command not in PLACED:
-        return MissionItem(item.command, CoordinateFrame.GLOBAL, params)
+        return MissionItem(item.command, CoordinateFrame.GLOBAL, params, *kept_beyond_params(item))
     if item.frame in _RELATIVE_FRAMES:
         frame = CoordinateFrame.GLOBAL_RELATIVE_ALT
     elif item.frame in _TERRAIN_FRAMES:
@@ -171,7 +84,7 @@ def fence_item_result(item: MissionItem) -> MissionResult:
 def kept_fence_item(item: MissionItem) -> MissionItem:
     """Give a fence item as it reads back: frame 0, z 0, only param1."""
     if item.command in _FENCE_VERTICES:
-        param1 = float(_uint8(item.params[0]))
+        param1 = float(uint8(item.params[0]))
     else:
         param1 = float32(item.params[0]) if item.command in _FENCE_CIRCLES else 0.0
     return MissionItem(
@@ -261,11 +174,3 @@ def _place_result(item: MissionItem, max_alt_m: float, frame_known: bool) -> Mis
 
 def _on_earth(item: MissionItem) -> bool:
     return abs(item.lat_e7) <= 900_000_000 and abs(item.lon_e7) <= 1_800_000_000
-
-
-def _uint16(value: float) -> int:
-    return max(0, min(65_535, int(value)))
-
-
-def _uint8(value: float) -> int:
-    return int(value) & 0xFF if math.isfinite(value) else 0

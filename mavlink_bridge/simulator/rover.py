@@ -221,15 +221,12 @@ class Rover:
             return
         clearance_m = self._area.clearance_m(self.body.position_m)
         was_breached, self.breached = self.breached, clearance_m < 0
-        if was_breached and not self.breached:
-            self.texts.append((6, "Fence breach cleared"))
         if not self.breached or was_breached:
             return
         self.breaches += 1
         self.breach_time_s = now_s
         if not self.is_armed:
             return
-        self.texts.append((2, "Fence breached"))
         action = int(self.parameters["FENCE_ACTION"])
         if action == 0:
             return

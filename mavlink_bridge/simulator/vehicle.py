@@ -18,7 +18,7 @@ from mavlink_bridge.simulator.item_lists import FenceList, ItemList, MissionList
 from mavlink_bridge.simulator.mission_server import MissionServer
 from mavlink_bridge.simulator.parameters import ParameterStore, kind
 from mavlink_bridge.simulator.rover import TICK_S, Rover
-from mavlink_bridge.simulator.streams import DEFAULT_RATES_HZ, Streams
+from mavlink_bridge.simulator.streams import DEFAULT_RATES_HZ, FENCE_STATUS, HEARTBEAT, Streams
 from mavlink_bridge.simulator.telemetry import State, telemetry
 from missions.geo import from_e7
 from missions.items import with_home
@@ -200,6 +200,7 @@ class SimulatedVehicle:
         self._streams = Streams(DEFAULT_RATES_HZ if self.config.streams else {}, boot_s)
         self._outbox += [m.Statustext(6, text) for text in _BOOT_TEXTS]
         self.rover.mode = Mode.MANUAL if self._is_ready(boot_s) else Mode.INITIALISING
+        self._told_mode, self._told_breaches = self.rover.mode, self.rover.breaches
 
     def _is_ready(self, now_s: float) -> bool:
         return now_s - self._boot_s >= self.config.ready_after_s
@@ -238,6 +239,7 @@ class SimulatedVehicle:
         self._outbox += [m.MissionItemReached(seq) for seq in rover.reached]
         rover.texts.clear()
         rover.reached.clear()
+        self._tell_changes(now_s)
         queue = self._parameter_queue
         self._outbox += [
             self._parameter(name, self.parameters.index_of(name)) for name in queue[:PARAMETERS_A_TICK]
@@ -247,6 +249,15 @@ class SimulatedVehicle:
             message = self._report(message_id, now_s)
             if message is not None:
                 self._outbox.append(message)
+
+    def _tell_changes(self, now_s: float) -> None:
+        """Tell at once of a breach, for which Rover has no text, and of another mode: in ArduPilot's usual order."""
+        rover = self.rover
+        if rover.breaches != self._told_breaches:
+            self._outbox += filter(None, [self._report(FENCE_STATUS, now_s)])
+        if rover.mode != self._told_mode:
+            self._outbox += filter(None, [self._report(HEARTBEAT, now_s)])
+        self._told_mode, self._told_breaches = rover.mode, rover.breaches
 
     def _take(self, frame: m.Frame, now_s: float) -> None:
         message = frame.message

@@ -305,7 +305,6 @@ WRONG: list[tuple[tuple[str, ...], int, str]] = [
     (("bridge", "--connect", DEAD, "--target", "there"), INPUT, "there"),
     (("bridge", "--connect", DEAD, "--clearance", "-1"), USAGE, "--clearance"),
     (("bridge", "--connect", DEAD, "--vehicle", "words.parm"), INPUT, "words.parm"),
-    (("bridge", "--connect", DEAD, "--log", "nofence.tlog"), USAGE, "nofence.tlog"),
     (("bridge", "--connect", DEAD, "--log", "missing/run.tlog"), INPUT, "missing"),
     # the simulated rover
     (("sim", "--home", "here"), INPUT, "here"),

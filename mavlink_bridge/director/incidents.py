@@ -1,0 +1,273 @@
+"""What the autopilot tells of breaches and failsafes, with a drive of ours or without; and which change of mode it answers them with.
+
+A breach is told by FENCE_STATUS, which ArduPilot sends at once and then in its stream; Rover gives no text of it, other vehicles do. A failsafe is
+told by a text: "Radio Failsafe" and "GCS Failsafe" before the mode is switched, "EKF failsafe" after it, "Crash: Going to HOLD", "Battery 1 is low
+…" (Rover's fence.cpp, failsafe.cpp, ekf_check.cpp, crash_check.cpp; AP_BattMonitor). The heartbeat of the new mode goes out on its own and
+may come before or after: neither order may lead to a claim that is not true.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from mavlink_bridge import messages as m
+from mavlink_bridge.director.events import EventName
+from mavlink_bridge.rover import HOLD_MODE, LOITER_MODE, RTL_MODE, SMART_RTL_MODE, mode_name
+from missions.fence_place import fence_place
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from mavlink_bridge.director.takeover import Takeover
+    from mavlink_bridge.director.voice import Voice
+    from missions.fence_place import FencePlace
+    from missions.request import Request
+    from missions.situation import Known, Pose, Situation
+
+_ANSWERED_WITHIN_S = 1.5
+"""ArduPilot switches in the same turn of its loop; a heartbeat tells of it at once, and where that is lost, the next one a second later."""
+
+_SAME_S = 2.0
+"""A text and a FENCE_STATUS, or two texts on one failsafe, that come so soon after another tell of the same."""
+
+_AT_MOST_EVERY_S = 1.0
+"""A vehicle on a fence's line, or one that means harm, may count many breaches a second."""
+
+_OLD_S = 2.0
+"""A position older than this is said to be: it comes four times a second."""
+
+_TOLD_LATE_M = 2.0
+"""How far before a fence the position told last may lie at a breach: a quarter of a second at 5 m/s, and its own error."""
+
+_DISARMING = -1
+_BREACH = "fence breach"
+_BREACH_TYPES = {1: "minimum altitude", 2: "maximum altitude", 3: "boundary"}
+"""FENCE_BREACH; ArduPilot calls circles and polygons alike boundary."""
+
+_ACTIONS: dict[int, frozenset[int]] = {
+    0: frozenset(),
+    1: frozenset({RTL_MODE, HOLD_MODE}),
+    2: frozenset({HOLD_MODE}),
+    3: frozenset({SMART_RTL_MODE, RTL_MODE, HOLD_MODE}),
+    4: frozenset({SMART_RTL_MODE, HOLD_MODE}),
+    5: frozenset({_DISARMING}),
+    6: frozenset({LOITER_MODE, HOLD_MODE}),
+}
+"""What FENCE_ACTION and FS_ACTION let a Rover do: it goes to HOLD where it cannot do what is asked, or is more than 100 m outside."""
+
+_ANY_ACTION = frozenset({RTL_MODE, SMART_RTL_MODE, HOLD_MODE, LOITER_MODE, _DISARMING})
+_RADIO, _GCS, _EKF, _BATTERY = "radio failsafe", "ground station failsafe", "EKF failsafe", "battery failsafe"
+_CRASH, _TERMINATION = "crash check", "termination"
+_FAILSAFES: tuple[tuple[re.Pattern[str], str], ...] = (
+    (re.compile(r"(radio|throttle) failsafe$", re.IGNORECASE), _RADIO),
+    (re.compile(r"gcs failsafe$", re.IGNORECASE), _GCS),
+    (re.compile(r"ekf failsafe$", re.IGNORECASE), _EKF),
+    (re.compile(r"battery \d+ is (low|critical)|low battery|battery failsafe", re.IGNORECASE), _BATTERY),
+    (re.compile(r"crash: ", re.IGNORECASE), _CRASH),
+    (re.compile(r"terminating due to ", re.IGNORECASE), _TERMINATION),
+    (re.compile(r"[\w ]{1,30}\bfailsafe$", re.IGNORECASE), "failsafe"),
+)
+"""Texts of failsafes, and what they are called."""
+
+_ACTIONS_OF = {
+    _EKF: frozenset({HOLD_MODE}),
+    _CRASH: frozenset({HOLD_MODE, _DISARMING}),
+    _TERMINATION: frozenset({HOLD_MODE, _DISARMING}),
+}
+_FS_ACTION = frozenset({_RADIO, _GCS})
+"""Failsafes whose answer is FS_ACTION's."""
+
+_VARIANCE = re.compile(r"ekf variance$", re.IGNORECASE)
+"""Comes before the change of mode of an EKF failsafe, whose own text comes after it."""
+
+_CONTINUING = re.compile(r"failsafe - continuing", re.IGNORECASE)
+_BREACH_TEXT = re.compile(r".*\bfences? breached|fence breach(ed)?$", re.IGNORECASE)
+
+
+@dataclass(frozen=True, slots=True)
+class Cause:
+    """Something that the autopilot may answer by switching its mode or disarming.
+
+    Parameters
+    ----------
+    reason : str
+        What.
+    heard_s : float
+        When it was heard.
+    modes : frozenset of int
+        The modes that it may answer with.
+    """
+
+    reason: str
+    heard_s: float
+    modes: frozenset[int]
+
+    def explains(self, takeover: Takeover) -> bool:
+        """Return whether the autopilot answers it with just that."""
+        return (_DISARMING if takeover.mode is None else takeover.mode) in self.modes
+
+
+class Incidents:
+    """Hears what befalls the vehicle and tells it.
+
+    Parameters
+    ----------
+    voice : Voice
+        Whom to tell.
+    request : Request
+        What is asked of routes; it says by which margins the ground is laid out.
+    """
+
+    def __init__(self, voice: Voice, request: Request) -> None:
+        self._voice = voice
+        self._request = request
+        self._causes: dict[str, Cause] = {}
+        self._unexplained: tuple[Takeover, float] | None = None
+        self._count: int | None = None
+        self._is_breached = False
+        self._breaches = 0
+        self._breach_told_s = self._breach_text_s = -math.inf
+        self._told_s: dict[str, float] = {}
+
+    def receive(self, message: m.Message, situation: Situation, now_s: float) -> None:
+        """Take a message of the vehicle's autopilot; the situation after it is given."""
+        if isinstance(message, m.FenceStatus):
+            self._take_fence_status(message, situation, now_s)
+        elif isinstance(message, m.Statustext):
+            self._take_text(message.text.strip(), situation, now_s)
+
+    def forget(self) -> None:
+        """Take notice that the vehicle was switched off and on: it counts anew."""
+        self._count = None
+        self._is_breached = False
+        self._causes.clear()
+
+    def cause_of(self, takeover: Takeover, now_s: float) -> Cause | None:
+        """Return what the autopilot has answered with a takeover; None where nothing was heard that explains it (yet)."""
+        found = [cause for cause in self._fresh(now_s) if cause.explains(takeover)]
+        self._unexplained = (takeover, now_s) if not found and takeover.asker is None else None
+        return min(found, key=lambda cause: cause.heard_s, default=None)
+
+    def heard_before(self, now_s: float) -> Cause | None:
+        """Return the newest thing heard that the autopilot may answer, if it was just now."""
+        return max(self._fresh(now_s), key=lambda cause: cause.heard_s, default=None)
+
+    def _fresh(self, now_s: float) -> list[Cause]:
+        return [cause for cause in self._causes.values() if now_s <= cause.heard_s + _ANSWERED_WITHIN_S]
+
+    def _note(self, cause: Cause) -> str | None:
+        """Remember a cause; return the name of the mode that the vehicle went to for it, where that was seen before it."""
+        self._causes[cause.reason] = cause
+        if self._unexplained is None:
+            return None
+        takeover, seen_s = self._unexplained
+        if cause.heard_s > seen_s + _ANSWERED_WITHIN_S or not cause.explains(takeover):
+            return None
+        self._unexplained = None
+        return "disarmed" if takeover.mode is None else mode_name(takeover.mode)
+
+    # Breaches
+
+    def _take_fence_status(self, status: m.FenceStatus, situation: Situation, now_s: float) -> None:
+        before, was_breached = self._count, self._is_breached
+        self._count, self._is_breached = status.breach_count, bool(status.breach_status)
+        if before is None:
+            if self._is_breached:
+                self._tell_breach(1, status.breach_type, situation, now_s, is_new=False)
+            return
+        new = status.breach_count - before
+        if new <= 0:  # the count has started anew where it is less
+            new = int(self._is_breached and not was_breached)
+        if new and now_s <= self._breach_text_s + _SAME_S:  # its text has told of it
+            self._breach_text_s = -math.inf
+            new -= 1
+        if new and now_s < self._breach_told_s + _AT_MOST_EVERY_S:  # counted with the next status after that
+            self._count, self._is_breached = before, was_breached
+            self._note(Cause(_BREACH, now_s, _actions(situation.parameters, "FENCE_ACTION")))
+        elif new:
+            self._tell_breach(new, status.breach_type, situation, now_s)
+
+    def _take_breach_text(self, situation: Situation, now_s: float) -> None:
+        if now_s > self._breach_told_s + _SAME_S:
+            self._tell_breach(1, None, situation, now_s)
+            self._breach_text_s = now_s
+
+    def _tell_breach(
+        self, new: int, breach_type: int | None, situation: Situation, now_s: float, *, is_new: bool = True
+    ) -> None:
+        """Tell a breach, with its place and fence."""
+        self._breach_told_s = now_s
+        self._breaches += new
+        mode = None
+        if is_new:
+            mode = self._note(Cause(_BREACH, now_s, _actions(situation.parameters, "FENCE_ACTION")))
+        pose = situation.pose
+        place = fence_place(situation, self._request, pose.value.position) if pose is not None else None
+        since = "" if is_new else ", since before it was listened to"
+        answer = f"; the autopilot answered it with {mode}" if mode is not None else ""
+        self._voice.tell(
+            now_s,
+            EventName.BREACH,
+            f"{_BREACH} {self._breaches}{since}{_by(place)}{_at(pose, now_s)}{answer}",
+            self._breaches,
+            list(pose.value.position) if pose is not None else None,
+            place.fence if place is not None else None,
+            round(place.beyond_m, 2) if place is not None else None,
+            None if breach_type is None else _BREACH_TYPES.get(breach_type, "unknown"),
+            mode,
+        )
+
+    # Failsafes
+
+    def _take_text(self, text: str, situation: Situation, now_s: float) -> None:
+        if _BREACH_TEXT.match(text):
+            self._take_breach_text(situation, now_s)
+        elif _CONTINUING.match(text):  # then it does not switch
+            self._causes.clear()
+        elif _VARIANCE.match(text):
+            self._note(Cause(_EKF, now_s, _ACTIONS_OF[_EKF]))
+        elif (
+            reason := next((name for pattern, name in _FAILSAFES if pattern.match(text)), None)
+        ) is not None:
+            self._tell_failsafe(reason, text, situation, now_s)
+
+    def _tell_failsafe(self, reason: str, text: str, situation: Situation, now_s: float) -> None:
+        modes = _ACTIONS_OF.get(reason, _ANY_ACTION)
+        if reason in _FS_ACTION and "FS_ACTION" in situation.parameters:
+            modes = _actions(situation.parameters, "FS_ACTION")
+        mode = self._note(Cause(reason, now_s, modes))
+        is_told = now_s <= self._told_s.get(reason, -math.inf) + _SAME_S
+        self._told_s[reason] = now_s
+        if is_told and mode is None:
+            return
+        answer = f"; the autopilot answered it with {mode}" if mode is not None else ""
+        self._voice.tell(now_s, EventName.FAILSAFE, f"{reason}: {text}{answer}", reason, mode)
+
+
+def _by(place: FencePlace | None) -> str:
+    """Say by which fence a place is."""
+    if place is None:
+        return ""
+    if place.beyond_m > 0:
+        return f", {place.beyond_m:.1f} m beyond {place.fence}"
+    if place.beyond_m >= -_TOLD_LATE_M:
+        return f", at {place.fence} ({-place.beyond_m:.1f} m before its line by the position told last)"
+    away_m = -place.beyond_m
+    return f"; no fence known here is broken there, the nearest is {place.fence}, {away_m:.1f} m away"
+
+
+def _at(pose: Known[Pose] | None, now_s: float) -> str:
+    """Say where it was, and how old that is where it is not of now."""
+    if pose is None:
+        return ""
+    age_s = 0.0 if pose.time_s is None else now_s - pose.time_s
+    return f", at {pose.value.position}" + (f" ({age_s:.0f} s before)" if age_s > _OLD_S else "")
+
+
+def _actions(parameters: Mapping[str, float], name: str) -> frozenset[int]:
+    """Return what a parameter lets the vehicle do; nothing where it is not known or means nothing, for then nothing can be claimed."""
+    value = parameters.get(name, math.nan)
+    return _ACTIONS.get(int(value), frozenset()) if math.isfinite(value) else frozenset()

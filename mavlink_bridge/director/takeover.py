@@ -1,0 +1,89 @@
+"""What was done to the vehicle's mode or arming that is none of our doing, and what can be said of who did it.
+
+Three answers, and no guess among them: a ground station, where its command was overheard; the autopilot itself, where a breach or a failsafe
+was heard that it answers so; else nobody knows, for a transmitter sends no MAVLink.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+from mavlink_bridge.rover import mode_name
+
+if TYPE_CHECKING:
+    from mavlink_bridge.director.incidents import Cause
+
+
+class Doer(StrEnum):
+    """Who took the vehicle, as far as it is known."""
+
+    GROUND_STATION = "ground_station"
+    AUTOPILOT = "autopilot"
+    UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True, slots=True)
+class Takeover:
+    """A change of mode or arming that is not ours.
+
+    Parameters
+    ----------
+    mode : int, optional
+        The mode that the vehicle is in, or was asked to go to; None: it was disarmed.
+    asker : tuple of int, optional
+        System and component whose command was overheard; None: the vehicle's heartbeat tells of it.
+    """
+
+    mode: int | None
+    asker: tuple[int, int] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Account:
+    """What is told of a takeover.
+
+    Parameters
+    ----------
+    text : str
+        For people.
+    by : Doer
+        Who did it.
+    reason : str, optional
+        What the autopilot answered with it, or whose command was overheard.
+    """
+
+    text: str
+    by: Doer
+    reason: str | None
+
+
+def account_of(takeover: Takeover, cause: Cause | None, heard: Cause | None) -> Account:
+    """Return what can be said of a takeover.
+
+    Parameters
+    ----------
+    takeover : Takeover
+        What was done.
+    cause : Cause, optional
+        What the autopilot answers with just that, heard just before.
+    heard : Cause, optional
+        What else was heard just before; it explains nothing for certain.
+    """
+    if takeover.asker is not None:
+        who = f"system {takeover.asker[0]} component {takeover.asker[1]}"
+        return Account(f"{who} {_done(takeover)}", Doer.GROUND_STATION, who)
+    if cause is not None:
+        return Account(
+            f"the autopilot {_done(takeover)} itself: {cause.reason}", Doer.AUTOPILOT, cause.reason
+        )
+    what = "was disarmed" if takeover.mode is None else f"went to {mode_name(takeover.mode)}"
+    before = f" ({heard.reason} was heard just before)" if heard is not None else ""
+    return Account(f"the vehicle {what} by itself or by somebody unseen{before}", Doer.UNKNOWN, None)
+
+
+def _done(takeover: Takeover) -> str:
+    if takeover.mode is None:
+        return "disarmed the vehicle"
+    return f"switched the vehicle to {mode_name(takeover.mode)}"

@@ -1,0 +1,82 @@
+"""What the vehicle says for its reasons: the STATUSTEXTs that have to do with a refusal, told from all else that it says meanwhile."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import TYPE_CHECKING
+
+from mavlink_bridge.messages import Statustext
+
+if TYPE_CHECKING:
+    from mavlink_bridge.messages import Frame
+    from mavlink_bridge.protocol.peer import Peer
+
+MOST_TEXTS = 8
+
+_MOST_SEVERITY = 5
+"""MAV_SEVERITY_NOTICE: ArduPilot gives reasons as notices ("No Mission. Can't set AUTO.") and graver; what is lighter says what goes well."""
+
+_LATE_S = 1.0
+"""ArduPilot queues its texts, so that a reason may come after the answer; it empties the queue several times a second."""
+
+_NOISE = re.compile(
+    r"flight plan received|fence indexed|(rally points? received)|got mission_request"
+    r"|mission: \d|reached waypoint|mission complete|auto mission changed|throttle (dis)?armed|arducopter|ardurover|ardupilot ready"
+    r"|pbpp:|#",
+    re.IGNORECASE,
+)
+"""What ArduPilot says of success and of its way, whatever severity it gives it."""
+
+_OF_THE_VEHICLE = re.compile(
+    r"prearm|arm:|arming|battery|ekf|ahrs|dcm|gps|imu|compass|mag|baro|rc\d|radio|crash|logging|chan\d"
+    r"|.*\bfailsafe\b|.*\bfences? (in [\d.]+ ?m|breached|cleared)|fence breach|internal error",
+    re.IGNORECASE,
+)
+"""What it says of its own state, again and again: no reason to refuse a list."""
+
+
+class Reasons:
+    """The texts that may say why a request was refused, from the request until shortly after its answer.
+
+    Parameters
+    ----------
+    peer : Peer
+        The vehicle; what others say is no reason of its.
+    is_about_list : bool
+        Whether a mission, fence or rally list is asked for: then the vehicle's own state (arming, battery, EKF) is no reason either.
+    """
+
+    def __init__(self, peer: Peer, *, is_about_list: bool = False) -> None:
+        self._peer = peer
+        self._is_about_list = is_about_list
+        self._texts: list[str] = []
+        self._until_s = -math.inf
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """What was said, each once, in order."""
+        return tuple(self._texts)
+
+    def ask(self) -> None:
+        """Take notice of a request: what was said before it is not about it."""
+        self._texts.clear()
+        self._until_s = math.inf
+
+    def answered(self, now_s: float) -> None:
+        """Take notice of its answer: only what is said shortly afterwards is still about it."""
+        self._until_s = min(self._until_s, now_s + _LATE_S)
+
+    def take(self, frame: Frame, now_s: float) -> None:
+        """Take a frame."""
+        message = frame.message
+        if not isinstance(message, Statustext) or not self._peer.accepts(frame) or now_s > self._until_s:
+            return
+        is_news = message.text not in self._texts and len(self._texts) < MOST_TEXTS
+        if is_news and self._may_be_reason(message):
+            self._texts.append(message.text)
+
+    def _may_be_reason(self, message: Statustext) -> bool:
+        if message.severity > _MOST_SEVERITY or not message.text.strip() or _NOISE.match(message.text):
+            return False
+        return not (self._is_about_list and _OF_THE_VEHICLE.match(message.text))

@@ -1,0 +1,11 @@
+"""Numbers in texts, short whatever they are: what a vehicle or a file tells may be anything."""
+
+from __future__ import annotations
+
+_LONG_M = 1e7
+"""Beyond the Earth's own size digits mean nothing."""
+
+
+def metres(value_m: float) -> str:
+    """Return a length in metres for people: to the centimetre, and short where it is no length on Earth."""
+    return f"{value_m:.2f} m" if abs(value_m) < _LONG_M else f"{value_m:.3g} m"

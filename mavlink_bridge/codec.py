@@ -159,6 +159,8 @@ def to_frame(raw: Any) -> Frame | None:  # noqa: ANN401 - pymavlink ships no typ
         values = [*(getattr(raw, field) for field in raw.fieldnames), *_ids_in(raw)]
     else:
         values = [getattr(raw, field) for field in _FIELDS[name]]
+        if name in _WITH_BYTES:
+            values = [bytes(value) if isinstance(value, list) else value for value in values]
     return Frame(raw.get_srcSystem(), raw.get_srcComponent(), message_class(*values))
 
 
@@ -189,6 +191,12 @@ def _blank(dialect_class: Any, field: str) -> Any:  # noqa: ANN401 - pymavlink s
     return [0] * length if length else 0
 
 
+_WITH_BYTES = frozenset(
+    name
+    for name, message_class in MESSAGES.items()
+    if any(isinstance(field.default, bytes) for field in fields(message_class))
+)
+"""Messages with a row of bytes, which pymavlink gives as a list of numbers."""
 _NAMES = {message_class: name for name, message_class in MESSAGES.items()}
 _BLANKS = {
     name: {field: _blank(dialect_class, field) for field in dialect_class.fieldnames}

@@ -455,10 +455,15 @@ class PositionTargetGlobalInt(Message):
 
 @dataclass(frozen=True, slots=True)
 class AutopilotVersion(Message):
-    """AUTOPILOT_VERSION (148), its capability bits and firmware version."""
+    """AUTOPILOT_VERSION (148): its capability bits, firmware version, and what tells this board from all others.
+
+    ArduPilot leaves ``uid`` 0 and fills ``uid2``, PX4 fills both.
+    """
 
     capabilities: int
     flight_sw_version: int = 0
+    uid: int = 0
+    uid2: bytes = bytes(18)
 
 
 @dataclass(frozen=True, slots=True)

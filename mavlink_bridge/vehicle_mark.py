@@ -44,7 +44,9 @@ class VehicleMark:
     autopilot: int | None = None
 
     def __str__(self) -> str:
-        known = f"board {self.uid}" if self.uid else f"connected by {self.connection}" if self.connection else ""
+        known = (
+            f"board {self.uid}" if self.uid else f"connected by {self.connection}" if self.connection else ""
+        )
         return f"system {self.system}" + (f" ({known})" if known else "")
 
     @property

@@ -8,12 +8,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from mavlink_bridge.errors import LinkError, OutcomeError, RefusedError
-from mavlink_bridge.link import open_link
+from mavlink_bridge.link import open_link, parse_connection
 from mavlink_bridge.messages import Autopilot, CommandLong, Heartbeat, ModeFlag, RequestDataStream
+from mavlink_bridge.protocol.ask_version import AskVersion
 from mavlink_bridge.protocol.command import SendCommand
 from mavlink_bridge.protocol.find import FindVehicle
 from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.rover import AUTO_MODE, MODE_NAMES
+from mavlink_bridge.vehicle_mark import VehicleMark, uid_of
 from missions.items import Command
 
 if TYPE_CHECKING:
@@ -85,6 +87,7 @@ class Session:
 
     def __init__(self, link: Link, address: Address, show: Callable[[str, int, int], None]) -> None:
         self._link = link
+        self._connection = address.connection
         self._show = show
         finder = FindVehicle(address.system, any_vehicle=address.any_vehicle, patience_s=address.timeout_s)
         self._heartbeat: Heartbeat | None = None
@@ -116,6 +119,18 @@ class Session:
             return None
         is_armed = bool(self._heartbeat.base_mode & ModeFlag.SAFETY_ARMED)
         return is_armed and self._heartbeat.custom_mode == AUTO_MODE
+
+    def which_vehicle(self) -> VehicleMark:
+        """Ask the vehicle which one it is; return by what it is known again."""
+        asking = AskVersion(self.vehicle)
+        self.run(asking, "asking which vehicle it is")
+        autopilot = self._heartbeat.autopilot if self._heartbeat is not None else None
+        return VehicleMark(
+            self.vehicle.system,
+            uid_of(asking.version),
+            str(parse_connection(self._connection)),
+            autopilot,
+        )
 
     def run(self, machine: Machine, text: str, on_step: Callable[[], None] | None = None) -> None:
         """Run a machine to its outcome, with progress."""

@@ -54,6 +54,7 @@ class Acquaintance(TableMachine[State, Cue]):
         self.trouble: BridgeError | MissionError | None = None
         patience_s = orders.patience_s if orders.once else math.inf
         self._find = FindVehicle(orders.system, any_vehicle=orders.any_vehicle, patience_s=patience_s)
+        self.vehicle_uid = ""
         self._peer: Peer | None = None
         self._steps = Steps()
         self._voice = Voice(announce=orders.announce)
@@ -173,6 +174,7 @@ class Acquaintance(TableMachine[State, Cue]):
             if not self.orders.once:
                 self._learn(now_s)
             return
+        self.vehicle_uid = machine.uid
         self.situation = machine.merged(self.situation, now_s)
         self._all_learnt(now_s)
 

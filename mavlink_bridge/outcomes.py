@@ -155,6 +155,8 @@ def end_of_upload(
         if not is_settled:
             words += _what_is_left(writing, words[0])
             details |= {"held": str(writing.held)}
+        elif verified and not writing.machine.has_written:
+            words.append(f"the {writing.name} was not written")
     if verified:
         words.append(f"written and verified before: {', '.join(verified)}")
     keeps_kind = is_ours and is_settled and (not verified or isinstance(cause, RefusedError))

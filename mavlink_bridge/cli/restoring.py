@@ -83,7 +83,7 @@ def backups_to_restore(store: BackupStore, vehicle: VehicleMark, wanted: Restora
     if not notes:
         _say_whose(store.notes(), vehicle)
         raise UsageError(
-            f"no upload to {vehicle} was interrupted; to restore another backup give its file (they are in {store.folder})"
+            f"no upload to system {vehicle.system} was interrupted; to restore another backup give its file (they are in {store.folder})"
         )
     backups = [note.backup for note in notes if note.backup]
     for backup in backups:

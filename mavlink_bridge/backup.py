@@ -228,7 +228,7 @@ class BackupStore:
             backup = self.folder / Path(content["backup"]).name  # it cannot lead out of the folder
             if "vehicle" in content:
                 vehicle = _mark_from_json(int(name[1]), content["vehicle"])
-        except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
             trouble = BackupError(f"{path}: the note of an interrupted upload cannot be read: {error}")
             return Note(path, vehicle, mission_type, trouble=trouble)
         try:

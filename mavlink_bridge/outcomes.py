@@ -154,7 +154,7 @@ def end_of_upload(
         details |= {"list": writing.name, "backup": str(writing.backup) if writing.backup else None}
         if not is_settled:
             words += _what_is_left(writing, words[0])
-            details |= {"held": str(writing.held)}
+            details |= {"outcome": details.get("outcome", "unknown"), "held": str(writing.held)}
         elif verified and not writing.machine.has_written:
             words.append(f"the {writing.name} was not written")
     if verified:

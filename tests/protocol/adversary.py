@@ -118,6 +118,7 @@ class Adversary:
     def tell_position(self):
         lat_e7, lon_e7 = to_e7(HOME)
         self.say(m.GlobalPositionInt(int(self.now_s * 1000) % 2**32, lat_e7, lon_e7, 0, 0, 0, 0, 0, 0))
+        self.say(m.GpsRawInt(0, fix_type=3, lat=lat_e7, lon=lon_e7, alt=0, h_acc=500))
         self.say(m.HomePosition(lat_e7, lon_e7))
 
     def acknowledge(self, result, mission_type):
@@ -379,14 +380,11 @@ class TcpVehicle:
     def __init__(self, vehicle):
         self.vehicle = vehicle
         self._server = socket.create_server(("127.0.0.1", 0))
+        self.connection = f"tcp:127.0.0.1:{self._server.getsockname()[1]}"
         self._clients = {}
         self._codecs = {}
         self._ends = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
-
-    @property
-    def connection(self):
-        return f"tcp:127.0.0.1:{self._server.getsockname()[1]}"
 
     def __enter__(self):
         self._thread.start()

@@ -36,6 +36,8 @@ from typer.testing import CliRunner
 from mavlink_bridge.backup import BackupStore, read_backup
 from mavlink_bridge.cli.app import app
 from mavlink_bridge.link import Link
+from mavlink_bridge.vehicle_lock import VehicleLock
+from mavlink_bridge.vehicle_mark import VehicleMark
 from missions.formats.waypoints import format_items
 
 OLD, NEW = mission(3, 900), mission(6, 500)
@@ -259,6 +261,8 @@ def test_a_program_that_is_ended_in_mid_upload_says_so(mission_file, fields, com
         until_s = time.monotonic() + 60
         while vehicle.stored < 3 and time.monotonic() < until_s:
             time.sleep(0.02)
+        lock = VehicleLock(VehicleMark(1, connection=link.connection, autopilot=3))
+        assert lock.take().process == process.pid
         process.send_signal(signal.SIGTERM)
         said = process.communicate(timeout=60)[1]
     assert process.returncode == 130

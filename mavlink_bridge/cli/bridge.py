@@ -176,7 +176,7 @@ class _Shell:
         journal: JournalWriter | None,
     ) -> None:
         from mavlink_bridge.cli.live import BackupKeeper, PlanMaker  # noqa: PLC0415 - quick help
-        from mavlink_bridge.link import now_s, parse_connection  # noqa: PLC0415
+        from mavlink_bridge.link import parse_connection  # noqa: PLC0415
 
         self._connection = connection
         self.director = director
@@ -188,7 +188,7 @@ class _Shell:
         self._backups = BackupKeeper(
             self.director,
             str(parse_connection(connection)),
-            journal=lambda name, text: self._written.call(name, now_s(), text=text),
+            journal=lambda name, now, text: self._written.call(name, now, text=text),
         )
         self._plans = PlanMaker(self.director)
         self._typed = _typed_lines()

@@ -239,7 +239,7 @@ class BackupKeeper:
     store : BackupStore, optional
         Where; the user's state folder if not given.
     journal : callable, optional
-        Told of each call of the director before it is made: its name and text.
+        Told of each call of the director before it is made: its name, time and text.
     """
 
     def __init__(
@@ -247,7 +247,7 @@ class BackupKeeper:
         director: Director,
         connection: str = "",
         store: BackupStore | None = None,
-        journal: Callable[[str, str], None] = lambda _name, _text: None,
+        journal: Callable[[str, float, str], None] = lambda _name, _now_s, _text: None,
     ) -> None:
         self.path: Path | None = None
         self._director = director
@@ -334,8 +334,9 @@ class BackupKeeper:
             self._noted = vehicle
             self.path = self._store.begin(vehicle, MissionType.MISSION, old)
         except BridgeError as error:
-            self._journal("in_use" if isinstance(error, VehicleInUseError) else "backup_failed", str(error))
+            name = "in_use" if isinstance(error, VehicleInUseError) else "backup_failed"
+            self._journal(name, now_s, str(error))
             self._director.backup_failed(error, now_s)
         else:
-            self._journal("backup_stored", str(self.path))
+            self._journal("backup_stored", now_s, str(self.path))
             self._director.backup_stored(now_s, self.path)

@@ -39,6 +39,14 @@ def mission_file(tmp_path):
     return path
 
 
+class Overwritten(Adversary):
+    """Somebody else's list is there as soon as ours was taken."""
+
+    def finish(self, kind):
+        super().finish(kind)
+        self.lists[kind] = list(THEIRS)
+
+
 def run(link, *arguments, **options):
     command = [*map(str, arguments), "--connect", link.connection, "--timeout", "8"]
     result = CliRunner().invoke(app, command, **options)
@@ -175,6 +183,36 @@ def test_the_bridge_holds_the_lock_and_keeps_to_it(fields, mission_file):
         assert code == 0, output
     assert lock.take() is None
     lock.free()
+
+
+def test_a_replay_tells_the_same_of_an_upload_that_was_not_begun_and_of_one_that_broke_off(fields, tmp_path):
+    from mavlink_bridge.director import Orders
+    from mavlink_bridge.journal import journal_path, read_journal
+    from mavlink_bridge.replay import replay_log
+    from missions.fence import fence_to_items
+    from missions.formats import read_fence
+
+    fence = list(fence_to_items(read_fence(fields / "yard-fence.waypoints")))
+    for name, vehicle, is_locked in (
+        ("locked", Adversary(OLD, uid=b"one"), True),
+        ("foreign", Overwritten(OLD, uid=b"two"), False),
+    ):
+        vehicle.lists[MissionType.FENCE] = fence
+        log = tmp_path / f"{name}.tlog"
+        with TcpVehicle(vehicle) as link:
+            lock = VehicleLock(VehicleMark(1, b"one".hex(), link.connection, 3))
+            if is_locked:
+                lock.take()
+            arguments = ("--target", "40.0720926,-105.2286152", "--upload", "--once", "--log", log, "--json")
+            code, output = run(link, "bridge", *arguments)
+            lock.free()
+        assert code == (6 if is_locked else 7), output
+        told = [dict(event) for event in read_journal(journal_path(log)).events]
+        [failed] = [event for event in told if event["event"] == "upload_failed"]
+        assert ("process" in failed["text"]) is is_locked
+        assert ("the old list is kept in" in failed["text"]) is not is_locked
+        replayed = json.loads(json.dumps([event.as_json() for event in replay_log(log, Orders())]))
+        assert replayed == told
 
 
 @pytest.mark.parametrize("command", ["upload", "plan"])

@@ -42,15 +42,15 @@ class Holder:
     process: int | None
     since: str
 
+    def __str__(self) -> str:
+        if self.process is None:
+            return "another pbpp"
+        return f"another pbpp (process {self.process}, since {self.since} UTC)"
+
     def error(self, vehicle: VehicleMark) -> VehicleInUseError:
         """Return the error of who wanted to write meanwhile."""
-        who = (
-            "another pbpp"
-            if self.process is None
-            else f"another pbpp (process {self.process}, since {self.since} UTC)"
-        )
         return VehicleInUseError(
-            f"{who} on this computer is writing to {vehicle}; nothing was written by this one",
+            f"{self} on this computer is writing to {vehicle}; nothing was written by this one",
             process=self.process,
             since=self.since,
             advice="wait until it has ended, or end it",

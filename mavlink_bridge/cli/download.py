@@ -20,7 +20,7 @@ from mavlink_bridge.cli.common import (
     progress_bar,
     warn,
 )
-from mavlink_bridge.cli.restoring import interrupted_warnings
+from mavlink_bridge.cli.restoring import reader_warnings
 from mavlink_bridge.cli.upload import RequiredConnectOption, SigningKeyOption
 from mavlink_bridge.errors import LinkError, RefusedError, UsageError
 
@@ -71,7 +71,7 @@ def download(
     with progress_bar(quiet=quiet or json_output) as show, open_session(address, show) as session:
         store = BackupStore()
         if store.notes():  # else there is nothing to be told apart
-            warn(interrupted_warnings(store, session.which_vehicle()))
+            warn(reader_warnings(store, session.which_vehicle()))
         if what == "parameters":
             parameters = _read_parameters(session)
             items: tuple[MissionItem, ...] = ()

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from mavlink_bridge.errors import BackupError, OtherVehicleError, UsageError
+from mavlink_bridge.vehicle_lock import VehicleLock
 from mavlink_bridge.vehicle_mark import Kinship
 
 if TYPE_CHECKING:
@@ -39,6 +40,19 @@ class Restoration:
 def interrupted_warnings(store: BackupStore, vehicle: VehicleMark) -> list[str]:
     """Return which uploads to a vehicle never came to their outcome."""
     return [_warning(note, vehicle) for note in store.interrupted(vehicle)]
+
+
+def reader_warnings(store: BackupStore, vehicle: VehicleMark) -> list[str]:
+    """Return what somebody who only reads from a vehicle should know: who writes to it now, or which uploads were interrupted."""
+    lock = VehicleLock(vehicle)
+    try:
+        holder = lock.take()
+    except BackupError:  # whoever only reads needs no lock
+        holder = None
+    lock.free()
+    if holder is None:
+        return interrupted_warnings(store, vehicle)
+    return [f"{holder} on this computer is writing to {vehicle}: what is read now may be part old, part new"]
 
 
 def _warning(note: Note, vehicle: VehicleMark) -> str:

@@ -148,6 +148,11 @@ def test_an_upload_beside_another_process_says_who_writes(mission_file, tmp_path
         code, output = run(link, "upload", parameters)
         assert (code, f"process {os.getpid()}" in output) == (6, True)
         assert (link.vehicle.counts, link.vehicle.sets) == (0, 0)
+        BackupStore().begin(lock.vehicle, MissionType.MISSION, OLD)
+        code, output = run(link, "download", "mission")
+        assert code == 0
+        assert f"process {os.getpid()}" in output
+        assert "is writing to system 1" in output
         lock.free()
 
 

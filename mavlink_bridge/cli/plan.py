@@ -215,7 +215,13 @@ def plan(
         backup = None
     warnings = list(planned.warnings)
     warn(warnings)
-    written = write_outputs(planned, situation, outputs, plots, blocks=blocks)
+    try:
+        written = write_outputs(planned, situation, outputs, plots, blocks=blocks)
+    except BaseException:
+        if verified:  # what went wrong after it must not hide what was done to the vehicle
+            kept = f"; the mission before is kept in {backup}" if backup else ""
+            warn([f"the mission is on the vehicle, verified{kept}"])
+        raise
     document = {
         **plan_document(planned),
         "source": Path(str(fence or log)).name if connect is None else connect,

@@ -11,16 +11,13 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from types import FrameType
 
-_NAMES = ("SIGTERM", "SIGHUP", "SIGBREAK")
-"""SIGBREAK is Ctrl-Break on Windows, where nothing sends the others."""
+_NAMES = ("SIGTERM", "SIGBREAK")
+"""The latter is Ctrl-Break on Windows, where nothing sends the former."""
 
 
 @contextmanager
 def sigterm_as_interrupt() -> Iterator[None]:
-    """Run a block that a SIGTERM, or the end of its terminal, interrupts as Ctrl-C does.
-
-    A signal that is ignored (``nohup``) stays so.
-    """
+    """Run a block that a SIGTERM interrupts as Ctrl-C does; where it is ignored or taken already, that stays so."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -7,27 +7,40 @@ PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; 
 	"$$p" -c '$(USABLE)' >/dev/null 2>&1 && { echo "$$p"; break; }; done)
 BIN := .venv/bin
 OUT ?= demo-out
+COVERAGE_PERCENT := 98
+# A lock is complete: nothing is resolved, so that what a registry publishes tomorrow does not matter.
+LOCKED := --quiet --disable-pip-version-check --require-hashes --no-deps
+quoted = '$(subst ','\'',$(1))'
 
-.PHONY: package bench bench-bridge bench-drive bench-transfer test-foreign docs soak bench-tlog fuzz demo test lint format types walls check lock clean
+.PHONY: coverage locks package bench bench-bridge bench-drive bench-transfer test-foreign docs soak bench-tlog fuzz demo test lint format types walls check lock clean
 
 demo: .venv/run.stamp
-	$(BIN)/pbpp demo --out $(OUT)
+	$(BIN)/pbpp demo --out $(call quoted,$(OUT))
 
 test: .venv/dev.stamp
 	$(BIN)/pytest -n 2 --dist worksteal
 
 .venv/pyvenv.cfg:
 	@test -n "$(PYTHON)" || { echo "PBPP Rover needs Python 3.11 or newer with its venv module; set PYTHON=..." >&2; exit 1; }
-	$(PYTHON) -m venv .venv
+	$(call quoted,$(PYTHON)) -m venv .venv
 
 .venv/run.stamp: requirements/run.lock pyproject.toml | .venv/pyvenv.cfg
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --no-deps -r requirements/run.lock
+	$(BIN)/python -m pip install $(LOCKED) -r requirements/run.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	@touch $@
 
 .venv/dev.stamp: requirements/dev.lock .venv/run.stamp
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --no-deps -r requirements/dev.lock
+	$(BIN)/python -m pip install $(LOCKED) -r requirements/dev.lock
 	@touch $@
+
+# The parts that promises rest on: the planner, missions, and all that decides or speaks a protocol without sockets.
+PROMISING := pbpp/*,missions/*,mavlink_bridge/protocol/*,mavlink_bridge/director/*,mavlink_bridge/tlog/*,mavlink_bridge/logbook/*,mavlink_bridge/fold.py
+COVERING := tests/pbpp tests/missions tests/formats tests/picture tests/protocol tests/bridge tests/tlog tests/logbook
+
+coverage: .venv/dev.stamp
+	rm -f .coverage .coverage.*
+	$(BIN)/pytest -q -n 2 --dist worksteal --cov --cov-report= $(COVERING)
+	$(BIN)/coverage report --include "$(PROMISING)" --precision 1 --fail-under $(COVERAGE_PERCENT)
 
 lint: .venv/dev.stamp
 	$(BIN)/ruff check .
@@ -49,6 +62,9 @@ docs: .venv/dev.stamp
 	$(BIN)/python docs/generated.py
 	$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_build
 
+locks: .venv/dev.stamp
+	$(BIN)/python tools/check_locks.py $(LOCKED)
+
 package: .venv/dev.stamp
 	$(BIN)/python tools/package.py $(if $(LOWEST),--lowest)
 
@@ -58,6 +74,8 @@ lock: .venv/run.stamp
 		--generate-hashes --no-header --quiet -o requirements/run.lock
 	$(BIN)/uv pip compile pyproject.toml requirements/build.in --extra plot --extra test --extra docs --extra dev --universal \
 		--python-version 3.11 --generate-hashes --no-header --quiet -c requirements/run.lock -o requirements/dev.lock
+	$(BIN)/uv pip compile pyproject.toml requirements/build.in --extra plot --extra test --python-version 3.11 \
+		--resolution lowest-direct --generate-hashes --no-header --quiet -o requirements/lowest.lock
 
 bench: .venv/dev.stamp
 	$(BIN)/python benchmarks/planner/run.py

@@ -77,6 +77,18 @@ _DIALECT_CLASSES: dict[str, Any] = {
 }
 
 
+_WITH_ARRAYS = frozenset(
+    name
+    for name, cls in _DIALECT_CLASSES.items()
+    if any(
+        cls.array_lengths[cls.ordered_fieldnames.index(field)]
+        and cls.fieldtypes[cls.fieldnames.index(field)] != "char"
+        for field in _FIELDS[name]
+    )
+)
+"""Messages with lists of numbers, which are tuples in ours."""
+
+
 class Codec:
     """One direction-less end of a MAVLink link: its own sequence counter and receive buffer.
 
@@ -159,8 +171,8 @@ def to_frame(raw: Any) -> Frame | None:  # noqa: ANN401 - pymavlink ships no typ
         values = [*(getattr(raw, field) for field in raw.fieldnames), *_ids_in(raw)]
     else:
         values = [getattr(raw, field) for field in _FIELDS[name]]
-        if name in _WITH_BYTES:
-            values = [bytes(value) if isinstance(value, list) else value for value in values]
+    if name in _WITH_ARRAYS:
+        values = [tuple(value) if isinstance(value, list) else value for value in values]
     return Frame(raw.get_srcSystem(), raw.get_srcComponent(), message_class(*values))
 
 
@@ -191,12 +203,6 @@ def _blank(dialect_class: Any, field: str) -> Any:  # noqa: ANN401 - pymavlink s
     return [0] * length if length else 0
 
 
-_WITH_BYTES = frozenset(
-    name
-    for name, message_class in MESSAGES.items()
-    if any(isinstance(field.default, bytes) for field in fields(message_class))
-)
-"""Messages with a row of bytes, which pymavlink gives as a list of numbers."""
 _NAMES = {message_class: name for name, message_class in MESSAGES.items()}
 _BLANKS = {
     name: {field: _blank(dialect_class, field) for field in dialect_class.fieldnames}

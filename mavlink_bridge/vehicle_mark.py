@@ -76,5 +76,5 @@ def uid_of(version: AutopilotVersion | None) -> str:
     if version is None:
         return ""
     if any(version.uid2):
-        return version.uid2.rstrip(b"\0").hex()
+        return bytes(version.uid2).rstrip(b"\0").hex()
     return f"{version.uid:016x}" if version.uid else ""

@@ -28,6 +28,7 @@ GeometryT = TypeVar("GeometryT", bound=BaseGeometry)
 
 _OPEN_MARGIN_M = 100.0
 _TINY_EDGE_M = 2e-9
+_LEAST_RING = 4  # the coordinates of a triangle: the first one is repeated
 _INSIDE_M = 1e-6
 _GRID_M = 2.0**-26
 _CLEAR_GRID_M = 2.0**-29
@@ -213,7 +214,19 @@ def build_free_space(
         tidy = shapely.remove_repeated_points(free, _TINY_EDGE_M)
     except shapely.GEOSException:  # a hole no larger than that
         return snapped(FreeSpace(tuple(polygons_only(free)), clearance_m, grown))
-    return FreeSpace(tuple(polygons_only(tidy)), clearance_m, grown)
+    return FreeSpace(tuple(_without_flat_rings(polygons_only(tidy))), clearance_m, grown)
+
+
+def _without_flat_rings(polygons: Sequence[Polygon]) -> list[Polygon]:
+    """Return polygons without the rings that taking out repeated points has left with two points: they enclose nothing, and part nothing."""
+    rings = shapely.get_rings(np.array(polygons, dtype=object))
+    if not len(rings) or shapely.get_num_coordinates(rings).min() >= _LEAST_RING:
+        return list(polygons)
+    return [
+        Polygon(one.exterior, [hole for hole in one.interiors if len(hole.coords) >= _LEAST_RING])
+        for one in polygons
+        if len(one.exterior.coords) >= _LEAST_RING
+    ]
 
 
 def snapped(free: FreeSpace) -> FreeSpace:

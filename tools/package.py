@@ -1,6 +1,7 @@
 """Build wheel and sdist, look into them, install the wheel into a fresh environment and plan with it: ``make package``.
 
-``--lowest`` installs the oldest dependencies that ``pyproject.toml`` allows, otherwise those of ``requirements/run.lock``.
+``--lowest`` installs the oldest dependencies that ``pyproject.toml`` allows (``requirements/lowest.lock``; some of them have wheels for Python 3.11
+only) and runs the quick tests with them; otherwise those of ``requirements/run.lock``.
 """
 
 from __future__ import annotations
@@ -9,14 +10,11 @@ import argparse
 import email
 import json
 import os
-import re
 import shutil
 import subprocess
 import sys
 import tarfile
 import tempfile
-import tomllib
-import venv
 import zipfile
 from pathlib import Path
 
@@ -29,6 +27,7 @@ NEEDED = {
     "mavlink_bridge/py.typed",
     "mavlink_bridge/cli/data/maze-fence.waypoints",
 }
+QUICK_TESTS = ("pbpp", "missions", "formats", "picture", "protocol", "tlog", "logbook")
 START, TARGET = "40.071374,-105.229930", "40.0720926,-105.2286152"
 
 
@@ -44,7 +43,10 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         look_into_sdist(sdist, names, place)
-        install_and_plan(wheel, place, lowest=lowest)
+        python = install(wheel, place, "lowest" if lowest else "run")
+        plan(python, place)
+        if lowest:
+            test(python, place)
     print(f"good: {wheel.name}, {sdist.name}")
 
 
@@ -99,30 +101,35 @@ def look_into_sdist(sdist: Path, names: set[str], place: Path) -> None:
         assert (source / needed).is_file(), f"not in the sdist: {needed}"
 
 
-def install_and_plan(wheel: Path, place: Path, *, lowest: bool) -> None:
-    """Install into an environment of its own; run the command far from the checkout."""
-    venv.create(place / "env", with_pip=True)
+def install(wheel: Path, place: Path, lock: str) -> Path:
+    """Install the wheel and the dependencies of a lock into an environment of its own; return its interpreter."""
+    base = oldest_python() if lock == "lowest" else sys.executable
+    run(base, "-m", "venv", str(place / "env"), cwd=place)
     python = place / "env" / ("Scripts" if os.name == "nt" else "bin") / "python"
-    constraints = place / "constraints.txt"
-    constraints.write_text(lowest_versions() if lowest else locked_versions())
-    run(
-        str(python),
-        "-m",
-        "pip",
-        "install",
-        "--quiet",
-        "--disable-pip-version-check",
-        "-c",
-        str(constraints),
-        f"{wheel}[plot]",
-        cwd=place,
-    )
+    pip = (str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps")
+    run(*pip, "--require-hashes", "-r", str(ROOT / "requirements" / f"{lock}.lock"), cwd=place)
+    run(*pip, str(wheel), cwd=place)
     run(str(python), "-m", "pip", "check", "--disable-pip-version-check", cwd=place)
     print(
         run(
             str(python), "-m", "pip", "list", "--format=freeze", "--disable-pip-version-check", cwd=place
         ).replace("\n", " ")
     )
+    return python
+
+
+def oldest_python() -> str:
+    """Return an interpreter of the oldest version that is supported: the oldest dependencies have wheels for it."""
+    for name in (sys.executable, "python3.11"):
+        asked = [name, "-c", "import sys, venv, ensurepip; sys.exit(sys.version_info[:2] != (3, 11))"]
+        if shutil.which(name) and subprocess.run(asked, capture_output=True, check=False).returncode == 0:
+            return name
+    print("skipped: the oldest dependencies need Python 3.11, which is not here")
+    sys.exit(0)
+
+
+def plan(python: Path, place: Path) -> None:
+    """Run the command far from the checkout."""
     shutil.copy(ROOT / "tests" / "fields" / "yard-fence.waypoints", place / "fence.waypoints")
     pbpp = str(python.with_name("pbpp"))
     clean = {
@@ -130,10 +137,10 @@ def install_and_plan(wheel: Path, place: Path, *, lowest: bool) -> None:
         "XDG_STATE_HOME": str(place / "state"),
     }
     print(run(pbpp, "--version", cwd=place, **clean).strip())
-    plan = ["plan", "--fence", "fence.waypoints", "--start", START, "--target", TARGET]
+    options = ["plan", "--fence", "fence.waypoints", "--start", START, "--target", TARGET]
     told = run(
         pbpp,
-        *plan,
+        *options,
         "-o",
         "m.plan",
         "-o",
@@ -155,17 +162,15 @@ def install_and_plan(wheel: Path, place: Path, *, lowest: bool) -> None:
     assert (driven["arrived"], driven["breaches"], driven["verified"]) == (True, 0, True), driven
 
 
-def locked_versions() -> str:
-    """Give the lock file without its hashes: a local wheel has none."""
-    text = (ROOT / "requirements" / "run.lock").read_text()
-    return "\n".join(re.findall(r"^[\w.-]+==[^\\\n]*", text, re.MULTILINE))
-
-
-def lowest_versions() -> str:
-    """Give the oldest versions that are allowed of what is named itself."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    wanted = [*project["dependencies"], *project["optional-dependencies"]["plot"]]
-    return "\n".join(need.replace(">=", "==") for need in wanted)
+def test(python: Path, place: Path) -> None:
+    """Run the quick tests of the sdist, on its own code."""
+    (source,) = (place / "sdist").iterdir()
+    folders = [str(Path("tests") / name) for name in QUICK_TESTS]
+    done = subprocess.run(
+        [python, "-m", "pytest", "-q", "-n", "2", "--dist", "worksteal", *folders], cwd=source, check=False
+    )
+    if done.returncode:
+        sys.exit(done.returncode)
 
 
 if __name__ == "__main__":

@@ -15,8 +15,8 @@ from mavlink_bridge.cli.failing import (
     is_reader_gone,
     report,
     report_defect,
-    says_no_colour,
 )
+from mavlink_bridge.cli.terminal import echo, echo_help, says_no_colour
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -131,7 +131,7 @@ def _version(wanted: bool) -> None:  # noqa: FBT001 - typer's way
     if wanted:
         from importlib.metadata import version  # noqa: PLC0415 - quick help
 
-        typer.echo(f"pbpp {version('pbpp-rover')}")
+        echo(f"pbpp {version('pbpp-rover')}")
         raise typer.Exit
 
 
@@ -149,7 +149,7 @@ def _app(
     if says_no_colour():
         context.color = False
     if context.invoked_subcommand is None:
-        typer.echo(context.get_help())
+        echo_help(context.get_help())
         raise typer.Exit(ExitCode.USAGE)
 
 

@@ -25,6 +25,7 @@ from mavlink_bridge.cli.common import (
     warn,
 )
 from mavlink_bridge.cli.plan_request import request_from_options
+from mavlink_bridge.cli.terminal import echo, say
 from mavlink_bridge.cli.terminating import sigterm_as_interrupt
 from mavlink_bridge.cli.upload import RequiredConnectOption, SigningKeyOption
 from mavlink_bridge.errors import IdentityTakenError, LinkError, UsageError
@@ -222,7 +223,7 @@ class _Shell:
                     raise
                 wait_s = _BACKOFF_S[min(failures, len(_BACKOFF_S) - 1)]
                 failures += 1
-                typer.secho(f"link: {error}; trying again in {wait_s:g} s", err=True, fg=typer.colors.YELLOW)
+                say(f"link: {error}; trying again in {wait_s:g} s", typer.colors.YELLOW)
                 self._idle(wait_s)
 
     def _run_link(self, link: Link) -> None:
@@ -290,7 +291,7 @@ class _Shell:
         try:
             target = parse_lat_lon(line)
         except InvalidPositionError as error:
-            typer.secho(f"typed: {error}", err=True, fg=typer.colors.YELLOW)
+            say(f"typed: {error}", typer.colors.YELLOW)
             return
         self._written.call("target", now, target)
         self.director.take_target(target, now)
@@ -384,7 +385,7 @@ def _tell_people(event: Event) -> None:
         Severity.WARNING: typer.colors.YELLOW,
     }
     clock = time.strftime("%H:%M:%S", time.localtime(event.time_s))
-    typer.secho(f"{clock} {event.text}", fg=colour.get(event.severity))
+    echo(f"{clock} {event.text}", colour.get(event.severity))
 
 
 def _recorders(
@@ -392,11 +393,12 @@ def _recorders(
 ) -> tuple[TlogWriter | None, JournalWriter | None]:
     if log is None:
         return None, None
-    from mavlink_bridge.journal import JournalWriter, journal_path  # noqa: PLC0415 - quick help
+    from mavlink_bridge.cli.kept_files import open_kept  # noqa: PLC0415 - quick help
+    from mavlink_bridge.journal import JournalWriter, journal_path  # noqa: PLC0415
     from mavlink_bridge.tlog import TlogWriter  # noqa: PLC0415
 
     if log.exists():
         raise UsageError(f"--log {log}: the file is there already; a journal belongs to one run")
     recorder = stack.enter_context(TlogWriter(log))
-    file = stack.enter_context(journal_path(log).open("w", encoding="utf-8"))
+    file = stack.enter_context(open_kept(journal_path(log)))
     return recorder, JournalWriter(file, orders, parameters)

@@ -5,11 +5,13 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from rich.console import Console, Group
+from rich.console import Console, Group  # the type: `terminal.console` makes one
 from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
+from mavlink_bridge.cli.terminal import cell
+from mavlink_bridge.cli.terminal import console as terminal_console
 from mavlink_bridge.director import Severity
 from mavlink_bridge.rover import MODE_NAMES
 from missions.picture import sketch_plan
@@ -46,7 +48,7 @@ class LiveView:
 
     def __init__(self, director: Director, console: Console | None = None) -> None:
         self._director = director
-        self._console = console or Console()
+        self._console = console or terminal_console()
         self._live = Live(console=self._console, auto_refresh=False)
         self._track: list[LatLon] = []
         self._map = ""
@@ -66,7 +68,7 @@ class LiveView:
         """Show an event above the view; progress stands in the view itself."""
         if event.name != "progress":
             clock = time.strftime("%H:%M:%S", time.localtime(event.time_s))
-            self._live.console.print(Text(f"{clock} {event.text}", style=_STYLES.get(event.severity, "")))
+            self._live.console.print(cell(f"{clock} {event.text}", _STYLES.get(event.severity, "")))
 
     def show(self, now_s: float) -> None:
         """Bring the view up to date, a few times a second at most, the map more rarely."""
@@ -106,5 +108,5 @@ class LiveView:
         elif director.plan is not None:
             rows.append(("route", f"{director.plan.length_m:.0f} m, {len(director.plan.items)} items"))
         for name, value in rows:
-            table.add_row(Text(name, style="dim"), value)
+            table.add_row(cell(name, "dim"), cell(value))
         return table

@@ -23,6 +23,7 @@ from mavlink_bridge.cli.common import (
     progress_bar,
     warn,
 )
+from mavlink_bridge.cli.terminal import cell, console, echo
 from mavlink_bridge.cli.upload import SigningKeyOption
 from mavlink_bridge.cli.vehicle_options import PANEL as VEHICLE_PANEL
 from mavlink_bridge.cli.vehicle_options import (
@@ -284,29 +285,28 @@ def _draw(checked: MissionCheck, situation: Situation, plots: list[Path]) -> Non
 
 
 def _report(checked: MissionCheck, plots: list[Path]) -> None:
-    from rich.console import Console  # noqa: PLC0415 - quick help
-    from rich.table import Table  # noqa: PLC0415
+    from rich.table import Table  # noqa: PLC0415 - quick help
 
     table = Table(box=None, pad_edge=False)
     for name in ("leg", "length", "time", "drawn", "driven", "nearest fence", "where"):
         right = name in {"length", "time", "drawn", "driven"}
         table.add_column(name, justify="right" if right else "left", no_wrap=name != "nearest fence")
     for leg in checked.legs:
-        table.add_row(*_row(leg), style="red" if leg.breaks else None)
-    Console().print(table)
-    typer.echo(
+        table.add_row(*map(cell, _row(leg)), style="red" if leg.breaks else None)
+    console().print(table)
+    echo(
         f"{len(checked.legs)} legs, {checked.length_m:.1f} m, about {checked.duration_s:.0f} s"
         f"{' for one time round' if checked.course.is_endless else ''}; {len(checked.mission.items) + 1} mission items with home"
     )
     for path in plots:
         if str(path) != "-":
-            typer.echo(f"Wrote {path}")
+            echo(f"Wrote {path}")
     for trouble in checked.troubles:
-        typer.secho(f"not understood: {trouble}", fg=typer.colors.RED)
+        echo(f"not understood: {trouble}", typer.colors.RED)
     for leg in checked.broken:
-        typer.secho(f"BREAKS: {_sentence(leg)}", fg=typer.colors.RED)
+        echo(f"BREAKS: {_sentence(leg)}", typer.colors.RED)
     if checked.holds:
-        typer.echo(f"Every leg keeps {checked.clearance_m:g} m while driving")
+        echo(f"Every leg keeps {checked.clearance_m:g} m while driving")
 
 
 def _row(leg: CheckedLeg) -> tuple[str, ...]:

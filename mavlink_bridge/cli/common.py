@@ -19,15 +19,15 @@ from mavlink_bridge.cli.failing import (
     drop_stdout,
     exit_code_of,
     is_reader_gone,
-    print_json,
     report,
     report_defect,
     report_error,
-    say,
     telling,
 )
 from mavlink_bridge.cli.options_file import take_options
+from mavlink_bridge.cli.terminal import console, print_json, say
 from missions import errors as mission_errors
+from missions.harmless import harmless
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -147,10 +147,10 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
     def run(**options: Any) -> None:  # noqa: ANN401 - any command's options
         wants_json = bool(options.get("json_output"))
         verbose = bool(options.get("verbose"))
-        begin_telling(verbose=verbose)
+        name = command.__name__
+        begin_telling(name, verbose=verbose)
         for parameter in added:
             options.pop(parameter.name, None)
-        name = command.__name__
         try:
             command(**options)
         except (mission_errors.MissionError, bridge_errors.BridgeError) as error:
@@ -194,15 +194,15 @@ def progress_bar(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
     if not sys.stderr.isatty() or quiet:
         yield _line_teller() if telling().verbose and not quiet else lambda _text, _done, _total: None
         return
-    from rich.console import Console  # noqa: PLC0415 - quick help
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn  # noqa: PLC0415
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn  # noqa: PLC0415 - quick help
 
-    columns = (TextColumn("{task.description:<38}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+    told = TextColumn("{task.description:<38}", markup=False)
+    columns = (told, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console(err=True), transient=True) as progress:
         task = progress.add_task("", total=None)
 
         def show(text: str, done: int, total: int) -> None:
-            progress.update(task, description=text, completed=done, total=total or None)
+            progress.update(task, description=harmless(text), completed=done, total=total or None)
 
         yield show
 
@@ -215,6 +215,6 @@ def _line_teller() -> Callable[[str, int, int], None]:
         nonlocal last
         if text != last:
             last = text
-            typer.echo(text, err=True)
+            say(text)
 
     return show

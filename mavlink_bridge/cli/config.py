@@ -10,6 +10,7 @@ import typer
 
 from mavlink_bridge.cli.common import ConfigOption, JsonOption, QuietOption, print_json
 from mavlink_bridge.cli.options_file import DARING, FOR_ALL, is_there, options_for, read_tables, user_file
+from mavlink_bridge.cli.terminal import echo, echo_lines
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -53,7 +54,7 @@ def config(
     `pbpp config --template`
     """
     if template:
-        typer.echo(_TEMPLATE, nl=False)
+        echo_lines(_TEMPLATE.splitlines())
         return
     from mavlink_bridge.backup import BackupStore  # noqa: PLC0415 - quick help
 
@@ -80,14 +81,12 @@ def config(
         return
     if quiet:
         return
-    typer.echo(
-        f"Your options: {own}{'' if is_there(own) else ' (not there; `pbpp config --template` shows one)'}"
-    )
-    typer.echo(f"Backups of what was on vehicles: {backups}")
+    echo(f"Your options: {own}{'' if is_there(own) else ' (not there; `pbpp config --template` shows one)'}")
+    echo(f"Backups of what was on vehicles: {backups}")
     for setting in settings:
-        typer.echo(f"pbpp {setting.command} {setting.option} {setting.value}   (by {setting.source})")
+        echo(f"pbpp {setting.command} {setting.option} {setting.value}   (by {setting.source})")
     for name, value in variables.items():
-        typer.echo(f"{name}={value}: {_VARIABLES[name]}")
+        echo(f"{name}={value}: {_VARIABLES[name]}")
 
 
 def settings_of(path: Path, *, is_asked_for: bool) -> list[Setting]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mavlink_bridge.cli.common import JsonOption, QuietOption, is_same_file, print_json, warn
+from mavlink_bridge.cli.terminal import echo
 from mavlink_bridge.errors import UsageError
 
 if TYPE_CHECKING:
@@ -46,14 +47,15 @@ def convert(
 
     `pbpp convert mission.waypoints route.gpx`
     """
-    from missions.formats import parts_of, read_situation, write_situation  # noqa: PLC0415 - quick help
+    from mavlink_bridge.cli.kept_files import write_kept  # noqa: PLC0415 - quick help
+    from missions.formats import parts_of, read_situation, write_situation  # noqa: PLC0415
 
     if is_same_file(source, output):
         raise UsageError(f"{output} would be written over what it is made of; give another OUT")
     part = _part(only)
     situation = _with_return_point(read_situation(source), return_point)
     _check_choice(situation, source, output, part)
-    written = write_situation(situation, output, part)
+    written = write_situation(situation, output, part, write=write_kept)
     warnings = _left_out(situation, written, output) if part is None else []
     warn(warnings)
     document = {
@@ -68,7 +70,7 @@ def convert(
     if json_output:
         print_json(document)
     elif not quiet:
-        typer.echo(f"Wrote {output}: {', '.join(_count(situation, one) for one in written)}")
+        echo(f"Wrote {output}: {', '.join(_count(situation, one) for one in written)}")
 
 
 def _part(only: str | None) -> Part | None:

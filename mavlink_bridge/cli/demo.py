@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mavlink_bridge.cli.common import JsonOption, QuietOption, print_json, warn
+from mavlink_bridge.cli.terminal import echo
 
 if TYPE_CHECKING:
     from mavlink_bridge.messages import Frame
@@ -51,7 +52,8 @@ def demo(
     quiet: QuietOption = False,
 ) -> None:
     """Show the whole loop: simulated rover, fence, target, plan, upload, verify, drive, picture, report."""
-    from mavlink_bridge.cli.live import LiveResult, conduct  # noqa: PLC0415 - quick help
+    from mavlink_bridge.cli.kept_files import make_room, remember, write_kept  # noqa: PLC0415 - quick help
+    from mavlink_bridge.cli.live import LiveResult, conduct  # noqa: PLC0415
     from mavlink_bridge.cli.plan_results import write_outputs  # noqa: PLC0415
     from mavlink_bridge.director import Orders  # noqa: PLC0415
     from mavlink_bridge.link import Link  # noqa: PLC0415
@@ -61,7 +63,7 @@ def demo(
     from missions.request import Request  # noqa: PLC0415
 
     out.mkdir(parents=True, exist_ok=True)
-    (out / "demo.tlog").unlink(missing_ok=True)
+    make_room(out / "demo.tlog")
     drive = _Drive()
     begun_s = time.monotonic()
     with ExitStack() as stack:
@@ -73,11 +75,12 @@ def demo(
         result: LiveResult = conduct(
             link, orders, quiet=quiet or json_output, on_frames=lambda frames: _observe(drive, frames)
         )
+    remember(out / "demo.tlog")
     warn(result.plan.warnings)
     written = write_outputs(
         result.plan, result.situation, [out / "mission.waypoints", out / "mission.plan"], []
     )
-    draw_plan(result.plan, out / "plan.png", track=drive.track)
+    draw_plan(result.plan, out / "plan.png", track=drive.track, write=write_kept)
     driven_m, length_m = _driven(result.plan, drive.track)
     document = {
         "status": "ok",
@@ -145,15 +148,15 @@ def _driven(plan: Plan, track: list[LatLon]) -> tuple[float, float]:
 
 
 def _report(document: dict[str, object], plan: Plan) -> None:
-    typer.echo(
+    echo(
         f"Arrived after {document['driven_length_m']} m (drawn {document['length_m']} m, {len(plan.items)} waypoints)"
     )
-    typer.echo(
+    echo(
         f"Clearance: {document['clearance_m']} m promised, {document['driven_clearance_m']} m driven; "
         f"breaches {document['breaches']}"
     )
-    typer.echo(f"The mission was verified on the vehicle; all of it took {document['time_s']} s")
+    echo(f"The mission was verified on the vehicle; all of it took {document['time_s']} s")
     outputs = document["outputs"]
     assert isinstance(outputs, list)
     for path in outputs:
-        typer.echo(f"Wrote {path}")
+        echo(f"Wrote {path}")

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mavlink_bridge.cli.common import ExitCode, JsonOption, QuietOption, print_json
+from mavlink_bridge.cli.terminal import echo, echo_labelled
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -84,11 +85,9 @@ def _tell(finding: _Finding) -> None:
         _Verdict.NOTE: typer.colors.YELLOW,
         _Verdict.WRONG: typer.colors.RED,
     }
-    typer.echo(
-        f"{typer.style(f'{finding.verdict:<5}', fg=colour[finding.verdict])}  {finding.what}: {finding.found}"
-    )
+    echo_labelled(f"{finding.verdict:<5}", colour[finding.verdict], f"{finding.what}: {finding.found}")
     if finding.advice:
-        typer.echo(f"       advice: {finding.advice}")
+        echo(f"       advice: {finding.advice}")
 
 
 def _python() -> Iterator[_Finding]:

@@ -21,6 +21,7 @@ from mavlink_bridge.cli.common import (
     warn,
 )
 from mavlink_bridge.cli.restoring import reader_warnings
+from mavlink_bridge.cli.terminal import echo
 from mavlink_bridge.cli.upload import RequiredConnectOption, SigningKeyOption
 from mavlink_bridge.errors import LinkError, RefusedError, UsageError
 
@@ -91,7 +92,7 @@ def download(
         print_json({**document, **_details(what, items, parameters)})
     elif not quiet:
         number = f"{len(parameters)} parameters" if what == "parameters" else f"{what}: {len(items)} items"
-        typer.echo(number + "".join(f"; written to {path}" for path in outputs))
+        echo(number + "".join(f"; written to {path}" for path in outputs))
 
 
 def _check(what: str, connect: str, outputs: list[Path]) -> None:
@@ -154,25 +155,28 @@ def _read_parameters(session: Session) -> dict[str, float]:
 
 
 def _write(path: Path, what: str, items: tuple[MissionItem, ...], parameters: Mapping[str, float]) -> None:
+    from mavlink_bridge.cli.kept_files import write_kept  # noqa: PLC0415 - quick help
+    from missions.formats.parameters import is_parameter_name  # noqa: PLC0415
+
     if path.suffix.lower() == ".plan":
         _write_plan(path, what, items)
         return
     if what == "parameters":
         separator = " " if path.suffix.lower() == ".parm" else ","
-        text = "".join(f"{name}{separator}{value:.9g}\n" for name, value in parameters.items())
+        odd = [name for name in parameters if not is_parameter_name(name)]  # it may hold a line break
+        if odd:
+            warn([f"{path}: left out, for no parameter has such a name: {', '.join(map(repr, odd))}"])
+        named = ((name, value) for name, value in parameters.items() if name not in odd)
+        text = "".join(f"{name}{separator}{value:.9g}\n" for name, value in named)
     else:
         from missions.formats.waypoints import format_items  # noqa: PLC0415
 
         text = format_items(items)
-    whole = path.with_name(f".{path.name}.part")  # so that nobody ever finds half a file
-    try:
-        whole.write_text(text, encoding="utf-8", newline="\n")
-        whole.replace(path)
-    except OSError as error:
-        raise UsageError(f"{path} cannot be written: {error.strerror or error}") from None
+    write_kept(path, text.encode())
 
 
 def _write_plan(path: Path, what: str, items: tuple[MissionItem, ...]) -> None:
+    from mavlink_bridge.cli.kept_files import write_kept  # noqa: PLC0415
     from missions.fence import fence_from_items  # noqa: PLC0415
     from missions.formats import write_mission  # noqa: PLC0415
     from missions.items import without_home  # noqa: PLC0415
@@ -187,7 +191,7 @@ def _write_plan(path: Path, what: str, items: tuple[MissionItem, ...]) -> None:
         situation = Situation(fence=Known(fence_from_items(items), None, source))
     else:
         situation = Situation(rally=Known(rally_from_items(items), None, source))
-    write_mission(situation, path)
+    write_mission(situation, path, write=write_kept)
 
 
 def _details(what: str, items: tuple[MissionItem, ...], parameters: Mapping[str, float]) -> dict[str, Any]:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import errno
-import json
-import math
 import os
 import re
 import sys
@@ -17,6 +15,7 @@ from pathlib import Path
 import typer
 
 from mavlink_bridge import errors as bridge_errors
+from mavlink_bridge.cli.terminal import print_json, say
 from missions import errors as mission_errors
 
 _IS_WINDOWS = os.name == "nt"
@@ -73,8 +72,9 @@ _REPORT = (
 
 @dataclass(slots=True)
 class Telling:
-    """How much a run tells, and which warnings it has told."""
+    """Which command runs, how much it tells, and which warnings it has told."""
 
+    command: str = ""
     verbose: bool = False
     warned: set[str] = field(default_factory=set)
 
@@ -84,12 +84,12 @@ _telling: ContextVar[Telling | None] = ContextVar("telling", default=None)
 
 def telling() -> Telling:
     """Give how much the command that runs is to tell."""
-    return _telling.get() or begin_telling(verbose=False)
+    return _telling.get() or begin_telling("", verbose=False)
 
 
-def begin_telling(*, verbose: bool) -> Telling:
+def begin_telling(command: str, *, verbose: bool) -> Telling:
     """Begin a command."""
-    now = Telling(verbose)
+    now = Telling(command, verbose)
     _telling.set(now)
     return now
 
@@ -97,11 +97,6 @@ def begin_telling(*, verbose: bool) -> Telling:
 def exit_code_of(error: Exception) -> ExitCode:
     """Give the exit code of an error."""
     return next(code for kind, code in _EXIT_CODES if isinstance(error, kind))
-
-
-def says_no_colour() -> bool:
-    """Tell whether the user wants no colour (https://no-color.org), or the terminal has none."""
-    return bool(os.environ.get("NO_COLOR")) or os.environ.get("TERM") == "dumb"
 
 
 def is_reader_gone(error: Exception) -> bool:
@@ -121,28 +116,6 @@ def drop_stdout() -> int:
     """Let go of a standard output that nobody reads any more (``pbpp log … | head``); give the exit code, as a shell tells of SIGPIPE."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 128 + 13
-
-
-def print_json(document: Mapping[str, object]) -> None:
-    """Put a JSON document on stdout; numbers that JSON has not become null."""
-    sys.stdout.write(json.dumps(_plain(document), allow_nan=False) + "\n")
-
-
-def _plain(value: object) -> object:
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    if isinstance(value, Mapping):
-        return {str(key): _plain(one) for key, one in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(one) for one in value]
-    if isinstance(value, (str, int, float)) or value is None:
-        return value
-    return str(value)
-
-
-def say(text: str, colour: str) -> None:
-    """Put a line on stderr, in colour if that is a terminal."""
-    typer.secho(text, err=True, fg=colour, color=False if says_no_colour() else None)
 
 
 def report_error(command: str, error: Exception, *, wants_json: bool) -> ExitCode:
@@ -175,7 +148,8 @@ def _trace_of(error: BaseException, *, wanted: bool) -> dict[str, str]:
     if not wanted and os.environ.get("PBPP_TRACEBACK", "") in ("", "0"):
         return {}
     trace = "".join(traceback.format_exception(error))
-    sys.stderr.write(trace)
+    for line in trace.split("\n"):
+        say(line)
     return {"traceback": trace}
 
 

@@ -16,6 +16,7 @@ from mavlink_bridge.cli.common import (
     print_json,
     progress_bar,
 )
+from mavlink_bridge.cli.terminal import cell, console, echo, say
 from mavlink_bridge.errors import LogError, UsageError
 
 if TYPE_CHECKING:
@@ -75,7 +76,7 @@ def log(
                     raise
                 is_unusable = True
                 documents.append({"log": path.name, "error": "LogError", "message": str(error)})
-                typer.secho(f"error: {error}", err=True, fg=typer.colors.RED)
+                say(f"error: {error}", typer.colors.RED)
                 continue
             if json_output:
                 documents.append(as_document(book))
@@ -89,12 +90,13 @@ def log(
         print_json({"status": status, "command": "log", **code, "logs": documents})
     elif not quiet:
         for picture in plots:
-            typer.echo(f"Wrote {picture}")
+            echo(f"Wrote {picture}")
     if is_unusable:
         raise typer.Exit(ExitCode.INPUT)
 
 
 def _draw(book: Logbook, path: Path) -> None:
+    from mavlink_bridge.cli.kept_files import write_kept  # noqa: PLC0415 - quick help
     from missions.picture.track import TrackPicture, draw_track  # noqa: PLC0415 - slow to come
 
     if not book.vehicles:
@@ -114,34 +116,34 @@ def _draw(book: Logbook, path: Path) -> None:
         title=f"{book.name}: {_driven(vehicle)}",
         union=bool(int(bits) & _UNION_BIT),
     )
-    draw_track(picture, path)
+    draw_track(picture, path, write=write_kept)
 
 
 # Tables for people
 
 
 def _print(book: Logbook) -> None:
-    from rich.console import Console  # noqa: PLC0415 - quick help
+    out = console()
 
-    console = Console(highlight=False, soft_wrap=False)
-    console.print(f"[bold]{_safe(book.name)}[/bold]: {_length(book)}", soft_wrap=True)
+    def show(line: str, title: str = "") -> None:
+        out.print(cell("").append_text(cell(title, "bold")).append_text(cell(line)), soft_wrap=True)
+
+    show(f": {_length(book)}", title=book.name)
     if not book.damage.is_clean:
-        console.print(f"Damage passed over: {book.damage}", soft_wrap=True)
+        show(f"Damage passed over: {book.damage}")
     if book.clock_jumps:
-        console.print(
-            f"The log's clock was set {book.clock_jumps} times while it was written: rates are off",
-            soft_wrap=True,
-        )
+        show(f"The log's clock was set {book.clock_jumps} times while it was written: rates are off")
     if book.clock_trouble:
-        console.print(f"{book.clock_trouble}: no time, rate or speed below means anything", soft_wrap=True)
-    console.print(_senders(book))
+        show(f"{book.clock_trouble}: no time, rate or speed below means anything")
+    out.print(_senders(book))
     for vehicle in book.vehicles:
-        console.print(f"\n[bold]Vehicle {vehicle.system}[/bold]: {_driven(vehicle)}", soft_wrap=True)
+        out.print()
+        show(f": {_driven(vehicle)}", title=f"Vehicle {vehicle.system}")
         for line in _findings(vehicle):
-            console.print(line, soft_wrap=True, markup=False)
+            show(line)
         for table in _vehicle_tables(vehicle):
-            console.print(table)
-    console.print(_messages(book))
+            out.print(table)
+    out.print(_messages(book))
 
 
 def _length(book: Logbook) -> str:
@@ -158,14 +160,15 @@ def _senders(book: Logbook) -> Table:
         rows = list(group)
         mav_type = vehicles.get(sender)
         what = "" if mav_type is None else _TYPES.get(mav_type, f"MAV_TYPE {mav_type}")
-        table.add_row(*map(str, sender), what, str(len(rows)), str(sum(row.count for row in rows)))
+        _add(table, *map(str, sender), what, str(len(rows)), str(sum(row.count for row in rows)))
     return table
 
 
 def _messages(book: Logbook) -> Table:
     table = _table("Messages", "system", "component", "type", "count", "rate (Hz)")
     for traffic in book.traffic:
-        table.add_row(
+        _add(
+            table,
             str(traffic.system),
             str(traffic.component),
             traffic.name,
@@ -233,7 +236,8 @@ def _vehicle_tables(vehicle: VehicleLog) -> Iterable[Table]:
             station = "?" if transfer.station is None else "/".join(map(str, transfer.station))
             announced = "?" if transfer.announced is None else transfer.announced
             result = f" ({transfer.result})" if transfer.result not in (None, "ACCEPTED") else ""
-            table.add_row(
+            _add(
+                table,
                 f"{transfer.begun_s:.1f}",
                 str(transfer.kind),
                 str(transfer.way),
@@ -246,16 +250,20 @@ def _vehicle_tables(vehicle: VehicleLog) -> Iterable[Table]:
         table = _table(f"Targets ({vehicle.targets_seen})", "at (s)", "position", "by", "from")
         for target in _rows(table, vehicle.targets):
             source = target.source if target.said == 1 else f"{target.source}, {target.said} times"
-            table.add_row(
-                f"{target.time_s:.1f}", str(target.position), source, "/".join(map(str, target.station))
+            _add(
+                table,
+                f"{target.time_s:.1f}",
+                str(target.position),
+                source,
+                "/".join(map(str, target.station)),
             )
         yield table
     if vehicle.modes:
         table = _table("Modes", "from (s)", "to (s)", "mode", "armed", "driven (m)")
         for span in _rows(table, vehicle.modes):
             armed = "yes" if span.armed else "no"
-            table.add_row(
-                f"{span.begun_s:.1f}", f"{span.ended_s:.1f}", span.name, armed, f"{span.driven_m:.1f}"
+            _add(
+                table, f"{span.begun_s:.1f}", f"{span.ended_s:.1f}", span.name, armed, f"{span.driven_m:.1f}"
             )
         yield table
     if vehicle.parameters:
@@ -264,7 +272,7 @@ def _vehicle_tables(vehicle: VehicleLog) -> Iterable[Table]:
         for change in vehicle.parameter_changes:
             before.setdefault(change.name, []).append(f"{change.before:g} until {change.time_s:.1f} s")
         for name, value in vehicle.parameters.items():
-            table.add_row(name, f"{value:g}", ", ".join(before.get(name, [])[-3:]))
+            _add(table, name, f"{value:g}", ", ".join(before.get(name, [])[-3:]))
         yield table
 
 
@@ -273,6 +281,10 @@ def _rows(table: Table, rows: Sequence[Row]) -> Sequence[Row]:
     if len(rows) > _MOST_ROWS:
         table.caption = f"the last {_MOST_ROWS} of {len(rows)}; all with --json"
     return rows[-_MOST_ROWS:]
+
+
+def _add(table: Table, *values: str) -> None:
+    table.add_row(*map(cell, values))
 
 
 def _table(title: str, *columns: str) -> Table:
@@ -284,12 +296,6 @@ def _table(title: str, *columns: str) -> Table:
         is_number = column.endswith(")") or column in ("count", "types", "messages", "system", "component")
         table.add_column(column, justify="right" if is_number else "left", overflow="fold")
     return table
-
-
-def _safe(text: str) -> str:
-    from rich.markup import escape  # noqa: PLC0415 - quick help
-
-    return escape(text)
 
 
 def _duration(duration_s: float) -> str:

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import typer
+from mavlink_bridge.cli.terminal import echo, echo_lines
 
 if TYPE_CHECKING:
     from missions.plan import Plan
@@ -19,7 +19,8 @@ def write_outputs(
     planned: Plan, situation: Situation, outputs: list[Path], plots: list[Path], *, blocks: bool = False
 ) -> list[Path]:
     """Write the mission and draw the plan; give the files."""
-    from missions.formats import write_mission  # noqa: PLC0415 - quick help
+    from mavlink_bridge.cli.kept_files import write_kept  # noqa: PLC0415 - quick help
+    from missions.formats import write_mission  # noqa: PLC0415
     from missions.situation import Known, Mission  # noqa: PLC0415
 
     mission = Mission(planned.items, planned.home or planned.start)
@@ -27,7 +28,7 @@ def write_outputs(
         situation, mission=Known(mission, None, "pbpp plan"), fence=Known(planned.fence, None, "pbpp plan")
     )
     for path in outputs:
-        write_mission(to_write, path)
+        write_mission(to_write, path, write=write_kept)
     return [*outputs, *draw(planned, plots, blocks=blocks)]
 
 
@@ -35,14 +36,15 @@ def draw(planned: Plan, plots: list[Path], *, title: str | None = None, blocks: 
     """Draw the plan to files, and to the terminal where ``-`` is among them; give the files."""
     if not plots:
         return []
-    from missions.picture import TERMINAL, draw_plan, sketch_plan  # noqa: PLC0415 - quick help
+    from mavlink_bridge.cli.kept_files import write_kept  # noqa: PLC0415 - quick help
+    from missions.picture import TERMINAL, draw_plan, sketch_plan  # noqa: PLC0415
 
     for path in plots:
         if str(path) == TERMINAL:
             columns = min(80, shutil.get_terminal_size().columns)
-            typer.echo(sketch_plan(planned, columns=columns, encoding=sys.stdout.encoding), nl=False)
+            echo_lines(sketch_plan(planned, columns=columns, encoding=sys.stdout.encoding).splitlines())
         else:
-            draw_plan(planned, path, title=title, blocks=blocks)
+            draw_plan(planned, path, title=title, blocks=blocks, write=write_kept)
     return [path for path in plots if str(path) != TERMINAL]
 
 
@@ -91,14 +93,14 @@ def report_plan(planned: Plan, written: list[Path], *, verified: bool, backup: P
     )
     waypoints = sum(item.is_placed for item in planned.items)
     turns = max(0, waypoints - len(planned.targets))
-    typer.echo(
+    echo(
         f"Route: {planned.length_m:.1f} m ({planned.straight_line_m:.1f} m as the crow flies), "
         f"about {planned.duration_s:.0f} s, {waypoints} waypoints ({turns} turns)"
     )
-    typer.echo(f"Clearance: {planned.drawn_clearance_m:.2f} m drawn, {promise}")
+    echo(f"Clearance: {planned.drawn_clearance_m:.2f} m drawn, {promise}")
     for path in written:
-        typer.echo(f"Wrote {path}")
+        echo(f"Wrote {path}")
     if verified:
-        typer.echo("Uploaded and verified")
+        echo("Uploaded and verified")
     if backup is not None:
-        typer.echo(f"The mission before is kept in {backup}")
+        echo(f"The mission before is kept in {backup}")

@@ -22,6 +22,7 @@ from mavlink_bridge.cli.common import (
     progress_bar,
 )
 from mavlink_bridge.cli.plan_request import request_from_options
+from mavlink_bridge.cli.terminal import echo, say
 from mavlink_bridge.errors import LogError, UsageError
 
 if TYPE_CHECKING:
@@ -123,20 +124,20 @@ class _Teller:
 
         begin = log_begin(log)
         self._begin_s = begin.time_s
-        typer.echo(f"{log.name}: {begin}")
+        echo(f"{log.name}: {begin}")
 
     def tell(self, event: _Told) -> None:
         if self._wants_json:
             print_json(event)
         elif not self._is_silent:
             prefix = f"{event['log']}: " if self._names_logs else ""
-            typer.echo(f"{prefix}{event['time_s'] - self._begin_s:8.2f} s  {event['event']}: {event['text']}")
+            echo(f"{prefix}{event['time_s'] - self._begin_s:8.2f} s  {event['event']}: {event['text']}")
 
     def fail(self, log: Path, error: LogError) -> None:
         """Tell of a log among several that cannot be used; the others are replayed all the same."""
         if self._wants_json:
             print_json({"log": log.name, "status": "error", "error": "LogError", "message": str(error)})
-        typer.secho(f"error: {error}", err=True, fg=typer.colors.RED)
+        say(f"error: {error}", typer.colors.RED)
 
 
 _Results = dict[Path, list[_Told] | LogError]
@@ -227,25 +228,23 @@ def _is_as_expected(expected: dict[Path | None, list[_Told]], results: _Results)
         told = [event for result in chosen if not isinstance(result, LogError) for event in result]
         found += differences(events, told)
     for line in found:
-        typer.secho(line, err=True)
+        say(line)
     if found:
-        typer.secho("- expected, did not come; + came, not expected; ~ came otherwise", err=True)
+        say("- expected, did not come; + came, not expected; ~ came otherwise")
     return not found
 
 
 def _record(results: _Results, *, quiet: bool) -> None:
-    from mavlink_bridge.expectations import expectation_path, to_expect  # noqa: PLC0415 - quick help
+    from mavlink_bridge.cli.kept_files import write_kept  # noqa: PLC0415 - quick help
+    from mavlink_bridge.expectations import expectation_path, to_expect  # noqa: PLC0415
 
     for log, told in results.items():
         if isinstance(told, LogError):
             continue
         path = expectation_path(log)
-        try:
-            path.write_text(to_expect(told), encoding="utf-8")
-        except OSError as error:
-            raise LogError(f"{path} cannot be written: {error.strerror}", file=str(path)) from None
+        write_kept(path, to_expect(told).encode())
         if not quiet:
-            typer.echo(f"Wrote {path}")
+            echo(f"Wrote {path}")
 
 
 class _Pace:
@@ -280,7 +279,7 @@ def _send(
                 pass
         count = _play(frames, speed, transport.send, transport.receive, show)
     if not quiet:
-        typer.echo(f"Sent {count} messages")
+        echo(f"Sent {count} messages")
 
 
 def _play(

@@ -6,8 +6,7 @@ import sys
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import typer
-
+from mavlink_bridge.cli.terminal import say
 from mavlink_bridge.errors import BackupError, OtherVehicleError, UsageError
 from mavlink_bridge.vehicle_lock import VehicleLock
 from mavlink_bridge.vehicle_mark import Kinship
@@ -119,10 +118,11 @@ def _check_vehicle(backup: Backup, vehicle: VehicleMark) -> None:
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
         raise _refusal(backup, vehicle)
     whose = "is another vehicle's" if kinship is Kinship.OTHER else "cannot be shown to be this vehicle's"
-    question = (
-        f"the backup {backup.path} of {backup.vehicle} {whose} (this is {vehicle}). Write it to this one?"
+    say(
+        f"the backup {backup.path} of {backup.vehicle} {whose}: this is {vehicle}. Write it here? [y/N] ",
+        nl=False,
     )
-    if not typer.confirm(question, default=False, err=True):
+    if sys.stdin.readline().strip().lower() not in ("y", "yes"):
         raise _refusal(backup, vehicle)
 
 

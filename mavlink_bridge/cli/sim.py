@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mavlink_bridge.cli.common import JsonOption, QuietOption, print_json
+from mavlink_bridge.cli.terminal import echo
 
 if TYPE_CHECKING:
     from mavlink_bridge.simulator.config import SimulatorConfig
@@ -79,7 +80,7 @@ def sim(
         if json_output:
             print_json({"status": "ok", "command": "sim", "connection": simulator.connection})
         else:
-            typer.echo(simulator.connection)
+            echo(simulator.connection)
         sys.stdout.flush()
         while not stop.wait(0.5) and simulator.is_running:
             pass

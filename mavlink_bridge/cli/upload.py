@@ -20,6 +20,7 @@ from mavlink_bridge.cli.common import (
     warn,
 )
 from mavlink_bridge.cli.restoring import Restoration, backups_to_restore, interrupted_warnings
+from mavlink_bridge.cli.terminal import echo
 from mavlink_bridge.cli.terminating import sigterm_as_interrupt
 from mavlink_bridge.errors import UsageError
 
@@ -176,11 +177,11 @@ def _forget(store: BackupStore, address: Address, *, json_output: bool, quiet: b
     elif not quiet:
         for entry in document:
             backup = entry["backup"] or "not known"
-            typer.echo(
+            echo(
                 f"{entry['list']} of {entry['vehicle']}: put aside as {entry['note']}; the backup is {backup}"
             )
         if not document:
-            typer.echo("no interrupted upload is noted")
+            echo("no interrupted upload is noted")
 
 
 def _content(
@@ -264,10 +265,10 @@ def _report(
         how = "was there already" if entry.outcome.pushes == 0 else f"uploaded in {entry.took_s:.1f} s"
         coarse = " (positions read back to about 1 m only)" if entry.outcome.is_coarse else ""
         name = entry.mission_type.name.lower()
-        typer.echo(f"{name}: {len(entry.outcome.found or ())} items, {how}, read back and verified{coarse}")
+        echo(f"{name}: {len(entry.outcome.found or ())} items, {how}, read back and verified{coarse}")
         if entry.backup:
-            typer.echo(f"  the list before is kept in {entry.backup}")
+            echo(f"  the list before is kept in {entry.backup}")
     for name, (old, new) in changed.items():
-        typer.echo(f"{name}: {old:g} -> {new:g}, confirmed")
+        echo(f"{name}: {old:g} -> {new:g}, confirmed")
     if not done and not changed:
-        typer.echo("all parameters have these values already")
+        echo("all parameters have these values already")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from mavlink_bridge.messages import Statustext
+from missions.harmless import harmless
 
 _EVERY_S = 1.0
 _MOST_WAITING = 8
@@ -23,7 +24,7 @@ class Announcer:
 
     def say(self, severity: int, text: str) -> None:
         """Take a text; of too many the oldest of the least grave ones is dropped."""
-        self._waiting.append((severity, f"pbpp: {text}"[:_MOST_CHARACTERS]))
+        self._waiting.append((severity, f"pbpp: {harmless(text)}"[:_MOST_CHARACTERS]))
         if len(self._waiting) > _MOST_WAITING:
             self._waiting.remove(max(self._waiting, key=lambda entry: entry[0]))
 

@@ -176,7 +176,9 @@ def _home(state: State) -> m.Message | None:
 
 
 def _version(state: State) -> m.Message:
-    return m.AutopilotVersion(int(_CAPABILITIES), _VERSION_4_7_0_DEV, uid2=state.uid.ljust(18, b"\0")[:18])
+    return m.AutopilotVersion(
+        int(_CAPABILITIES), _VERSION_4_7_0_DEV, uid2=tuple(state.uid.ljust(18, b"\0")[:18])
+    )
 
 
 def _boot_ms(boot_s: float) -> int:

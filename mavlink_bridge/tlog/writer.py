@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import struct
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Self
@@ -35,9 +37,10 @@ class TlogWriter:
     def __init__(self, path: Path | str) -> None:
         path = Path(path)
         try:
-            self._file = path.open("ab", buffering=0)
+            self._file = open(path, "ab", buffering=0, opener=_open_no_link)  # noqa: SIM115 - Path.open knows no opener
         except OSError as error:
-            raise LogError(f"{path}: {error.strerror}", path=str(path)) from error
+            trouble = "it is a link; give the file itself" if error.errno == errno.ELOOP else error.strerror
+            raise LogError(f"{path}: {trouble}", path=str(path)) from error
         self._pending: dict[int, bytes] = {}
 
     def write(self, time_s: float, data: bytes, link: int = 0) -> None:
@@ -76,6 +79,11 @@ class TlogWriter:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def _open_no_link(path: str, flags: int) -> int:
+    """Open a file, but none that a link leads to: whoever may write into the folder must not choose what is written to."""
+    return os.open(path, flags | getattr(os, "O_NOFOLLOW", 0), 0o666)
 
 
 def _split(data: bytes) -> tuple[list[bytes], bytes]:

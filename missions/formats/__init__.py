@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from missions.errors import FenceMissingError, MissionFormatError
 from missions.formats import fen, geojson, gpx, kml, parameters, poly, qgc_plan, waypoints
-from missions.formats.files import read_text, write_text
+from missions.formats.files import read_text, write_file
 from missions.formats.parameters import read_parameters
 from missions.formats.parts import Part, only, parts_of
 from missions.situation import Known, Situation
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from missions.fence import Fence
+    from missions.formats.files import Writer
     from missions.situation import Mission
 
 __all__ = [
@@ -141,7 +142,9 @@ def read_mission(path: Path | str) -> Mission:
     return mission.value
 
 
-def write_situation(situation: Situation, path: Path | str, part: Part | None = None) -> tuple[Part, ...]:
+def write_situation(
+    situation: Situation, path: Path | str, part: Part | None = None, *, write: Writer = write_file
+) -> tuple[Part, ...]:
     """Write what is known and what the format holds, or one part of it; a file is written whole or not at all.
 
     Parameters
@@ -152,6 +155,8 @@ def write_situation(situation: Situation, path: Path | str, part: Part | None = 
         The suffix chooses the format.
     part : Part, optional
         Write this and nothing else. Default: all that the format holds.
+    write : callable
+        What puts the bytes into the file.
 
     Returns
     -------
@@ -185,11 +190,11 @@ def write_situation(situation: Situation, path: Path | str, part: Part | None = 
         text = format_.write(only(situation, part) if part else situation)
     except MissionFormatError as error:
         raise MissionFormatError(f"{path}: {error}", file=str(path), **error.details) from None
-    write_text(path, text)
+    write(path, text.encode())
     return tuple(wanted)
 
 
-def write_mission(situation: Situation, path: Path | str) -> None:
+def write_mission(situation: Situation, path: Path | str, *, write: Writer = write_file) -> None:
     """Write the situation's mission, and in formats that hold them its fence, rally points and home.
 
     Raises
@@ -199,7 +204,8 @@ def write_mission(situation: Situation, path: Path | str) -> None:
     """
     path = Path(path)
     check_writable_format(path)
-    write_situation(situation, path, None if format_of(path, "write").together else Part.MISSION)
+    part = None if format_of(path, "write").together else Part.MISSION
+    write_situation(situation, path, part, write=write)
 
 
 def write_fence(fence: Fence, path: Path | str) -> None:

@@ -10,6 +10,7 @@ from missions.errors import MissionFormatError
 from missions.formats.files import read_text
 from missions.situation import Situation
 
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,15}")
 _LINE = re.compile(r"^([A-Za-z][A-Za-z0-9_]{0,15})[\s,=:]+([^\s_]+)(?:\s|$)")
 
 
@@ -45,6 +46,11 @@ def write(situation: Situation) -> str:
     """Give the text of a file with the situation's parameters by name, as exact as the wire's 32 bits."""
     rows = [f"{name:<16} {value:.9g}\n" for name, value in sorted(situation.parameters.items())]
     return "".join(rows)
+
+
+def is_parameter_name(text: str) -> bool:
+    """Return whether a text can be a parameter's name in a file: a letter, then up to 15 letters, digits and underscores."""
+    return _NAME.fullmatch(text) is not None
 
 
 def _parse(text: str, where: str) -> tuple[str, float]:

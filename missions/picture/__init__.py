@@ -10,12 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from missions.errors import MissionFormatError
-from missions.formats.files import unwritable
+from missions.formats.files import write_file
 from missions.picture.scene import Scene
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from missions.formats.files import Writer
     from missions.geo import LatLon
     from missions.plan import Plan
 
@@ -61,6 +62,7 @@ def draw_plan(
     track: Sequence[LatLon] = (),
     title: str | None = None,
     blocks: bool = False,
+    write: Writer = write_file,
 ) -> None:
     """Draw a plan to a file.
 
@@ -76,6 +78,8 @@ def draw_plan(
         Default: length, time and clearance.
     blocks : bool
         Whether to draw the blocks of the free space's partition too.
+    write : callable
+        What puts the bytes into the file.
 
     Raises
     ------
@@ -85,17 +89,14 @@ def draw_plan(
     path = Path(path)
     check_picture_format(path)
     scene = Scene(plan, track)
-    try:
-        if path.suffix.lower() == ".html":
-            from missions.picture.html import write_html  # noqa: PLC0415 - slow to come, an extra
+    if path.suffix.lower() == ".html":
+        from missions.picture.html import html_page  # noqa: PLC0415 - slow to come, an extra
 
-            write_html(scene, path, title=title, blocks=blocks)
-        else:
-            from missions.picture.figure import write_figure  # noqa: PLC0415 - slow to come, an extra
+        write(path, html_page(scene, title=title, blocks=blocks))
+    else:
+        from missions.picture.figure import figure_image  # noqa: PLC0415 - slow to come, an extra
 
-            write_figure(scene, path, title=title, blocks=blocks)
-    except OSError as error:
-        raise unwritable(path, error) from None
+        write(path, figure_image(scene, path.suffix, title=title, blocks=blocks))
 
 
 def sketch_plan(

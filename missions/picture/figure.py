@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,13 +14,12 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
 from matplotlib.transforms import ScaledTranslation, Transform
 
+from missions.harmless import harmless
 from missions.picture import style
 from missions.picture.labels import place_labels
 from missions.picture.scene import polygons
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from shapely.geometry.base import BaseGeometry
 
     from missions.picture.scene import Scene
@@ -31,17 +31,18 @@ _UNDATED = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 """A picture of the same plan is the same file."""
 
 
-def write_figure(scene: Scene, path: Path, *, title: str | None = None, blocks: bool = False) -> None:
-    """Draw a scene to a file.
+def figure_image(scene: Scene, suffix: str, *, title: str | None = None, blocks: bool = False) -> bytes:
+    """Return a scene as an image of the format that a suffix names."""
+    return image_of(plan_figure(scene, title=title, blocks=blocks), suffix)
 
-    Raises
-    ------
-    OSError
-        The file cannot be written.
-    """
-    figure = plan_figure(scene, title=title, blocks=blocks)
+
+def image_of(figure: Figure, suffix: str) -> bytes:
+    """Return a figure as an image: the same bytes for the same picture."""
+    kind = suffix.lower()[1:]
+    image = BytesIO()
     with rc_context({"svg.hashsalt": "pbpp"}):
-        figure.savefig(path, dpi=_DPI, metadata=_UNDATED.get(path.suffix.lower()[1:]))
+        figure.savefig(image, format=kind, dpi=_DPI, metadata=_UNDATED.get(kind))
+    return image.getvalue()
 
 
 def plan_figure(scene: Scene, *, title: str | None = None, blocks: bool = False) -> Figure:
@@ -67,7 +68,7 @@ def plan_figure(scene: Scene, *, title: str | None = None, blocks: bool = False)
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     axes.set(xlim=(west, east), ylim=(south, north), aspect="equal", xlabel="east (m)", ylabel="north (m)")
-    axes.set_title(title or scene.title(), fontsize=11, pad=34)
+    axes.set_title(harmless(title or scene.title()), fontsize=11, pad=34, parse_math=False)
     _draw_ground(axes, scene)
     if blocks:
         outlines = PolyCollection(scene.blocks(), facecolor="none", edgecolor=style.BLOCK, linewidth=0.4)

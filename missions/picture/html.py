@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import math
+from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import plotly.graph_objects as go
 
 from missions.fence import ZoneKind
+from missions.harmless import harmless
 from missions.picture import style
 from missions.picture.labels import short_name
 from missions.picture.scene import polygons
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from pathlib import Path
 
     from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
@@ -54,14 +55,8 @@ _NORTH = {
 }
 
 
-def write_html(scene: Scene, path: Path, *, title: str | None = None, blocks: bool = False) -> None:
-    """Draw a scene to a page.
-
-    Raises
-    ------
-    OSError
-        The file cannot be written.
-    """
+def html_page(scene: Scene, *, title: str | None = None, blocks: bool = False) -> bytes:
+    """Return a scene as a page."""
     figure = html_figure(scene, title=title, blocks=blocks)
     page = figure.to_html(
         include_plotlyjs=True,
@@ -70,7 +65,12 @@ def write_html(scene: Scene, path: Path, *, title: str | None = None, blocks: bo
         default_height="100vh",
         config=_CONFIG,
     ).replace("<body>", _BODY, 1)
-    path.write_text(page, encoding="utf-8", newline="\n")
+    return bytes(page, "utf-8")
+
+
+def plain_text(text: str) -> str:
+    """Return a text as plotly shows it as it stands: no tags, no links, no control characters."""
+    return escape(harmless(text), quote=False)
 
 
 def html_figure(scene: Scene, *, title: str | None = None, blocks: bool = False) -> go.Figure:
@@ -93,7 +93,7 @@ def html_figure(scene: Scene, *, title: str | None = None, blocks: bool = False)
     west, south, east, north = scene.bounds_m
     traces = [*_ground(scene, blocks=blocks), *_lines(scene), _names(scene), _scale(scene)]
     layout = go.Layout(
-        title={"text": title or scene.title()},
+        title={"text": plain_text(title or scene.title())},
         xaxis={
             "title": {"text": "east (m)"},
             "range": [west, east],

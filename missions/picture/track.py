@@ -11,8 +11,9 @@ import shapely
 
 from missions.errors import MissionFormatError
 from missions.fence import PolygonZone, ZoneKind
-from missions.formats.files import unwritable
+from missions.formats.files import write_file
 from missions.ground import lay_out
+from missions.harmless import harmless
 from missions.local_frame import frame_around
 from missions.picture import check_picture_format, style
 from missions.picture.scene import polygons
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from shapely import Polygon
 
     from missions.fence import Fence
+    from missions.formats.files import Writer
     from missions.geo import LatLon
     from missions.ground import Ground
     from missions.local_frame import LocalFrame
@@ -34,7 +36,6 @@ _MODE_COLOURS: Final = ("#0072B2", "#CC79A7", "#000000", "#56B4E9", "#E69F00", "
 
 _MODE_LINES: Final = ("-", "--", "-.", ":", "-", "--")
 _PLOTLY_LINES: Final = {"-": "solid", "--": "dash", "-.": "dashdot", ":": "dot"}
-_UNDATED = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +120,7 @@ class TrackPicture:
         return found
 
 
-def draw_track(picture: TrackPicture, path: Path) -> None:
+def draw_track(picture: TrackPicture, path: Path, *, write: Writer = write_file) -> None:
     """Draw what was driven to a file.
 
     Parameters
@@ -127,6 +128,8 @@ def draw_track(picture: TrackPicture, path: Path) -> None:
     picture : TrackPicture
     path : pathlib.Path
         The suffix chooses the format: .png, .svg, .pdf, .html.
+    write : callable
+        What puts the bytes into the file.
 
     Raises
     ------
@@ -134,20 +137,12 @@ def draw_track(picture: TrackPicture, path: Path) -> None:
         The suffix is unknown, a library is not installed, or the file cannot be written.
     """
     check_picture_format(path)
-    try:
-        if path.suffix.lower() == ".html":
-            _write_html(picture, path)
-        else:
-            _write_figure(picture, path)
-    except OSError as error:
-        raise unwritable(path, error) from None
+    if path.suffix.lower() == ".html":
+        write(path, _page(picture))
+    else:
+        from missions.picture.figure import image_of  # noqa: PLC0415 - slow to come, an extra
 
-
-def _write_figure(picture: TrackPicture, path: Path) -> None:
-    from matplotlib import rc_context  # noqa: PLC0415 - slow to come, an extra
-
-    with rc_context({"svg.hashsalt": "pbpp"}):
-        track_figure(picture).savefig(path, dpi=150, metadata=_UNDATED.get(path.suffix.lower()[1:]))
+        write(path, image_of(track_figure(picture), path.suffix))
 
 
 def track_figure(picture: TrackPicture) -> Any:  # noqa: ANN401 - matplotlib is untyped
@@ -161,7 +156,7 @@ def track_figure(picture: TrackPicture) -> Any:  # noqa: ANN401 - matplotlib is 
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     axes.set(xlim=(west, east), ylim=(south, north), aspect="equal", xlabel="east (m)", ylabel="north (m)")
-    axes.set_title(picture.title, fontsize=11)
+    axes.set_title(harmless(picture.title), fontsize=11, parse_math=False)
     named: set[str] = set()
 
     def once(name: str) -> str | None:
@@ -194,8 +189,10 @@ def track_figure(picture: TrackPicture) -> Any:  # noqa: ANN401 - matplotlib is 
     return figure
 
 
-def _write_html(picture: TrackPicture, path: Path) -> None:
+def _page(picture: TrackPicture) -> bytes:
     import plotly.graph_objects as go  # noqa: PLC0415 - slow to come, an extra
+
+    from missions.picture.html import plain_text  # noqa: PLC0415 - as above
 
     figure = go.Figure()
     named: set[str] = set()
@@ -227,13 +224,16 @@ def _write_html(picture: TrackPicture, path: Path) -> None:
         }
         add("target", picture.frame.to_local_array(picture.targets), mode="markers", marker=marker)
     figure.update_layout(
-        title=picture.title, template="plotly_white", xaxis_title="east (m)", yaxis_title="north (m)"
+        title=plain_text(picture.title),
+        template="plotly_white",
+        xaxis_title="east (m)",
+        yaxis_title="north (m)",
     )
     figure.update_yaxes(scaleanchor="x")
     # Nobody's field belongs on plotly's server: plotly 7 has a button for that by default.
     config = {"displaylogo": False, "scrollZoom": True, "showSendToCloud": False}
     page = figure.to_html(include_plotlyjs=True, full_html=True, div_id="track", config=config)
-    path.write_text(page, encoding="utf-8", newline="\n")
+    return bytes(page, "utf-8")
 
 
 def _rings(areas: list[Polygon]) -> list[NDArray[np.float64]]:

@@ -26,11 +26,11 @@ def values(message_class: type[Message], name: str) -> st.SearchStrategy:
     kind = wire.fieldtypes[wire.fieldnames.index(name)]
     if kind == "float":
         return st.floats(width=32, allow_nan=False)
-    length = wire.array_lengths[wire.ordered_fieldnames.index(name)]
-    if kind == "uint8_t" and length:
-        return st.binary(min_size=length, max_size=length)
     if kind == "char":
+        length = wire.array_lengths[wire.ordered_fieldnames.index(name)]
         return st.text(st.characters(codec="ascii", exclude_characters="\0"), max_size=length)
+    if length := wire.array_lengths[wire.ordered_fieldnames.index(name)]:
+        return st.tuples(*[st.integers(*RANGES[kind])] * length)
     return st.integers(*RANGES[kind])
 
 

@@ -213,7 +213,7 @@ class Adversary:
         )
         self.say(m.CommandAck(message.command, m.MavResult.ACCEPTED))
         if asks_version and self.uid:
-            self.say(m.AutopilotVersion(0, uid2=self.uid.ljust(18, b"\0")))
+            self.say(m.AutopilotVersion(0, uid2=tuple(self.uid.ljust(18, b"\0"))))
 
 
 class _Client:

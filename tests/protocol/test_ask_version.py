@@ -15,7 +15,7 @@ from mavlink_bridge.vehicle_mark import uid_of
 
 BY_MESSAGE = CommandLong(1, 1, 512, param1=148.0)
 BY_CAPABILITIES = CommandLong(1, 1, 520, param1=1.0)
-VERSION = AutopilotVersion(7, uid2=b"abc".ljust(18, b"\0"))
+VERSION = AutopilotVersion(7, uid2=tuple(b"abc".ljust(18, b"\0")))
 
 
 def test_it_is_told():

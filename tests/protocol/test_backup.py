@@ -113,7 +113,7 @@ def test_which_marks_are_of_one_vehicle(one, other, kinship):
 
 
 def test_the_uid_is_the_boards_own():
-    board = bytes(range(1, 13)).ljust(18, b"\0")
+    board = tuple(bytes(range(1, 13)).ljust(18, b"\0"))
     assert uid_of(AutopilotVersion(0, uid2=board)) == "0102030405060708090a0b0c"
     assert uid_of(AutopilotVersion(0, uid=0xAB)) == "00000000000000ab"
     assert uid_of(AutopilotVersion(0)) == uid_of(None) == ""

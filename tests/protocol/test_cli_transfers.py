@@ -245,7 +245,7 @@ def test_usage(arguments, code, fields):
 
 def test_a_file_that_cannot_be_written(rover, tmp_path):
     code, _, output = run(rover, "download", "mission", "-o", tmp_path / "no" / "m.waypoints")
-    assert code == 2
+    assert code == 3
     assert "cannot be written" in output
 
 

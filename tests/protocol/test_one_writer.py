@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import subprocess
@@ -276,16 +277,16 @@ def test_a_vehicle_gets_its_own_back_however_it_is_connected(mission_file):
 def test_on_a_terminal_one_is_asked(mission_file, monkeypatch, answer, code):
     interrupted_on(RebootsMidway(OLD, uid=b"mine"), mission_file)
 
-    class Terminal:
+    class Terminal(io.StringIO):
         def isatty(self):
             return True
 
     class System:
-        stdin = stderr = Terminal()
+        stdin, stderr = Terminal(answer), Terminal()
 
     monkeypatch.setattr(restoring, "sys", System)
     with TcpVehicle(Adversary(NEW[:4])) as link:  # it does not tell its uid this time
-        found, output = run(link, "upload", "--restore", input=answer)
+        found, output = run(link, "upload", "--restore")
         assert found == code, output
         assert "cannot be shown to be this vehicle's" in output
         assert places(link.vehicle.held) == places(OLD if code == 0 else NEW[:4])

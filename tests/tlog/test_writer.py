@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from itertools import pairwise
 
 import pytest
@@ -88,3 +89,15 @@ def test_a_link_number_has_two_bits(tmp_path):
 def test_a_file_that_cannot_be_written(tmp_path):
     with pytest.raises(LogError, match="No such file"):
         TlogWriter(tmp_path / "no" / "folder.tlog")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="links need rights elsewhere")
+@pytest.mark.parametrize("aim", ["precious", "nowhere"])
+def test_follows_no_link(tmp_path, aim):
+    (tmp_path / "precious").write_bytes(b"precious")
+    path = tmp_path / "run.tlog"
+    path.symlink_to(tmp_path / aim)
+    with pytest.raises(LogError, match=r"run\.tlog: it is a link; give the file itself"):
+        TlogWriter(path)
+    assert (tmp_path / "precious").read_bytes() == b"precious"
+    assert not (tmp_path / "nowhere").exists()

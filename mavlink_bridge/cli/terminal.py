@@ -1,0 +1,97 @@
+"""The one way to the standard output and standard error: whatever comes from outside arrives there harmless.
+
+A line is put out as one line, with every character seen (`missions.harmless`), so that neither a vehicle's text nor a file's name
+moves the cursor, names the window or passes for a line of ours. What has several lines is put out line by line. Nothing else in the command line
+prints (a test looks).
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import sys
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import typer
+
+from missions.harmless import harmless
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from rich.console import Console
+    from rich.text import Text
+
+
+def says_no_colour() -> bool:
+    """Return whether the user wants no colour (https://no-color.org), or the terminal has none."""
+    return bool(os.environ.get("NO_COLOR")) or os.environ.get("TERM") == "dumb"
+
+
+def echo(line: str, colour: str | None = None) -> None:
+    """Put a line on stdout, in colour if that is a terminal."""
+    _put(line, colour, is_error=False)
+
+
+def say(line: str, colour: str | None = None, *, nl: bool = True) -> None:
+    """Put a line on stderr, in colour if that is a terminal; without its end where an answer is to stand behind it."""
+    _put(line, colour, is_error=True, nl=nl)
+
+
+def echo_lines(lines: Iterable[str]) -> None:
+    """Put several lines on stdout."""
+    for line in lines:
+        echo(line)
+
+
+def echo_labelled(label: str, colour: str, line: str) -> None:
+    """Put a line on stdout that begins with a label in colour."""
+    shown = f"{typer.style(harmless(label), fg=colour)}  {harmless(line)}"
+    typer.echo(shown, color=_colour_wanted())
+
+
+def echo_help(text: str) -> None:
+    """Put a help text on stdout: it is all ours, with its colours."""
+    typer.echo(text)
+
+
+def print_json(document: Mapping[str, object]) -> None:
+    """Put a JSON document on stdout, in ASCII; numbers that JSON has not become null."""
+    text = json.dumps(_plain(document), allow_nan=False)  # which lets one control character through: DEL
+    sys.stdout.write(text.replace("\x7f", "\\u007f") + "\n")
+
+
+def console(*, err: bool = False) -> Console:
+    """Return a console for what rich draws; every text from outside goes into it as a `cell`."""
+    from rich.console import Console  # noqa: PLC0415 - quick help
+
+    return Console(stderr=err, highlight=False, markup=False)
+
+
+def cell(text: object, style: str = "") -> Text:
+    """Return what rich shows of a text: as it stands, without markup and without control characters."""
+    from rich.text import Text  # noqa: PLC0415 - quick help
+
+    return Text(harmless(str(text)), style=style)
+
+
+def _put(line: str, colour: str | None, *, is_error: bool, nl: bool = True) -> None:
+    typer.secho(harmless(line), err=is_error, nl=nl, fg=colour, color=_colour_wanted())
+
+
+def _colour_wanted() -> bool | None:
+    return False if says_no_colour() else None
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, Mapping):
+        return {str(key): _plain(one) for key, one in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(one) for one in value]
+    if isinstance(value, (str, int, float)) or value is None:
+        return value
+    return str(value)

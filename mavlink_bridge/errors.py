@@ -9,8 +9,11 @@
     ├── IdentityTakenError       somebody else had our system and component id before anything was written
     ├── VehicleNotFoundError     nobody there is the vehicle asked for
     ├── RefusedError             the vehicle said no
+    │   └── VehicleInUseError    another pbpp on this computer is writing to it
     └── OutcomeError             what is on the vehicle is not what was wanted, or unknown
+        ├── DefectError          a bug of ours, after something was written
         └── BackupError          the old list cannot be kept or read back: nothing is written
+            └── OtherVehicleError    the backup is another vehicle's, or may be
 """
 
 from __future__ import annotations
@@ -48,9 +51,21 @@ class RefusedError(BridgeError):
     """The vehicle refused: its result by name, and the item it refused where there is one."""
 
 
+class VehicleInUseError(RefusedError):
+    """Another pbpp on this computer is writing to the vehicle: which process, and since when."""
+
+
 class OutcomeError(BridgeError):
     """What is on the vehicle is not what was wanted, or it is unknown."""
 
 
+class DefectError(OutcomeError):
+    """A bug of this program ended a transfer after something was written; its cause is the bug."""
+
+
 class BackupError(OutcomeError):
     """The vehicle's old list cannot be kept, or a kept one cannot be read."""
+
+
+class OtherVehicleError(BackupError):
+    """The backup is of another vehicle, or cannot be shown to be of this one: nothing is written."""

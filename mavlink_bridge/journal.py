@@ -25,7 +25,7 @@ _FORMAT = 2
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """A call of the director: ``start``, ``timer``, ``target``, ``confirm``, ``backup_stored`` or ``plan_made``.
+    """A call of the director: ``start``, ``timer``, ``target``, ``confirm``, ``plan_made``, ``backup_stored``, ``backup_failed`` or ``in_use``.
 
     Parameters
     ----------
@@ -37,12 +37,15 @@ class Call:
         Which call.
     target : LatLon, optional
         The target that was typed.
+    text : str
+        Where the backup lies, or why there is none.
     """
 
     frames: int
     time_s: float
     name: str
     target: LatLon | None = None
+    text: str = ""
 
 
 @dataclass(frozen=True)
@@ -82,6 +85,8 @@ class JournalWriter:
         entry: dict[str, Any] = {"frames": call.frames, "time_s": call.time_s, "call": call.name}
         if call.target is not None:
             entry["target"] = list(call.target)
+        if call.text:
+            entry["text"] = call.text
         self._write(entry)
 
     def event(self, event: Event) -> None:
@@ -127,7 +132,9 @@ def read_journal(path: Path) -> Journal:
                 events.append(entry["told"])
             else:
                 target = LatLon(*entry["target"]) if "target" in entry else None
-                calls.append(Call(entry["frames"], entry["time_s"], entry["call"], target))
+                calls.append(
+                    Call(entry["frames"], entry["time_s"], entry["call"], target, str(entry.get("text", "")))
+                )
     except OSError as error:
         raise LogError(f"{path} cannot be read: {error.strerror}", file=str(path)) from None
     except (ValueError, KeyError, TypeError, IndexError) as error:

@@ -7,10 +7,11 @@ other log the director only listens: it learns from what others transferred, and
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.director import Director, Orders
-from mavlink_bridge.errors import LogError
+from mavlink_bridge.errors import BackupError, LogError, VehicleInUseError
 from mavlink_bridge.journal import journal_path, read_journal
 from mavlink_bridge.logbook.clock import Pulse, SteadyClock
 from mavlink_bridge.tlog import TlogReader
@@ -18,7 +19,6 @@ from missions.situation import Situation
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
-    from pathlib import Path
 
     from mavlink_bridge.director import Event
     from mavlink_bridge.journal import Call, Journal
@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 SENT_LINK = 3
 """MAVProxy's link number, and ours, for what the recording side sent."""
 
-
+_NO_BACKUP = {"backup_failed": BackupError, "in_use": VehicleInUseError}
+"""Calls that tell why nothing can be uploaded."""
 _STILL_ADVICE = "fence, mission and targets are in it all the same: `pbpp log FILE`, `pbpp plan --log FILE`"
 
 
@@ -145,7 +146,9 @@ def _call(director: Director, call: Call) -> Iterator[Event]:
     elif call.name == "confirm":
         director.confirm(call.time_s)
     elif call.name == "backup_stored":
-        director.backup_stored(call.time_s)
+        director.backup_stored(call.time_s, Path(call.text) if call.text else None)
+    elif call.name in _NO_BACKUP:
+        director.backup_failed(_NO_BACKUP[call.name](call.text), call.time_s)
     elif call.name == "plan_made":
         _make_plan(director, call.time_s)
     yield from _spoken(director)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 import select
-import signal
 import sys
 import time
 from dataclasses import dataclass
@@ -28,6 +27,7 @@ from mavlink_bridge.cli.common import (
 )
 from mavlink_bridge.cli.plan_request import request_from_options
 from mavlink_bridge.cli.terminal import echo, say
+from mavlink_bridge.cli.terminating import sigterm_as_interrupt
 from mavlink_bridge.cli.upload import RequiredConnectOption, SigningKeyOption
 from mavlink_bridge.errors import LinkError, UsageError
 
@@ -114,12 +114,6 @@ def bridge(
     `pbpp bridge --connect /dev/ttyAMA0,921600 --upload --drive --log run.tlog --json`
     """
     del config  # its callback has taken it
-    for name in (
-        "SIGTERM",
-        "SIGBREAK",
-    ):  # the latter is Ctrl-Break on Windows, where nothing sends the former
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), _end)
     from mavlink_bridge.cli.run_log import RunLog, SafeTeller  # noqa: PLC0415
     from mavlink_bridge.cli.session import signing_of  # noqa: PLC0415
     from mavlink_bridge.director import AT_WORK, Director, Orders  # noqa: PLC0415 - quick help
@@ -148,23 +142,20 @@ def bridge(
     )
     parameters = read_parameters(vehicle) if vehicle else {}
     with contextlib.ExitStack() as stack:
+        stack.enter_context(sigterm_as_interrupt())
         recorder, journal = _recorders(stack, log, orders, parameters)
         director = Director(orders, Situation(parameters=parameters))
         view = _view(stack, director, is_wanted=not (json_output or quiet))
         tell = view.tell if view else _teller(wants_json=json_output, quiet=quiet)
         log_of_run = RunLog(recorder, journal) if recorder is not None and journal is not None else None
         tell = SafeTeller(tell, lambda: director.state not in AT_WORK)
-        shell = _Shell(director, tell, view, log_of_run, quiet=quiet)
-        shell.run(connect, signing_of(signing_key), timeout)
+        shell = _Shell(director, connect, tell, view, log_of_run, quiet=quiet)
+        shell.run(signing_of(signing_key), timeout)
     trouble = shell.director.trouble
     if trouble is not None and shell.director.is_done:
         if json_output:
             raise typer.Exit(exit_code_of(trouble))
         raise trouble
-
-
-def _end(_number: int, _frame: object) -> None:
-    raise KeyboardInterrupt
 
 
 @dataclass(eq=False)
@@ -175,13 +166,13 @@ class _Journaled:
     writer: RunLog | None
     frames: int = 0
 
-    def call(self, name: str, now_s: float, target: object = None) -> None:
+    def call(self, name: str, now_s: float, target: object = None, text: str = "") -> None:
         from mavlink_bridge.journal import Call  # noqa: PLC0415 - quick help
         from missions.geo import LatLon  # noqa: PLC0415
 
         if self.writer is not None:
             place = target if isinstance(target, LatLon) else None
-            self.writer.call(Call(self.frames, now_s, name, place))
+            self.writer.call(Call(self.frames, now_s, name, place, text))
 
 
 class _Shell:
@@ -190,6 +181,7 @@ class _Shell:
     def __init__(
         self,
         director: Director,
+        connection: str,
         tell: Callable[[Event], None],
         view: LiveView | None,
         log: RunLog | None,
@@ -198,26 +190,37 @@ class _Shell:
     ) -> None:
         from mavlink_bridge.cli.link_notes import LinkNotes  # noqa: PLC0415 - quick help
         from mavlink_bridge.cli.live import BackupKeeper, PlanMaker  # noqa: PLC0415
+        from mavlink_bridge.link import parse_connection  # noqa: PLC0415
 
+        self._connection = connection
         self.director = director
         self._view = view
         self._written = _Journaled(self.director, log)
         self._tell = tell
         self._log = log
         self._notes = LinkNotes()
-        self._backups = BackupKeeper(self.director)
+        self._backups = BackupKeeper(
+            self.director,
+            str(parse_connection(connection)),
+            journal=lambda name, now, text: self._written.call(name, now, text=text),
+        )
         self._plans = PlanMaker(self.director)
         self._typed = _typed_lines()
         self._quiet = quiet
         self._asked_for: Plan | None = None  # the plan that was said to wait for a yes
 
-    def run(self, connection: str, signing: Signing | None, timeout_s: float) -> None:
+    def run(self, signing: Signing | None, timeout_s: float) -> None:
         """Run until the single job is done, or for ever; a link that breaks is opened again."""
+        from mavlink_bridge.outcomes import ends_in_words  # noqa: PLC0415 - quick help
+
+        with ends_in_words(lambda: self._backups.writing, last_words=self._backups.release):
+            self._run(signing, timeout_s)
+
+    def _run(self, signing: Signing | None, timeout_s: float) -> None:
         from mavlink_bridge.cli.opening import Opening  # noqa: PLC0415 - quick help
         from mavlink_bridge.echoes import SentFrames  # noqa: PLC0415
-        from mavlink_bridge.link import ONE_SHOT_IDENTITY, now_s, open_link, parse_connection  # noqa: PLC0415
+        from mavlink_bridge.link import ONE_SHOT_IDENTITY, now_s, open_link  # noqa: PLC0415
 
-        parse_connection(connection)
         sent = SentFrames()
         begun_s = now_s()
         self._written.call("start", begun_s)
@@ -229,7 +232,7 @@ class _Shell:
                 opening = Opening(
                     partial(
                         open_link,
-                        connection,
+                        self._connection,
                         identity,
                         recorder=self._log,
                         signing=signing,
@@ -310,8 +313,6 @@ class _Shell:
             time.sleep(min(_LINK_LOOK_S, max(0.0, until_s - now_s())))
 
     def _keep_backup(self, now: float) -> None:
-        if self.director.pending_backup is not None:
-            self._written.call("backup_stored", now)
         warn(self._backups.step(now))
 
     def _hand_over_plan(self, now: float) -> None:

@@ -105,6 +105,8 @@ def demo(
 
 def _rover(speedup: float) -> SteppedRover:
     """Give a rover in the maze, on a link that no slow computer breaks."""
+    import secrets  # noqa: PLC0415 - quick help
+
     from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig, SteppedRover  # noqa: PLC0415 - quick help
     from missions.fence import fence_to_items  # noqa: PLC0415
     from missions.geo import LatLon  # noqa: PLC0415
@@ -113,6 +115,7 @@ def _rover(speedup: float) -> SteppedRover:
         home=LatLon(*_HOME),
         fence=fence_to_items(_maze()),
         parameters={"FENCE_ENABLE": 1.0, "WP_RADIUS": 2.0, "WP_SPEED": 4.0},
+        uid=secrets.token_bytes(12),  # each demo is a new rover: an interrupted one says nothing of the next
     )
     return SteppedRover(SimulatedVehicle(config), speedup)
 

@@ -20,8 +20,9 @@ from mavlink_bridge.cli.common import (
     progress_bar,
     warn,
 )
+from mavlink_bridge.cli.restoring import reader_warnings
 from mavlink_bridge.cli.terminal import echo
-from mavlink_bridge.cli.upload import RequiredConnectOption, SigningKeyOption, interrupted_warnings
+from mavlink_bridge.cli.upload import RequiredConnectOption, SigningKeyOption
 from mavlink_bridge.errors import LinkError, RefusedError, UsageError
 
 if TYPE_CHECKING:
@@ -69,7 +70,9 @@ def download(
 
     address = Address(connect, (source_system, source_component), system, any_vehicle, timeout, signing_key)
     with progress_bar(quiet=quiet or json_output) as show, open_session(address, show) as session:
-        warn(interrupted_warnings(BackupStore(), session.vehicle.system))
+        store = BackupStore()
+        if store.notes():  # else there is nothing to be told apart
+            warn(reader_warnings(store, session.which_vehicle()))
         if what == "parameters":
             parameters = _read_parameters(session)
             items: tuple[MissionItem, ...] = ()

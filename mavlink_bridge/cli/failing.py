@@ -125,25 +125,39 @@ def report_error(command: str, error: Exception, *, wants_json: bool) -> ExitCod
     details = dict(getattr(error, "details", {}))
     if "advice" not in details and (advice := _advice(command, error)):
         details["advice"] = advice
-    report(command, type(error).__name__, str(error), code, details, wants_json=wants_json)
+    message = str(error)
+    if isinstance(error, bridge_errors.DefectError) and error.__cause__ is not None:
+        message += f"; {_defect_line(error.__cause__)}"
+        details["advice"] = "; ".join(filter(None, (details.get("advice"), _REPORT)))
+        details |= _trace_of(error.__cause__, wanted=telling().verbose)
+    report(command, type(error).__name__, message, code, details, wants_json=wants_json)
     return code
+
+
+def _defect_line(error: BaseException) -> str:
+    import traceback  # noqa: PLC0415 - only then
+
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    what = " ".join(f"{type(error).__name__}: {error}".split())
+    return f"internal error, a bug in pbpp: {what} (at {Path(place.filename).name}:{place.lineno})"
+
+
+def _trace_of(error: BaseException, *, wanted: bool) -> dict[str, str]:
+    """Put a defect's traceback on stderr where it is wanted; return it for the document."""
+    import traceback  # noqa: PLC0415 - only then
+
+    if not wanted and os.environ.get("PBPP_TRACEBACK", "") in ("", "0"):
+        return {}
+    trace = "".join(traceback.format_exception(error))
+    for line in trace.split("\n"):
+        say(line)
+    return {"traceback": trace}
 
 
 def report_defect(command: str, error: BaseException, *, wants_json: bool, verbose: bool = False) -> ExitCode:
     """Report what should never happen, in a line that says what broke and where; give its exit code."""
-    import traceback  # noqa: PLC0415 - only then
-
-    place = traceback.extract_tb(error.__traceback__)[-1]
-    where = f"{Path(place.filename).name}:{place.lineno}"
-    what = " ".join(f"{type(error).__name__}: {error}".split())
-    message = f"internal error, a bug in pbpp: {what} (at {where})"
-    details: dict[str, object] = {"advice": _REPORT}
-    if verbose or os.environ.get("PBPP_TRACEBACK", "") not in ("", "0"):
-        trace = "".join(traceback.format_exception(error))
-        details["traceback"] = trace
-        for line in trace.split("\n"):
-            say(line)
-    report(command, "InternalError", message, ExitCode.INTERNAL, details, wants_json=wants_json)
+    details: dict[str, object] = {"advice": _REPORT, **_trace_of(error, wanted=verbose)}
+    report(command, "InternalError", _defect_line(error), ExitCode.INTERNAL, details, wants_json=wants_json)
     return ExitCode.INTERNAL
 
 

@@ -11,13 +11,16 @@ from mavlink_bridge.backup import BackupStore
 from mavlink_bridge.cli.common import progress_bar, warn
 from mavlink_bridge.cli.link_notes import LinkNotes
 from mavlink_bridge.cli.plan import timed_plan
+from mavlink_bridge.cli.restoring import interrupted_warnings
 from mavlink_bridge.cli.session import signing_of
-from mavlink_bridge.cli.upload import interrupted_warnings, with_backup
 from mavlink_bridge.director import Director, EventName, Orders, State
-from mavlink_bridge.errors import BridgeError, LinkError
-from mavlink_bridge.link import ONE_SHOT_IDENTITY, open_link
-from mavlink_bridge.messages import MissionType
+from mavlink_bridge.errors import BackupError, BridgeError, LinkError, VehicleInUseError
+from mavlink_bridge.link import ONE_SHOT_IDENTITY, open_link, parse_connection
+from mavlink_bridge.messages import Autopilot, MissionType
+from mavlink_bridge.outcomes import Writing, ends_in_words
 from mavlink_bridge.protocol.verified_upload import Held
+from mavlink_bridge.vehicle_lock import VehicleLock
+from mavlink_bridge.vehicle_mark import Kinship, VehicleMark
 from missions.course import follow_mission
 from missions.errors import SituationError
 from missions.formats import read_parameters
@@ -32,11 +35,15 @@ if TYPE_CHECKING:
     from mavlink_bridge.director.plan_task import PlanTask
     from mavlink_bridge.link import Link
     from mavlink_bridge.messages import Frame
+    from mavlink_bridge.protocol.verified_upload import VerifiedUpload
     from missions.errors import MissionError
+    from missions.items import MissionItem
     from missions.plan import Plan
     from missions.request import Request
 
 _IDLE_S, _BUSY_S = 0.25, 0.02
+_NOT_KNOWN_YET = frozenset({State.LISTENING, State.LEARNING})
+"""States in which it is not yet known which vehicle it is."""
 
 _STATE_TEXTS = {
     State.LISTENING: "listening for the vehicle",
@@ -62,12 +69,13 @@ _STATE_TEXTS = {
 
 @dataclass(frozen=True, eq=False)
 class LiveResult:
-    """What came of a live run."""
+    """What came of a live run; the backup is None where nothing was written."""
 
     plan: Plan
     planning_s: float
     situation: Situation
     verified: bool
+    backup: Path | None
 
 
 def plan_live(
@@ -83,7 +91,13 @@ def plan_live(
     parameters = read_parameters(vehicle_file) if vehicle_file else {}
     identity = orders.identity or ONE_SHOT_IDENTITY
     with open_link(connection, identity, signing=signing_of(key_file)) as link:
-        return conduct(link, orders, Situation(parameters=parameters), quiet=quiet)
+        return conduct(
+            link,
+            orders,
+            Situation(parameters=parameters),
+            connection=str(parse_connection(connection)),
+            quiet=quiet,
+        )
 
 
 def conduct(
@@ -92,6 +106,7 @@ def conduct(
     situation: Situation | None = None,
     *,
     quiet: bool,
+    connection: str = "",
     on_frames: Callable[[list[Frame]], None] | None = None,
 ) -> LiveResult:
     """Run a director on a link until its single job is done, and keep backups for it.
@@ -99,7 +114,7 @@ def conduct(
     Raises
     ------
     BridgeError, MissionError
-        The director's trouble.
+        The director's trouble; or what ended the run, with what may be on the vehicle.
     """
     planning_s: list[float] = []
     has_driven = False
@@ -118,7 +133,7 @@ def conduct(
 
     director = Director(replace(orders, once=True), situation)
     plans = PlanMaker(director, timed)
-    backups = BackupKeeper(director)
+    backups = BackupKeeper(director, connection)
     notes = LinkNotes()
     with progress_bar(quiet=quiet) as show:
 
@@ -132,15 +147,17 @@ def conduct(
             if (made := plans.take()) is not None:
                 director.plan_made(*made, link.now_s())
 
-        link.run(director, on_frames=on_frames, on_step=step, longest_wait_s=plans.longest_wait_s)
+        with ends_in_words(lambda: backups.writing, last_words=backups.release):
+            link.run(director, on_frames=on_frames, on_step=step, longest_wait_s=plans.longest_wait_s)
     if director.trouble is not None or director.plan is None:
-        raise backups.explained(director.trouble or LinkError("the director ended without a plan"))
+        raise director.trouble or LinkError("the director ended without a plan")
     outcome = director.upload_outcome
     return LiveResult(
         director.plan,
         planning_s[-1],
         director.situation,
         verified=outcome is not None and outcome.is_verified,
+        backup=backups.path,
     )
 
 
@@ -217,45 +234,115 @@ class PlanMaker:
 class BackupKeeper:
     """Keeps a director's backups: stores the old mission before anything is written, and the note of an upload under way.
 
+    While an upload runs the vehicle is locked against other processes of this computer.
+
     Parameters
     ----------
     director : Director
         Whose missions.
+    connection : str
+        How the vehicle is connected.
     store : BackupStore, optional
         Where; the user's state folder if not given.
+    journal : callable, optional
+        Told of each call of the director before it is made: its name, time and text.
     """
 
-    def __init__(self, director: Director, store: BackupStore | None = None) -> None:
+    def __init__(
+        self,
+        director: Director,
+        connection: str = "",
+        store: BackupStore | None = None,
+        journal: Callable[[str, float, str], None] = lambda _name, _now_s, _text: None,
+    ) -> None:
+        self.path: Path | None = None
         self._director = director
+        self._connection = connection
         self._store = store or BackupStore()
-        self._path: Path | None = None
-        self._was_interrupted: bool | None = None
+        self._journal = journal
+        self._has_warned = False
+        self._guarded: VerifiedUpload | None = None
+        self._lock: VehicleLock | None = None
+        self._hindrance: BridgeError | None = None
+        self._was_interrupted = False
+        self._noted: VehicleMark | None = None
         self._settled: object = None
 
+    @property
+    def writing(self) -> Writing | None:
+        """The newest upload; None before the first."""
+        upload = self._director.upload
+        return Writing("mission", upload, self.path) if upload is not None else None
+
     def step(self, now_s: float) -> list[str]:
-        """Do what the director waits for; give warnings of earlier uploads that were interrupted, once."""
-        director, peer = self._director, self._director.peer
-        if peer is None:
+        """Do what the director waits for; return warnings of earlier uploads that were interrupted, once."""
+        director, vehicle = self._director, self._vehicle()
+        if vehicle is None:
             return []
-        warnings = []
-        if self._was_interrupted is None:
-            warnings = interrupted_warnings(self._store, peer.system)
-            self._was_interrupted = self._store.interrupted(peer.system, MissionType.MISSION) is not None
+        if director.is_uploading and director.upload is not self._guarded:
+            self._guard(vehicle)
         if (old := director.pending_backup) is not None:
-            self._path = self._store.begin(peer.system, MissionType.MISSION, old)
-            director.backup_stored(now_s)
+            self._keep(vehicle, old, now_s)
         outcome = director.upload_outcome
         if outcome is not None and outcome is not self._settled:
             self._settled = outcome
             is_settled = outcome.held in (Held.OLD, Held.FOREIGN) and not self._was_interrupted
             if outcome.held is Held.WANTED or is_settled:
-                self._store.end(peer.system, MissionType.MISSION)
-                self._was_interrupted = False
-        return warnings
+                self._store.end(vehicle, MissionType.MISSION)
+        if not director.is_uploading:
+            self.release()
+        if self._has_warned or director.state in _NOT_KNOWN_YET:
+            return []
+        self._has_warned = True
+        return interrupted_warnings(self._store, vehicle)
 
-    def explained(self, trouble: BridgeError | MissionError) -> BridgeError | MissionError:
-        """Give the director's trouble, after an upload with where the old mission lies."""
-        outcome = self._director.upload_outcome
-        if outcome is None or outcome.is_verified or not isinstance(trouble, BridgeError):
-            return trouble
-        return with_backup(trouble, "mission", self._path, is_old_there=outcome.held is Held.OLD)
+    def release(self) -> None:
+        """Let other processes write to the vehicle; a note of an upload that has written nothing goes with it."""
+        if self._lock is None:
+            return
+        upload = self._guarded
+        if (
+            self._noted is not None
+            and upload is not None
+            and not upload.has_written
+            and not self._was_interrupted
+        ):
+            self._store.end(self._noted, MissionType.MISSION)
+        self._noted = None
+        self._lock.free()
+        self._lock = None
+
+    def _vehicle(self) -> VehicleMark | None:
+        peer = self._director.peer
+        if peer is None:
+            return None
+        return VehicleMark(
+            peer.system, self._director.vehicle_uid, self._connection, int(Autopilot.ARDUPILOTMEGA)
+        )
+
+    def _guard(self, vehicle: VehicleMark) -> None:
+        """Lock the vehicle before its old mission is read: a mission that somebody else was writing meanwhile is no backup."""
+        self.release()
+        self._guarded, self._hindrance, self.path = self._director.upload, None, None
+        self._lock = VehicleLock(vehicle)
+        try:
+            if holder := self._lock.take():
+                self._hindrance = holder.error(vehicle)
+        except BackupError as error:
+            self._hindrance = error
+
+    def _keep(self, vehicle: VehicleMark, old: tuple[MissionItem, ...], now_s: float) -> None:
+        try:
+            if self._hindrance is not None:
+                raise self._hindrance
+            earlier = self._store.interrupted(vehicle, MissionType.MISSION)
+            self._was_interrupted = any(vehicle.kinship(note.vehicle) is Kinship.SAME for note in earlier)
+            self._noted = vehicle
+            self.path = self._store.begin(vehicle, MissionType.MISSION, old)
+        except BridgeError as error:
+            name = "in_use" if isinstance(error, VehicleInUseError) else "backup_failed"
+            self._journal(name, now_s, str(error))
+            self._director.backup_failed(error, now_s)
+        else:
+            self._journal("backup_stored", now_s, str(self.path))
+            self._director.backup_stored(now_s, self.path)

@@ -25,6 +25,7 @@ from mavlink_bridge.cli.common import (
 )
 from mavlink_bridge.cli.plan_request import ENDS, METHODS, ORDERS, request_from_options, with_tour
 from mavlink_bridge.cli.plan_results import plan_document, report_plan, write_outputs
+from mavlink_bridge.cli.terminating import sigterm_as_interrupt
 from mavlink_bridge.cli.upload import SigningKeyOption
 from mavlink_bridge.cli.vehicle_options import PANEL as VEHICLE_PANEL
 from mavlink_bridge.cli.vehicle_options import (
@@ -199,19 +200,28 @@ def plan(
         )
         if request.repairs:  # it goes where the mission goes, whatever is clicked meanwhile
             orders = replace(orders, target_sources=frozenset())
-        result = plan_live(
-            connect, orders, vehicle_file=vehicle, key_file=signing_key, quiet=quiet or json_output
-        )
+        with sigterm_as_interrupt():
+            result = plan_live(
+                connect, orders, vehicle_file=vehicle, key_file=signing_key, quiet=quiet or json_output
+            )
         planned, planning_s, situation = result.plan, result.planning_s, result.situation
         uploaded = verified = result.verified
+        backup = result.backup
     else:
         situation = _offline_situation(fence, log, system, any_vehicle=any_vehicle)
         situation = with_home_option(with_parameter_file(situation, vehicle), home)
         planned, planning_s = timed_plan(situation, request)
         uploaded = verified = False
+        backup = None
     warnings = list(planned.warnings)
     warn(warnings)
-    written = write_outputs(planned, situation, outputs, plots, blocks=blocks)
+    try:
+        written = write_outputs(planned, situation, outputs, plots, blocks=blocks)
+    except BaseException:
+        if verified:  # what went wrong after it must not hide what was done to the vehicle
+            kept = f"; the mission before is kept in {backup}" if backup else ""
+            warn([f"the mission is on the vehicle, verified{kept}"])
+        raise
     document = {
         **plan_document(planned),
         "source": Path(str(fence or log)).name if connect is None else connect,
@@ -221,11 +231,12 @@ def plan(
         "warnings": warnings,
         "uploaded": uploaded,
         "verified": verified,
+        "backup": str(backup) if backup else None,
     }
     if json_output:
         print_json(document)
     elif not quiet:
-        report_plan(planned, written, verified=verified)
+        report_plan(planned, written, verified=verified, backup=backup)
 
 
 def timed_plan(situation: Situation, request: Request) -> tuple[Plan, float]:

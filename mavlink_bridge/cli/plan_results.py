@@ -84,7 +84,7 @@ def _finite(value_m: float | None) -> float | None:
     return None if value_m is None or value_m == float("inf") else round(value_m, 4)
 
 
-def report_plan(planned: Plan, written: list[Path], *, verified: bool) -> None:
+def report_plan(planned: Plan, written: list[Path], *, verified: bool, backup: Path | None = None) -> None:
     """Tell people of a plan, and of what was done with it."""
     promise = (
         f"{planned.clearance_m:g} m promised while driving"
@@ -102,3 +102,5 @@ def report_plan(planned: Plan, written: list[Path], *, verified: bool) -> None:
         echo(f"Wrote {path}")
     if verified:
         echo("Uploaded and verified")
+    if backup is not None:
+        echo(f"The mission before is kept in {backup}")

@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Any
 from mavlink_bridge.cli.common import warn
 from mavlink_bridge.cli.link_notes import LinkNotes
 from mavlink_bridge.errors import LinkError, OutcomeError, RefusedError
-from mavlink_bridge.link import open_link
+from mavlink_bridge.link import open_link, parse_connection
 from mavlink_bridge.messages import Autopilot, CommandLong, Heartbeat, ModeFlag, RequestDataStream
+from mavlink_bridge.protocol.ask_version import AskVersion
 from mavlink_bridge.protocol.command import SendCommand
 from mavlink_bridge.protocol.find import FindVehicle, identity_shared, identity_taken
 from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.rover import AUTO_MODE, MODE_NAMES
+from mavlink_bridge.vehicle_mark import VehicleMark, uid_of
 from missions.items import Command
 
 if TYPE_CHECKING:
@@ -89,6 +91,7 @@ class Session:
 
     def __init__(self, link: Link, address: Address, show: Callable[[str, int, int], None]) -> None:
         self._link = link
+        self._connection = address.connection
         self._show = show
         self._notes = LinkNotes()
         self._machine: Machine | None = None
@@ -128,6 +131,18 @@ class Session:
             return None
         is_armed = bool(self._heartbeat.base_mode & ModeFlag.SAFETY_ARMED)
         return is_armed and self._heartbeat.custom_mode == AUTO_MODE
+
+    def which_vehicle(self) -> VehicleMark:
+        """Ask the vehicle which one it is; return by what it is known again."""
+        asking = AskVersion(self.vehicle)
+        self.run(asking, "asking which vehicle it is")
+        autopilot = self._heartbeat.autopilot if self._heartbeat is not None else None
+        return VehicleMark(
+            self.vehicle.system,
+            uid_of(asking.version),
+            str(parse_connection(self._connection)),
+            autopilot,
+        )
 
     def run(self, machine: Machine, text: str, on_step: Callable[[], None] | None = None) -> None:
         """Run a machine to its outcome, with progress.

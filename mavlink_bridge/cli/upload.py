@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import time
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -21,17 +19,17 @@ from mavlink_bridge.cli.common import (
     progress_bar,
     warn,
 )
+from mavlink_bridge.cli.restoring import Restoration, backups_to_restore, interrupted_warnings
 from mavlink_bridge.cli.terminal import echo
-from mavlink_bridge.errors import BridgeError, OutcomeError, RefusedError, UsageError
+from mavlink_bridge.cli.terminating import sigterm_as_interrupt
+from mavlink_bridge.errors import UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from mavlink_bridge.backup import Backup, BackupStore
-    from mavlink_bridge.cli.session import Session
-    from mavlink_bridge.messages import MissionType
-    from mavlink_bridge.protocol.limits import Limits
-    from mavlink_bridge.protocol.verified_upload import VerifiedUpload, VerifiedUploadOutcome
+    from mavlink_bridge.backup import BackupStore
+    from mavlink_bridge.cli.session import Address, Session
+    from mavlink_bridge.cli.uploading import Done, Lists
     from missions.items import MissionItem
 
 _LISTS = ("fence", "rally", "mission")  # a fence before the mission that it governs
@@ -49,36 +47,6 @@ SigningKeyOption = Annotated[
     Path | None,
     typer.Option(metavar="FILE", help="Sign with this key: 32 bytes, hex, base64, or a passphrase."),
 ]
-
-
-@dataclass(frozen=True, slots=True)
-class _Wish:
-    """What may be done to the vehicle."""
-
-    hold: bool
-    replace_active: bool
-    drive: bool
-
-
-@dataclass(frozen=True, slots=True)
-class _Done:
-    """One list that is on the vehicle now, verified."""
-
-    mission_type: MissionType
-    outcome: VerifiedUploadOutcome
-    backup: Path | None
-    took_s: float
-
-    def document(self) -> dict[str, Any]:
-        """Give it for JSON."""
-        return {
-            "list": self.mission_type.name.lower(),
-            "items": len(self.outcome.found or ()),
-            "outcome": str(self.outcome.kind),
-            "pushes": self.outcome.pushes,
-            "backup": str(self.backup) if self.backup else None,
-            "transfer_s": round(self.took_s, 3),
-        }
 
 
 def upload(
@@ -106,6 +74,14 @@ def upload(
     drive: Annotated[
         bool, typer.Option("--drive", help="Switch to AUTO once everything is verified; arms nothing.")
     ] = False,
+    other_vehicle: Annotated[
+        bool,
+        typer.Option("--other-vehicle", help="With --restore FILE: the backup may be another vehicle's."),
+    ] = False,
+    forget: Annotated[
+        bool,
+        typer.Option("--forget", help="Put the notes of interrupted uploads aside; the backups stay."),
+    ] = False,
     signing_key: SigningKeyOption = None,
     system: SystemOption = None,
     any_vehicle: AnyVehicleOption = False,
@@ -125,87 +101,116 @@ def upload(
 
     `pbpp upload --restore --connect udpin:0.0.0.0:14550`
     """
-    if not connect:
+    if other_vehicle and not (restore and file):
+        raise UsageError("--other-vehicle goes with --restore FILE: name the backup that is to be written")
+    if forget and (file is not None or restore or drive):
+        raise UsageError("--forget only puts notes aside; upload or restore in another run")
+    if not connect and not forget:
         raise UsageError("upload needs --connect CONNECTION")
-    if file is None and not restore:
+    if file is None and not restore and not forget:
         raise UsageError("what is to be uploaded? Give a FILE, or --restore")
-    lists, parameters = _content(file, only or [], restore=restore)
+    restoration = _restoration(file, for_another=other_vehicle) if restore else None
+    lists, parameters = _content(file, only or [], restoration)
 
     from mavlink_bridge.backup import BackupStore  # noqa: PLC0415 - usage errors need not wait for it
     from mavlink_bridge.cli.session import Address, open_session  # noqa: PLC0415
 
     address = Address(connect, (source_system, source_component), system, any_vehicle, timeout, signing_key)
-    wish = _Wish(hold, replace_active, drive)
-    done: list[_Done] = []
-    changed: dict[str, tuple[float | None, float]] = {}
-    with progress_bar(quiet=quiet or json_output) as show, open_session(address, show) as session:
-        store = BackupStore()
-        if restore and file is None:
-            lists = _interrupted_lists(store, session.vehicle.system)
-        elif not restore:
-            warn(interrupted_warnings(store, session.vehicle.system))
+    store = BackupStore()
+    if forget:
+        _forget(store, address, json_output=json_output, quiet=quiet)
+        return
+
+    from mavlink_bridge.cli.uploading import Uploads, Wish  # noqa: PLC0415
+
+    with (
+        sigterm_as_interrupt(),
+        progress_bar(quiet=quiet or json_output) as show,
+        open_session(address, show) as session,
+    ):
         if not session.is_ardupilot:
             raise UsageError("the vehicle's autopilot is not ArduPilot: what it stores could not be verified")
-        _make_ready(session, wish)
-        limits = _limits(session, lists)
-        for mission_type, items in lists:
-            done.append(_upload_list(session, store, mission_type, items, limits, wish))
-        if parameters:
-            changed = _upload_parameters(session, parameters)
-        if drive:
-            _drive(session)
-    _report(session, done, changed, json_output=json_output, quiet=quiet)
+        vehicle = session.which_vehicle()
+        uploads = Uploads(session, store, vehicle, Wish(hold, replace_active))
+        with uploads.begin():
+            backups = backups_to_restore(store, vehicle, restoration) if restoration else []
+            if not restoration:
+                warn(interrupted_warnings(store, vehicle))
+            uploads.make_ready()
+            for backup in backups:
+                uploads.write_lists([(backup.mission_type, backup.items)], backup.path)
+            uploads.write_lists(lists)
+            if parameters:
+                uploads.write_parameters(parameters)
+            if drive:
+                _drive(session)
+    _report(session, uploads.done, uploads.changed, json_output=json_output, quiet=quiet)
 
 
-def interrupted_warnings(store: BackupStore, system: int) -> list[str]:
-    """Say which uploads to a vehicle never came to their outcome."""
-    return [
-        f"an upload of the {backup.mission_type.name.lower()} to system {system} was interrupted: the list may be part old, part new. "
-        f"`pbpp upload --restore` puts back the old one ({len(backup.items)} items, read {backup.time:%Y-%m-%d %H:%M:%S} UTC, {backup.path})"
-        for backup in _interrupted(store, system)
+def _restoration(file: Path | None, *, for_another: bool) -> Restoration:
+    from mavlink_bridge.backup import read_backup  # noqa: PLC0415 - usage errors need not wait for it
+
+    return Restoration(read_backup(file) if file else None, for_another)
+
+
+def _forget(store: BackupStore, address: Address, *, json_output: bool, quiet: bool) -> None:
+    """Put notes aside: all that there are, those of a system id, or those that may be about the vehicle on a link."""
+    if address.connection:
+        from mavlink_bridge.cli.session import open_session  # noqa: PLC0415 - usage errors need not wait for it
+
+        with progress_bar(quiet=quiet or json_output) as show, open_session(address, show) as session:
+            notes = store.interrupted(session.which_vehicle())
+    else:
+        notes = [note for note in store.notes() if address.system in (None, note.vehicle.system)]
+    put_aside = store.forget(notes)
+    document = [
+        {
+            "list": note.mission_type.name.lower(),
+            "vehicle": str(note.vehicle),
+            "backup": str(note.backup.path) if note.backup else None,
+            "note": str(path),
+        }
+        for note, path in zip(notes, put_aside, strict=True)
     ]
-
-
-def _interrupted(store: BackupStore, system: int) -> list[Backup]:
-    from mavlink_bridge.messages import MissionType  # noqa: PLC0415
-
-    found = (store.interrupted(system, MissionType[name.upper()]) for name in _LISTS)
-    return [backup for backup in found if backup]
-
-
-def _interrupted_lists(store: BackupStore, system: int) -> list[tuple[MissionType, tuple[MissionItem, ...]]]:
-    backups = _interrupted(store, system)
-    if not backups:
-        raise UsageError(
-            f"no upload to system {system} was interrupted; to restore another backup give its file (they are in {store.folder})"
-        )
-    return [(backup.mission_type, backup.items) for backup in backups]
+    if json_output:
+        print_json({"status": "ok", "command": "upload", "forgotten": document})
+    elif not quiet:
+        for entry in document:
+            backup = entry["backup"] or "not known"
+            echo(
+                f"{entry['list']} of {entry['vehicle']}: put aside as {entry['note']}; the backup is {backup}"
+            )
+        if not document:
+            echo("no interrupted upload is noted")
 
 
 def _content(
-    file: Path | None, only: Sequence[str], *, restore: bool
-) -> tuple[list[tuple[MissionType, tuple[MissionItem, ...]]], Mapping[str, float]]:
-    """Read the file: lists as they go over the wire, or parameters."""
+    file: Path | None, only: Sequence[str], restoration: Restoration | None
+) -> tuple[Lists, Mapping[str, float]]:
+    """Read the file, lists as they go over the wire or parameters; all that it holds can be sent."""
     from mavlink_bridge.messages import MissionType  # noqa: PLC0415 - usage errors need not wait for it
+    from mavlink_bridge.protocol.sendable import check_items, check_parameters  # noqa: PLC0415
 
     if unknown := [name for name in only if name not in _LISTS]:
         raise UsageError(f"--only {unknown[0]}: expected one of {', '.join(_LISTS)}")
-    if file is None:
+    if restoration is not None and restoration.backup is not None:
+        check_items(restoration.backup.items, restoration.backup.mission_type, allow_infinite=True)
+    if file is None or restoration is not None:
         return [], {}
-    if restore:
-        from mavlink_bridge.backup import read_backup  # noqa: PLC0415
-
-        backup = read_backup(file)
-        return [(backup.mission_type, backup.items)], {}
     if file.suffix.lower() in _PARAMETER_SUFFIXES:
         from missions.formats import read_parameters  # noqa: PLC0415
 
-        return [], read_parameters(file)
+        parameters = read_parameters(file)
+        check_parameters(parameters)
+        return [], parameters
     found = _lists_of(file)
     chosen = [name for name in _LISTS if name in found and (not only or name in only)]
     if not chosen:
         raise UsageError(f"{file} holds no {' or '.join(only or _LISTS)}")
-    return [(MissionType[name.upper()], found[name]) for name in chosen], {}
+    lists = [(MissionType[name.upper()], found[name]) for name in chosen]
+    for mission_type, items in lists:
+        check_items(items, mission_type)
+    return lists, {}
 
 
 def _lists_of(file: Path) -> dict[str, tuple[MissionItem, ...]]:
@@ -228,139 +233,6 @@ def _lists_of(file: Path) -> dict[str, tuple[MissionItem, ...]]:
     return found
 
 
-def _make_ready(session: Session, wish: _Wish) -> None:
-    """See to it that the vehicle does not drive what is about to be replaced."""
-    from mavlink_bridge.rover import HOLD_MODE  # noqa: PLC0415
-
-    if session.is_active and wish.hold:
-        session.change_mode(HOLD_MODE)
-    elif session.is_active and not wish.replace_active:
-        raise RefusedError(
-            "the vehicle is armed and drives its mission in AUTO; nothing was written. "
-            "--hold switches it to HOLD first, --replace-active writes all the same"
-        )
-
-
-def _limits(session: Session, lists: Sequence[tuple[MissionType, tuple[MissionItem, ...]]]) -> Limits:
-    """Give what fits; where the usual limits are too small, the vehicle is asked for its SD card's."""
-    from mavlink_bridge.protocol.limits import Limits  # noqa: PLC0415
-
-    limits = Limits()
-    if not any(limits.problem(items, mission_type) for mission_type, items in lists):
-        return limits
-    from mavlink_bridge.protocol.parameters import ReadParameters  # noqa: PLC0415
-
-    # ARMING_CHECK is on every vehicle: an answer to it tells a missing parameter from a lossy link.
-    reading = ReadParameters(session.vehicle, ("ARMING_CHECK", "BRD_SD_MISSION", "BRD_SD_FENCE"))
-    session.run(reading, "reading the vehicle's limits")
-    return Limits.from_parameters(reading.outcome.values) if reading.outcome else limits
-
-
-def _upload_list(
-    session: Session,
-    store: BackupStore,
-    mission_type: MissionType,
-    items: tuple[MissionItem, ...],
-    limits: Limits,
-    wish: _Wish,
-) -> _Done:
-    from mavlink_bridge.link import now_s  # noqa: PLC0415 - pymavlink takes its time
-    from mavlink_bridge.outcomes import upload_trouble  # noqa: PLC0415
-    from mavlink_bridge.protocol.verified_upload import Held, VerifiedUpload  # noqa: PLC0415
-
-    system, name = session.vehicle.system, mission_type.name.lower()
-    was_interrupted = store.interrupted(system, mission_type) is not None
-    machine = VerifiedUpload(
-        session.vehicle,
-        mission_type,
-        items,
-        limits=limits,
-        is_active=session.is_active,
-        replace_active=wish.replace_active,
-    )
-    backup: Path | None = None
-
-    def step() -> None:
-        nonlocal backup
-        if (old := machine.pending_backup) is not None:
-            backup = store.begin(system, mission_type, old)
-            machine.backup_stored(now_s())
-
-    begun_s = time.monotonic()
-    try:
-        session.run(machine, f"{name}: {len(items)} items", step)
-    except KeyboardInterrupt:
-        raise _interrupt(machine, backup, name) from None
-    outcome = machine.outcome
-    assert outcome is not None
-    trouble = upload_trouble(outcome)
-    if trouble is None:
-        store.end(system, mission_type)
-        return _Done(mission_type, outcome, backup, time.monotonic() - begun_s)
-    if outcome.held in (Held.OLD, Held.FOREIGN) and not was_interrupted:
-        store.end(system, mission_type)
-    raise with_backup(trouble, name, backup, is_old_there=outcome.held is Held.OLD)
-
-
-def with_backup(trouble: BridgeError, name: str, backup: Path | None, *, is_old_there: bool) -> BridgeError:
-    """Give an upload's error with where the old list lies."""
-    message = f"{name}: {trouble}"
-    if backup is not None and not is_old_there:
-        message += f"; the old list is kept in {backup}, `pbpp upload --restore {backup}` puts it back"
-    return type(trouble)(message, **trouble.details, list=name, backup=str(backup) if backup else None)
-
-
-def _interrupt(machine: VerifiedUpload, backup: Path | None, name: str) -> KeyboardInterrupt:
-    if backup is None or machine.pending_backup is not None:
-        return KeyboardInterrupt()
-    return KeyboardInterrupt(
-        f"interrupted while the {name} was written: the vehicle may hold part of the old and part of the new list; "
-        f"do not drive it. The old list is kept in {backup}, `pbpp upload --restore` puts it back"
-    )
-
-
-def _upload_parameters(
-    session: Session, wanted: Mapping[str, float]
-) -> dict[str, tuple[float | None, float]]:
-    """Set the parameters that differ; give their old and new values."""
-    from mavlink_bridge.protocol.parameters import ReadParameters, SetParameter  # noqa: PLC0415
-
-    reading = ReadParameters(session.vehicle, wanted)
-    session.run(reading, "reading parameters")
-    read = reading.outcome
-    assert read is not None
-    if read.is_silent:
-        raise OutcomeError("the vehicle does not answer when asked for its parameters; none was set")
-    if read.missing:
-        raise RefusedError(
-            f"the vehicle has no parameter {', '.join(read.missing)}; none was set",
-            missing=list(read.missing),
-        )
-    changed: dict[str, tuple[float | None, float]] = {}
-    for name, value in wanted.items():
-        if _is_same(read.values[name], value):
-            continue
-        setting = SetParameter(session.vehicle, name, value)
-        session.run(setting, f"setting {name}")
-        outcome = setting.outcome
-        assert outcome is not None
-        if not outcome.is_confirmed:
-            now = "an unknown value" if outcome.value is None else f"{outcome.value:g}"
-            raise OutcomeError(
-                f"parameter {name} was to be {value:g}, the vehicle holds {now}; set before it: {', '.join(changed) or 'none'}",
-                parameter=name,
-                wanted=value,
-                found=outcome.value,
-                changed=list(changed),
-            )
-        changed[name] = (read.values[name], value)
-    return changed
-
-
-def _is_same(held: float, wanted: float) -> bool:
-    return abs(held - wanted) <= 1e-6 * abs(wanted)
-
-
 def _drive(session: Session) -> None:
     from mavlink_bridge.rover import AUTO_MODE  # noqa: PLC0415
 
@@ -369,7 +241,7 @@ def _drive(session: Session) -> None:
 
 def _report(
     session: Session,
-    done: Sequence[_Done],
+    done: Sequence[Done],
     changed: Mapping[str, tuple[float | None, float]],
     *,
     json_output: bool,

@@ -55,6 +55,7 @@ class Acquaintance(TableMachine[State, Cue]):
         self.situation = situation or Situation()
         self.trouble: BridgeError | MissionError | None = None
         patience_s = orders.patience_s if orders.once else math.inf
+        self.vehicle_uid = ""
         self._peer: Peer | None = None
         self._find = FindVehicle(
             orders.system,
@@ -187,6 +188,7 @@ class Acquaintance(TableMachine[State, Cue]):
             if not self.orders.once:
                 self._learn(now_s)
             return
+        self.vehicle_uid = machine.uid
         self.situation = machine.merged(self.situation, now_s)
         self._all_learnt(now_s)
 

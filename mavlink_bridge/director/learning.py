@@ -11,9 +11,11 @@ from mavlink_bridge.director.steps import Steps
 from mavlink_bridge.errors import BridgeError, LinkError
 from mavlink_bridge.fold import with_list
 from mavlink_bridge.outcomes import download_refusal
+from mavlink_bridge.protocol.ask_version import AskVersion
 from mavlink_bridge.protocol.command import SendCommand
 from mavlink_bridge.protocol.download import Download
 from mavlink_bridge.protocol.parameters import ReadParameters
+from mavlink_bridge.vehicle_mark import uid_of
 from missions.items import Command
 from missions.situation import ListKind
 from missions.vehicle import PARAMETER_NAMES
@@ -51,10 +53,18 @@ class Learning:
         How long to wait for a position.
     kinds : sequence of ListKind
         The lists that are read.
+
+    Attributes
+    ----------
+    trouble : BridgeError or None
+        What could not be learnt.
+    uid : str
+        The uid of the vehicle's board; empty where it tells none.
     """
 
     def __init__(self, peer: Peer, patience_s: float, kinds: Sequence[ListKind]) -> None:
         self.trouble: BridgeError | None = None
+        self.uid = ""
         self._peer = peer
         self._patience_s = patience_s
         self._kinds = tuple(kinds)
@@ -105,6 +115,7 @@ class Learning:
                     (Download(peer, MISSION_TYPES[kind]), partial(self._take_list, kind))
                     for kind in self._kinds
                 ),
+                (AskVersion(peer), self._take_version),
                 (SendCommand(peer, home), self._take_home),
             ],
             now_s,
@@ -163,6 +174,9 @@ class Learning:
             self._fail(items)
         else:
             self._lists[kind] = items
+
+    def _take_version(self, machine: AskVersion, _now_s: float) -> None:
+        self.uid = uid_of(machine.version)
 
     def _take_home(self, _machine: SendCommand, now_s: float) -> None:
         self._position_until_s = now_s + self._patience_s

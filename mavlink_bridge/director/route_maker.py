@@ -12,8 +12,10 @@ from mavlink_bridge.director.grounds import Grounds
 from mavlink_bridge.director.plan_task import PlanTask
 from mavlink_bridge.director.states import Cue, State
 from mavlink_bridge.director.target_taker import TargetTaker
-from mavlink_bridge.outcomes import upload_trouble
+from mavlink_bridge.errors import BridgeError
+from mavlink_bridge.outcomes import Writing, end_of_upload, upload_trouble
 from mavlink_bridge.protocol.limits import Limits
+from mavlink_bridge.protocol.sendable import check_items
 from mavlink_bridge.protocol.verified_upload import VerifiedUpload, VerifiedUploadOutcome
 from mavlink_bridge.rover import AUTO_MODE
 from missions.errors import MissionError
@@ -22,8 +24,10 @@ from missions.plan import asked_clearance
 from missions.recheck import recheck
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
     from mavlink_bridge.director.orders import Orders
-    from mavlink_bridge.errors import BridgeError
     from mavlink_bridge.messages import Frame
     from missions.items import MissionItem
     from missions.plan import Plan
@@ -49,10 +53,20 @@ class RouteMaker(TargetTaker):
         What it may do.
     situation : Situation, optional
         What is known beforehand (parameters of a file).
+
+    Attributes
+    ----------
+    upload : VerifiedUpload or None
+        The newest upload, under way or ended; None before the first.
+    upload_outcome : VerifiedUploadOutcome or None
+        How the newest upload that has ended did.
+    plan : Plan or None
+        The plan that stands.
     """
 
     def __init__(self, orders: Orders, situation: Situation | None = None) -> None:
         super().__init__(orders, situation)
+        self.upload: VerifiedUpload | None = None
         self.upload_outcome: VerifiedUploadOutcome | None = None
         self.plan: Plan | None = None
         self._task: PlanTask | None = None
@@ -63,8 +77,14 @@ class RouteMaker(TargetTaker):
         )
         self._ours: tuple[MissionItem, ...] | None = None  # the mission that is on the vehicle by us
         self._confirmed = False
+        self._backup_path: Path | None = None
 
     # What the shell sees and does
+
+    @property
+    def is_uploading(self) -> bool:
+        """Whether an upload is under way, from the reading of the old mission on."""
+        return isinstance(self._steps.current, VerifiedUpload)
 
     @property
     def pending_backup(self) -> tuple[MissionItem, ...] | None:
@@ -95,11 +115,20 @@ class RouteMaker(TargetTaker):
             self._confirmed = True
             self._go_on(now_s)
 
-    def backup_stored(self, now_s: float) -> None:
-        """Take notice that the old mission is safe."""
+    def backup_stored(self, now_s: float, path: Path | None = None) -> None:
+        """Take notice that the old mission is safe, and where: an upload that fails says so."""
         upload = self._steps.current
         if isinstance(upload, VerifiedUpload):
+            self._backup_path = path
             upload.backup_stored(now_s)
+
+    def backup_failed(self, trouble: BridgeError, now_s: float) -> None:
+        """Take notice that the old mission cannot be stored: the upload is left before anything is written."""
+        if self.pending_backup is None:
+            return
+        self._drop_steps()
+        self._upload_failed(trouble, {}, now_s)
+        self._after_upload(now_s)
 
     def receive(self, frame: Frame, now_s: float) -> None:
         """Take a frame."""
@@ -221,8 +250,14 @@ class RouteMaker(TargetTaker):
             return
         self._drop_steps()
         items = with_home(self.plan.items, self.plan.home or self.plan.start)
+        try:
+            check_items(items, m.MissionType.MISSION)
+        except MissionError as error:
+            self._upload_failed(error, dict(error.details), now_s)
+            return
         is_active = bool(self.situation.armed) and self.situation.mode == AUTO_MODE
-        upload = VerifiedUpload(
+        self._backup_path = None
+        upload = self.upload = VerifiedUpload(
             self._peer,
             m.MissionType.MISSION,
             items,
@@ -241,8 +276,9 @@ class RouteMaker(TargetTaker):
         assert outcome is not None
         if (trouble := upload_trouble(outcome)) is not None:
             self._ours = None
-            self._voice.error(now_s, EventName.UPLOAD_FAILED, trouble, dict(trouble.details))
-            self._fail_step(trouble)
+            ended = end_of_upload(trouble, Writing("mission", machine, self._backup_path))
+            assert isinstance(ended, BridgeError)
+            self._upload_failed(ended, dict(ended.details), now_s)
         else:
             self._ours = outcome.found if outcome.found is not None else outcome.backup
             self._move(Cue.UPLOAD_VERIFIED)
@@ -251,6 +287,12 @@ class RouteMaker(TargetTaker):
             text = f"mission of {count} items verified on the vehicle"
             self._voice.tell(now_s, EventName.VERIFIED, text, count, outcome.pushes)
         self._after_upload(now_s)
+
+    def _upload_failed(
+        self, trouble: BridgeError | MissionError, details: Mapping[str, object], now_s: float
+    ) -> None:
+        self._voice.error(now_s, EventName.UPLOAD_FAILED, trouble, details)
+        self._fail_step(trouble)
 
     def _after_upload(self, now_s: float) -> None:
         """Go on from an upload that has ended, well or badly; the machine has moved already."""
@@ -275,7 +317,7 @@ class RouteMaker(TargetTaker):
         self._voice.rechecked(now_s, EventName.ROUTE_BROKEN, "the way from here", found)
         self._cue_target(now_s, is_own_idea=True)
 
-    def _fail_step(self, trouble: BridgeError) -> None:
+    def _fail_step(self, trouble: BridgeError | MissionError) -> None:
         self._move(Cue.TROUBLE)
         self._give_up(trouble)
 

@@ -332,6 +332,11 @@ class SetParameter(TableMachine[ParameterState, ParameterEvent]):
         self._give_up_s = 0.0
 
     @property
+    def name(self) -> str:
+        """Which parameter."""
+        return self._name
+
+    @property
     def outcome(self) -> SetParameterOutcome | None:
         """How it ended; None while it runs."""
         return SetParameterOutcome(self._name, self._value, self._is_confirmed) if self.is_done else None

@@ -306,6 +306,38 @@ COMMAND = {
 }
 
 
+class VersionState(StrEnum):
+    """Where the question for AUTOPILOT_VERSION is."""
+
+    IDLE = auto()
+    ASKING = auto()
+    TOLD = auto()
+    NOT_TOLD = auto()
+
+
+class VersionEvent(StrEnum):
+    """What moves the question for AUTOPILOT_VERSION."""
+
+    START = auto()
+    VERSION = auto()
+    GIVEN_UP = auto()  # refused, or granted without its coming
+    SILENCE = auto()
+
+
+VERSION = {
+    VersionState.IDLE: {
+        VersionEvent.START: VersionState.ASKING,
+    },
+    VersionState.ASKING: {
+        VersionEvent.VERSION: VersionState.TOLD,
+        VersionEvent.GIVEN_UP: VersionState.NOT_TOLD,
+        VersionEvent.SILENCE: VersionState.NOT_TOLD,
+    },
+    VersionState.TOLD: {},
+    VersionState.NOT_TOLD: {},
+}
+
+
 class FindState(StrEnum):
     """Where the search for the vehicle is."""
 
@@ -355,5 +387,6 @@ TABLES = {
     "verified_upload": VERIFIED_UPLOAD,
     "parameters": PARAMETERS,
     "command": COMMAND,
+    "version": VERSION,
 }
 """All tables by name, for the documentation and the tests."""

@@ -17,9 +17,6 @@ if TYPE_CHECKING:
     from mavlink_bridge.simulator.rover import Rover
     from mavlink_bridge.simulator.streams import Streams
 
-REQUEST_AUTOPILOT_CAPABILITIES = 520
-"""MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES, the old way to ask for AUTOPILOT_VERSION."""
-
 _WHOLE: dict[int, tuple[str, ...]] = {
     Command.DO_SET_MODE: ("param2",),
     Command.DO_SET_MISSION_CURRENT: ("param1",),
@@ -76,7 +73,7 @@ class Commands:
         if command.command in (
             Command.REQUEST_MESSAGE,
             Command.GET_HOME_POSITION,
-            REQUEST_AUTOPILOT_CAPABILITIES,
+            Command.REQUEST_AUTOPILOT_CAPABILITIES,
         ):
             return self._request(command, now_s)
         done = self._do(command, now_s)

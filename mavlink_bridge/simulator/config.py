@@ -52,6 +52,8 @@ class SimulatorConfig:
         Whether telemetry flows unasked; without it only HEARTBEAT does.
     list_ids : bool
         Whether MISSION_CURRENT carries ids of the lists, as PX4's does and ArduPilot's does not.
+    uid : bytes
+        What AUTOPILOT_VERSION tells this board from others by, at most 18 bytes; empty: it tells none.
     """
 
     system: int = 1
@@ -65,3 +67,4 @@ class SimulatorConfig:
     ready_after_s: float = 0.0
     streams: bool = True
     list_ids: bool = False
+    uid: bytes = b""

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import contextlib
 import os
+import secrets
 import selectors
 import socket
 import threading
 import time
+from dataclasses import replace
 from typing import TYPE_CHECKING, Self
 
 from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import LinkError
+from mavlink_bridge.simulator.config import SimulatorConfig
 from mavlink_bridge.simulator.faults import Faults, FaultyLink
 from mavlink_bridge.simulator.framing import FrameSplitter
 from mavlink_bridge.simulator.vehicle import SimulatedVehicle
@@ -20,12 +23,13 @@ if TYPE_CHECKING:
     from types import TracebackType
 
     from mavlink_bridge.messages import Frame
-    from mavlink_bridge.simulator.config import SimulatorConfig
 
 DEFAULT_LISTEN = "tcpin:127.0.0.1:5760"
 """Where ArduPilot's own simulator listens."""
 
 _READ_BYTES = 65_536
+_UID_BYTES = 12
+"""As long as the unique id of an STM32, which is what ArduPilot tells."""
 _MAX_BACKLOG_BYTES = 4_000_000
 _LONGEST_WAIT_S = 0.5
 _MOST_AT_ONCE_S, _MOST_REAL_AT_ONCE_S = 1.0, 0.1
@@ -89,6 +93,9 @@ class Simulator:
     ) -> None:
         if not 0 < speedup < float("inf"):
             raise LinkError(f"speedup {speedup:g} is not a positive number")
+        config = config or SimulatorConfig()
+        if not config.uid:  # nothing that one run stores is there in the next: each is a vehicle of its own
+            config = replace(config, uid=secrets.token_bytes(_UID_BYTES))
         self.vehicle = SimulatedVehicle(config)
         self._faults = faults or Faults()
         self._seed = seed

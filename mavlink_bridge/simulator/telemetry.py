@@ -43,7 +43,7 @@ _BOUNDARY = 3
 class State:
     """What telemetry is about: the rover, the items in its mission (home included), its time since boot, whether it has a position.
 
-    The ids are those of mission, fence and rally points, 0 where none are told.
+    The ids are those of mission, fence and rally points, 0 where none are told; the uid is the board's own.
     """
 
     rover: Rover
@@ -51,6 +51,7 @@ class State:
     boot_s: float
     is_ready: bool
     list_ids: tuple[int, int, int] = (0, 0, 0)
+    uid: bytes = b""
 
 
 def telemetry(message_id: int, state: State) -> m.Message | None:
@@ -174,8 +175,10 @@ def _home(state: State) -> m.Message | None:
     return m.HomePosition(*to_e7(state.rover.home)) if state.is_ready else None
 
 
-def _version(_state: State) -> m.Message:
-    return m.AutopilotVersion(int(_CAPABILITIES), _VERSION_4_7_0_DEV)
+def _version(state: State) -> m.Message:
+    return m.AutopilotVersion(
+        int(_CAPABILITIES), _VERSION_4_7_0_DEV, uid2=tuple(state.uid.ljust(18, b"\0")[:18])
+    )
 
 
 def _boot_ms(boot_s: float) -> int:

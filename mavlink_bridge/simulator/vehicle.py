@@ -354,6 +354,7 @@ class SimulatedVehicle:
             now_s - self._boot_s,
             self._is_ready(now_s),
             (mission_id, fence_id, rally_id),
+            self.config.uid,
         )
         return telemetry(message_id, state)
 

@@ -153,9 +153,9 @@ class Watcher:
 
 def test_the_view_goes_on_while_the_link_is_opened_again():
     watcher = Watcher(3)
-    shell = bridge._Shell(Director(Orders()), lambda _event: None, watcher, None)
+    shell = bridge._Shell(Director(Orders()), "tcp:127.0.0.1:1", lambda _event: None, watcher, None)
     with pytest.raises(KeyboardInterrupt):
-        shell.run("tcp:127.0.0.1:1", None, 30.0)
+        shell.run(None, 30.0)
     assert "tcp:127.0.0.1:1 cannot be opened" in watcher.link_trouble
     assert watcher.notes[-1] == f"link: {watcher.link_trouble}"
 

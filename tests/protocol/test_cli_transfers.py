@@ -179,7 +179,7 @@ def test_a_refusal_says_what_and_where(rover, tmp_path):
     assert document["details"]["result"] == "UNSUPPORTED"
     assert document["details"]["item"] == 7
     assert places(rover.vehicle.mission[1:]) == places(OLD[1:])
-    assert BackupStore().interrupted(1, MISSION) is None
+    assert BackupStore().notes() == []
 
 
 def test_what_does_not_fit_is_said_before_anything_is_sent(rover, tmp_path):

@@ -1,0 +1,252 @@
+"""Lists and parameters on their way to one vehicle: made ready, locked, backed up, uploaded, verified; and what is said if that breaks off."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from mavlink_bridge.backup import BackupStore
+from mavlink_bridge.errors import LinkError, OutcomeError, RefusedError
+from mavlink_bridge.link import now_s
+from mavlink_bridge.messages import MissionType
+from mavlink_bridge.outcomes import Writing, end_of_parameters, ends_in_words, upload_trouble
+from mavlink_bridge.protocol.limits import Limits
+from mavlink_bridge.protocol.parameters import ReadParameters, SetParameter
+from mavlink_bridge.protocol.verified_upload import Held, VerifiedUpload
+from mavlink_bridge.rover import HOLD_MODE
+from mavlink_bridge.vehicle_lock import VehicleLock
+from mavlink_bridge.vehicle_mark import Kinship
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from contextlib import AbstractContextManager
+    from pathlib import Path
+
+    from mavlink_bridge.cli.session import Session
+    from mavlink_bridge.protocol.parameters import SetParameterOutcome
+    from mavlink_bridge.protocol.verified_upload import VerifiedUploadOutcome
+    from mavlink_bridge.vehicle_mark import VehicleMark
+    from missions.items import MissionItem
+
+Lists = list[tuple[MissionType, tuple["MissionItem", ...]]]
+
+_LOCK_PATIENCE_S = 5.0
+"""Most uploads take less; who waits longer wants to know for whom."""
+_LOCK_LOOK_S = 0.2
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """What may be done to the vehicle."""
+
+    hold: bool
+    replace_active: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """One list that is on the vehicle now, verified."""
+
+    mission_type: MissionType
+    outcome: VerifiedUploadOutcome
+    backup: Path | None
+    took_s: float
+
+    def document(self) -> dict[str, Any]:
+        """Return it for JSON."""
+        return {
+            "list": self.mission_type.name.lower(),
+            "items": len(self.outcome.found or ()),
+            "outcome": str(self.outcome.kind),
+            "pushes": self.outcome.pushes,
+            "backup": str(self.backup) if self.backup else None,
+            "transfer_s": round(self.took_s, 3),
+        }
+
+
+class Uploads:
+    """What one run writes to one vehicle.
+
+    Parameters
+    ----------
+    session : Session
+        The vehicle on its link.
+    store : BackupStore
+        Where the old lists are kept.
+    vehicle : VehicleMark
+        Which vehicle it is.
+    wish : Wish
+        What may be done to it.
+
+    Attributes
+    ----------
+    done : list of Done
+        The lists that are on the vehicle, verified.
+    changed : dict
+        The parameters that were set, with their old and new values.
+    """
+
+    def __init__(self, session: Session, store: BackupStore, vehicle: VehicleMark, wish: Wish) -> None:
+        self.done: list[Done] = []
+        self.changed: dict[str, tuple[float | None, float]] = {}
+        self._session = session
+        self._store = store
+        self._vehicle = vehicle
+        self._wish = wish
+        self._lock = VehicleLock(vehicle)
+        self._writing: Writing | None = None
+        self._verified: list[str] = []
+
+    def begin(self) -> AbstractContextManager[None]:
+        """Lock the vehicle for a block that writes to it; whatever ends the block says what it left on the vehicle.
+
+        Raises
+        ------
+        VehicleInUseError
+            Another process of this computer writes to the vehicle, and goes on doing so.
+        BackupError
+            No lock can be taken.
+        """
+        until_s = time.monotonic() + _LOCK_PATIENCE_S
+        while holder := self._lock.take():
+            if time.monotonic() >= until_s:
+                raise holder.error(self._vehicle)
+            self._session.listen_until(lambda: False, _LOCK_LOOK_S)
+        return ends_in_words(lambda: self._writing, self._verified, self._lock.free)
+
+    def make_ready(self) -> None:
+        """See to it that the vehicle does not drive what is about to be replaced.
+
+        Raises
+        ------
+        RefusedError
+            It does.
+        """
+        session, wish = self._session, self._wish
+        if session.is_active and wish.hold:
+            session.change_mode(HOLD_MODE)
+        elif session.is_active and not wish.replace_active:
+            raise RefusedError(
+                "the vehicle is armed and drives its mission in AUTO; nothing was written. "
+                "--hold switches it to HOLD first, --replace-active writes all the same"
+            )
+
+    def write_lists(self, lists: Lists, restored: Path | None = None) -> None:
+        """Upload lists one after the other, each verified.
+
+        Parameters
+        ----------
+        lists : list of tuple
+            Lists as they go over the wire.
+        restored : Path, optional
+            The backup that they are read from.
+
+        Raises
+        ------
+        BridgeError
+            What an upload ended with.
+        """
+        limits = _limits(self._session, lists)
+        for mission_type, items in lists:
+            self._write_list(mission_type, items, limits, restored)
+
+    def _write_list(
+        self, mission_type: MissionType, items: tuple[MissionItem, ...], limits: Limits, restored: Path | None
+    ) -> None:
+        session, store, vehicle = self._session, self._store, self._vehicle
+        name = mission_type.name.lower()
+        earlier = store.interrupted(vehicle, mission_type)
+        was_interrupted = any(vehicle.kinship(note.vehicle) is Kinship.SAME for note in earlier)
+        machine = VerifiedUpload(
+            session.vehicle,
+            mission_type,
+            items,
+            limits=limits,
+            is_active=session.is_active,
+            replace_active=self._wish.replace_active,
+        )
+        self._writing = Writing(name, machine, None)
+
+        def step() -> None:
+            if (old := machine.pending_backup) is not None:
+                self._writing = Writing(name, machine, store.begin(vehicle, mission_type, old))
+                machine.backup_stored(now_s())
+
+        begun_s = time.monotonic()
+        try:
+            session.run(machine, f"{name}: {len(items)} items", step)
+        except BaseException:
+            if not machine.has_written and not was_interrupted:
+                store.end(vehicle, mission_type)
+            raise
+        outcome = machine.outcome
+        assert outcome is not None
+        if trouble := upload_trouble(outcome):
+            if outcome.held in (Held.OLD, Held.FOREIGN) and not was_interrupted:
+                store.end(vehicle, mission_type)
+            raise trouble
+        store.end(vehicle, mission_type, restored)
+        self.done.append(Done(mission_type, outcome, self._writing.backup, time.monotonic() - begun_s))
+        self._writing = None
+        if outcome.pushes:
+            self._verified.append(name)
+
+    def write_parameters(self, wanted: Mapping[str, float]) -> None:
+        """Set the parameters that differ.
+
+        Raises
+        ------
+        BridgeError
+            The vehicle does not have one, does not take one, or does not answer.
+        """
+        reading = ReadParameters(self._session.vehicle, wanted)
+        self._session.run(reading, "reading parameters")
+        read = reading.outcome
+        assert read is not None
+        if read.is_silent:
+            raise LinkError("the vehicle does not answer when asked for its parameters; none was set")
+        if read.missing:
+            raise RefusedError(
+                f"the vehicle has no parameter {', '.join(read.missing)}; none was set",
+                missing=list(read.missing),
+            )
+        different = {name: value for name, value in wanted.items() if not _is_same(read.values[name], value)}
+        setting: SetParameter | None = None
+        try:
+            for name, value in different.items():
+                setting = SetParameter(self._session.vehicle, name, value)
+                self._session.run(setting, f"setting {name}")
+                _check_set(setting.outcome, value)
+                self.changed[name] = (read.values[name], value)
+        except BaseException as cause:
+            ended = end_of_parameters(cause, setting, self.changed)
+            if ended is cause:
+                raise
+            raise ended from cause
+
+
+def _check_set(outcome: SetParameterOutcome | None, wanted: float) -> None:
+    assert outcome is not None
+    if not outcome.is_confirmed:
+        now = "an unknown value" if outcome.value is None else f"{outcome.value:g}"
+        raise OutcomeError(
+            f"parameter {outcome.name} was to be {wanted:g}, the vehicle holds {now}",
+            wanted=wanted,
+            found=outcome.value,
+        )
+
+
+def _is_same(held: float, wanted: float) -> bool:
+    return abs(held - wanted) <= 1e-6 * abs(wanted)
+
+
+def _limits(session: Session, lists: Sequence[tuple[MissionType, tuple[MissionItem, ...]]]) -> Limits:
+    """Return what fits; where the usual limits are too small, the vehicle is asked for its SD card's."""
+    limits = Limits()
+    if not any(limits.problem(items, mission_type) for mission_type, items in lists):
+        return limits
+    # ARMING_CHECK is on every vehicle: an answer to it tells a missing parameter from a lossy link.
+    reading = ReadParameters(session.vehicle, ("ARMING_CHECK", "BRD_SD_MISSION", "BRD_SD_FENCE"))
+    session.run(reading, "reading the vehicle's limits")
+    return Limits.from_parameters(reading.outcome.values) if reading.outcome else limits

@@ -188,6 +188,11 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         return self._old
 
     @property
+    def has_written(self) -> bool:
+        """Whether anything was handed out to be sent that may have changed the list; true from the first MISSION_COUNT on."""
+        return self._pushes > 0
+
+    @property
     def outcome(self) -> VerifiedUploadOutcome | None:
         """How it ended; None while it runs."""
         if self._outcome is None and self.is_done:

@@ -52,7 +52,9 @@ def test_nothing_is_written_before_the_backup_is_stored():
     assert not any(isinstance(message, MissionCount) for message in script.sent + script.pass_time(100.0))
     script.machine.backup_stored(script.now_s)
     assert script.machine.pending_backup is None
+    assert not script.machine.has_written
     assert script.hear(ARMED_HOLD) == [MissionCount(1, 1, 3, 0)]
+    assert script.machine.has_written
 
 
 @pytest.mark.parametrize(

@@ -131,7 +131,7 @@ def read_list(session: Session, what: str) -> tuple[MissionItem, ...]:
         raise RefusedError(f"another ground station keeps the {what} busy (DENIED)", result="DENIED")
     if outcome.result is not None:
         raise download_refusal(what, outcome.result)
-    raise LinkError(f"the {what} could not be read: the vehicle fell silent")
+    raise LinkError(f"the {what} could not be read: {outcome.shortfall}")
 
 
 def _read_parameters(session: Session) -> dict[str, float]:

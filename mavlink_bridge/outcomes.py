@@ -35,7 +35,7 @@ def upload_trouble(outcome: VerifiedUploadOutcome) -> BridgeError | None:
         )
     if outcome.kind is OutcomeKind.BUSY:
         why = "" if outcome.writer else "another ground station keeps the list busy (DENIED)"
-        return RefusedError(f"{why or _other_writer(outcome)}; nothing was written; {held}", **details)
+        return RefusedError(f"{why or _other_writer(outcome)}; {held}", **details)
     if outcome.kind is OutcomeKind.ACTIVE:
         return RefusedError(
             "the vehicle is armed and drives its mission in AUTO; nothing was written. Switch it to HOLD first",

@@ -122,9 +122,7 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
         """When `handle_timer` wants to be called."""
         if self.is_done or self.state is SwitchState.IDLE:
             return None
-        return min(
-            self._sent_s + (_HURRY_S if self._may_send_blindly else _PATIENCE_S), self._give_up_s
-        )
+        return min(self._sent_s + (_HURRY_S if self._may_send_blindly else _PATIENCE_S), self._give_up_s)
 
     @property
     def bound_s(self) -> float:

@@ -138,11 +138,6 @@ class Upload(TableMachine[UploadState, UploadEvent]):
         return UploadOutcome(self.state, self._result, item, is_certain)
 
     @property
-    def was_heeded(self) -> bool:
-        """Whether the vehicle asked for an item: it has begun to write."""
-        return self._wanted >= 0
-
-    @property
     def progress(self) -> tuple[int, int]:
         """Items asked for and items in all."""
         count = len(self._messages)

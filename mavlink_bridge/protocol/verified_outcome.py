@@ -23,7 +23,9 @@ class OutcomeKind(StrEnum):
     UNCHANGED = auto()  # the upload did not get through; the old list was never replaced
     RESTORED = auto()  # the upload did not get through; the old list was put back and verified
     DIFFERENT = auto()  # something else is on the vehicle
-    UNKNOWN = auto()  # what is on the vehicle could not be read, was another list each time, or is being written by others
+    UNKNOWN = (
+        auto()
+    )  # what is on the vehicle could not be read, was another list each time, or is being written by others
 
 
 class Held(StrEnum):

@@ -22,12 +22,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.messages import Heartbeat, MissionResult, ModeFlag, Statustext
+from mavlink_bridge.messages import Heartbeat, MissionResult, Statustext
 from mavlink_bridge.protocol.download import RIVAL_PATIENCE_S
+from mavlink_bridge.protocol.judging import held_list, is_armed_in_auto, is_settled_refusal
 from mavlink_bridge.protocol.limits import Limits
 from mavlink_bridge.protocol.pace import MOST_S, bound_s
 from mavlink_bridge.protocol.round_trip import RoundTrip
-from mavlink_bridge.protocol.stored_form import differences, is_unfinished_write
+from mavlink_bridge.protocol.stored_form import differences
 from mavlink_bridge.protocol.table_machine import TableMachine
 from mavlink_bridge.protocol.transitions import (
     VERIFIED_UPLOAD,
@@ -52,7 +53,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Held", "OutcomeKind", "VerifiedUpload", "VerifiedUploadOutcome"]
 
-ROVER_AUTO_MODE = 10
 MOST_PUSHES = 4
 MOST_RESTORES = 3
 _MOST_READS = 6  # of the list after one push: two that agree came in 2 reads in all but 1 of 10,000 transfers
@@ -126,7 +126,6 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         self._pushed: UploadOutcome | None = None
         self._pushed_before: UploadOutcome | None = None
         self._refusal: UploadOutcome | None = None
-        self._was_heeded = False
         self._pushes = 0
         self._restores = 0
         self._failed_read: DownloadOutcome | None = None
@@ -248,7 +247,7 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         if not self._peer.accepts(frame):
             return
         if isinstance(frame.message, Heartbeat):
-            self._is_active = _is_armed_in_auto(frame.message)
+            self._is_active = is_armed_in_auto(frame.message)
             self._active_known_s = now_s
             self._check_vehicle(now_s)
         elif isinstance(frame.message, Statustext):
@@ -284,7 +283,6 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
             self._reading = None
             self._take_read(read, now_s)
         elif self._upload and (pushed := self._upload.outcome):
-            self._was_heeded |= self._upload.was_heeded
             self._upload = None
             self._take_push(pushed, now_s)
 
@@ -373,7 +371,8 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
     def _judge(self, found: tuple[MissionItem, ...], now_s: float) -> None:
         """Decide what a read-back means; anything but the wanted list must be read twice alike before it is believed."""
         restoring = self.state is VerifiedUploadState.READING_RESTORED
-        self._held = self._held_list(found)
+        assert self._old is not None
+        self._held = held_list(found, self._wanted, self._old, self._mission_type, coarse=self._is_coarse)
         expected = Held.OLD if restoring else Held.WANTED
         if self._held is expected:
             self._move(VerifiedUploadEvent.READ_OLD if restoring else VerifiedUploadEvent.READ_WANTED)
@@ -390,29 +389,13 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         else:
             self._push_again(now_s)
 
-    def _held_list(self, found: tuple[MissionItem, ...]) -> Held:
-        assert self._old is not None
-        if not self._differences(self._wanted, found):
-            return Held.WANTED
-        if not self._differences(self._old, found):
-            return Held.OLD
-        if is_unfinished_write(found, self._old, self._wanted, self._mission_type, coarse=self._is_coarse):
-            return Held.UNFINISHED
-        return Held.FOREIGN
-
     def _push_again(self, now_s: float) -> None:
         """Send the list once more where that can help, else end with the old list there or put back."""
         assert self._old is not None
         pushed = self._pushed
         assert pushed is not None
         refused = pushed.state is UploadState.REFUSED
-        # ERROR also answers an item that nobody waits for (after a reboot, say): it must come twice. And with several items
-        # under way the refused one is not certain. Serving the items one by one settles both.
-        settled = (
-            refused
-            and pushed.item_is_certain
-            and (pushed.result is not MissionResult.ERROR or _is_same_refusal(pushed, self._pushed_before))
-        )
+        settled = is_settled_refusal(pushed, self._pushed_before)
         if settled:
             self._refusal = pushed
         # Somebody may have set it going meanwhile: the whole old list is driven on, a mix is put right all the same.
@@ -464,25 +447,9 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
             if failed and failed.state is DownloadState.BUSY:
                 return OutcomeKind.BUSY
             return OutcomeKind.ACTIVE if self._is_active else OutcomeKind.NO_ANSWER
-        if self.state is VerifiedUploadState.UNKNOWN and self._never_wrote():
-            return OutcomeKind.BUSY
         if self.state in (VerifiedUploadState.UNCHANGED, VerifiedUploadState.RESTORED) and self._refusal:
             return OutcomeKind.REFUSED
-        if self.state is VerifiedUploadState.UNCHANGED and self._pushed_to_busy():
+        was_busy = self._pushed is not None and self._pushed.state is UploadState.BUSY
+        if self.state is VerifiedUploadState.UNCHANGED and was_busy:
             return OutcomeKind.BUSY
         return OutcomeKind(self.state.value)
-
-    def _pushed_to_busy(self) -> bool:
-        return self._pushed is not None and self._pushed.state is UploadState.BUSY
-
-    def _never_wrote(self) -> bool:
-        return self._pushed_to_busy() and not self._was_heeded
-
-
-def _is_same_refusal(a: UploadOutcome, b: UploadOutcome | None) -> bool:
-    return b is not None and (a.state, a.result, a.item) == (b.state, b.result, b.item)
-
-
-def _is_armed_in_auto(heartbeat: Heartbeat) -> bool:
-    is_armed = bool(heartbeat.base_mode & ModeFlag.SAFETY_ARMED)
-    return is_armed and heartbeat.custom_mode == ROVER_AUTO_MODE

@@ -150,11 +150,14 @@ class WriteWatch:
         elif isinstance(message, m.ParamValue):
             if message.param_id == _TOTALS.get(self._mission_type):
                 self._compare(message.param_id, message.param_value, now_s)
-        elif isinstance(message, m.Statustext) and self._mission_type is MissionType.MISSION:
-            if message.text.lower().startswith(_STORED_TEXT):
-                is_ours, self._expects_text = self._expects_text, False
-                if not is_ours and self._is_counted:
-                    self._disturb(None, now_s)
+        elif isinstance(message, m.Statustext) and message.text.lower().startswith(_STORED_TEXT):
+            self._take_stored_text(now_s)
+
+    def _take_stored_text(self, now_s: float) -> None:
+        """Take the word that a mission was written: once for each upload of ours it is about that."""
+        is_ours, self._expects_text = self._expects_text, False
+        if self._mission_type is MissionType.MISSION and self._is_counted and not is_ours:
+            self._disturb(None, now_s)
 
     def _answered(self, target: tuple[int, int], now_s: float) -> None:
         may_be_ours = target in (self._own, (0, 0))

@@ -8,7 +8,7 @@ PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; 
 BIN := .venv/bin
 OUT ?= demo-out
 
-.PHONY: package bench bench-bridge bench-drive bench-transfer test-foreign docs soak bench-tlog fuzz demo test lint format types walls check lock clean
+.PHONY: package bench bench-bridge bench-drive bench-transfer test-foreign docs soak bench-tlog campaign fuzz demo test lint format types walls check lock clean
 
 demo: .venv/run.stamp
 	$(BIN)/pbpp demo --out $(OUT)
@@ -80,6 +80,9 @@ soak: .venv/dev.stamp
 
 bench-tlog: .venv/dev.stamp
 	$(BIN)/python benchmarks/tlog.py
+
+campaign: .venv/dev.stamp
+	$(BIN)/python tests/protocol/campaign.py --count $(or $(COUNT),10000)
 
 fuzz: .venv/dev.stamp
 	$(BIN)/python tests/tlog/fuzz_tlog.py --count 100000

@@ -188,8 +188,8 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
 
     @property
     def bound_s(self) -> float:
-        """Longest time from the start to the end, whatever the link does (it grows when the count is known)."""
-        return bound_s(self._most_count)
+        """Longest time from the start to the end, whatever the link and the vehicle do; less once the count is known."""
+        return bound_s(self._most_count) if self._most_count else MOST_S
 
     @property
     def deadline_s(self) -> float | None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.protocol.download import RIVAL_PATIENCE_S, Download
-from mavlink_bridge.protocol.pace import MOST_S, bound_s
+from mavlink_bridge.protocol.pace import MOST_S
 from mavlink_bridge.protocol.round_trip import RoundTrip
 from mavlink_bridge.protocol.table_machine import TableMachine
 from mavlink_bridge.protocol.transitions import (
@@ -47,7 +47,7 @@ class UndisturbedRead(TableMachine[UndisturbedReadState, UndisturbedReadEvent]):
     round_trip : RoundTrip, optional
         What is known of the link from transfers before.
     most_s : float
-        The longest a single read may take.
+        The longest all reads may take together.
     float_form : bool
         Whether the old MISSION_REQUEST may be used.
     """
@@ -73,8 +73,8 @@ class UndisturbedRead(TableMachine[UndisturbedReadState, UndisturbedReadEvent]):
         self._float_form = float_form
         self._download: Download | None = None
         self._read: DownloadOutcome | None = None
-        self._most_count = 0
         self._reads = 0
+        self._limit_s = 0.0
         self._settled_at_s = 0.0
         self._settle_until_s = 0.0
 
@@ -97,9 +97,8 @@ class UndisturbedRead(TableMachine[UndisturbedReadState, UndisturbedReadEvent]):
 
     @property
     def bound_s(self) -> float:
-        """Longest time from the start to the end, whatever the link does (it grows when the count is known)."""
-        count = max(self._most_count, self._download.progress[1] if self._download else 0)
-        return MOST_READS * (min(bound_s(count), self._most_s) + self._rival_patience_s)
+        """Longest time from the start to the end, whatever the link and the vehicle do."""
+        return self._most_s
 
     @property
     def deadline_s(self) -> float | None:
@@ -111,6 +110,7 @@ class UndisturbedRead(TableMachine[UndisturbedReadState, UndisturbedReadEvent]):
     def start(self, now_s: float) -> None:
         """Begin to read."""
         if self._move(UndisturbedReadEvent.START):
+            self._limit_s = now_s + self._most_s
             self._start_reading(now_s)
 
     def receive(self, frame: Frame, now_s: float) -> None:
@@ -137,7 +137,7 @@ class UndisturbedRead(TableMachine[UndisturbedReadState, UndisturbedReadEvent]):
             self._mission_type,
             rival_patience_s=self._rival_patience_s,
             round_trip=self._round_trip,
-            most_s=self._most_s,
+            most_s=self._limit_s - now_s,
             float_form=self._float_form,
         )
         self._download.start(now_s)
@@ -152,7 +152,6 @@ class UndisturbedRead(TableMachine[UndisturbedReadState, UndisturbedReadEvent]):
         read = self._download.outcome
         if read is None:
             return
-        self._most_count = max(self._most_count, read.count)
         self._download, self._read = None, read
         if not read.is_complete:
             self._move(UndisturbedReadEvent.FAILURE)
@@ -162,7 +161,7 @@ class UndisturbedRead(TableMachine[UndisturbedReadState, UndisturbedReadEvent]):
             self._move(UndisturbedReadEvent.OTHERS_STAY)
         elif self._move(UndisturbedReadEvent.DISTURBANCE):
             self._settled_at_s = now_s + self._quiet_s
-            self._settle_until_s = now_s + max(self._rival_patience_s, self._quiet_s)
+            self._settle_until_s = min(now_s + max(self._rival_patience_s, self._quiet_s), self._limit_s)
 
     @property
     def _quiet_s(self) -> float:
@@ -170,7 +169,7 @@ class UndisturbedRead(TableMachine[UndisturbedReadState, UndisturbedReadEvent]):
 
     def _settle(self, now_s: float) -> None:
         self._settled_at_s = max(self._settled_at_s, self._watch.heard_s + self._quiet_s)
-        if now_s >= self._settled_at_s and self._move(UndisturbedReadEvent.QUIET):
-            self._start_reading(now_s)
-        elif now_s >= self._settle_until_s:
+        if now_s < self._settled_at_s and now_s >= self._settle_until_s:
             self._move(UndisturbedReadEvent.OTHERS_STAY)
+        elif now_s >= self._settled_at_s and self._move(UndisturbedReadEvent.QUIET):
+            self._start_reading(now_s)

@@ -206,7 +206,7 @@ class VerifiedUploadEvent(StrEnum):
     READ_WANTED = auto()  # what is read is the list to be uploaded
     READ_UNFINISHED = auto()  # part old, part new: our own unfinished write
     READ_FOREIGN = auto()  # neither: somebody else's list
-    READ_AGAIN = auto()  # not the wanted list: believed only when a second read says the same
+    READ_AGAIN = auto()  # not the wanted list: believed only when a second read says the same; or written by others since
     READ_UNSTEADY = auto()  # it was another list at each read
     READ_FAILED = auto()
     OTHERS_WRITE = auto()  # another station keeps writing the list
@@ -237,6 +237,9 @@ VERIFIED_UPLOAD = {
     VerifiedUploadState.CHECKING_VEHICLE: {
         VerifiedUploadEvent.CLEAR_TO_WRITE: VerifiedUploadState.PUSHING,
         VerifiedUploadEvent.NOT_CLEAR: VerifiedUploadState.NOT_STARTED,
+        VerifiedUploadEvent.READ_AGAIN: VerifiedUploadState.READING_OLD,
+        VerifiedUploadEvent.OTHERS_WRITE: VerifiedUploadState.NOT_STARTED,
+        VerifiedUploadEvent.TIME_IS_UP: VerifiedUploadState.NOT_STARTED,
     },
     VerifiedUploadState.PUSHING: {
         VerifiedUploadEvent.PUSH_ENDED: VerifiedUploadState.READING_BACK,

@@ -185,13 +185,17 @@ def _broken_lies(scenario, client, vehicle, before):
     machine = client.machine
     has_written = any(isinstance(message, WRITES) for _, message in client.sent)
     lies = []
-    if machine.outcome is not None:
-        lies.append("the link broke, and yet it claims an outcome")
+    is_verified = (
+        machine.outcome is not None and machine.outcome.is_verified
+    )  # it broke at our last word of thanks
+    held = vehicle.held(scenario.mission_type)
+    if is_verified and scenario.rival is None and _body(held) != _body(machine.outcome.found):
+        lies.append("the link broke, and it says verified of what is not there")
     if has_written and not machine.has_written:
         lies.append("a silent end: something was written, and it says that nothing was")
     if has_written and machine.backup is None:
         lies.append("a silent end: something was written, and there is no backup")
-    is_as_before = _body(vehicle.held(scenario.mission_type)) == _body(before)
+    is_as_before = _body(held) == _body(before)
     if scenario.rival is None and not machine.has_written and not is_as_before:
         lies.append("it says that nothing was written, but the list is another one")
     return lies

@@ -204,7 +204,7 @@ class AwaitHeartbeat:
 
     @property
     def deadline_s(self) -> float | None:
-        """Never: a vehicle that falls silent is noticed elsewhere."""
+        """Never: it has no bound of its own. The director drops it when the vehicle has been silent for some seconds, and nothing may follow from silence."""
         return None
 
     @property

@@ -206,7 +206,9 @@ class VerifiedUploadEvent(StrEnum):
     READ_WANTED = auto()  # what is read is the list to be uploaded
     READ_UNFINISHED = auto()  # part old, part new: our own unfinished write
     READ_FOREIGN = auto()  # neither: somebody else's list
-    READ_AGAIN = auto()  # not the wanted list: believed only when a second read says the same; or written by others since
+    READ_AGAIN = (
+        auto()
+    )  # not the wanted list: believed only when a second read says the same; or written by others since
     READ_UNSTEADY = auto()  # it was another list at each read
     READ_FAILED = auto()
     OTHERS_WRITE = auto()  # another station keeps writing the list

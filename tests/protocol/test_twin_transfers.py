@@ -194,7 +194,7 @@ def test_scenarios_differ():
     assert {scenario.rival_begins_in for scenario in scenarios if scenario.rival} == set(MOMENTS)
     for kind in ("rival_has_our_ids", "is_shared", "odd_items", "breaks_after"):
         assert 10 < sum(bool(getattr(scenario, kind)) for scenario in scenarios) < 200
-    assert {scenario.faults.loss for scenario in scenarios} == {0.0, 0.05, 0.1, 0.2, 0.3, 0.4}
+    assert {scenario.faults.loss for scenario in scenarios} == {0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4}
     assert any(scenario.reboots for scenario in scenarios)
 
 

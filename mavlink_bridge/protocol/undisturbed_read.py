@@ -19,12 +19,12 @@ from mavlink_bridge.protocol.transitions import (
     UndisturbedReadEvent,
     UndisturbedReadState,
 )
+from mavlink_bridge.protocol.write_watch import WriteWatch
 
 if TYPE_CHECKING:
     from mavlink_bridge.messages import Frame, MissionType
     from mavlink_bridge.protocol.download import DownloadOutcome
     from mavlink_bridge.protocol.peer import Peer
-    from mavlink_bridge.protocol.write_watch import WriteWatch
 
 MOST_READS = 4
 _QUIET_S = 1.5
@@ -40,8 +40,8 @@ class UndisturbedRead(TableMachine[UndisturbedReadState, UndisturbedReadEvent]):
         The vehicle and our identity.
     mission_type : MissionType
         Which list.
-    watch : WriteWatch
-        Hears every frame, before this machine does.
+    watch : WriteWatch, optional
+        Is shown every frame by whoever runs this machine; one of its own if not given.
     rival_patience_s : float
         How long another ground station may keep the list busy, or be waited for between two reads.
     round_trip : RoundTrip, optional
@@ -56,7 +56,7 @@ class UndisturbedRead(TableMachine[UndisturbedReadState, UndisturbedReadEvent]):
         self,
         peer: Peer,
         mission_type: MissionType,
-        watch: WriteWatch,
+        watch: WriteWatch | None = None,
         *,
         rival_patience_s: float = RIVAL_PATIENCE_S,
         round_trip: RoundTrip | None = None,
@@ -66,7 +66,8 @@ class UndisturbedRead(TableMachine[UndisturbedReadState, UndisturbedReadEvent]):
         super().__init__(UNDISTURBED_READ, UndisturbedReadState.IDLE)
         self._peer = peer
         self._mission_type = mission_type
-        self._watch = watch
+        self._has_own_watch = watch is None
+        self._watch = watch or WriteWatch(peer, mission_type)
         self._rival_patience_s = rival_patience_s
         self._round_trip = round_trip or RoundTrip()
         self._most_s = most_s
@@ -115,6 +116,8 @@ class UndisturbedRead(TableMachine[UndisturbedReadState, UndisturbedReadEvent]):
 
     def receive(self, frame: Frame, now_s: float) -> None:
         """Take a frame; what is not for this machine is ignored."""
+        if self._has_own_watch:
+            self._watch.look(frame, now_s)
         if self.state is UndisturbedReadState.SETTLING:
             self._settle(now_s)
         elif self._download is not None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import operator
 import platform
 import random
 import sys
@@ -360,11 +361,13 @@ def _watch(twin, kind):
     """Record each list the vehicle holds and from when."""
     vehicle = twin.vehicle
     timeline = [(0.0, vehicle.held(kind))]
+    stored = [list(vehicle.lists[kind].items)]
 
     def note():
-        held = vehicle.held(kind)
-        if _body(held) != _body(timeline[-1][1]):
-            timeline.append((twin.now_s, held))
+        items = vehicle.lists[kind].items
+        if len(items) != len(stored[0]) or any(map(operator.is_not, items, stored[0])):
+            stored[0] = list(items)
+            timeline.append((twin.now_s, vehicle.held(kind)))
 
     twin.after_vehicle = note
     return timeline

@@ -12,7 +12,7 @@ COVERAGE_PERCENT := 98
 LOCKED := --quiet --disable-pip-version-check --require-hashes --no-deps
 quoted = '$(subst ','\'',$(1))'
 
-.PHONY: coverage locks package bench bench-bridge bench-drive bench-transfer test-foreign docs soak bench-tlog fuzz demo test lint format types walls check lock clean
+.PHONY: coverage locks package bench bench-bridge bench-drive bench-transfer test-foreign docs soak bench-tlog campaign fuzz demo test lint format types walls check lock clean
 
 demo: .venv/run.stamp
 	$(BIN)/pbpp demo --out $(call quoted,$(OUT))
@@ -98,6 +98,9 @@ soak: .venv/dev.stamp
 
 bench-tlog: .venv/dev.stamp
 	$(BIN)/python benchmarks/tlog.py
+
+campaign: .venv/dev.stamp
+	$(BIN)/python tests/protocol/campaign.py --count $(or $(COUNT),10000)
 
 fuzz: .venv/dev.stamp
 	$(BIN)/python tests/tlog/fuzz_tlog.py --count 100000

@@ -47,16 +47,26 @@ def upload_trouble(outcome: VerifiedUploadOutcome) -> BridgeError | None:
             f"the vehicle refused the upload{item}: {result}{texts}; {held}", result=result, **details
         )
     if outcome.kind is OutcomeKind.BUSY:
-        return RefusedError(f"another ground station keeps the list busy (DENIED); {held}", **details)
+        why = "" if outcome.writer else "another ground station keeps the list busy (DENIED)"
+        return RefusedError(f"{why or _other_writer(outcome)}; {held}", **details)
     if outcome.kind is OutcomeKind.ACTIVE:
         return RefusedError(
             "the vehicle is armed and drives its mission in AUTO; nothing was written. Switch it to HOLD first",
             **details,
         )
     if outcome.kind is OutcomeKind.NO_ANSWER:
-        return LinkError("the vehicle does not answer; nothing was written", **details)
+        why = outcome.shortfall or "the vehicle does not answer"
+        return LinkError(f"{why}; nothing was written", **details)
     differences = "".join(f"; {difference}" for difference in outcome.differences[:3])
-    return OutcomeError(f"the upload ended {outcome.kind}: {held}{differences}{texts}", **details)
+    why = "".join(f"; {text}" for text in (_other_writer(outcome), outcome.shortfall) if text)
+    return OutcomeError(f"the upload ended {outcome.kind}: {held}{why}{differences}{texts}", **details)
+
+
+def _other_writer(outcome: VerifiedUploadOutcome) -> str:
+    if outcome.writer is None:
+        return ""
+    system, component = outcome.writer
+    return f"system {system} component {component} was heard to write the list meanwhile"
 
 
 @dataclass(frozen=True, slots=True)

@@ -114,19 +114,21 @@ def read_list(session: Session, what: str) -> tuple[MissionItem, ...]:
     Raises
     ------
     RefusedError
-        The vehicle refused to give it.
+        The vehicle refused to give it, or another station keeps writing it.
     LinkError
         It fell silent.
     """
     from mavlink_bridge.messages import MissionType  # noqa: PLC0415
     from mavlink_bridge.outcomes import download_refusal  # noqa: PLC0415
-    from mavlink_bridge.protocol.download import Download  # noqa: PLC0415
     from mavlink_bridge.protocol.transitions import DownloadState  # noqa: PLC0415
+    from mavlink_bridge.protocol.undisturbed_read import UndisturbedRead  # noqa: PLC0415
 
-    machine = Download(session.vehicle, MissionType[what.upper()])
+    machine = UndisturbedRead(session.vehicle, MissionType[what.upper()])
     session.run(machine, f"reading the {what}")
     outcome = machine.outcome
     assert outcome is not None
+    if machine.is_disturbed:
+        raise RefusedError(f"another station keeps writing the {what}: it was another one while it was read")
     if outcome.is_complete:
         if outcome.is_coarse:
             warn([f"the vehicle gives positions as 32-bit floats: the {what} is known to about 1 m only"])
@@ -135,7 +137,7 @@ def read_list(session: Session, what: str) -> tuple[MissionItem, ...]:
         raise RefusedError(f"another ground station keeps the {what} busy (DENIED)", result="DENIED")
     if outcome.result is not None:
         raise download_refusal(what, outcome.result)
-    raise LinkError(f"the {what} could not be read: the vehicle fell silent")
+    raise LinkError(f"the {what} could not be read: {outcome.shortfall}")
 
 
 def _read_parameters(session: Session) -> dict[str, float]:

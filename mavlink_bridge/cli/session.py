@@ -290,12 +290,12 @@ class _Listen:
     progress = (0, 0)
 
     def __init__(self, for_s: float) -> None:
-        self._for_s = for_s
+        self.bound_s = for_s
         self.deadline_s: float | None = None
         self.is_done = False
 
     def start(self, now_s: float) -> None:
-        self.deadline_s = now_s + self._for_s
+        self.deadline_s = now_s + self.bound_s
 
     def receive(self, frame: Frame, now_s: float) -> None:
         pass

@@ -14,7 +14,9 @@ from mavlink_bridge.outcomes import download_refusal
 from mavlink_bridge.protocol.ask_version import AskVersion
 from mavlink_bridge.protocol.command import SendCommand
 from mavlink_bridge.protocol.download import Download
+from mavlink_bridge.protocol.pace import MOST_S
 from mavlink_bridge.protocol.parameters import ReadParameters
+from mavlink_bridge.protocol.transitions import DownloadState
 from mavlink_bridge.vehicle_mark import uid_of
 from missions.items import Command
 from missions.situation import ListKind
@@ -37,6 +39,7 @@ MISSION_TYPES = {
 _POSITION_STREAM, _STATUS_STREAM = 6, 2
 _STREAM_HZ = 4
 _ASK_STREAMS_EVERY_S = 3.0
+_HOME_S = 60.0  # the longest that a command may take
 _FIX_PATIENCE_S = 3.0
 """What is promised rests on the fix, so that whether it is known must not be a matter of luck; not every vehicle tells it."""
 _STORAGE_NAMES = ("BRD_SD_MISSION", "BRD_SD_FENCE")
@@ -89,6 +92,12 @@ class Learning:
         current = self._steps.current
         progress: tuple[int, int] = current.progress if current else (0, 0)
         return progress
+
+    @property
+    def bound_s(self) -> float:
+        """Longest time from the start to the end, whatever the link and the vehicle do."""
+        transfers_s = MOST_S * (1 + len(self._kinds))  # the parameters and the lists
+        return transfers_s + _HOME_S + self._patience_s
 
     @property
     def deadline_s(self) -> float | None:
@@ -204,4 +213,6 @@ def list_of(machine: Download, kind: ListKind) -> tuple[MissionItem, ...] | Brid
         return outcome.items
     if outcome is not None and outcome.result is not None:
         return download_refusal(str(kind), outcome.result)
+    if outcome is not None and outcome.state is DownloadState.TOO_SLOW:
+        return LinkError(f"the vehicle's {kind} could not be read: {outcome.shortfall}")
     return LinkError(f"the vehicle's {kind} could not be read ({outcome.state if outcome else 'no outcome'})")

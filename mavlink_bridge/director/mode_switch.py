@@ -25,6 +25,7 @@ _SETTLE_S = 0.5
 """A heartbeat that comes sooner after a command may have been sent before it."""
 
 _MOST_SENDS = 16
+_MOST_S = 60.0  # 16 sends at a heartbeat a second take 16 s; where heartbeats are lost it takes longer
 _HEARTBEAT_ID = 0.0
 
 
@@ -98,6 +99,7 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
         self._is_urgent = is_urgent
         self._sends = 0
         self._sent_s = 0.0
+        self._give_up_s = 0.0
         self._result: MavResult | None = None
 
     @property
@@ -120,11 +122,17 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
         """When `handle_timer` wants to be called."""
         if self.is_done or self.state is SwitchState.IDLE:
             return None
-        return self._sent_s + (_HURRY_S if self._may_send_blindly else _PATIENCE_S)
+        return min(self._sent_s + (_HURRY_S if self._may_send_blindly else _PATIENCE_S), self._give_up_s)
+
+    @property
+    def bound_s(self) -> float:
+        """Longest time from the start to the end, whatever the link does."""
+        return _MOST_S
 
     def start(self, now_s: float) -> None:
         """Send the command."""
         if self._move(SwitchEvent.START):
+            self._give_up_s = now_s + _MOST_S
             self._send_once(now_s)
 
     def receive(self, frame: Frame, now_s: float) -> None:
@@ -145,7 +153,7 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
         deadline_s = self.deadline_s
         if deadline_s is None or now_s < deadline_s:
             return
-        if self._may_send_blindly:
+        if self._may_send_blindly and now_s < self._give_up_s:
             self._send_again(now_s)
         else:
             self._move(SwitchEvent.SILENCE)
@@ -196,7 +204,7 @@ class AwaitHeartbeat:
 
     @property
     def deadline_s(self) -> float | None:
-        """Never: a vehicle that falls silent is noticed elsewhere."""
+        """Never: it has no bound of its own. The director drops it when the vehicle has been silent for some seconds, and nothing may follow from silence."""
         return None
 
     @property

@@ -18,6 +18,7 @@ _SEND_AGAIN_S = 1.0
 _MOST_SENDS = 6
 _PROGRESS_PATIENCE_S = 10.0
 _PROGRESS_UNKNOWN = 255
+_MOST_S = 60.0  # however long the vehicle says that it is at it: nothing that is sent here takes longer
 _RESULTS = {int(result): result for result in MavResult}
 
 
@@ -65,6 +66,7 @@ class SendCommand(TableMachine[CommandState, CommandEvent]):
         self._percent = 0
         self._reasons = Reasons(peer)
         self._deadline_s = 0.0
+        self._give_up_s = 0.0
 
     @property
     def outcome(self) -> CommandOutcome | None:
@@ -80,8 +82,8 @@ class SendCommand(TableMachine[CommandState, CommandEvent]):
 
     @property
     def bound_s(self) -> float:
-        """Longest time to the end unless the vehicle keeps reporting progress."""
-        return _MOST_SENDS * _SEND_AGAIN_S
+        """Longest time from the start to the end, also where the vehicle keeps reporting progress."""
+        return _MOST_S
 
     @property
     def deadline_s(self) -> float | None:
@@ -92,6 +94,7 @@ class SendCommand(TableMachine[CommandState, CommandEvent]):
         """Send the command."""
         if self._move(CommandEvent.START):
             self._reasons.ask()
+            self._give_up_s = now_s + _MOST_S
             self._send_once(now_s)
 
     def receive(self, frame: Frame, now_s: float) -> None:
@@ -124,7 +127,7 @@ class SendCommand(TableMachine[CommandState, CommandEvent]):
         result = _RESULTS.get(ack.result)
         if result is MavResult.IN_PROGRESS:
             if self._move(CommandEvent.PROGRESS):
-                self._deadline_s = now_s + _PROGRESS_PATIENCE_S
+                self._deadline_s = min(now_s + _PROGRESS_PATIENCE_S, self._give_up_s)
                 if ack.progress != _PROGRESS_UNKNOWN:
                     self._percent = min(max(ack.progress, 0), 100)
         elif result is not None and self._move(CommandEvent.RESULT):

@@ -7,14 +7,16 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from mavlink_bridge import messages
-from mavlink_bridge.messages import MissionResult
+from mavlink_bridge.messages import MissionResult, MissionType
+from mavlink_bridge.protocol.pace import MOST_S, Pace, bound_s
 from mavlink_bridge.protocol.round_trip import RoundTrip
+from mavlink_bridge.protocol.stored_form import is_same_item
 from mavlink_bridge.protocol.table_machine import TableMachine
 from mavlink_bridge.protocol.transitions import DOWNLOAD, DownloadEvent, DownloadState
 from mavlink_bridge.protocol.wire import item_from_message, mission_result
 
 if TYPE_CHECKING:
-    from mavlink_bridge.messages import Frame, MissionType
+    from mavlink_bridge.messages import Frame
     from mavlink_bridge.protocol.peer import Peer
     from missions.items import MissionItem
 
@@ -44,24 +46,46 @@ class DownloadOutcome:
     Parameters
     ----------
     state : DownloadState
-        COMPLETE, REFUSED, BUSY (another ground station kept writing) or SILENT.
+        COMPLETE, REFUSED, BUSY (another ground station kept writing), SILENT or TOO_SLOW.
     items : tuple of MissionItem
         The list as the vehicle holds it, for missions with the home item at 0; empty unless complete.
     result : MissionResult, optional
         What the vehicle refused with.
     is_coarse : bool
         The vehicle gave positions as 32-bit floats (MISSION_ITEM), up to 1 m off.
+    is_contradicted : bool
+        An item came twice and was another one the second time: the list changed while it was read.
+    count : int
+        How many items the vehicle announced.
+    received : int
+        How many of them came.
+    took_s : float
+        How long it took.
     """
 
     state: DownloadState
     items: tuple[MissionItem, ...] = ()
     result: MissionResult | None = None
     is_coarse: bool = False
+    is_contradicted: bool = False
+    count: int = 0
+    received: int = 0
+    took_s: float = 0.0
 
     @property
     def is_complete(self) -> bool:
         """Whether the whole list arrived."""
         return self.state is DownloadState.COMPLETE
+
+    @property
+    def shortfall(self) -> str:
+        """How far a download came that the vehicle did not finish, in words."""
+        if self.state is not DownloadState.TOO_SLOW:
+            return "the vehicle fell silent"
+        return (
+            f"the vehicle announced {self.count} items and sent {self.received} in {self.took_s:.0f} s; "
+            f"a list may take {bound_s(self.count):.0f} s"
+        )
 
 
 @dataclass(slots=True)
@@ -86,6 +110,8 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         How long another ground station may keep the list busy.
     round_trip : RoundTrip, optional
         What is known of the link from transfers before.
+    most_s : float
+        The longest it may take, `pace.MOST_S` if not given.
     float_form : bool
         Whether a vehicle that answers no MISSION_REQUEST_INT is asked by the old MISSION_REQUEST, which gives coarse positions.
     """
@@ -98,6 +124,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         window: int = WINDOW,
         rival_patience_s: float = RIVAL_PATIENCE_S,
         round_trip: RoundTrip | None = None,
+        most_s: float = MOST_S,
         float_form: bool = True,
     ) -> None:
         super().__init__(DOWNLOAD, DownloadState.IDLE)
@@ -128,8 +155,9 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         self._fetching_since_s = 0.0
         self._act_at_s = 0.0
         self._rival_since_s: float | None = None
-        self._begun_s = 0.0
-        self._limit_s = 0.0
+        self._begun_s = self._ended_s = 0.0
+        self._pace = Pace(most_s)
+        self._is_contradicted = False
 
     @property
     def outcome(self) -> DownloadOutcome | None:
@@ -142,7 +170,16 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
             else ()
         )
         result = self._result if self.state is DownloadState.REFUSED else None
-        return DownloadOutcome(self.state, items, result, bool(self._coarse_seqs))
+        return DownloadOutcome(
+            self.state,
+            items,
+            result,
+            is_coarse=bool(self._coarse_seqs),
+            is_contradicted=self._is_contradicted,
+            count=self._count,
+            received=len(self._items),
+            took_s=self._ended_s - self._begun_s,
+        )
 
     @property
     def progress(self) -> tuple[int, int]:
@@ -151,8 +188,8 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
 
     @property
     def bound_s(self) -> float:
-        """Longest time from the start to the end, whatever the link does (it grows when the count is known)."""
-        return 50.0 + self._rival_patience_s + 0.5 * self._most_count
+        """Longest time from the start to the end, whatever the link and the vehicle do; less once the count is known."""
+        return bound_s(self._most_count) if self._most_count else MOST_S
 
     @property
     def deadline_s(self) -> float | None:
@@ -160,21 +197,22 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         if self.is_done or self.state is DownloadState.IDLE:
             return None
         if self.state is DownloadState.FETCHING:
-            due_s = min(self._overdue_at_s(), self._heard_s + PATIENCE_S, self._limit_s)
+            due_s = min(self._overdue_at_s(), self._heard_s + PATIENCE_S, self._pace.deadline_s)
             return due_s if self._believed_at_s is None else min(due_s, self._believed_at_s)
-        return min(self._act_at_s, self._limit_s)
+        return min(self._act_at_s, self._pace.deadline_s)
 
     def start(self, now_s: float) -> None:
         """Ask how many items there are."""
         if self._move(DownloadEvent.START):
             self._heard_s = self._begun_s = self._counting_since_s = now_s
-            self._limit_s = now_s + self.bound_s
+            self._pace.start(now_s)
             self._ask_count(now_s)
 
     def receive(self, frame: Frame, now_s: float) -> None:
         """Take a frame; what is not for this machine is ignored."""
         if self.is_done or not self._peer.accepts(frame, self._mission_type):
             return
+        self._ended_s = now_s
         message = frame.message
         if isinstance(message, messages.MissionItemInt | messages.MissionItem):
             self._take_item(message, now_s)
@@ -187,8 +225,11 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         """Take notice that time has passed."""
         if self.is_done or self.state is DownloadState.IDLE:
             return
+        self._ended_s = now_s
         is_waiting = self.state is DownloadState.WAITING
-        if now_s >= self._limit_s or (not is_waiting and now_s >= self._heard_s + PATIENCE_S):
+        if not is_waiting and now_s >= self._heard_s + PATIENCE_S:
+            self._move(DownloadEvent.SILENCE)
+        elif self._pace.is_over(now_s) or self._is_hopeless(now_s):
             self._give_up()
         elif self.state is DownloadState.FETCHING:
             if self._believed_at_s is not None and now_s >= self._believed_at_s:
@@ -204,8 +245,14 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
             self._ask_count(now_s)
 
     def _give_up(self) -> None:
-        if not self._move(DownloadEvent.SILENCE):
-            self._move(DownloadEvent.RIVAL_STAYS)
+        for event in (DownloadEvent.TIME_IS_UP, DownloadEvent.RIVAL_STAYS, DownloadEvent.SILENCE):
+            if self._move(event):
+                return
+
+    def _is_hopeless(self, now_s: float) -> bool:
+        if self.state is not DownloadState.FETCHING:
+            return False
+        return self._pace.is_hopeless(len(self._items), self._count, self._fetching_since_s, now_s)
 
     def _rival_may_go_on(self, now_s: float) -> bool:
         return self._rival_since_s is None or now_s < self._rival_since_s + self._rival_patience_s
@@ -233,7 +280,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         self._refusals = 0
         self._count = count
         self._most_count = max(self._most_count, count)
-        self._limit_s = self._begun_s + self.bound_s
+        self._is_contradicted = False
         self._forget_items()
         if self.is_done:
             self._thank()
@@ -262,8 +309,10 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         if not is_coarse:
             self._forget_coarse(now_s)
         if message.seq in self._items:
+            self._compare_again(message)
             return
         self._items[message.seq] = item_from_message(message)
+        self._pace.advance(len(self._items), now_s)
         if is_coarse:
             self._coarse_seqs.add(message.seq)
         self._window = min(self._window + 1.0, self._most_in_flight)
@@ -275,6 +324,14 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
             return
         self._repeat_overtaken(now_s)
         self._fill_window(now_s)
+
+    def _compare_again(self, message: messages.MissionItemInt | messages.MissionItem) -> None:
+        """Notice that an item that came before is another one now; home moves by itself."""
+        is_home = message.seq == 0 and self._mission_type is MissionType.MISSION
+        is_coarse = isinstance(message, messages.MissionItem) or message.seq in self._coarse_seqs
+        before, again = self._items[message.seq], item_from_message(message)
+        if not is_home and not is_same_item(before, again, self._mission_type, coarse=is_coarse):
+            self._is_contradicted = True
 
     def _finish(self) -> None:
         self._move(DownloadEvent.ALL_ITEMS)

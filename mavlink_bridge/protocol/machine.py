@@ -12,7 +12,8 @@ class Machine(Protocol):
     """What a shell (live link, replay, test) needs to run a machine.
 
     The shell calls `start` once, then `receive` for each frame and `handle_timer` when `deadline_s` is reached, and after each call
-    sends what `messages_to_send` gives. ``now_s`` is any clock that only goes forward.
+    sends what `messages_to_send` gives. ``now_s`` is any clock that only goes forward. Every machine that comes to an end (all but the
+    director and what waits only for its signs) also has `bound_s`: the longest time from `start` to the end, whatever link and vehicle do.
     """
 
     @property

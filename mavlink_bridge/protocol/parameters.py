@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.messages import ParamRequestList, ParamRequestRead, ParamSet, ParamValue
+from mavlink_bridge.protocol.pace import MOST_S, Pace, bound_s
 from mavlink_bridge.protocol.round_trip import RoundTrip
 from mavlink_bridge.protocol.table_machine import TableMachine
 from mavlink_bridge.protocol.transitions import PARAMETERS, ParameterEvent, ParameterState
@@ -105,6 +106,7 @@ class ReadParameters(TableMachine[ParameterState, ParameterEvent]):
         self._quiet_rounds = 0
         self._heard_s = 0.0
         self._list_at_s = 0.0
+        self._pace = Pace()
 
     @property
     def outcome(self) -> ParametersOutcome | None:
@@ -124,13 +126,13 @@ class ReadParameters(TableMachine[ParameterState, ParameterEvent]):
 
     @property
     def bound_s(self) -> float:
-        """Longest time from the start to the end for parameters by name, whatever the link does."""
-        return PATIENCE_S + _MOST_TRIES * _MOST_OVERDUE_S * (1 + len(self._names or ()) / WINDOW)
+        """Longest time from the start to the end, whatever the link and the vehicle do."""
+        return MOST_S if self._names is None else bound_s(len(self._names))
 
     @property
     def deadline_s(self) -> float | None:
         """When `handle_timer` wants to be called."""
-        silence_s = self._heard_s + PATIENCE_S
+        silence_s = min(self._heard_s + PATIENCE_S, self._pace.deadline_s)
         if self.state is ParameterState.LISTING:
             return min(self._list_at_s, silence_s)
         if self.state is ParameterState.ASKING:
@@ -140,6 +142,7 @@ class ReadParameters(TableMachine[ParameterState, ParameterEvent]):
     def start(self, now_s: float) -> None:
         """Ask."""
         self._heard_s = now_s
+        self._pace.start(now_s)
         if self._names is None:
             if self._move(ParameterEvent.START_ALL):
                 self._ask_list(now_s)
@@ -167,16 +170,17 @@ class ReadParameters(TableMachine[ParameterState, ParameterEvent]):
             self._heard_s = now_s
             self._values[message.param_id] = message.param_value
             self._settle(message.param_id, now_s)
+        self._pace.advance(self.progress[0], now_s)
         self._go_on(now_s)
 
     def handle_timer(self, now_s: float) -> None:
         """Take notice that time has passed."""
         if self.is_done or self.state is ParameterState.IDLE:
             return
-        if self.state is ParameterState.LISTING:
-            if now_s >= self._heard_s + PATIENCE_S:
-                self._move(ParameterEvent.SILENCE)
-            elif now_s >= self._list_at_s:
+        if now_s >= self._heard_s + PATIENCE_S or self._pace.is_over(now_s):
+            self._move(ParameterEvent.SILENCE)
+        elif self.state is ParameterState.LISTING:
+            if now_s >= self._list_at_s:
                 self._end_list(now_s)
         else:
             self._repeat_overdue(now_s)
@@ -256,9 +260,6 @@ class ReadParameters(TableMachine[ParameterState, ParameterEvent]):
         return min(overdue_s * 2.0 ** max(self._quiet_rounds - _PATIENT_ROUNDS, 0), _MOST_OVERDUE_S)
 
     def _repeat_overdue(self, now_s: float) -> None:
-        if now_s >= self._heard_s + PATIENCE_S:
-            self._move(ParameterEvent.SILENCE)
-            return
         overdue_s = self._overdue_s()
         enough = self._tries_enough()
         repeated = False

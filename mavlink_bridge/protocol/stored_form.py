@@ -308,4 +308,6 @@ def _has_none(stored: _StoredItem) -> bool:
 
 def _is_near(a_m: float, b_m: float) -> bool:
     """Tell whether two altitudes can be the same whole number of centimetres, cut or rounded."""
-    return abs(a_m - b_m) < 0.0151 + 1e-6 * abs(a_m) or (math.isnan(a_m) and math.isnan(b_m))
+    if not (math.isfinite(a_m) and math.isfinite(b_m)):
+        return str(a_m) == str(b_m)
+    return abs(a_m - b_m) < 0.0151 + 1e-6 * abs(a_m)

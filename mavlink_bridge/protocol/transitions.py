@@ -24,6 +24,7 @@ class DownloadState(StrEnum):
     REFUSED = auto()
     BUSY = auto()
     SILENT = auto()
+    TOO_SLOW = auto()  # it answers, but not so that the list could come within the bound
 
 
 class DownloadEvent(StrEnum):
@@ -39,6 +40,7 @@ class DownloadEvent(StrEnum):
     REFUSAL = auto()
     RIVAL_STAYS = auto()
     SILENCE = auto()
+    TIME_IS_UP = auto()  # too few items came
 
 
 DOWNLOAD = {
@@ -59,6 +61,7 @@ DOWNLOAD = {
         DownloadEvent.LIST_CHANGED: DownloadState.COUNTING,
         DownloadEvent.DENIED: DownloadState.WAITING,
         DownloadEvent.SILENCE: DownloadState.SILENT,
+        DownloadEvent.TIME_IS_UP: DownloadState.TOO_SLOW,
     },
     DownloadState.WAITING: {
         DownloadEvent.RETRY: DownloadState.COUNTING,
@@ -68,6 +71,49 @@ DOWNLOAD = {
     DownloadState.REFUSED: {},
     DownloadState.BUSY: {},
     DownloadState.SILENT: {},
+    DownloadState.TOO_SLOW: {},
+}
+
+
+class UndisturbedReadState(StrEnum):
+    """Where the reading of a list that others may write is."""
+
+    IDLE = auto()
+    READING = auto()
+    SETTLING = auto()  # somebody else wrote meanwhile: waiting until that is over
+    COMPLETE = auto()
+    FAILED = auto()  # the download did not come to its end
+    DISTURBED = auto()  # others keep writing
+
+
+class UndisturbedReadEvent(StrEnum):
+    """What moves such a reading."""
+
+    START = auto()
+    READ = auto()
+    DISTURBANCE = auto()
+    QUIET = auto()
+    FAILURE = auto()
+    OTHERS_STAY = auto()
+
+
+UNDISTURBED_READ = {
+    UndisturbedReadState.IDLE: {
+        UndisturbedReadEvent.START: UndisturbedReadState.READING,
+    },
+    UndisturbedReadState.READING: {
+        UndisturbedReadEvent.READ: UndisturbedReadState.COMPLETE,
+        UndisturbedReadEvent.DISTURBANCE: UndisturbedReadState.SETTLING,
+        UndisturbedReadEvent.FAILURE: UndisturbedReadState.FAILED,
+        UndisturbedReadEvent.OTHERS_STAY: UndisturbedReadState.DISTURBED,
+    },
+    UndisturbedReadState.SETTLING: {
+        UndisturbedReadEvent.QUIET: UndisturbedReadState.READING,
+        UndisturbedReadEvent.OTHERS_STAY: UndisturbedReadState.DISTURBED,
+    },
+    UndisturbedReadState.COMPLETE: {},
+    UndisturbedReadState.FAILED: {},
+    UndisturbedReadState.DISTURBED: {},
 }
 
 
@@ -160,13 +206,19 @@ class VerifiedUploadEvent(StrEnum):
     READ_WANTED = auto()  # what is read is the list to be uploaded
     READ_UNFINISHED = auto()  # part old, part new: our own unfinished write
     READ_FOREIGN = auto()  # neither: somebody else's list
-    READ_AGAIN = auto()  # not the wanted list: believed only when a second read says the same
+    READ_AGAIN = (
+        auto()
+    )  # not the wanted list: believed only when a second read says the same; or written by others since
+    READ_UNSTEADY = auto()  # it was another list at each read
     READ_FAILED = auto()
+    OTHERS_WRITE = auto()  # another station keeps writing the list
     BACKUP_STORED = auto()
     CLEAR_TO_WRITE = auto()
     NOT_CLEAR = auto()
     PUSH_ENDED = auto()
     PUSH_AGAIN = auto()
+    NO_TIME_LEFT = auto()  # not enough of it to put the old list back
+    TIME_IS_UP = auto()
 
 
 VERIFIED_UPLOAD = {
@@ -178,6 +230,8 @@ VERIFIED_UPLOAD = {
         VerifiedUploadEvent.READ_WANTED: VerifiedUploadState.VERIFIED,
         VerifiedUploadEvent.READ_OLD: VerifiedUploadState.STORING_BACKUP,
         VerifiedUploadEvent.READ_FAILED: VerifiedUploadState.NOT_STARTED,
+        VerifiedUploadEvent.OTHERS_WRITE: VerifiedUploadState.NOT_STARTED,
+        VerifiedUploadEvent.TIME_IS_UP: VerifiedUploadState.NOT_STARTED,
     },
     VerifiedUploadState.STORING_BACKUP: {
         VerifiedUploadEvent.BACKUP_STORED: VerifiedUploadState.CHECKING_VEHICLE,
@@ -185,9 +239,13 @@ VERIFIED_UPLOAD = {
     VerifiedUploadState.CHECKING_VEHICLE: {
         VerifiedUploadEvent.CLEAR_TO_WRITE: VerifiedUploadState.PUSHING,
         VerifiedUploadEvent.NOT_CLEAR: VerifiedUploadState.NOT_STARTED,
+        VerifiedUploadEvent.READ_AGAIN: VerifiedUploadState.READING_OLD,
+        VerifiedUploadEvent.OTHERS_WRITE: VerifiedUploadState.NOT_STARTED,
+        VerifiedUploadEvent.TIME_IS_UP: VerifiedUploadState.NOT_STARTED,
     },
     VerifiedUploadState.PUSHING: {
         VerifiedUploadEvent.PUSH_ENDED: VerifiedUploadState.READING_BACK,
+        VerifiedUploadEvent.TIME_IS_UP: VerifiedUploadState.UNKNOWN,
     },
     VerifiedUploadState.READING_BACK: {
         VerifiedUploadEvent.READ_WANTED: VerifiedUploadState.VERIFIED,
@@ -195,11 +253,16 @@ VERIFIED_UPLOAD = {
         VerifiedUploadEvent.PUSH_AGAIN: VerifiedUploadState.PUSHING,
         VerifiedUploadEvent.READ_OLD: VerifiedUploadState.UNCHANGED,
         VerifiedUploadEvent.READ_UNFINISHED: VerifiedUploadState.RESTORING,
+        VerifiedUploadEvent.NO_TIME_LEFT: VerifiedUploadState.DIFFERENT,
         VerifiedUploadEvent.READ_FOREIGN: VerifiedUploadState.DIFFERENT,
+        VerifiedUploadEvent.READ_UNSTEADY: VerifiedUploadState.UNKNOWN,
         VerifiedUploadEvent.READ_FAILED: VerifiedUploadState.UNKNOWN,
+        VerifiedUploadEvent.OTHERS_WRITE: VerifiedUploadState.UNKNOWN,
+        VerifiedUploadEvent.TIME_IS_UP: VerifiedUploadState.UNKNOWN,
     },
     VerifiedUploadState.RESTORING: {
         VerifiedUploadEvent.PUSH_ENDED: VerifiedUploadState.READING_RESTORED,
+        VerifiedUploadEvent.TIME_IS_UP: VerifiedUploadState.UNKNOWN,
     },
     VerifiedUploadState.READING_RESTORED: {
         VerifiedUploadEvent.READ_OLD: VerifiedUploadState.RESTORED,
@@ -207,7 +270,10 @@ VERIFIED_UPLOAD = {
         VerifiedUploadEvent.PUSH_AGAIN: VerifiedUploadState.RESTORING,
         VerifiedUploadEvent.READ_UNFINISHED: VerifiedUploadState.DIFFERENT,
         VerifiedUploadEvent.READ_FOREIGN: VerifiedUploadState.DIFFERENT,
+        VerifiedUploadEvent.READ_UNSTEADY: VerifiedUploadState.UNKNOWN,
         VerifiedUploadEvent.READ_FAILED: VerifiedUploadState.UNKNOWN,
+        VerifiedUploadEvent.OTHERS_WRITE: VerifiedUploadState.UNKNOWN,
+        VerifiedUploadEvent.TIME_IS_UP: VerifiedUploadState.UNKNOWN,
     },
     VerifiedUploadState.VERIFIED: {},
     VerifiedUploadState.UNCHANGED: {},
@@ -239,7 +305,7 @@ class ParameterEvent(StrEnum):
     ALL_HERE = auto()
     CONFIRMED = auto()
     GIVEN_UP = auto()  # the vehicle answers, but not with what is missing
-    SILENCE = auto()
+    SILENCE = auto()  # or too little came in too long a time
 
 
 PARAMETERS = {
@@ -383,6 +449,7 @@ FIND = {
 TABLES = {
     "find": FIND,
     "download": DOWNLOAD,
+    "undisturbed_read": UNDISTURBED_READ,
     "upload": UPLOAD,
     "verified_upload": VERIFIED_UPLOAD,
     "parameters": PARAMETERS,

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from mavlink_bridge import messages
 from mavlink_bridge.messages import MissionResult
 from mavlink_bridge.protocol.download import PATIENCE_S, RIVAL_PATIENCE_S
+from mavlink_bridge.protocol.pace import MOST_S, Pace, bound_s
 from mavlink_bridge.protocol.round_trip import RoundTrip
 from mavlink_bridge.protocol.table_machine import TableMachine
 from mavlink_bridge.protocol.transitions import UPLOAD, UploadEvent, UploadState
@@ -84,6 +85,8 @@ class Upload(TableMachine[UploadState, UploadEvent]):
         How long another ground station may keep the list busy.
     round_trip : RoundTrip, optional
         What is known of the link from transfers before.
+    most_s : float
+        The longest it may take, `pace.MOST_S` if not given.
     """
 
     def __init__(
@@ -95,6 +98,7 @@ class Upload(TableMachine[UploadState, UploadEvent]):
         window: int = WINDOW,
         rival_patience_s: float = RIVAL_PATIENCE_S,
         round_trip: RoundTrip | None = None,
+        most_s: float = MOST_S,
     ) -> None:
         super().__init__(UPLOAD, UploadState.IDLE)
         self._peer = peer
@@ -120,7 +124,7 @@ class Upload(TableMachine[UploadState, UploadEvent]):
         self._advanced_s = math.inf  # when another item was asked for
         self._asked_s = -math.inf  # when the item wanted was last asked for
         self._rival_since_s: float | None = None
-        self._limit_s = 0.0
+        self._pace = Pace(most_s)
 
     @property
     def outcome(self) -> UploadOutcome | None:
@@ -134,11 +138,6 @@ class Upload(TableMachine[UploadState, UploadEvent]):
         return UploadOutcome(self.state, self._result, item, is_certain)
 
     @property
-    def was_heeded(self) -> bool:
-        """Whether the vehicle asked for an item: it has begun to write."""
-        return self._wanted >= 0
-
-    @property
     def progress(self) -> tuple[int, int]:
         """Items asked for and items in all."""
         count = len(self._messages)
@@ -147,7 +146,7 @@ class Upload(TableMachine[UploadState, UploadEvent]):
     @property
     def bound_s(self) -> float:
         """Longest time from the start to the end, whatever the link does."""
-        return 60.0 + self._rival_patience_s + 1.5 * len(self._messages)
+        return bound_s(len(self._messages))
 
     @property
     def deadline_s(self) -> float | None:
@@ -155,15 +154,15 @@ class Upload(TableMachine[UploadState, UploadEvent]):
         if self.is_done or self.state is UploadState.IDLE:
             return None
         if self.state is UploadState.WAITING:
-            return min(self._act_at_s, self._limit_s)
-        due_s = min(self._act_at_s, self._heard_s + PATIENCE_S, self._limit_s)
+            return min(self._act_at_s, self._pace.deadline_s)
+        due_s = min(self._act_at_s, self._heard_s + PATIENCE_S, self._pace.deadline_s)
         return due_s if self._gap_at_s is None else min(due_s, self._gap_at_s)
 
     def start(self, now_s: float) -> None:
         """Announce the list."""
         if self._move(UploadEvent.START):
             self._heard_s = now_s
-            self._limit_s = now_s + self.bound_s
+            self._pace.start(now_s)
             self._announced_s = now_s
             self._announce(now_s)
 
@@ -184,7 +183,7 @@ class Upload(TableMachine[UploadState, UploadEvent]):
         if self.is_done or self.state is UploadState.IDLE:
             return
         is_waiting = self.state is UploadState.WAITING
-        if now_s >= self._limit_s or (not is_waiting and now_s >= self._heard_s + PATIENCE_S):
+        if self._pace.is_over(now_s) or (not is_waiting and now_s >= self._heard_s + PATIENCE_S):
             if not self._move(UploadEvent.SILENCE):
                 self._move(UploadEvent.RIVAL_STAYS)
             return
@@ -224,6 +223,7 @@ class Upload(TableMachine[UploadState, UploadEvent]):
         if not 0 <= seq < len(self._messages) or not self._move(UploadEvent.REQUEST):
             return
         self._heard_s = now_s
+        self._pace.advance(seq, now_s)
         if self._wanted < 0:
             self._round_trip.guess(now_s - self._announced_s)
         if seq != self._wanted:

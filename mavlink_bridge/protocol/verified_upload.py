@@ -1,16 +1,34 @@
-"""The whole safe transfer: keep the old list, push the new one, read back what is there, put the old one back if need be."""
+"""The whole safe transfer: keep the old list, push the new one, read back what is there, put the old one back if need be.
+
+How it works, and why. An upload to ArduPilot is no transaction: the first message cuts the stored list, every item is written as it comes, and the final
+word can be lost. So the vehicle's acknowledgement decides nothing here; what is read back does. Four rules make "verified" true:
+
+1. *Only a whole read counts, and only one that nobody disturbed.* Every read is an `UndisturbedRead`: traffic which shows that somebody else wrote this
+   list while it was read makes it worthless (an item already read may have been replaced), and it is read again, a bounded number of times. So the
+   list was on the vehicle as a whole at one moment of the last read, and whatever was heard since says nothing else.
+2. *The wanted list is believed at once, anything else only when two reads agree.* A read of something else may be a late copy of an earlier answer; so one
+   more read costs little. Reads that never agree end as unknown. Lists are compared as the vehicle stores them, NaN equal to NaN: every list is equal to
+   itself.
+3. *Nothing is written before the old list is safe, nor while the vehicle drives it.* The machine stops at `pending_backup` until the shell has
+   stored it. What is the old list, or our own unfinished write, is pushed again, then the old one put back; a list that is neither is left alone.
+4. *It ends.* Every part has a `Pace`; the whole may take `pace.MOST_S` besides the wait for the backup. No push begins in its second half, where there may
+   be no time to put the old list back, and a push or a restoring stops early enough for what is there to be read. Wherever the time runs out after
+   the first write, the outcome is unknown or different, never silence.
+
+The states and what leads from one to the next stand in `transitions.VERIFIED_UPLOAD`.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from enum import StrEnum, auto
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.messages import Heartbeat, MissionResult, ModeFlag
-from mavlink_bridge.protocol.download import RIVAL_PATIENCE_S, Download, DownloadOutcome
+from mavlink_bridge.messages import Heartbeat, MissionResult
+from mavlink_bridge.protocol.download import RIVAL_PATIENCE_S
+from mavlink_bridge.protocol.judging import held_list, is_armed_in_auto, is_settled_refusal
 from mavlink_bridge.protocol.limits import Limits
+from mavlink_bridge.protocol.pace import MOST_S, bound_s
 from mavlink_bridge.protocol.round_trip import RoundTrip
-from mavlink_bridge.protocol.stored_form import Difference, differences, is_unfinished_write
+from mavlink_bridge.protocol.stored_form import differences
 from mavlink_bridge.protocol.table_machine import TableMachine
 from mavlink_bridge.protocol.texts import Reasons
 from mavlink_bridge.protocol.transitions import (
@@ -20,92 +38,32 @@ from mavlink_bridge.protocol.transitions import (
     VerifiedUploadEvent,
     VerifiedUploadState,
 )
+from mavlink_bridge.protocol.undisturbed_read import UndisturbedRead
 from mavlink_bridge.protocol.upload import WINDOW, Upload, UploadOutcome
+from mavlink_bridge.protocol.verified_outcome import Held, OutcomeKind, VerifiedUploadOutcome
+from mavlink_bridge.protocol.write_watch import WriteWatch
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from mavlink_bridge.messages import Frame, MissionType
+    from mavlink_bridge.protocol.download import DownloadOutcome
     from mavlink_bridge.protocol.peer import Peer
+    from mavlink_bridge.protocol.stored_form import Difference
     from missions.items import MissionItem
 
-ROVER_AUTO_MODE = 10
+__all__ = ["Held", "OutcomeKind", "VerifiedUpload", "VerifiedUploadOutcome"]
+
 MOST_PUSHES = 4
 MOST_RESTORES = 3
+_MOST_READS = (
+    6  # of the list after one push; two mostly agree, late copies on a link that reorders may need one more
+)
+_MOST_BACKUPS = 3  # as often as the old list is read because others wrote it before we could
+_LAST_PUSH_S = MOST_S / 2  # later than this no push begins
+_READ_RESERVE_S = 45.0  # kept for reading what a push left: 655 items at 40 % loss took up to 25 s, the 8 s included for which a vehicle left half-way refuses
 _HEARTBEAT_PATIENCE_S = 10.0
 _FRESH_S = 3.0  # a heartbeat comes every second
-
-
-class OutcomeKind(StrEnum):
-    """How a safe upload ended."""
-
-    VERIFIED = auto()  # the last complete read-back equalled the list, nothing was written since
-    REFUSED = auto()  # the vehicle (or the check of its limits) said no; the old list is there
-    BUSY = auto()  # another ground station kept the list busy; nothing was written
-    ACTIVE = auto()  # armed in AUTO; nothing was written
-    NO_ANSWER = auto()  # silence before anything was written
-    UNCHANGED = auto()  # the upload did not get through; the old list was never replaced
-    RESTORED = auto()  # the upload did not get through; the old list was put back and verified
-    DIFFERENT = auto()  # something else is on the vehicle
-    UNKNOWN = auto()  # what is on the vehicle could not be read
-
-
-class Held(StrEnum):
-    """What the vehicle holds now."""
-
-    WANTED = auto()
-    OLD = auto()
-    UNFINISHED = auto()  # part old, part new
-    FOREIGN = auto()  # neither
-    UNKNOWN = auto()
-
-
-@dataclass(frozen=True, slots=True)
-class VerifiedUploadOutcome:
-    """How a safe upload ended and what is on the vehicle.
-
-    Parameters
-    ----------
-    kind : OutcomeKind
-        How it ended.
-    held : Held
-        What the vehicle holds now.
-    mission_type : MissionType
-        Which list.
-    result : MissionResult, optional
-        What the vehicle refused with.
-    item : int, optional
-        The item it refused, for missions with home at 0.
-    texts : tuple of str
-        STATUSTEXTs that came while items were sent and may be the reason of a refusal, or the limit that the list breaks.
-    differences : tuple of Difference
-        Where what is on the vehicle differs from what was wanted, as last read.
-    backup : tuple of MissionItem, optional
-        The list that was there before; None if it was never read.
-    found : tuple of MissionItem, optional
-        The list as last read; None if nothing was read after the upload began.
-    pushes : int
-        How often the list was sent; 0: it was there already, or nothing was written.
-    is_coarse : bool
-        The vehicle gives positions as 32-bit floats only: what is there is known to about 1 m.
-    """
-
-    kind: OutcomeKind
-    held: Held
-    mission_type: MissionType
-    result: MissionResult | None = None
-    item: int | None = None
-    texts: tuple[str, ...] = ()
-    differences: tuple[Difference, ...] = ()
-    backup: tuple[MissionItem, ...] | None = None
-    found: tuple[MissionItem, ...] | None = None
-    pushes: int = 0
-    is_coarse: bool = False
-
-    @property
-    def is_verified(self) -> bool:
-        """Whether the vehicle holds the list, proved by reading it back."""
-        return self.kind is OutcomeKind.VERIFIED
 
 
 class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
@@ -156,23 +114,28 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         self._window = window
         self._rival_patience_s = rival_patience_s
         self._round_trip = RoundTrip()
-        self._download: Download | None = None
+        self._watch = WriteWatch(peer, mission_type)
+        self._reading: UndisturbedRead | None = None
         self._upload: Upload | None = None
         self._old: tuple[MissionItem, ...] | None = None
         self._found: tuple[MissionItem, ...] | None = None
         self._is_coarse = False
         self._may_be_coarse = True
         self._read_before: tuple[MissionItem, ...] | None = None
+        self._reads = 0  # since the push
+        self._backups = 0
+        self._is_disturbed = False
         self._pushed: UploadOutcome | None = None
         self._pushed_before: UploadOutcome | None = None
         self._refusal: UploadOutcome | None = None
-        self._was_heeded = False
         self._pushes = 0
         self._restores = 0
         self._failed_read: DownloadOutcome | None = None
         self._reasons = Reasons(peer, is_about_list=True)
         self._problem: str | None = None
         self._check_until_s = 0.0
+        self._begun_s = 0.0  # the wait for the backup left out
+        self._waits_since_s = 0.0
         self._held = Held.UNKNOWN
         self._shown_progress = 0
         self._outcome: VerifiedUploadOutcome | None = None
@@ -218,6 +181,8 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
             found=found,
             pushes=self._pushes,
             is_coarse=self._is_coarse,
+            writer=self._watch.writer if self._is_disturbed or self._held is Held.FOREIGN else None,
+            shortfall=self._shortfall(),
         )
 
     @property
@@ -227,7 +192,7 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         total = old_count + 2 * len(self._wanted)
         if self.is_done:
             return total, total
-        part = self._download or self._upload
+        part = self._reading or self._upload
         before = {
             VerifiedUploadState.CHECKING_VEHICLE: old_count,
             VerifiedUploadState.STORING_BACKUP: old_count,
@@ -239,21 +204,23 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
 
     @property
     def bound_s(self) -> float:
-        """Longest time from the start to the end, whatever the link does; the wait for the backup is left out."""
-        longest = max(len(self._wanted), len(self._old or ()))
-        read_s = 50.0 + self._rival_patience_s + 0.5 * longest
-        push_s = 60.0 + self._rival_patience_s + 1.5 * longest
-        return _HEARTBEAT_PATIENCE_S + read_s + (MOST_PUSHES + MOST_RESTORES) * (push_s + 2 * read_s)
+        """Longest time from the start to the end, whatever the link and the vehicle do; the wait for the backup is left out."""
+        return MOST_S
 
     @property
     def deadline_s(self) -> float | None:
         """When `handle_timer` wants to be called."""
-        if self.is_done:
+        if self.is_done or self.state in (VerifiedUploadState.IDLE, VerifiedUploadState.STORING_BACKUP):
             return None
         if self.state is VerifiedUploadState.CHECKING_VEHICLE:
-            return self._check_until_s
-        part = self._download or self._upload
-        return part.deadline_s if part else None
+            return min(self._check_until_s, self._limit_s)
+        part = self._reading or self._upload
+        part_s = part.deadline_s if part else None
+        return self._limit_s if part_s is None else min(part_s, self._limit_s)
+
+    @property
+    def _limit_s(self) -> float:
+        return self._begun_s + MOST_S
 
     def start(self, now_s: float) -> None:
         """Check the limits and begin with reading the old list."""
@@ -261,7 +228,7 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
             return
         self._problem = self._limits.problem(self._wanted, self._mission_type)
         self._held = Held.OLD  # whatever it is: nothing was written yet
-        self._active_known_s = now_s
+        self._active_known_s = self._begun_s = now_s
         if self._problem:
             self._move(VerifiedUploadEvent.TOO_LARGE)
         elif self._move(VerifiedUploadEvent.START):
@@ -270,57 +237,71 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
     def backup_stored(self, now_s: float) -> None:
         """Take notice that the old list is safe; only now is anything written."""
         if self._move(VerifiedUploadEvent.BACKUP_STORED):
+            self._begun_s += now_s - self._waits_since_s
             self._check_until_s = now_s + _HEARTBEAT_PATIENCE_S
             self._check_vehicle(now_s)
 
     def receive(self, frame: Frame, now_s: float) -> None:
         """Take a frame; what is not for this machine is ignored."""
-        if self.is_done or not self._peer.accepts(frame):
+        if self.is_done:
+            return
+        self._watch.look(frame, now_s)
+        if not self._peer.accepts(frame):
             return
         self._reasons.take(frame, now_s)
         if isinstance(frame.message, Heartbeat):
-            self._is_active = _is_armed_in_auto(frame.message)
+            self._is_active = is_armed_in_auto(frame.message)
             self._active_known_s = now_s
             self._check_vehicle(now_s)
-        elif part := self._download or self._upload:
+        elif part := self._reading or self._upload:
             part.receive(frame, now_s)
             self._advance(now_s)
 
     def handle_timer(self, now_s: float) -> None:
         """Take notice that time has passed."""
+        if self.is_done or self.state is VerifiedUploadState.STORING_BACKUP:
+            return
         if self.state is VerifiedUploadState.CHECKING_VEHICLE and now_s >= self._check_until_s:
             self._move(VerifiedUploadEvent.NOT_CLEAR)
-        elif part := self._download or self._upload:
+        elif now_s >= self._limit_s and self._move(VerifiedUploadEvent.TIME_IS_UP):
+            self._reading = self._upload = None
+            if self.has_written:
+                self._held = Held.UNKNOWN
+        elif part := self._reading or self._upload:
             part.handle_timer(now_s)
             self._advance(now_s)
 
     def _advance(self, now_s: float) -> None:
         """Pass on what the part under way wants to send, and go on when it has ended."""
-        part = self._download or self._upload
+        part = self._reading or self._upload
         assert part is not None
         for message in part.messages_to_send():
+            self._watch.note_sent(message)
             self._send(message)
-        if self._download and (read := self._download.outcome):
-            self._download = None
+        if self._reading and (read := self._reading.outcome):
+            self._is_disturbed = self._reading.is_disturbed
+            self._reading = None
             self._take_read(read, now_s)
         elif self._upload and (pushed := self._upload.outcome):
-            self._was_heeded |= self._upload.was_heeded
             self._upload = None
             self._take_push(pushed, now_s)
 
     def _start_reading(self, now_s: float) -> None:
-        self._download = Download(
+        self._reads += 1
+        self._reading = UndisturbedRead(
             self._peer,
             self._mission_type,
+            self._watch,
             rival_patience_s=self._rival_patience_s,
             round_trip=self._round_trip,
             float_form=self._may_be_coarse,
         )
-        self._download.start(now_s)
+        self._reading.start(now_s)
         self._advance(now_s)
 
     def _start_pushing(self, items: tuple[MissionItem, ...], window: int, now_s: float) -> None:
         self._read_before = None
+        self._reads = 0
         self._upload = Upload(
             self._peer,
             self._mission_type,
@@ -328,6 +309,7 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
             window=window,
             rival_patience_s=self._rival_patience_s,
             round_trip=self._round_trip,
+            most_s=min(bound_s(len(items)), self._limit_s - _READ_RESERVE_S - now_s),
         )
         self._upload.start(now_s)
         self._advance(now_s)
@@ -338,6 +320,12 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
             return
         if self._is_active and not self._replace_active:
             self._move(VerifiedUploadEvent.NOT_CLEAR)
+        elif self._watch.is_disturbed:  # the backup may not be what would be replaced
+            self._is_disturbed = True
+            if self._backups < _MOST_BACKUPS and self._move(VerifiedUploadEvent.READ_AGAIN):
+                self._start_reading(now_s)
+            else:
+                self._move(VerifiedUploadEvent.OTHERS_WRITE)
         elif self._move(VerifiedUploadEvent.CLEAR_TO_WRITE):
             self._push_wanted(self._window, now_s)
 
@@ -353,22 +341,27 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
             self._start_reading(now_s)
 
     def _take_read(self, read: DownloadOutcome, now_s: float) -> None:
-        if not read.is_complete:
+        if self._is_disturbed:
+            self._held = Held.UNKNOWN
+            self._move(VerifiedUploadEvent.OTHERS_WRITE)
+        elif not read.is_complete:
             self._failed_read = read
-            if self._pushes:
+            if self.has_written:
                 self._held = Held.UNKNOWN
             self._move(VerifiedUploadEvent.READ_FAILED)
         elif self.state is VerifiedUploadState.READING_OLD:
             self._is_coarse = read.is_coarse
             self._may_be_coarse = read.is_coarse or not read.items
-            self._take_old(read.items)
+            self._take_old(read.items, now_s)
         else:
             self._is_coarse = read.is_coarse
             self._found = read.items
             self._judge(read.items, now_s)
 
-    def _take_old(self, items: tuple[MissionItem, ...]) -> None:
+    def _take_old(self, items: tuple[MissionItem, ...], now_s: float) -> None:
         self._old = items
+        self._backups += 1
+        self._waits_since_s = now_s
         if not self._differences(self._wanted, items):
             self._found = items
             self._held = Held.WANTED
@@ -379,14 +372,17 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
     def _judge(self, found: tuple[MissionItem, ...], now_s: float) -> None:
         """Decide what a read-back means; anything but the wanted list must be read twice alike before it is believed."""
         restoring = self.state is VerifiedUploadState.READING_RESTORED
-        self._held = self._held_list(found)
+        assert self._old is not None
+        self._held = held_list(found, self._wanted, self._old, self._mission_type, coarse=self._is_coarse)
         expected = Held.OLD if restoring else Held.WANTED
         if self._held is expected:
             self._move(VerifiedUploadEvent.READ_OLD if restoring else VerifiedUploadEvent.READ_WANTED)
         elif self._read_before is None or self._differences(self._read_before, found):
             self._read_before = found
-            self._move(VerifiedUploadEvent.READ_AGAIN)
-            self._start_reading(now_s)
+            if self._reads < _MOST_READS and self._move(VerifiedUploadEvent.READ_AGAIN):
+                self._start_reading(now_s)
+            elif self._move(VerifiedUploadEvent.READ_UNSTEADY):
+                self._held = Held.UNKNOWN
         elif self._held is Held.FOREIGN:
             self._move(VerifiedUploadEvent.READ_FOREIGN)
         elif restoring:
@@ -394,40 +390,30 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         else:
             self._push_again(now_s)
 
-    def _held_list(self, found: tuple[MissionItem, ...]) -> Held:
-        assert self._old is not None
-        if not self._differences(self._wanted, found):
-            return Held.WANTED
-        if not self._differences(self._old, found):
-            return Held.OLD
-        if is_unfinished_write(found, self._old, self._wanted, self._mission_type, coarse=self._is_coarse):
-            return Held.UNFINISHED
-        return Held.FOREIGN
-
     def _push_again(self, now_s: float) -> None:
         """Send the list once more where that can help, else end with the old list there or put back."""
         assert self._old is not None
         pushed = self._pushed
         assert pushed is not None
         refused = pushed.state is UploadState.REFUSED
-        # ERROR also answers an item that nobody waits for (after a reboot, say): it must come twice. And with several items
-        # under way the refused one is not certain. Serving the items one by one settles both.
-        settled = (
-            refused
-            and pushed.item_is_certain
-            and (pushed.result is not MissionResult.ERROR or _is_same_refusal(pushed, self._pushed_before))
-        )
+        settled = is_settled_refusal(pushed, self._pushed_before)
         if settled:
             self._refusal = pushed
         # Somebody may have set it going meanwhile: the whole old list is driven on, a mix is put right all the same.
         drives_old = self._held is Held.OLD and bool(self._is_active) and not self._replace_active
-        may_push = not settled and not drives_old and self._pushes < MOST_PUSHES
+        is_time = now_s < self._begun_s + _LAST_PUSH_S
+        may_push = not settled and not drives_old and is_time and self._pushes < MOST_PUSHES
         if may_push and self._move(VerifiedUploadEvent.PUSH_AGAIN):
             self._push_wanted(1 if refused else self._window, now_s)
         elif self._held is Held.OLD:
             self._move(VerifiedUploadEvent.READ_OLD)
+        elif not self._may_restore(now_s):
+            self._move(VerifiedUploadEvent.NO_TIME_LEFT)
         elif self._move(VerifiedUploadEvent.READ_UNFINISHED):
             self._restore(now_s)
+
+    def _may_restore(self, now_s: float) -> bool:
+        return self._restores < MOST_RESTORES and now_s < self._limit_s - 2 * _READ_RESERVE_S
 
     def _restore(self, now_s: float) -> None:
         assert self._old is not None
@@ -435,7 +421,7 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         self._start_pushing(self._old, self._window, now_s)
 
     def _restore_again(self, now_s: float) -> None:
-        if self._restores < MOST_RESTORES and self._move(VerifiedUploadEvent.PUSH_AGAIN):
+        if self._may_restore(now_s) and self._move(VerifiedUploadEvent.PUSH_AGAIN):
             self._restore(now_s)
         else:
             self._move(VerifiedUploadEvent.READ_UNFINISHED)
@@ -445,36 +431,26 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
     ) -> tuple[Difference, ...]:
         return differences(wanted, found, self._mission_type, coarse=self._is_coarse)
 
+    def _shortfall(self) -> str:
+        failed = self._failed_read
+        return failed.shortfall if failed and failed.state is DownloadState.TOO_SLOW else ""
+
     def _read_result(self) -> MissionResult | None:
         return self._failed_read.result if self._failed_read else None
 
     def _kind(self) -> OutcomeKind:
         failed = self._failed_read
         if self.state is VerifiedUploadState.NOT_STARTED:
+            if self._is_disturbed:
+                return OutcomeKind.BUSY
             if self._problem or (failed and failed.state is DownloadState.REFUSED):
                 return OutcomeKind.REFUSED
             if failed and failed.state is DownloadState.BUSY:
                 return OutcomeKind.BUSY
             return OutcomeKind.ACTIVE if self._is_active else OutcomeKind.NO_ANSWER
-        if self.state is VerifiedUploadState.UNKNOWN and self._never_wrote():
-            return OutcomeKind.BUSY
         if self.state in (VerifiedUploadState.UNCHANGED, VerifiedUploadState.RESTORED) and self._refusal:
             return OutcomeKind.REFUSED
-        if self.state is VerifiedUploadState.UNCHANGED and self._pushed_to_busy():
+        was_busy = self._pushed is not None and self._pushed.state is UploadState.BUSY
+        if self.state is VerifiedUploadState.UNCHANGED and was_busy:
             return OutcomeKind.BUSY
         return OutcomeKind(self.state.value)
-
-    def _pushed_to_busy(self) -> bool:
-        return self._pushed is not None and self._pushed.state is UploadState.BUSY
-
-    def _never_wrote(self) -> bool:
-        return self._pushed_to_busy() and not self._was_heeded
-
-
-def _is_same_refusal(a: UploadOutcome, b: UploadOutcome | None) -> bool:
-    return b is not None and (a.state, a.result, a.item) == (b.state, b.result, b.item)
-
-
-def _is_armed_in_auto(heartbeat: Heartbeat) -> bool:
-    is_armed = bool(heartbeat.base_mode & ModeFlag.SAFETY_ARMED)
-    return is_armed and heartbeat.custom_mode == ROVER_AUTO_MODE

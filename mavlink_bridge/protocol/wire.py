@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import struct
+from dataclasses import fields
 from typing import TYPE_CHECKING
 
 from mavlink_bridge import messages
@@ -10,7 +12,7 @@ from mavlink_bridge.messages import MissionResult
 from missions.items import CoordinateFrame, MissionItem
 
 if TYPE_CHECKING:
-    from mavlink_bridge.messages import MissionType
+    from mavlink_bridge.messages import Message, MissionType
     from mavlink_bridge.protocol.peer import Peer
 
 INT32_MAX = 2**31 - 1
@@ -64,6 +66,19 @@ def item_from_message(message: messages.MissionItemInt | messages.MissionItem) -
         current=bool(message.current),
         autocontinue=bool(message.autocontinue),
     )
+
+
+def wire_key(message: Message) -> tuple[object, ...]:
+    """Return what tells a message from all others as it goes over the wire: floats as their 32 bits, so that NaN equals itself."""
+    values = ((field, getattr(message, field.name)) for field in fields(message))
+    return (type(message), *(_bits(value) if field.type == "float" else value for field, value in values))
+
+
+def _bits(value: float) -> bytes:
+    try:
+        return struct.pack("<f", value)
+    except OverflowError:
+        return struct.pack("<f", math.copysign(math.inf, value))
 
 
 _RESULTS = {int(result): result for result in MissionResult}

@@ -385,8 +385,8 @@ def test_a_vehicle_that_refuses_or_is_busy(rover, monkeypatch):
     assert (code, document["details"]["result"]) == (6, "UNSUPPORTED")
     results[0] = 14
     monkeypatch.setattr(
-        "mavlink_bridge.protocol.download.Download.__init__.__kwdefaults__",
-        {"window": 100, "rival_patience_s": 0.5, "round_trip": None, "float_form": True},
+        "mavlink_bridge.protocol.undisturbed_read.UndisturbedRead.__init__.__kwdefaults__",
+        {"rival_patience_s": 0.5, "round_trip": None, "most_s": 600.0, "float_form": True},
     )
     code, document, _ = run(rover, "download", "fence", "--json")
     assert (code, document["details"]["result"]) == (6, "DENIED")

@@ -20,6 +20,41 @@ LOITERS = [17, 18, 19]
 COMMANDS = [16, 17, 18, 19, 20, 21, 22, 92, 93, 112, 114, 178, 179, 194, 207, 213]
 
 
+ANY = st.floats(width=32)
+
+
+@given(
+    st.sampled_from([MISSION, FENCE, RALLY]),
+    st.sampled_from([*COMMANDS, 5000, 5001, 5003, 5100, 31000]),
+    st.tuples(ANY, ANY, ANY, ANY),
+    ANY,
+    st.booleans(),
+)
+def test_every_item_is_the_same_as_itself(kind, command, params, alt_m, coarse):
+    def anew():
+        return MissionItem(
+            command, 3, tuple(float(repr(param)) for param in params), 5, 6, float(repr(alt_m))
+        )
+
+    assert is_same_item(anew(), anew(), kind, coarse=coarse)
+    assert differences([anew()] * 2, [anew()] * 2, kind) == ()
+
+
+@pytest.mark.parametrize(
+    ("a_m", "b_m", "is_same"),
+    [
+        (float("inf"), float("inf"), True),
+        (float("-inf"), float("inf"), False),
+        (float("nan"), 5.0, False),
+        (5.0, float("inf"), False),
+    ],
+)
+def test_altitudes_that_are_no_numbers_are_equal_only_to_themselves(a_m, b_m, is_same):
+    item = MissionItem(16, 3, (0.0, float("nan"), 0.0, 0.0), 5, 6)
+    assert is_same_item(replace(item, alt_m=a_m), replace(item, alt_m=b_m), MISSION) is is_same
+    assert is_same_item(replace(item, alt_m=b_m), replace(item, alt_m=a_m), MISSION) is is_same
+
+
 @given(
     st.sampled_from(COMMANDS),
     st.sampled_from([0, 2, 3, 5, 6, 10, 11]),

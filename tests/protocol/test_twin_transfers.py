@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from protocol.campaign import Scenario, scenario_of, transfer
+from protocol.campaign import MOMENTS, RIVALS, Scenario, scenario_of, transfer
 from protocol.twin import PEER, RIVAL, Client, Faults, Twin, Vehicle, plain_fence, plain_mission
 
 from mavlink_bridge.messages import MissionItemInt, MissionType
@@ -190,8 +190,11 @@ def test_rally_points_and_the_home_item_come_back():
 def test_scenarios_differ():
     scenarios = [scenario_of(seed) for seed in range(300)]
     assert all(isinstance(scenario, Scenario) for scenario in scenarios)
-    assert {scenario.rival for scenario in scenarios} == {None, "upload", "half an upload", "download"}
-    assert {scenario.faults.loss for scenario in scenarios} == {0.0, 0.05, 0.1, 0.2, 0.3, 0.4}
+    assert {scenario.rival for scenario in scenarios} == {None, *RIVALS}
+    assert {scenario.rival_begins_in for scenario in scenarios if scenario.rival} == set(MOMENTS)
+    for kind in ("rival_has_our_ids", "is_shared", "odd_items", "breaks_after"):
+        assert 10 < sum(bool(getattr(scenario, kind)) for scenario in scenarios) < 200
+    assert {scenario.faults.loss for scenario in scenarios} == {0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4}
     assert any(scenario.reboots for scenario in scenarios)
 
 

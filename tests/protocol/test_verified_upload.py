@@ -319,7 +319,8 @@ def test_a_rival_that_comes_after_the_backup_is_reported():
     denied = MissionAck(PEER.own_system, PEER.own_component, MissionResult.DENIED, MISSION)
     while not script.machine.is_done and script.now_s < 100.0:
         script.hear(denied, after_s=0.5)
-    assert (script.machine.outcome.kind, script.machine.outcome.held) == (OutcomeKind.BUSY, Held.UNKNOWN)
+    # MISSION_COUNT was sent and the vehicle's word for it may be lost: that nothing was written is not known.
+    assert (script.machine.outcome.kind, script.machine.outcome.held) == (OutcomeKind.UNKNOWN, Held.UNKNOWN)
 
 
 def test_a_vehicle_with_float_positions_is_verified_as_far_as_they_go():

@@ -1,6 +1,7 @@
 """Client machines and the simulated vehicle's mission server on one bad link, in stepped time: no sockets, no clocks.
 
-A client is any protocol machine with a `Peer`; a rival ground station is a second client with other ids. The vehicle takes its input at
+A client is any protocol machine with a `Peer`; a rival ground station is a second client with other ids, or with ours. All hear what the vehicle
+says to any of them; on a shared link they hear each other too. The vehicle takes its input at
 ticks of 20 ms, as the measured autopilot does.
 """
 
@@ -9,7 +10,7 @@ from __future__ import annotations
 import heapq
 import math
 import random
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import count
 
 from mavlink_bridge.messages import (
@@ -19,10 +20,14 @@ from mavlink_bridge.messages import (
     MissionCount,
     MissionItem,
     MissionItemInt,
+    MissionRequest,
+    MissionRequestInt,
     MissionType,
+    MissionWritePartialList,
     Statustext,
 )
 from mavlink_bridge.protocol.peer import Peer
+from mavlink_bridge.protocol.wire import item_to_message
 from mavlink_bridge.simulator.item_lists import FenceList, MissionList, RallyList
 from mavlink_bridge.simulator.mission_server import MissionServer
 from missions.geo import LatLon
@@ -34,7 +39,7 @@ TICK_S = 0.02
 HEARTBEAT_EVERY_S = 1.0
 PEER = Peer(1, 1, 245, 190)
 RIVAL = Peer(1, 1, 255, 190)
-WRITES = (MissionCount, MissionItem, MissionItemInt)
+WRITES = (MissionCount, MissionItem, MissionItemInt, MissionWritePartialList)
 
 
 BYTES = {Statustext: 66, MissionItemInt: 50, MissionItem: 50}
@@ -56,10 +61,11 @@ class Faults:
 
 @dataclass
 class Vehicle:
-    """The vehicle's mission server, its clock ticks, and when it is off."""
+    """The vehicle's mission server, its clock ticks, when it is off, and which items it keeps otherwise than they were sent."""
 
     is_running: bool = False
     off: list[tuple[float, float]] = field(default_factory=list)
+    keeps: dict[int, Item] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.lists = {
@@ -83,6 +89,17 @@ class Vehicle:
         stored = self.lists[mission_type]
         return tuple(stored.read(seq) for seq in range(len(stored)))
 
+    def spoil(self, mission_type: MissionType) -> None:
+        """Keep some items otherwise than they were sent; what is not a number is another object at each read."""
+        stored = self.lists[mission_type]
+        read = stored.read
+
+        def read_anew(seq: int) -> Item | None:
+            item = self.keeps.get(seq, read(seq)) if seq < len(stored) else read(seq)
+            return item and replace(item, params=tuple(float(repr(param)) for param in item.params))
+
+        stored.read = read_anew
+
     def is_off(self, now_s: float) -> bool:
         return any(begin_s <= now_s < end_s for begin_s, end_s in self.off)
 
@@ -95,8 +112,11 @@ class Client:
     peer: Peer
     begins_s: float = 0.0
     sent: list[tuple[float, Message]] = field(default_factory=list)
+    heard: list[tuple[float, float, Frame]] = field(default_factory=list)  # when sent, when it came, and what
     ended_s: float | None = None
     mute_after: int | None = None
+    breaks_after: int | None = None  # messages sent and heard until the link is gone
+    is_broken: bool = False
 
 
 class Twin:
@@ -110,16 +130,21 @@ class Twin:
     seed : int
     store_backup : bool
         Whether a backup that a client hands out is stored at once.
+    is_shared : bool
+        Whether clients hear what others send.
     """
 
-    def __init__(self, vehicle, clients, faults=None, seed=0, store_backup=True):
+    def __init__(self, vehicle, clients, faults=None, seed=0, store_backup=True, is_shared=False):
         self.vehicle = vehicle
         self.clients = clients
         self.faults = faults or Faults()
         self.random = random.Random(seed)
         self.store_backup = store_backup
+        self.is_shared = is_shared
         self.now_s = 0.0
         self.after_vehicle = None
+        self.after_client = None
+        self._sent_at_s = {}
         self._order = count()
         self._events = []
         self._inbox = []
@@ -138,8 +163,13 @@ class Twin:
     def run_until_ended(self, client, limit_s):
         """Run until one client has ended or the limit is reached."""
         self._schedule()
-        while client.ended_s is None and self._step(limit_s):
+        while client.ended_s is None and not client.is_broken and self._step(limit_s):
             pass
+
+    def begin(self, client, at_s):
+        """Let a client that did not begin by itself begin then."""
+        client.begins_s = at_s
+        self._at(at_s, self._begin, client)
 
     def drain(self, for_s=30.0):
         """Let what is still under way arrive, and the vehicle's own timers run out."""
@@ -150,7 +180,8 @@ class Twin:
 
     def _schedule(self):
         for client in self.clients:
-            self._at(client.begins_s, self._begin, client)
+            if client.begins_s < math.inf:
+                self._at(client.begins_s, self._begin, client)
         for reboot_s in self._reboots:
             self._at(reboot_s, self.vehicle.server.reboot)
 
@@ -169,6 +200,7 @@ class Twin:
                 (deadline_s, client)
                 for client in self.clients
                 if client.ended_s is None
+                and not client.is_broken
                 and self.now_s >= client.begins_s
                 and (deadline_s := client.machine.deadline_s) is not None
             ),
@@ -207,9 +239,16 @@ class Twin:
         for message in machine.messages_to_send():
             if client.mute_after is not None and len(client.sent) >= client.mute_after:
                 continue
+            if self._breaks(client):
+                return
             client.sent.append((self.now_s, message))
             frame = Frame(client.peer.own_system, client.peer.own_component, message)
             self._carry(("up", client.peer), self._to_vehicle, frame)
+            if self.is_shared:
+                others = [other for other in self.clients if other is not client]
+                self._carry(("across", client.peer), lambda frame, to=others: self._hear(frame, to), frame)
+        if self.after_client:
+            self.after_client(client)
         if machine.is_done and client.ended_s is None:
             client.ended_s = self.now_s
 
@@ -237,13 +276,27 @@ class Twin:
                 self._carry(("down",), self._to_clients, Frame(1, 1, message))
 
     def _to_clients(self, frame):
-        for client in self.clients:
-            if client.ended_s is None and self.now_s >= client.begins_s:
+        self._hear(frame, self.clients)
+
+    def _hear(self, frame, clients):
+        for client in clients:
+            if client.ended_s is None and not client.is_broken and self.now_s >= client.begins_s:
+                if self._breaks(client):
+                    continue
+                sent_s, _ = self._sent_at_s.get(id(frame), (self.now_s, frame))
+                client.heard.append((sent_s, self.now_s, frame))
                 client.machine.receive(frame, self.now_s)
                 self._from_client(client)
 
+    def _breaks(self, client):
+        """Break the link at the message that is the last; give whether it is broken."""
+        if client.breaks_after is not None and len(client.sent) + len(client.heard) >= client.breaks_after:
+            client.is_broken = True
+        return client.is_broken
+
     def _carry(self, direction, deliver, frame):
         faults = self.faults
+        self._sent_at_s[id(frame)] = (self.now_s, frame)
         copies = 1 + (self.random.random() < faults.duplicates)
         for _ in range(copies):
             if self.random.random() < faults.loss:
@@ -268,6 +321,75 @@ class Twin:
             return None
         self._free_s[way] = begins_s + size / faults.bytes_per_s
         return self._free_s[way]
+
+
+class PartialWriter:
+    """A rival that replaces one item of the vehicle's list, as Mission Planner does, once or again and again.
+
+    Parameters
+    ----------
+    peer : Peer
+        The vehicle and its identity.
+    mission_type : MissionType
+    seq : int
+        Which item.
+    items : list of Item
+        What is written there, one after the other.
+    every_s : float
+        How long after the last write was begun.
+    is_blind : bool
+        Whether the item is sent at once, without waiting to be asked.
+    """
+
+    pending_backup = None
+    progress = (0, 0)
+
+    def __init__(self, peer, mission_type, seq, items, every_s=2.0, is_blind=False):
+        self._peer, self._type, self._seq = peer, mission_type, seq
+        self._items = iter(items)
+        self._item = None
+        self._every_s, self._is_blind = every_s, is_blind
+        self._next_s = math.inf
+        self._outgoing = []
+
+    @property
+    def deadline_s(self):
+        return self._next_s
+
+    @property
+    def is_done(self):
+        return False
+
+    def start(self, now_s):
+        self._next_s = now_s
+        self.handle_timer(now_s)
+
+    def receive(self, frame, now_s):
+        message = frame.message
+        is_asked = isinstance(message, MissionRequest | MissionRequestInt) and self._item is not None
+        if is_asked and self._peer.accepts(frame, self._type) and message.seq == self._seq:
+            self._send_item()
+
+    def handle_timer(self, now_s):
+        if now_s < self._next_s:
+            return
+        self._next_s = now_s + self._every_s
+        self._item = next(self._items, None)
+        if self._item is None:
+            self._next_s = math.inf
+            return
+        peer = self._peer
+        part = MissionWritePartialList(peer.system, peer.component, self._seq, self._seq, int(self._type))
+        self._outgoing.append(part)
+        if self._is_blind:
+            self._send_item()
+
+    def _send_item(self):
+        self._outgoing.append(item_to_message(self._item, self._seq, self._peer, self._type))
+
+    def messages_to_send(self):
+        outgoing, self._outgoing = self._outgoing, []
+        return outgoing
 
 
 def plain_mission(length, salt=0):

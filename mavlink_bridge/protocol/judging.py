@@ -1,0 +1,56 @@
+"""What a safe upload concludes from what it read and was answered: pure functions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from mavlink_bridge.messages import MissionResult, ModeFlag
+from mavlink_bridge.protocol.stored_form import differences, is_unfinished_write
+from mavlink_bridge.protocol.transitions import UploadState
+from mavlink_bridge.protocol.verified_outcome import Held
+from mavlink_bridge.rover import AUTO_MODE
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from mavlink_bridge.messages import Heartbeat, MissionType
+    from mavlink_bridge.protocol.upload import UploadOutcome
+    from missions.items import MissionItem
+
+
+def held_list(
+    found: Sequence[MissionItem],
+    wanted: Sequence[MissionItem],
+    old: Sequence[MissionItem],
+    mission_type: MissionType,
+    *,
+    coarse: bool,
+) -> Held:
+    """Return which list was found: the wanted one, the old one, our unfinished write of one over the other, or a foreign one."""
+    if not differences(wanted, found, mission_type, coarse=coarse):
+        return Held.WANTED
+    if not differences(old, found, mission_type, coarse=coarse):
+        return Held.OLD
+    if is_unfinished_write(found, old, wanted, mission_type, coarse=coarse):
+        return Held.UNFINISHED
+    return Held.FOREIGN
+
+
+def is_settled_refusal(pushed: UploadOutcome, before: UploadOutcome | None) -> bool:
+    """Return whether the vehicle surely refuses the list, so that there is no use in sending it again.
+
+    ERROR also answers an item that nobody waits for (after a reboot, say): it must come twice. And with several items under way the refused one is
+    not certain. Serving the items one by one settles both.
+    """
+    if pushed.state is not UploadState.REFUSED or not pushed.item_is_certain:
+        return False
+    return pushed.result is not MissionResult.ERROR or _is_same(pushed, before)
+
+
+def _is_same(a: UploadOutcome, b: UploadOutcome | None) -> bool:
+    return b is not None and (a.state, a.result, a.item) == (b.state, b.result, b.item)
+
+
+def is_armed_in_auto(heartbeat: Heartbeat) -> bool:
+    """Return whether a rover's heartbeat says that it is armed and drives its mission."""
+    return bool(heartbeat.base_mode & ModeFlag.SAFETY_ARMED) and heartbeat.custom_mode == AUTO_MODE

@@ -77,6 +77,18 @@ _DIALECT_CLASSES: dict[str, Any] = {
 }
 
 
+_WITH_ARRAYS = frozenset(
+    name
+    for name, cls in _DIALECT_CLASSES.items()
+    if any(
+        cls.array_lengths[cls.ordered_fieldnames.index(field)]
+        and cls.fieldtypes[cls.fieldnames.index(field)] != "char"
+        for field in _FIELDS[name]
+    )
+)
+"""Messages with lists of numbers, which are tuples in ours."""
+
+
 class Codec:
     """One direction-less end of a MAVLink link: its own sequence counter and receive buffer.
 
@@ -159,6 +171,8 @@ def to_frame(raw: Any) -> Frame | None:  # noqa: ANN401 - pymavlink ships no typ
         values = [*(getattr(raw, field) for field in raw.fieldnames), *_ids_in(raw)]
     else:
         values = [getattr(raw, field) for field in _FIELDS[name]]
+    if name in _WITH_ARRAYS:
+        values = [tuple(value) if isinstance(value, list) else value for value in values]
     return Frame(raw.get_srcSystem(), raw.get_srcComponent(), message_class(*values))
 
 

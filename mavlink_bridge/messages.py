@@ -89,11 +89,13 @@ class Capability(IntFlag):
     PARAM_FLOAT = 2
     MISSION_INT = 4
     COMMAND_INT = 8
+    PARAM_ENCODE_BYTEWISE = 16
     FTP = 32
     SET_POSITION_TARGET_GLOBAL_INT = 256
     MAVLINK2 = 8192
     MISSION_FENCE = 16384
     MISSION_RALLY = 32768
+    PARAM_ENCODE_C_CAST = 131072
 
 
 @dataclass(frozen=True, slots=True)
@@ -455,10 +457,20 @@ class PositionTargetGlobalInt(Message):
 
 @dataclass(frozen=True, slots=True)
 class AutopilotVersion(Message):
-    """AUTOPILOT_VERSION (148), its capability bits and firmware version."""
+    """AUTOPILOT_VERSION (148); a version is major, minor, patch and type, a byte each from the top, and ids of 0 are not told."""
 
     capabilities: int
     flight_sw_version: int = 0
+    middleware_sw_version: int = 0
+    os_sw_version: int = 0
+    board_version: int = 0
+    flight_custom_version: tuple[int, ...] = (0,) * 8
+    middleware_custom_version: tuple[int, ...] = (0,) * 8
+    os_custom_version: tuple[int, ...] = (0,) * 8
+    vendor_id: int = 0
+    product_id: int = 0
+    uid: int = 0
+    uid2: tuple[int, ...] = (0,) * 18
 
 
 @dataclass(frozen=True, slots=True)

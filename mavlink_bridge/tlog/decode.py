@@ -88,10 +88,14 @@ def _text(text: bytes) -> str:
 
 def _values(layout: Layout, rows: NDArray[np.void]) -> list[list[Any]]:
     names = layout.dtype.names or ()
-    return [
-        texts(rows[name]) if is_text else rows[name].tolist()
-        for name, is_text in zip(names, layout.texts, strict=True)
-    ]
+    return [_column(rows[name], is_text=is_text) for name, is_text in zip(names, layout.texts, strict=True)]
+
+
+def _column(column: NDArray[Any], *, is_text: bool) -> list[Any]:
+    """Return a field's values; where each is a list of numbers, as tuples."""
+    if is_text:
+        return texts(column)
+    return column.tolist() if column.ndim == 1 else list(map(tuple, column.tolist()))
 
 
 def _by_id(ids: NDArray[np.uint32]) -> Iterator[tuple[int, NDArray[np.int64]]]:

@@ -70,9 +70,15 @@ def _base_bytes(cls: Any, formats: dict[str, str]) -> int:  # noqa: ANN401 - pym
 def _layout(message_class: type[Message], cls: Any, formats: dict[str, str]) -> Layout:  # noqa: ANN401
     offsets = _offsets(formats)
     names = [field.name for field in fields(message_class)]
-    kinds = ["S" + formats[name][:-1] if formats[name][-1] == "s" else "<" + formats[name] for name in names]
+    kinds = [_kind(formats[name]) for name in names]
     dtype = np.dtype({"names": names, "formats": kinds, "offsets": [offsets[name] for name in names]})
     return Layout(cls.id, dtype, tuple(formats[name][-1] == "s" for name in names))
+
+
+def _kind(code: str) -> str:
+    """Return numpy's name for a field of a struct format: a text, a number, or a list of numbers."""
+    length, letter = code[:-1], code[-1]
+    return f"S{length}" if letter == "s" else f"{length}<{letter}"
 
 
 def _offsets(formats: dict[str, str]) -> dict[str, int]:

@@ -533,6 +533,7 @@ def test_no_message_from_anyone_breaks_it(data):
     whole = st.integers(-(2**31), 2**31 - 1)
     real = st.floats(width=32)
     kinds = {"int": st.one_of(small, whole), "float": real, "str": st.text(max_size=16)}
+    kinds["tuple[int, ...]"] = st.lists(small, max_size=18).map(tuple)
     for _ in range(data.draw(st.integers(1, 12))):
         message_class = data.draw(st.sampled_from(sorted(m.MESSAGES.values(), key=lambda c: c.__name__)))
         values = [data.draw(kinds[str(kind)]) for kind in message_class.__annotations__.values()]

@@ -29,6 +29,8 @@ def values(message_class: type[Message], name: str) -> st.SearchStrategy:
     if kind == "char":
         length = wire.array_lengths[wire.ordered_fieldnames.index(name)]
         return st.text(st.characters(codec="ascii", exclude_characters="\0"), max_size=length)
+    if length := wire.array_lengths[wire.ordered_fieldnames.index(name)]:
+        return st.tuples(*[st.integers(*RANGES[kind])] * length)
     return st.integers(*RANGES[kind])
 
 

@@ -102,4 +102,7 @@ def test_columns_hold_what_the_entries_hold(name):
     assert columns["system"].tolist() == [entry.frame.system for entry in entries]
     assert columns["component"].tolist() == [entry.frame.component for entry in entries]
     for field in message_class.__slots__:
-        assert columns[field].tolist() == [getattr(entry.frame.message, field) for entry in entries]
+        values = [getattr(entry.frame.message, field) for entry in entries]
+        assert columns[field].tolist() == [
+            list(value) if isinstance(value, tuple) else value for value in values
+        ]

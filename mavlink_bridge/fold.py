@@ -6,11 +6,14 @@ read-backs) and takes what others send to it as requests.
 
 from __future__ import annotations
 
+import math
+import re
 from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from mavlink_bridge import messages as m
+from mavlink_bridge.parameter_values import parameter_value
 from mavlink_bridge.protocol.wire import item_from_message, mission_result
 from mavlink_bridge.vehicles import is_vehicle
 from missions.errors import FenceError, InvalidPositionError
@@ -45,6 +48,7 @@ _GLOBAL_FRAMES = frozenset(
 _IGNORE_X_OR_Y = 0b11
 _GUIDED_TARGET, _GUIDED_ALTITUDE = 2, 3
 _HEADING_UNKNOWN = 65535
+_BANNER = re.compile(r"(?:ArduRover|APMrover2|Rover) V(\d{1,2})\.(\d{1,2})(?:\.(\d{1,2}))?")
 
 
 def fold(situation: Situation, frame: Frame, time_s: float) -> Situation:
@@ -84,10 +88,9 @@ def _heartbeat(situation: Situation, frame: Frame, _time_s: float) -> Situation:
     if not is_vehicle(heartbeat):
         return situation
     return replace(
-        situation,
+        with_autopilot(situation, heartbeat.autopilot),
         component=frame.component,
         vehicle_type=heartbeat.type,
-        ardupilot=heartbeat.autopilot == m.Autopilot.ARDUPILOTMEGA,
         mode=heartbeat.custom_mode,
         armed=bool(heartbeat.base_mode & m.ModeFlag.SAFETY_ARMED),
     )
@@ -97,10 +100,62 @@ def _param_value(situation: Situation, frame: Frame, _time_s: float) -> Situatio
     """Take a parameter; ground stations write those they fetched by MAVFTP under components of their own."""
     message = frame.message
     assert isinstance(message, m.ParamValue)
-    if situation.parameters.get(message.param_id) == message.param_value:
+    return with_parameter(
+        situation, message.param_id, parameter_value(message, bytewise=bool(situation.bytewise))
+    )
+
+
+def with_parameter(situation: Situation, name: str, value: float) -> Situation:
+    """Return the situation with a parameter that was told.
+
+    What is no number is none of the vehicle's parameters: what was known before stands, and what came is noted.
+    """
+    if not math.isfinite(value):
+        if situation.no_numbers.get(name) == str(value):
+            return situation
+        return replace(situation, no_numbers=MappingProxyType({**situation.no_numbers, name: str(value)}))
+    if situation.parameters.get(name) == value and name not in situation.no_numbers:
         return situation
-    parameters = {**situation.parameters, message.param_id: message.param_value}
-    return replace(situation, parameters=MappingProxyType(parameters))
+    return replace(
+        situation,
+        parameters=MappingProxyType({**situation.parameters, name: value}),
+        no_numbers=MappingProxyType({key: came for key, came in situation.no_numbers.items() if key != name}),
+    )
+
+
+def with_autopilot(situation: Situation, autopilot: int) -> Situation:
+    """Return the situation with what a HEARTBEAT's MAV_AUTOPILOT tells: whose it is, and how that one encodes parameters.
+
+    ArduPilot always casts whole numbers and PX4 never does, whatever their AUTOPILOT_VERSION says; of others that one counts.
+    """
+    ardupilot = autopilot == m.Autopilot.ARDUPILOTMEGA
+    bytewise = situation.bytewise
+    if autopilot in (m.Autopilot.ARDUPILOTMEGA, m.Autopilot.PX4):
+        bytewise = autopilot == m.Autopilot.PX4
+    if (ardupilot, bytewise) == (situation.ardupilot, situation.bytewise):
+        return situation
+    return replace(situation, ardupilot=ardupilot, bytewise=bytewise)
+
+
+def _autopilot_version(situation: Situation, frame: Frame, _time_s: float) -> Situation:
+    message = frame.message
+    assert isinstance(message, m.AutopilotVersion)
+    bytewise = situation.bytewise
+    if bytewise is None:
+        bytewise = bool(message.capabilities & m.Capability.PARAM_ENCODE_BYTEWISE)
+    version = message.flight_sw_version
+    firmware = (version >> 24 & 255, version >> 16 & 255, version >> 8 & 255) if version else None
+    return replace(situation, bytewise=bytewise, firmware=firmware or situation.firmware)
+
+
+def _text(situation: Situation, frame: Frame, _time_s: float) -> Situation:
+    """Take ArduPilot's version from its banner, "ArduRover V4.5.7 (0358a9c2)"."""
+    message = frame.message
+    assert isinstance(message, m.Statustext)
+    found = _BANNER.match(message.text)
+    if found is None:
+        return situation
+    return replace(situation, firmware=(int(found[1]), int(found[2]), int(found[3] or 0)))
 
 
 def _global_position(situation: Situation, frame: Frame, time_s: float) -> Situation:
@@ -234,6 +289,8 @@ def _position_target(situation: Situation, message: Message, time_s: float) -> S
 _TOLD: dict[type[Message], Callable[[Situation, Frame, float], Situation]] = {
     m.Heartbeat: _heartbeat,
     m.ParamValue: _param_value,
+    m.AutopilotVersion: _autopilot_version,
+    m.Statustext: _text,
     m.GlobalPositionInt: _global_position,
     m.GpsRawInt: _gps_raw,
     m.HomePosition: _home_position,

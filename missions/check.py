@@ -22,8 +22,10 @@ from missions.known_fence import fence_warnings, known_fence
 from missions.local_frame import LocalPoint
 from missions.mission_end import crossed_zones, end_warnings, return_place, return_warnings
 from missions.plan import Plan, drawn_leg, ground_for
+from missions.remarks import parameter_remarks
 from missions.request import Request
 from missions.situation import Known
+from missions.vehicle import real_number
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -195,7 +197,13 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
     heading_deg = pose.heading_deg if pose and pose.position == start else None
     forecast = _forecast(course, ground, vehicle, heading_deg)
     legs = _checked_legs(course, ground, forecast, asked.required_m)
-    warnings = [*fence_warnings(vehicle, situation), *ground.warnings, *asked.warnings, *course.notes]
+    warnings = [
+        *parameter_remarks(situation),
+        *fence_warnings(vehicle, situation),
+        *ground.warnings,
+        *asked.warnings,
+        *course.notes,
+    ]
     warnings += _start_warnings(start, heading_deg, legs[0], asked.required_m)
     warnings += _drive_warnings(vehicle, forecast, course)
     warnings += return_warnings(situation, vehicle, ground, path)
@@ -253,8 +261,8 @@ def _course(
         start,
         home=home,
         return_to=partial(return_place, situation),
-        return_speed_mps=situation.parameters.get("RTL_SPEED") or None,
-        circle_m=situation.parameters.get("CIRC_RADIUS", CIRCLE_M),
+        return_speed_mps=real_number(situation.parameters, "RTL_SPEED", 0.0) or None,
+        circle_m=real_number(situation.parameters, "CIRC_RADIUS", CIRCLE_M),
         own_speed_mps=vehicle.speed_mps,
     )
     if not course.legs:

@@ -65,7 +65,9 @@ def known_vehicle(situation: Situation, request: Request) -> Vehicle:
     VehicleError
         A parameter or the speed cannot be used.
     """
-    vehicle = vehicle_from_parameters(situation.parameters, mav_type=situation.vehicle_type)
+    vehicle = vehicle_from_parameters(
+        situation.parameters, mav_type=situation.vehicle_type, firmware=situation.firmware
+    )
     if request.speed_mps is None:
         return vehicle
     if not 0 < request.speed_mps < float("inf"):

@@ -25,7 +25,7 @@ from missions.lines import (
     path_length_m,
 )
 from missions.planned import Plan
-from missions.remarks import drive_remarks, lead_away_remarks, moved_target_remarks
+from missions.remarks import drive_remarks, lead_away_remarks, moved_target_remarks, parameter_remarks
 from missions.surroundings import MAX_FIELD_M, ground_for, heading_at, route_ends
 from missions.uniform_route import uniform_route
 
@@ -75,7 +75,12 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
     start, targets = route_ends(situation, request)
     ground = ground_for(situation, vehicle, (start, *targets))
     asked = promise(situation, request, vehicle)
-    warnings = [*fence_warnings(vehicle, situation), *ground.warnings, *asked.warnings]
+    warnings = [
+        *parameter_remarks(situation),
+        *fence_warnings(vehicle, situation),
+        *ground.warnings,
+        *asked.warnings,
+    ]
 
     heading_deg = heading_at(situation, start)
     ends = [ground.frame.to_local(position) for position in (start, *targets)]

@@ -6,14 +6,16 @@ from typing import TYPE_CHECKING
 
 from missions.drive_model import beyond_measured
 from missions.geo import distance_m
+from missions.item_limit import storage_remarks
 from missions.lines import ROUNDING_RESERVE_M
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from missions.clearance import Promise
     from missions.driven_route import DrivenRoute
     from missions.geo import LatLon
+    from missions.situation import Situation
     from missions.vehicle import Vehicle
 
 
@@ -32,6 +34,28 @@ _DRIVEN_BY = frozenset(
     }
 )
 """Parameters whose defaults a driver should see when they stand in for the vehicle's own."""
+
+
+_MOST_NAMED = 5
+
+
+def parameter_remarks(situation: Situation) -> list[str]:
+    """Return what the vehicle told of its parameters that cannot be."""
+    return [
+        *no_number_remarks(situation.no_numbers, situation.parameters),
+        *storage_remarks(situation.parameters),
+    ]
+
+
+def no_number_remarks(no_numbers: Mapping[str, str], parameters: Mapping[str, float]) -> list[str]:
+    """Return which parameters came as no number, and what counts in their place."""
+    remarks = [
+        f"{name} came as {came}, which is no number: "
+        + (f"it stays at {parameters[name]:g}, as it was told before" if name in parameters else "not known")
+        for name, came in no_numbers.items()
+    ]
+    more = len(remarks) - _MOST_NAMED
+    return [*remarks[:_MOST_NAMED], f"and {more} more parameters"] if more > 0 else remarks
 
 
 def lead_away_remarks(found: DrivenRoute, least_m: float) -> list[str]:

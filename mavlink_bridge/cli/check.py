@@ -35,7 +35,7 @@ from mavlink_bridge.cli.vehicle_options import (
     with_home_option,
     with_vehicle,
 )
-from mavlink_bridge.errors import LinkError, UsageError
+from mavlink_bridge.errors import LinkError, LogError, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -131,8 +131,11 @@ def check(
     unknown: list[str] = []
     if log is not None:
         from mavlink_bridge.recorded import situation_from_log  # noqa: PLC0415 - pymavlink only where needed
+        from mavlink_bridge.vehicles import not_ardupilot  # noqa: PLC0415
 
         situation = situation_from_log(log, system, any_vehicle=any_vehicle)
+        if situation.ardupilot is False:  # how another autopilot drives its items was not measured
+            raise LogError(f"{log}: {not_ardupilot(situation.system, None)}", file=str(log))
     elif connect is not None:
         from mavlink_bridge.cli.session import Address as At  # noqa: PLC0415 - only with a link
 

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from mavlink_bridge.errors import LinkError, OutcomeError, RefusedError
 from mavlink_bridge.link import open_link
-from mavlink_bridge.messages import Autopilot, CommandLong, Heartbeat, ModeFlag, RequestDataStream
+from mavlink_bridge.messages import CommandLong, Heartbeat, ModeFlag, RequestDataStream
 from mavlink_bridge.protocol.command import SendCommand
 from mavlink_bridge.protocol.find import FindVehicle
 from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.rover import AUTO_MODE, MODE_NAMES
+from mavlink_bridge.vehicles import not_ardupilot
 from missions.items import Command
 
 if TYPE_CHECKING:
@@ -80,7 +81,7 @@ class Session:
     Raises
     ------
     LinkError
-        The vehicle is not there.
+        The vehicle is not there, or its autopilot is not ArduPilot.
     """
 
     def __init__(self, link: Link, address: Address, show: Callable[[str, int, int], None]) -> None:
@@ -97,17 +98,16 @@ class Session:
             raise self._with_signing_hint(finder.trouble)
         self.peer = Peer(finder.vehicle.system, finder.vehicle.component, *link.identity)
         self._heartbeat, self._heartbeat_s = finder.heartbeat, time.monotonic()
+        if finder.heartbeat is not None and (
+            other := not_ardupilot(finder.vehicle.system, finder.heartbeat.autopilot)
+        ):
+            raise other
 
     @property
     def vehicle(self) -> Peer:
         """The vehicle that was found."""
         assert self.peer is not None
         return self.peer
-
-    @property
-    def is_ardupilot(self) -> bool:
-        """Whether its autopilot is ArduPilot."""
-        return self._heartbeat is not None and self._heartbeat.autopilot == Autopilot.ARDUPILOTMEGA
 
     @property
     def is_active(self) -> bool | None:

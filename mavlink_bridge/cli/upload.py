@@ -143,8 +143,6 @@ def upload(
             lists = _interrupted_lists(store, session.vehicle.system)
         elif not restore:
             warn(interrupted_warnings(store, session.vehicle.system))
-        if not session.is_ardupilot:
-            raise UsageError("the vehicle's autopilot is not ArduPilot: what it stores could not be verified")
         _make_ready(session, wish)
         limits = _limits(session, lists)
         for mission_type, items in lists:
@@ -337,7 +335,8 @@ def _upload_parameters(
         )
     changed: dict[str, tuple[float | None, float]] = {}
     for name, value in wanted.items():
-        if _is_same(read.values[name], value):
+        old = read.values.get(name)  # None where the vehicle holds no number
+        if old is not None and _is_same(old, value):
             continue
         setting = SetParameter(session.vehicle, name, value)
         session.run(setting, f"setting {name}")
@@ -352,7 +351,7 @@ def _upload_parameters(
                 found=outcome.value,
                 changed=list(changed),
             )
-        changed[name] = (read.values[name], value)
+        changed[name] = (old, value)
     return changed
 
 
@@ -396,6 +395,6 @@ def _report(
         if entry.backup:
             typer.echo(f"  the list before is kept in {entry.backup}")
     for name, (old, new) in changed.items():
-        typer.echo(f"{name}: {old:g} -> {new:g}, confirmed")
+        typer.echo(f"{name}: {'no number' if old is None else f'{old:g}'} -> {new:g}, confirmed")
     if not done and not changed:
         typer.echo("all parameters have these values already")

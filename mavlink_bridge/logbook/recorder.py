@@ -285,7 +285,9 @@ class Recorder:
         self._meter = None
         situation = self.situation
         try:
-            self._vehicle = vehicle_from_parameters(situation.parameters, mav_type=situation.vehicle_type)
+            self._vehicle = vehicle_from_parameters(
+                situation.parameters, mav_type=situation.vehicle_type, firmware=situation.firmware
+            )
             if situation.fence is not None and situation.fence.value.zones:
                 self._meter = FenceMeter(ground_for(situation, self._with_known_circle(self._vehicle), ()))
         except MissionError as error:

@@ -487,6 +487,8 @@ by_name = {
     "frame": st.integers(0, 12), "coordinate_frame": st.integers(0, 12),
     "command": st.sampled_from([16, 17, 20, 192, 202, 5000, 5001, 5002, 5003, 5004, 5100, 65535]),
     "current": small, "autocontinue": small, "param1": floats | st.sampled_from([3.0, 4.0]),
+    "text": st.text(max_size=50) | st.from_regex(r"ArduRover V[0-9]{1,3}\.[0-9]{1,3}", fullmatch=True),
+    "capabilities": st.integers(0, 2**64 - 1), "flight_sw_version": st.integers(0, 2**32 - 1),
     "param_id": st.text(max_size=16), "autopilot": st.sampled_from([0, 3, 8, 12]), "type_mask": st.sampled_from([0, 1, 0xFFFF]),
     "base_mode": st.integers(0, 255), "custom_mode": st.integers(0, 2**32 - 1), "hdg": st.integers(0, 65535),
 }  # fmt: skip

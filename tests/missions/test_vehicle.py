@@ -30,6 +30,7 @@ KNOWN = {
     "FENCE_OPTIONS": 3,
     "FENCE_ACTION": 2,
     "AVOID_ENABLE": 1,
+    "AVOID_BACKUP_SPD": 0.0,
     "OA_TYPE": 2,
     **ACKERMANN,
 }
@@ -51,6 +52,7 @@ def test_a_vehicle_whose_parameters_are_all_known() -> None:
         fence=FenceParameters(enabled=True, type_bits=4, margin_m=1.0, radius_m=150.0, union=True, action=2),
         avoid_bits=1,
         oa_type=2,
+        backs_away=False,
         assumed=(),
         mav_type=10,
     )
@@ -112,7 +114,7 @@ def test_zero_means_what_it_means_to_ardupilot(
     ],
 )
 def test_steering_from_the_outputs(functions: dict[str, float], steering: Steering) -> None:
-    vehicle = vehicle_from_parameters(functions)
+    vehicle = vehicle_from_parameters({"WP_PIVOT_ANGLE": 60, **functions})
     assert vehicle.steering is steering
     assert vehicle.can_pivot is (steering is Steering.SKID)
 
@@ -124,9 +126,9 @@ def test_no_pivot_angle_no_pivots() -> None:
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        ({"WP_RADIUS": -1.0}, "WP_RADIUS is -1; it cannot be below 0"),
+        ({"WP_RADIUS": -1.0}, "WP_RADIUS is -1; possible are 0 to 1000"),
         ({"WP_SPEED": math.nan}, "WP_SPEED is nan, which is no number"),
-        ({"PSC_POS_P": 0.0}, "PSC_POS_P is 0; it cannot be below 0.01"),
+        ({"PSC_POS_P": 0.0}, "PSC_POS_P is 0; possible are 0.01 to 100"),
         ({"WP_SPEED": 0.0, "CRUISE_SPEED": 0.0}, "would not move"),
         ({"RA_MAX_STR_ANG": 1.6}, "RA_MAX_STR_ANG is 1.6 rad"),
         ({"RA_MAX_STR_ANG": math.inf}, "RA_MAX_STR_ANG is inf"),

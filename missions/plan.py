@@ -10,7 +10,7 @@ import numpy as np
 from missions.avoidance import with_avoidance
 from missions.clearance import known_vehicle, promise
 from missions.drive_model import envelope
-from missions.errors import PlanCheckError
+from missions.errors import PlanCheckError, RouteError, StartBlockedError
 from missions.fitted_route import FittedRoute
 from missions.geo import bearing_deg, rounded
 from missions.known_fence import fence_warnings, known_fence
@@ -26,6 +26,8 @@ from missions.lines import (
 )
 from missions.planned import Plan
 from missions.remarks import drive_remarks, lead_away_remarks, moved_target_remarks, parameter_remarks
+from missions.seams import explained, with_seams
+from missions.start_hazard import start_hazard
 from missions.surroundings import MAX_FIELD_M, ground_for, heading_at, route_ends
 from missions.uniform_route import uniform_route
 
@@ -73,7 +75,8 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
     fence = known_fence(situation)
     vehicle = known_vehicle(situation, request)
     start, targets = route_ends(situation, request)
-    ground = ground_for(situation, vehicle, (start, *targets))
+    plain = ground_for(situation, vehicle, (start, *targets))
+    ground = with_seams(plain, vehicle)
     asked = promise(situation, request, vehicle)
     warnings = [
         *parameter_remarks(situation),
@@ -84,10 +87,17 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
 
     heading_deg = heading_at(situation, start)
     ends = [ground.frame.to_local(position) for position in (start, *targets)]
-    if asked.allowance_m is None:
-        asked, found = FittedRoute(ground, ends, request, vehicle, heading_deg, should_stop).find(asked)
-    else:
-        asked, found = uniform_route(ground, ends, asked, request, should_stop)
+    hazard = start_hazard(plain, ends[0], vehicle)
+    if isinstance(hazard, StartBlockedError):
+        raise hazard
+    warnings += [hazard] if hazard else []
+    try:
+        if asked.allowance_m is None:
+            asked, found = FittedRoute(ground, ends, request, vehicle, heading_deg, should_stop).find(asked)
+        else:
+            asked, found = uniform_route(ground, ends, asked, request, should_stop)
+    except RouteError as error:
+        raise explained(error, vehicle) from None
     lines = finished(ground, found.drawing, found.lead_away)
     reached = tuple(map(rounded, ground.frame.to_lat_lons(np.array(found.targets))))
     least_m = asked.required_m + (asked.allowance_m or 0.0)

@@ -306,6 +306,8 @@ def _report(checked: MissionCheck, plots: list[Path]) -> None:
             typer.echo(f"Wrote {path}")
     for trouble in checked.troubles:
         typer.secho(f"not understood: {trouble}", fg=typer.colors.RED)
+    for danger in checked.dangers:
+        typer.secho(f"DANGER: {danger}", fg=typer.colors.RED)
     for leg in checked.broken:
         typer.secho(f"BREAKS: {_sentence(leg)}", fg=typer.colors.RED)
     if checked.holds:
@@ -329,6 +331,8 @@ def _metres(value_m: float) -> str:
 
 
 def _sentence(leg: CheckedLeg) -> str:
+    if leg.stops_at_seam:
+        return f"leg {leg.name} crosses {', '.join(leg.crosses)}: the vehicle stops at {leg.at}"
     if leg.crosses:
         return f"leg {leg.name} crosses {', '.join(leg.crosses)}, first at {leg.at}"
     return (
@@ -355,6 +359,7 @@ def _document(
         "broken": len(checked.broken),
         "legs": [_leg_document(leg) for leg in checked.legs],
         "not_understood": list(checked.troubles),
+        "dangers": list(checked.dangers),
         "outputs": [str(path) for path in plots],
         "warnings": warnings,
     }

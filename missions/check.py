@@ -448,7 +448,9 @@ def _drive_warnings(vehicle: Vehicle, forecast: Envelope, course: Course) -> lis
         for corner in forecast.corners
         if not corner.bounded
     ]
-    warnings += beyond_measured(vehicle)
+    warnings += beyond_measured(
+        vehicle, min((leg.speed_mps for leg in course.legs if leg.speed_mps), default=None)
+    )
     assumed = [f"{one.parameter} {one.value:g}" for one in vehicle.assumed if one.parameter in _DRIVING]
     if assumed:
         warnings.append(f"not known of the vehicle, so these defaults count: {', '.join(assumed)}")

@@ -68,8 +68,12 @@ def known_vehicle(situation: Situation, request: Request) -> Vehicle:
     VehicleError
         A parameter or the speed cannot be used.
     """
+    # What the vehicle told, but as no number, must not be taken for what it did not tell: a default in its place would be a guess.
+    no_numbers = {name: float(came) for name, came in situation.no_numbers.items()}
     vehicle = vehicle_from_parameters(
-        situation.parameters, mav_type=situation.vehicle_type, firmware=situation.firmware
+        {**no_numbers, **situation.parameters},
+        mav_type=situation.vehicle_type,
+        firmware=situation.firmware,
     )
     if request.speed_mps is None:
         return vehicle

@@ -134,7 +134,14 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
                     *warnings,
                     *lead_away_remarks(found, least_m),
                     *moved_target_remarks(targets, reached),
-                    *drive_remarks(vehicle, heading_deg, asked, driven_m, found),
+                    *drive_remarks(
+                        vehicle,
+                        min(filter(None, lines.speeds), default=None),
+                        heading_deg,
+                        asked,
+                        driven_m,
+                        found,
+                    ),
                 ]
             )
         ),

@@ -86,12 +86,17 @@ def moved_target_remarks(targets: Sequence[LatLon], reached: Sequence[LatLon]) -
 
 
 def drive_remarks(
-    vehicle: Vehicle, heading_deg: float | None, asked: Promise, driven_m: float, found: DrivenRoute
+    vehicle: Vehicle,
+    slowest_mps: float | None,
+    heading_deg: float | None,
+    asked: Promise,
+    driven_m: float,
+    found: DrivenRoute,
 ) -> list[str]:
-    """Say what the drive model's word rests on."""
+    """Return what the drive model's word rests on."""
     if asked.allowance_m == 0:
         return []
-    warnings = list(beyond_measured(vehicle))
+    warnings = list(beyond_measured(vehicle, slowest_mps))
     if heading_deg is None:
         warnings.append("the vehicle's heading is not told: it is taken to face along the first leg")
     assumed = [f"{one.parameter} {one.value:g}" for one in vehicle.assumed if one.parameter in _DRIVEN_BY]

@@ -29,6 +29,7 @@ from missions.errors import MissionError
 from missions.geo import distance_m
 from missions.local_frame import MAX_LATITUDE_DEG, frame_around
 from missions.plan import ground_for
+from missions.remarks import no_number_remarks
 from missions.vehicle import PARAMETER_NAMES, Vehicle, vehicle_from_parameters
 
 if TYPE_CHECKING:
@@ -113,6 +114,8 @@ class Recorder:
         if self._modes:
             self._modes[-1] = replace(self._modes[-1], ended_s=now_s)
         situation = self.situation
+        for text in no_number_remarks(situation.no_numbers, situation.parameters):
+            self._note(text)
         if self._nearest is None and not self._fences:
             self._note("no clearance: no fence was transferred")
         return VehicleLog(

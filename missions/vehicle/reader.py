@@ -80,6 +80,5 @@ class ParameterReader:
 
     def bits(self, name: str, default: int) -> int:
         """Return the parameter as a whole number, or the default and a note of it."""
-        if name not in self.parameters:
-            self.assumed.append(Assumed(name, default))
+        self.value(name, default, most=_MOST_WHOLE)
         return bits(self.parameters, name, default)

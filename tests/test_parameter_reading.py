@@ -38,11 +38,7 @@ def test_no_parameter_becomes_a_whole_number_by_itself() -> None:
         for path in SOURCES
         if (lines := conversions(path.read_text(encoding="utf-8")))
     }
-    # The reader checks before it rounds; the simulated rover's own store holds finite numbers only.
-    assert {name: len(lines) for name, lines in found.items()} == {
-        "mavlink_bridge/simulator/parameters.py": 1,
-        "missions/vehicle/reader.py": 1,
-    }
+    assert {name: len(lines) for name, lines in found.items()} == {"missions/vehicle/reader.py": 1}
 
 
 def test_the_search_finds_what_it_looks_for() -> None:

@@ -76,7 +76,7 @@ class ParameterStore:
     Raises
     ------
     BridgeError
-        An override of a parameter the rover does not have, or one that no 32-bit float holds.
+        An override of a parameter the rover does not have.
     """
 
     def __init__(self, overrides: Mapping[str, float]) -> None:
@@ -88,9 +88,6 @@ class ParameterStore:
                 parameters=unknown,
             )
         self._values = {name: float32(value) for name, value in (DEFAULTS | dict(overrides)).items()}
-        odd = sorted(name for name, value in self._values.items() if not math.isfinite(value))
-        if odd:
-            raise BridgeError(f"parameter {', '.join(odd)}: no 32-bit float holds that", parameters=odd)
         self._names = tuple(self._values)
 
     def __len__(self) -> int:
@@ -110,8 +107,9 @@ class ParameterStore:
         return bool(self.whole(name) & bit)
 
     def whole(self, name: str) -> int:
-        """Return an enumeration or a bit mask; every value here is finite."""
-        return int(self._values[name])
+        """Return an enumeration or a bit mask; 0 of what is no number."""
+        value = self._values[name]
+        return int(value) if math.isfinite(value) else 0
 
     @property
     def fence_margin_m(self) -> float:

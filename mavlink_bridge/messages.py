@@ -473,6 +473,10 @@ class AutopilotVersion(Message):
     uid2: tuple[int, ...] = (0,) * 18
 
 
+AUTOPILOT_VERSION_ID = 148
+"""For asking for it (MAV_CMD_REQUEST_MESSAGE); it is not sent unasked."""
+
+
 @dataclass(frozen=True, slots=True)
 class FenceStatus(Message):
     """FENCE_STATUS (162)."""

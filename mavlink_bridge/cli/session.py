@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from mavlink_bridge.errors import LinkError, OutcomeError, RefusedError
 from mavlink_bridge.link import open_link
-from mavlink_bridge.messages import CommandLong, Heartbeat, ModeFlag, RequestDataStream
+from mavlink_bridge.messages import AUTOPILOT_VERSION_ID, CommandLong, Heartbeat, ModeFlag, RequestDataStream
 from mavlink_bridge.protocol.command import SendCommand
 from mavlink_bridge.protocol.find import FindVehicle
 from mavlink_bridge.protocol.peer import Peer
@@ -156,10 +156,18 @@ class Session:
             raise OutcomeError(f"the vehicle does not show mode {name}", mode=name)
 
     def ask_telemetry(self) -> None:
-        """Ask for the position and its quality, which not every link gets unasked."""
+        """Ask for the position, its quality and the firmware's version, which not every link gets unasked."""
         peer = self.vehicle
         self._link.send_all(
-            [RequestDataStream(peer.system, peer.component, stream, _STREAM_HZ, 1) for stream in _STREAMS]
+            [
+                *(
+                    RequestDataStream(peer.system, peer.component, stream, _STREAM_HZ, 1)
+                    for stream in _STREAMS
+                ),
+                CommandLong(
+                    peer.system, peer.component, Command.REQUEST_MESSAGE, param1=AUTOPILOT_VERSION_ID
+                ),
+            ]
         )
 
     def listen_until(self, is_enough: Callable[[], bool], for_s: float) -> bool:

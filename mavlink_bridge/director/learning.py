@@ -149,6 +149,12 @@ class Learning:
             peer = self._peer
             for stream in (_POSITION_STREAM, _STATUS_STREAM):
                 self._outgoing.append(m.RequestDataStream(peer.system, peer.component, stream, _STREAM_HZ, 1))
+            # Its version decides what some parameters are by default; nothing waits for the answer.
+            self._outgoing.append(
+                m.CommandLong(
+                    peer.system, peer.component, Command.REQUEST_MESSAGE, param1=m.AUTOPILOT_VERSION_ID
+                )
+            )
 
     def _take_parameters(self, machine: ReadParameters, _now_s: float) -> None:
         outcome = machine.outcome

@@ -67,7 +67,7 @@ def test_without_the_order_to_drive_it_ends_verified_and_touches_neither_mode_no
     assert (vehicle.mode, vehicle.is_armed) == (mode, False)
     assert vehicle.mission[-1].position == TARGET
     commands = {message.command for message in run.sent if isinstance(message, m.CommandLong)}
-    assert commands == {Command.GET_HOME_POSITION}
+    assert commands == {Command.GET_HOME_POSITION, Command.REQUEST_MESSAGE}
 
 
 def test_learns_parameters_fence_mission_home_and_position():

@@ -47,8 +47,10 @@ def start_hazard(ground: Ground, start: LocalPoint, vehicle: Vehicle) -> StartBl
     leaves_from_m = vehicle.stops_within_m + _LEAVES_FROM_M
     if away_m >= leaves_from_m:
         return None
-    margin = f"{vehicle.fence.margin_name} {vehicle.stops_within_m:g} m"
-    where = f"the start is {away_m:.2f} m from {fence}, within {margin} of a fence that the vehicle avoids"
+    margin = f"{vehicle.fence.margin_name} {vehicle.stops_within_m:g} m and {_LEAVES_FROM_M:g} m"
+    where = (
+        f"the start is {away_m:.2f} m from {fence}, nearer than {margin} to a fence that the vehicle avoids"
+    )
     advice = f"drive it {leaves_from_m:.2f} m away from the fence by hand, or set AVOID_BACKUP_SPD 0 or AVOID_ENABLE 0 until it is there"
     is_steered = vehicle.steering is Steering.ACKERMANN
     if is_steered and vehicle.backs_away:

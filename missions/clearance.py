@@ -74,6 +74,7 @@ def known_vehicle(situation: Situation, request: Request) -> Vehicle:
         {**no_numbers, **situation.parameters},
         mav_type=situation.vehicle_type,
         firmware=situation.firmware,
+        ardupilot=situation.ardupilot,
     )
     if request.speed_mps is None:
         return vehicle

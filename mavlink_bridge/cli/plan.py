@@ -39,7 +39,7 @@ from mavlink_bridge.cli.vehicle_options import (
     with_home_option,
     with_vehicle,
 )
-from mavlink_bridge.errors import UsageError
+from mavlink_bridge.errors import LogError, UsageError
 
 if TYPE_CHECKING:
     from missions.plan import Plan
@@ -205,8 +205,12 @@ def plan(
         planned, planning_s, situation = result.plan, result.planning_s, result.situation
         uploaded = verified = result.verified
     else:
+        from mavlink_bridge.vehicles import not_ardupilot  # noqa: PLC0415 - only where needed
+
         situation = _offline_situation(fence, log, system, any_vehicle=any_vehicle)
         situation = with_home_option(with_parameter_file(situation, vehicle), home)
+        if request.repairs and situation.ardupilot is False:
+            raise LogError(f"{log}: {not_ardupilot(situation.system, None)}", file=str(log))
         planned, planning_s = timed_plan(situation, request)
         uploaded = verified = False
     warnings = list(planned.warnings)

@@ -289,7 +289,10 @@ class Recorder:
         situation = self.situation
         try:
             self._vehicle = vehicle_from_parameters(
-                situation.parameters, mav_type=situation.vehicle_type, firmware=situation.firmware
+                situation.parameters,
+                mav_type=situation.vehicle_type,
+                firmware=situation.firmware,
+                ardupilot=situation.ardupilot,
             )
             if situation.fence is not None and situation.fence.value.zones:
                 self._meter = FenceMeter(ground_for(situation, self._with_known_circle(self._vehicle), ()))

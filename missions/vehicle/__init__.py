@@ -32,6 +32,7 @@ def vehicle_from_parameters(
     *,
     mav_type: int | None = None,
     firmware: tuple[int, int, int] | None = None,
+    ardupilot: bool | None = None,
 ) -> Vehicle:
     """Return the vehicle that a set of autopilot parameters describes.
 
@@ -43,6 +44,8 @@ def vehicle_from_parameters(
         MAV_TYPE of the vehicle's heartbeat.
     firmware : tuple of int, optional
         The autopilot's version, major, minor and patch.
+    ardupilot : bool, optional
+        Whether its heartbeat said that the autopilot is ArduPilot; default: told by the names.
 
     Returns
     -------
@@ -54,10 +57,11 @@ def vehicle_from_parameters(
     VehicleError
         A value that is not a number or out of its range, with its name.
     """
-    px4 = any(name.startswith(_PX4_PREFIXES) for name in parameters)
-    ardupilot = any(name.startswith(_ARDUPILOT_PREFIXES) for name in parameters)
+    has_px4s = any(name.startswith(_PX4_PREFIXES) for name in parameters)
+    has_ardupilots = any(name.startswith(_ARDUPILOT_PREFIXES) for name in parameters)
     reader = ParameterReader(parameters)
-    made_by = px4_vehicle if px4 and not ardupilot else ardupilot_vehicle
+    is_ardupilot = ardupilot if ardupilot is not None else has_ardupilots or not has_px4s
+    made_by = ardupilot_vehicle if is_ardupilot else px4_vehicle
     return made_by(reader, mav_type, firmware)
 
 

@@ -6,13 +6,12 @@ read-backs) and takes what others send to it as requests.
 
 from __future__ import annotations
 
-import math
-import re
 from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from mavlink_bridge import messages as m
+from mavlink_bridge.autopilot_facts import with_autopilot, with_banner, with_parameter, with_version
 from mavlink_bridge.parameter_values import parameter_value
 from mavlink_bridge.protocol.wire import item_from_message, mission_result
 from mavlink_bridge.vehicles import is_vehicle
@@ -48,7 +47,6 @@ _GLOBAL_FRAMES = frozenset(
 _IGNORE_X_OR_Y = 0b11
 _GUIDED_TARGET, _GUIDED_ALTITUDE = 2, 3
 _HEADING_UNKNOWN = 65535
-_BANNER = re.compile(r"(?:ArduRover|APMrover2|Rover) V(\d{1,2})\.(\d{1,2})(?:\.(\d{1,2}))?")
 
 
 def fold(situation: Situation, frame: Frame, time_s: float) -> Situation:
@@ -105,57 +103,14 @@ def _param_value(situation: Situation, frame: Frame, _time_s: float) -> Situatio
     )
 
 
-def with_parameter(situation: Situation, name: str, value: float) -> Situation:
-    """Return the situation with a parameter that was told.
-
-    What is no number is none of the vehicle's parameters: what was known before stands, and what came is noted.
-    """
-    if not math.isfinite(value):
-        if situation.no_numbers.get(name) == str(value):
-            return situation
-        return replace(situation, no_numbers=MappingProxyType({**situation.no_numbers, name: str(value)}))
-    if situation.parameters.get(name) == value and name not in situation.no_numbers:
-        return situation
-    return replace(
-        situation,
-        parameters=MappingProxyType({**situation.parameters, name: value}),
-        no_numbers=MappingProxyType({key: came for key, came in situation.no_numbers.items() if key != name}),
-    )
-
-
-def with_autopilot(situation: Situation, autopilot: int) -> Situation:
-    """Return the situation with what a HEARTBEAT's MAV_AUTOPILOT tells: whose it is, and how that one encodes parameters.
-
-    ArduPilot always casts whole numbers and PX4 never does, whatever their AUTOPILOT_VERSION says; of others that one counts.
-    """
-    ardupilot = autopilot == m.Autopilot.ARDUPILOTMEGA
-    bytewise = situation.bytewise
-    if autopilot in (m.Autopilot.ARDUPILOTMEGA, m.Autopilot.PX4):
-        bytewise = autopilot == m.Autopilot.PX4
-    if (ardupilot, bytewise) == (situation.ardupilot, situation.bytewise):
-        return situation
-    return replace(situation, ardupilot=ardupilot, bytewise=bytewise)
-
-
 def _autopilot_version(situation: Situation, frame: Frame, _time_s: float) -> Situation:
-    message = frame.message
-    assert isinstance(message, m.AutopilotVersion)
-    bytewise = situation.bytewise
-    if bytewise is None:
-        bytewise = bool(message.capabilities & m.Capability.PARAM_ENCODE_BYTEWISE)
-    version = message.flight_sw_version
-    firmware = (version >> 24 & 255, version >> 16 & 255, version >> 8 & 255) if version else None
-    return replace(situation, bytewise=bytewise, firmware=firmware or situation.firmware)
+    assert isinstance(frame.message, m.AutopilotVersion)
+    return with_version(situation, frame.message)
 
 
 def _text(situation: Situation, frame: Frame, _time_s: float) -> Situation:
-    """Take ArduPilot's version from its banner, "ArduRover V4.5.7 (0358a9c2)"."""
-    message = frame.message
-    assert isinstance(message, m.Statustext)
-    found = _BANNER.match(message.text)
-    if found is None:
-        return situation
-    return replace(situation, firmware=(int(found[1]), int(found[2]), int(found[3] or 0)))
+    assert isinstance(frame.message, m.Statustext)
+    return with_banner(situation, frame.message.text)
 
 
 def _global_position(situation: Situation, frame: Frame, time_s: float) -> Situation:

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from missions.drive_model import Envelope
     from missions.driven_route import DrivenRoute
     from missions.ground import Ground
+    from missions.local_frame import LocalPoint
     from missions.request import Request
     from missions.situation import Situation
     from missions.vehicle import Vehicle
@@ -87,10 +88,7 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
 
     heading_deg = heading_at(situation, start)
     ends = [ground.frame.to_local(position) for position in (start, *targets)]
-    hazard = start_hazard(plain, ends[0], vehicle)
-    if isinstance(hazard, StartBlockedError):
-        raise hazard
-    warnings += [hazard] if hazard else []
+    warnings += _start_remarks(plain, ends[0], vehicle)
     try:
         if asked.allowance_m is None:
             asked, found = FittedRoute(ground, ends, request, vehicle, heading_deg, should_stop).find(asked)
@@ -146,6 +144,20 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
             )
         ),
     )
+
+
+def _start_remarks(ground: Ground, start: LocalPoint, vehicle: Vehicle) -> list[str]:
+    """Return what is to be said of the start.
+
+    Raises
+    ------
+    StartBlockedError
+        From there the vehicle may back into the fence.
+    """
+    hazard = start_hazard(ground, start, vehicle)
+    if isinstance(hazard, StartBlockedError):
+        raise hazard
+    return [hazard] if hazard else []
 
 
 def asked_clearance(situation: Situation, request: Request) -> tuple[Vehicle, float]:

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mavlink_bridge import messages as m
+from mavlink_bridge.autopilot_facts import with_parameter
 from mavlink_bridge.errors import LogError
-from mavlink_bridge.fold import FOLDED, fold, with_parameter
+from mavlink_bridge.fold import FOLDED, fold
 from mavlink_bridge.logbook.clock import NEAR_S, SILENCE_S, Pulse, SteadyClock
 from mavlink_bridge.logbook.facts import Logbook, VehicleLog
 from mavlink_bridge.logbook.recorder import RECORDED, Recorder

@@ -179,7 +179,8 @@ class Recorder:
         self._targets.append(TargetSeen(now_s, position, source, (frame.system, frame.component)))
 
     def _take_parameter(self, before: Mapping[str, float], message: m.ParamValue, now_s: float) -> None:
-        name, value = message.param_id, message.param_value
+        name = message.param_id
+        value = self.situation.parameters[name]
         known = before.get(name)
         if _matters(name) and known is not None:
             self._changes.append(ParameterChange(now_s, name, known, value))

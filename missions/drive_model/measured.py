@@ -57,7 +57,7 @@ def beyond_measured(vehicle: Vehicle, slowest_mps: float | None = None) -> tuple
             and least_mps < SLOW_MPS,
             (
                 f"the promise was not measured for steered rovers below {SLOW_MPS:g} m/s, and this one drives {least_mps:g} m/s: there they swing out "
-                "ever farther (after 90° about 0.9 m at 1 m/s, 1.8 m at 0.5, 3.2 m at 0.3) and count waypoints as reached that they passed at a "
+                "ever farther (after 90° 0.7 m at 1 m/s, 1.8 m at 0.5, 3.2 m at 0.3) and count waypoints as reached that they passed at a "
                 f"distance; drive {SLOW_MPS:g} m/s or more"
             ),
         ),
@@ -77,6 +77,14 @@ def beyond_measured(vehicle: Vehicle, slowest_mps: float | None = None) -> tuple
                 "ArduPilot 4.7 on, 60 before)"
             ),
         ),
+        *_beyond_limits(vehicle),
+    )
+    return tuple(sentence for outside, sentence in checks if outside)
+
+
+def _beyond_limits(vehicle: Vehicle) -> tuple[tuple[bool, str], ...]:
+    """Return which of the vehicle's limits and gains were not measured."""
+    return (
         (
             vehicle.steering is Steering.ACKERMANN and vehicle.turn_radius_m > 1.0,
             f"swings were measured at a turning radius of 0.9 m and are scaled to {vehicle.turn_radius_m:g} m",
@@ -91,4 +99,3 @@ def beyond_measured(vehicle: Vehicle, slowest_mps: float | None = None) -> tuple
             f"straying was measured at a position gain (PSC_POS_P) of 0.2, not {vehicle.position_gain_per_s:g}",
         ),
     )
-    return tuple(sentence for outside, sentence in checks if outside)

@@ -41,6 +41,7 @@ def px4_log(path: Path, parameters=PARAMETERS, *, waypoints=((48.1002, 11.5005),
     own: list[m.Message] = [
         heartbeat,
         m.AutopilotVersion(0xE8FF, 0x011100FF),
+        m.ParamValue("GF_ACTION", told(INT32, 3), INT32, 7, 0),
         *(m.ParamValue(name, told(kind, value), kind, 7, 0) for name, kind, value in parameters),
     ]
     for mission_type, command, places in ((1, 5001, CORNERS), (0, 16, waypoints)):
@@ -81,6 +82,8 @@ def test_the_log_tells_them_too(tmp_path: Path) -> None:
         "GF_ACTION": 2.0,
         "NAV_ACC_RAD": 0.5,
     }
+    (change,) = vehicle["parameter_changes"]
+    assert (change["name"], change["before"], change["after"]) == ("GF_ACTION", 3.0, 2.0)
 
 
 def test_a_px4_rover_that_told_no_parameters_is_no_ardupilot(tmp_path: Path) -> None:

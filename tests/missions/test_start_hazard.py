@@ -124,3 +124,18 @@ def test_a_mission_from_there_is_not_repaired() -> None:
     mission = Mission((waypoint(place(*TARGET)),), place(0, 9))
     with pytest.raises(StartBlockedError, match=r"cannot be repaired: the start is 1\.00 m from"):
         repair_mission(mission, situation_of(FIELD, WALL, **AVOIDING), Request(place(0, 9), clearance_m=2.2))
+
+
+def test_a_margin_of_nothing_is_said_and_a_tenth_of_a_metre_promised() -> None:
+    zones = (FIELD, box(OUT, -20, 30, 20, 40))
+    situation = situation_of(*zones, **{**AVOIDING, "FENCE_MARGIN": 0.0})
+    found = plan(situation, Request(place(0, 0), (place(*TARGET),), 0.0))
+    assert found.clearance_m == 0.1
+    assert said(found.warnings, "FENCE_MARGIN 0 m does not switch avoidance off")
+    assert said(found.warnings, "Set FENCE_MARGIN 0.1 or more, or AVOID_ENABLE 2 (without bit 0)")
+    for changed in ({"FENCE_MARGIN": 0.1}, {"AVOID_ENABLE": 2.0}, {"FENCE_ENABLE": 0.0}):
+        found = plan(
+            situation_of(*zones, **{**AVOIDING, "FENCE_MARGIN": 0.0, **changed}),
+            Request(place(0, 0), (place(*TARGET),), 0.0),
+        )
+        assert not said(found.warnings, "does not switch avoidance off")

@@ -109,14 +109,14 @@ class _Reading(ParameterReader):
 
     asked: dict[str, float | None]
 
-    def known(self, name: str) -> float | None:
+    def known(self, name: str, **limits: float) -> float | None:
         self.asked.setdefault(name, None)
-        return super().known(name)
+        return super().known(name, **limits)
 
-    def value(self, name: str, default: float, *, least: float = 0.0) -> float:
+    def value(self, name: str, default: float, **limits: float) -> float:
         if self.asked.get(name) is None:
             self.asked[name] = default
-        return super().value(name, default, least=least)
+        return super().value(name, default, **limits)
 
 
 def parameters() -> str:
@@ -131,7 +131,7 @@ def parameters() -> str:
         for airframe in airframes:
             reading = _Reading(airframe)
             reading.asked = asked
-            read(reading, None)
+            read(reading, None, None)
         if autopilot == "ArduPilot":
             asked = {name: asked.get(name) for name in dict.fromkeys((*PARAMETER_NAMES, *asked))}
         servos = [name for name in asked if re.fullmatch(r"SERVO\d+_FUNCTION", name)]

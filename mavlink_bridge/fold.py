@@ -11,6 +11,8 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from mavlink_bridge import messages as m
+from mavlink_bridge.autopilot_facts import with_autopilot, with_banner, with_parameter, with_version
+from mavlink_bridge.parameter_values import parameter_value
 from mavlink_bridge.protocol.wire import item_from_message, mission_result
 from mavlink_bridge.vehicles import is_vehicle
 from missions.errors import FenceError, InvalidPositionError
@@ -84,10 +86,9 @@ def _heartbeat(situation: Situation, frame: Frame, _time_s: float) -> Situation:
     if not is_vehicle(heartbeat):
         return situation
     return replace(
-        situation,
+        with_autopilot(situation, heartbeat.autopilot),
         component=frame.component,
         vehicle_type=heartbeat.type,
-        ardupilot=heartbeat.autopilot == m.Autopilot.ARDUPILOTMEGA,
         mode=heartbeat.custom_mode,
         armed=bool(heartbeat.base_mode & m.ModeFlag.SAFETY_ARMED),
     )
@@ -97,10 +98,19 @@ def _param_value(situation: Situation, frame: Frame, _time_s: float) -> Situatio
     """Take a parameter; ground stations write those they fetched by MAVFTP under components of their own."""
     message = frame.message
     assert isinstance(message, m.ParamValue)
-    if situation.parameters.get(message.param_id) == message.param_value:
-        return situation
-    parameters = {**situation.parameters, message.param_id: message.param_value}
-    return replace(situation, parameters=MappingProxyType(parameters))
+    return with_parameter(
+        situation, message.param_id, parameter_value(message, bytewise=bool(situation.bytewise))
+    )
+
+
+def _autopilot_version(situation: Situation, frame: Frame, _time_s: float) -> Situation:
+    assert isinstance(frame.message, m.AutopilotVersion)
+    return with_version(situation, frame.message)
+
+
+def _text(situation: Situation, frame: Frame, _time_s: float) -> Situation:
+    assert isinstance(frame.message, m.Statustext)
+    return with_banner(situation, frame.message.text)
 
 
 def _global_position(situation: Situation, frame: Frame, time_s: float) -> Situation:
@@ -234,6 +244,8 @@ def _position_target(situation: Situation, message: Message, time_s: float) -> S
 _TOLD: dict[type[Message], Callable[[Situation, Frame, float], Situation]] = {
     m.Heartbeat: _heartbeat,
     m.ParamValue: _param_value,
+    m.AutopilotVersion: _autopilot_version,
+    m.Statustext: _text,
     m.GlobalPositionInt: _global_position,
     m.GpsRawInt: _gps_raw,
     m.HomePosition: _home_position,

@@ -17,6 +17,7 @@ from missions.avoidance import with_avoidance
 from missions.drive_model import envelope
 from missions.errors import MissionError
 from missions.items import Command
+from missions.vehicle import Autopilot
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -279,6 +280,8 @@ class DriveGrader:
         if self.way.odd is not None:
             self._notes.append(f"nothing is foreseen: the drive model does not know {self.way.odd}")
             return None
+        if self._field.vehicle.autopilot is not Autopilot.ARDUPILOT:
+            self._notes.append("what is foreseen rests on measurements of ArduPilot Rover, which this is not")
         try:
             forecast = envelope(
                 self._points,

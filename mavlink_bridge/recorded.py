@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.errors import LogError, VehicleNotFoundError
 from mavlink_bridge.fold import FOLDED, fold
-from mavlink_bridge.messages import Heartbeat
+from mavlink_bridge.messages import AutopilotVersion, Heartbeat, Statustext
 from mavlink_bridge.tlog import TlogReader
-from mavlink_bridge.vehicles import choose_vehicle, vehicles_heard
+from mavlink_bridge.vehicles import Vehicle, choose_vehicle, vehicles_heard
 from missions.situation import Situation
 
 if TYPE_CHECKING:
@@ -16,6 +17,20 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from mavlink_bridge.tlog import Damage
+
+
+def begun(path: Path | str, vehicle: Vehicle) -> Situation:
+    """Return what is known of a vehicle before a log's first frame: its ids, and what the whole log tells of its autopilot.
+
+    How parameters are encoded, and the version, were so before they were told.
+    """
+    situation = Situation(system=vehicle.system, component=vehicle.component, vehicle_type=vehicle.type)
+    for entry in TlogReader(path, {Heartbeat, AutopilotVersion, Statustext}):
+        told = fold(situation, entry.frame, entry.time_s)
+        situation = replace(
+            situation, ardupilot=told.ardupilot, bytewise=told.bytewise, firmware=told.firmware
+        )
+    return situation
 
 
 def situation_from_log(
@@ -48,7 +63,7 @@ def situation_from_log(
         vehicle = choose_vehicle(vehicles, system, any_vehicle=any_vehicle)
     except VehicleNotFoundError as error:
         raise LogError(f"{path}: {error}", file=str(path)) from None
-    situation = Situation(system=vehicle.system, component=vehicle.component, vehicle_type=vehicle.type)
+    situation = begun(path, vehicle)
     reader = TlogReader(path, FOLDED)
     for entry in reader:
         situation = fold(situation, entry.frame, entry.time_s)

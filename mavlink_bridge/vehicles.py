@@ -64,3 +64,25 @@ def choose_vehicle(heard: Sequence[Vehicle], system: int | None, *, any_vehicle:
             f"{names} is no rover (MAV_TYPE 10 or 11); --any-vehicle takes it all the same"
         )
     raise VehicleNotFoundError(f"system {system} was not heard, only {names}")
+
+
+def not_ardupilot(system: int | None, autopilot: int | None) -> VehicleNotFoundError | None:
+    """Return the error that a vehicle is, whose autopilot is not ArduPilot; None where it is.
+
+    Whether a mission's first item is home, how waypoints are driven, how lists are stored and what modes are called is each autopilot's own:
+    of another one nothing could be promised.
+
+    Parameters
+    ----------
+    system : int or None
+        The vehicle's system id.
+    autopilot : int or None
+        MAV_AUTOPILOT of its heartbeat; None is one that is not known, but not ArduPilot.
+    """
+    if autopilot == m.Autopilot.ARDUPILOTMEGA:
+        return None
+    name = {m.Autopilot.PX4.value: " (PX4)", None: ""}.get(autopilot, f" (MAV_AUTOPILOT {autopilot})")
+    return VehicleNotFoundError(
+        f"the autopilot of system {system} is not ArduPilot{name}: for now only ArduPilot is served",
+        autopilot=autopilot,
+    )

@@ -67,7 +67,7 @@ def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry) -> Env
     Envelope
         The same where nothing is near, else with more pieces where the rover falls behind.
     """
-    if not vehicle.stops_within_m or fence.is_empty or not band.legs:
+    if not vehicle.avoids_fence or fence.is_empty or not band.legs:
         return band
     target = _Target(band, vehicle)
     lags = target.lags(vehicle, FenceAhead(fence, target.places, vehicle))

@@ -15,15 +15,19 @@ from missions.avoidance import with_avoidance
 from missions.clearance import known_vehicle, promise
 from missions.course import CIRCLE_M, Course, CourseLeg, follow_mission
 from missions.drive_model import Envelope, beyond_measured, envelope
-from missions.errors import SituationError
+from missions.errors import SituationError, StartBlockedError
 from missions.geo import LatLon, bearing_deg, distance_m
 from missions.ground import EDGE_BOW_M, Ground
 from missions.known_fence import fence_warnings, known_fence
 from missions.local_frame import LocalPoint
 from missions.mission_end import crossed_zones, end_warnings, return_place, return_warnings
 from missions.plan import Plan, drawn_leg, ground_for
+from missions.remarks import parameter_remarks
 from missions.request import Request
+from missions.seams import Seam, first_stop, is_seam, seam_advice, seam_reason, seams_of
 from missions.situation import Known
+from missions.start_hazard import start_hazard
+from missions.vehicle import real_number
 from missions.words import metres
 
 if TYPE_CHECKING:
@@ -63,7 +67,7 @@ class CheckedLeg:
     at : LatLon or None
         Where on the leg it is nearest; where it crosses forbidden ground, the first place of that.
     crosses : tuple of str
-        The zones whose forbidden ground the straight line crosses.
+        The zones whose forbidden ground the straight line crosses, and seams of a union before which the vehicle stops.
     time_s : float
         Time from the place before to this leg's end.
     """
@@ -77,6 +81,11 @@ class CheckedLeg:
     at: LatLon | None
     crosses: tuple[str, ...]
     time_s: float
+
+    @property
+    def stops_at_seam(self) -> bool:
+        """Whether the vehicle would stop before a seam of the union."""
+        return any(is_seam(name) for name in self.crosses)
 
     @property
     def breaks(self) -> bool:
@@ -109,6 +118,8 @@ class MissionCheck:
         The time for all of it; of a mission without end for one time round.
     troubles : tuple of str
         What was not understood; with any of these the mission does not hold.
+    dangers : tuple of str
+        What is known to end in the fence, whatever the legs keep; with any of these the mission does not hold.
     warnings : tuple of str
         What else a person should know.
     envelope : Envelope
@@ -121,6 +132,7 @@ class MissionCheck:
     clearance_m: float
     duration_s: float
     troubles: tuple[str, ...]
+    dangers: tuple[str, ...]
     warnings: tuple[str, ...]
     fence: Fence
     ground: Ground
@@ -134,8 +146,8 @@ class MissionCheck:
 
     @property
     def holds(self) -> bool:
-        """Whether every leg keeps its clearance and everything was understood."""
-        return not self.broken and not self.troubles
+        """Whether every leg keeps its clearance, everything was understood, and nothing is known to end in the fence."""
+        return not self.broken and not self.troubles and not self.dangers
 
     @property
     def length_m(self) -> float:
@@ -195,8 +207,19 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
     ground = ground_for(situation, vehicle, (*path, *near_home))
     heading_deg = pose.heading_deg if pose and pose.position == start else None
     forecast = _forecast(course, ground, vehicle, heading_deg)
-    legs = _checked_legs(course, ground, forecast, asked.required_m)
-    warnings = [*fence_warnings(vehicle, situation), *ground.warnings, *asked.warnings, *course.notes]
+    legs = _checked_legs(course, ground, forecast, asked.required_m, seams_of(ground, vehicle))
+    hazard = start_hazard(ground, ground.frame.to_local(start), vehicle) if start else None
+    dangers = (f"{hazard}; {hazard.details['advice']}",) if isinstance(hazard, StartBlockedError) else ()
+    warnings = [
+        *parameter_remarks(situation),
+        *fence_warnings(vehicle, situation),
+        *ground.warnings,
+        *asked.warnings,
+        *course.notes,
+    ]
+    warnings += [hazard] if isinstance(hazard, str) else []
+    if any(leg.stops_at_seam for leg in legs):
+        warnings.append(f"{seam_reason(vehicle)}; {seam_advice(vehicle)}")
     warnings += _start_warnings(start, heading_deg, legs[0], asked.required_m)
     warnings += _drive_warnings(vehicle, forecast, course)
     warnings += return_warnings(situation, vehicle, ground, path)
@@ -208,6 +231,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
         clearance_m=asked.promised_m,
         duration_s=forecast.duration_s,
         troubles=course.troubles,
+        dangers=dangers,
         warnings=tuple(dict.fromkeys(warnings)),
         fence=fence,
         ground=ground,
@@ -254,8 +278,8 @@ def _course(
         start,
         home=home,
         return_to=partial(return_place, situation),
-        return_speed_mps=situation.parameters.get("RTL_SPEED") or None,
-        circle_m=situation.parameters.get("CIRC_RADIUS", CIRCLE_M),
+        return_speed_mps=real_number(situation.parameters, "RTL_SPEED", 0.0) or None,
+        circle_m=real_number(situation.parameters, "CIRC_RADIUS", CIRCLE_M),
         own_speed_mps=vehicle.speed_mps,
     )
     if not course.legs:
@@ -279,7 +303,7 @@ def _forecast(course: Course, ground: Ground, vehicle: Vehicle, heading_deg: flo
 
 
 def _checked_legs(
-    course: Course, ground: Ground, forecast: Envelope, promised_m: float
+    course: Course, ground: Ground, forecast: Envelope, promised_m: float, seams: tuple[Seam, ...]
 ) -> tuple[CheckedLeg, ...]:
     times_s = np.diff(forecast.arrivals_s)
     driven_m = _driven_m(forecast, ground, len(course.legs))
@@ -288,7 +312,7 @@ def _checked_legs(
     circle_before_m = 0.0
     for number, leg in enumerate(course.legs):
         shape = _shape(ground, leg, circle_before_m)
-        drawn = known.setdefault(shape, _Drawn.of(ground, shape))
+        drawn = known.get(shape) or known.setdefault(shape, _Drawn.of(ground, shape, seams))
         leg_driven_m = min(float(driven_m[number]), drawn.clearance_m)
         if leg.circle_m or circle_before_m:
             leg_driven_m = min(leg_driven_m, max(0.0, drawn.clearance_m - forecast_band_m(forecast)))
@@ -356,10 +380,13 @@ class _Drawn:
     crosses: tuple[str, ...]
 
     @classmethod
-    def of(cls, ground: Ground, shape: BaseGeometry) -> _Drawn:
+    def of(cls, ground: Ground, shape: BaseGeometry, seams: tuple[Seam, ...]) -> _Drawn:
         if not ground.allowed.covers(shape):
             crossed = crossed_zones(ground, shape)
             return cls(0.0, crossed[0], _position(ground, _first_outside(ground, shape)), crossed)
+        if (stop := first_stop(seams, shape)) is not None:
+            name, place = stop
+            return cls(0.0, name, _position(ground, place), (name,))
         nearest, _ = ground.nearest(shape)
         at, _ = nearest_points(shape, ground.edge)
         clearance_m = max(0.0, ground.clearance_m(shape) - EDGE_BOW_M)
@@ -422,7 +449,9 @@ def _drive_warnings(vehicle: Vehicle, forecast: Envelope, course: Course) -> lis
         for corner in forecast.corners
         if not corner.bounded
     ]
-    warnings += beyond_measured(vehicle)
+    warnings += beyond_measured(
+        vehicle, min((leg.speed_mps for leg in course.legs if leg.speed_mps), default=None)
+    )
     assumed = [f"{one.parameter} {one.value:g}" for one in vehicle.assumed if one.parameter in _DRIVING]
     if assumed:
         warnings.append(f"not known of the vehicle, so these defaults count: {', '.join(assumed)}")

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 MARGIN_RESERVE_M = 0.1
 """More than FENCE_MARGIN, where coming nearer stops the vehicle for good: so far measured rovers left the drive model's band."""
 
+LEAST_MARGIN_M = 0.1
+"""With less FENCE_MARGIN measured rovers stopped at the fence or past it (0: 0.02 to 0.04 m past, 0.05: 0.02 m before)."""
+
 DEFAULT_BEYOND_MARGIN_M = 0.5
 LEAST_DEFAULT_M = 1.0
 
@@ -65,7 +68,14 @@ def known_vehicle(situation: Situation, request: Request) -> Vehicle:
     VehicleError
         A parameter or the speed cannot be used.
     """
-    vehicle = vehicle_from_parameters(situation.parameters, mav_type=situation.vehicle_type)
+    # What the vehicle told, but as no number, must not be taken for what it did not tell: a default in its place would be a guess.
+    no_numbers = {name: float(came) for name, came in situation.no_numbers.items()}
+    vehicle = vehicle_from_parameters(
+        {**no_numbers, **situation.parameters},
+        mav_type=situation.vehicle_type,
+        firmware=situation.firmware,
+        ardupilot=situation.ardupilot,
+    )
     if request.speed_mps is None:
         return vehicle
     if not 0 < request.speed_mps < float("inf"):
@@ -91,10 +101,11 @@ def promise(situation: Situation, request: Request, vehicle: Vehicle) -> Promise
             warnings.append(f"{_stops(vehicle)}; the clearance of {promised_m:g} m is less")
         error_m = request.reserve_m + (request.position_error_m or 0.0)
         return Promise(promised_m, error_m, request.corner_allowance_m, tuple(warnings))
+    warnings += margin_remarks(vehicle)
     error_m, told = _position_error_m(situation, request)
     # Avoidance goes by where the vehicle believes to be: the error of its position counts towards the margin.
     raised_m = vehicle.stops_within_m + MARGIN_RESERVE_M - error_m
-    if vehicle.stops_within_m and promised_m < raised_m:
+    if vehicle.avoids_fence and promised_m < raised_m:
         if not request.widest:
             warnings.append(
                 f"{_stops(vehicle)}; the clearance of {promised_m:g} m is raised to {raised_m:g} m"
@@ -103,9 +114,22 @@ def promise(situation: Situation, request: Request, vehicle: Vehicle) -> Promise
     return Promise(promised_m, error_m + request.reserve_m, None, (*warnings, *told))
 
 
+def margin_remarks(vehicle: Vehicle) -> list[str]:
+    """Return what is to be said of a margin that is less than measured rovers needed."""
+    if not vehicle.avoids_fence or vehicle.stops_within_m >= LEAST_MARGIN_M:
+        return []
+    return [
+        (
+            f"{vehicle.fence.margin_name} {vehicle.stops_within_m:g} m does not switch avoidance off: the vehicle brakes before the fence just the "
+            "same, and measured rovers came to rest as far as 0.04 m past it, a breach; what is promised was not measured there. "
+            f"Set {vehicle.fence.margin_name} {LEAST_MARGIN_M:g} or more, or AVOID_ENABLE {vehicle.avoid_bits & ~1} (without bit 0)"
+        )
+    ]
+
+
 def _stops(vehicle: Vehicle) -> str:
     return (
-        f"nearer than FENCE_MARGIN {vehicle.stops_within_m:g} m to the fence the vehicle stops in AUTO for good "
+        f"nearer than {vehicle.fence.margin_name} {vehicle.stops_within_m:g} m to the fence the vehicle stops in AUTO for good "
         "(AVOID_ENABLE)"
     )
 

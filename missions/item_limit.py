@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from missions.errors import VehicleError
+from missions.vehicle import whole_number
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -12,9 +15,30 @@ MISSION_ITEMS = 655
 
 _SD_BYTES_PER_ITEM = 15
 _SD_HEADER_BYTES = 4
+_MOST_SD_KB = 1024
+"""ArduPilot's documentation allows 64; more than a megabyte no list of 16-bit numbers can fill."""
 
 
 def most_items(parameters: Mapping[str, float]) -> int:
-    """Give how many items a vehicle holds, home included: BRD_SD_MISSION is storage on an SD card, in KB."""
-    sd_bytes = int(parameters.get("BRD_SD_MISSION", 0)) * 1024
+    """Return how many items a vehicle holds, home included."""
+    sd_bytes = sd_card_bytes(parameters, "BRD_SD_MISSION")
     return (sd_bytes - _SD_HEADER_BYTES) // _SD_BYTES_PER_ITEM if sd_bytes > 0 else MISSION_ITEMS
+
+
+def sd_card_bytes(parameters: Mapping[str, float], name: str) -> int:
+    """Return the storage on the SD card that BRD_SD_MISSION or BRD_SD_FENCE tell in KB; 0, the least of all, where that is none."""
+    try:
+        return whole_number(parameters, name, 0, most=_MOST_SD_KB) * 1024
+    except VehicleError:
+        return 0
+
+
+def storage_remarks(parameters: Mapping[str, float]) -> list[str]:
+    """Return what is to be said of storage that no vehicle can have."""
+    remarks = []
+    for name in ("BRD_SD_MISSION", "BRD_SD_FENCE"):
+        try:
+            whole_number(parameters, name, 0, most=_MOST_SD_KB)
+        except VehicleError as error:
+            remarks.append(f"{error}: taken as 0, no storage on an SD card")
+    return remarks

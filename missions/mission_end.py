@@ -12,7 +12,7 @@ from shapely import MultiPoint
 from missions.fence import ZoneKind
 from missions.geo import LatLon, distance_m
 from missions.items import Command, MissionItem, waypoint
-from missions.vehicle import Autopilot
+from missions.vehicle import Autopilot, real_number, whole_number
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -83,7 +83,7 @@ def return_place(situation: Situation, here: LatLon, home: LatLon | None) -> Lat
     nearest = min(rally, key=lambda place: distance_m(here, place))
     if home is None:
         return nearest
-    limit_m = situation.parameters.get("RALLY_LIMIT_KM", RALLY_LIMIT_M / 1000) * 1000
+    limit_m = real_number(situation.parameters, "RALLY_LIMIT_KM", RALLY_LIMIT_M / 1000) * 1000
     away_m = distance_m(here, nearest)
     counts_home = situation.parameters.get("RALLY_INCL_HOME") == 1 or 0 < limit_m < away_m
     return home if counts_home and distance_m(here, home) < away_m else nearest
@@ -143,7 +143,7 @@ def end_warnings(situation: Situation, vehicle: Vehicle, course: Course) -> list
     """Warn where the vehicle does not stay at the end of a mission."""
     if vehicle.autopilot is not Autopilot.ARDUPILOT or course.is_endless or course.ends_in_loiter:
         return []
-    mode = _DONE_MODES.get(int(situation.parameters.get("MIS_DONE_BEHAVE", 0)))
+    mode = _DONE_MODES.get(whole_number(situation.parameters, "MIS_DONE_BEHAVE", 0))
     return (
         [f"after its last item the vehicle changes to {mode} (MIS_DONE_BEHAVE), not to Hold"] if mode else []
     )

@@ -10,7 +10,7 @@ import numpy as np
 from missions.avoidance import with_avoidance
 from missions.clearance import known_vehicle, promise
 from missions.drive_model import envelope
-from missions.errors import PlanCheckError
+from missions.errors import PlanCheckError, RouteError, StartBlockedError
 from missions.fitted_route import FittedRoute
 from missions.geo import bearing_deg, rounded
 from missions.known_fence import fence_warnings, known_fence
@@ -25,7 +25,9 @@ from missions.lines import (
     path_length_m,
 )
 from missions.planned import Plan
-from missions.remarks import drive_remarks, lead_away_remarks, moved_target_remarks
+from missions.remarks import drive_remarks, lead_away_remarks, moved_target_remarks, parameter_remarks
+from missions.seams import explained, with_seams
+from missions.start_hazard import start_hazard
 from missions.surroundings import MAX_FIELD_M, ground_for, heading_at, route_ends
 from missions.uniform_route import uniform_route
 
@@ -36,6 +38,7 @@ if TYPE_CHECKING:
     from missions.drive_model import Envelope
     from missions.driven_route import DrivenRoute
     from missions.ground import Ground
+    from missions.local_frame import LocalPoint
     from missions.request import Request
     from missions.situation import Situation
     from missions.vehicle import Vehicle
@@ -73,16 +76,26 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
     fence = known_fence(situation)
     vehicle = known_vehicle(situation, request)
     start, targets = route_ends(situation, request)
-    ground = ground_for(situation, vehicle, (start, *targets))
+    plain = ground_for(situation, vehicle, (start, *targets))
+    ground = with_seams(plain, vehicle)
     asked = promise(situation, request, vehicle)
-    warnings = [*fence_warnings(vehicle, situation), *ground.warnings, *asked.warnings]
+    warnings = [
+        *parameter_remarks(situation),
+        *fence_warnings(vehicle, situation),
+        *ground.warnings,
+        *asked.warnings,
+    ]
 
     heading_deg = heading_at(situation, start)
     ends = [ground.frame.to_local(position) for position in (start, *targets)]
-    if asked.allowance_m is None:
-        asked, found = FittedRoute(ground, ends, request, vehicle, heading_deg, should_stop).find(asked)
-    else:
-        asked, found = uniform_route(ground, ends, asked, request, should_stop)
+    warnings += _start_remarks(plain, ends[0], vehicle)
+    try:
+        if asked.allowance_m is None:
+            asked, found = FittedRoute(ground, ends, request, vehicle, heading_deg, should_stop).find(asked)
+        else:
+            asked, found = uniform_route(ground, ends, asked, request, should_stop)
+    except RouteError as error:
+        raise explained(error, vehicle) from None
     lines = finished(ground, found.drawing, found.lead_away)
     reached = tuple(map(rounded, ground.frame.to_lat_lons(np.array(found.targets))))
     least_m = asked.required_m + (asked.allowance_m or 0.0)
@@ -119,11 +132,32 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
                     *warnings,
                     *lead_away_remarks(found, least_m),
                     *moved_target_remarks(targets, reached),
-                    *drive_remarks(vehicle, heading_deg, asked, driven_m, found),
+                    *drive_remarks(
+                        vehicle,
+                        min(filter(None, lines.speeds), default=None),
+                        heading_deg,
+                        asked,
+                        driven_m,
+                        found,
+                    ),
                 ]
             )
         ),
     )
+
+
+def _start_remarks(ground: Ground, start: LocalPoint, vehicle: Vehicle) -> list[str]:
+    """Return what is to be said of the start.
+
+    Raises
+    ------
+    StartBlockedError
+        From there the vehicle may back into the fence.
+    """
+    hazard = start_hazard(ground, start, vehicle)
+    if isinstance(hazard, StartBlockedError):
+        raise hazard
+    return [hazard] if hazard else []
 
 
 def asked_clearance(situation: Situation, request: Request) -> tuple[Vehicle, float]:

@@ -12,7 +12,7 @@ from missions.errors import MissionError
 from missions.geo import distance_m
 from missions.lines import drawn_leg
 from missions.plan import asked_clearance
-from missions.surroundings import ground_for
+from missions.surroundings import route_ground
 
 if TYPE_CHECKING:
     from missions.geo import LatLon
@@ -60,7 +60,7 @@ def recheck(plan: Plan, situation: Situation, item: int) -> Recheck:
     pose = situation.pose
     here = pose.value.position if pose is not None else plan.start
     try:
-        ground = ground_for(situation, plan.vehicle, (here, *plan.targets))
+        ground = route_ground(situation, plan.vehicle, (here, *plan.targets))
     except MissionError as error:
         return Recheck(0.0, plan.asked_m, str(error))
     rest = plan.path[plan.path_index(item) :]
@@ -80,7 +80,7 @@ def straight_line(situation: Situation, request: Request, target: LatLon) -> Rec
         return None
     try:
         vehicle, promised_m = asked_clearance(situation, request)
-        ground = ground_for(situation, vehicle, (pose.value.position, target))
+        ground = route_ground(situation, vehicle, (pose.value.position, target))
     except MissionError:
         return None
     line = drawn_leg(ground, pose.value.position, target)

@@ -6,15 +6,17 @@ from typing import TYPE_CHECKING
 
 from missions.drive_model import beyond_measured
 from missions.geo import distance_m
+from missions.item_limit import storage_remarks
 from missions.lines import ROUNDING_RESERVE_M
 from missions.words import metres
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from missions.clearance import Promise
     from missions.driven_route import DrivenRoute
     from missions.geo import LatLon
+    from missions.situation import Situation
     from missions.vehicle import Vehicle
 
 
@@ -33,6 +35,28 @@ _DRIVEN_BY = frozenset(
     }
 )
 """Parameters whose defaults a driver should see when they stand in for the vehicle's own."""
+
+
+_MOST_NAMED = 5
+
+
+def parameter_remarks(situation: Situation) -> list[str]:
+    """Return what the vehicle told of its parameters that cannot be."""
+    return [
+        *no_number_remarks(situation.no_numbers, situation.parameters),
+        *storage_remarks(situation.parameters),
+    ]
+
+
+def no_number_remarks(no_numbers: Mapping[str, str], parameters: Mapping[str, float]) -> list[str]:
+    """Return which parameters came as no number, and what counts in their place."""
+    remarks = [
+        f"{name} came as {came}, which is no number: "
+        + (f"it stays at {parameters[name]:g}, as it was told before" if name in parameters else "not known")
+        for name, came in no_numbers.items()
+    ]
+    more = len(remarks) - _MOST_NAMED
+    return [*remarks[:_MOST_NAMED], f"and {more} more parameters"] if more > 0 else remarks
 
 
 def lead_away_remarks(found: DrivenRoute, least_m: float) -> list[str]:
@@ -65,12 +89,17 @@ def moved_target_remarks(targets: Sequence[LatLon], reached: Sequence[LatLon]) -
 
 
 def drive_remarks(
-    vehicle: Vehicle, heading_deg: float | None, asked: Promise, driven_m: float, found: DrivenRoute
+    vehicle: Vehicle,
+    slowest_mps: float | None,
+    heading_deg: float | None,
+    asked: Promise,
+    driven_m: float,
+    found: DrivenRoute,
 ) -> list[str]:
-    """Say what the drive model's word rests on."""
+    """Return what the drive model's word rests on."""
     if asked.allowance_m == 0:
         return []
-    warnings = list(beyond_measured(vehicle))
+    warnings = list(beyond_measured(vehicle, slowest_mps))
     if heading_deg is None:
         warnings.append("the vehicle's heading is not told: it is taken to face along the first leg")
     assumed = [f"{one.parameter} {one.value:g}" for one in vehicle.assumed if one.parameter in _DRIVEN_BY]

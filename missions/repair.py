@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from missions.check import MissionCheck, check_mission, plan_of
-from missions.errors import NoRouteError, RouteError, SituationError
+from missions.errors import NoRouteError, RouteError, SituationError, StartBlockedError
 from missions.geo import bearing_deg, distance_m, to_e7
 from missions.item_limit import most_items
 from missions.item_list import ItemList
@@ -117,6 +117,8 @@ def repair_mission(
     asked = check_mission(mission, situation, request)
     if asked.troubles:
         raise SituationError(f"the mission cannot be repaired: {'; '.join(asked.troubles)}")
+    if asked.dangers:
+        raise StartBlockedError(f"the mission cannot be repaired: {'; '.join(asked.dangers)}")
     repaired, checked = ItemList(mission), asked
     keys = {_key(leg.leg) for leg in asked.broken}
     clearance_m = asked.clearance_m

@@ -111,8 +111,14 @@ class Situation:
         The autopilot's own mode number (HEARTBEAT.custom_mode).
     target : Known of LatLon
         The newest place somebody asked the vehicle to drive to.
+    bytewise : bool or None
+        Whether the autopilot tells whole-number parameters as the bits of a float (PX4), not as its value.
+    firmware : tuple of int or None
+        The autopilot's version: major, minor, patch.
     parameters : mapping of str to float
-        The autopilot's parameters, as far as they are known.
+        The autopilot's parameters, as far as they are known; each a number.
+    no_numbers : mapping of str to str
+        Parameters that last came as no number (``nan``, ``inf``), and what came; what was known of them before still stands.
     transfers : mapping
         Lists on their way, by kind and direction (True: to the vehicle).
     fence_trouble : str or None
@@ -122,6 +128,8 @@ class Situation:
     system: int | None = None
     component: int | None = None
     ardupilot: bool | None = None
+    bytewise: bool | None = None
+    firmware: tuple[int, int, int] | None = None
     vehicle_type: int | None = None
     mode: int | None = None
     armed: bool | None = None
@@ -133,6 +141,7 @@ class Situation:
     fix: Known[Fix] | None = None
     target: Known[LatLon] | None = None
     parameters: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    no_numbers: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     transfers: Mapping[tuple[ListKind, bool], ListTransfer] = field(
         default_factory=lambda: MappingProxyType({})
     )

@@ -11,6 +11,7 @@ from missions.ground import Ground, check_ground, lay_out
 from missions.items import last_place
 from missions.known_fence import known_fence
 from missions.local_frame import check_latitude, frame_around
+from missions.seams import with_seams
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -92,3 +93,8 @@ def ground_for(situation: Situation, vehicle: Vehicle, ends: Sequence[LatLon]) -
     )
     check_ground(ground)
     return ground
+
+
+def route_ground(situation: Situation, vehicle: Vehicle, ends: Sequence[LatLon]) -> Ground:
+    """Return the ground for a route: as `ground_for`, and the seams at which the vehicle would stop are obstacles too."""
+    return with_seams(ground_for(situation, vehicle, ends), vehicle)

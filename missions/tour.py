@@ -19,11 +19,11 @@ from missions.item_limit import most_items
 from missions.local_frame import LocalPoint
 from missions.mission_end import End, ending
 from missions.narrow import widest_clearance_m
-from missions.plan import Plan, ground_for, plan
+from missions.plan import Plan, plan
 from missions.repair import repaired_plan
 from missions.situation import Mission
 from missions.storage import shortened
-from missions.surroundings import route_ends
+from missions.surroundings import route_ends, route_ground
 from missions.visit_order import VisitOrder, length_of, shortest_order
 
 if TYPE_CHECKING:
@@ -137,7 +137,7 @@ def route_lengths_m(
         Symmetric; infinite where there is no route.
     """
     vehicle = known_vehicle(situation, request)
-    ground = ground_for(situation, vehicle, places)
+    ground = route_ground(situation, vehicle, places)
     local = [ground.frame.to_local(place) for place in places]
     if request.widest:
         clearance_m = _WIDEST_SHARE * widest_clearance_m(ground, local, should_stop)

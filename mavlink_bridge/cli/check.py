@@ -36,7 +36,7 @@ from mavlink_bridge.cli.vehicle_options import (
     with_home_option,
     with_vehicle,
 )
-from mavlink_bridge.errors import LinkError, UsageError
+from mavlink_bridge.errors import LinkError, LogError, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -132,8 +132,11 @@ def check(
     unknown: list[str] = []
     if log is not None:
         from mavlink_bridge.recorded import situation_from_log  # noqa: PLC0415 - pymavlink only where needed
+        from mavlink_bridge.vehicles import not_ardupilot  # noqa: PLC0415
 
         situation = situation_from_log(log, system, any_vehicle=any_vehicle)
+        if situation.ardupilot is False:  # how another autopilot drives its items was not measured
+            raise LogError(f"{log}: {not_ardupilot(situation.system, None)}", file=str(log))
     elif connect is not None:
         from mavlink_bridge.cli.session import Address as At  # noqa: PLC0415 - only with a link
 
@@ -303,6 +306,8 @@ def _report(checked: MissionCheck, plots: list[Path]) -> None:
             echo(f"Wrote {path}")
     for trouble in checked.troubles:
         echo(f"not understood: {trouble}", typer.colors.RED)
+    for danger in checked.dangers:
+        echo(f"DANGER: {danger}", typer.colors.RED)
     for leg in checked.broken:
         echo(f"BREAKS: {_sentence(leg)}", typer.colors.RED)
     if checked.holds:
@@ -328,6 +333,8 @@ def _metres(value_m: float) -> str:
 def _sentence(leg: CheckedLeg) -> str:
     from missions.words import metres  # noqa: PLC0415 - quick help
 
+    if leg.stops_at_seam:
+        return f"leg {leg.name} crosses {', '.join(leg.crosses)}: the vehicle stops at {leg.at}"
     if leg.crosses:
         return f"leg {leg.name} crosses {', '.join(leg.crosses)}, first at {leg.at}"
     return (
@@ -354,6 +361,7 @@ def _document(
         "broken": len(checked.broken),
         "legs": [_leg_document(leg) for leg in checked.legs],
         "not_understood": list(checked.troubles),
+        "dangers": list(checked.dangers),
         "outputs": [str(path) for path in plots],
         "warnings": warnings,
     }

@@ -153,6 +153,9 @@ def _read_parameters(session: Session) -> dict[str, float]:
             received=len(outcome.values),
             missing=len(outcome.missing),
         )
+    warn(
+        [f"{name} came as {came}, which is no number: left out" for name, came in outcome.no_numbers.items()]
+    )
     return dict(sorted(outcome.values.items()))
 
 

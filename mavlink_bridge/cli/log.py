@@ -107,16 +107,26 @@ def _draw(book: Logbook, path: Path) -> None:
         raise UsageError(f"{book.name} holds vehicles {names}; choose one to draw with --system N")
     mission = vehicle.situation.mission
     waypoints = [item.position for item in mission.value.items if item.is_placed] if mission else []
-    bits = vehicle.parameters.get("FENCE_OPTIONS", 0.0)
     picture = TrackPicture(
         fence=vehicle.fences[-1][1] if vehicle.fences else None,
         parts=tuple((part.mode, part.positions) for part in vehicle.track),
         mission=tuple(waypoints),
         targets=tuple(target.position for target in vehicle.targets),
         title=f"{book.name}: {_driven(vehicle)}",
-        union=bool(int(bits) & _UNION_BIT),
+        union=_is_union(vehicle),
     )
     draw_track(picture, path, write=write_kept)
+
+
+def _is_union(vehicle: VehicleLog) -> bool:
+    """Return whether one inclusion is enough; of a FENCE_OPTIONS that is none the notes tell."""
+    from missions.errors import VehicleError  # noqa: PLC0415 - quick help
+    from missions.vehicle import bits  # noqa: PLC0415
+
+    try:
+        return bool(bits(vehicle.parameters, "FENCE_OPTIONS", 0) & _UNION_BIT)
+    except VehicleError:
+        return False
 
 
 # Tables for people

@@ -40,7 +40,7 @@ from mavlink_bridge.cli.vehicle_options import (
     with_home_option,
     with_vehicle,
 )
-from mavlink_bridge.errors import UsageError
+from mavlink_bridge.errors import LogError, UsageError
 
 if TYPE_CHECKING:
     from missions.plan import Plan
@@ -208,8 +208,12 @@ def plan(
         uploaded = verified = result.verified
         backup = result.backup
     else:
+        from mavlink_bridge.vehicles import not_ardupilot  # noqa: PLC0415 - only where needed
+
         situation = _offline_situation(fence, log, system, any_vehicle=any_vehicle)
         situation = with_home_option(with_parameter_file(situation, vehicle), home)
+        if request.repairs and situation.ardupilot is False:
+            raise LogError(f"{log}: {not_ardupilot(situation.system, None)}", file=str(log))
         planned, planning_s = timed_plan(situation, request)
         uploaded = verified = False
         backup = None

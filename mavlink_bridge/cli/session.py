@@ -11,13 +11,14 @@ from mavlink_bridge.cli.common import warn
 from mavlink_bridge.cli.link_notes import LinkNotes
 from mavlink_bridge.errors import LinkError, OutcomeError, RefusedError
 from mavlink_bridge.link import open_link, parse_connection
-from mavlink_bridge.messages import Autopilot, CommandLong, Heartbeat, ModeFlag, RequestDataStream
+from mavlink_bridge.messages import AUTOPILOT_VERSION_ID, CommandLong, Heartbeat, ModeFlag, RequestDataStream
 from mavlink_bridge.protocol.ask_version import AskVersion
 from mavlink_bridge.protocol.command import SendCommand
 from mavlink_bridge.protocol.find import FindVehicle, identity_shared, identity_taken
 from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.rover import AUTO_MODE, MODE_NAMES
 from mavlink_bridge.vehicle_mark import VehicleMark, uid_of
+from mavlink_bridge.vehicles import not_ardupilot
 from missions.items import Command
 
 if TYPE_CHECKING:
@@ -84,7 +85,7 @@ class Session:
     Raises
     ------
     LinkError
-        The vehicle is not there.
+        The vehicle is not there, or its autopilot is not ArduPilot.
     IdentityTakenError
         Somebody else on the link speaks with our ids.
     """
@@ -112,17 +113,16 @@ class Session:
             raise self._with_signing_hint(finder.trouble)
         self.peer = Peer(finder.vehicle.system, finder.vehicle.component, *link.identity)
         self._heartbeat, self._heartbeat_s = finder.heartbeat, time.monotonic()
+        if finder.heartbeat is not None and (
+            other := not_ardupilot(finder.vehicle.system, finder.heartbeat.autopilot)
+        ):
+            raise other
 
     @property
     def vehicle(self) -> Peer:
         """The vehicle that was found."""
         assert self.peer is not None
         return self.peer
-
-    @property
-    def is_ardupilot(self) -> bool:
-        """Whether its autopilot is ArduPilot."""
-        return self._heartbeat is not None and self._heartbeat.autopilot == Autopilot.ARDUPILOTMEGA
 
     @property
     def is_active(self) -> bool | None:
@@ -198,10 +198,18 @@ class Session:
             raise OutcomeError(f"the vehicle does not show mode {name}", mode=name)
 
     def ask_telemetry(self) -> None:
-        """Ask for the position and its quality, which not every link gets unasked."""
+        """Ask for the position, its quality and the firmware's version, which not every link gets unasked."""
         peer = self.vehicle
         self._link.send_all(
-            [RequestDataStream(peer.system, peer.component, stream, _STREAM_HZ, 1) for stream in _STREAMS]
+            [
+                *(
+                    RequestDataStream(peer.system, peer.component, stream, _STREAM_HZ, 1)
+                    for stream in _STREAMS
+                ),
+                CommandLong(
+                    peer.system, peer.component, Command.REQUEST_MESSAGE, param1=AUTOPILOT_VERSION_ID
+                ),
+            ]
         )
 
     def listen_until(self, is_enough: Callable[[], bool], for_s: float) -> bool:

@@ -128,8 +128,6 @@ def upload(
         progress_bar(quiet=quiet or json_output) as show,
         open_session(address, show) as session,
     ):
-        if not session.is_ardupilot:
-            raise UsageError("the vehicle's autopilot is not ArduPilot: what it stores could not be verified")
         vehicle = session.which_vehicle()
         uploads = Uploads(session, store, vehicle, Wish(hold, replace_active))
         with uploads.begin():
@@ -269,6 +267,6 @@ def _report(
         if entry.backup:
             echo(f"  the list before is kept in {entry.backup}")
     for name, (old, new) in changed.items():
-        echo(f"{name}: {old:g} -> {new:g}, confirmed")
+        echo(f"{name}: {'no number' if old is None else f'{old:g}'} -> {new:g}, confirmed")
     if not done and not changed:
         echo("all parameters have these values already")

@@ -211,14 +211,16 @@ class Uploads:
                 f"the vehicle has no parameter {', '.join(read.missing)}; none was set",
                 missing=list(read.missing),
             )
-        different = {name: value for name, value in wanted.items() if not _is_same(read.values[name], value)}
+        different = {
+            name: value for name, value in wanted.items() if not _is_same(read.values.get(name), value)
+        }
         setting: SetParameter | None = None
         try:
             for name, value in different.items():
                 setting = SetParameter(self._session.vehicle, name, value)
                 self._session.run(setting, f"setting {name}")
                 _check_set(setting.outcome, value)
-                self.changed[name] = (read.values[name], value)
+                self.changed[name] = (read.values.get(name), value)  # None where it held no number
         except BaseException as cause:
             ended = end_of_parameters(cause, setting, self.changed)
             if ended is cause:
@@ -237,8 +239,8 @@ def _check_set(outcome: SetParameterOutcome | None, wanted: float) -> None:
         )
 
 
-def _is_same(held: float, wanted: float) -> bool:
-    return abs(held - wanted) <= 1e-6 * abs(wanted)
+def _is_same(held: float | None, wanted: float) -> bool:
+    return held is not None and abs(held - wanted) <= 1e-6 * abs(wanted)
 
 
 def _limits(session: Session, lists: Sequence[tuple[MissionType, tuple[MissionItem, ...]]]) -> Limits:

@@ -17,12 +17,13 @@ from mavlink_bridge.director.orders import Orders, TargetSource
 from mavlink_bridge.director.states import TRANSITIONS, Cue, State
 from mavlink_bridge.director.steps import Steps
 from mavlink_bridge.director.voice import Voice
-from mavlink_bridge.errors import BridgeError, LinkError, VehicleNotFoundError
+from mavlink_bridge.errors import BridgeError, LinkError
 from mavlink_bridge.fold import fold
 from mavlink_bridge.messages import Frame
 from mavlink_bridge.protocol.find import FindVehicle
 from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.protocol.table_machine import TableMachine
+from mavlink_bridge.vehicles import not_ardupilot
 from missions.situation import ListKind, Situation
 
 if TYPE_CHECKING:
@@ -148,8 +149,8 @@ class Acquaintance(TableMachine[State, Cue]):
         if find.vehicle is None or find.heartbeat is None:
             return
         vehicle = find.vehicle
-        if find.heartbeat.autopilot != m.Autopilot.ARDUPILOTMEGA and not self.orders.passive:
-            self._refuse(_no_ardupilot(vehicle.system, find.heartbeat.autopilot), now_s)
+        if not self.orders.passive and (other := not_ardupilot(vehicle.system, find.heartbeat.autopilot)):
+            self._refuse(other, now_s)
             return
         identity = self.orders.identity or (vehicle.system, self.orders.own_component)
         self._peer = Peer(vehicle.system, vehicle.component, *identity)
@@ -285,9 +286,3 @@ class Acquaintance(TableMachine[State, Cue]):
     def _vehicle_gone(self, *, has_forgotten: bool) -> None:
         """Act on a vehicle that is silent, or was switched off and on."""
         raise NotImplementedError
-
-
-def _no_ardupilot(system: int, autopilot: int) -> VehicleNotFoundError:
-    """Say that missions are made for ArduPilot only: where home stands and what modes are called is its own."""
-    name = "PX4" if autopilot == m.Autopilot.PX4 else f"MAV_AUTOPILOT {autopilot}"
-    return VehicleNotFoundError(f"system {system} is no ArduPilot ({name}): for now only ArduPilot is served")

@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
+from missions.errors import VehicleError
 from missions.geo import distance_m
+from missions.vehicle import bits
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -14,7 +16,14 @@ if TYPE_CHECKING:
     from missions.geo import LatLon
     from missions.situation import Known, Situation
 
-_PARAMETERS = ("FENCE_ENABLE", "FENCE_TYPE", "FENCE_RADIUS", "FENCE_OPTIONS", "FENCE_MARGIN")
+_PARAMETERS = (
+    "FENCE_ENABLE",
+    "FENCE_TYPE",
+    "FENCE_RADIUS",
+    "FENCE_OPTIONS",
+    "FENCE_MARGIN",
+    "FENCE_MARGIN_XY",
+)
 _CIRCLE_ABOUT_HOME = 2
 _HOME_MOVED_M = 0.5
 
@@ -30,8 +39,9 @@ class Grounds:
     @classmethod
     def of(cls, situation: Situation) -> Self:
         """Take them from what is known."""
-        has_circle = int(situation.parameters.get("FENCE_TYPE", 0)) & _CIRCLE_ABOUT_HOME
-        home = situation.home.value if has_circle and situation.home is not None else None
+        home = (
+            situation.home.value if _has_circle(situation.parameters) and situation.home is not None else None
+        )
         return cls(situation.fence, situation.parameters, home)
 
     def changes_since(self, before: Grounds) -> list[str]:
@@ -49,3 +59,11 @@ class Grounds:
         if self.home is not None and before.home is not None:
             changes += ["home moved"] if distance_m(self.home, before.home) > _HOME_MOVED_M else []
         return changes
+
+
+def _has_circle(parameters: Mapping[str, float]) -> bool:
+    """Return whether home matters; of a FENCE_TYPE that is none it may (a plan refuses it by name)."""
+    try:
+        return bool(bits(parameters, "FENCE_TYPE", 0) & _CIRCLE_ABOUT_HOME)
+    except VehicleError:
+        return True

@@ -15,7 +15,9 @@ from mavlink_bridge.director.orders import TargetSource
 from mavlink_bridge.director.states import State
 from mavlink_bridge.errors import BridgeError
 from mavlink_bridge.protocol.download import Download
+from missions.remarks import no_number_remarks
 from missions.situation import ListKind
+from missions.vehicle import PARAMETER_NAMES
 
 if TYPE_CHECKING:
     from mavlink_bridge.director.orders import Orders
@@ -98,8 +100,21 @@ class Keeper(Acquaintance):
 
     def _take_any_frame(self, frame: Frame, before: Situation, now_s: float) -> None:
         after = self.situation
+        if after.no_numbers is not before.no_numbers:
+            self._tell_no_numbers(before, now_s)
         if after.fence is not before.fence or isinstance(frame.message, m.ParamValue | m.HomePosition):
             self._notice_grounds(now_s)
+
+    def _tell_no_numbers(self, before: Situation, now_s: float) -> None:
+        """Tell of a parameter that came as no number, once; of those that matter here."""
+        after = self.situation
+        came = {
+            name: text
+            for name, text in after.no_numbers.items()
+            if name in PARAMETER_NAMES and before.no_numbers.get(name) != text
+        }
+        for text in no_number_remarks(came, after.parameters):
+            self._voice.tell(now_s, EventName.TROUBLE, text, "VehicleError", came)
 
     # Reading again
 

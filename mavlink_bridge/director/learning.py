@@ -11,7 +11,7 @@ from mavlink_bridge.director.steps import Steps
 from mavlink_bridge.errors import BridgeError, LinkError
 from mavlink_bridge.fold import with_list
 from mavlink_bridge.outcomes import download_refusal
-from mavlink_bridge.protocol.ask_version import AskVersion
+from mavlink_bridge.protocol.ask_version import VERSION_PATIENCE_S, AskVersion
 from mavlink_bridge.protocol.command import SendCommand
 from mavlink_bridge.protocol.download import Download
 from mavlink_bridge.protocol.pace import MOST_S
@@ -97,7 +97,7 @@ class Learning:
     def bound_s(self) -> float:
         """Longest time from the start to the end, whatever the link and the vehicle do."""
         transfers_s = MOST_S * (1 + len(self._kinds))  # the parameters and the lists
-        return transfers_s + _HOME_S + self._patience_s
+        return transfers_s + VERSION_PATIENCE_S + _HOME_S + self._patience_s
 
     @property
     def deadline_s(self) -> float | None:
@@ -124,6 +124,7 @@ class Learning:
                     (Download(peer, MISSION_TYPES[kind]), partial(self._take_list, kind))
                     for kind in self._kinds
                 ),
+                # Which vehicle it is, and its firmware, which decides what some parameters are by default.
                 (AskVersion(peer), self._take_version),
                 (SendCommand(peer, home), self._take_home),
             ],

@@ -8,19 +8,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mavlink_bridge import messages as m
+from mavlink_bridge.autopilot_facts import with_parameter
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.fold import FOLDED, fold
 from mavlink_bridge.logbook.clock import NEAR_S, SILENCE_S, Pulse, SteadyClock
 from mavlink_bridge.logbook.facts import Logbook, VehicleLog
 from mavlink_bridge.logbook.recorder import RECORDED, Recorder
+from mavlink_bridge.parameter_values import parameter_value
+from mavlink_bridge.recorded import begun
 from mavlink_bridge.tlog import TlogReader, survey
 from mavlink_bridge.vehicles import Vehicle, vehicles_heard
-from missions.situation import Situation
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
+
+    from missions.situation import Situation
 
 _AUTOPILOT = 1
 """MAV_COMP_ID_AUTOPILOT1."""
@@ -112,19 +116,15 @@ def _first_situations(path: Path, vehicles: list[Vehicle]) -> list[Situation]:
 
     A parameter or home that is told later held before, and so did a fence that is first seen when it is read from the vehicle.
     """
-    now = {
-        vehicle.system: Situation(
-            system=vehicle.system, component=vehicle.component, vehicle_type=vehicle.type
-        )
-        for vehicle in vehicles
-    }
+    now = {vehicle.system: begun(path, vehicle) for vehicle in vehicles}
     first = dict(now)
-    parameters: dict[int, dict[str, float]] = {number: {} for number in now}
     for entry in TlogReader(path, FOLDED - {m.GlobalPositionInt}):
         message = entry.frame.message
         if isinstance(message, m.ParamValue):
-            if entry.frame.system in parameters:
-                parameters[entry.frame.system].setdefault(message.param_id, message.param_value)
+            known = first.get(entry.frame.system)
+            if known is not None and message.param_id not in known.parameters:
+                value = parameter_value(message, bytewise=bool(known.bytewise))
+                first[entry.frame.system] = with_parameter(known, message.param_id, value)
             continue
         for number, before in now.items():
             after = now[number] = fold(before, entry.frame, entry.time_s)
@@ -134,4 +134,4 @@ def _first_situations(path: Path, vehicles: list[Vehicle]) -> list[Situation]:
                 first[number] = replace(first[number], fence=fence)
             if first[number].home is None and after.home is not None:
                 first[number] = replace(first[number], home=after.home)
-    return [replace(situation, parameters=parameters[number]) for number, situation in first.items()]
+    return list(first.values())

@@ -29,6 +29,7 @@ from missions.errors import MissionError
 from missions.geo import distance_m
 from missions.local_frame import MAX_LATITUDE_DEG, frame_around
 from missions.plan import ground_for
+from missions.remarks import no_number_remarks
 from missions.vehicle import PARAMETER_NAMES, Vehicle, vehicle_from_parameters
 
 if TYPE_CHECKING:
@@ -113,6 +114,8 @@ class Recorder:
         if self._modes:
             self._modes[-1] = replace(self._modes[-1], ended_s=now_s)
         situation = self.situation
+        for text in no_number_remarks(situation.no_numbers, situation.parameters):
+            self._note(text)
         if self._nearest is None and not self._fences:
             self._note("no clearance: no fence was transferred")
         return VehicleLog(
@@ -176,7 +179,8 @@ class Recorder:
         self._targets.append(TargetSeen(now_s, position, source, (frame.system, frame.component)))
 
     def _take_parameter(self, before: Mapping[str, float], message: m.ParamValue, now_s: float) -> None:
-        name, value = message.param_id, message.param_value
+        name = message.param_id
+        value = self.situation.parameters[name]
         known = before.get(name)
         if _matters(name) and known is not None:
             self._changes.append(ParameterChange(now_s, name, known, value))
@@ -285,7 +289,12 @@ class Recorder:
         self._meter = None
         situation = self.situation
         try:
-            self._vehicle = vehicle_from_parameters(situation.parameters, mav_type=situation.vehicle_type)
+            self._vehicle = vehicle_from_parameters(
+                situation.parameters,
+                mav_type=situation.vehicle_type,
+                firmware=situation.firmware,
+                ardupilot=situation.ardupilot,
+            )
             if situation.fence is not None and situation.fence.value.zones:
                 self._meter = FenceMeter(ground_for(situation, self._with_known_circle(self._vehicle), ()))
         except MissionError as error:

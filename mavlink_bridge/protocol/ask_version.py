@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.messages import AutopilotVersion, CommandAck, CommandLong, MavResult
+from mavlink_bridge.messages import AUTOPILOT_VERSION_ID, AutopilotVersion, CommandAck, CommandLong, MavResult
 from mavlink_bridge.protocol.table_machine import TableMachine
 from mavlink_bridge.protocol.transitions import VERSION, VersionEvent, VersionState
 from missions.items import Command
@@ -17,14 +17,13 @@ if TYPE_CHECKING:
     from mavlink_bridge.messages import Frame
     from mavlink_bridge.protocol.peer import Peer
 
-_AUTOPILOT_VERSION = 148
 _ASK_AGAIN_S = 0.7
-_PATIENCE_S = 5.0
+VERSION_PATIENCE_S = 5.0
 """At 40 % loss each way eight questions leave one vehicle in forty unknown."""
 _MOST_EMPTY_GRANTS = 2
 """Granted so often without its coming, it does not come."""
 _QUESTIONS = (
-    (Command.REQUEST_MESSAGE, float(_AUTOPILOT_VERSION)),
+    (Command.REQUEST_MESSAGE, float(AUTOPILOT_VERSION_ID)),
     (Command.REQUEST_AUTOPILOT_CAPABILITIES, 1.0),
 )
 
@@ -62,7 +61,7 @@ class AskVersion(TableMachine[VersionState, VersionEvent]):
     @property
     def bound_s(self) -> float:
         """Longest time from the start to the end."""
-        return _PATIENCE_S
+        return VERSION_PATIENCE_S
 
     @property
     def deadline_s(self) -> float | None:
@@ -72,7 +71,7 @@ class AskVersion(TableMachine[VersionState, VersionEvent]):
     def start(self, now_s: float) -> None:
         """Ask."""
         if self._move(VersionEvent.START):
-            self._give_up_s = now_s + _PATIENCE_S
+            self._give_up_s = now_s + VERSION_PATIENCE_S
             self._ask(now_s)
 
     def receive(self, frame: Frame, now_s: float) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.messages import MissionType
-from missions.item_limit import MISSION_ITEMS, most_items
+from missions.item_limit import MISSION_ITEMS, most_items, sd_card_bytes
 from missions.items import Command
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class Limits:
     def from_parameters(cls, parameters: Mapping[str, float]) -> Limits:
         """Give a vehicle's limits from its parameters: BRD_SD_MISSION and BRD_SD_FENCE are storage on the SD card, in KB."""
         limits = cls(mission_items=most_items(parameters))
-        fence_bytes = int(parameters.get("BRD_SD_FENCE", 0)) * 1024
+        fence_bytes = sd_card_bytes(parameters, "BRD_SD_FENCE")
         if fence_bytes > 0:
             limits = replace(
                 limits, fence_items=min(fence_bytes // 8, _SD_FENCE_ITEMS), fence_bytes=fence_bytes

@@ -53,11 +53,14 @@ class ParametersOutcome:
         Names the vehicle did not answer to; numbers of parameters of the list that never came.
     is_silent : bool
         The vehicle did not answer at all, or stopped answering.
+    no_numbers : mapping of str to str
+        Parameters that the vehicle answered with what is no number, and what came; they are not among the values.
     """
 
     values: Mapping[str, float] = field(default_factory=dict)
     missing: tuple[str, ...] = ()
     is_silent: bool = False
+    no_numbers: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def is_complete(self) -> bool:
@@ -92,6 +95,7 @@ class ReadParameters(TableMachine[ParameterState, ParameterEvent]):
         self._peer = peer
         self._names = None if names is None else tuple(dict.fromkeys(names))
         self._values: dict[str, float] = {}
+        self._no_numbers: dict[str, str] = {}
         self._seen_indices: set[int] = set()
         self._count = 0
         self._waiting: list[str | int] = []  # in reverse order
@@ -115,7 +119,9 @@ class ReadParameters(TableMachine[ParameterState, ParameterEvent]):
             return None
         is_silent = self.state is ParameterState.SILENT
         open_asks = [*self._missing, *self._asks, *reversed(self._waiting)]
-        return ParametersOutcome(dict(self._values), tuple(map(str, open_asks)), is_silent)
+        return ParametersOutcome(
+            dict(self._values), tuple(map(str, open_asks)), is_silent, dict(self._no_numbers)
+        )
 
     @property
     def progress(self) -> tuple[int, int]:
@@ -159,7 +165,7 @@ class ReadParameters(TableMachine[ParameterState, ParameterEvent]):
             return
         self._hear_control(message, now_s)
         if self._names is None:
-            self._values[message.param_id] = message.param_value
+            self._take(message)
             if 0 <= message.param_index < message.param_count and message.param_index != _NO_INDEX:
                 self._count = message.param_count
                 self._seen_indices.add(message.param_index)
@@ -168,10 +174,20 @@ class ReadParameters(TableMachine[ParameterState, ParameterEvent]):
             self._settle(message.param_index, now_s)
         elif message.param_id in self._names:
             self._heard_s = now_s
-            self._values[message.param_id] = message.param_value
+            self._take(message)
             self._settle(message.param_id, now_s)
         self._pace.advance(self.progress[0], now_s)
         self._go_on(now_s)
+
+    def _take(self, message: ParamValue) -> None:
+        """Take an answer; only ArduPilot is asked, which casts whole numbers."""
+        name, value = message.param_id, message.param_value
+        if math.isfinite(value):
+            self._values[name] = value
+            self._no_numbers.pop(name, None)
+        else:
+            self._values.pop(name, None)
+            self._no_numbers[name] = str(value)
 
     def handle_timer(self, now_s: float) -> None:
         """Take notice that time has passed."""

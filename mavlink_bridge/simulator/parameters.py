@@ -23,7 +23,7 @@ DEFAULTS: dict[str, float] = {
     "AVOID_BACKUP_SPD": 0.75, "AVOID_BEHAVE": 1.0, "AVOID_ENABLE": 3.0, "AVOID_MARGIN": 2.0,
     "BRD_SD_FENCE": 0, "BRD_SD_MISSION": 0, "CRUISE_SPEED": 5.0, "CRUISE_THROTTLE": 30.0, "EK3_ENABLE": 1.0, "EK3_SRC1_POSXY": 3.0,
     "EK3_SRC1_VELXY": 3.0, "EK3_SRC1_YAW": 1.0, "FENCE_ACTION": 1.0, "FENCE_ENABLE": 0, "FENCE_MARGIN":
-    2.0, "FENCE_NTF_FREQ": 1.0, "FENCE_OPTIONS": 0, "FENCE_RADIUS": 300.0, "FENCE_TOTAL": 0, "FENCE_TYPE":
+    2.0, "FENCE_MARGIN_XY": 0.0, "FENCE_NTF_FREQ": 1.0, "FENCE_OPTIONS": 0, "FENCE_RADIUS": 300.0, "FENCE_TOTAL": 0, "FENCE_TYPE":
     6, "FORMAT_VERSION": 16.0, "FRAME_CLASS": 1.0, "FRAME_TYPE": 0.0, "FS_ACTION": 2.0, "FS_CRASH_CHECK":
     0.0, "FS_EKF_ACTION": 1.0, "FS_EKF_THRESH": 0.8, "FS_GCS_ENABLE": 0.0, "FS_GCS_TIMEOUT": 5.0,
     "FS_OPTIONS": 0.0, "FS_THR_ENABLE": 1.0, "FS_THR_VALUE": 910.0, "FS_TIMEOUT": 1.5, "GUID_OPTIONS":
@@ -42,7 +42,7 @@ DEFAULTS: dict[str, float] = {
     3.0, "WP_SPEED": 5.0,
 }
 # fmt: on
-"""Read from ArduRover 4.7.0-dev, software in the loop."""
+"""Read from ArduRover 4.7.0-dev (24 October 2025), software in the loop; FENCE_MARGIN_XY came later, and at 0 changes nothing."""
 
 REAL32 = 9
 """MAV_PARAM_TYPE_REAL32."""
@@ -104,7 +104,17 @@ class ParameterStore:
 
     def flag(self, name: str, bit: int) -> bool:
         """Whether the bit of that value is set in a bit mask."""
-        return bool(int(self._values[name]) & bit)
+        return bool(self.whole(name) & bit)
+
+    def whole(self, name: str) -> int:
+        """Return an enumeration or a bit mask; 0 of what is no number."""
+        value = self._values[name]
+        return int(value) if math.isfinite(value) else 0
+
+    @property
+    def fence_margin_m(self) -> float:
+        """FENCE_MARGIN_XY where that is above 0, else FENCE_MARGIN (AC_Fence, from 4.7 on)."""
+        return self._values["FENCE_MARGIN_XY"] or self._values["FENCE_MARGIN"]
 
     def set(self, name: str, value: float) -> None:
         """Change a value; an integer parameter drops the fraction."""

@@ -139,7 +139,7 @@ class Rover:
     def renew_fence(self) -> None:
         """Take a changed fence."""
         parameters = self.parameters
-        self._enforced = int(parameters["FENCE_TYPE"]) if parameters["FENCE_ENABLE"] else 0
+        self._enforced = parameters.whole("FENCE_TYPE") if parameters["FENCE_ENABLE"] else 0
         union = parameters.flag("FENCE_OPTIONS", _UNION)
         circle = (0j, parameters["FENCE_RADIUS"]) if self._enforced & _CIRCLE else None
         items = self._fence()
@@ -227,7 +227,7 @@ class Rover:
         self.breach_time_s = now_s
         if not self.is_armed:
             return
-        action = int(self.parameters["FENCE_ACTION"])
+        action = self.parameters.whole("FENCE_ACTION")
         if action == 0:
             return
         home_wanted = action in (1, 3) and -clearance_m < GIVE_UP_M
@@ -259,7 +259,7 @@ class Rover:
         speed_mps = abs(velocity_mps)
         if not speed_mps:
             return velocity_mps
-        margin_m = self.parameters["FENCE_MARGIN"]
+        margin_m = self.parameters.fence_margin_m
         p = self.parameters["PSC_POS_P"]
         accel = min(self.parameters["ATC_ACCEL_MAX"] or 1.0, self.parameters["AVOID_ACCEL_MAX"])
         linear_mps = accel / p

@@ -32,6 +32,7 @@ _CAPABILITIES = (
     | m.Capability.MAVLINK2
     | m.Capability.MISSION_FENCE
     | m.Capability.MISSION_RALLY
+    | m.Capability.PARAM_ENCODE_C_CAST
 )
 _VERSION_4_7_0_DEV = 4 << 24 | 7 << 16
 _STANDBY, _ACTIVE, _CALIBRATING = 3, 4, 2

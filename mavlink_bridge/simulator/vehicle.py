@@ -73,9 +73,9 @@ class SimulatedVehicle:
         self._mission = MissionList(
             lambda: self._home,
             lambda: self.rover.is_running_mission,
-            int(self.parameters["BRD_SD_MISSION"]),
+            self.parameters.whole("BRD_SD_MISSION"),
         )
-        self._fence, self._rally = FenceList(int(self.parameters["BRD_SD_FENCE"])), RallyList()
+        self._fence, self._rally = FenceList(self.parameters.whole("BRD_SD_FENCE")), RallyList()
         self._lists: tuple[ItemList, ...] = (self._mission, self._fence, self._rally)
         if self.config.mission:
             _store(self._mission, with_home(self.config.mission, self._home))

@@ -13,17 +13,33 @@ if TYPE_CHECKING:
 TOP_SPEED_MPS = {Steering.ACKERMANN: 5.0, Steering.SKID: 3.0}
 
 
-def beyond_measured(vehicle: Vehicle) -> tuple[str, ...]:
-    """Say in what a vehicle lies outside the measurements that the drive model rests on.
+SLOW_MPS = 1.0
+"""Slower steered rovers swing out ever farther: the firmware turns lateral acceleration into turn rate with at least 1 m/s."""
+
+OLDEST_FIRMWARE = (4, 6, 0)
+"""The first with the corners that were measured (upstream commit 56b99d4aa5, March 2025)."""
+
+
+def beyond_measured(vehicle: Vehicle, slowest_mps: float | None = None) -> tuple[str, ...]:
+    """Return in what a vehicle lies outside the measurements that the drive model rests on.
 
     The formulas go on beyond them (a larger turning radius swings out farther, a weaker position gain strays farther), but nothing was
     measured there.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        What drives.
+    slowest_mps : float, optional
+        The least speed that is asked for on its way; default its own.
 
     Returns
     -------
     tuple of str
         One sentence each; empty where the vehicle is of the measured kind.
     """
+    least_mps = vehicle.speed_mps if slowest_mps is None else min(slowest_mps, vehicle.speed_mps)
+    firmware = vehicle.firmware or OLDEST_FIRMWARE
     top_mps = TOP_SPEED_MPS[vehicle.steering]
     checks = (
         (
@@ -35,6 +51,40 @@ def beyond_measured(vehicle: Vehicle) -> tuple[str, ...]:
             vehicle.speed_mps > top_mps,
             f"{vehicle.steering} steering was measured up to {top_mps:g} m/s, not at {vehicle.speed_mps:g} m/s",
         ),
+        (
+            vehicle.autopilot is Autopilot.ARDUPILOT
+            and vehicle.steering is Steering.ACKERMANN
+            and least_mps < SLOW_MPS,
+            (
+                f"the promise was not measured for steered rovers below {SLOW_MPS:g} m/s, and this one drives {least_mps:g} m/s: there they swing out "
+                "ever farther (after 90° 0.7 m at 1 m/s, 1.8 m at 0.5, 3.2 m at 0.3) and count waypoints as reached that they passed at a "
+                f"distance; drive {SLOW_MPS:g} m/s or more"
+            ),
+        ),
+        (
+            vehicle.autopilot is Autopilot.ARDUPILOT and firmware < OLDEST_FIRMWARE,
+            (
+                f"the promise was not measured for ArduPilot {'.'.join(map(str, firmware))}: before 4.6 rovers cut corners up to twice as deep, and "
+                "swing out as far as 5.4 m after sharp ones"
+            ),
+        ),
+        (
+            vehicle.steering is Steering.SKID
+            and vehicle.firmware is None
+            and any(one.parameter == "WP_PIVOT_ANGLE" for one in vehicle.assumed),
+            (
+                "WP_PIVOT_ANGLE is not known, nor the firmware's version: taken as 0, which needs more room (no turning on the spot; the default from "
+                "ArduPilot 4.7 on, 60 before)"
+            ),
+        ),
+        *_beyond_limits(vehicle),
+    )
+    return tuple(sentence for outside, sentence in checks if outside)
+
+
+def _beyond_limits(vehicle: Vehicle) -> tuple[tuple[bool, str], ...]:
+    """Return which of the vehicle's limits and gains were not measured."""
+    return (
         (
             vehicle.steering is Steering.ACKERMANN and vehicle.turn_radius_m > 1.0,
             f"swings were measured at a turning radius of 0.9 m and are scaled to {vehicle.turn_radius_m:g} m",
@@ -49,4 +99,3 @@ def beyond_measured(vehicle: Vehicle) -> tuple[str, ...]:
             f"straying was measured at a position gain (PSC_POS_P) of 0.2, not {vehicle.position_gain_per_s:g}",
         ),
     )
-    return tuple(sentence for outside, sentence in checks if outside)

@@ -13,6 +13,12 @@ from missions.situation import Situation
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,15}")
 _LINE = re.compile(r"^([A-Za-z][A-Za-z0-9_]{0,15})[\s,=:]+([^\s_]+)(?:\s|$)")
 
+_MOST = 3.4028234663852886e38
+"""The largest number of MAVLink's 32-bit floats."""
+
+_NOT_A_PARAMETER = "_HASH_CHECK"
+"""A checksum of all parameters that PX4 sends along with them, and MAVProxy writes down."""
+
 
 def read_parameters(path: Path | str) -> dict[str, float]:
     """Read a parameter file of Mission Planner, MAVProxy or QGroundControl (its last two columns).
@@ -36,7 +42,7 @@ def read(text: str, source: str) -> Situation:
     parameters = {}
     for number, line in enumerate(text.splitlines(), start=1):
         content = line.partition("#")[0].strip()
-        if content:
+        if content and not content.startswith(_NOT_A_PARAMETER):
             name, value = _parse(content, f"{source}: line {number}")
             parameters[name] = value
     return Situation(parameters=parameters)
@@ -59,11 +65,15 @@ def _parse(text: str, where: str) -> tuple[str, float]:
         text = f"{columns[2]} {columns[3]}"
     match = _LINE.match(text)
     try:
-        value = float(match[2]) if match else math.nan
-    except ValueError:
+        value = _number(match[2]) if match else math.nan
+    except (ValueError, OverflowError):
         value = math.nan
-    if match is None or not math.isfinite(value):
+    if match is None or not abs(value) <= _MOST:
         raise MissionFormatError(
             f"{where}: expected a parameter's name and a number, found {text!r}", where=where
         )
     return match[1].upper(), value
+
+
+def _number(text: str) -> float:
+    return float(int(text, 16)) if text.lower().startswith(("0x", "-0x")) else float(text)

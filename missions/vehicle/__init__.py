@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from missions.vehicle.ardupilot import PARAMETER_NAMES, ardupilot_vehicle
 from missions.vehicle.model import Assumed, Autopilot, FenceParameters, Footprint, Steering, Vehicle
 from missions.vehicle.px4 import px4_vehicle
-from missions.vehicle.reader import ParameterReader
+from missions.vehicle.reader import ParameterReader, bits, real_number, whole_number
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -20,12 +20,21 @@ __all__ = [
     "Footprint",
     "Steering",
     "Vehicle",
+    "bits",
+    "real_number",
     "vehicle_from_parameters",
+    "whole_number",
 ]
 
 
-def vehicle_from_parameters(parameters: Mapping[str, float], *, mav_type: int | None = None) -> Vehicle:
-    """Give the vehicle that a set of autopilot parameters describes.
+def vehicle_from_parameters(
+    parameters: Mapping[str, float],
+    *,
+    mav_type: int | None = None,
+    firmware: tuple[int, int, int] | None = None,
+    ardupilot: bool | None = None,
+) -> Vehicle:
+    """Return the vehicle that a set of autopilot parameters describes.
 
     Parameters
     ----------
@@ -33,6 +42,10 @@ def vehicle_from_parameters(parameters: Mapping[str, float], *, mav_type: int | 
         Names and values as in PARAM_VALUE or a parameter file; may hold others, may lack some or all.
     mav_type : int, optional
         MAV_TYPE of the vehicle's heartbeat.
+    firmware : tuple of int, optional
+        The autopilot's version, major, minor and patch.
+    ardupilot : bool, optional
+        Whether its heartbeat said that the autopilot is ArduPilot; default: told by the names.
 
     Returns
     -------
@@ -44,10 +57,12 @@ def vehicle_from_parameters(parameters: Mapping[str, float], *, mav_type: int | 
     VehicleError
         A value that is not a number or out of its range, with its name.
     """
-    px4 = any(name.startswith(_PX4_PREFIXES) for name in parameters)
-    ardupilot = any(name.startswith(_ARDUPILOT_PREFIXES) for name in parameters)
+    has_px4s = any(name.startswith(_PX4_PREFIXES) for name in parameters)
+    has_ardupilots = any(name.startswith(_ARDUPILOT_PREFIXES) for name in parameters)
     reader = ParameterReader(parameters)
-    return px4_vehicle(reader, mav_type) if px4 and not ardupilot else ardupilot_vehicle(reader, mav_type)
+    is_ardupilot = ardupilot if ardupilot is not None else has_ardupilots or not has_px4s
+    made_by = ardupilot_vehicle if is_ardupilot else px4_vehicle
+    return made_by(reader, mav_type, firmware)
 
 
 _PX4_PREFIXES = ("NAV_ACC_RAD", "RA_", "RD_", "RO_", "GF_")

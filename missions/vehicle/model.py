@@ -37,7 +37,9 @@ class FenceParameters:
     type_bits : int
         FENCE_TYPE: 2 the circle about home, 4 polygons and circles.
     margin_m : float
-        FENCE_MARGIN: ArduPilot's avoidance stops a rover this far from an enabled fence.
+        FENCE_MARGIN, or FENCE_MARGIN_XY where that is above 0: ArduPilot's avoidance stops a rover this far from an enabled fence.
+    margin_name : str
+        Which of the two it is.
     radius_m : float
         FENCE_RADIUS, of the circle about home (PX4: GF_MAX_HOR_DIST, 0 where there is none).
     union : bool
@@ -49,6 +51,7 @@ class FenceParameters:
     enabled: bool = False
     type_bits: int = 6
     margin_m: float = 2.0
+    margin_name: str = "FENCE_MARGIN"
     radius_m: float = 300.0
     union: bool = False
     action: int = 1
@@ -104,10 +107,14 @@ class Vehicle:
         AVOID_ENABLE: 1 keeps off fences.
     oa_type : int
         OA_TYPE: 0 none, 1 BendyRuler, 2 Dijkstra, 3 both.
+    backs_away : bool
+        AVOID_BACKUP_SPD above 0: inside the margin its avoidance drives it backwards.
     assumed : tuple of Assumed
         What was not known, with the value taken.
     mav_type : int or None
         MAV_TYPE of its heartbeat, where one was heard.
+    firmware : tuple of int or None
+        The autopilot's version, major, minor and patch, where it told.
     """
 
     waypoint_radius_m: float = 2.0
@@ -124,8 +131,10 @@ class Vehicle:
     fence: FenceParameters = field(default_factory=FenceParameters)
     avoid_bits: int = 3
     oa_type: int = 0
+    backs_away: bool = True
     assumed: tuple[Assumed, ...] = ()
     mav_type: int | None = None
+    firmware: tuple[int, int, int] | None = None
 
     @property
     def is_rover(self) -> bool:
@@ -139,7 +148,7 @@ class Vehicle:
 
     @property
     def avoids_fence(self) -> bool:
-        """Whether its own avoidance stops it in AUTO, for good, nearer than FENCE_MARGIN to a fence."""
+        """Whether its own avoidance stops it in AUTO, for good, nearer than its margin to a fence."""
         return (
             self.autopilot is Autopilot.ARDUPILOT and self.fence.enforces_zones and bool(self.avoid_bits & 1)
         )

@@ -13,8 +13,10 @@ if TYPE_CHECKING:
     from missions.vehicle.reader import ParameterReader
 
 
-def px4_vehicle(read: ParameterReader, mav_type: int | None) -> Vehicle:
-    """Give the vehicle of PX4's rover parameters; -1 is no limit."""
+def px4_vehicle(
+    read: ParameterReader, mav_type: int | None, firmware: tuple[int, int, int] | None
+) -> Vehicle:
+    """Return the vehicle of PX4's rover parameters; -1 is no limit."""
     steering = _steering(read)
     nav_acceptance_m = read.value("NAV_ACC_RAD", 10.0)
     skid = steering is Steering.SKID
@@ -42,8 +44,10 @@ def px4_vehicle(read: ParameterReader, mav_type: int | None) -> Vehicle:
             action=action,
         ),
         avoid_bits=0,
+        backs_away=False,
         assumed=tuple(read.assumed),
         mav_type=mav_type,
+        firmware=firmware,
     )
 
 

@@ -1,4 +1,4 @@
-"""Reading parameters one by one, with a note of those that were not there."""
+"""Reading parameters: each as what it can mean, or refused by its name; the one place where a parameter becomes a number of its own."""
 
 from __future__ import annotations
 
@@ -14,6 +14,50 @@ if TYPE_CHECKING:
 UNLIMITED_ACCEL_MPS2 = 20.0
 """What ArduPilot takes where ATC_ACCEL_MAX is 0, "no limit" (AR_WPNav.cpp, AR_WPNAV_ACCEL_MAX)."""
 
+MOST = 10_000.0
+"""More metres, metres a second or degrees than any rover's parameter means: FENCE_RADIUS, the longest of all, ends there (AC_Fence)."""
+
+_MOST_WHOLE = 32_767
+"""ArduPilot keeps enumerations and bit masks in 8 or 16 bits."""
+
+
+def real_number(
+    parameters: Mapping[str, float], name: str, default: float, *, least: float = 0.0, most: float = MOST
+) -> float:
+    """Return a parameter, or the default where it is not known.
+
+    Raises
+    ------
+    VehicleError
+        It is no number, or none that it can be; says what is possible.
+    """
+    value = parameters.get(name)
+    if value is None:
+        return default
+    if not math.isfinite(value):
+        raise VehicleError(f"{name} is {value}, which is no number", parameter=name, value=value)
+    if not least <= value <= most:
+        raise VehicleError(
+            f"{name} is {value:g}; possible are {least:g} to {most:g}",
+            parameter=name,
+            value=value,
+            least=least,
+            most=most,
+        )
+    return float(value)
+
+
+def whole_number(
+    parameters: Mapping[str, float], name: str, default: int, *, least: int = 0, most: int = _MOST_WHOLE
+) -> int:
+    """Return a parameter that is a whole number, rounded as ArduPilot rounds what it is sent; raises as `real_number`."""
+    return round(real_number(parameters, name, default, least=least, most=most))
+
+
+def bits(parameters: Mapping[str, float], name: str, default: int) -> int:
+    """Return a parameter that is a bit mask; raises as `real_number`."""
+    return whole_number(parameters, name, default)
+
 
 class ParameterReader:
     """Reads parameters one by one and notes which were not there."""
@@ -22,27 +66,19 @@ class ParameterReader:
         self.parameters = parameters
         self.assumed: list[Assumed] = []
 
-    def known(self, name: str) -> float | None:
-        """Give the parameter, None where it is not there."""
-        value = self.parameters.get(name)
-        if value is None:
+    def known(self, name: str, *, least: float = -MOST, most: float = MOST) -> float | None:
+        """Return the parameter, None where it is not there."""
+        if name not in self.parameters:
             return None
-        if not math.isfinite(value):
-            raise VehicleError(f"{name} is {value}, which is no number", parameter=name, value=value)
-        return float(value)
+        return real_number(self.parameters, name, 0.0, least=least, most=most)
 
-    def value(self, name: str, default: float, *, least: float = 0.0) -> float:
-        """Give the parameter, or the default and a note of it."""
-        value = self.known(name)
-        if value is None:
+    def value(self, name: str, default: float, *, least: float = 0.0, most: float = MOST) -> float:
+        """Return the parameter, or the default and a note of it."""
+        if name not in self.parameters:
             self.assumed.append(Assumed(name, default))
-            return default
-        if value < least:
-            raise VehicleError(
-                f"{name} is {value:g}; it cannot be below {least:g}", parameter=name, value=value
-            )
-        return value
+        return real_number(self.parameters, name, default, least=least, most=most)
 
     def bits(self, name: str, default: int) -> int:
-        """Give the parameter as a whole number, or the default and a note of it."""
-        return int(self.value(name, default))
+        """Return the parameter as a whole number, or the default and a note of it."""
+        self.value(name, default, most=_MOST_WHOLE)
+        return bits(self.parameters, name, default)

@@ -546,3 +546,40 @@ def test_no_message_from_anyone_breaks_it(data):
         for _ in range(data.draw(st.integers(1, 40))):
             run.step()
     run.director.deadline_s  # noqa: B018 - must not raise either
+
+
+@pytest.mark.parametrize("came", [float("nan"), float("inf")])
+@pytest.mark.parametrize(
+    "name", ["FENCE_TYPE", "FENCE_OPTIONS", "FENCE_MARGIN", "BRD_SD_MISSION", "MIS_DONE_BEHAVE"]
+)
+def test_a_parameter_that_comes_as_no_number_while_it_drives_is_told_once_and_changes_nothing(name, came):
+    run = driving(conductor())
+    before = len(run.events)
+    for _ in range(3):
+        run.down.push(m.Frame(1, 1, m.ParamValue(name, came, 9, 1, 0)), run.now_s)
+        for _ in range(20):
+            run.step()
+    assert run.director.state is State.DRIVING
+    told = [event for event in run.events[before:] if event.name is EventName.TROUBLE]
+    matters = name.startswith("FENCE_")
+    assert len(told) == matters
+    if matters:
+        assert told[0].text.startswith(f"{name} came as {came}, which is no number: it stays at ")
+    run.run_until(lambda: run.director.state is State.ARRIVED)
+
+
+@pytest.mark.parametrize(
+    ("name", "came"), [("FENCE_TYPE", 1e38), ("FENCE_OPTIONS", -3.0), ("BRD_SD_FENCE", 1e38)]
+)
+def test_a_parameter_that_cannot_be_does_not_end_the_bridge(name, came):
+    run = driving(conductor())
+    run.down.push(m.Frame(1, 1, m.ParamValue(name, came, 9, 1, 0)), run.now_s)
+    for _ in range(200):
+        run.step()
+    assert run.director.state is not State.FAILED
+    if name == "BRD_SD_FENCE":
+        assert run.director.state is State.DRIVING
+        return
+    run.director.take_target(HOME, run.now_s)
+    run.run_until(lambda: run.events[-1].name is EventName.NO_PLAN)
+    assert f"{name} is {came:g}; possible are 0 to 32767" in run.events[-1].text

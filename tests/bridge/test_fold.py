@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import struct
 from dataclasses import fields, replace
 
 import pytest
@@ -487,6 +488,8 @@ by_name = {
     "frame": st.integers(0, 12), "coordinate_frame": st.integers(0, 12),
     "command": st.sampled_from([16, 17, 20, 192, 202, 5000, 5001, 5002, 5003, 5004, 5100, 65535]),
     "current": small, "autocontinue": small, "param1": floats | st.sampled_from([3.0, 4.0]),
+    "text": st.text(max_size=50) | st.from_regex(r"ArduRover V[0-9]{1,3}\.[0-9]{1,3}", fullmatch=True),
+    "capabilities": st.integers(0, 2**64 - 1), "flight_sw_version": st.integers(0, 2**32 - 1),
     "param_id": st.text(max_size=16), "autopilot": st.sampled_from([0, 3, 8, 12]), "type_mask": st.sampled_from([0, 1, 0xFFFF]),
     "base_mode": st.integers(0, 255), "custom_mode": st.integers(0, 2**32 - 1), "hdg": st.integers(0, 65535),
 }  # fmt: skip
@@ -529,3 +532,77 @@ def test_no_stream_makes_fold_raise_or_believe_nonsense(stream: list[Frame]) -> 
                 assert place != (0, 0)
         if situation.fence is not None:
             assert fence_to_items(situation.fence.value) is not None
+
+
+class TestParametersAreParsed:
+    """Only numbers become parameters, each decoded as its autopilot encodes it."""
+
+    PX4, ARDUPILOT, OTHER = (m.Heartbeat(10, autopilot) for autopilot in (12, 3, 0))
+
+    @staticmethod
+    def bits(layout: str, value: int) -> float:
+        return struct.unpack("<f", struct.pack(layout, value))[0]
+
+    @pytest.mark.parametrize("came", [math.nan, math.inf, -math.inf])
+    def test_what_is_no_number_is_none(self, came: float) -> None:
+        found = after(NEW, (ROVER, m.ParamValue("FENCE_TYPE", came, 9, 1, 0)))
+        assert dict(found.parameters) == {}
+        assert dict(found.no_numbers) == {"FENCE_TYPE": str(came)}
+        assert after(found, (ROVER, m.ParamValue("FENCE_TYPE", came, 9, 1, 0))) is found
+        mended = after(found, (ROVER, m.ParamValue("FENCE_TYPE", 7.0, 9, 1, 0)))
+        assert (dict(mended.parameters), dict(mended.no_numbers)) == ({"FENCE_TYPE": 7.0}, {})
+
+    def test_what_was_known_before_stands(self) -> None:
+        known = after(NEW, (ROVER, m.ParamValue("FENCE_TYPE", 4.0, 9, 1, 0)))
+        found = after(known, (ROVER, m.ParamValue("FENCE_TYPE", math.nan, 9, 1, 0)))
+        assert dict(found.parameters) == {"FENCE_TYPE": 4.0}
+        assert dict(found.no_numbers) == {"FENCE_TYPE": "nan"}
+
+    @pytest.mark.parametrize(
+        ("kind", "layout", "value"),
+        [(1, "<Bxxx", 200), (2, "<bxxx", -7), (3, "<Hxx", 40_000), (4, "<hxx", -300), (5, "<I", 2**31), (6, "<i", -1),
+         (6, "<i", 6), (6, "<i", 1_077_936_128)],
+    )  # fmt: skip
+    def test_px4_sends_bits(self, kind: int, layout: str, value: int) -> None:
+        told = m.ParamValue("GF_ACTION", self.bits(layout, value), kind, 1, 0)
+        assert dict(after(NEW, (ROVER, self.PX4), (ROVER, told)).parameters) == {"GF_ACTION": value}
+
+    def test_px4_sends_real_numbers_as_they_are(self) -> None:
+        told = m.ParamValue("NAV_ACC_RAD", 0.5, 9, 1, 0)
+        assert dict(after(NEW, (ROVER, self.PX4), (ROVER, told)).parameters) == {"NAV_ACC_RAD": 0.5}
+
+    @pytest.mark.parametrize("capabilities", [0, 16, 131072])
+    def test_ardupilot_casts_and_px4_does_not_whatever_else_they_say(self, capabilities: int) -> None:
+        told = m.ParamValue("FENCE_TYPE", 7.0, 2, 1, 0)
+        says = m.AutopilotVersion(capabilities)
+        assert after(NEW, (ROVER, says), (ROVER, self.ARDUPILOT), (ROVER, told)).parameters["FENCE_TYPE"] == 7
+        told = m.ParamValue("GF_ACTION", self.bits("<i", 2), 6, 1, 0)
+        assert after(NEW, (ROVER, self.PX4), (ROVER, says), (ROVER, told)).parameters["GF_ACTION"] == 2
+
+    def test_of_others_their_capabilities_count(self) -> None:
+        told = (ROVER, m.ParamValue("A", self.bits("<i", 2), 6, 1, 0))
+        bytewise = after(NEW, (ROVER, self.OTHER), (ROVER, m.AutopilotVersion(16)), told)
+        assert bytewise.parameters["A"] == 2
+        cast = after(NEW, (ROVER, self.OTHER), (ROVER, m.AutopilotVersion(131072)), told)
+        assert cast.parameters["A"] == self.bits("<i", 2)
+
+
+class TestFirmware:
+    """The version is told by AUTOPILOT_VERSION, or by ArduPilot's banner."""
+
+    @pytest.mark.parametrize(
+        ("message", "firmware"),
+        [
+            (m.AutopilotVersion(0, 0x040507FF), (4, 5, 7)),
+            (m.AutopilotVersion(0, 0x04070000), (4, 7, 0)),
+            (m.AutopilotVersion(0, 0), None),
+            (m.Statustext(6, "ArduRover V4.5.7 (0358a9c2)"), (4, 5, 7)),
+            (m.Statustext(6, "ArduRover V4.7.0-dev (ee3f6ed6)"), (4, 7, 0)),
+            (m.Statustext(6, "ArduRover V4.6 beta"), (4, 6, 0)),
+            (m.Statustext(6, "I like ArduRover V4.5.7"), None),
+            (m.Statustext(6, "ArduRover V"), None),
+        ],
+    )
+    def test_it_is_read(self, message: m.Message, firmware: tuple[int, int, int] | None) -> None:
+        assert after(NEW, (ROVER, message)).firmware == firmware
+        assert after(NEW, (STATION, message)).firmware is None

@@ -20,7 +20,7 @@ from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.rover import AUTO_MODE, HOLD_MODE
 from mavlink_bridge.simulator import Simulator, SimulatorConfig
 from missions.errors import SituationError
-from missions.fence import PolygonZone, ZoneKind, fence_to_items
+from missions.fence import Fence, PolygonZone, ZoneKind, fence_to_items
 from missions.formats import read_fence, read_mission, read_situation, write_situation
 from missions.geo import LatLon
 from missions.items import Command, CoordinateFrame, MissionItem, with_home
@@ -400,3 +400,67 @@ def test_wrong_usage_of_tours(yard):
         assert run(*base, *via, *more).exit_code == 2
     assert run(*base, "--via-mission", "own").exit_code == 3  # the fence's file holds none
     assert run(*base, "--via-mission", "none.plan").exit_code == 3
+
+
+UNION = "FENCE_ENABLE 1\nFENCE_TYPE 4\nFENCE_OPTIONS 2\nFENCE_MARGIN 2\nAVOID_ENABLE 3\n"
+
+
+def test_a_seam_before_which_the_vehicle_stops_is_named_with_its_place(tmp_path):
+    fence, mission, vehicle = (tmp_path / name for name in ("f.waypoints", "m.waypoints", "rover.parm"))
+    lons = ((-105.2310, -105.2295), (-105.2297, -105.2280))
+    zones = [
+        PolygonZone(
+            ZoneKind.INCLUSION,
+            tuple(LatLon(*corner) for corner in ((40.07, a), (40.073, a), (40.073, b), (40.07, b))),
+        )
+        for a, b in lons
+    ]
+    write_situation(Situation(fence=Known(Fence(tuple(zones)), None, "test")), fence)
+    items = (MissionItem(16, 3, lat_e7=400_713_740, lon_e7=-1_052_285_000),)
+    write_situation(Situation(mission=Known(Mission(items, HOME), None, "test")), mission)
+    vehicle.write_text(UNION, encoding="utf-8")
+    asked = ("check", "--mission", mission, "--fence", fence, "--vehicle", vehicle)
+    result = run(*asked)
+    assert result.exit_code == 8
+    assert re.search(
+        r"BREAKS: leg start → 1 crosses the seam at the edge of inclusion polygon 2: the vehicle stops at 40\.07137\d+,-105\.22970\d+",
+        result.output,
+    )
+    assert "set AVOID_ENABLE 2 (without bit 0), or draw the polygons as one" in result.output
+    document = document_of(*asked, code=8)
+    assert document["legs"][0]["crosses"][0].startswith("the seam at the edge of inclusion polygon")
+    vehicle.write_text(UNION.replace("AVOID_ENABLE 3", "AVOID_ENABLE 2"), encoding="utf-8")
+    assert document_of(*asked)["broken"] == 0
+
+
+def test_a_start_from_which_rovers_back_into_the_fence_is_a_danger(tmp_path):
+    fence, mission, vehicle = (tmp_path / name for name in ("f.waypoints", "m.waypoints", "rover.parm"))
+    corners = ((40.0713, -105.2305), (40.0733, -105.2305), (40.0733, -105.228), (40.0713, -105.228))
+    zone = PolygonZone(ZoneKind.INCLUSION, tuple(LatLon(*corner) for corner in corners))
+    write_situation(Situation(fence=Known(Fence((zone,)), None, "test")), fence)
+    home = LatLon(40.07131, -105.2295)  # 1.1 m inside the southern edge
+    items = (MissionItem(16, 3, lat_e7=400_722_000, lon_e7=-1_052_295_000),)
+    write_situation(Situation(mission=Known(Mission(items, home), None, "test")), mission)
+    vehicle.write_text("FENCE_ENABLE 1\nFENCE_TYPE 4\nFENCE_MARGIN 2\nAVOID_ENABLE 3\n", encoding="utf-8")
+    asked = ("check", "--mission", mission, "--fence", fence, "--vehicle", vehicle)
+    result = run(*asked)
+    assert result.exit_code == 8
+    assert (
+        "DANGER: the start is 1.11 m from inclusion polygon 1, nearer than FENCE_MARGIN 2 m" in result.output
+    )
+    document = document_of(*asked, code=8)
+    assert (document["status"], document["broken"], len(document["dangers"])) == ("failed", 0, 1)
+    vehicle.write_text(
+        "FENCE_ENABLE 1\nFENCE_TYPE 4\nFENCE_MARGIN 2\nAVOID_ENABLE 3\nAVOID_BACKUP_SPD 0\n", encoding="utf-8"
+    )
+    assert document_of(*asked)["dangers"] == []
+
+
+def test_a_slow_mission_and_old_firmware_are_said(tmp_path, yard):
+    vehicle = tmp_path / "rover.parm"
+    vehicle.write_text("WP_SPEED 0.5\nFENCE_MARGIN 0\nFENCE_ENABLE 1\nFENCE_TYPE 4\n", encoding="utf-8")
+    warnings = check_yard(yard, "--vehicle", str(vehicle))["warnings"]
+    assert any(
+        "not measured for steered rovers below 1 m/s, and this one drives 0.5 m/s" in one for one in warnings
+    )
+    assert any("FENCE_MARGIN 0 m does not switch avoidance off" in one for one in warnings)

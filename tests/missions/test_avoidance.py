@@ -97,6 +97,13 @@ def driven(
         (ROUND_TWO_CORNERS, wall(47.5, 49.0), STEERED_5),
         (NORTH_THEN_EAST, wall(43.0, 46.0), STEERED_2),
         ([(0.0, 0.0), (0.0, 40.0), (30.0, 60.0)], wall(43.5, 46.0, -60.0, 1.0), SKID_2),
+        pytest.param(NORTH_THEN_EAST, wall(42.5, 46.0), {**STEERED_5, "FENCE_MARGIN": 0.0}, id="no margin"),
+        pytest.param(
+            NORTH_THEN_EAST,
+            wall(44.0, 46.0),
+            {**STEERED_5, "FENCE_MARGIN": 0.0, "FENCE_MARGIN_XY": 2.0},
+            id="the flat margin",
+        ),
     ],
 )
 def test_a_rover_that_is_slowed_at_a_corner_leaves_the_plain_band_but_not_this_one(

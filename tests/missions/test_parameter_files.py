@@ -74,3 +74,23 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     (tmp_path / "x.parm").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(MissionFormatError, match=r"x\.parm is not a text file"):
         read_parameters(tmp_path / "x.parm")
+
+
+def test_the_checksum_that_mavproxy_writes_down_is_passed_over(tmp_path: Path) -> None:
+    path = tmp_path / "mav.parm"
+    path.write_text("NAV_ACC_RAD      0.500000\n_HASH_CHECK      123456789\n", encoding="utf-8")
+    assert read_parameters(path) == {"NAV_ACC_RAD": 0.5}
+
+
+def test_bit_masks_may_be_hexadecimal(tmp_path: Path) -> None:
+    path = tmp_path / "a.parm"
+    path.write_text("CAN_D1_UC_ESC_BM 0x0F\nFENCE_OPTIONS 0X2\n", encoding="utf-8")
+    assert read_parameters(path) == {"CAN_D1_UC_ESC_BM": 15.0, "FENCE_OPTIONS": 2.0}
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "-inf", "1e999", "1e39", "0x" + "f" * 400, "0xg"])
+def test_what_no_32_bit_float_holds_is_no_value(tmp_path: Path, value: str) -> None:
+    path = tmp_path / "a.parm"
+    path.write_text(f"FENCE_TYPE {value}\n", encoding="utf-8")
+    with pytest.raises(MissionFormatError, match="line 1: expected a parameter's name and a number"):
+        read_parameters(path)

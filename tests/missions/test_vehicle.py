@@ -6,8 +6,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from missions.drive_model import beyond_measured
 from missions.errors import VehicleError
-from missions.vehicle import Autopilot, FenceParameters, Footprint, Steering, Vehicle, vehicle_from_parameters
+from missions.item_limit import most_items, storage_remarks
+from missions.vehicle import (
+    Autopilot,
+    FenceParameters,
+    Footprint,
+    Steering,
+    Vehicle,
+    vehicle_from_parameters,
+    whole_number,
+)
 
 SKID = {"SERVO1_FUNCTION": 73, "SERVO3_FUNCTION": 74}
 ACKERMANN = {"SERVO1_FUNCTION": 26, "SERVO3_FUNCTION": 70}
@@ -30,6 +40,7 @@ KNOWN = {
     "FENCE_OPTIONS": 3,
     "FENCE_ACTION": 2,
     "AVOID_ENABLE": 1,
+    "AVOID_BACKUP_SPD": 0.0,
     "OA_TYPE": 2,
     **ACKERMANN,
 }
@@ -51,6 +62,7 @@ def test_a_vehicle_whose_parameters_are_all_known() -> None:
         fence=FenceParameters(enabled=True, type_bits=4, margin_m=1.0, radius_m=150.0, union=True, action=2),
         avoid_bits=1,
         oa_type=2,
+        backs_away=False,
         assumed=(),
         mav_type=10,
     )
@@ -112,7 +124,7 @@ def test_zero_means_what_it_means_to_ardupilot(
     ],
 )
 def test_steering_from_the_outputs(functions: dict[str, float], steering: Steering) -> None:
-    vehicle = vehicle_from_parameters(functions)
+    vehicle = vehicle_from_parameters({"WP_PIVOT_ANGLE": 60, **functions})
     assert vehicle.steering is steering
     assert vehicle.can_pivot is (steering is Steering.SKID)
 
@@ -124,9 +136,9 @@ def test_no_pivot_angle_no_pivots() -> None:
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        ({"WP_RADIUS": -1.0}, "WP_RADIUS is -1; it cannot be below 0"),
+        ({"WP_RADIUS": -1.0}, "WP_RADIUS is -1; possible are 0 to 1000"),
         ({"WP_SPEED": math.nan}, "WP_SPEED is nan, which is no number"),
-        ({"PSC_POS_P": 0.0}, "PSC_POS_P is 0; it cannot be below 0.01"),
+        ({"PSC_POS_P": 0.0}, "PSC_POS_P is 0; possible are 0.01 to 100"),
         ({"WP_SPEED": 0.0, "CRUISE_SPEED": 0.0}, "would not move"),
         ({"RA_MAX_STR_ANG": 1.6}, "RA_MAX_STR_ANG is 1.6 rad"),
         ({"RA_MAX_STR_ANG": math.inf}, "RA_MAX_STR_ANG is inf"),
@@ -229,3 +241,104 @@ def test_footprint() -> None:
 def test_a_footprint_that_is_none(sizes: tuple[float, float]) -> None:
     with pytest.raises(VehicleError, match="footprint"):
         Footprint(*sizes)
+
+
+@pytest.mark.parametrize("value", [1e38, -1.0, 32_768.0, math.nan, math.inf])
+@pytest.mark.parametrize("name", ["FENCE_TYPE", "FENCE_OPTIONS", "FENCE_ACTION", "AVOID_ENABLE", "OA_TYPE"])
+def test_a_bit_mask_or_enumeration_that_is_none_is_refused(name: str, value: float) -> None:
+    with pytest.raises(VehicleError, match=f"{name} is .*(possible are 0 to 32767|no number)"):
+        vehicle_from_parameters({name: value})
+
+
+@pytest.mark.parametrize("value", [1e38, -1.0, math.nan, math.inf])
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("WP_SPEED", "WP_RADIUS", "TURN_RADIUS", "ATC_TURN_MAX_G", "ATC_ACCEL_MAX", "ATC_DECEL_MAX", "WP_ACCEL", "WP_JERK"),
+        *("PSC_POS_P", "FENCE_MARGIN", "FENCE_MARGIN_XY", "FENCE_RADIUS", "AVOID_BACKUP_SPD", "WP_PIVOT_RATE"),
+    ],
+)  # fmt: skip
+def test_a_quantity_that_is_none_is_refused(name: str, value: float) -> None:
+    with pytest.raises(VehicleError, match=f"{name} is .*(possible are|no number)"):
+        vehicle_from_parameters({name: value})
+
+
+def test_whole_numbers_are_rounded_as_ardupilot_rounds_them() -> None:
+    assert vehicle_from_parameters({"FENCE_TYPE": 5.9}).fence.type_bits == 6
+    assert whole_number({"A": 2.4}, "A", 7) == 2
+    assert whole_number({}, "A", 7) == 7
+
+
+@pytest.mark.parametrize(
+    ("parameters", "margin_m", "name"),
+    [
+        ({"FENCE_MARGIN": 3.0}, 3.0, "FENCE_MARGIN"),
+        ({"FENCE_MARGIN": 3.0, "FENCE_MARGIN_XY": 0.0}, 3.0, "FENCE_MARGIN"),
+        ({"FENCE_MARGIN": 3.0, "FENCE_MARGIN_XY": 0.5}, 0.5, "FENCE_MARGIN_XY"),
+        ({"FENCE_MARGIN": 0.0, "FENCE_MARGIN_XY": 5.0}, 5.0, "FENCE_MARGIN_XY"),
+    ],
+)
+def test_the_margin_of_horizontal_fences(parameters: dict[str, float], margin_m: float, name: str) -> None:
+    vehicle = vehicle_from_parameters({**KNOWN, **parameters})
+    assert (vehicle.fence.margin_m, vehicle.fence.margin_name) == (margin_m, name)
+    assert vehicle.stops_within_m == margin_m
+
+
+@pytest.mark.parametrize(
+    ("told", "firmware", "pivot_angle_deg"),
+    [
+        ({}, None, 0.0),
+        ({}, (4, 5, 7), 60.0),
+        ({}, (4, 6, 3), 60.0),
+        ({}, (4, 7, 0), 0.0),
+        ({"WP_PIVOT_ANGLE": 45.0}, None, 45.0),
+        ({"WP_PIVOT_ANGLE": 45.0}, (4, 7, 0), 45.0),
+    ],
+)
+def test_what_a_skid_steered_rover_pivots_at_where_nobody_told(
+    told: dict[str, float], firmware: tuple[int, int, int] | None, pivot_angle_deg: float
+) -> None:
+    vehicle = vehicle_from_parameters({**SKID, **told}, firmware=firmware)
+    assert vehicle.pivot_angle_deg == pivot_angle_deg
+    said = [text for text in beyond_measured(vehicle) if "WP_PIVOT_ANGLE is not known" in text]
+    assert bool(said) is (not told and firmware is None)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "slowest_mps", "said"),
+    [
+        ({"WP_SPEED": 1.0}, None, False),
+        ({"WP_SPEED": 0.9}, None, True),
+        ({"WP_SPEED": 2.0}, 0.5, True),
+        ({"WP_SPEED": 0.5, **SKID}, None, False),
+    ],
+)
+def test_slow_steered_rovers_were_not_measured(
+    parameters: dict[str, float], slowest_mps: float | None, said: bool
+) -> None:
+    texts = beyond_measured(vehicle_from_parameters(parameters), slowest_mps)
+    assert any("not measured for steered rovers below 1 m/s" in text for text in texts) is said
+
+
+@pytest.mark.parametrize(
+    ("firmware", "said"), [(None, False), ((4, 5, 7), True), ((4, 6, 0), False), ((4, 7, 0), False)]
+)
+def test_firmware_before_4_6_was_not_measured(firmware: tuple[int, int, int] | None, said: bool) -> None:
+    texts = beyond_measured(vehicle_from_parameters({}, firmware=firmware))
+    assert any("not measured for ArduPilot 4.5.7: before 4.6" in text for text in texts) is said
+
+
+@pytest.mark.parametrize(
+    ("parameters", "items"),
+    [
+        ({}, 655),
+        ({"BRD_SD_MISSION": 64.0}, 4368),
+        ({"BRD_SD_MISSION": 1e38}, 655),
+        ({"BRD_SD_MISSION": -1.0}, 655),
+    ],
+)
+def test_storage_that_is_none_counts_as_none(parameters: dict[str, float], items: int) -> None:
+    assert most_items(parameters) == items
+    said = storage_remarks(parameters)
+    assert bool(said) is (parameters.get("BRD_SD_MISSION") in (1e38, -1.0))
+    assert all("taken as 0" in text for text in said)

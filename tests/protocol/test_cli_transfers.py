@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import pytest
 from protocol.twin import plain_fence, plain_mission
@@ -392,10 +393,30 @@ def test_a_vehicle_that_refuses_or_is_busy(rover, monkeypatch):
     assert (code, document["details"]["result"]) == (6, "DENIED")
 
 
-def test_an_autopilot_that_is_not_ardupilot_is_not_written_to(rover, tmp_path, monkeypatch):
-    from mavlink_bridge.cli import session
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("upload", "MISSION"),
+        ("download", "mission"),
+        ("download", "fence"),
+        ("download", "parameters"),
+        ("check",),
+        ("plan", "--target", "40.0726,-105.2290"),
+    ],
+)
+def test_an_autopilot_that_is_not_ardupilot_is_refused_by_every_command(
+    rover, tmp_path, monkeypatch, command
+):
+    from mavlink_bridge.simulator import telemetry
 
-    monkeypatch.setattr(session.Session, "is_ardupilot", property(lambda _: False))
-    code, _, output = run(rover, "upload", mission_file(tmp_path))
-    assert code == 2
-    assert "not ArduPilot" in output
+    arguments = [str(mission_file(tmp_path)) if word == "MISSION" else word for word in command]
+    own = telemetry._BUILDERS[telemetry.streams.HEARTBEAT]
+    monkeypatch.setitem(
+        telemetry._BUILDERS, telemetry.streams.HEARTBEAT, lambda state: replace(own(state), autopilot=12)
+    )
+    code, document, _ = run(rover, *arguments, "--json")
+    assert (code, document["error"]) == (5, "VehicleNotFoundError")
+    assert document["message"] == (
+        "the autopilot of system 1 is not ArduPilot (PX4): for now only ArduPilot is served"
+    )
+    assert document["details"]["autopilot"] == 12

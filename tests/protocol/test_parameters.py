@@ -224,3 +224,14 @@ def test_unstarted_machines_are_quiet():
         assert machine.messages_to_send() == []
         assert machine.deadline_s is None
         assert machine.outcome is None
+
+
+@pytest.mark.parametrize("came", [math.nan, math.inf])
+def test_what_is_no_number_is_answered_and_no_value(came):
+    store = Store(ReadParameters(PEER, NAMES[:3]))
+    store.values["P001"] = came
+    store.run()
+    outcome = store.machine.outcome
+    assert outcome.values == {"P000": 0.0, "P002": 2.0}
+    assert outcome.no_numbers == {"P001": str(came)}
+    assert (outcome.missing, outcome.is_complete) == ((), True)

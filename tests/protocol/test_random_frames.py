@@ -64,6 +64,8 @@ def any_message(draw, classes):
             values[field.name] = draw(st.sampled_from([0, 0, 0, 1, 255]))
         elif field.type == "float":
             values[field.name] = draw(st.one_of(NUMBERS, st.just(float("nan"))))
+        elif field.type == "tuple[int, ...]":
+            values[field.name] = tuple(draw(st.lists(st.integers(0, 255), max_size=18)))
         else:
             values[field.name] = draw(st.one_of(st.integers(0, 6), st.integers(0, 255)))
     return message_class(**values)

@@ -1,0 +1,101 @@
+"""Recordings of PX4 rovers: their parameters are read as PX4 sends them, and what would be a false claim is refused."""
+
+from __future__ import annotations
+
+import json
+import struct
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from typer.testing import CliRunner
+
+from mavlink_bridge import messages as m
+from mavlink_bridge.cli.app import app
+from mavlink_bridge.codec import Codec
+from mavlink_bridge.tlog import TlogWriter
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+INT32, REAL32 = 6, 9
+CORNERS = [(48.1, 11.5), (48.101, 11.5), (48.101, 11.501), (48.1, 11.501)]
+TARGET = "48.1008,11.5008"
+PARAMETERS = [
+    ("CA_AIRFRAME", INT32, 6),
+    ("GF_ACTION", INT32, 2),
+    ("RA_WHEEL_BASE", REAL32, 0.5),
+    ("RD_TRANS_DRV_TRN", REAL32, 0.1),
+    ("RO_SPEED_LIM", REAL32, 1.5),
+    ("NAV_ACC_RAD", REAL32, 0.5),
+    ("GF_MAX_HOR_DIST", REAL32, 0.0),
+]
+
+
+def told(kind: int, value: float) -> float:
+    return struct.unpack("<f", struct.pack("<i", value))[0] if kind == INT32 else value
+
+
+def px4_log(path: Path, parameters=PARAMETERS, *, waypoints=((48.1002, 11.5005), (48.1008, 11.5005))) -> Path:
+    """A PX4 rover's log: INT32 sent bytewise, a fence and a mission read back (without a home item), a place."""
+    heartbeat = m.Heartbeat(10, 12, 0x51, 0x04040000, 4)
+    own: list[m.Message] = [
+        heartbeat,
+        m.AutopilotVersion(0xE8FF, 0x011100FF),
+        m.ParamValue("GF_ACTION", told(INT32, 3), INT32, 7, 0),
+        *(m.ParamValue(name, told(kind, value), kind, 7, 0) for name, kind, value in parameters),
+    ]
+    for mission_type, command, places in ((1, 5001, CORNERS), (0, 16, waypoints)):
+        own.append(m.MissionCount(255, 190, len(places), mission_type))
+        own += [
+            m.MissionItemInt(
+                255, 190, n, 0, command, 0, 1, 4.0 if mission_type else 0.0, 0, 0, 0, round(lat * 1e7), round(lon * 1e7), 0, mission_type
+            )
+            for n, (lat, lon) in enumerate(places)
+        ]  # fmt: skip
+    own += [heartbeat, m.GlobalPositionInt(0, 481_005_000, 115_005_000)]
+    codec = Codec(1, 1)
+    with TlogWriter(path) as log:
+        for number, message in enumerate(own):
+            log.write(1.79e9 + number / 10, codec.encode(message))
+    return path
+
+
+def run(*arguments: object) -> tuple[int, dict[str, Any]]:
+    result = CliRunner().invoke(app, [*map(str, arguments), "--json"])
+    return result.exit_code, json.loads(result.stdout)
+
+
+def test_whole_numbers_are_read_as_px4_sends_them(tmp_path: Path) -> None:
+    code, found = run("plan", "--log", px4_log(tmp_path / "px4.tlog"), "--target", TARGET)
+    assert code == 0
+    assert not any("does not enforce this fence" in text for text in found["warnings"])  # GF_ACTION 2
+    assert not any("CA_AIRFRAME" in text for text in found["warnings"])
+    assert "the drive model was measured on ArduPilot Rover, not on PX4" in found["warnings"]
+
+
+def test_the_log_tells_them_too(tmp_path: Path) -> None:
+    code, found = run("log", px4_log(tmp_path / "px4.tlog"))
+    assert code == 0
+    (vehicle,) = found["vehicles"] if "vehicles" in found else found["logs"][0]["vehicles"]
+    parameters = vehicle["parameters"]
+    assert {name: parameters[name] for name in ("GF_ACTION", "NAV_ACC_RAD")} == {
+        "GF_ACTION": 2.0,
+        "NAV_ACC_RAD": 0.5,
+    }
+    (change,) = vehicle["parameter_changes"]
+    assert (change["name"], change["before"], change["after"]) == ("GF_ACTION", 3.0, 2.0)
+
+
+def test_a_px4_rover_that_told_no_parameters_is_no_ardupilot(tmp_path: Path) -> None:
+    code, found = run("plan", "--log", px4_log(tmp_path / "px4.tlog", []), "--target", TARGET)
+    assert code == 0
+    assert "the drive model was measured on ArduPilot Rover, not on PX4" in found["warnings"]
+
+
+@pytest.mark.parametrize("command", [("check", "--log"), ("plan", "--via-mission", "own", "--log")])
+def test_of_its_mission_nothing_is_claimed(tmp_path: Path, command: tuple[str, ...]) -> None:
+    code, found = run(*command, log := px4_log(tmp_path / "px4.tlog"))
+    assert (code, found["error"]) == (3, "LogError")
+    assert found["message"] == (
+        f"{log}: the autopilot of system 1 is not ArduPilot: for now only ArduPilot is served"
+    )

@@ -25,8 +25,10 @@ from mavlink_bridge.cli.common import (
     print_json,
     warn,
 )
+from mavlink_bridge.cli.permissions import check_permissions
 from mavlink_bridge.cli.plan_request import request_from_options
 from mavlink_bridge.cli.upload import RequiredConnectOption, SigningKeyOption
+from mavlink_bridge.cli.values import MOST_M, within
 from mavlink_bridge.errors import IdentityTakenError, LinkError, UsageError
 
 if TYPE_CHECKING:
@@ -63,16 +65,23 @@ def bridge(
         str, typer.Option(metavar="M|auto", help="Room for cut corners on top.")
     ] = "auto",
     snap: Annotated[
-        float, typer.Option(metavar="M", min=0.0, help="Move blocked targets to free ground.")
+        float,
+        typer.Option(
+            metavar="M", parser=within(0.0, MOST_M, "metres"), help="Move blocked targets to free ground."
+        ),
     ] = 0.0,
     vehicle: Annotated[
         Path | None, typer.Option(metavar="FILE.parm", help="Parameters that the vehicle does not tell.")
     ] = None,
     upload: Annotated[bool, typer.Option("--upload", help="Write missions to the vehicle.")] = False,
     drive: Annotated[
-        bool, typer.Option("--drive", help="Switch modes: HOLD before a new route, AUTO for a verified one.")
+        bool,
+        typer.Option(
+            "--drive",
+            help="With --upload: switch modes, HOLD before a new route and after arrival, AUTO for a verified one.",
+        ),
     ] = False,
-    arm: Annotated[bool, typer.Option("--arm", help="Arm before AUTO.")] = False,
+    arm: Annotated[bool, typer.Option("--arm", help="With --drive: arm before AUTO.")] = False,
     confirm: Annotated[bool, typer.Option("--confirm", help="Upload a plan only after a typed yes.")] = False,
     once: Annotated[bool, typer.Option("--once", help="End after one job.")] = False,
     log: Annotated[
@@ -96,7 +105,7 @@ def bridge(
 ) -> None:
     """Run beside the autopilot: read fences, state and targets from the stream, keep a plan, upload it verified, watch the drive.
 
-    Type targets as `LAT,LON`; `yes` confirms a plan. Without `--upload` and `--drive` it only reports.
+    Type targets as `LAT,LON`; `yes` confirms a plan. Without `--upload` it only reports.
 
     For example:
 
@@ -105,6 +114,7 @@ def bridge(
     `pbpp bridge --connect /dev/ttyAMA0,921600 --upload --drive --log run.tlog --json`
     """
     del config  # its callback has taken it
+    check_permissions(upload=upload, drive=drive, arm=arm)
     for name in (
         "SIGTERM",
         "SIGBREAK",
@@ -127,7 +137,7 @@ def bridge(
         system=system,
         any_vehicle=any_vehicle,
         request=request_from_options(None, target or [], clearance, corner_allowance, snap, "optimal"),
-        upload=upload or drive,
+        upload=upload,
         drive=drive,
         arm=arm,
         confirm=confirm,

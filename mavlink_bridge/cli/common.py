@@ -27,6 +27,7 @@ from mavlink_bridge.cli.failing import (
     telling,
 )
 from mavlink_bridge.cli.options_file import take_options
+from mavlink_bridge.cli.values import MOST_S, within
 from missions import errors as mission_errors
 
 if TYPE_CHECKING:
@@ -85,7 +86,12 @@ SourceComponentOption = Annotated[
 ]
 TimeoutOption = Annotated[
     float,
-    typer.Option(metavar="S", min=0.1, help="How long to wait for the vehicle.", rich_help_panel=LINK_PANEL),
+    typer.Option(
+        metavar="S",
+        parser=within(0.1, MOST_S, "seconds"),
+        help="How long to wait for the vehicle.",
+        rich_help_panel=LINK_PANEL,
+    ),
 ]
 AnyVehicleOption = Annotated[
     bool,

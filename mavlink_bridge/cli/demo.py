@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mavlink_bridge.cli.common import JsonOption, QuietOption, print_json, warn
+from mavlink_bridge.cli.values import within
 
 if TYPE_CHECKING:
     from mavlink_bridge.messages import Frame
@@ -42,8 +43,7 @@ def demo(
         float,
         typer.Option(
             metavar="X",
-            min=1.0,
-            max=20.0,
+            parser=within(1.0, 20.0),
             help="Simulated time runs so much faster, where the computer keeps up.",
         ),
     ] = 4.0,

@@ -23,9 +23,11 @@ from mavlink_bridge.cli.common import (
     print_json,
     warn,
 )
+from mavlink_bridge.cli.permissions import check_permissions
 from mavlink_bridge.cli.plan_request import ENDS, METHODS, ORDERS, request_from_options, with_tour
 from mavlink_bridge.cli.plan_results import plan_document, report_plan, write_outputs
 from mavlink_bridge.cli.upload import SigningKeyOption
+from mavlink_bridge.cli.values import MOST_M, within
 from mavlink_bridge.cli.vehicle_options import PANEL as VEHICLE_PANEL
 from mavlink_bridge.cli.vehicle_options import (
     EscapeOption,
@@ -85,7 +87,11 @@ def plan(
     ] = None,
     snap: Annotated[
         float,
-        typer.Option(metavar="M", min=0.0, help="Move a blocked target to free ground within M metres."),
+        typer.Option(
+            metavar="M",
+            parser=within(0.0, MOST_M, "metres"),
+            help="Move a blocked target to free ground within M metres.",
+        ),
     ] = 0.0,
     speed: SpeedOption = None,
     reserve: ReserveOption = 0.0,
@@ -148,7 +154,18 @@ def plan(
         typer.Option("--blocks", help="Draw the blocks of the free space too.", rich_help_panel=OUTPUT_PANEL),
     ] = False,
     upload: Annotated[bool, typer.Option("--upload", help="Upload to the vehicle and verify.")] = False,
-    drive: Annotated[bool, typer.Option("--drive", help="Then switch to AUTO; arms nothing.")] = False,
+    hold: Annotated[
+        bool,
+        typer.Option(
+            "--hold", help="With --upload: a vehicle that drives in AUTO is switched to HOLD first."
+        ),
+    ] = False,
+    drive: Annotated[
+        bool,
+        typer.Option(
+            "--drive", help="With --upload: then switch to AUTO, after arrival to HOLD; arms nothing."
+        ),
+    ] = False,
     system: SystemOption = None,
     any_vehicle: AnyVehicleOption = False,
     source_system: SourceSystemOption = 245,
@@ -168,6 +185,7 @@ def plan(
 
     `pbpp plan --connect udpin:0.0.0.0:14550 --target 40.0726,-105.2290 --upload`
     """
+    check_permissions(upload=upload, drive=drive, hold=hold)
     outputs, plots = output or [], plot or []
     request = request_from_options(start, target or [], clearance, corner_allowance, snap, method)
     request = with_vehicle(
@@ -179,7 +197,7 @@ def plan(
         escape=escape,
     )
     request = with_tour(request, order, end, via_mission, comes_back=come_back)
-    _check_options(fence, log, connect, upload=upload or drive, outputs=outputs, plots=plots)
+    _check_options(fence, log, connect, upload=upload, outputs=outputs, plots=plots)
     if home is not None and connect is not None:
         raise UsageError("--home goes with --fence and --log: a live vehicle tells its own home")
     if json_output and Path("-") in plots:
@@ -193,8 +211,9 @@ def plan(
             system=system,
             any_vehicle=any_vehicle,
             request=request,
-            upload=upload or drive,
+            upload=upload,
             drive=drive,
+            hold=hold,
             patience_s=timeout,
         )
         if request.repairs:  # it goes where the mission goes, whatever is clicked meanwhile
@@ -262,7 +281,7 @@ def _check_options(
     if [fence, log, connect].count(None) != 2:
         raise UsageError("give one SOURCE: --fence FILE, --log FILE.tlog or --connect CONNECTION")
     if upload and connect is None:
-        raise UsageError("--upload and --drive need a live link: --connect CONNECTION")
+        raise UsageError("--upload needs a live link: --connect CONNECTION")
     for path in outputs:
         check_writable_format(path)
         if path.suffix.lower() != ".plan" and fence is not None and is_same_file(path, fence):

@@ -17,8 +17,9 @@ from mavlink_bridge import messages as m
 from mavlink_bridge.director.drive_watch import DriveWatch
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.mode_switch import AwaitHeartbeat, ModeSwitch
-from mavlink_bridge.director.operator_watch import mode_name
+from mavlink_bridge.director.operator_watch import DISARMED, mode_name
 from mavlink_bridge.director.orders import TargetSource
+from mavlink_bridge.director.put_back import PutBack
 from mavlink_bridge.director.states import Cue, State
 from mavlink_bridge.director.stopper import Stopper
 from mavlink_bridge.director.targets import Target
@@ -37,6 +38,14 @@ if TYPE_CHECKING:
 
 _MOVED_M = 1.0
 
+_ARMING_SHOWS_S = 1.5
+"""So long after the start a heartbeat from before the arming may still come."""
+
+_START_YOURSELF = (
+    "arm it and give the target again, or start the mission yourself: arm it in HOLD, then switch to AUTO"
+)
+_ENDLESS = (Command.NAV_LOITER_UNLIM, Command.NAV_RETURN_TO_LAUNCH)
+
 
 class Director(Stopper):
     """Takes targets to verified missions, and missions to arrival.
@@ -54,6 +63,8 @@ class Director(Stopper):
         self._taken_over: OutcomeError | None = None
         self._is_first_time = True
         self._item_now = 1
+        self._is_our_start = False  # the drive was begun by us, not by somebody else
+        self._holds_after_arrival = False
 
     @property
     def progress(self) -> tuple[int, int]:
@@ -86,16 +97,19 @@ class Director(Stopper):
 
     def _take_heartbeat(self, heartbeat: m.Heartbeat, now_s: float) -> None:
         taken = self._operator.take_heartbeat(heartbeat, now_s)
+        if taken is None and self._drives_unarmed(now_s):
+            taken = DISARMED
         if taken is not None:
             self._let_go(taken, now_s)
         elif self._operator.is_late_click(heartbeat, now_s) and self._stopping is None:
             self._command_hold(now_s)
         elif self.state is State.VERIFIED and not self.orders.drive and self._is_driving_ours:
             self._watch_on(now_s, "somebody drives the mission")
-        elif self.state is State.DRIVING and self.orders.once and not self.situation.armed:
-            self._give_up(
-                OutcomeError("the mission is on the vehicle in AUTO, but it is not armed and does not drive")
-            )
+
+    def _drives_unarmed(self, now_s: float) -> bool:
+        """Return whether our drive runs on a vehicle that never showed itself armed."""
+        is_late = self.drive is not None and now_s > self.drive.begun_s + _ARMING_SHOWS_S
+        return self.state is State.DRIVING and is_late and not self.situation.armed
 
     def _take_any_frame(self, frame: Frame, before: Situation, now_s: float) -> None:
         peer = self._peer
@@ -143,6 +157,7 @@ class Director(Stopper):
         """Watch a drive on our mission that we did not start just now."""
         if self.plan is not None and self._move(Cue.RESUMED):
             self._operator.expect(AUTO_MODE, set(), is_armed=True)
+            self._is_our_start = False
             self.drive = DriveWatch(self.plan, self._voice, now_s)
             self.drive.item = self._item_now
             self._voice.tell(now_s, EventName.DRIVING, text, len(self.plan.items))
@@ -175,6 +190,10 @@ class Director(Stopper):
 
     def _let_go(self, what: str, now_s: float) -> None:
         """Leave the vehicle to the operator, until a new target comes."""
+        if self.state is State.ARRIVED and self.orders.once:
+            self._end_drive()  # it has arrived; whoever has it now
+            return
+        is_ours_in_auto = self._may_be_in_auto
         if not self._move(Cue.TAKEN_OVER):
             return
         self._let_loose()
@@ -187,8 +206,28 @@ class Director(Stopper):
         trouble = OutcomeError(f"somebody {what} before it arrived", mode=mode)
         if is_withdrawing:
             self._taken_over = trouble
+        elif what == DISARMED and is_ours_in_auto:
+            self._put_back(now_s)
         else:
             self._give_up(trouble)
+
+    def _put_back(self, now_s: float) -> None:
+        """Take the vehicle, disarmed now, out of the AUTO that we switched it to."""
+        assert self._peer is not None
+        self._steps.run([(PutBack(self._peer), self._was_put_back)], now_s)
+
+    def _was_put_back(self, machine: PutBack, now_s: float) -> None:
+        what = "somebody disarmed the vehicle before it arrived"
+        if machine.is_left_in_auto:
+            text = f"{what}, and it does not go to HOLD: it is in AUTO, arming it drives off"
+        elif machine.was_needed:
+            text = f"{what}; it was switched back from AUTO to HOLD, so that arming it does not drive off"
+        else:
+            text = what
+        trouble = OutcomeError(text, advice=_START_YOURSELF, mode=mode_name(self.situation.mode))
+        if machine.was_needed:
+            self._voice.error(now_s, EventName.TROUBLE, trouble, dict(trouble.details))
+        self._give_up(trouble)
 
     def _let_loose(self) -> None:
         """Forget what was wanted and what is under way, but for an upload and for learning."""
@@ -241,6 +280,9 @@ class Director(Stopper):
         ):
             self._look_once_more(now_s)
             return
+        if not self.situation.armed and not self.orders.arm:
+            self._refuse_unarmed(now_s)
+            return
         if (
             self.situation.mode != HOLD_MODE
         ):  # it starts from HOLD: any other mode is then known for somebody else's
@@ -254,6 +296,19 @@ class Director(Stopper):
             self._steps.run([self._command(Command.COMPONENT_ARM_DISARM, 1.0, self._armed)], now_s)
         else:
             self._switch_to_auto(now_s)
+
+    def _refuse_unarmed(self, now_s: float) -> None:
+        """Leave the mode of a disarmed vehicle alone: in AUTO, arming it would drive off."""
+        mode = mode_name(self.situation.mode)
+        drives_off = ": arming it drives off" if self.situation.mode == AUTO_MODE else ""
+        trouble = OutcomeError(
+            f"the mission is verified on the vehicle, which is not armed and does not drive: its mode was left alone ({mode}{drives_off})",
+            advice=_START_YOURSELF,
+            mode=mode,
+        )
+        self._stand_by()
+        self._voice.error(now_s, EventName.TROUBLE, trouble, dict(trouble.details))
+        self._fail_step(trouble)
 
     def _armed(self, machine: SendCommand, now_s: float) -> None:
         if self._is_accepted(machine, now_s):
@@ -281,6 +336,7 @@ class Director(Stopper):
             self._command_hold(now_s)  # it drives from an item that we do not know
         elif self._move(Cue.STARTED):
             assert self.plan is not None
+            self._is_our_start = True
             self.drive = DriveWatch(self.plan, self._voice, now_s)
             self._voice.tell(now_s, EventName.DRIVING, "AUTO", len(self.plan.items))
 
@@ -310,6 +366,30 @@ class Director(Stopper):
         drive.receive(frame, now_s)
         if drive.has_arrived and self._move(Cue.REACHED):
             drive.tell_progress(now_s)
-            self._voice.arrived(now_s, drive)
-            self._let_loose()
-            self._end()
+            self._holds_after_arrival = self._is_our_start and not self._goes_on_after_arrival
+            self._voice.arrived(now_s, drive, holds=self._holds_after_arrival)
+            if self._holds_after_arrival:
+                self._command_hold(now_s)
+            self.drive = None
+            if not self._holds_after_arrival:
+                self._end_drive()
+
+    @property
+    def _goes_on_after_arrival(self) -> bool:
+        """Whether the mission's end is something to do: to loiter, to return, or what MIS_DONE_BEHAVE says."""
+        assert self.plan is not None
+        ends = any(item.command in _ENDLESS for item in self.plan.items)
+        return ends or self.situation.parameters.get("MIS_DONE_BEHAVE", 0) != 0
+
+    def _look_after_hold(self, now_s: float) -> None:
+        super()._look_after_hold(now_s)
+        if self._stopping is None and self._holds_after_arrival and self.state is State.ARRIVED:
+            self._end_drive()
+            if not self._is_hold_granted:
+                self._give_up(OutcomeError("it has arrived, but it does not go to HOLD: it is still in AUTO"))
+
+    def _end_drive(self) -> None:
+        """End a drive that has arrived; a single job is done with it."""
+        self._holds_after_arrival = False
+        self._let_loose()
+        self._end()

@@ -16,6 +16,8 @@ from missions.items import Command
 if TYPE_CHECKING:
     from mavlink_bridge.messages import Message
 
+DISARMED = "disarmed the vehicle"
+
 _STALE_S = 1.5
 """For so long after a mode change was accepted a heartbeat may still show what was before."""
 
@@ -86,7 +88,7 @@ class OperatorWatch:
             return None
         is_armed = bool(heartbeat.base_mode & m.ModeFlag.SAFETY_ARMED)
         if self._was_armed and not is_armed:
-            return "disarmed the vehicle"
+            return DISARMED
         self._was_armed = is_armed
         mode = heartbeat.custom_mode
         if mode == self._ours:
@@ -111,7 +113,7 @@ class OperatorWatch:
         if getattr(message, "target_component", component) not in (0, component):
             return None
         if _is_disarming(message):
-            return "disarmed the vehicle"
+            return DISARMED
         mode = _mode_asked_for(message)
         if mode is None or (mode == AUTO_MODE and self._ours == AUTO_MODE):
             return None

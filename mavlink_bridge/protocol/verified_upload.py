@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum, auto
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.messages import Heartbeat, MissionResult, ModeFlag, Statustext
+from mavlink_bridge.messages import Heartbeat, MissionResult, Statustext
 from mavlink_bridge.protocol.download import RIVAL_PATIENCE_S, Download, DownloadOutcome
 from mavlink_bridge.protocol.limits import Limits
 from mavlink_bridge.protocol.round_trip import RoundTrip
@@ -20,6 +20,7 @@ from mavlink_bridge.protocol.transitions import (
     VerifiedUploadState,
 )
 from mavlink_bridge.protocol.upload import WINDOW, Upload, UploadOutcome
+from mavlink_bridge.protocol.vehicle_watch import VehicleWatch
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
     from mavlink_bridge.protocol.peer import Peer
     from missions.items import MissionItem
 
-ROVER_AUTO_MODE = 10
 MOST_PUSHES = 4
 MOST_RESTORES = 3
 _HEARTBEAT_PATIENCE_S = 10.0
@@ -124,7 +124,7 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
     limits : Limits, optional
         What fits on the vehicle; ArduPilot Rover's defaults if not given.
     is_active : bool, optional
-        Whether the vehicle is armed in AUTO, from a fresh heartbeat; None waits for one.
+        Whether the vehicle drives its mission (armed in AUTO, the mission not complete), from a fresh heartbeat; None waits for one.
     replace_active : bool
         Write even if it is.
     window : int
@@ -151,6 +151,7 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         self._wanted = tuple(items)
         self._limits = limits or Limits()
         self._is_active = is_active
+        self._watch = VehicleWatch()
         self._active_known_s = 0.0
         self._replace_active = replace_active
         self._window = window
@@ -176,6 +177,11 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         self._held = Held.UNKNOWN
         self._shown_progress = 0
         self._outcome: VerifiedUploadOutcome | None = None
+
+    def know_vehicle(self, watch: VehicleWatch, now_s: float) -> None:
+        """Take over what the vehicle told of itself before the start."""
+        self._watch = watch
+        self._is_active = watch.is_active(now_s)
 
     @property
     def pending_backup(self) -> tuple[MissionItem, ...] | None:
@@ -272,8 +278,9 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         """Take a frame; what is not for this machine is ignored."""
         if self.is_done or not self._peer.accepts(frame):
             return
+        self._watch.receive(frame.message, now_s)
         if isinstance(frame.message, Heartbeat):
-            self._is_active = _is_armed_in_auto(frame.message)
+            self._is_active = self._watch.doing(now_s).drives_mission
             self._active_known_s = now_s
             self._check_vehicle(now_s)
         elif isinstance(frame.message, Statustext):
@@ -469,8 +476,3 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
 
 def _is_same_refusal(a: UploadOutcome, b: UploadOutcome | None) -> bool:
     return b is not None and (a.state, a.result, a.item) == (b.state, b.result, b.item)
-
-
-def _is_armed_in_auto(heartbeat: Heartbeat) -> bool:
-    is_armed = bool(heartbeat.base_mode & ModeFlag.SAFETY_ARMED)
-    return is_armed and heartbeat.custom_mode == ROVER_AUTO_MODE

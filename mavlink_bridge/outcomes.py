@@ -20,6 +20,11 @@ _HELD = {
 }
 
 
+def held_text(held: Held) -> str:
+    """Return what a vehicle holds after an upload, for people."""
+    return _HELD[held]
+
+
 def upload_trouble(outcome: VerifiedUploadOutcome) -> BridgeError | None:
     """Give the error that an upload's outcome is; None for a verified one."""
     if outcome.is_verified:

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import os
-import select
-import signal
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -25,6 +22,8 @@ from mavlink_bridge.cli.common import (
     print_json,
     warn,
 )
+from mavlink_bridge.cli.interrupting import AtHand, interruptible, terminable
+from mavlink_bridge.cli.keyboard import Keyboard
 from mavlink_bridge.cli.permissions import check_permissions
 from mavlink_bridge.cli.plan_request import request_from_options
 from mavlink_bridge.cli.upload import RequiredConnectOption, SigningKeyOption
@@ -32,7 +31,7 @@ from mavlink_bridge.cli.values import MOST_M, within
 from mavlink_bridge.errors import IdentityTakenError, LinkError, UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Mapping
 
     from mavlink_bridge.cli.bridge_view import LiveView
     from mavlink_bridge.director import Director, Event, Orders
@@ -115,12 +114,6 @@ def bridge(
     """
     del config  # its callback has taken it
     check_permissions(upload=upload, drive=drive, arm=arm)
-    for name in (
-        "SIGTERM",
-        "SIGBREAK",
-    ):  # the latter is Ctrl-Break on Windows, where nothing sends the former
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), _end)
     from mavlink_bridge.cli.session import signing_of  # noqa: PLC0415
     from mavlink_bridge.director import Director, Orders  # noqa: PLC0415 - quick help
     from mavlink_bridge.director.orders import DEFAULT_SOURCES, TargetSource  # noqa: PLC0415
@@ -153,16 +146,13 @@ def bridge(
         view = _view(stack, director, is_wanted=not (json_output or quiet))
         tell = view.tell if view else _teller(wants_json=json_output, quiet=quiet)
         shell = _Shell(director, tell, view, recorder, journal)
-        shell.run(connect, signing_of(signing_key), timeout)
+        with terminable():
+            shell.run(connect, signing_of(signing_key), timeout)
     trouble = shell.director.trouble
     if trouble is not None and shell.director.is_done:
         if json_output:
             raise typer.Exit(exit_code_of(trouble))
         raise trouble
-
-
-def _end(_number: int, _frame: object) -> None:
-    raise KeyboardInterrupt
 
 
 @dataclass(eq=False)
@@ -203,23 +193,43 @@ class _Shell:
         self._journal = journal
         self._backups = BackupKeeper(self.director)
         self._plans = PlanMaker(self.director)
-        self._typed = _typed_lines()
+        self._keyboard = Keyboard()
 
     def run(self, connection: str, signing: Signing | None, timeout_s: float) -> None:
         """Run until the single job is done, or for ever; a link that breaks is opened again."""
-        from mavlink_bridge.link import ONE_SHOT_IDENTITY, now_s, open_link, parse_connection  # noqa: PLC0415 - quick help
+        from mavlink_bridge.link import now_s, parse_connection  # noqa: PLC0415 - quick help
 
         parse_connection(connection)
         begun_s = now_s()
         self._written.call("start", begun_s)
         self.director.start(begun_s)
+        with interruptible(self._at_hand(None)):
+            self._keep_linked(connection, signing, timeout_s)
+
+    def _at_hand(self, link: Link | None) -> AtHand:
+        """Return the vehicle as an interrupt finds it."""
+        from mavlink_bridge.cli.live import director_at_hand  # noqa: PLC0415 - quick help
+
+        at_hand = director_at_hand(self.director, self._backups, link)
+        return replace(
+            at_hand,
+            aside=self._view.aside if self._view is not None else contextlib.nullcontext,
+            keyboard=self._keyboard,
+        )
+
+    def _keep_linked(self, connection: str, signing: Signing | None, timeout_s: float) -> None:
+        from mavlink_bridge.link import ONE_SHOT_IDENTITY, open_link  # noqa: PLC0415 - quick help
+
         failures = 0
         while not self.director.is_done:
             try:
                 identity = self.director.identity or ONE_SHOT_IDENTITY
-                with open_link(
-                    connection, identity, recorder=self._recorder, signing=signing, timeout_s=timeout_s
-                ) as link:
+                with (
+                    open_link(
+                        connection, identity, recorder=self._recorder, signing=signing, timeout_s=timeout_s
+                    ) as link,
+                    interruptible(self._at_hand(link)),
+                ):
                     failures = 0
                     self._run_link(link)
             except IdentityTakenError:
@@ -289,7 +299,7 @@ class _Shell:
         from missions.errors import InvalidPositionError  # noqa: PLC0415 - quick help
         from missions.geo import parse_lat_lon  # noqa: PLC0415
 
-        line = next(self._typed)
+        line = self._keyboard.line()
         if not line:
             return
         if line.lower() in ("yes", "y", "go"):
@@ -309,56 +319,6 @@ class _Shell:
             if self._journal is not None:
                 self._journal.event(event)
             self._tell(event)
-
-
-def _typed_lines() -> Iterator[str]:
-    """Give what was typed, a line at a time; an empty text while nothing was. Does not wait."""
-    read = _keyboard_thread(0) if os.name == "nt" else _typed_now
-    waiting = b""
-    while True:
-        if b"\n" not in waiting:
-            waiting += read()
-        line, found, rest = waiting.partition(b"\n")
-        if found:
-            waiting = rest
-            yield line.decode(errors="replace").strip()
-        else:
-            yield ""
-
-
-def _typed_now() -> bytes:
-    """Give what was typed, empty while nothing was."""
-    try:
-        has_input = bool(select.select([sys.stdin], [], [], 0)[0])
-        return os.read(sys.stdin.fileno(), 4096) if has_input else b""
-    except (OSError, ValueError):  # no stdin, or a closed one
-        return b""
-
-
-def _keyboard_thread(descriptor: int) -> Callable[[], bytes]:
-    """Give what gives what was typed, read by a thread: Windows cannot tell whether a console has input.
-
-    The thread reads the descriptor itself: one that waits in ``sys.stdin`` would hold its lock when the program ends.
-    """
-    import queue  # noqa: PLC0415 - only on Windows
-    import threading  # noqa: PLC0415
-
-    typed: queue.SimpleQueue[bytes] = queue.SimpleQueue()
-
-    def read() -> None:
-        with contextlib.suppress(OSError):
-            while data := os.read(descriptor, 4096):
-                typed.put(data)
-
-    threading.Thread(target=read, name="keyboard", daemon=True).start()
-
-    def give() -> bytes:
-        try:
-            return typed.get_nowait()
-        except queue.Empty:
-            return b""
-
-    return give
 
 
 def _view(stack: contextlib.ExitStack, director: Director, *, is_wanted: bool) -> LiveView | None:

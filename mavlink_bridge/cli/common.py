@@ -6,7 +6,7 @@ import functools
 import inspect
 import sys
 from collections.abc import Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -32,6 +32,8 @@ from missions import errors as mission_errors
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
+
+    from rich.progress import Progress
 
 __all__ = [
     "AnyVehicleOption",
@@ -163,7 +165,8 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
             raise typer.Exit(report_error(name, error, wants_json=wants_json)) from None
         except KeyboardInterrupt as interrupt:
             message = str(interrupt) or "interrupted; the vehicle was left as it was"
-            report(name, "Interrupted", message, ExitCode.INTERRUPTED, wants_json=wants_json)
+            details = getattr(interrupt, "details", None)
+            report(name, "Interrupted", message, ExitCode.INTERRUPTED, details, wants_json=wants_json)
             raise typer.Exit(ExitCode.INTERRUPTED) from None
         except (typer.Exit, typer.Abort, typer.BadParameter):
             raise
@@ -194,33 +197,57 @@ def is_same_file(one: Path, other: Path) -> bool:
     return one.exists() and other.exists() and one.samefile(other)
 
 
+class Shown:
+    """Shows how far a command is: text, steps done, steps in all. This one shows nothing."""
+
+    def __call__(self, text: str, done: int, total: int) -> None:
+        """Show it."""
+
+    def aside(self) -> AbstractContextManager[None]:
+        """Clear the terminal of what moves on it, for as long as the context lasts."""
+        return nullcontext()
+
+
+class _Lines(Shown):
+    """Tells progress in lines, one for each new text."""
+
+    def __init__(self) -> None:
+        self._last = ""
+
+    def __call__(self, text: str, _done: int, _total: int) -> None:
+        if text != self._last:
+            self._last = text
+            typer.echo(text, err=True)
+
+
+class _Bar(Shown):
+    """A progress bar on stderr."""
+
+    def __init__(self, progress: Progress) -> None:
+        self._progress = progress
+        self._task = progress.add_task("", total=None)
+
+    def __call__(self, text: str, done: int, total: int) -> None:
+        self._progress.update(self._task, description=text, completed=done, total=total or None)
+
+    @contextmanager
+    def aside(self) -> Iterator[None]:
+        self._progress.stop()
+        try:
+            yield
+        finally:
+            self._progress.start()
+
+
 @contextmanager
-def progress_bar(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
-    """Show a progress bar on stderr; give the function that moves it: text, steps done, steps in all."""
+def progress_bar(*, quiet: bool) -> Iterator[Shown]:
+    """Show a progress bar on stderr where that is a terminal; give what moves it."""
     if not sys.stderr.isatty() or quiet:
-        yield _line_teller() if telling().verbose and not quiet else lambda _text, _done, _total: None
+        yield _Lines() if telling().verbose and not quiet else Shown()
         return
     from rich.console import Console  # noqa: PLC0415 - quick help
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn  # noqa: PLC0415
 
     columns = (TextColumn("{task.description:<38}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task("", total=None)
-
-        def show(text: str, done: int, total: int) -> None:
-            progress.update(task, description=text, completed=done, total=total or None)
-
-        yield show
-
-
-def _line_teller() -> Callable[[str, int, int], None]:
-    """Give what tells progress in lines, one for each new text."""
-    last = ""
-
-    def show(text: str, _done: int, _total: int) -> None:
-        nonlocal last
-        if text != last:
-            last = text
-            typer.echo(text, err=True)
-
-    return show
+        yield _Bar(progress)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from threading import Thread
@@ -9,30 +10,33 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.backup import BackupStore
 from mavlink_bridge.cli.common import progress_bar, warn
+from mavlink_bridge.cli.interrupting import AtHand, interruptible, terminable
 from mavlink_bridge.cli.plan import timed_plan
 from mavlink_bridge.cli.session import signing_of
 from mavlink_bridge.cli.upload import interrupted_warnings, with_backup
-from mavlink_bridge.director import Director, Orders, State
+from mavlink_bridge.director import Director, EventName, Orders, State
 from mavlink_bridge.errors import BridgeError, LinkError
 from mavlink_bridge.link import ONE_SHOT_IDENTITY, open_link
 from mavlink_bridge.messages import MissionType
-from mavlink_bridge.protocol.verified_upload import Held
+from mavlink_bridge.outcomes import held_text
+from mavlink_bridge.protocol.vehicle_watch import Doing
+from mavlink_bridge.protocol.verified_upload import Held, OutcomeKind
 from missions.course import follow_mission
 from missions.errors import SituationError
 from missions.formats import read_parameters
 from missions.items import Command
+from missions.plan import Plan
 from missions.plan import plan as make_plan
 from missions.situation import Mission, Situation
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Mapping
     from pathlib import Path
 
     from mavlink_bridge.director.plan_task import PlanTask
     from mavlink_bridge.link import Link
     from mavlink_bridge.messages import Frame
     from missions.errors import MissionError
-    from missions.plan import Plan
     from missions.request import Request
 
 _IDLE_S, _BUSY_S = 0.25, 0.02
@@ -59,18 +63,34 @@ _STATE_TEXTS = {
 
 @dataclass(frozen=True, eq=False)
 class LiveResult:
-    """What came of a live run."""
+    """What came of a live run; ``arrival`` holds the data of the director's event, None where nothing was driven."""
 
     plan: Plan
     planning_s: float
     situation: Situation
     verified: bool
+    arrival: Mapping[str, object] | None = None
+    doing: Doing | None = None
+
+
+PlanTaker = Callable[[Plan, float, Situation], None]
+"""Takes a plan, how long it took, and the situation that it was made in."""
+
+
+def _take_none(_plan: Plan, _planning_s: float, _situation: Situation) -> None:
+    """Do nothing with a plan."""
 
 
 def plan_live(
-    connection: str, orders: Orders, *, vehicle_file: Path | None, key_file: Path | None, quiet: bool
+    connection: str,
+    orders: Orders,
+    *,
+    vehicle_file: Path | None,
+    key_file: Path | None,
+    quiet: bool,
+    on_plan: PlanTaker = _take_none,
 ) -> LiveResult:
-    """Open a link and take one mission as far as the orders go.
+    """Open a link and take one mission as far as the orders go; each plan is given to ``on_plan`` before it is acted upon.
 
     Raises
     ------
@@ -79,8 +99,8 @@ def plan_live(
     """
     parameters = read_parameters(vehicle_file) if vehicle_file else {}
     identity = orders.identity or ONE_SHOT_IDENTITY
-    with open_link(connection, identity, signing=signing_of(key_file)) as link:
-        return conduct(link, orders, Situation(parameters=parameters), quiet=quiet)
+    with terminable(), open_link(connection, identity, signing=signing_of(key_file)) as link:
+        return conduct(link, orders, Situation(parameters=parameters), quiet=quiet, on_plan=on_plan)
 
 
 def conduct(
@@ -90,6 +110,7 @@ def conduct(
     *,
     quiet: bool,
     on_frames: Callable[[list[Frame]], None] | None = None,
+    on_plan: PlanTaker = _take_none,
 ) -> LiveResult:
     """Run a director on a link until its single job is done, and keep backups for it.
 
@@ -116,26 +137,84 @@ def conduct(
     director = Director(replace(orders, once=True), situation)
     plans = PlanMaker(director, timed)
     backups = BackupKeeper(director)
+    taken: Plan | None = None
+    arrival: Mapping[str, object] | None = None
     with progress_bar(quiet=quiet) as show:
 
         def step() -> None:
-            nonlocal has_driven
+            nonlocal has_driven, taken, arrival
             has_driven = has_driven or director.state is State.DRIVING
             show(_STATE_TEXTS[director.state], *director.progress)
             warn(backups.step(link.now_s()))
             if (made := plans.take()) is not None:
                 director.plan_made(*made, link.now_s())
+            if director.plan is not None and director.plan is not taken:
+                taken = director.plan
+                with show.aside():  # before anything of it is sent
+                    on_plan(taken, planning_s[-1], director.situation)
+            for event in director.take_events():
+                arrival = event.data if event.name is EventName.ARRIVED else arrival
 
-        link.run(director, on_frames=on_frames, on_step=step, longest_wait_s=plans.longest_wait_s)
+        with interruptible(replace(director_at_hand(director, backups, link), aside=show.aside)):
+            link.run(director, on_frames=on_frames, on_step=step, longest_wait_s=plans.longest_wait_s)
     if director.trouble is not None or director.plan is None:
-        raise backups.explained(director.trouble or LinkError("the director ended without a plan"))
+        raise _with_hint(
+            backups.explained(director.trouble or LinkError("the director ended without a plan"))
+        )
     outcome = director.upload_outcome
     return LiveResult(
         director.plan,
         planning_s[-1],
         director.situation,
         verified=outcome is not None and outcome.is_verified,
+        arrival=arrival,
+        doing=director.watch.doing(link.now_s()),
     )
+
+
+def _with_hint(trouble: BridgeError | MissionError) -> BridgeError | MissionError:
+    """Return a director's trouble with the option that would help."""
+    if trouble.details.get("outcome") == OutcomeKind.ACTIVE:
+        trouble.details["advice"] = "--hold switches it to HOLD first"
+    return trouble
+
+
+def director_at_hand(director: Director, backups: BackupKeeper, link: Link | None) -> AtHand:
+    """Return the vehicle of a director, as an interrupt finds it."""
+    return AtHand(
+        link=link,
+        peer=lambda: director.peer,
+        watch=lambda: director.watch,
+        drives=lambda: director.drives_by_us,
+        on_it=lambda: _mission_on_it(director, backups),
+        changed=lambda: _has_changed(director),
+    )
+
+
+def _has_changed(director: Director) -> bool:
+    """Return whether anything on the vehicle was changed, or may have been."""
+    has_written = director.upload_outcome is not None or _is_writing(director)
+    return has_written or director.drives_by_us or director.state is State.HOLDING
+
+
+def _is_writing(director: Director) -> bool:
+    upload = director.upload_under_way
+    return upload is not None and upload.backup is not None and upload.pending_backup is None
+
+
+def _mission_on_it(director: Director, backups: BackupKeeper) -> str:
+    """Return which mission is on the vehicle, for people."""
+    if _is_writing(director):
+        return (
+            "the vehicle may hold part of the old and part of the new mission: do not drive it. "
+            f"The old one is kept in {backups.path}, `pbpp upload --restore` puts it back"
+        )
+    outcome = director.upload_outcome
+    if outcome is None:
+        return ""
+    if outcome.is_verified and director.plan is not None:
+        return f"the mission on it is the planned one ({len(outcome.found or outcome.backup or ())} items, verified)"
+    return f"its mission: {held_text(outcome.held)}"
 
 
 def _check_drivable(planned: Plan) -> None:
@@ -217,12 +296,17 @@ class BackupKeeper:
         Whose missions.
     store : BackupStore, optional
         Where; the user's state folder if not given.
+
+    Attributes
+    ----------
+    path : Path, optional
+        Where the newest backup lies.
     """
 
     def __init__(self, director: Director, store: BackupStore | None = None) -> None:
         self._director = director
         self._store = store or BackupStore()
-        self._path: Path | None = None
+        self.path: Path | None = None
         self._was_interrupted: bool | None = None
         self._settled: object = None
 
@@ -236,7 +320,7 @@ class BackupKeeper:
             warnings = interrupted_warnings(self._store, peer.system)
             self._was_interrupted = self._store.interrupted(peer.system, MissionType.MISSION) is not None
         if (old := director.pending_backup) is not None:
-            self._path = self._store.begin(peer.system, MissionType.MISSION, old)
+            self.path = self._store.begin(peer.system, MissionType.MISSION, old)
             director.backup_stored(now_s)
         outcome = director.upload_outcome
         if outcome is not None and outcome is not self._settled:
@@ -252,4 +336,4 @@ class BackupKeeper:
         outcome = self._director.upload_outcome
         if outcome is None or outcome.is_verified or not isinstance(trouble, BridgeError):
             return trouble
-        return with_backup(trouble, "mission", self._path, is_old_there=outcome.held is Held.OLD)
+        return with_backup(trouble, "mission", self.path, is_old_there=outcome.held is Held.OLD)

@@ -25,7 +25,7 @@ from mavlink_bridge.cli.common import (
 )
 from mavlink_bridge.cli.permissions import check_permissions
 from mavlink_bridge.cli.plan_request import ENDS, METHODS, ORDERS, request_from_options, with_tour
-from mavlink_bridge.cli.plan_results import plan_document, report_plan, write_outputs
+from mavlink_bridge.cli.plan_results import Told, arrival_document, report_end
 from mavlink_bridge.cli.upload import SigningKeyOption
 from mavlink_bridge.cli.values import MOST_M, within
 from mavlink_bridge.cli.vehicle_options import PANEL as VEHICLE_PANEL
@@ -202,6 +202,7 @@ def plan(
         raise UsageError("--home goes with --fence and --log: a live vehicle tells its own home")
     if json_output and Path("-") in plots:
         raise UsageError("--plot - and --json both want the standard output; give a file to --plot")
+    told = Told(outputs, plots, blocks=blocks, is_silent=json_output or quiet)
     if connect is not None:
         from mavlink_bridge.cli.live import plan_live  # noqa: PLC0415 - only with a link
         from mavlink_bridge.director import Orders  # noqa: PLC0415
@@ -219,32 +220,31 @@ def plan(
         if request.repairs:  # it goes where the mission goes, whatever is clicked meanwhile
             orders = replace(orders, target_sources=frozenset())
         result = plan_live(
-            connect, orders, vehicle_file=vehicle, key_file=signing_key, quiet=quiet or json_output
+            connect,
+            orders,
+            vehicle_file=vehicle,
+            key_file=signing_key,
+            quiet=quiet or json_output,
+            on_plan=told.tell,
         )
-        planned, planning_s, situation = result.plan, result.planning_s, result.situation
-        uploaded = verified = result.verified
+        situation, verified, arrival = result.situation, result.verified, result.arrival
     else:
         situation = _offline_situation(fence, log, system, any_vehicle=any_vehicle)
         situation = with_home_option(with_parameter_file(situation, vehicle), home)
-        planned, planning_s = timed_plan(situation, request)
-        uploaded = verified = False
-    warnings = list(planned.warnings)
-    warn(warnings)
-    written = write_outputs(planned, situation, outputs, plots, blocks=blocks)
+        told.tell(*timed_plan(situation, request), situation)
+        verified, arrival = False, None
     document = {
-        **plan_document(planned),
+        **told.document(),
         "source": Path(str(fence or log)).name if connect is None else connect,
         "system": situation.system,
-        "planning_s": round(planning_s, 6),
-        "outputs": [str(path) for path in written],
-        "warnings": warnings,
-        "uploaded": uploaded,
+        "uploaded": verified,
         "verified": verified,
+        **arrival_document(arrival),
     }
     if json_output:
         print_json(document)
     elif not quiet:
-        report_plan(planned, written, verified=verified)
+        report_end(arrival, verified=verified)
 
 
 def timed_plan(situation: Situation, request: Request) -> tuple[Plan, float]:

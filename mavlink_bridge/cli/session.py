@@ -7,26 +7,32 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from mavlink_bridge.cli.interrupting import AtHand
 from mavlink_bridge.errors import LinkError, OutcomeError, RefusedError
 from mavlink_bridge.link import open_link
 from mavlink_bridge.messages import Autopilot, CommandLong, Heartbeat, ModeFlag, RequestDataStream
 from mavlink_bridge.protocol.command import SendCommand
 from mavlink_bridge.protocol.find import FindVehicle
 from mavlink_bridge.protocol.peer import Peer
-from mavlink_bridge.rover import AUTO_MODE, MODE_NAMES
+from mavlink_bridge.protocol.vehicle_watch import VehicleWatch
+from mavlink_bridge.rover import MODE_NAMES
 from missions.items import Command
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from contextlib import AbstractContextManager
     from pathlib import Path
 
     from mavlink_bridge.link import Link
-    from mavlink_bridge.messages import Frame
+    from mavlink_bridge.messages import Frame, Message
     from mavlink_bridge.protocol.machine import Machine
+    from mavlink_bridge.protocol.vehicle_watch import Doing
     from mavlink_bridge.signing import Signing
 
 _MODE_PATIENCE_S = 5.0
-_FRESH_S = 3.0
+_HEARTBEAT_PATIENCE_S = 5.0
+"""A heartbeat comes every second; over a bad link some are lost."""
+
 _STREAMS = (6, 2)
 """MAV_DATA_STREAM_POSITION and _EXTENDED_STATUS, which holds GPS_RAW_INT."""
 _STREAM_HZ = 4
@@ -74,6 +80,12 @@ class Session:
 
     Attributes
     ----------
+    link : Link
+        The open link.
+    watch : VehicleWatch
+        What the vehicle told of itself.
+    drives_by_us : bool
+        Whether it drives because of us, or is about to.
     listeners : list of callable
         Told of every batch of frames.
 
@@ -84,11 +96,13 @@ class Session:
     """
 
     def __init__(self, link: Link, address: Address, show: Callable[[str, int, int], None]) -> None:
-        self._link = link
+        self.link = link
         self._show = show
         finder = FindVehicle(address.system, any_vehicle=address.any_vehicle, patience_s=address.timeout_s)
         self._heartbeat: Heartbeat | None = None
-        self._heartbeat_s = 0.0
+        self.watch = VehicleWatch()
+        self.drives_by_us = False
+        self._has_changed_mode = False
         self.peer: Peer | None = None
         self.listeners: list[Callable[[list[Frame]], None]] = []
         self.run(finder, "listening for the vehicle")
@@ -96,7 +110,8 @@ class Session:
             assert finder.trouble is not None
             raise self._with_signing_hint(finder.trouble)
         self.peer = Peer(finder.vehicle.system, finder.vehicle.component, *link.identity)
-        self._heartbeat, self._heartbeat_s = finder.heartbeat, time.monotonic()
+        assert finder.heartbeat is not None
+        self._take(finder.heartbeat)
 
     @property
     def vehicle(self) -> Peer:
@@ -111,11 +126,30 @@ class Session:
 
     @property
     def is_active(self) -> bool | None:
-        """Whether it is armed in AUTO; None if its last heartbeat is too old to tell."""
-        if self._heartbeat is None or time.monotonic() - self._heartbeat_s > _FRESH_S:
-            return None
-        is_armed = bool(self._heartbeat.base_mode & ModeFlag.SAFETY_ARMED)
-        return is_armed and self._heartbeat.custom_mode == AUTO_MODE
+        """Whether it drives its mission in AUTO; None if its last heartbeat is too old to tell."""
+        return self.watch.is_active(self.link.now_s())
+
+    @property
+    def doing(self) -> Doing:
+        """What it does, as last told."""
+        return self.watch.doing(self.link.now_s())
+
+    def at_hand(self, aside: Callable[[], AbstractContextManager[Any]], on_it: Callable[[], str]) -> AtHand:
+        """Give the vehicle as an interrupt finds it."""
+        return AtHand(
+            link=self.link,
+            peer=lambda: self.peer,
+            watch=lambda: self.watch,
+            drives=lambda: self.drives_by_us,
+            on_it=on_it,
+            changed=lambda: self._has_changed_mode or bool(on_it()),
+            aside=aside,
+        )
+
+    def hear_anew(self) -> bool:
+        """Wait for its next heartbeat; give whether one came."""
+        begun_s = self.link.now_s()
+        return self.listen_until(lambda: self.watch.heartbeat_s > begun_s, _HEARTBEAT_PATIENCE_S)
 
     def run(self, machine: Machine, text: str, on_step: Callable[[], None] | None = None) -> None:
         """Run a machine to its outcome, with progress."""
@@ -125,7 +159,7 @@ class Session:
             if on_step:
                 on_step()
 
-        self._link.run(machine, on_frames=self._listen, on_step=step)
+        self.link.run(machine, on_frames=self._listen, on_step=step)
 
     def change_mode(self, mode: int) -> None:
         """Switch the vehicle's mode and wait until its heartbeat says so.
@@ -144,6 +178,7 @@ class Session:
             peer.system, peer.component, Command.DO_SET_MODE, param1=flags, param2=float(mode)
         )
         command = SendCommand(peer, message)
+        self._has_changed_mode = True
         self.run(command, f"switching to {name}")
         outcome = command.outcome
         assert outcome is not None
@@ -158,13 +193,13 @@ class Session:
     def ask_telemetry(self) -> None:
         """Ask for the position and its quality, which not every link gets unasked."""
         peer = self.vehicle
-        self._link.send_all(
+        self.link.send_all(
             [RequestDataStream(peer.system, peer.component, stream, _STREAM_HZ, 1) for stream in _STREAMS]
         )
 
     def listen_until(self, is_enough: Callable[[], bool], for_s: float) -> bool:
         """Listen until something is so, no longer than a time; give whether it is."""
-        self._link.run(_Listen(for_s), on_frames=self._listen, until=is_enough)
+        self.link.run(_Listen(for_s), on_frames=self._listen, until=is_enough)
         return is_enough()
 
     def _is_in(self, mode: int) -> bool:
@@ -174,20 +209,24 @@ class Session:
         for listener in self.listeners:
             listener(frames)
         for frame in frames:
-            if (
-                self.peer is not None
-                and isinstance(frame.message, Heartbeat)
-                and (frame.system, frame.component) == (self.peer.system, self.peer.component)
+            if self.peer is not None and (frame.system, frame.component) == (
+                self.peer.system,
+                self.peer.component,
             ):
-                self._heartbeat, self._heartbeat_s = frame.message, time.monotonic()
+                self._take(frame.message)
+
+    def _take(self, message: Message) -> None:
+        if isinstance(message, Heartbeat):
+            self._heartbeat = message
+        self.watch.receive(message, self.link.now_s())
 
     def _with_signing_hint(self, trouble: LinkError) -> LinkError:
-        if not self._link.untrusted_frames:
+        if not self.link.untrusted_frames:
             return trouble
         return type(trouble)(
-            f"{trouble}; {self._link.untrusted_frames} frames were left out: not signed with this key",
+            f"{trouble}; {self.link.untrusted_frames} frames were left out: not signed with this key",
             **trouble.details,
-            untrusted_frames=self._link.untrusted_frames,
+            untrusted_frames=self.link.untrusted_frames,
         )
 
 

@@ -51,15 +51,6 @@ SigningKeyOption = Annotated[
 
 
 @dataclass(frozen=True, slots=True)
-class _Wish:
-    """What may be done to the vehicle."""
-
-    hold: bool
-    replace_active: bool
-    drive: bool
-
-
-@dataclass(frozen=True, slots=True)
 class _Done:
     """One list that is on the vehicle now, verified."""
 
@@ -131,13 +122,19 @@ def upload(
     lists, parameters = _content(file, only or [], restore=restore)
 
     from mavlink_bridge.backup import BackupStore  # noqa: PLC0415 - usage errors need not wait for it
+    from mavlink_bridge.cli.interrupting import interruptible, terminable  # noqa: PLC0415
     from mavlink_bridge.cli.session import Address, open_session  # noqa: PLC0415
+    from mavlink_bridge.cli.starting import make_ready, start_driving  # noqa: PLC0415
 
     address = Address(connect, (source_system, source_component), system, any_vehicle, timeout, signing_key)
-    wish = _Wish(hold, replace_active, drive)
     done: list[_Done] = []
     changed: dict[str, tuple[float | None, float]] = {}
-    with progress_bar(quiet=quiet or json_output) as show, open_session(address, show) as session:
+    with (
+        terminable(),
+        progress_bar(quiet=quiet or json_output) as show,
+        open_session(address, show) as session,
+        interruptible(session.at_hand(show.aside, lambda: _on_it(done, changed))),
+    ):
         store = BackupStore()
         if restore and file is None:
             lists = _interrupted_lists(store, session.vehicle.system)
@@ -145,14 +142,16 @@ def upload(
             warn(interrupted_warnings(store, session.vehicle.system))
         if not session.is_ardupilot:
             raise UsageError("the vehicle's autopilot is not ArduPilot: what it stores could not be verified")
-        _make_ready(session, wish)
+        make_ready(session, hold=hold, replace_active=replace_active)
         limits = _limits(session, lists)
         for mission_type, items in lists:
-            done.append(_upload_list(session, store, mission_type, items, limits, wish))
+            done.append(
+                _upload_list(session, store, mission_type, items, limits, replace_active=replace_active)
+            )
         if parameters:
-            changed = _upload_parameters(session, parameters)
+            _upload_parameters(session, parameters, changed)
         if drive:
-            _drive(session)
+            start_driving(session)
     _report(session, done, changed, json_output=json_output, quiet=quiet)
 
 
@@ -227,19 +226,6 @@ def _lists_of(file: Path) -> dict[str, tuple[MissionItem, ...]]:
     return found
 
 
-def _make_ready(session: Session, wish: _Wish) -> None:
-    """See to it that the vehicle does not drive what is about to be replaced."""
-    from mavlink_bridge.rover import HOLD_MODE  # noqa: PLC0415
-
-    if session.is_active and wish.hold:
-        session.change_mode(HOLD_MODE)
-    elif session.is_active and not wish.replace_active:
-        raise RefusedError(
-            "the vehicle is armed and drives its mission in AUTO; nothing was written. "
-            "--hold switches it to HOLD first, --replace-active writes all the same"
-        )
-
-
 def _limits(session: Session, lists: Sequence[tuple[MissionType, tuple[MissionItem, ...]]]) -> Limits:
     """Give what fits; where the usual limits are too small, the vehicle is asked for its SD card's."""
     from mavlink_bridge.protocol.limits import Limits  # noqa: PLC0415
@@ -261,7 +247,8 @@ def _upload_list(
     mission_type: MissionType,
     items: tuple[MissionItem, ...],
     limits: Limits,
-    wish: _Wish,
+    *,
+    replace_active: bool,
 ) -> _Done:
     from mavlink_bridge.link import now_s  # noqa: PLC0415 - pymavlink takes its time
     from mavlink_bridge.outcomes import upload_trouble  # noqa: PLC0415
@@ -274,9 +261,9 @@ def _upload_list(
         mission_type,
         items,
         limits=limits,
-        is_active=session.is_active,
-        replace_active=wish.replace_active,
+        replace_active=replace_active,
     )
+    machine.know_vehicle(session.watch, session.link.now_s())
     backup: Path | None = None
 
     def step() -> None:
@@ -319,9 +306,9 @@ def _interrupt(machine: VerifiedUpload, backup: Path | None, name: str) -> Keybo
 
 
 def _upload_parameters(
-    session: Session, wanted: Mapping[str, float]
-) -> dict[str, tuple[float | None, float]]:
-    """Set the parameters that differ; give their old and new values."""
+    session: Session, wanted: Mapping[str, float], changed: dict[str, tuple[float | None, float]]
+) -> None:
+    """Set the parameters that differ; note their old and new values."""
     from mavlink_bridge.protocol.parameters import ReadParameters, SetParameter  # noqa: PLC0415
 
     reading = ReadParameters(session.vehicle, wanted)
@@ -335,7 +322,6 @@ def _upload_parameters(
             f"the vehicle has no parameter {', '.join(read.missing)}; none was set",
             missing=list(read.missing),
         )
-    changed: dict[str, tuple[float | None, float]] = {}
     for name, value in wanted.items():
         if _is_same(read.values[name], value):
             continue
@@ -353,17 +339,18 @@ def _upload_parameters(
                 changed=list(changed),
             )
         changed[name] = (read.values[name], value)
-    return changed
 
 
 def _is_same(held: float, wanted: float) -> bool:
     return abs(held - wanted) <= 1e-6 * abs(wanted)
 
 
-def _drive(session: Session) -> None:
-    from mavlink_bridge.rover import AUTO_MODE  # noqa: PLC0415
-
-    session.change_mode(AUTO_MODE)
+def _on_it(done: Sequence[_Done], changed: Mapping[str, object]) -> str:
+    """Return what the command has put on the vehicle so far, for people."""
+    lists = [f"{entry.mission_type.name.lower()} ({len(entry.outcome.found or ())} items)" for entry in done]
+    parameters = [f"parameters {', '.join(changed)}"] if changed else []
+    put = ", ".join((*lists, *parameters))
+    return f"put on it and verified: {put}" if put else ""
 
 
 def _report(

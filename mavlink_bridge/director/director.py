@@ -11,6 +11,8 @@ left to the operator: nothing else arms or switches to AUTO.
 
 from __future__ import annotations
 
+import math
+from functools import partial
 from typing import TYPE_CHECKING
 
 from mavlink_bridge import messages as m
@@ -73,6 +75,11 @@ class Director(Stopper):
             return self.drive.item - 1, len(self.plan.items)
         progress: tuple[int, int] = self._steps.current.progress if self._steps else (0, 0)
         return progress
+
+    @property
+    def drives_by_us(self) -> bool:
+        """Whether the vehicle drives because of us, or is about to."""
+        return self.orders.drive and (self._may_be_in_auto or self.state is State.DRIVING)
 
     # What the vehicle and others do
 
@@ -193,7 +200,7 @@ class Director(Stopper):
         if self.state is State.ARRIVED and self.orders.once:
             self._end_drive()  # it has arrived; whoever has it now
             return
-        is_ours_in_auto = self._may_be_in_auto
+        is_ours_in_auto, drive = self._may_be_in_auto, self.drive
         if not self._move(Cue.TAKEN_OVER):
             return
         self._let_loose()
@@ -203,21 +210,20 @@ class Director(Stopper):
         then = "the upload is finished first" if is_withdrawing else "waiting for a new target"
         mode = what.rpartition(" ")[2] if "switched" in what else mode_name(self.situation.mode)
         self._voice.tell(now_s, EventName.TAKEN_OVER, f"somebody {what}; {then}", mode)
-        trouble = OutcomeError(f"somebody {what} before it arrived", mode=mode)
+        trouble = OutcomeError(f"somebody {what} before it arrived{_so_far(drive)}", mode=mode)
         if is_withdrawing:
             self._taken_over = trouble
         elif what == DISARMED and is_ours_in_auto:
-            self._put_back(now_s)
+            self._put_back(str(trouble), now_s)
         else:
             self._give_up(trouble)
 
-    def _put_back(self, now_s: float) -> None:
+    def _put_back(self, what: str, now_s: float) -> None:
         """Take the vehicle, disarmed now, out of the AUTO that we switched it to."""
         assert self._peer is not None
-        self._steps.run([(PutBack(self._peer), self._was_put_back)], now_s)
+        self._steps.run([(PutBack(self._peer), partial(self._was_put_back, what))], now_s)
 
-    def _was_put_back(self, machine: PutBack, now_s: float) -> None:
-        what = "somebody disarmed the vehicle before it arrived"
+    def _was_put_back(self, what: str, machine: PutBack, now_s: float) -> None:
         if machine.is_left_in_auto:
             text = f"{what}, and it does not go to HOLD: it is in AUTO, arming it drives off"
         elif machine.was_needed:
@@ -393,3 +399,12 @@ class Director(Stopper):
         self._holds_after_arrival = False
         self._let_loose()
         self._end()
+
+
+def _so_far(drive: DriveWatch | None) -> str:
+    """Return how a drive went until its early end."""
+    if drive is None:
+        return ""
+    least_m = drive.least_clearance_m
+    kept = f", least clearance {least_m:.2f} m" if least_m < math.inf else ""
+    return f" (after {drive.driven_m:.1f} m{kept}, {drive.distance_left_m:.0f} m left)"

@@ -73,6 +73,12 @@ class RouteMaker(TargetTaker):
         return upload.pending_backup if isinstance(upload, VerifiedUpload) else None
 
     @property
+    def upload_under_way(self) -> VerifiedUpload | None:
+        """The upload that runs; None while none does."""
+        upload = self._steps.current
+        return upload if isinstance(upload, VerifiedUpload) else None
+
+    @property
     def pending_plan(self) -> PlanTask | None:
         """The plan that is waited for; nothing follows before `plan_made`."""
         return self._task if self.state is State.PLANNING and self._made is None else None

@@ -112,7 +112,10 @@ def test_nobody_speaks():
 
 def test_drives_only_a_vehicle_that_is_armed(config):
     with Simulator(config, "tcpin:127.0.0.1:0") as simulator:
-        result = run("plan", "--connect", simulator.connection, "--target", TARGET, "--drive", "--json")
+        result = run(
+            "plan", "--connect", simulator.connection, "--target", TARGET, "--upload", "--drive", "--json"
+        )
+        assert simulator.vehicle.mode != AUTO_MODE
         assert not simulator.vehicle.is_armed
     document = json.loads(result.stdout)
     assert (result.exit_code, document["error"]) == (7, "OutcomeError")

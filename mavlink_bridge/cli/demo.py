@@ -71,7 +71,11 @@ def demo(
         request = Request(targets=(LatLon(*_TARGET),), clearance_m=_CLEARANCE_M)
         orders = Orders(identity=_IDENTITY, request=request, upload=True, drive=True, arm=True)
         result: LiveResult = conduct(
-            link, orders, quiet=quiet or json_output, on_frames=lambda frames: _observe(drive, frames)
+            link,
+            orders,
+            quiet=quiet or json_output,
+            on_frames=lambda frames: _observe(drive, frames),
+            is_real=False,
         )
     warn(result.plan.warnings)
     written = write_outputs(

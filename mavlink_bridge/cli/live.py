@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from threading import Thread
 from typing import TYPE_CHECKING
@@ -111,8 +112,11 @@ def conduct(
     quiet: bool,
     on_frames: Callable[[list[Frame]], None] | None = None,
     on_plan: PlanTaker = _take_none,
+    is_real: bool = True,
 ) -> LiveResult:
     """Run a director on a link until its single job is done, and keep backups for it.
+
+    Where the vehicle is real, an interrupt ends with what it does, and may ask whether to stop it.
 
     Raises
     ------
@@ -155,7 +159,8 @@ def conduct(
             for event in director.take_events():
                 arrival = event.data if event.name is EventName.ARRIVED else arrival
 
-        with interruptible(replace(director_at_hand(director, backups, link), aside=show.aside)):
+        at_hand = replace(director_at_hand(director, backups, link), aside=show.aside)
+        with interruptible(at_hand) if is_real else nullcontext():
             link.run(director, on_frames=on_frames, on_step=step, longest_wait_s=plans.longest_wait_s)
     if director.trouble is not None or director.plan is None:
         raise _with_hint(

@@ -28,7 +28,7 @@ def make_ready(session: Session, *, hold: bool, replace_active: bool) -> None:
     """
     if session.is_active:  # a mission that is complete is not driven: the vehicle may not have told so yet
         session.ask_telemetry()
-        session.listen_until(lambda: not session.is_active, _STATE_PATIENCE_S)
+        session.listen_until(lambda: session.is_active is False, _STATE_PATIENCE_S)
     if not session.is_active:
         return
     if hold:

@@ -241,7 +241,7 @@ class _Bar(Shown):
 
 @contextmanager
 def progress_bar(*, quiet: bool) -> Iterator[Shown]:
-    """Show a progress bar on stderr where that is a terminal; give what moves it."""
+    """Show a progress bar on stderr where that is a terminal; yields what moves it."""
     if not sys.stderr.isatty() or quiet:
         yield _Lines() if telling().verbose and not quiet else Shown()
         return

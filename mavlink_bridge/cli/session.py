@@ -135,7 +135,7 @@ class Session:
         return self.watch.doing(self.link.now_s())
 
     def at_hand(self, aside: Callable[[], AbstractContextManager[Any]], on_it: Callable[[], str]) -> AtHand:
-        """Give the vehicle as an interrupt finds it."""
+        """Return the vehicle as an interrupt finds it."""
         return AtHand(
             link=self.link,
             peer=lambda: self.peer,
@@ -147,7 +147,7 @@ class Session:
         )
 
     def hear_anew(self) -> bool:
-        """Wait for its next heartbeat; give whether one came."""
+        """Return whether its next heartbeat came; waits for it."""
         begun_s = self.link.now_s()
         return self.listen_until(lambda: self.watch.heartbeat_s > begun_s, _HEARTBEAT_PATIENCE_S)
 

@@ -11,7 +11,6 @@ left to the operator: nothing else arms or switches to AUTO.
 
 from __future__ import annotations
 
-import math
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -210,7 +209,9 @@ class Director(Stopper):
         then = "the upload is finished first" if is_withdrawing else "waiting for a new target"
         mode = what.rpartition(" ")[2] if "switched" in what else mode_name(self.situation.mode)
         self._voice.tell(now_s, EventName.TAKEN_OVER, f"somebody {what}; {then}", mode)
-        trouble = OutcomeError(f"somebody {what} before it arrived{_so_far(drive)}", mode=mode)
+        trouble = OutcomeError(
+            f"somebody {what} before it arrived{drive.so_far if drive is not None else ''}", mode=mode
+        )
         if is_withdrawing:
             self._taken_over = trouble
         elif what == DISARMED and is_ours_in_auto:
@@ -399,12 +400,3 @@ class Director(Stopper):
         self._holds_after_arrival = False
         self._let_loose()
         self._end()
-
-
-def _so_far(drive: DriveWatch | None) -> str:
-    """Return how a drive went until its early end."""
-    if drive is None:
-        return ""
-    least_m = drive.least_clearance_m
-    kept = f", least clearance {least_m:.2f} m" if least_m < math.inf else ""
-    return f" (after {drive.driven_m:.1f} m{kept}, {drive.distance_left_m:.0f} m left)"

@@ -125,21 +125,8 @@ def conduct(
     """
     planning_s: list[float] = []
     has_driven = False
-
-    def timed(situation: Situation, request: Request) -> Plan:
-        if request.repairs and has_driven:
-            raise SituationError(
-                "the rest of the mission would no longer keep its clearance, and the vehicle was switched to HOLD: part of the mission "
-                "is driven already, so that it is not begun anew"
-            )
-        planned, seconds = timed_plan(situation, request)
-        if request.repairs and orders.drive:
-            _check_drivable(planned)
-        planning_s.append(seconds)
-        return planned
-
     director = Director(replace(orders, once=True), situation)
-    plans = PlanMaker(director, timed)
+    plans = PlanMaker(director, _timed_planner(orders, lambda: has_driven, planning_s))
     backups = BackupKeeper(director)
     taken: Plan | None = None
     arrival: Mapping[str, object] | None = None
@@ -175,6 +162,26 @@ def conduct(
         arrival=arrival,
         doing=director.watch.doing(link.now_s()),
     )
+
+
+def _timed_planner(
+    orders: Orders, has_driven: Callable[[], bool], planning_s: list[float]
+) -> Callable[[Situation, Request], Plan]:
+    """Return what makes a live run's plans, and notes how long each took; a mission that is driven in part is not begun anew."""
+
+    def timed(situation: Situation, request: Request) -> Plan:
+        if request.repairs and has_driven():
+            raise SituationError(
+                "the rest of the mission would no longer keep its clearance, and the vehicle was switched to HOLD: part of the mission "
+                "is driven already, so that it is not begun anew"
+            )
+        planned, seconds = timed_plan(situation, request)
+        if request.repairs and orders.drive:
+            _check_drivable(planned)
+        planning_s.append(seconds)
+        return planned
+
+    return timed
 
 
 def _with_hint(trouble: BridgeError | MissionError) -> BridgeError | MissionError:

@@ -270,7 +270,7 @@ def target_to_verified() -> tuple[float, int]:
 
 def fence_across_the_route(faults: Faults) -> dict[str, float]:
     """Give how a drive goes on whose route is cut by a new fence: times in s, and breaches."""
-    options = ("--drive", "--arm", "--clearance", "2.5")
+    options = ("--upload", "--drive", "--arm", "--clearance", "2.5")
     with (
         Simulator(config("yard"), faults=faults) as simulator,
         Bridge(simulator.connection, *options) as bridge,

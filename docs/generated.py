@@ -100,7 +100,7 @@ _CODES = {
     ExitCode.REFUSED: "the vehicle refused; says its result by name, and the item",
     ExitCode.OUTCOME: "what is on the vehicle is not what was wanted, or unknown; says what is known and where the backup lies",
     ExitCode.CHECK: "a check or comparison failed (`check`, `replay --expect`, `doctor`)",
-    ExitCode.INTERRUPTED: "interrupted by the user; the vehicle was left as it was, or this says otherwise",
+    ExitCode.INTERRUPTED: "interrupted by the user; says what the vehicle does now (mode, armed, speed) and what is on it",
 }
 
 

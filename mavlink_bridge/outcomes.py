@@ -33,6 +33,11 @@ _BROKEN_OFF = "the vehicle may hold the old list, the new one, or part of the ol
 _INTERRUPTED = "interrupted"
 
 
+def held_text(held: Held) -> str:
+    """Return what a vehicle holds after an upload, for people."""
+    return _HELD[held]
+
+
 def upload_trouble(outcome: VerifiedUploadOutcome) -> BridgeError | None:
     """Return the error that an upload's outcome is; None for a verified one."""
     if outcome.is_verified:
@@ -153,6 +158,8 @@ def end_of_upload(
         Where nothing was written, or the vehicle is known to hold the new list or the old one: the cause, an error of ours with the list's name.
         Otherwise an `OutcomeError`, or an interrupt, that says what may be on the vehicle and where the old list lies.
     """
+    if isinstance(cause, KeyboardInterrupt) and cause.args:
+        return cause  # it has its words already
     is_settled = writing is None or writing.is_settled
     is_ours = isinstance(cause, BridgeError)
     if is_settled and not verified and not (is_ours and writing is not None):
@@ -228,7 +235,7 @@ def _ended(
 ) -> BaseException:
     ended: BaseException
     if isinstance(cause, KeyboardInterrupt):
-        ended = KeyboardInterrupt(message)
+        ended = type(cause)(message)  # a SIGTERM stays one
     elif keeps_kind and isinstance(cause, BridgeError):
         ended = type(cause)(message, **details)
     elif isinstance(cause, (BridgeError, MissionError, OSError)):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from missions.errors import SituationError
+from missions.errors import NoRouteError, SituationError
 from missions.fence import PolygonZone
 from missions.geo import distance_m
 from missions.ground import Ground, check_ground, lay_out
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from missions.vehicle import Vehicle
 
 MAX_FIELD_M = 100_000.0
+"""No place of a plan is further from the fence's centre: the local plane's distances are good for a field, not for a country."""
 
 
 def route_ends(situation: Situation, request: Request) -> tuple[LatLon, tuple[LatLon, ...]]:
@@ -63,7 +64,7 @@ def ground_for(situation: Situation, vehicle: Vehicle, ends: Sequence[LatLon]) -
 
     Raises
     ------
-    FenceMissingError, FenceError, InvalidPositionError, SituationError
+    FenceMissingError, FenceError, InvalidPositionError, SituationError, NoRouteError
         As `missions.plan.plan`.
     """
     fence = known_fence(situation)
@@ -74,27 +75,51 @@ def ground_for(situation: Situation, vehicle: Vehicle, ends: Sequence[LatLon]) -
     ]
     frame = frame_around(positions)
     home = situation.home.value if situation.home and vehicle.fence.enforces_home_circle else None
-    named = [*(("", position) for position in (*positions, *ends)), *([("home ", home)] if home else [])]
+    named = [*(("", position) for position in positions), *([("home ", home)] if home else [])]
     for name, position in named:
-        check_latitude(position)
         if (away_m := distance_m(frame.origin, position)) > MAX_FIELD_M:
-            raise SituationError(
-                f"{name}{position} is {away_m / 1000:.0f} km from the fence's centre {frame.origin}; "
-                f"at most {MAX_FIELD_M / 1000:.0f} km can be planned",
-                distance_m=away_m,
-            )
+            raise SituationError(f"{name}{_too_far(position, frame.origin, away_m)}", distance_m=away_m)
+        check_latitude(position)
+    near = [end for end in ends if distance_m(frame.origin, end) <= MAX_FIELD_M]
+    for end in near:
+        check_latitude(end)
     ground = lay_out(
         fence,
         frame,
         union=vehicle.fence.union,
         home=home,
         home_radius_m=vehicle.fence.radius_m if vehicle.fence.enforces_home_circle else None,
-        around=ends,
+        around=near,
     )
     check_ground(ground)
+    for end in ends:  # last: a fence that cannot be used is no matter of the target
+        _check_reach(end, frame.origin)
     return ground
 
 
 def route_ground(situation: Situation, vehicle: Vehicle, ends: Sequence[LatLon]) -> Ground:
     """Return the ground for a route: as `ground_for`, and the seams at which the vehicle would stop are obstacles too."""
     return with_seams(ground_for(situation, vehicle, ends), vehicle)
+
+
+def _check_reach(end: LatLon, centre: LatLon) -> None:
+    """Refuse a start or target so far away that no plane holds it and the fence: nothing can be driven there.
+
+    Raises
+    ------
+    NoRouteError
+        It is too far away.
+    """
+    if (away_m := distance_m(centre, end)) > MAX_FIELD_M:
+        raise NoRouteError(
+            f"no route: {_too_far(end, centre, away_m)}",
+            distance_m=away_m,
+            advice="is it the right place and the right fence? Latitude comes first: LAT,LON",
+        )
+
+
+def _too_far(position: LatLon, centre: LatLon, away_m: float) -> str:
+    return (
+        f"{position} is {away_m / 1000:.0f} km from the fence's centre {centre}; "
+        f"at most {MAX_FIELD_M / 1000:.0f} km can be planned"
+    )

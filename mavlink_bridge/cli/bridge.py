@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import os
-import select
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -25,10 +23,13 @@ from mavlink_bridge.cli.common import (
     print_json,
     warn,
 )
+from mavlink_bridge.cli.interrupting import AtHand, interruptible, terminable
+from mavlink_bridge.cli.keyboard import Keyboard
+from mavlink_bridge.cli.permissions import check_permissions
 from mavlink_bridge.cli.plan_request import request_from_options
 from mavlink_bridge.cli.terminal import echo, say
-from mavlink_bridge.cli.terminating import sigterm_as_interrupt
 from mavlink_bridge.cli.upload import RequiredConnectOption, SigningKeyOption
+from mavlink_bridge.cli.values import MOST_M, within
 from mavlink_bridge.errors import LinkError, UsageError
 
 if TYPE_CHECKING:
@@ -69,16 +70,23 @@ def bridge(
         str, typer.Option(metavar="M|auto", help="Room for cut corners on top.")
     ] = "auto",
     snap: Annotated[
-        float, typer.Option(metavar="M", min=0.0, help="Move blocked targets to free ground.")
+        float,
+        typer.Option(
+            metavar="M", parser=within(0.0, MOST_M, "metres"), help="Move blocked targets to free ground."
+        ),
     ] = 0.0,
     vehicle: Annotated[
         Path | None, typer.Option(metavar="FILE.parm", help="Parameters that the vehicle does not tell.")
     ] = None,
     upload: Annotated[bool, typer.Option("--upload", help="Write missions to the vehicle.")] = False,
     drive: Annotated[
-        bool, typer.Option("--drive", help="Switch modes: HOLD before a new route, AUTO for a verified one.")
+        bool,
+        typer.Option(
+            "--drive",
+            help="With --upload: switch modes, HOLD before a new route and after arrival, AUTO for a verified one.",
+        ),
     ] = False,
-    arm: Annotated[bool, typer.Option("--arm", help="Arm before AUTO.")] = False,
+    arm: Annotated[bool, typer.Option("--arm", help="With --drive: arm before AUTO.")] = False,
     confirm: Annotated[bool, typer.Option("--confirm", help="Upload a plan only after a typed yes.")] = False,
     once: Annotated[bool, typer.Option("--once", help="End after one job.")] = False,
     log: Annotated[
@@ -105,7 +113,7 @@ def bridge(
 ) -> None:
     """Run beside the autopilot: read fences, state and targets from the stream, keep a plan, upload it verified, watch the drive.
 
-    Type targets as `LAT,LON`; `yes` confirms a plan. Without `--upload` and `--drive` it only reports.
+    Type targets as `LAT,LON`; `yes` confirms a plan. Without `--upload` it only reports.
 
     For example:
 
@@ -114,6 +122,7 @@ def bridge(
     `pbpp bridge --connect /dev/ttyAMA0,921600 --upload --drive --log run.tlog --json`
     """
     del config  # its callback has taken it
+    check_permissions(upload=upload, drive=drive, arm=arm)
     from mavlink_bridge.cli.run_log import RunLog, SafeTeller  # noqa: PLC0415
     from mavlink_bridge.cli.session import signing_of  # noqa: PLC0415
     from mavlink_bridge.director import AT_WORK, Director, Orders  # noqa: PLC0415 - quick help
@@ -131,7 +140,7 @@ def bridge(
         system=system,
         any_vehicle=any_vehicle,
         request=request_from_options(None, target or [], clearance, corner_allowance, snap, "optimal"),
-        upload=upload or drive,
+        upload=upload,
         drive=drive,
         arm=arm,
         confirm=confirm,
@@ -142,7 +151,6 @@ def bridge(
     )
     parameters = read_parameters(vehicle) if vehicle else {}
     with contextlib.ExitStack() as stack:
-        stack.enter_context(sigterm_as_interrupt())
         recorder, journal = _recorders(stack, log, orders, parameters)
         director = Director(orders, Situation(parameters=parameters))
         view = _view(stack, director, is_wanted=not (json_output or quiet))
@@ -150,7 +158,8 @@ def bridge(
         log_of_run = RunLog(recorder, journal) if recorder is not None and journal is not None else None
         tell = SafeTeller(tell, lambda: director.state not in AT_WORK)
         shell = _Shell(director, connect, tell, view, log_of_run, quiet=quiet)
-        shell.run(signing_of(signing_key), timeout)
+        with terminable():
+            shell.run(signing_of(signing_key), timeout)
     trouble = shell.director.trouble
     if trouble is not None and shell.director.is_done:
         if json_output:
@@ -205,26 +214,51 @@ class _Shell:
             journal=lambda name, now, text: self._written.call(name, now, text=text),
         )
         self._plans = PlanMaker(self.director)
-        self._typed = _typed_lines()
+        self._keyboard = Keyboard()
         self._quiet = quiet
         self._asked_for: Plan | None = None  # the plan that was said to wait for a yes
 
     def run(self, signing: Signing | None, timeout_s: float) -> None:
         """Run until the single job is done, or for ever; a link that breaks is opened again."""
-        from mavlink_bridge.outcomes import ends_in_words  # noqa: PLC0415 - quick help
+        from mavlink_bridge.link import now_s  # noqa: PLC0415 - quick help
+        from mavlink_bridge.outcomes import ends_in_words  # noqa: PLC0415
 
-        with ends_in_words(lambda: self._backups.writing, last_words=self._backups.release):
-            self._run(signing, timeout_s)
-
-    def _run(self, signing: Signing | None, timeout_s: float) -> None:
-        from mavlink_bridge.cli.opening import Opening  # noqa: PLC0415 - quick help
-        from mavlink_bridge.echoes import SentFrames  # noqa: PLC0415
-        from mavlink_bridge.link import ONE_SHOT_IDENTITY, now_s, open_link  # noqa: PLC0415
-
-        sent = SentFrames()
         begun_s = now_s()
         self._written.call("start", begun_s)
         self.director.start(begun_s)
+        with (
+            interruptible(self._at_hand(None)),
+            ends_in_words(lambda: self._backups.writing, last_words=self._backups.release),
+        ):
+            self._keep_linked(signing, timeout_s)
+
+    def _at_hand(self, link: Link | None) -> AtHand:
+        """Return the vehicle as an interrupt finds it."""
+        from mavlink_bridge.cli.live import director_at_hand  # noqa: PLC0415 - quick help
+
+        at_hand = director_at_hand(self.director, link)
+        return replace(
+            at_hand,
+            aside=self._view.aside if self._view is not None else contextlib.nullcontext,
+            keyboard=self._keyboard,
+        )
+
+    @contextlib.contextmanager
+    def _interrupt_in_words(self) -> Iterator[None]:
+        """Let an interrupt say what an upload under way has left; a link that breaks is no end of it."""
+        from mavlink_bridge.outcomes import end_of_upload  # noqa: PLC0415 - quick help
+
+        try:
+            yield
+        except KeyboardInterrupt as cause:
+            raise end_of_upload(cause, self._backups.writing) from None
+
+    def _keep_linked(self, signing: Signing | None, timeout_s: float) -> None:
+        from mavlink_bridge.cli.opening import Opening  # noqa: PLC0415 - quick help
+        from mavlink_bridge.echoes import SentFrames  # noqa: PLC0415
+        from mavlink_bridge.link import ONE_SHOT_IDENTITY, open_link  # noqa: PLC0415
+
+        sent = SentFrames()
         failures = 0
         while not self.director.is_done:
             try:
@@ -242,7 +276,7 @@ class _Shell:
                 )
                 if not self._is_opened(opening):
                     return
-                with opening.link() as link:
+                with opening.link() as link, interruptible(self._at_hand(link)), self._interrupt_in_words():
                     failures = 0
                     if self._view is not None:
                         self._view.link_trouble = None
@@ -323,7 +357,7 @@ class _Shell:
     def _listen_to_keyboard(self, now: float) -> None:
         from mavlink_bridge.cli.typed import understood  # noqa: PLC0415 - quick help
 
-        line = next(self._typed)
+        line = self._keyboard.line()
         if not line:
             return
         typed = understood(line, self.director)
@@ -360,56 +394,6 @@ class _Shell:
                 self._log.event(event)
             self._tell(event)
         self._ask_for_yes()
-
-
-def _typed_lines() -> Iterator[str]:
-    """Give what was typed, a line at a time; an empty text while nothing was. Does not wait."""
-    read = _keyboard_thread(0) if os.name == "nt" else _typed_now
-    waiting = b""
-    while True:
-        if b"\n" not in waiting:
-            waiting += read()
-        line, found, rest = waiting.partition(b"\n")
-        if found:
-            waiting = rest
-            yield line.decode(errors="replace").strip()
-        else:
-            yield ""
-
-
-def _typed_now() -> bytes:
-    """Give what was typed, empty while nothing was."""
-    try:
-        has_input = bool(select.select([sys.stdin], [], [], 0)[0])
-        return os.read(sys.stdin.fileno(), 4096) if has_input else b""
-    except (OSError, ValueError):  # no stdin, or a closed one
-        return b""
-
-
-def _keyboard_thread(descriptor: int) -> Callable[[], bytes]:
-    """Give what gives what was typed, read by a thread: Windows cannot tell whether a console has input.
-
-    The thread reads the descriptor itself: one that waits in ``sys.stdin`` would hold its lock when the program ends.
-    """
-    import queue  # noqa: PLC0415 - only on Windows
-    import threading  # noqa: PLC0415
-
-    typed: queue.SimpleQueue[bytes] = queue.SimpleQueue()
-
-    def read() -> None:
-        with contextlib.suppress(OSError):
-            while data := os.read(descriptor, 4096):
-                typed.put(data)
-
-    threading.Thread(target=read, name="keyboard", daemon=True).start()
-
-    def give() -> bytes:
-        try:
-            return typed.get_nowait()
-        except queue.Empty:
-            return b""
-
-    return give
 
 
 def _view(stack: contextlib.ExitStack, director: Director, *, is_wanted: bool) -> LiveView | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from rich.console import Console, Group  # the type: `terminal.console` makes one
@@ -21,6 +22,7 @@ from mavlink_bridge.rover import mode_name
 from missions.picture import sketch_plan
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from types import TracebackType
     from typing import Self
 
@@ -74,6 +76,15 @@ class LiveView:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._live.__exit__(kind, error, trace)
+
+    @contextmanager
+    def aside(self) -> Iterator[None]:
+        """Clear the terminal of the view, for as long as the context lasts."""
+        self._live.stop()
+        try:
+            yield
+        finally:
+            self._live.start()
 
     def tell(self, event: Event) -> None:
         """Show an event above the view; progress stands in the view itself."""

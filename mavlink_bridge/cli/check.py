@@ -25,6 +25,7 @@ from mavlink_bridge.cli.common import (
 )
 from mavlink_bridge.cli.terminal import cell, console, echo
 from mavlink_bridge.cli.upload import SigningKeyOption
+from mavlink_bridge.cli.values import MOST_M, position_from, within
 from mavlink_bridge.cli.vehicle_options import PANEL as VEHICLE_PANEL
 from mavlink_bridge.cli.vehicle_options import (
     GpsOption,
@@ -78,7 +79,9 @@ def check(
     clearance: Annotated[
         float | None,
         typer.Option(
-            metavar="M", min=0.0, help="To be kept by each leg while driving. Default: from FENCE_MARGIN."
+            metavar="M",
+            parser=within(0.0, MOST_M, "metres"),
+            help="To be kept by each leg while driving. Default: from FENCE_MARGIN.",
         ),
     ] = None,
     plot: Annotated[
@@ -118,7 +121,6 @@ def check(
     if json_output and Path("-") in plots:
         raise UsageError("--plot - and --json both want the standard output; give a file to --plot")
     from missions.check import check_mission  # noqa: PLC0415
-    from missions.geo import parse_lat_lon  # noqa: PLC0415
     from missions.request import Request  # noqa: PLC0415
 
     request = with_vehicle(
@@ -127,7 +129,7 @@ def check(
         position_error=position_error,
         size=(length, width, gps),
     )
-    begin = parse_lat_lon(start) if start else None
+    begin = position_from("--start", start) if start is not None else None
     situation: Situation | None = None
     unknown: list[str] = []
     if log is not None:

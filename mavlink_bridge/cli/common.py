@@ -6,7 +6,7 @@ import functools
 import inspect
 import sys
 from collections.abc import Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -26,11 +26,14 @@ from mavlink_bridge.cli.failing import (
 )
 from mavlink_bridge.cli.options_file import take_options
 from mavlink_bridge.cli.terminal import console, print_json, say
+from mavlink_bridge.cli.values import MOST_S, within
 from missions import errors as mission_errors
 from missions.harmless import harmless
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
+
+    from rich.progress import Progress
 
 __all__ = [
     "AnyVehicleOption",
@@ -85,7 +88,12 @@ SourceComponentOption = Annotated[
 ]
 TimeoutOption = Annotated[
     float,
-    typer.Option(metavar="S", min=0.1, help="How long to wait for the vehicle.", rich_help_panel=LINK_PANEL),
+    typer.Option(
+        metavar="S",
+        parser=within(0.1, MOST_S, "seconds"),
+        help="How long to wait for the vehicle.",
+        rich_help_panel=LINK_PANEL,
+    ),
 ]
 AnyVehicleOption = Annotated[
     bool,
@@ -158,7 +166,8 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
             raise typer.Exit(report_error(name, error, wants_json=wants_json)) from None
         except KeyboardInterrupt as interrupt:
             message = str(interrupt) or "interrupted; the vehicle was left as it was"
-            report(name, "Interrupted", message, ExitCode.INTERRUPTED, wants_json=wants_json)
+            details = getattr(interrupt, "details", None)
+            report(name, "Interrupted", message, ExitCode.INTERRUPTED, details, wants_json=wants_json)
             raise typer.Exit(ExitCode.INTERRUPTED) from None
         except (typer.Exit, typer.Abort, typer.BadParameter):
             raise
@@ -189,33 +198,57 @@ def is_same_file(one: Path, other: Path) -> bool:
     return one.exists() and other.exists() and one.samefile(other)
 
 
+class Shown:
+    """Shows how far a command is: text, steps done, steps in all. This one shows nothing."""
+
+    def __call__(self, text: str, done: int, total: int) -> None:
+        """Show it."""
+
+    def aside(self) -> AbstractContextManager[None]:
+        """Clear the terminal of what moves on it, for as long as the context lasts."""
+        return nullcontext()
+
+
+class _Lines(Shown):
+    """Tells progress in lines, one for each new text."""
+
+    def __init__(self) -> None:
+        self._last = ""
+
+    def __call__(self, text: str, _done: int, _total: int) -> None:
+        if text != self._last:
+            self._last = text
+            say(text)
+
+
+class _Bar(Shown):
+    """A progress bar on stderr."""
+
+    def __init__(self, progress: Progress) -> None:
+        self._progress = progress
+        self._task = progress.add_task("", total=None)
+
+    def __call__(self, text: str, done: int, total: int) -> None:
+        self._progress.update(self._task, description=harmless(text), completed=done, total=total or None)
+
+    @contextmanager
+    def aside(self) -> Iterator[None]:
+        self._progress.stop()
+        try:
+            yield
+        finally:
+            self._progress.start()
+
+
 @contextmanager
-def progress_bar(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
-    """Show a progress bar on stderr; give the function that moves it: text, steps done, steps in all."""
+def progress_bar(*, quiet: bool) -> Iterator[Shown]:
+    """Show a progress bar on stderr where that is a terminal; yields what moves it."""
     if not sys.stderr.isatty() or quiet:
-        yield _line_teller() if telling().verbose and not quiet else lambda _text, _done, _total: None
+        yield _Lines() if telling().verbose and not quiet else Shown()
         return
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn  # noqa: PLC0415 - quick help
 
     told = TextColumn("{task.description:<38}", markup=False)
     columns = (told, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console(err=True), transient=True) as progress:
-        task = progress.add_task("", total=None)
-
-        def show(text: str, done: int, total: int) -> None:
-            progress.update(task, description=harmless(text), completed=done, total=total or None)
-
-        yield show
-
-
-def _line_teller() -> Callable[[str, int, int], None]:
-    """Give what tells progress in lines, one for each new text."""
-    last = ""
-
-    def show(text: str, _done: int, _total: int) -> None:
-        nonlocal last
-        if text != last:
-            last = text
-            say(text)
-
-    return show
+        yield _Bar(progress)

@@ -10,6 +10,7 @@ import typer
 
 from mavlink_bridge.cli.common import JsonOption, QuietOption, is_same_file, print_json, warn
 from mavlink_bridge.cli.terminal import echo
+from mavlink_bridge.cli.values import position_from
 from mavlink_bridge.errors import UsageError
 
 if TYPE_CHECKING:
@@ -86,9 +87,7 @@ def _part(only: str | None) -> Part | None:
 def _with_return_point(situation: Situation, return_point: str | None) -> Situation:
     if return_point is None:
         return situation
-    from missions.geo import parse_lat_lon  # noqa: PLC0415 - quick help
-
-    position = parse_lat_lon(return_point)
+    position = position_from("--return-point", return_point)
     if situation.fence is None:
         raise UsageError("--return-point belongs to a fence, and IN holds none")
     fence = replace(situation.fence.value, return_point=position)

@@ -13,6 +13,7 @@ import typer
 
 from mavlink_bridge.cli.common import JsonOption, QuietOption, print_json, warn
 from mavlink_bridge.cli.terminal import echo
+from mavlink_bridge.cli.values import within
 
 if TYPE_CHECKING:
     from mavlink_bridge.messages import Frame
@@ -43,8 +44,7 @@ def demo(
         float,
         typer.Option(
             metavar="X",
-            min=1.0,
-            max=20.0,
+            parser=within(1.0, 20.0),
             help="Simulated time runs so much faster, where the computer keeps up.",
         ),
     ] = 4.0,
@@ -73,7 +73,11 @@ def demo(
         request = Request(targets=(LatLon(*_TARGET),), clearance_m=_CLEARANCE_M)
         orders = Orders(identity=_IDENTITY, request=request, upload=True, drive=True, arm=True)
         result: LiveResult = conduct(
-            link, orders, quiet=quiet or json_output, on_frames=lambda frames: _observe(drive, frames)
+            link,
+            orders,
+            quiet=quiet or json_output,
+            on_frames=lambda frames: _observe(drive, frames),
+            is_real=False,
         )
     remember(out / "demo.tlog")
     warn(result.plan.warnings)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import Future
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from threading import Thread
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.backup import BackupStore
 from mavlink_bridge.cli.common import progress_bar, warn
+from mavlink_bridge.cli.interrupting import AtHand, interruptible, terminable
 from mavlink_bridge.cli.link_notes import LinkNotes
 from mavlink_bridge.cli.plan import timed_plan
 from mavlink_bridge.cli.restoring import interrupted_warnings
@@ -17,19 +20,21 @@ from mavlink_bridge.director import Director, EventName, Orders, State
 from mavlink_bridge.errors import BackupError, BridgeError, LinkError, VehicleInUseError
 from mavlink_bridge.link import ONE_SHOT_IDENTITY, open_link, parse_connection
 from mavlink_bridge.messages import Autopilot, MissionType
-from mavlink_bridge.outcomes import Writing, ends_in_words
-from mavlink_bridge.protocol.verified_upload import Held
+from mavlink_bridge.outcomes import Writing, ends_in_words, held_text
+from mavlink_bridge.protocol.vehicle_watch import Doing
+from mavlink_bridge.protocol.verified_upload import Held, OutcomeKind
 from mavlink_bridge.vehicle_lock import VehicleLock
 from mavlink_bridge.vehicle_mark import Kinship, VehicleMark
 from missions.course import follow_mission
 from missions.errors import SituationError
 from missions.formats import read_parameters
 from missions.items import Command
+from missions.plan import Plan
 from missions.plan import plan as make_plan
 from missions.situation import Mission, Situation
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Mapping
     from pathlib import Path
 
     from mavlink_bridge.director.plan_task import PlanTask
@@ -38,7 +43,6 @@ if TYPE_CHECKING:
     from mavlink_bridge.protocol.verified_upload import VerifiedUpload
     from missions.errors import MissionError
     from missions.items import MissionItem
-    from missions.plan import Plan
     from missions.request import Request
 
 _IDLE_S, _BUSY_S = 0.25, 0.02
@@ -69,19 +73,38 @@ _STATE_TEXTS = {
 
 @dataclass(frozen=True, eq=False)
 class LiveResult:
-    """What came of a live run; the backup is None where nothing was written."""
+    """What came of a live run.
+
+    ``arrival`` holds the data of the director's event, None where nothing was driven; the backup is None where nothing was written.
+    """
 
     plan: Plan
     planning_s: float
     situation: Situation
     verified: bool
     backup: Path | None
+    arrival: Mapping[str, object] | None = None
+    doing: Doing | None = None
+
+
+PlanTaker = Callable[[Plan, float, Situation], None]
+"""Takes a plan, how long it took, and the situation that it was made in."""
+
+
+def _take_none(_plan: Plan, _planning_s: float, _situation: Situation) -> None:
+    """Do nothing with a plan."""
 
 
 def plan_live(
-    connection: str, orders: Orders, *, vehicle_file: Path | None, key_file: Path | None, quiet: bool
+    connection: str,
+    orders: Orders,
+    *,
+    vehicle_file: Path | None,
+    key_file: Path | None,
+    quiet: bool,
+    on_plan: PlanTaker = _take_none,
 ) -> LiveResult:
-    """Open a link and take one mission as far as the orders go.
+    """Open a link and take one mission as far as the orders go; each plan is given to ``on_plan`` before it is acted upon.
 
     Raises
     ------
@@ -90,13 +113,14 @@ def plan_live(
     """
     parameters = read_parameters(vehicle_file) if vehicle_file else {}
     identity = orders.identity or ONE_SHOT_IDENTITY
-    with open_link(connection, identity, signing=signing_of(key_file)) as link:
+    with terminable(), open_link(connection, identity, signing=signing_of(key_file)) as link:
         return conduct(
             link,
             orders,
             Situation(parameters=parameters),
             connection=str(parse_connection(connection)),
             quiet=quiet,
+            on_plan=on_plan,
         )
 
 
@@ -108,8 +132,12 @@ def conduct(
     quiet: bool,
     connection: str = "",
     on_frames: Callable[[list[Frame]], None] | None = None,
+    on_plan: PlanTaker = _take_none,
+    is_real: bool = True,
 ) -> LiveResult:
     """Run a director on a link until its single job is done, and keep backups for it.
+
+    Where the vehicle is real, an interrupt ends with what it does, and may ask whether to stop it.
 
     Raises
     ------
@@ -118,9 +146,58 @@ def conduct(
     """
     planning_s: list[float] = []
     has_driven = False
+    director = Director(replace(orders, once=True), situation)
+    plans = PlanMaker(director, _timed_planner(orders, lambda: has_driven, planning_s))
+    backups = BackupKeeper(director, connection)
+    notes = LinkNotes()
+    taken: Plan | None = None
+    arrival: Mapping[str, object] | None = None
+    with progress_bar(quiet=quiet) as show:
+
+        def step() -> None:
+            nonlocal has_driven, taken, arrival
+            has_driven = has_driven or director.state is State.DRIVING
+            show(_STATE_TEXTS[director.state], *director.progress)
+            warn(backups.step(link.now_s()))
+            if (made := plans.take()) is not None:
+                director.plan_made(*made, link.now_s())
+            if director.plan is not None and director.plan is not taken:
+                taken = director.plan
+                with show.aside():  # before anything of it is sent
+                    on_plan(taken, planning_s[-1], director.situation)
+            for event in director.take_events():
+                arrival = event.data if event.name is EventName.ARRIVED else arrival
+                if event.name is EventName.IDENTITY_CLASH:
+                    warn([event.text])
+            notes.tell(link)
+
+        at_hand = replace(director_at_hand(director, link), aside=show.aside)
+        with (
+            interruptible(at_hand) if is_real else nullcontext(),
+            ends_in_words(lambda: backups.writing, last_words=backups.release),
+        ):
+            link.run(director, on_frames=on_frames, on_step=step, longest_wait_s=plans.longest_wait_s)
+    if director.trouble is not None or director.plan is None:
+        raise _with_hint(director.trouble or LinkError("the director ended without a plan"))
+    outcome = director.upload_outcome
+    return LiveResult(
+        director.plan,
+        planning_s[-1],
+        director.situation,
+        verified=outcome is not None and outcome.is_verified,
+        backup=backups.path,
+        arrival=arrival,
+        doing=director.watch.doing(link.now_s()),
+    )
+
+
+def _timed_planner(
+    orders: Orders, has_driven: Callable[[], bool], planning_s: list[float]
+) -> Callable[[Situation, Request], Plan]:
+    """Return what makes a live run's plans, and notes how long each took; a mission that is driven in part is not begun anew."""
 
     def timed(situation: Situation, request: Request) -> Plan:
-        if request.repairs and has_driven:
+        if request.repairs and has_driven():
             raise SituationError(
                 "the rest of the mission would no longer keep its clearance, and the vehicle was switched to HOLD: part of the mission "
                 "is driven already, so that it is not begun anew"
@@ -131,34 +208,42 @@ def conduct(
         planning_s.append(seconds)
         return planned
 
-    director = Director(replace(orders, once=True), situation)
-    plans = PlanMaker(director, timed)
-    backups = BackupKeeper(director, connection)
-    notes = LinkNotes()
-    with progress_bar(quiet=quiet) as show:
+    return timed
 
-        def step() -> None:
-            nonlocal has_driven
-            has_driven = has_driven or director.state is State.DRIVING
-            show(_STATE_TEXTS[director.state], *director.progress)
-            warn(backups.step(link.now_s()))
-            warn(event.text for event in director.take_events() if event.name is EventName.IDENTITY_CLASH)
-            notes.tell(link)
-            if (made := plans.take()) is not None:
-                director.plan_made(*made, link.now_s())
 
-        with ends_in_words(lambda: backups.writing, last_words=backups.release):
-            link.run(director, on_frames=on_frames, on_step=step, longest_wait_s=plans.longest_wait_s)
-    if director.trouble is not None or director.plan is None:
-        raise director.trouble or LinkError("the director ended without a plan")
-    outcome = director.upload_outcome
-    return LiveResult(
-        director.plan,
-        planning_s[-1],
-        director.situation,
-        verified=outcome is not None and outcome.is_verified,
-        backup=backups.path,
+def _with_hint(trouble: BridgeError | MissionError) -> BridgeError | MissionError:
+    """Return a director's trouble with the option that would help."""
+    if trouble.details.get("outcome") == OutcomeKind.ACTIVE:
+        trouble.details["advice"] = "--hold switches it to HOLD first"
+    return trouble
+
+
+def director_at_hand(director: Director, link: Link | None) -> AtHand:
+    """Return the vehicle of a director, as an interrupt finds it."""
+    return AtHand(
+        link=link,
+        peer=lambda: director.peer,
+        watch=lambda: director.watch,
+        drives=lambda: director.drives_by_us,
+        on_it=lambda: _mission_on_it(director),
+        changed=lambda: _has_changed(director),
     )
+
+
+def _has_changed(director: Director) -> bool:
+    """Return whether anything on the vehicle was changed, or may have been."""
+    has_written = director.upload is not None and director.upload.has_written
+    return has_written or director.drives_by_us or director.state is State.HOLDING
+
+
+def _mission_on_it(director: Director) -> str:
+    """Return which mission is on the vehicle, for people; empty while one is uploaded, of which `ends_in_words` says what it left."""
+    outcome = director.upload_outcome
+    if outcome is None or director.is_uploading:
+        return ""
+    if outcome.is_verified and director.plan is not None:
+        return f"the mission on it is the planned one ({len(outcome.found or outcome.backup or ())} items, verified)"
+    return f"its mission: {held_text(outcome.held)}"
 
 
 def _check_drivable(planned: Plan) -> None:

@@ -23,10 +23,11 @@ from mavlink_bridge.cli.common import (
     print_json,
     warn,
 )
+from mavlink_bridge.cli.permissions import check_permissions
 from mavlink_bridge.cli.plan_request import ENDS, METHODS, ORDERS, request_from_options, with_tour
-from mavlink_bridge.cli.plan_results import plan_document, report_plan, write_outputs
-from mavlink_bridge.cli.terminating import sigterm_as_interrupt
+from mavlink_bridge.cli.plan_results import Told, arrival_document, report_end
 from mavlink_bridge.cli.upload import SigningKeyOption
+from mavlink_bridge.cli.values import MOST_M, within
 from mavlink_bridge.cli.vehicle_options import PANEL as VEHICLE_PANEL
 from mavlink_bridge.cli.vehicle_options import (
     EscapeOption,
@@ -86,7 +87,11 @@ def plan(
     ] = None,
     snap: Annotated[
         float,
-        typer.Option(metavar="M", min=0.0, help="Move a blocked target to free ground within M metres."),
+        typer.Option(
+            metavar="M",
+            parser=within(0.0, MOST_M, "metres"),
+            help="Move a blocked target to free ground within M metres.",
+        ),
     ] = 0.0,
     speed: SpeedOption = None,
     reserve: ReserveOption = 0.0,
@@ -149,7 +154,18 @@ def plan(
         typer.Option("--blocks", help="Draw the blocks of the free space too.", rich_help_panel=OUTPUT_PANEL),
     ] = False,
     upload: Annotated[bool, typer.Option("--upload", help="Upload to the vehicle and verify.")] = False,
-    drive: Annotated[bool, typer.Option("--drive", help="Then switch to AUTO; arms nothing.")] = False,
+    hold: Annotated[
+        bool,
+        typer.Option(
+            "--hold", help="With --upload: a vehicle that drives in AUTO is switched to HOLD first."
+        ),
+    ] = False,
+    drive: Annotated[
+        bool,
+        typer.Option(
+            "--drive", help="With --upload: then switch to AUTO, after arrival to HOLD; arms nothing."
+        ),
+    ] = False,
     system: SystemOption = None,
     any_vehicle: AnyVehicleOption = False,
     source_system: SourceSystemOption = 245,
@@ -169,6 +185,7 @@ def plan(
 
     `pbpp plan --connect udpin:0.0.0.0:14550 --target 40.0726,-105.2290 --upload`
     """
+    check_permissions(upload=upload, drive=drive, hold=hold)
     outputs, plots = output or [], plot or []
     request = request_from_options(start, target or [], clearance, corner_allowance, snap, method)
     request = with_vehicle(
@@ -180,11 +197,12 @@ def plan(
         escape=escape,
     )
     request = with_tour(request, order, end, via_mission, comes_back=come_back)
-    _check_options(fence, log, connect, upload=upload or drive, outputs=outputs, plots=plots)
+    _check_options(fence, log, connect, upload=upload, outputs=outputs, plots=plots)
     if home is not None and connect is not None:
         raise UsageError("--home goes with --fence and --log: a live vehicle tells its own home")
     if json_output and Path("-") in plots:
         raise UsageError("--plot - and --json both want the standard output; give a file to --plot")
+    told = Told(outputs, plots, blocks=blocks, is_silent=json_output or quiet)
     if connect is not None:
         from mavlink_bridge.cli.live import plan_live  # noqa: PLC0415 - only with a link
         from mavlink_bridge.director import Orders  # noqa: PLC0415
@@ -194,18 +212,22 @@ def plan(
             system=system,
             any_vehicle=any_vehicle,
             request=request,
-            upload=upload or drive,
+            upload=upload,
             drive=drive,
+            hold=hold,
             patience_s=timeout,
         )
         if request.repairs:  # it goes where the mission goes, whatever is clicked meanwhile
             orders = replace(orders, target_sources=frozenset())
-        with sigterm_as_interrupt():
-            result = plan_live(
-                connect, orders, vehicle_file=vehicle, key_file=signing_key, quiet=quiet or json_output
-            )
-        planned, planning_s, situation = result.plan, result.planning_s, result.situation
-        uploaded = verified = result.verified
+        result = plan_live(
+            connect,
+            orders,
+            vehicle_file=vehicle,
+            key_file=signing_key,
+            quiet=quiet or json_output,
+            on_plan=told.tell,
+        )
+        situation, verified, arrival = result.situation, result.verified, result.arrival
         backup = result.backup
     else:
         from mavlink_bridge.vehicles import not_ardupilot  # noqa: PLC0415 - only where needed
@@ -214,33 +236,21 @@ def plan(
         situation = with_home_option(with_parameter_file(situation, vehicle), home)
         if request.repairs and situation.ardupilot is False:
             raise LogError(f"{log}: {not_ardupilot(situation.system, None)}", file=str(log))
-        planned, planning_s = timed_plan(situation, request)
-        uploaded = verified = False
-        backup = None
-    warnings = list(planned.warnings)
-    warn(warnings)
-    try:
-        written = write_outputs(planned, situation, outputs, plots, blocks=blocks)
-    except BaseException:
-        if verified:  # what went wrong after it must not hide what was done to the vehicle
-            kept = f"; the mission before is kept in {backup}" if backup else ""
-            warn([f"the mission is on the vehicle, verified{kept}"])
-        raise
+        told.tell(*timed_plan(situation, request), situation)
+        verified, arrival, backup = False, None, None
     document = {
-        **plan_document(planned),
+        **told.document(),
         "source": Path(str(fence or log)).name if connect is None else connect,
         "system": situation.system,
-        "planning_s": round(planning_s, 6),
-        "outputs": [str(path) for path in written],
-        "warnings": warnings,
-        "uploaded": uploaded,
+        "uploaded": verified,
         "verified": verified,
         "backup": str(backup) if backup else None,
+        **arrival_document(arrival),
     }
     if json_output:
         print_json(document)
     elif not quiet:
-        report_plan(planned, written, verified=verified, backup=backup)
+        report_end(arrival, backup, verified=verified)
 
 
 def timed_plan(situation: Situation, request: Request) -> tuple[Plan, float]:
@@ -277,7 +287,7 @@ def _check_options(
     if [fence, log, connect].count(None) != 2:
         raise UsageError("give one SOURCE: --fence FILE, --log FILE.tlog or --connect CONNECTION")
     if upload and connect is None:
-        raise UsageError("--upload and --drive need a live link: --connect CONNECTION")
+        raise UsageError("--upload needs a live link: --connect CONNECTION")
     for path in outputs:
         check_writable_format(path)
         if path.suffix.lower() != ".plan" and fence is not None and is_same_file(path, fence):

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mavlink_bridge.cli.values import metres_or, position_from
 from mavlink_bridge.errors import UsageError
 
 if TYPE_CHECKING:
@@ -24,21 +25,20 @@ def request_from_options(
 
     Raises
     ------
-    UsageError, InvalidPositionError
+    UsageError
         An option is not what it has to be.
     """
-    from missions.geo import parse_lat_lon  # noqa: PLC0415 - quick help
     from missions.request import Request  # noqa: PLC0415
 
     if method not in METHODS:
         raise UsageError(f"--method {method!r}: expected one of {', '.join(METHODS)}")
     return Request(
-        start=parse_lat_lon(start) if start is not None else None,
-        targets=tuple(parse_lat_lon(target) for target in targets),
-        clearance_m=None if clearance == "max" else _metres("--clearance", clearance, "max"),
+        start=position_from("--start", start) if start is not None else None,
+        targets=tuple(position_from("--target", target) for target in targets),
+        clearance_m=metres_or("--clearance", clearance, "max"),
         widest=clearance == "max",
-        corner_allowance_m=None if allowance == "auto" else _metres("--corner-allowance", allowance, "auto"),
-        snap_m=_metres("--snap", str(snap), "leave it out") or 0.0,
+        corner_allowance_m=metres_or("--corner-allowance", allowance, "auto"),
+        snap_m=snap,
         method=method,
     )
 
@@ -72,16 +72,3 @@ def with_tour(request: Request, order: str, end: str, via: str | None, *, comes_
     from missions.formats import read_mission  # noqa: PLC0415 - quick help
 
     return replace(request, via=read_mission(Path(via)))
-
-
-def _metres(option: str, text: str | None, word: str) -> float | None:
-    """Read an option that is metres, 0 or more, or one word."""
-    if text is None:
-        return None
-    try:
-        value_m = float(text)
-    except ValueError:
-        value_m = -1.0
-    if not 0 <= value_m < float("inf"):
-        raise UsageError(f"{option} {text!r}: expected metres (0 or more) or {word}")
-    return value_m

@@ -8,9 +8,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mavlink_bridge.cli.common import warn
 from mavlink_bridge.cli.terminal import echo, echo_lines
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from missions.plan import Plan
     from missions.situation import Situation
 
@@ -84,8 +87,57 @@ def _finite(value_m: float | None) -> float | None:
     return None if value_m is None or value_m == float("inf") else round(value_m, 4)
 
 
-def report_plan(planned: Plan, written: list[Path], *, verified: bool, backup: Path | None = None) -> None:
-    """Tell people of a plan, and of what was done with it."""
+class Told:
+    """A plan as it is told: warnings, files and pictures, and the report for people; before anything is done with it.
+
+    Parameters
+    ----------
+    outputs, plots : list of Path
+        Where the mission and its pictures go.
+    blocks : bool
+        Draw the blocks of the free space too.
+    is_silent : bool
+        Print no report.
+    """
+
+    def __init__(self, outputs: list[Path], plots: list[Path], *, blocks: bool, is_silent: bool) -> None:
+        self._outputs = outputs
+        self._plots = plots
+        self._blocks = blocks
+        self._is_silent = is_silent
+        self._plan: Plan | None = None
+        self._planning_s = 0.0
+        self._written: list[Path] = []
+
+    def tell(self, planned: Plan, planning_s: float, situation: Situation) -> None:
+        """Tell a plan; a later one is the route made anew."""
+        warn(planned.warnings)
+        self._written = write_outputs(planned, situation, self._outputs, self._plots, blocks=self._blocks)
+        if not self._is_silent:
+            if self._plan is not None:
+                echo("The route was made anew:")
+            report_plan(planned, self._written)
+            sys.stdout.flush()
+        self._plan, self._planning_s = planned, planning_s
+
+    def document(self) -> dict[str, object]:
+        """Return what the JSON document tells of the newest plan."""
+        assert self._plan is not None
+        return {
+            **plan_document(self._plan),
+            "planning_s": round(self._planning_s, 6),
+            "outputs": [str(path) for path in self._written],
+        }
+
+
+def arrival_document(arrival: Mapping[str, object] | None) -> dict[str, object]:
+    """Return what the JSON document tells of a drive: the event's data, null where nothing was driven."""
+    names = ("driven_m", "took_s", "least_clearance_m", "breaches")
+    return {"arrived": arrival is not None, "drive": arrival and {name: arrival[name] for name in names}}
+
+
+def report_plan(planned: Plan, written: list[Path]) -> None:
+    """Tell people of a plan, and where it was written."""
     promise = (
         f"{planned.clearance_m:g} m promised while driving"
         if planned.clearance_m is not None
@@ -100,7 +152,18 @@ def report_plan(planned: Plan, written: list[Path], *, verified: bool, backup: P
     echo(f"Clearance: {planned.drawn_clearance_m:.2f} m drawn, {promise}")
     for path in written:
         echo(f"Wrote {path}")
+
+
+def report_end(arrival: Mapping[str, object] | None, backup: Path | None, *, verified: bool) -> None:
+    """Tell people what was done with a plan."""
     if verified:
         echo("Uploaded and verified")
     if backup is not None:
         echo(f"The mission before is kept in {backup}")
+    if arrival is not None:
+        least = arrival["least_clearance_m"]
+        kept = f"least clearance {least:.2f} m" if isinstance(least, float) else "no fence near"
+        echo(
+            f"Arrived after {arrival['driven_m']:.1f} m in {arrival['took_s']:.0f} s; {kept} while driving, "
+            f"breaches {arrival['breaches']}"
+        )

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from mavlink_bridge.cli.common import warn
+from mavlink_bridge.cli.interrupting import AtHand
 from mavlink_bridge.cli.link_notes import LinkNotes
 from mavlink_bridge.errors import LinkError, OutcomeError, RefusedError
 from mavlink_bridge.link import open_link, parse_connection
@@ -16,6 +17,7 @@ from mavlink_bridge.protocol.ask_version import AskVersion
 from mavlink_bridge.protocol.command import SendCommand
 from mavlink_bridge.protocol.find import FindVehicle, identity_shared, identity_taken
 from mavlink_bridge.protocol.peer import Peer
+from mavlink_bridge.protocol.vehicle_watch import VehicleWatch
 from mavlink_bridge.rover import AUTO_MODE, MODE_NAMES
 from mavlink_bridge.vehicle_mark import VehicleMark, uid_of
 from mavlink_bridge.vehicles import not_ardupilot
@@ -23,15 +25,19 @@ from missions.items import Command
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from contextlib import AbstractContextManager
     from pathlib import Path
 
     from mavlink_bridge.link import Link
-    from mavlink_bridge.messages import Frame
+    from mavlink_bridge.messages import Frame, Message
     from mavlink_bridge.protocol.machine import Machine
+    from mavlink_bridge.protocol.vehicle_watch import Doing
     from mavlink_bridge.signing import Signing
 
 _MODE_PATIENCE_S = 5.0
-_FRESH_S = 3.0
+_HEARTBEAT_PATIENCE_S = 5.0
+"""A heartbeat comes every second; over a bad link some are lost."""
+
 _STREAMS = (6, 2)
 """MAV_DATA_STREAM_POSITION and _EXTENDED_STATUS, which holds GPS_RAW_INT."""
 _STREAM_HZ = 4
@@ -79,6 +85,12 @@ class Session:
 
     Attributes
     ----------
+    link : Link
+        The open link.
+    watch : VehicleWatch
+        What the vehicle told of itself.
+    drives_by_us : bool
+        Whether it drives because of us, or is about to.
     listeners : list of callable
         Told of every batch of frames, but for those of somebody else who has our ids.
 
@@ -91,7 +103,7 @@ class Session:
     """
 
     def __init__(self, link: Link, address: Address, show: Callable[[str, int, int], None]) -> None:
-        self._link = link
+        self.link = link
         self._connection = address.connection
         self._show = show
         self._notes = LinkNotes()
@@ -104,7 +116,9 @@ class Session:
             identity=link.identity,
         )
         self._heartbeat: Heartbeat | None = None
-        self._heartbeat_s = 0.0
+        self.watch = VehicleWatch()
+        self.drives_by_us = False
+        self._has_changed_mode = False
         self.peer: Peer | None = None
         self.listeners: list[Callable[[list[Frame]], None]] = []
         self.run(finder, "listening for the vehicle")
@@ -112,10 +126,9 @@ class Session:
             assert finder.trouble is not None
             raise self._with_signing_hint(finder.trouble)
         self.peer = Peer(finder.vehicle.system, finder.vehicle.component, *link.identity)
-        self._heartbeat, self._heartbeat_s = finder.heartbeat, time.monotonic()
-        if finder.heartbeat is not None and (
-            other := not_ardupilot(finder.vehicle.system, finder.heartbeat.autopilot)
-        ):
+        assert finder.heartbeat is not None
+        self._take(finder.heartbeat)
+        if other := not_ardupilot(finder.vehicle.system, finder.heartbeat.autopilot):
             raise other
 
     @property
@@ -126,11 +139,30 @@ class Session:
 
     @property
     def is_active(self) -> bool | None:
-        """Whether it is armed in AUTO; None if its last heartbeat is too old to tell."""
-        if self._heartbeat is None or time.monotonic() - self._heartbeat_s > _FRESH_S:
-            return None
-        is_armed = bool(self._heartbeat.base_mode & ModeFlag.SAFETY_ARMED)
-        return is_armed and self._heartbeat.custom_mode == AUTO_MODE
+        """Whether it drives its mission in AUTO; None if its last heartbeat is too old to tell."""
+        return self.watch.is_active(self.link.now_s())
+
+    @property
+    def doing(self) -> Doing:
+        """What it does, as last told."""
+        return self.watch.doing(self.link.now_s())
+
+    def at_hand(self, aside: Callable[[], AbstractContextManager[Any]], on_it: Callable[[], str]) -> AtHand:
+        """Return the vehicle as an interrupt finds it."""
+        return AtHand(
+            link=self.link,
+            peer=lambda: self.peer,
+            watch=lambda: self.watch,
+            drives=lambda: self.drives_by_us,
+            on_it=on_it,
+            changed=lambda: self._has_changed_mode or bool(on_it()),
+            aside=aside,
+        )
+
+    def hear_anew(self) -> bool:
+        """Return whether its next heartbeat came; waits for it."""
+        begun_s = self.link.now_s()
+        return self.listen_until(lambda: self.watch.heartbeat_s > begun_s, _HEARTBEAT_PATIENCE_S)
 
     def which_vehicle(self) -> VehicleMark:
         """Ask the vehicle which one it is; return by what it is known again."""
@@ -155,14 +187,14 @@ class Session:
 
         def step() -> None:
             self._show(text, *machine.progress)
-            self._notes.tell(self._link)
+            self._notes.tell(self.link)
             if on_step:
                 on_step()
 
         self._machine = machine
-        self._link.run(machine, on_frames=self._listen, on_step=step, until=lambda: self._is_refused)
+        self.link.run(machine, on_frames=self._listen, on_step=step, until=lambda: self._is_refused)
         if self._is_refused:
-            raise identity_taken(self._link.identity)
+            raise identity_taken(self.link.identity)
         self._has_written = self._has_written or getattr(machine, "has_written", False)
 
     def change_mode(self, mode: int) -> None:
@@ -178,7 +210,7 @@ class Session:
         name = MODE_NAMES[mode]
         if mode == AUTO_MODE and self._has_clashed:
             raise identity_shared(
-                self._link.identity, "the vehicle is not switched to AUTO; what was uploaded is on it"
+                self.link.identity, "the vehicle is not switched to AUTO; what was uploaded is on it"
             )
         peer = self.vehicle
         flags = float(ModeFlag.CUSTOM_MODE_ENABLED)
@@ -186,6 +218,7 @@ class Session:
             peer.system, peer.component, Command.DO_SET_MODE, param1=flags, param2=float(mode)
         )
         command = SendCommand(peer, message)
+        self._has_changed_mode = True
         self.run(command, f"switching to {name}")
         outcome = command.outcome
         assert outcome is not None
@@ -200,7 +233,7 @@ class Session:
     def ask_telemetry(self) -> None:
         """Ask for the position, its quality and the firmware's version, which not every link gets unasked."""
         peer = self.vehicle
-        self._link.send_all(
+        self.link.send_all(
             [
                 *(
                     RequestDataStream(peer.system, peer.component, stream, _STREAM_HZ, 1)
@@ -214,25 +247,29 @@ class Session:
 
     def listen_until(self, is_enough: Callable[[], bool], for_s: float) -> bool:
         """Listen until something is so, no longer than a time; give whether it is."""
-        self._link.run(_Listen(for_s), on_frames=self._listen, until=is_enough)
+        self.link.run(_Listen(for_s), on_frames=self._listen, until=is_enough)
         return is_enough()
 
     def _is_in(self, mode: int) -> bool:
         return self._heartbeat is not None and self._heartbeat.custom_mode == mode
 
     def _listen(self, frames: list[Frame]) -> None:
-        others = [frame for frame in frames if not self._link.is_ours(frame)]
+        others = [frame for frame in frames if not self.link.is_ours(frame)]
         if len(others) < len(frames) and self.peer is not None:
             self._take_clash()
         for listener in self.listeners:
             listener(others)
         for frame in others:
-            if (
-                self.peer is not None
-                and isinstance(frame.message, Heartbeat)
-                and (frame.system, frame.component) == (self.peer.system, self.peer.component)
+            if self.peer is not None and (frame.system, frame.component) == (
+                self.peer.system,
+                self.peer.component,
             ):
-                self._heartbeat, self._heartbeat_s = frame.message, time.monotonic()
+                self._take(frame.message)
+
+    def _take(self, message: Message) -> None:
+        if isinstance(message, Heartbeat):
+            self._heartbeat = message
+        self.watch.receive(message, self.link.now_s())
 
     def _take_clash(self) -> None:
         """End before anything is written; later go on, for what is under way is checked against what the vehicle holds, and say so."""
@@ -240,7 +277,7 @@ class Session:
         is_going_to_write = not getattr(self._machine, "has_written", True)
         self._is_refused = is_going_to_write and not self._has_written
         if not self._is_refused:
-            system, component = self._link.identity
+            system, component = self.link.identity
             text = (
                 f"somebody else on the link has our ids (system {system} component {component}): what the vehicle answers may be meant for "
                 "him; choose others with --source-system and --source-component"
@@ -248,12 +285,12 @@ class Session:
             warn([text])
 
     def _with_signing_hint(self, trouble: LinkError) -> LinkError:
-        if not self._link.untrusted_frames:
+        if not self.link.untrusted_frames:
             return trouble
         return type(trouble)(
-            f"{trouble}; {self._link.untrusted_frames} frames were left out: not signed with this key",
+            f"{trouble}; {self.link.untrusted_frames} frames were left out: not signed with this key",
             **trouble.details,
-            untrusted_frames=self._link.untrusted_frames,
+            untrusted_frames=self.link.untrusted_frames,
         )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,10 +10,15 @@ import typer
 
 from mavlink_bridge.cli.common import JsonOption, QuietOption, print_json
 from mavlink_bridge.cli.terminal import echo
+from mavlink_bridge.cli.values import MOST_FLOAT32, MOST_S, checked_number, position_from, within
+from mavlink_bridge.errors import UsageError
 
 if TYPE_CHECKING:
     from mavlink_bridge.simulator.config import SimulatorConfig
     from missions.geo import LatLon
+
+MOST_SEED = 2**63 - 1
+"""What fits everywhere a seed is kept."""
 
 
 def sim(
@@ -36,13 +40,27 @@ def sim(
         list[str] | None, typer.Option(metavar="NAME=VALUE", help="A parameter that differs; repeatable.")
     ] = None,
     speedup: Annotated[
-        float, typer.Option(min=0.01, max=1000, help="How many times faster than real.")
+        float, typer.Option(metavar="X", parser=within(0.01, 1000.0), help="How many times faster than real.")
     ] = 1.0,
-    loss: Annotated[float, typer.Option(min=0, max=1, help="Share of frames lost, each way.")] = 0.0,
-    duplicate: Annotated[float, typer.Option(min=0, max=1, help="Share of frames that come twice.")] = 0.0,
-    latency: Annotated[float, typer.Option(min=0, help="Seconds each frame is late, each way.")] = 0.0,
-    jitter: Annotated[float, typer.Option(min=0, help="Up to so many seconds more, at random.")] = 0.0,
-    seed: Annotated[int, typer.Option(help="Seed of the link's faults.")] = 0,
+    loss: Annotated[
+        float, typer.Option(metavar="P", parser=within(0.0, 1.0), help="Share of frames lost, each way.")
+    ] = 0.0,
+    duplicate: Annotated[
+        float, typer.Option(metavar="P", parser=within(0.0, 1.0), help="Share of frames that come twice.")
+    ] = 0.0,
+    latency: Annotated[
+        float,
+        typer.Option(
+            metavar="S", parser=within(0.0, MOST_S, "seconds"), help="Seconds each frame is late, each way."
+        ),
+    ] = 0.0,
+    jitter: Annotated[
+        float,
+        typer.Option(
+            metavar="S", parser=within(0.0, MOST_S, "seconds"), help="Up to so many seconds more, at random."
+        ),
+    ] = 0.0,
+    seed: Annotated[int, typer.Option(min=-MOST_SEED, max=MOST_SEED, help="Seed of the link's faults.")] = 0,
     system: Annotated[int, typer.Option(min=1, max=255, help="MAVLink system id.")] = 1,
     json_output: JsonOption = False,
     quiet: QuietOption = False,
@@ -105,29 +123,25 @@ def _config(
 
 
 def _parse_home(text: str) -> tuple[LatLon, float]:
-    from missions.geo import parse_lat_lon  # noqa: PLC0415
-
     lat, _, rest = text.partition(",")
     lon, _, heading = rest.partition(",")
+    position = position_from("--home", f"{lat},{lon}")
     try:
-        heading_deg = float(heading or 0.0)
-    except ValueError:
-        raise typer.BadParameter(f"{heading!r} is not a heading in degrees", param_hint="--home") from None
-    if not -360.0 <= heading_deg <= 360.0:
-        raise typer.BadParameter(f"heading {heading_deg:g}° is beyond ±360°", param_hint="--home")
-    return parse_lat_lon(f"{lat},{lon}"), heading_deg
+        return position, checked_number(heading or 0.0, -360.0, 360.0, "a heading in degrees")
+    except UsageError as error:
+        raise UsageError(f"--home: {error}") from None
 
 
 def _parse_parameter(text: str) -> tuple[str, float]:
     from mavlink_bridge.simulator.parameters import DEFAULTS  # noqa: PLC0415
 
     name, equals, value = text.partition("=")
-    try:
-        number = float(value)
-    except ValueError:
-        number = math.nan
-    if not equals or not math.isfinite(number):
+    if not equals:
         raise typer.BadParameter(f"{text!r} is not NAME=VALUE", param_hint="--param")
+    try:
+        number = checked_number(value, -MOST_FLOAT32, MOST_FLOAT32)
+    except UsageError as error:
+        raise typer.BadParameter(f"{text!r} is not NAME=VALUE: {error}", param_hint="--param") from None
     name = name.strip().upper()
     if name not in DEFAULTS:
         raise typer.BadParameter(f"the simulated rover has no parameter {name}", param_hint="--param")

@@ -21,7 +21,6 @@ from mavlink_bridge.cli.common import (
 )
 from mavlink_bridge.cli.restoring import Restoration, backups_to_restore, interrupted_warnings
 from mavlink_bridge.cli.terminal import echo
-from mavlink_bridge.cli.terminating import sigterm_as_interrupt
 from mavlink_bridge.errors import UsageError
 
 if TYPE_CHECKING:
@@ -113,7 +112,9 @@ def upload(
     lists, parameters = _content(file, only or [], restoration)
 
     from mavlink_bridge.backup import BackupStore  # noqa: PLC0415 - usage errors need not wait for it
+    from mavlink_bridge.cli.interrupting import interruptible, terminable  # noqa: PLC0415
     from mavlink_bridge.cli.session import Address, open_session  # noqa: PLC0415
+    from mavlink_bridge.cli.starting import make_ready, start_driving  # noqa: PLC0415
 
     address = Address(connect, (source_system, source_component), system, any_vehicle, timeout, signing_key)
     store = BackupStore()
@@ -121,27 +122,26 @@ def upload(
         _forget(store, address, json_output=json_output, quiet=quiet)
         return
 
-    from mavlink_bridge.cli.uploading import Uploads, Wish  # noqa: PLC0415
+    from mavlink_bridge.cli.uploading import Uploads  # noqa: PLC0415
 
     with (
-        sigterm_as_interrupt(),
+        terminable(),
         progress_bar(quiet=quiet or json_output) as show,
         open_session(address, show) as session,
     ):
-        vehicle = session.which_vehicle()
-        uploads = Uploads(session, store, vehicle, Wish(hold, replace_active))
-        with uploads.begin():
-            backups = backups_to_restore(store, vehicle, restoration) if restoration else []
+        uploads = Uploads(session, store, replace_active=replace_active)
+        with interruptible(session.at_hand(show.aside, uploads.on_it)), uploads.begin():
+            backups = backups_to_restore(store, uploads.vehicle, restoration) if restoration else []
             if not restoration:
-                warn(interrupted_warnings(store, vehicle))
-            uploads.make_ready()
+                warn(interrupted_warnings(store, uploads.vehicle))
+            make_ready(session, hold=hold, replace_active=replace_active)
             for backup in backups:
                 uploads.write_lists([(backup.mission_type, backup.items)], backup.path)
             uploads.write_lists(lists)
             if parameters:
                 uploads.write_parameters(parameters)
             if drive:
-                _drive(session)
+                start_driving(session)
     _report(session, uploads.done, uploads.changed, json_output=json_output, quiet=quiet)
 
 
@@ -229,12 +229,6 @@ def _lists_of(file: Path) -> dict[str, tuple[MissionItem, ...]]:
         # ArduPilot looks at the home item but keeps its own home.
         found["mission"] = with_home(mission.items, mission.home or LatLon(0.0, 0.0))
     return found
-
-
-def _drive(session: Session) -> None:
-    from mavlink_bridge.rover import AUTO_MODE  # noqa: PLC0415
-
-    session.change_mode(AUTO_MODE)
 
 
 def _report(

@@ -14,7 +14,6 @@ from mavlink_bridge.outcomes import Writing, end_of_parameters, ends_in_words, u
 from mavlink_bridge.protocol.limits import Limits
 from mavlink_bridge.protocol.parameters import ReadParameters, SetParameter
 from mavlink_bridge.protocol.verified_upload import Held, VerifiedUpload
-from mavlink_bridge.rover import HOLD_MODE
 from mavlink_bridge.vehicle_lock import VehicleLock
 from mavlink_bridge.vehicle_mark import Kinship
 
@@ -34,14 +33,6 @@ Lists = list[tuple[MissionType, tuple["MissionItem", ...]]]
 _LOCK_PATIENCE_S = 5.0
 """Most uploads take less; who waits longer wants to know for whom."""
 _LOCK_LOOK_S = 0.2
-
-
-@dataclass(frozen=True, slots=True)
-class Wish:
-    """What may be done to the vehicle."""
-
-    hold: bool
-    replace_active: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,27 +65,27 @@ class Uploads:
         The vehicle on its link.
     store : BackupStore
         Where the old lists are kept.
-    vehicle : VehicleMark
-        Which vehicle it is.
-    wish : Wish
-        What may be done to it.
+    replace_active : bool
+        Write even while the vehicle drives its mission.
 
     Attributes
     ----------
+    vehicle : VehicleMark
+        Which vehicle it is.
     done : list of Done
         The lists that are on the vehicle, verified.
     changed : dict
         The parameters that were set, with their old and new values.
     """
 
-    def __init__(self, session: Session, store: BackupStore, vehicle: VehicleMark, wish: Wish) -> None:
+    def __init__(self, session: Session, store: BackupStore, *, replace_active: bool) -> None:
+        self.vehicle: VehicleMark = session.which_vehicle()
         self.done: list[Done] = []
         self.changed: dict[str, tuple[float | None, float]] = {}
         self._session = session
         self._store = store
-        self._vehicle = vehicle
-        self._wish = wish
-        self._lock = VehicleLock(vehicle)
+        self._replace_active = replace_active
+        self._lock = VehicleLock(self.vehicle)
         self._writing: Writing | None = None
         self._verified: list[str] = []
 
@@ -111,26 +102,19 @@ class Uploads:
         until_s = time.monotonic() + _LOCK_PATIENCE_S
         while holder := self._lock.take():
             if time.monotonic() >= until_s:
-                raise holder.error(self._vehicle)
+                raise holder.error(self.vehicle)
             self._session.listen_until(lambda: False, _LOCK_LOOK_S)
         return ends_in_words(lambda: self._writing, self._verified, self._lock.free)
 
-    def make_ready(self) -> None:
-        """See to it that the vehicle does not drive what is about to be replaced.
-
-        Raises
-        ------
-        RefusedError
-            It does.
-        """
-        session, wish = self._session, self._wish
-        if session.is_active and wish.hold:
-            session.change_mode(HOLD_MODE)
-        elif session.is_active and not wish.replace_active:
-            raise RefusedError(
-                "the vehicle is armed and drives its mission in AUTO; nothing was written. "
-                "--hold switches it to HOLD first, --replace-active writes all the same"
-            )
+    def on_it(self) -> str:
+        """Return what this run has put on the vehicle so far, for people."""
+        lists = [
+            f"{entry.mission_type.name.lower()} ({len(entry.outcome.found or ())} items)"
+            for entry in self.done
+        ]
+        parameters = [f"parameters {', '.join(self.changed)}"] if self.changed else []
+        put = ", ".join((*lists, *parameters))
+        return f"put on it and verified: {put}" if put else ""
 
     def write_lists(self, lists: Lists, restored: Path | None = None) -> None:
         """Upload lists one after the other, each verified.
@@ -154,7 +138,7 @@ class Uploads:
     def _write_list(
         self, mission_type: MissionType, items: tuple[MissionItem, ...], limits: Limits, restored: Path | None
     ) -> None:
-        session, store, vehicle = self._session, self._store, self._vehicle
+        session, store, vehicle = self._session, self._store, self.vehicle
         name = mission_type.name.lower()
         earlier = store.interrupted(vehicle, mission_type)
         was_interrupted = any(vehicle.kinship(note.vehicle) is Kinship.SAME for note in earlier)
@@ -163,9 +147,9 @@ class Uploads:
             mission_type,
             items,
             limits=limits,
-            is_active=session.is_active,
-            replace_active=self._wish.replace_active,
+            replace_active=self._replace_active,
         )
+        machine.know_vehicle(session.watch, session.link.now_s())
         self._writing = Writing(name, machine, None)
 
         def step() -> None:

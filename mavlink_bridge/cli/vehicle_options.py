@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from mavlink_bridge.cli.values import (
+    MOST_M,
+    MOST_MPS,
+    MOST_VEHICLE_M,
+    checked_number,
+    position_from,
+    within,
+)
 from mavlink_bridge.errors import UsageError
 
 if TYPE_CHECKING:
@@ -19,17 +26,26 @@ PANEL = "Vehicle"
 SpeedOption = Annotated[
     float | None,
     typer.Option(
-        metavar="M/S", help="Drive at this speed. Default: the vehicle's own.", rich_help_panel=PANEL
+        metavar="M/S",
+        parser=within(0.0, MOST_MPS, "metres a second", above=True),
+        help="Drive at this speed. Default: the vehicle's own.",
+        rich_help_panel=PANEL,
     ),
 ]
 ReserveOption = Annotated[
     float,
-    typer.Option(metavar="M", help="Kept on top of the clearance, for wind and slip.", rich_help_panel=PANEL),
+    typer.Option(
+        metavar="M",
+        parser=within(0.0, MOST_M, "metres"),
+        help="Kept on top of the clearance, for wind and slip.",
+        rich_help_panel=PANEL,
+    ),
 ]
 PositionErrorOption = Annotated[
     float | None,
     typer.Option(
         metavar="M",
+        parser=within(0.0, MOST_M, "metres"),
         help="Of the vehicle's position, kept on top too. Default: from its fix.",
         rich_help_panel=PANEL,
     ),
@@ -48,10 +64,22 @@ EscapeOption = Annotated[
     ),
 ]
 LengthOption = Annotated[
-    float, typer.Option(metavar="M", help="The vehicle's length, tools included.", rich_help_panel=PANEL)
+    float,
+    typer.Option(
+        metavar="M",
+        parser=within(0.0, MOST_VEHICLE_M, "metres"),
+        help="The vehicle's length, tools included.",
+        rich_help_panel=PANEL,
+    ),
 ]
 WidthOption = Annotated[
-    float, typer.Option(metavar="M", help="The vehicle's width, tools included.", rich_help_panel=PANEL)
+    float,
+    typer.Option(
+        metavar="M",
+        parser=within(0.0, MOST_VEHICLE_M, "metres"),
+        help="The vehicle's width, tools included.",
+        rich_help_panel=PANEL,
+    ),
 ]
 GpsOption = Annotated[
     str,
@@ -82,22 +110,14 @@ def with_vehicle(
     from missions.vehicle import Footprint  # noqa: PLC0415 - quick help
 
     length_m, width_m, antenna = size
-    for option, value in (
-        ("--reserve", reserve),
-        ("--position-error", position_error or 0.0),
-        ("--length", length_m),
-        ("--width", width_m),
-    ):
-        if not 0 <= value < math.inf:
-            raise UsageError(f"{option} {value:g}: expected metres (0 or more)")
-    if speed is not None and not 0 < speed < math.inf:
-        raise UsageError(f"--speed {speed:g}: expected metres a second, above 0")
     try:
-        forward_m, right_m = (float(part) for part in antenna.split(","))
+        forward_m, right_m = (
+            checked_number(part, -MOST_VEHICLE_M, MOST_VEHICLE_M, "metres") for part in antenna.split(",")
+        )
     except ValueError:
         raise UsageError(f"--gps {antenna!r}: expected FORWARD,RIGHT in metres") from None
-    if not (math.isfinite(forward_m) and math.isfinite(right_m)):
-        raise UsageError(f"--gps {antenna!r}: expected FORWARD,RIGHT in metres")
+    except UsageError as error:
+        raise UsageError(f"--gps {antenna!r}: expected FORWARD,RIGHT in metres; {error}") from None
     return replace(
         request,
         speed_mps=speed,
@@ -113,12 +133,11 @@ def with_home_option(situation: Situation, home: str | None) -> Situation:
 
     Raises
     ------
-    InvalidPositionError
+    UsageError
         It is no position.
     """
     if home is None:
         return situation
-    from missions.geo import parse_lat_lon  # noqa: PLC0415 - quick help
     from missions.situation import Known  # noqa: PLC0415
 
-    return replace(situation, home=Known(parse_lat_lon(home), None, "--home"))
+    return replace(situation, home=Known(position_from("--home", home), None, "--home"))

@@ -23,6 +23,7 @@ from mavlink_bridge.messages import Frame
 from mavlink_bridge.protocol.find import FindVehicle
 from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.protocol.table_machine import TableMachine
+from mavlink_bridge.protocol.vehicle_watch import VehicleWatch
 from mavlink_bridge.vehicles import not_ardupilot
 from missions.situation import ListKind, Situation
 
@@ -48,6 +49,11 @@ class Acquaintance(TableMachine[State, Cue]):
         Whom to look for, and as whom to speak.
     situation : Situation, optional
         What is known beforehand (parameters of a file).
+
+    Attributes
+    ----------
+    watch : VehicleWatch
+        What the vehicle does, as last told.
     """
 
     def __init__(self, orders: Orders, situation: Situation | None = None) -> None:
@@ -65,6 +71,7 @@ class Acquaintance(TableMachine[State, Cue]):
             identity=None if orders.passive else self.identity,
             own_component=None if orders.passive else orders.own_component,
         )
+        self.watch = VehicleWatch()
         self._steps = Steps()
         self._voice = Voice(announce=orders.announce)
         self._reboots = RebootWatch()
@@ -162,6 +169,7 @@ class Acquaintance(TableMachine[State, Cue]):
         heartbeat = Frame(vehicle.system, vehicle.component, find.heartbeat)
         self.situation = fold(known, heartbeat, find.heard_s)
         self._heartbeat_s = find.heard_s
+        self.watch.receive(find.heartbeat, find.heard_s)
         self._learn(now_s)
 
     def _refuse(self, error: LinkError, now_s: float) -> None:
@@ -208,6 +216,7 @@ class Acquaintance(TableMachine[State, Cue]):
     # Silence and reboots
 
     def _take_vehicle_frame(self, frame: Frame, now_s: float) -> None:
+        self.watch.receive(frame.message, now_s)
         if isinstance(frame.message, m.Heartbeat):
             self._heartbeat_s = now_s
             if self.state is State.LOST and self._move(Cue.HEARD):

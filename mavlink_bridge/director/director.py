@@ -11,6 +11,7 @@ left to the operator: nothing else arms or switches to AUTO.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from mavlink_bridge import messages as m
@@ -20,9 +21,10 @@ from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.incidents import Incidents
 from mavlink_bridge.director.mode_switch import AwaitHeartbeat, ModeSwitch
 from mavlink_bridge.director.orders import TargetSource
+from mavlink_bridge.director.put_back import PutBack
 from mavlink_bridge.director.states import Cue, State
 from mavlink_bridge.director.stopper import Stopper
-from mavlink_bridge.director.takeover import account_of
+from mavlink_bridge.director.takeover import Takeover, account_of
 from mavlink_bridge.director.targets import Target
 from mavlink_bridge.errors import OutcomeError, RefusedError
 from mavlink_bridge.protocol.command import SendCommand
@@ -35,11 +37,18 @@ if TYPE_CHECKING:
 
     from mavlink_bridge.director.orders import Orders
     from mavlink_bridge.director.steps import Step
-    from mavlink_bridge.director.takeover import Takeover
     from mavlink_bridge.messages import Frame
     from missions.situation import Situation
 
 _MOVED_M = 1.0
+
+_ARMING_SHOWS_S = 1.5
+"""So long after the start a heartbeat from before the arming may still come."""
+
+_START_YOURSELF = (
+    "arm it and give the target again, or start the mission yourself: arm it in HOLD, then switch to AUTO"
+)
+_ENDLESS = (Command.NAV_LOITER_UNLIM, Command.NAV_RETURN_TO_LAUNCH)
 
 
 class Director(Stopper):
@@ -59,6 +68,8 @@ class Director(Stopper):
         self._taken_over: OutcomeError | None = None
         self._is_first_time = True
         self._item_now = 1
+        self._is_our_start = False  # the drive was begun by us, not by somebody else
+        self._holds_after_arrival = False
 
     @property
     def progress(self) -> tuple[int, int]:
@@ -76,6 +87,11 @@ class Director(Stopper):
             return
         self._identity_clash(now_s)
         self._steps.receive(frame, now_s)  # a list that is read back may not be what we have written any more
+
+    @property
+    def drives_by_us(self) -> bool:
+        """Whether the vehicle drives because of us, or is about to."""
+        return self.orders.drive and (self._may_be_in_auto or self.state is State.DRIVING)
 
     # What the vehicle and others do
 
@@ -104,16 +120,19 @@ class Director(Stopper):
             self._watch_hold(heartbeat, now_s)
             return
         taken = self._operator.take_heartbeat(heartbeat, now_s)
+        if taken is None and self._drives_unarmed(now_s):
+            taken = Takeover(None)
         if taken is not None:
             self._let_go(taken, now_s)
         elif self._operator.is_late_click(heartbeat, now_s) and self._stopping is None:
             self._command_hold(now_s)
         elif self.state is State.VERIFIED and not self.orders.drive and self._is_driving_ours:
             self._watch_on(now_s, "somebody drives the mission")
-        elif self.state is State.DRIVING and self.orders.once and not self.situation.armed:
-            self._give_up(
-                OutcomeError("the mission is on the vehicle in AUTO, but it is not armed and does not drive")
-            )
+
+    def _drives_unarmed(self, now_s: float) -> bool:
+        """Return whether our drive runs on a vehicle that never showed itself armed."""
+        is_late = self.drive is not None and now_s > self.drive.begun_s + _ARMING_SHOWS_S
+        return self.state is State.DRIVING and is_late and not self.situation.armed
 
     def _take_any_frame(self, frame: Frame, before: Situation, now_s: float) -> None:
         if self.state in clash.CLASHES:
@@ -163,6 +182,7 @@ class Director(Stopper):
         """Watch a drive on our mission that we did not start just now."""
         if self.plan is not None and self._move(Cue.RESUMED):
             self._operator.expect(AUTO_MODE, set(), is_armed=True)
+            self._is_our_start = False
             self.drive = DriveWatch(self.plan, self._voice, now_s)
             self.drive.item = self._item_now
             self._voice.tell(now_s, EventName.DRIVING, text, len(self.plan.items))
@@ -196,6 +216,10 @@ class Director(Stopper):
 
     def _let_go(self, taken: Takeover, now_s: float) -> None:
         """Leave the vehicle to the operator, until a new target comes."""
+        if self.state is State.ARRIVED and self.orders.once:
+            self._end_drive()  # it has arrived; whoever has it now
+            return
+        is_ours_in_auto, drive = self._may_be_in_auto, self.drive
         if not self._move(Cue.TAKEN_OVER):
             return
         self._let_loose()
@@ -208,11 +232,31 @@ class Director(Stopper):
         mode = mode_name(self.situation.mode if taken.mode is None else taken.mode)
         text = f"{account.text}; {then}"
         self._voice.tell(now_s, EventName.TAKEN_OVER, text, mode, str(account.by), account.reason)
-        trouble = OutcomeError(f"{account.text}, before it arrived", mode=mode)
+        so_far = drive.so_far if drive is not None else ""
+        trouble = OutcomeError(f"{account.text}, before it arrived{so_far}", mode=mode)
         if is_withdrawing:
             self._taken_over = trouble
+        elif taken.mode is None and is_ours_in_auto:
+            self._put_back(str(trouble), now_s)
         else:
             self._give_up(trouble)
+
+    def _put_back(self, what: str, now_s: float) -> None:
+        """Take the vehicle, disarmed now, out of the AUTO that we switched it to."""
+        assert self._peer is not None
+        self._steps.run([(PutBack(self._peer), partial(self._was_put_back, what))], now_s)
+
+    def _was_put_back(self, what: str, machine: PutBack, now_s: float) -> None:
+        if machine.is_left_in_auto:
+            text = f"{what}, and it does not go to HOLD: it is in AUTO, arming it drives off"
+        elif machine.was_needed:
+            text = f"{what}; it was switched back from AUTO to HOLD, so that arming it does not drive off"
+        else:
+            text = what
+        trouble = OutcomeError(text, advice=_START_YOURSELF, mode=mode_name(self.situation.mode))
+        if machine.was_needed:
+            self._voice.error(now_s, EventName.TROUBLE, trouble, dict(trouble.details))
+        self._give_up(trouble)
 
     def _let_loose(self) -> None:
         """Forget what was wanted and what is under way, but for an upload and for learning."""
@@ -328,6 +372,9 @@ class Director(Stopper):
         ):
             self._look_once_more(now_s)
             return
+        if not self.situation.armed and not self.orders.arm:
+            self._refuse_unarmed(now_s)
+            return
         if (
             self.situation.mode != HOLD_MODE
         ):  # it starts from HOLD: any other mode is then known for somebody else's
@@ -341,6 +388,19 @@ class Director(Stopper):
             self._steps.run([self._command(Command.COMPONENT_ARM_DISARM, 1.0, self._armed)], now_s)
         else:
             self._switch_to_auto(now_s)
+
+    def _refuse_unarmed(self, now_s: float) -> None:
+        """Leave the mode of a disarmed vehicle alone: in AUTO, arming it would drive off."""
+        mode = mode_name(self.situation.mode)
+        drives_off = ": arming it drives off" if self.situation.mode == AUTO_MODE else ""
+        trouble = OutcomeError(
+            f"the mission is verified on the vehicle, which is not armed and does not drive: its mode was left alone ({mode}{drives_off})",
+            advice=_START_YOURSELF,
+            mode=mode,
+        )
+        self._stand_by()
+        self._voice.error(now_s, EventName.TROUBLE, trouble, dict(trouble.details))
+        self._fail_step(trouble)
 
     def _armed(self, machine: SendCommand, now_s: float) -> None:
         if self._is_accepted(machine, now_s):
@@ -368,6 +428,7 @@ class Director(Stopper):
             self._command_hold(now_s)  # it drives from an item that we do not know
         elif self._move(Cue.STARTED):
             assert self.plan is not None
+            self._is_our_start = True
             self.drive = DriveWatch(self.plan, self._voice, now_s)
             self._voice.tell(now_s, EventName.DRIVING, "AUTO", len(self.plan.items))
 
@@ -397,6 +458,30 @@ class Director(Stopper):
         drive.receive(frame, now_s)
         if drive.has_arrived and self._move(Cue.REACHED):
             drive.tell_progress(now_s)
-            self._voice.arrived(now_s, drive)
-            self._let_loose()
-            self._end()
+            self._holds_after_arrival = self._is_our_start and not self._goes_on_after_arrival
+            self._voice.arrived(now_s, drive, holds=self._holds_after_arrival)
+            if self._holds_after_arrival:
+                self._command_hold(now_s)
+            self.drive = None
+            if not self._holds_after_arrival:
+                self._end_drive()
+
+    @property
+    def _goes_on_after_arrival(self) -> bool:
+        """Whether the mission's end is something to do: to loiter, to return, or what MIS_DONE_BEHAVE says."""
+        assert self.plan is not None
+        ends = any(item.command in _ENDLESS for item in self.plan.items)
+        return ends or self.situation.parameters.get("MIS_DONE_BEHAVE", 0) != 0
+
+    def _look_after_hold(self, now_s: float) -> None:
+        super()._look_after_hold(now_s)
+        if self._stopping is None and self._holds_after_arrival and self.state is State.ARRIVED:
+            self._end_drive()
+            if not self._is_hold_granted:
+                self._give_up(OutcomeError("it has arrived, but it does not go to HOLD: it is still in AUTO"))
+
+    def _end_drive(self) -> None:
+        """End a drive that has arrived; a single job is done with it."""
+        self._holds_after_arrival = False
+        self._let_loose()
+        self._end()

@@ -78,6 +78,13 @@ class DriveWatch:
         whole_m = self._line.length or 1.0
         return self._plan.envelope.duration_s * min(1.0, self.distance_left_m / whole_m)
 
+    @property
+    def so_far(self) -> str:
+        """How the drive went until its early end, in words that follow others."""
+        is_fenced = math.isfinite(self.least_clearance_m)
+        kept = f", least clearance {self.least_clearance_m:.2f} m" if is_fenced else ""
+        return f" (after {self.driven_m:.1f} m{kept}, {self.distance_left_m:.0f} m left)"
+
     def receive(self, frame: Frame, now_s: float) -> None:
         """Take a frame of the vehicle."""
         message = frame.message

@@ -42,7 +42,8 @@ _ASK_STREAMS_EVERY_S = 3.0
 _HOME_S = 60.0  # the longest that a command may take
 _FIX_PATIENCE_S = 3.0
 """What is promised rests on the fix, so that whether it is known must not be a matter of luck; not every vehicle tells it."""
-_STORAGE_NAMES = ("BRD_SD_MISSION", "BRD_SD_FENCE")
+_MORE_NAMES = ("BRD_SD_MISSION", "BRD_SD_FENCE", "MIS_DONE_BEHAVE")
+"""How much it stores, and what it does at the end of a mission."""
 
 
 class Learning:
@@ -119,7 +120,7 @@ class Learning:
         home = m.CommandLong(peer.system, peer.component, Command.GET_HOME_POSITION)
         self._steps.run(
             [
-                (ReadParameters(peer, (*PARAMETER_NAMES, *_STORAGE_NAMES)), self._take_parameters),
+                (ReadParameters(peer, (*PARAMETER_NAMES, *_MORE_NAMES)), self._take_parameters),
                 *(
                     (Download(peer, MISSION_TYPES[kind]), partial(self._take_list, kind))
                     for kind in self._kinds

@@ -47,9 +47,11 @@ class Orders:
     upload : bool
         Write missions to the vehicle.
     drive : bool
-        Switch modes: HOLD before a new route, AUTO for a verified one.
+        Switch modes: HOLD before a new route and after arrival, AUTO for a verified one.
     arm : bool
         Arm before AUTO.
+    hold : bool
+        Switch a vehicle that drives its mission to HOLD before another mission is written, also without ``drive``.
     confirm : bool
         Upload a plan only after `Director.confirm`.
     once : bool
@@ -72,6 +74,7 @@ class Orders:
     upload: bool = False
     drive: bool = False
     arm: bool = False
+    hold: bool = False
     confirm: bool = False
     once: bool = False
     announce: bool = False

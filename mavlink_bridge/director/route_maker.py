@@ -255,15 +255,15 @@ class RouteMaker(TargetTaker):
         except MissionError as error:
             self._upload_failed(error, dict(error.details), now_s)
             return
-        is_active = bool(self.situation.armed) and self.situation.mode == AUTO_MODE
         self._backup_path = None
         upload = self.upload = VerifiedUpload(
             self._peer,
             m.MissionType.MISSION,
             items,
             limits=Limits.from_parameters(self.situation.parameters),
-            is_active=is_active if self._is_mode_known(now_s) else None,
         )
+        if self._is_mode_known(now_s):
+            upload.know_vehicle(self.watch, now_s)
         self._voice.tell(now_s, EventName.UPLOADING, f"uploading {len(items)} items", len(items))
         self._steps.run([(upload, self._uploaded)], now_s)
 

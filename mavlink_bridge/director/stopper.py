@@ -46,6 +46,7 @@ class Stopper(RouteMaker):
         self._stopped_s = -math.inf  # when the vehicle took it
         self._may_be_in_auto = False  # our AUTO may be on its way, or no heartbeat may have told of it yet
         self._speed_mps = 0.0
+        self._is_hold_granted = False
         self._held_at_s: float | None = None
         self._standstill_due_s = math.inf
 
@@ -90,7 +91,11 @@ class Stopper(RouteMaker):
 
     @property
     def _may_stop_it(self) -> bool:
-        if not self.orders.drive or self._peer is None:
+        if self._peer is None:
+            return False
+        if self.orders.hold and self.situation.armed and self.situation.mode == AUTO_MODE:
+            return True
+        if not self.orders.drive:
             return False
         if self.state in (State.STARTING, State.DRIVING):
             return True
@@ -159,6 +164,7 @@ class Stopper(RouteMaker):
         self._outgoing += stopping.messages_to_send()
         self._stopping = None
         self._may_be_in_auto = False
+        self._is_hold_granted = stopping.is_granted
         self._stopped_s = now_s
         self._operator.settle(now_s)
         if not stopping.is_granted:

@@ -117,13 +117,13 @@ class Voice:
             list(position),
         )
 
-    def arrived(self, now_s: float, drive: DriveWatch) -> None:
-        """Tell the end of a drive."""
+    def arrived(self, now_s: float, drive: DriveWatch, *, holds: bool) -> None:
+        """Tell the end of a drive, and whether the vehicle is switched to HOLD."""
         took_s = now_s - drive.begun_s
         self.tell(
             now_s,
             EventName.ARRIVED,
-            f"arrived after {drive.driven_m:.0f} m in {took_s:.0f} s",
+            f"arrived after {drive.driven_m:.0f} m in {took_s:.0f} s{'; HOLD' if holds else ''}",
             round(drive.driven_m, 2),
             round(took_s, 1),
             metres(drive.least_clearance_m),

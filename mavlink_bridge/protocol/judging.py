@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.messages import MissionResult, ModeFlag
+from mavlink_bridge.messages import MissionResult
 from mavlink_bridge.protocol.stored_form import differences, is_unfinished_write
 from mavlink_bridge.protocol.transitions import UploadState
 from mavlink_bridge.protocol.verified_outcome import Held
-from mavlink_bridge.rover import AUTO_MODE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from mavlink_bridge.messages import Heartbeat, MissionType
+    from mavlink_bridge.messages import MissionType
     from mavlink_bridge.protocol.upload import UploadOutcome
     from missions.items import MissionItem
 
@@ -49,8 +48,3 @@ def is_settled_refusal(pushed: UploadOutcome, before: UploadOutcome | None) -> b
 
 def _is_same(a: UploadOutcome, b: UploadOutcome | None) -> bool:
     return b is not None and (a.state, a.result, a.item) == (b.state, b.result, b.item)
-
-
-def is_armed_in_auto(heartbeat: Heartbeat) -> bool:
-    """Return whether a rover's heartbeat says that it is armed and drives its mission."""
-    return bool(heartbeat.base_mode & ModeFlag.SAFETY_ARMED) and heartbeat.custom_mode == AUTO_MODE

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.messages import Heartbeat, MissionResult
 from mavlink_bridge.protocol.download import RIVAL_PATIENCE_S
-from mavlink_bridge.protocol.judging import held_list, is_armed_in_auto, is_settled_refusal
+from mavlink_bridge.protocol.judging import held_list, is_settled_refusal
 from mavlink_bridge.protocol.limits import Limits
 from mavlink_bridge.protocol.pace import MOST_S, bound_s
 from mavlink_bridge.protocol.round_trip import RoundTrip
@@ -40,6 +40,7 @@ from mavlink_bridge.protocol.transitions import (
 )
 from mavlink_bridge.protocol.undisturbed_read import UndisturbedRead
 from mavlink_bridge.protocol.upload import WINDOW, Upload, UploadOutcome
+from mavlink_bridge.protocol.vehicle_watch import VehicleWatch
 from mavlink_bridge.protocol.verified_outcome import Held, OutcomeKind, VerifiedUploadOutcome
 from mavlink_bridge.protocol.write_watch import WriteWatch
 
@@ -82,7 +83,7 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
     limits : Limits, optional
         What fits on the vehicle; ArduPilot Rover's defaults if not given.
     is_active : bool, optional
-        Whether the vehicle is armed in AUTO, from a fresh heartbeat; None waits for one.
+        Whether the vehicle drives its mission (armed in AUTO, the mission not complete), from a fresh heartbeat; None waits for one.
     replace_active : bool
         Write even if it is.
     window : int
@@ -109,6 +110,7 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         self._wanted = tuple(items)
         self._limits = limits or Limits()
         self._is_active = is_active
+        self._vehicle = VehicleWatch()
         self._active_known_s = 0.0
         self._replace_active = replace_active
         self._window = window
@@ -139,6 +141,11 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         self._held = Held.UNKNOWN
         self._shown_progress = 0
         self._outcome: VerifiedUploadOutcome | None = None
+
+    def know_vehicle(self, watch: VehicleWatch, now_s: float) -> None:
+        """Take over what the vehicle told of itself before the start."""
+        self._vehicle = watch
+        self._is_active = watch.is_active(now_s)
 
     @property
     def pending_backup(self) -> tuple[MissionItem, ...] | None:
@@ -249,8 +256,9 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         if not self._peer.accepts(frame):
             return
         self._reasons.take(frame, now_s)
+        self._vehicle.receive(frame.message, now_s)
         if isinstance(frame.message, Heartbeat):
-            self._is_active = is_armed_in_auto(frame.message)
+            self._is_active = self._vehicle.doing(now_s).drives_mission
             self._active_known_s = now_s
             self._check_vehicle(now_s)
         elif part := self._reading or self._upload:

@@ -433,10 +433,12 @@ def test_a_reboot_is_noticed():
 def test_does_not_arm_unasked():
     run = ready(conductor())
     run.director.take_target(FAR, run.now_s)
-    run.run_until(run.happened(EventName.DRIVING), 20)
+    mode = run.vehicles[0].mode
+    run.run_until(run.happened(EventName.TROUBLE), 20)
+    assert "not armed" in run.last(EventName.TROUBLE).text
     for _ in range(200):
         run.step()
-    assert not run.vehicles[0].is_armed
+    assert (run.vehicles[0].is_armed, run.vehicles[0].mode) == (False, mode)
     sent = [message for message in run.sent if isinstance(message, m.CommandLong)]
     assert Command.COMPONENT_ARM_DISARM not in {message.command for message in sent}
 

@@ -310,6 +310,8 @@ def test_after_a_lost_link_a_takeover_in_the_meantime_counts():
 def test_after_arrival_a_lost_link_drives_nowhere():
     run = driving(conductor(arm=True), NEAR)
     run.run_until(lambda: run.director.state is State.ARRIVED)
+    run.run_until(lambda: run.vehicles[0].mode == HOLD_MODE, 2)
+    wait(run, 1)
     unheard(run, m.SetMode(1, 1, MANUAL))
     cut(run)
     run.run_until(lambda: run.director.state is State.READY, 20)

@@ -74,7 +74,7 @@ def test_one_job_with_a_log_that_replays_to_the_same_decisions(config, tmp_path)
     log = tmp_path / "run.tlog"
     with Simulator(config, "tcpin:127.0.0.1:0", speedup=10) as simulator:
         process = start_bridge(
-            simulator.connection, "--target", FAR, "--drive", "--arm", "--once", "--log", str(log)
+            simulator.connection, "--target", FAR, "--upload", "--drive", "--arm", "--once", "--log", str(log)
         )
         output, errors = process.communicate("", timeout=120)
         assert process.returncode == 0, errors

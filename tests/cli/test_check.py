@@ -321,7 +321,7 @@ def held_by(fields, *items) -> SimulatorConfig:
 def test_a_repaired_mission_is_driven_only_by_a_vehicle_that_is_armed(fields):
     first, last = read_mission(fields / "yard-mission.waypoints").items
     with Simulator(held_by(fields, first, last), "tcpin:127.0.0.1:0") as simulator:
-        options = ("--via-mission", "own", "--clearance", "2", "--drive")
+        options = ("--via-mission", "own", "--clearance", "2", "--upload", "--drive")
         document = document_of("plan", "--connect", simulator.connection, *options, code=7)
         assert "not armed" in document["message"]
         assert len(simulator.vehicle.mission) > 3
@@ -380,7 +380,7 @@ def test_what_cannot_be_watched_is_not_driven(fields, item, word):
     first, last = read_mission(fields / "yard-mission.waypoints").items
     with Simulator(held_by(fields, first, last, item), "tcpin:127.0.0.1:0") as simulator:
         held = simulator.vehicle.mission
-        options = ("--via-mission", "own", "--clearance", "2", "--drive")
+        options = ("--via-mission", "own", "--clearance", "2", "--upload", "--drive")
         document = document_of("plan", "--connect", simulator.connection, *options, code=3)
         assert word in document["message"]
         assert "nothing was written" in document["message"]

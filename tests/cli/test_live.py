@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 from mavlink_bridge.cli.app import app
 from mavlink_bridge.messages import CommandLong
-from mavlink_bridge.rover import AUTO_MODE
+from mavlink_bridge.rover import AUTO_MODE, HOLD_MODE
 from mavlink_bridge.simulator import Simulator, SimulatorConfig
 from missions.fence import fence_to_items
 from missions.formats import read_fence, read_situation
@@ -112,11 +112,72 @@ def test_nobody_speaks():
 
 def test_drives_only_a_vehicle_that_is_armed(config):
     with Simulator(config, "tcpin:127.0.0.1:0") as simulator:
-        result = run("plan", "--connect", simulator.connection, "--target", TARGET, "--drive", "--json")
+        result = run(
+            "plan", "--connect", simulator.connection, "--target", TARGET, "--upload", "--drive", "--json"
+        )
+        assert simulator.vehicle.mode != AUTO_MODE
         assert not simulator.vehicle.is_armed
     document = json.loads(result.stdout)
     assert (result.exit_code, document["error"]) == (7, "OutcomeError")
     assert "not armed" in document["message"]
+
+
+def driven(simulator: Simulator, *options: str):
+    simulator.vehicle.rover.is_armed = True
+    plan = ("plan", "--connect", simulator.connection, "--target", TARGET, "--clearance", "2")
+    return run(*plan, "--upload", "--drive", *options)
+
+
+def test_a_drive_ends_with_what_it_was_like(config, tmp_path):
+    fast = replace(config, parameters={**config.parameters, "WP_SPEED": 4.0})
+    with Simulator(fast, "tcpin:127.0.0.1:0", speedup=10) as simulator:
+        result = driven(simulator, "--json", "-o", str(tmp_path / "m.plan"))
+        vehicle = simulator.vehicle
+        assert (vehicle.mode, vehicle.is_armed, vehicle.breaches) == (HOLD_MODE, True, 0)
+        again = run("plan", "--connect", simulator.connection, "--target", "40.07125,-105.2292", "--upload", "--json")  # fmt: skip
+    document = json.loads(result.stdout)
+    assert result.exit_code == 0, result.output
+    assert (document["arrived"], document["verified"]) == (True, True)
+    drive = document["drive"]
+    assert set(drive) == {"driven_m", "took_s", "least_clearance_m", "breaches"}
+    assert drive["driven_m"] == pytest.approx(document["length_m"], rel=0.1)
+    assert drive["least_clearance_m"] >= document["clearance_m"] - 0.1
+    assert drive["breaches"] == 0
+    assert json.loads(again.stdout)["verified"] is True, "it waits in HOLD for the next one"
+
+
+def test_people_see_the_plan_before_anything_is_written(config, tmp_path, monkeypatch):
+    from mavlink_bridge.protocol.verified_upload import VerifiedUpload
+
+    shown = tmp_path / "m.plan"
+    is_shown: list[bool] = []
+    start = VerifiedUpload._start_pushing
+
+    def noted(self, *arguments):
+        is_shown.append(shown.exists())
+        start(self, *arguments)
+
+    monkeypatch.setattr(VerifiedUpload, "_start_pushing", noted)
+    with Simulator(config, "tcpin:127.0.0.1:0", speedup=10) as simulator:
+        result = driven(simulator, "-o", str(shown))
+    assert result.exit_code == 0, result.output
+    assert is_shown
+    assert all(is_shown)
+    lines = [line.split(" ")[0] for line in result.stdout.splitlines()]
+    assert lines == ["Route:", "Clearance:", "Wrote", "Uploaded", "Arrived"]
+    assert re.search(r"Arrived after [0-9.]+ m in \d+ s; least clearance [0-9.]+ m while driving, breaches 0", result.stdout)  # fmt: skip
+
+
+def test_hold_stops_it_first(config):
+    far = replace(config, mission=tuple(waypoint(LatLon(40.0722, -105.2300 + 0.0002 * i)) for i in range(4)))
+    with Simulator(far, "tcpin:127.0.0.1:0") as simulator:
+        _command(simulator, Command.COMPONENT_ARM_DISARM, 1.0)
+        _command(simulator, Command.DO_SET_MODE, 1.0, AUTO_MODE)
+        plan = ("plan", "--connect", simulator.connection, "--target", TARGET, "--upload", "--json")
+        refused = json.loads(run(*plan).stdout)
+        assert (refused["exit_code"], refused["advice"]) == (6, "--hold switches it to HOLD first")
+        assert json.loads(run(*plan, "--hold").stdout)["verified"] is True
+        assert (simulator.vehicle.mode, simulator.vehicle.is_armed) == (HOLD_MODE, True)
 
 
 def test_sim_says_where_it_listens_and_ends_when_asked(fields):

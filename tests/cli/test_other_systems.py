@@ -18,7 +18,9 @@ from typer.testing import CliRunner
 from mavlink_bridge.backup import BackupStore
 from mavlink_bridge.cli import bridge as bridge_command
 from mavlink_bridge.cli import failing
+from mavlink_bridge.cli import keyboard as keyboard_module
 from mavlink_bridge.cli.app import app
+from mavlink_bridge.cli.keyboard import Keyboard
 from mavlink_bridge.cli.options_file import user_file
 from mavlink_bridge.errors import LinkError
 from mavlink_bridge.link import parse_connection
@@ -26,10 +28,10 @@ from mavlink_bridge.link import parse_connection
 ENDS = ("--start", "40.071374,-105.229930", "--target", "40.0720926,-105.2286152")
 
 
-def wait_for(lines, within_s: float = 60.0) -> str:
+def wait_for(keyboard: Keyboard, within_s: float = 60.0) -> str:
     until_s = time.monotonic() + within_s
     while time.monotonic() < until_s:
-        if line := next(lines):
+        if (line := keyboard.line()) is not None:
             return line
         time.sleep(0.01)
     raise AssertionError("nothing was typed")
@@ -37,18 +39,22 @@ def wait_for(lines, within_s: float = 60.0) -> str:
 
 def test_what_is_typed_comes_through_a_thread_where_consoles_cannot_be_waited_for(monkeypatch):
     ours, theirs = os.pipe()
-    thread = bridge_command._keyboard_thread(ours)
-    monkeypatch.setattr(bridge_command, "_keyboard_thread", lambda _descriptor: thread)
-    monkeypatch.setattr(bridge_command.os, "name", "nt")
-    lines = bridge_command._typed_lines()
-    assert next(lines) == ""
+    thread = keyboard_module.keyboard_thread(ours)
+    monkeypatch.setattr(keyboard_module, "keyboard_thread", lambda _descriptor: thread)
+    monkeypatch.setattr(keyboard_module.os, "name", "nt")
+    keyboard = Keyboard()
+    assert keyboard.line() is None
     os.write(theirs, b"40.07,-105.2\r\nye")
-    assert wait_for(lines) == "40.07,-105.2"
-    assert next(lines) == ""
-    os.write(theirs, b"s\r\n")
-    assert wait_for(lines) == "yes"
+    assert wait_for(keyboard) == "40.07,-105.2"
+    assert keyboard.line() is None
+    os.write(theirs, b"s\r\n\r\n")
+    assert wait_for(keyboard) == "yes"
+    assert wait_for(keyboard) == ""
     os.close(theirs)
-    assert next(lines) == ""
+    until_s = time.monotonic() + 60
+    while not keyboard.is_closed and time.monotonic() < until_s:
+        assert keyboard.line() is None
+    assert keyboard.is_closed
 
 
 @pytest.mark.parametrize(

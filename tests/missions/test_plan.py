@@ -568,6 +568,12 @@ class TestWhatIsNotKnown:
         assert result.path[0] == place(2, 2)
         assert result.targets == (place(40, 40),)
 
+    @pytest.mark.parametrize("ends", [(HOME, (LatLon(41.1, -105.2),)), (LatLon(41.1, -105.2), (HOME,))])
+    def test_nothing_leads_to_where_no_plane_reaches(self, ends):
+        problem = r"no route: 41\.1000000,-105\.2000000 is 114 km from the fence's centre .*; at most 100 km"
+        with pytest.raises(NoRouteError, match=problem):
+            plan(situation_of(FIELD), Request(*ends))
+
     @pytest.mark.parametrize(
         ("situation", "request_", "problem"),
         [
@@ -577,11 +583,6 @@ class TestWhatIsNotKnown:
                 Situation(fence=Known(Fence((FIELD,)), None, ""), home=Known(HOME, None, ""), mission=Known(Mission(()), None, "")),
                 Request(),
                 "the target is not known",
-            ),
-            (
-                situation_of(FIELD),
-                Request(HOME, (LatLon(41.1, -105.2),)),
-                r"41\.1000000,-105\.2000000 is 114 km from the fence's centre .*; at most 100 km",
             ),
             (
                 Situation(fence=Known(Fence((FIELD,)), None, ""), parameters={"FENCE_ENABLE": 1.0}),

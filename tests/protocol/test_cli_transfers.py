@@ -214,6 +214,43 @@ def test_a_driving_vehicle_is_left_alone_unless_told(slow_rover, tmp_path):
     assert len(rover.vehicle.mission) == 20
 
 
+def test_a_disarmed_vehicle_is_not_left_in_auto(rover, tmp_path):
+    for mode in (HOLD_MODE, 0):
+        put(rover, mode)
+        rover.vehicle.rover.is_armed = False
+        code, document, _ = run(rover, "upload", mission_file(tmp_path), "--drive", "--json")
+        assert (code, document["error"]) == (7, "OutcomeError")
+        assert "not armed and does not drive: its mode was left alone" in document["message"]
+        assert rover.vehicle.mode == mode
+    assert places(rover.vehicle.mission[1:]) == places(NEW[1:])
+
+
+def test_disarmed_between_the_look_and_the_switch_it_is_put_back(rover, tmp_path, monkeypatch):
+    put(rover, HOLD_MODE)
+    set_mode = rover.vehicle.rover.set_mode
+
+    def disarmed_meanwhile(number, now_s):
+        if number == AUTO_MODE:
+            rover.vehicle.rover.disarm()
+        return set_mode(number, now_s)
+
+    monkeypatch.setattr(rover.vehicle.rover, "set_mode", disarmed_meanwhile)
+    code, document, _ = run(rover, "upload", mission_file(tmp_path), "--drive", "--json")
+    assert code == 7
+    assert "switched back to HOLD and does not drive" in document["message"]
+    assert rover.vehicle.mode == HOLD_MODE
+
+
+def test_a_mission_that_is_complete_is_replaced_and_begun_anew(rover, tmp_path):
+    put(rover, AUTO_MODE)
+    rover.vehicle.rover.route.is_complete = True
+    path = mission_file(tmp_path)
+    assert run(rover, "upload", path)[0] == 0
+    assert (rover.vehicle.mode, rover.vehicle.rover.route.is_complete) == (AUTO_MODE, True)
+    assert run(rover, "upload", path, "--drive")[0] == 0
+    assert (rover.vehicle.mode, rover.vehicle.rover.route.is_complete) == (AUTO_MODE, False)
+
+
 def test_nobody_there(tmp_path):
     result = CliRunner().invoke(
         app, ["upload", str(mission_file(tmp_path)), "--connect", "udpin:127.0.0.1:0", "--timeout", "0.3"]

@@ -1,0 +1,332 @@
+"""What an interrupt leads to: what the vehicle does is said, and while it drives because of us a person is asked whether to stop it.
+
+On a terminal the first Ctrl-C asks "HOLD? [Y/n]"; at a second one nothing more is sent. Without a terminal, and on SIGTERM, nothing is sent at
+all: whoever ends a service does not ask for a vehicle to be stopped. The command ends with 130 whatever the answer.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import sys
+from dataclasses import dataclass
+from enum import StrEnum, auto
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from mavlink_bridge.cli.keyboard import Keyboard
+from mavlink_bridge.errors import LinkError
+from mavlink_bridge.rover import AUTO_MODE, HOLD_MODE, MODE_NAMES
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+    from contextlib import AbstractContextManager
+
+    from mavlink_bridge.link import Link
+    from mavlink_bridge.protocol.peer import Peer
+    from mavlink_bridge.protocol.vehicle_watch import Doing, VehicleWatch
+
+_LOOK_S = 0.1
+_LISTEN_S = 1.5
+"""Without a question: for so long the vehicle is listened to, so that what is said of it is true now. A heartbeat comes every second."""
+
+_OLD_S = 2.0
+
+
+class Terminated(KeyboardInterrupt):
+    """SIGTERM, or Ctrl-Break on Windows: the end without a person at the keyboard."""
+
+
+class Interrupted(KeyboardInterrupt):
+    """An interrupt with what is to be said of it; ``details`` is for scripts."""
+
+    def __init__(self, message: str, details: Mapping[str, object]) -> None:
+        super().__init__(message)
+        self.details = details
+
+
+class Step(StrEnum):
+    """What is done next after an interrupt."""
+
+    ASK = auto()
+    HOLD = auto()
+    REPORT = auto()
+
+
+def first_step(*, drives: bool, can_ask: bool, is_terminated: bool) -> Step:
+    """Return what an interrupt leads to.
+
+    Parameters
+    ----------
+    drives : bool
+        Whether the vehicle drives because of us.
+    can_ask : bool
+        Whether a person sits at a terminal.
+    is_terminated : bool
+        Whether it was a SIGTERM.
+    """
+    return Step.ASK if drives and can_ask and not is_terminated else Step.REPORT
+
+
+def step_after(answer: str | None) -> Step:
+    """Return what an answer to "HOLD? [Y/n]" leads to; None is none: a second interrupt, or the end of the input."""
+    if answer is None:
+        return Step.REPORT
+    word = answer.strip().lower()
+    if word in ("", "y", "yes", "hold"):
+        return Step.HOLD
+    return Step.REPORT if word in ("n", "no") else Step.ASK
+
+
+@dataclass(frozen=True, slots=True)
+class Ending:
+    """What is known at the end of an interrupted command.
+
+    Parameters
+    ----------
+    said : str
+        What the part that was interrupted says of itself; empty if nothing.
+    doing : Doing
+        What the vehicle does.
+    on_it : str
+        What is on it; empty if ``said`` says it, or nothing was written.
+    drives : bool
+        Whether it drove because of us.
+    was_asked : bool
+        Whether a person was asked.
+    is_held : bool, optional
+        Whether a HOLD of ours was confirmed; None if none was sent.
+    is_link_lost : bool
+        Whether the link is gone, so that nothing could be sent or heard.
+    changed : bool
+        Whether the command had changed anything on the vehicle.
+    """
+
+    said: str
+    doing: Doing
+    on_it: str
+    drives: bool = False
+    was_asked: bool = False
+    is_held: bool | None = None
+    is_link_lost: bool = False
+    changed: bool = False
+
+    def message(self) -> str:
+        """Return what people are told."""
+        on_it = self.on_it or ("" if self.said else "nothing was written to it")
+        return "; ".join(filter(None, (self.said or "interrupted", self._deed(), on_it)))
+
+    def details(self) -> dict[str, object]:
+        """Return what scripts are told."""
+        doing = self.doing
+        return {
+            "mode": _mode_name(doing.mode),
+            "armed": doing.is_armed,
+            "speed_mps": None if doing.speed_mps is None else round(doing.speed_mps, 2),
+            "age_s": round(doing.age_s, 1),
+            "drives": self.drives and not self.is_held,
+            "hold": {None: "not sent", True: "confirmed", False: "not confirmed"}[self.is_held],
+        }
+
+    def _deed(self) -> str:
+        now = doing_text(self.doing)
+        if self.is_link_lost:
+            now += " when it was last heard (the link is lost)"
+        if self.is_held:
+            return f"the vehicle was switched to HOLD, confirmed by its heartbeat: {now}"
+        if self.is_held is False:
+            return f"HOLD was sent, but no heartbeat confirms it: {now}"
+        if self.drives:
+            return f"nothing was sent: the vehicle drives on as we set it going: {now}"
+        if self.said or self.changed:
+            return f"the vehicle now: {now}"
+        return f"the vehicle was left as it was: {now}"
+
+
+def doing_text(doing: Doing) -> str:
+    """Return what a vehicle does, for people: mode, armed or not, speed, and how old that is where it is old."""
+    if doing.mode is None:
+        return "its mode is not known, no heartbeat was heard"
+    armed = "armed" if doing.is_armed else "not armed"
+    speed = "speed not known" if doing.speed_mps is None else f"{doing.speed_mps:.1f} m/s"
+    age_s = max(doing.age_s, 0.0 if doing.speed_mps is None else doing.speed_age_s)
+    old = f" (told {age_s:.0f} s ago)" if age_s > _OLD_S else ""
+    complete = ", its mission complete" if doing.has_completed and doing.mode == AUTO_MODE else ""
+    return f"{_mode_name(doing.mode)}, {armed}, {speed}{complete}{old}"
+
+
+def _mode_name(mode: int | None) -> str | None:
+    return None if mode is None else MODE_NAMES.get(mode, f"mode {mode}")
+
+
+@dataclass(frozen=True, eq=False)
+class AtHand:
+    """A vehicle at hand while a command runs, for the moment of an interrupt.
+
+    Parameters
+    ----------
+    link : Link, optional
+        The open link; None while there is none.
+    peer : callable
+        Returns the vehicle, None before it was found.
+    watch : callable
+        Returns what it told of itself.
+    drives : callable
+        Returns whether it drives because of us.
+    on_it : callable
+        Returns what is on it, for people; empty where nothing was written, or the part that was interrupted says so itself.
+    changed : callable
+        Returns whether anything on it was changed by the command.
+    aside : callable
+        Clears the terminal of what moves on it, for as long as the context lasts.
+    keyboard : Keyboard, optional
+        What is typed; the standard input if not given.
+    """
+
+    link: Link | None
+    peer: Callable[[], Peer | None]
+    watch: Callable[[], VehicleWatch]
+    drives: Callable[[], bool]
+    on_it: Callable[[], str]
+    changed: Callable[[], bool] = lambda: False
+    aside: Callable[[], AbstractContextManager[Any]] = contextlib.nullcontext
+    keyboard: Keyboard | None = None
+
+
+@contextlib.contextmanager
+def interruptible(at_hand: AtHand) -> Iterator[None]:
+    """End an interrupt with what the vehicle does and what is on it, after asking about HOLD where that is to be asked.
+
+    Raises
+    ------
+    Interrupted
+        In the place of a KeyboardInterrupt.
+    """
+    try:
+        yield
+    except Interrupted:
+        raise
+    except KeyboardInterrupt as interrupt:
+        with at_hand.aside():
+            raise _settled(at_hand, interrupt) from None
+
+
+def _settled(at_hand: AtHand, interrupt: KeyboardInterrupt) -> Interrupted:
+    """Do what an interrupt leads to; a second one ends it at once."""
+    drives = at_hand.drives()
+    can_ask = at_hand.link is not None and sys.stdin.isatty() and sys.stderr.isatty()
+    step = first_step(drives=drives, can_ask=can_ask, is_terminated=isinstance(interrupt, Terminated))
+    was_asked, is_held = step is Step.ASK, None
+    is_link_lost = at_hand.link is None
+    try:
+        if was_asked:
+            step = _ask(at_hand)
+        if step is Step.HOLD:
+            is_held = False
+            is_held = _hold(at_hand)
+        elif at_hand.link is not None and at_hand.peer() is not None:
+            _listen(at_hand)
+    except KeyboardInterrupt:
+        pass  # the second: nothing more is sent
+    except LinkError:
+        is_link_lost = True
+    _heed_no_more()
+    now_s = at_hand.link.now_s() if at_hand.link is not None else _now_s()
+    ending = Ending(
+        said=str(interrupt),
+        doing=at_hand.watch().doing(now_s),
+        on_it=at_hand.on_it(),
+        drives=drives,
+        was_asked=was_asked,
+        is_held=is_held,
+        is_link_lost=is_link_lost,
+        changed=at_hand.changed(),
+    )
+    return Interrupted(ending.message(), ending.details())
+
+
+def _ask(at_hand: AtHand) -> Step:
+    """Ask whether to stop the vehicle, and listen to it meanwhile."""
+    keyboard = at_hand.keyboard or Keyboard()
+    keyboard.forget()
+    step = Step.ASK
+    typer.echo(f"\nthe vehicle drives: {_doing_text_now(at_hand)}", err=True)
+    while step is Step.ASK:
+        typer.echo("HOLD? [Y/n] ", nl=False, err=True)
+        while (answer := keyboard.line()) is None and not keyboard.is_closed:
+            _hear(at_hand, _LOOK_S)
+        step = step_after(answer)
+    return step
+
+
+def _doing_text_now(at_hand: AtHand) -> str:
+    assert at_hand.link is not None
+    return doing_text(at_hand.watch().doing(at_hand.link.now_s()))
+
+
+def _hold(at_hand: AtHand) -> bool:
+    """Switch the vehicle to HOLD, and return whether its heartbeat has confirmed it."""
+    from mavlink_bridge.director.mode_switch import ModeSwitch  # noqa: PLC0415 - quick help
+
+    link, peer = at_hand.link, at_hand.peer()
+    assert link is not None
+    assert peer is not None
+    switch = ModeSwitch(peer, HOLD_MODE, is_urgent=True, until_seen=True)
+    link.run(switch, on_frames=lambda frames: _take(at_hand, frames))
+    return switch.is_granted
+
+
+def _listen(at_hand: AtHand) -> None:
+    """Listen for a heartbeat, so that what is said of the vehicle is true now."""
+    assert at_hand.link is not None
+    begun_s = at_hand.link.now_s()
+    while at_hand.watch().heartbeat_s < begun_s and at_hand.link.now_s() < begun_s + _LISTEN_S:
+        _hear(at_hand, _LOOK_S)
+
+
+def _hear(at_hand: AtHand, timeout_s: float) -> None:
+    assert at_hand.link is not None
+    _take(at_hand, at_hand.link.receive(timeout_s))
+
+
+def _take(at_hand: AtHand, frames: list[Any]) -> None:
+    peer, link = at_hand.peer(), at_hand.link
+    assert link is not None
+    for frame in frames:
+        if peer is not None and (frame.system, frame.component) == (peer.system, peer.component):
+            at_hand.watch().receive(frame.message, link.now_s())
+
+
+def _now_s() -> float:
+    from mavlink_bridge.link import now_s  # noqa: PLC0415 - quick help
+
+    return now_s()
+
+
+def _heed_no_more() -> None:
+    """Let no further Ctrl-C spoil what is said last."""
+    with contextlib.suppress(ValueError):  # not the main thread: no signals come here
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _terminate(_number: int, _frame: object) -> None:
+    raise Terminated
+
+
+@contextlib.contextmanager
+def terminable() -> Iterator[None]:
+    """Let SIGTERM, on Windows Ctrl-Break, end what runs in the context as an interrupt does: with a word of what the vehicle does."""
+    before: dict[int, Any] = {}
+    names = ("SIGINT", "SIGTERM", "SIGBREAK")  # what SIGINT does is put back at the end
+    for number in (getattr(signal, name) for name in names if hasattr(signal, name)):
+        before[number] = signal.getsignal(number)
+        if number != signal.SIGINT:
+            with contextlib.suppress(ValueError):  # not the main thread
+                signal.signal(number, _terminate)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            if handler is not None and signal.getsignal(number) is not handler:
+                signal.signal(number, handler)

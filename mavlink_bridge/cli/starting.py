@@ -1,0 +1,87 @@
+"""Setting a vehicle going on the mission that it holds, after an upload; and stopping one that still drives, before it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from mavlink_bridge.errors import BridgeError, OutcomeError, RefusedError
+from mavlink_bridge.rover import AUTO_MODE, HOLD_MODE, MODE_NAMES
+
+if TYPE_CHECKING:
+    from mavlink_bridge.cli.session import Session
+
+_STATE_PATIENCE_S = 2.0
+"""MISSION_CURRENT comes at least once a second where it is streamed."""
+
+_ADVICE = "arm it in HOLD, then run this again or switch it to AUTO yourself"
+
+
+def make_ready(session: Session, *, hold: bool, replace_active: bool) -> None:
+    """See to it that the vehicle does not drive what is about to be replaced.
+
+    Raises
+    ------
+    RefusedError
+        It drives its mission, and nobody said what to do about that.
+    OutcomeError
+        It does not go to HOLD.
+    """
+    if session.is_active:  # a mission that is complete is not driven: the vehicle may not have told so yet
+        session.ask_telemetry()
+        session.listen_until(lambda: session.is_active is False, _STATE_PATIENCE_S)
+    if not session.is_active:
+        return
+    if hold:
+        session.change_mode(HOLD_MODE)
+    elif not replace_active:
+        raise RefusedError(
+            "the vehicle is armed and drives its mission in AUTO; nothing was written. "
+            "--hold switches it to HOLD first, --replace-active writes all the same"
+        )
+
+
+def start_driving(session: Session) -> None:
+    """Switch an armed vehicle to AUTO, and take it out again if it was disarmed meanwhile: arming it would drive off.
+
+    Raises
+    ------
+    OutcomeError
+        It is not armed, or tells nothing: its mode was left alone. Or it was disarmed meanwhile.
+    RefusedError
+        It refused AUTO.
+    """
+    if not session.hear_anew():
+        raise OutcomeError(
+            "all is verified on the vehicle, but no heartbeat tells whether it is armed: its mode was left alone",
+            advice=_ADVICE,
+        )
+    doing = session.doing
+    if not doing.is_armed:
+        mode = MODE_NAMES.get(doing.mode or 0, f"mode {doing.mode}")
+        drives_off = ": arming it drives off" if doing.mode == AUTO_MODE else ""
+        raise OutcomeError(
+            f"all is verified on the vehicle, which is not armed and does not drive: its mode was left alone ({mode}{drives_off})",
+            advice=_ADVICE,
+            mode=mode,
+        )
+    if doing.mode == AUTO_MODE and doing.has_completed:
+        session.change_mode(HOLD_MODE)  # AUTO begins anew only out of another mode
+    session.drives_by_us = True
+    try:
+        session.change_mode(AUTO_MODE)
+    finally:
+        if session.doing.mode != AUTO_MODE and session.doing.is_fresh:
+            session.drives_by_us = False
+    if not session.doing.is_armed:
+        session.drives_by_us = False
+        raise _put_back(session)
+
+
+def _put_back(session: Session) -> OutcomeError:
+    """Take a vehicle that is disarmed out of AUTO, and return what came of it."""
+    what = "all is verified on the vehicle, but it was disarmed when it went to AUTO"
+    try:
+        session.change_mode(HOLD_MODE)
+    except BridgeError as error:
+        return OutcomeError(f"{what}, and it is still there, arming it drives off: {error}", advice=_ADVICE)
+    return OutcomeError(f"{what}: it was switched back to HOLD and does not drive", advice=_ADVICE)

@@ -1,0 +1,124 @@
+"""Numbers and positions in options, each with its range: what is none of them is wrong usage, said before anything is done."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import typer
+
+from mavlink_bridge.errors import UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from missions.geo import LatLon
+
+MOST_M = 1_000_000.0
+"""No clearance, allowance or reserve is wider: ten times the widest field that can be planned."""
+
+MOST_VEHICLE_M = 100.0
+"""No vehicle is longer or wider, and no antenna further from its middle."""
+
+MOST_MPS = 100.0
+"""No rover is faster."""
+
+MOST_S = 86_400.0
+"""No patience and no link's latency is longer than a day."""
+
+_POSITION_ADVICE = "latitude comes first: LAT,LON in decimal degrees, such as 40.0713,-105.2299"
+
+MOST_FLOAT32 = 3.402_823e38
+"""What a parameter's 32-bit float on the wire can hold."""
+
+
+def within(
+    least: float, most: float, unit: str = "", *, above: bool = False
+) -> Callable[[str | float], float]:
+    """Return a parser of numbers in a range (typer's ``parser=``).
+
+    Parameters
+    ----------
+    least, most : float
+        The ends of the range, both allowed.
+    unit : str
+        What the numbers are, for the message.
+    above : bool
+        Whether ``least`` itself is not allowed.
+    """
+
+    def number(value: str | float) -> float:
+        try:
+            return checked_number(value, least, most, unit, above=above)
+        except UsageError as error:
+            raise typer.BadParameter(str(error)) from None
+
+    return number
+
+
+def checked_number(
+    value: str | float, least: float, most: float, unit: str = "", *, above: bool = False, word: str = ""
+) -> float:
+    """Return the number that a text is.
+
+    Parameters
+    ----------
+    value : str or float
+        As typed, or a default.
+    least, most : float
+        The ends of the range, both allowed.
+    unit : str
+        What the number is, for the message.
+    above : bool
+        Whether ``least`` itself is not allowed.
+    word : str
+        A word that the option takes instead of a number, for the message.
+
+    Raises
+    ------
+    UsageError
+        It is no number, not finite, or outside the range.
+    """
+    try:
+        number = float(value.replace("_", "?") if isinstance(value, str) else value)  # 4_0 is 40 to Python
+    except ValueError:
+        number = math.nan
+    if not least <= number <= most or (above and number == least):
+        interval = f"above {least:.10g}, to {most:.10g}" if above else f"{least:.10g} to {most:.10g}"
+        raise UsageError(
+            f"{str(value)!r}: expected {unit or 'a number'} ({interval}){f' or {word}' if word else ''}"
+        )
+    return number
+
+
+def metres_or(option: str, text: str | None, word: str) -> float | None:
+    """Return the metres of an option that is a number or one word.
+
+    Raises
+    ------
+    UsageError
+        It is neither.
+    """
+    if text is None or text == word:
+        return None
+    try:
+        return checked_number(text, 0.0, MOST_M, "metres", word=word)
+    except UsageError as error:
+        raise UsageError(f"{option} {error}") from None
+
+
+def position_from(option: str, text: str) -> LatLon:
+    """Return the position that an option is.
+
+    Raises
+    ------
+    UsageError
+        It is none.
+    """
+    from missions.errors import InvalidPositionError  # noqa: PLC0415 - quick help
+    from missions.geo import parse_lat_lon  # noqa: PLC0415
+
+    try:
+        return parse_lat_lon(text)
+    except InvalidPositionError as error:
+        raise UsageError(f"{option}: {error}", **{"advice": _POSITION_ADVICE, **error.details}) from None

@@ -1,0 +1,102 @@
+"""Taking a disarmed vehicle out of the AUTO that we switched it to: left there, arming it would set it going.
+
+HOLD is sent only on a heartbeat that shows the vehicle disarmed and in AUTO, so it goes against nobody: who has armed it, or switched its mode, has it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from mavlink_bridge.messages import CommandLong, Heartbeat, ModeFlag
+from mavlink_bridge.rover import AUTO_MODE, HOLD_MODE
+from missions.items import Command
+
+if TYPE_CHECKING:
+    from mavlink_bridge.messages import Frame
+    from mavlink_bridge.protocol.peer import Peer
+
+_PATIENCE_S = 4.0
+"""An AUTO of ours that was on its way shows within this time: heartbeats come every second, some are lost."""
+
+_MOST_SENDS = 16
+
+
+class PutBack:
+    """Switches a vehicle to HOLD as long as it is shown disarmed and in AUTO.
+
+    Parameters
+    ----------
+    peer : Peer
+        The vehicle and our identity.
+    """
+
+    def __init__(self, peer: Peer) -> None:
+        self._peer = peer
+        self._outgoing: list[CommandLong] = []
+        self._sends = 0
+        self._until_s = 0.0
+        self._mode: int | None = None
+        self._is_armed: bool | None = None
+        self.is_done = False
+
+    @property
+    def deadline_s(self) -> float | None:
+        """When `handle_timer` wants to be called."""
+        return None if self.is_done else self._until_s
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        """Whether it is done, as steps."""
+        return int(self.is_done), 1
+
+    @property
+    def is_left_in_auto(self) -> bool:
+        """Whether the vehicle was last shown disarmed and in AUTO all the same."""
+        return self._mode == AUTO_MODE and self._is_armed is False
+
+    @property
+    def was_needed(self) -> bool:
+        """Whether HOLD was sent."""
+        return self._sends > 0
+
+    def start(self, now_s: float) -> None:
+        """Begin to look."""
+        self._until_s = now_s + _PATIENCE_S
+
+    def receive(self, frame: Frame, now_s: float) -> None:
+        """Take a frame; what is not for this machine is ignored."""
+        heartbeat = frame.message
+        if self.is_done or not isinstance(heartbeat, Heartbeat) or not self._peer.accepts(frame):
+            return
+        self._mode = heartbeat.custom_mode
+        self._is_armed = bool(heartbeat.base_mode & ModeFlag.SAFETY_ARMED)
+        if self.is_left_in_auto:
+            self._send_hold(now_s)
+        elif self._mode not in (AUTO_MODE, HOLD_MODE) or self._sends:
+            self.is_done = True
+
+    def handle_timer(self, now_s: float) -> None:
+        """Take notice that time has passed."""
+        self.is_done = self.is_done or now_s >= self._until_s
+
+    def messages_to_send(self) -> list[CommandLong]:
+        """Return and forget what is to be sent now."""
+        outgoing, self._outgoing = self._outgoing, []
+        return outgoing
+
+    def _send_hold(self, now_s: float) -> None:
+        if self._sends >= _MOST_SENDS:
+            self.is_done = True
+            return
+        self._until_s = now_s + _PATIENCE_S
+        self._outgoing.append(
+            CommandLong(
+                self._peer.system,
+                self._peer.component,
+                Command.DO_SET_MODE,
+                self._sends,
+                param1=ModeFlag.CUSTOM_MODE_ENABLED,
+                param2=HOLD_MODE,
+            )
+        )
+        self._sends += 1

@@ -13,9 +13,8 @@ from dataclasses import dataclass
 from enum import StrEnum, auto
 from typing import TYPE_CHECKING, Any
 
-import typer
-
 from mavlink_bridge.cli.keyboard import Keyboard
+from mavlink_bridge.cli.terminal import say
 from mavlink_bridge.errors import LinkError
 from mavlink_bridge.rover import AUTO_MODE, HOLD_MODE, MODE_NAMES
 
@@ -251,9 +250,10 @@ def _ask(at_hand: AtHand) -> Step:
     keyboard = at_hand.keyboard or Keyboard()
     keyboard.forget()
     step = Step.ASK
-    typer.echo(f"\nthe vehicle drives: {_doing_text_now(at_hand)}", err=True)
+    say("")  # behind the terminal's ^C
+    say(f"the vehicle drives: {_doing_text_now(at_hand)}")
     while step is Step.ASK:
-        typer.echo("HOLD? [Y/n] ", nl=False, err=True)
+        say("HOLD? [Y/n] ", nl=False)
         while (answer := keyboard.line()) is None and not keyboard.is_closed:
             _hear(at_hand, _LOOK_S)
         step = step_after(answer)

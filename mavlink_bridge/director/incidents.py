@@ -238,6 +238,8 @@ class Incidents:
         modes = _ACTIONS_OF.get(reason, _ANY_ACTION)
         if reason in _FS_ACTION and "FS_ACTION" in situation.parameters:
             modes = _actions(situation.parameters, "FS_ACTION")
+        elif reason in _FS_ACTION and "FS_ACTION" in situation.no_numbers:
+            modes = frozenset()  # the vehicle's own word for it says nothing, so nothing is claimed
         mode = self._note(Cause(reason, now_s, modes))
         is_told = now_s <= self._told_s.get(reason, -math.inf) + _SAME_S
         self._told_s[reason] = now_s

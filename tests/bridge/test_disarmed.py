@@ -90,7 +90,7 @@ def test_disarmed_between_the_look_and_the_switch_it_is_put_back_to_hold(once, l
     wait(run, 6)
     vehicle = run.vehicles[0]
     assert (vehicle.mode, vehicle.is_armed) == (HOLD_MODE, False)
-    assert "somebody disarmed the vehicle" in str(run.director.trouble)
+    assert "the vehicle was disarmed by itself or by somebody unseen" in str(run.director.trouble)
     place = vehicle.position
     unheard(run, ARM)
     wait(run, 5)

@@ -130,6 +130,8 @@ def test_without_a_drive_of_ours_nothing_is_sent(state):
         wait(run, 8)
         run.vehicles[0].reboot(run.now_s)
     run.run_until(lambda: run.director.state is state, 90)
+    if state is State.ARRIVED:
+        wait(run, 3)  # until it is shown in HOLD, where our drives end
     run.director.messages_to_send()
     spoof(run, count=5)
     (told,) = [event for event in run.director.take_events() if event.name is EventName.IDENTITY_CLASH]

@@ -110,12 +110,14 @@ def test_an_upload_that_has_begun_goes_on_to_its_verified_end_and_says_so_once(r
 
 
 def test_an_upload_is_not_driven_then(rover, forge, mission_file):
+    rover.vehicle.rover.arm()
     forge(MissionItemInt)
     result = run(rover, "upload", mission_file, "--drive")
     document = json.loads(result.stdout)
     assert (result.exit_code, document["error"]) == (7, "OutcomeError")
     assert document["message"] == (
         "somebody else has our ids (system 245 component 190): the vehicle is not switched to AUTO; what was uploaded is on it"
+        "; written and verified before: mission"
     )
     assert is_held(rover, NEW)
     assert rover.vehicle.mode != AUTO_MODE

@@ -319,7 +319,7 @@ def test_at_a_real_terminal(fields, tmp_path, command, answer, mode, said):
     ("owner", "method", "said", "not_said"),
     [
         (BackupStore, "begin", "was left as it was: MANUAL, not armed, 0.0 m/s; nothing was written to it", "part of"),
-        (VerifiedUpload, "backup_stored", "part of the old and part of the new mission: do not drive it. The old one is kept in ", "nothing was"),
+        (VerifiedUpload, "backup_stored", "part of the old and part of the new: do not drive before it is read back; the old list is kept in ", "nothing was"),
     ],
 )  # fmt: skip
 def test_an_interrupted_plan_says_what_is_on_the_vehicle(

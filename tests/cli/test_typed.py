@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import threading
 from importlib import import_module
@@ -144,6 +145,9 @@ class Watcher:
     def note(self, text: str, *, is_warning: bool) -> None:
         assert is_warning
         self.notes.append(text)
+
+    def aside(self) -> contextlib.AbstractContextManager[None]:
+        return contextlib.nullcontext()
 
     def show(self, _now_s: float) -> None:
         self._left -= self.link_trouble is not None

@@ -134,7 +134,7 @@ def test_parameters(tmp_path: Path) -> None:
         (["all.plan", "x.geojson", "--only", "fences"], 2, "--only 'fences': expected one of mission, fence, rally, parameters"),
         (["all.plan", "x.geojson", "--only", "parameters"], 3, "a .geojson file holds no parameters; it holds mission or fence or rally"),
         (["all.plan", "x.poly", "--only", "mission"], 3, "a .poly file holds no mission"),
-        (["all.plan", "x.geojson", "--return-point", "north"], 3, "'north' is not a position"),
+        (["all.plan", "x.geojson", "--return-point", "north"], 2, "'north' is not a position"),
         (["x.parm", "y.parm", "--return-point", "1,2"], 2, "--return-point belongs to a fence, and IN holds none"),
         (["none.plan", "x.geojson"], 3, "none.plan cannot be read: No such file"),
         (["none.plan", "all.plan"], 3, "none.plan cannot be read: No such file"),

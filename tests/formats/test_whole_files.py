@@ -158,6 +158,7 @@ def test_nothing_else_creates_files(package):
         # What is handed a descriptor that was created exclusively, the list of our own in the state folder, and no file at all.
         'mavlink_bridge/cli/kept_files.py: return os.fdopen(create_exclusively(path), "w", encoding="utf-8", newline="\\n")',
         'mavlink_bridge/cli/kept_files.py: with known.open("a", encoding="utf-8") as file:',
+        'mavlink_bridge/vehicle_lock.py: file: IO[bytes] = path.open("a+b")',  # locked, and told who has it
         "mavlink_bridge/cli/failing.py: os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())",
     }
 

@@ -201,13 +201,15 @@ def test_plan_names_its_backup(stepped, fields):
     assert (again["verified"], again["backup"]) == (True, None)
 
 
-def test_a_file_that_cannot_be_written_does_not_hide_the_upload(stepped, fields, tmp_path):
+def test_a_file_that_cannot_be_written_ends_a_plan_before_anything_is_written_to_the_vehicle(
+    stepped, fields, tmp_path
+):
     (tmp_path / "m.plan").mkdir()
     vehicle = Adversary(OLD)
     code, _, stderr = stepped(vehicle, "plan", *_plan(vehicle, fields), "-o", tmp_path / "m.plan")
     assert code == 3
-    assert "the mission is on the vehicle, verified; the mission before is kept in" in stderr
-    assert vehicle.counts == 1
+    assert "m.plan cannot be written" in stderr
+    assert (vehicle.counts, places(vehicle.held)) == (0, places(OLD))
 
 
 def test_parameters_that_were_set_before_the_link_broke_are_named(stepped, tmp_path):

@@ -61,8 +61,8 @@ def test_it_runs_until_told_to_stop(stop, fields):
 @pytest.mark.parametrize(
     ("options", "code", "said"),
     [
-        (["--home=91,0"], 3, "latitude"),
-        (["--home=nowhere"], 3, "LAT,LON"),
+        (["--home=91,0"], 2, "latitude"),
+        (["--home=nowhere"], 2, "LAT,LON"),
         (["--home=40,-105,north"], 2, "heading"),
         (["--home=40,-105,999"], 2, "heading"),
         (["--param=WP_SPEED"], 2, "NAME=VALUE"),

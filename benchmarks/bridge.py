@@ -32,12 +32,12 @@ from typing import TYPE_CHECKING, Any, Self
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from mavlink_bridge import messages as m
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.link import Link, open_link
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.codec import Codec
+from mavlink_bridge.mavlink.rover import HOLD_MODE
 from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.protocol.upload import Upload
-from mavlink_bridge.rover import HOLD_MODE
 from mavlink_bridge.simulator import Simulator, SimulatorConfig
 from mavlink_bridge.simulator.faults import Faults
 from missions.fence import CircleZone, Fence, ZoneKind, fence_to_items

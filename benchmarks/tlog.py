@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 
 from pymavlink import mavutil
 
-from mavlink_bridge import messages as m
-from mavlink_bridge.codec import to_frame
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.codec import to_frame
 from mavlink_bridge.tlog import LogEntry, TlogReader, read_columns
 
 if TYPE_CHECKING:

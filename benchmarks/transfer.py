@@ -25,7 +25,7 @@ from protocol.campaign import Judged, Scenario, scenario_of, transfer
 from protocol.twin import PEER, Client, Faults, Twin, Vehicle, plain_mission
 
 from mavlink_bridge.link import Link, now_s, open_link
-from mavlink_bridge.messages import MissionType
+from mavlink_bridge.mavlink.messages import MissionType
 from mavlink_bridge.protocol.download import Download
 from mavlink_bridge.protocol.upload import WINDOW, Upload
 from mavlink_bridge.protocol.verified_upload import VerifiedUpload

@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from mavlink_bridge.director import Director, Orders
     from mavlink_bridge.errors import BridgeError
     from mavlink_bridge.link import Link, open_link
-    from mavlink_bridge.messages import Frame
-    from mavlink_bridge.recorded import situation_from_log
+    from mavlink_bridge.logbook.recorded import situation_from_log
+    from mavlink_bridge.mavlink.messages import Frame
     from mavlink_bridge.simulator import Simulator, SimulatorConfig
     from mavlink_bridge.tlog import TlogReader, TlogWriter
 
@@ -34,7 +34,7 @@ __all__ = [
 _HOMES = {
     "BridgeError": "errors",
     "Director": "director",
-    "Frame": "messages",
+    "Frame": "mavlink.messages",
     "Link": "link",
     "Orders": "director",
     "Simulator": "simulator",
@@ -42,7 +42,7 @@ _HOMES = {
     "TlogReader": "tlog",
     "TlogWriter": "tlog",
     "open_link": "link",
-    "situation_from_log": "recorded",
+    "situation_from_log": "logbook.recorded",
 }
 
 

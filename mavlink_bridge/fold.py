@@ -10,11 +10,11 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from mavlink_bridge import messages as m
-from mavlink_bridge.autopilot_facts import with_autopilot, with_banner, with_parameter, with_version
-from mavlink_bridge.parameter_values import parameter_value
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.autopilot_facts import with_autopilot, with_banner, with_parameter, with_version
+from mavlink_bridge.mavlink.parameter_values import parameter_value
+from mavlink_bridge.mavlink.vehicles import is_vehicle
 from mavlink_bridge.protocol.wire import item_from_message, mission_result
-from mavlink_bridge.vehicles import is_vehicle
 from missions.errors import FenceError, InvalidPositionError
 from missions.fence import fence_from_items, fence_to_items
 from missions.geo import LatLon, checked_lat_lon, from_e7
@@ -25,7 +25,7 @@ from missions.situation import Fix, Known, ListKind, ListTransfer, Mission, Pose
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from mavlink_bridge.messages import Frame, Message
+    from mavlink_bridge.mavlink.messages import Frame, Message
 
 KINDS: dict[int, ListKind] = {
     m.MissionType.MISSION: ListKind.MISSION,

@@ -10,19 +10,19 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, Self
 
-from mavlink_bridge.callers import FORGOTTEN_AFTER_S, Callers
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import LinkError
-from mavlink_bridge.messages import Autopilot, Heartbeat, MavType
+from mavlink_bridge.mavlink.callers import FORGOTTEN_AFTER_S, Callers
+from mavlink_bridge.mavlink.codec import Codec
+from mavlink_bridge.mavlink.messages import Autopilot, Heartbeat, MavType
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Sequence
     from types import TracebackType
 
-    from mavlink_bridge.echoes import SentFrames
-    from mavlink_bridge.messages import Frame, Message
+    from mavlink_bridge.mavlink.echoes import SentFrames
+    from mavlink_bridge.mavlink.messages import Frame, Message
+    from mavlink_bridge.mavlink.signing import Signing
     from mavlink_bridge.protocol.machine import Machine
-    from mavlink_bridge.signing import Signing
 
 ONE_SHOT_IDENTITY = (245, 190)
 """System and component id of one-shot commands: nobody else's by custom."""

@@ -9,7 +9,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from missions.check import CheckedLeg, MissionCheck, check_mission
+    from missions.checking.check import CheckedLeg, MissionCheck, check_mission
+    from missions.editing.repair import Repair, repair_mission
     from missions.errors import MissionError
     from missions.fence import CircleZone, Fence, PolygonZone, ZoneKind
     from missions.formats import (
@@ -22,12 +23,11 @@ if TYPE_CHECKING:
     )
     from missions.geo import LatLon
     from missions.items import MissionItem, waypoint
-    from missions.plan import Plan
-    from missions.plan import plan as plan_mission
-    from missions.repair import Repair, repair_mission
+    from missions.planning.plan import Plan
+    from missions.planning.plan import plan as plan_mission
     from missions.request import Request
     from missions.situation import Known, Mission, Situation
-    from missions.tour import plan_tour
+    from missions.tour.tour import plan_tour
     from missions.vehicle import Vehicle, vehicle_from_parameters
 
 __all__ = [
@@ -62,30 +62,30 @@ __all__ = [
 ]
 
 _HOMES = {
-    "CheckedLeg": "check",
+    "CheckedLeg": "checking.check",
     "CircleZone": "fence",
     "Fence": "fence",
     "Known": "situation",
     "LatLon": "geo",
     "Mission": "situation",
-    "MissionCheck": "check",
+    "MissionCheck": "checking.check",
     "MissionError": "errors",
     "MissionItem": "items",
-    "Plan": "plan",
+    "Plan": "planning.plan",
     "PolygonZone": "fence",
-    "Repair": "repair",
+    "Repair": "editing.repair",
     "Request": "request",
     "Situation": "situation",
     "Vehicle": "vehicle",
     "ZoneKind": "fence",
-    "check_mission": "check",
-    "plan_mission": "plan",
-    "plan_tour": "tour",
+    "check_mission": "checking.check",
+    "plan_mission": "planning.plan",
+    "plan_tour": "tour.tour",
     "read_fence": "formats",
     "read_mission": "formats",
     "read_parameters": "formats",
     "read_situation": "formats",
-    "repair_mission": "repair",
+    "repair_mission": "editing.repair",
     "vehicle_from_parameters": "vehicle",
     "waypoint": "items",
     "write_mission": "formats",

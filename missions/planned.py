@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from missions.drive_model import Envelope
     from missions.fence import Fence
     from missions.geo import LatLon
-    from missions.ground import Ground
+    from missions.ground.ground import Ground
     from missions.items import MissionItem
     from missions.vehicle import Vehicle
 

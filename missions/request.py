@@ -48,13 +48,13 @@ class Request:
     escape : bool
         Whether a vehicle on forbidden ground may drive out.
     order : str
-        ``given``: the targets in their order; ``best``: in the shortest one (`missions.tour`).
+        ``given``: the targets in their order; ``best``: in the shortest one (`missions.tour.tour`).
     comes_back : bool
-        Whether the route leads home after the last target (`missions.tour`).
+        Whether the route leads home after the last target (`missions.tour.tour`).
     end : str
-        At the end ``hold``, ``loiter`` or ``rtl`` (`missions.tour`).
+        At the end ``hold``, ``loiter`` or ``rtl`` (`missions.tour.tour`).
     via : Mission, optional
-        A mission to repair, in the place of targets (`missions.repair`).
+        A mission to repair, in the place of targets (`missions.editing.repair`).
     via_own : bool
         Repair the mission that the situation tells of.
     """

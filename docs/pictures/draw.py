@@ -8,7 +8,7 @@ from pathlib import Path
 from missions.formats import read_situation
 from missions.geo import LatLon
 from missions.picture import draw_plan
-from missions.plan import plan
+from missions.planning.plan import plan
 from missions.request import Request
 
 HERE = Path(__file__).parent

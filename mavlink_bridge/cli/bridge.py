@@ -39,11 +39,11 @@ if TYPE_CHECKING:
     from mavlink_bridge.cli.opening import Opening
     from mavlink_bridge.cli.run_log import RunLog
     from mavlink_bridge.director import Director, Event, Orders
-    from mavlink_bridge.journal import JournalWriter
     from mavlink_bridge.link import Link
-    from mavlink_bridge.signing import Signing
+    from mavlink_bridge.mavlink.signing import Signing
+    from mavlink_bridge.replay.journal import JournalWriter
     from mavlink_bridge.tlog import TlogWriter
-    from missions.plan import Plan
+    from missions.planning.plan import Plan
 
 _BACKOFF_S = (0.5, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0)
 _LINK_LOOK_S = 0.25
@@ -176,7 +176,7 @@ class _Journaled:
     frames: int = 0
 
     def call(self, name: str, now_s: float, target: object = None, text: str = "") -> None:
-        from mavlink_bridge.journal import Call  # noqa: PLC0415 - quick help
+        from mavlink_bridge.replay.journal import Call  # noqa: PLC0415 - quick help
         from missions.geo import LatLon  # noqa: PLC0415
 
         if self.writer is not None:
@@ -221,7 +221,7 @@ class _Shell:
     def run(self, signing: Signing | None, timeout_s: float) -> None:
         """Run until the single job is done, or for ever; a link that breaks is opened again."""
         from mavlink_bridge.link import now_s  # noqa: PLC0415 - quick help
-        from mavlink_bridge.outcomes import ends_in_words  # noqa: PLC0415
+        from mavlink_bridge.protocol.outcomes import ends_in_words  # noqa: PLC0415
 
         begun_s = now_s()
         self._written.call("start", begun_s)
@@ -246,7 +246,7 @@ class _Shell:
     @contextlib.contextmanager
     def _interrupt_in_words(self) -> Iterator[None]:
         """Let an interrupt say what an upload under way has left; a link that breaks is no end of it."""
-        from mavlink_bridge.outcomes import end_of_upload  # noqa: PLC0415 - quick help
+        from mavlink_bridge.protocol.outcomes import end_of_upload  # noqa: PLC0415 - quick help
 
         try:
             yield
@@ -255,8 +255,8 @@ class _Shell:
 
     def _keep_linked(self, signing: Signing | None, timeout_s: float) -> None:
         from mavlink_bridge.cli.opening import Opening  # noqa: PLC0415 - quick help
-        from mavlink_bridge.echoes import SentFrames  # noqa: PLC0415
         from mavlink_bridge.link import ONE_SHOT_IDENTITY, open_link  # noqa: PLC0415
+        from mavlink_bridge.mavlink.echoes import SentFrames  # noqa: PLC0415
 
         sent = SentFrames()
         failures = 0

@@ -18,7 +18,7 @@ from mavlink_bridge.cli.terminal import cell
 from mavlink_bridge.cli.terminal import console as terminal_console
 from mavlink_bridge.cli.typed import CONFIRM
 from mavlink_bridge.director import Severity, State
-from mavlink_bridge.rover import mode_name
+from mavlink_bridge.mavlink.rover import mode_name
 from missions.picture import sketch_plan
 
 if TYPE_CHECKING:

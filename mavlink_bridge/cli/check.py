@@ -43,8 +43,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from mavlink_bridge.cli.session import Address
-    from mavlink_bridge.messages import Frame
-    from missions.check import CheckedLeg, MissionCheck
+    from mavlink_bridge.mavlink.messages import Frame
+    from missions.checking.check import CheckedLeg, MissionCheck
     from missions.items import MissionItem
     from missions.situation import Situation
 
@@ -120,7 +120,7 @@ def check(
     _check_options(mission, log, connect, home, plots)
     if json_output and Path("-") in plots:
         raise UsageError("--plot - and --json both want the standard output; give a file to --plot")
-    from missions.check import check_mission  # noqa: PLC0415
+    from missions.checking.check import check_mission  # noqa: PLC0415
     from missions.request import Request  # noqa: PLC0415
 
     request = with_vehicle(
@@ -133,8 +133,8 @@ def check(
     situation: Situation | None = None
     unknown: list[str] = []
     if log is not None:
-        from mavlink_bridge.recorded import situation_from_log  # noqa: PLC0415 - pymavlink only where needed
-        from mavlink_bridge.vehicles import not_ardupilot  # noqa: PLC0415
+        from mavlink_bridge.logbook.recorded import situation_from_log  # noqa: PLC0415 - pymavlink only where needed
+        from mavlink_bridge.mavlink.vehicles import not_ardupilot  # noqa: PLC0415
 
         situation = situation_from_log(log, system, any_vehicle=any_vehicle)
         if situation.ardupilot is False:  # how another autopilot drives its items was not measured
@@ -180,7 +180,7 @@ def _check_options(
 
 def _storage_warnings(items: Sequence[MissionItem], situation: Situation) -> list[str]:
     """Warn of a mission (its items without home) that the vehicle cannot hold."""
-    from missions.item_limit import most_items  # noqa: PLC0415 - quick help
+    from missions.vehicle.item_limit import most_items  # noqa: PLC0415 - quick help
 
     most = most_items(situation.parameters)
     count = len(items) + 1
@@ -233,9 +233,9 @@ def _live_situation(address: Address, *, quiet: bool) -> tuple[Situation, list[s
     from mavlink_bridge.fold import fold  # noqa: PLC0415
     from mavlink_bridge.link import now_s  # noqa: PLC0415
     from mavlink_bridge.protocol.parameters import ReadParameters  # noqa: PLC0415
+    from missions.checking.mission_end import PARAMETER_NAMES as END_NAMES  # noqa: PLC0415
     from missions.fence import fence_from_items  # noqa: PLC0415
     from missions.items import without_home  # noqa: PLC0415
-    from missions.mission_end import PARAMETER_NAMES as END_NAMES  # noqa: PLC0415
     from missions.rally import rally_from_items  # noqa: PLC0415
     from missions.situation import Known, Mission, Situation  # noqa: PLC0415
     from missions.vehicle import PARAMETER_NAMES  # noqa: PLC0415
@@ -278,7 +278,7 @@ def _draw(checked: MissionCheck, situation: Situation, plots: list[Path]) -> Non
     if not plots:
         return
     from mavlink_bridge.cli.plan_results import draw  # noqa: PLC0415 - quick help
-    from missions.check import plan_of  # noqa: PLC0415
+    from missions.checking.check import plan_of  # noqa: PLC0415
 
     broken = len(checked.broken)
     title = (

@@ -16,11 +16,11 @@ from mavlink_bridge.cli.terminal import echo
 from mavlink_bridge.cli.values import within
 
 if TYPE_CHECKING:
-    from mavlink_bridge.messages import Frame
+    from mavlink_bridge.mavlink.messages import Frame
     from mavlink_bridge.simulator import SteppedRover
     from missions.fence import Fence
     from missions.geo import LatLon
-    from missions.plan import Plan
+    from missions.planning.plan import Plan
 
 _HOME = (40.071374, -105.229930)
 _TARGET = (40.0726316, -105.2290497)
@@ -133,7 +133,7 @@ def _maze() -> Fence:
 
 def _observe(drive: _Drive, frames: list[Frame]) -> None:
     """Keep the track and the breaches that the vehicle reports."""
-    from mavlink_bridge.messages import FenceStatus, GlobalPositionInt  # noqa: PLC0415 - quick help
+    from mavlink_bridge.mavlink.messages import FenceStatus, GlobalPositionInt  # noqa: PLC0415 - quick help
     from missions.geo import from_e7  # noqa: PLC0415
 
     for frame in frames:

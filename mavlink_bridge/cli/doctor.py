@@ -161,7 +161,7 @@ def _key(path: Path | None) -> Iterator[_Finding]:
     if path is None:
         return
     from mavlink_bridge.errors import UsageError  # noqa: PLC0415 - quick help
-    from mavlink_bridge.signing import SigningKey  # noqa: PLC0415
+    from mavlink_bridge.mavlink.signing import SigningKey  # noqa: PLC0415
 
     try:
         SigningKey.read(path)
@@ -176,7 +176,7 @@ def _key(path: Path | None) -> Iterator[_Finding]:
 
 
 def _backups() -> Iterator[_Finding]:
-    from mavlink_bridge.backup import BackupStore  # noqa: PLC0415 - quick help
+    from mavlink_bridge.backup.backup import BackupStore  # noqa: PLC0415 - quick help
 
     folder = BackupStore().folder
     above = next(path for path in (folder, *folder.parents) if path.exists())
@@ -200,7 +200,7 @@ def _test_plan() -> Iterator[_Finding]:
 
     from missions.formats import read_situation  # noqa: PLC0415
     from missions.geo import LatLon  # noqa: PLC0415
-    from missions.plan import plan  # noqa: PLC0415
+    from missions.planning.plan import plan  # noqa: PLC0415
     from missions.request import Request  # noqa: PLC0415
     from missions.situation import Situation  # noqa: PLC0415
 

@@ -65,7 +65,7 @@ def download(
     outputs = output or []
     _check(what, connect, outputs)
 
-    from mavlink_bridge.backup import BackupStore  # noqa: PLC0415 - usage errors need not wait for it
+    from mavlink_bridge.backup.backup import BackupStore  # noqa: PLC0415 - usage errors need not wait for it
     from mavlink_bridge.cli.session import Address, open_session  # noqa: PLC0415
 
     address = Address(connect, (source_system, source_component), system, any_vehicle, timeout, signing_key)
@@ -118,8 +118,8 @@ def read_list(session: Session, what: str) -> tuple[MissionItem, ...]:
     LinkError
         It fell silent.
     """
-    from mavlink_bridge.messages import MissionType  # noqa: PLC0415
-    from mavlink_bridge.outcomes import download_refusal  # noqa: PLC0415
+    from mavlink_bridge.mavlink.messages import MissionType  # noqa: PLC0415
+    from mavlink_bridge.protocol.outcomes import download_refusal  # noqa: PLC0415
     from mavlink_bridge.protocol.transitions import DownloadState  # noqa: PLC0415
     from mavlink_bridge.protocol.undisturbed_read import UndisturbedRead  # noqa: PLC0415
 

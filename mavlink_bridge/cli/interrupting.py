@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from mavlink_bridge.cli.keyboard import Keyboard
 from mavlink_bridge.cli.terminal import say
 from mavlink_bridge.errors import LinkError
-from mavlink_bridge.rover import AUTO_MODE, HOLD_MODE, MODE_NAMES
+from mavlink_bridge.mavlink.rover import AUTO_MODE, HOLD_MODE, MODE_NAMES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping

@@ -9,7 +9,9 @@ from dataclasses import dataclass, replace
 from threading import Thread
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.backup import BackupStore
+from mavlink_bridge.backup.backup import BackupStore
+from mavlink_bridge.backup.vehicle_lock import VehicleLock
+from mavlink_bridge.backup.vehicle_mark import Kinship, VehicleMark
 from mavlink_bridge.cli.common import progress_bar, warn
 from mavlink_bridge.cli.interrupting import AtHand, interruptible, terminable
 from mavlink_bridge.cli.link_notes import LinkNotes
@@ -19,18 +21,16 @@ from mavlink_bridge.cli.session import signing_of
 from mavlink_bridge.director import Director, EventName, Orders, State
 from mavlink_bridge.errors import BackupError, BridgeError, LinkError, VehicleInUseError
 from mavlink_bridge.link import ONE_SHOT_IDENTITY, open_link, parse_connection
-from mavlink_bridge.messages import Autopilot, MissionType
-from mavlink_bridge.outcomes import Writing, ends_in_words, held_text
+from mavlink_bridge.mavlink.messages import Autopilot, MissionType
+from mavlink_bridge.protocol.outcomes import Writing, ends_in_words, held_text
 from mavlink_bridge.protocol.vehicle_watch import Doing
 from mavlink_bridge.protocol.verified_upload import Held, OutcomeKind
-from mavlink_bridge.vehicle_lock import VehicleLock
-from mavlink_bridge.vehicle_mark import Kinship, VehicleMark
-from missions.course import follow_mission
+from missions.checking.course import follow_mission
 from missions.errors import SituationError
 from missions.formats import read_parameters
 from missions.items import Command
-from missions.plan import Plan
-from missions.plan import plan as make_plan
+from missions.planning.plan import Plan
+from missions.planning.plan import plan as make_plan
 from missions.situation import Mission, Situation
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
     from mavlink_bridge.director.plan_task import PlanTask
     from mavlink_bridge.link import Link
-    from mavlink_bridge.messages import Frame
+    from mavlink_bridge.mavlink.messages import Frame
     from mavlink_bridge.protocol.verified_upload import VerifiedUpload
     from missions.errors import MissionError
     from missions.items import MissionItem
@@ -277,7 +277,7 @@ class PlanMaker:
     director : Director
         Who waits for them.
     planner : callable, optional
-        Makes one; `missions.plan.plan` if not given.
+        Makes one; `missions.planning.plan.plan` if not given.
     """
 
     def __init__(self, director: Director, planner: Callable[[Situation, Request], Plan] = make_plan) -> None:

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
     from rich.table import Table
 
-    from mavlink_bridge.grade import Grade
     from mavlink_bridge.logbook import Logbook, VehicleLog
+    from mavlink_bridge.logbook.grade import Grade
 
 Row = TypeVar("Row")
 _MOST_ROWS = 40

@@ -44,7 +44,7 @@ from mavlink_bridge.cli.vehicle_options import (
 from mavlink_bridge.errors import LogError, UsageError
 
 if TYPE_CHECKING:
-    from missions.plan import Plan
+    from missions.planning.plan import Plan
     from missions.request import Request
     from missions.situation import Situation
 
@@ -230,7 +230,7 @@ def plan(
         situation, verified, arrival = result.situation, result.verified, result.arrival
         backup = result.backup
     else:
-        from mavlink_bridge.vehicles import not_ardupilot  # noqa: PLC0415 - only where needed
+        from mavlink_bridge.mavlink.vehicles import not_ardupilot  # noqa: PLC0415 - only where needed
 
         situation = _offline_situation(fence, log, system, any_vehicle=any_vehicle)
         situation = with_home_option(with_parameter_file(situation, vehicle), home)
@@ -255,7 +255,7 @@ def plan(
 
 def timed_plan(situation: Situation, request: Request) -> tuple[Plan, float]:
     """Plan, and tell how long it took."""
-    from missions.tour import plan_tour  # noqa: PLC0415 - quick help
+    from missions.tour.tour import plan_tour  # noqa: PLC0415 - quick help
 
     begun_s = time.perf_counter()
     planned = plan_tour(situation, request)
@@ -309,7 +309,7 @@ def _offline_situation(
     fence: Path | None, log: Path | None, system: int | None, *, any_vehicle: bool
 ) -> Situation:
     if log is not None:
-        from mavlink_bridge.recorded import situation_from_log  # noqa: PLC0415 - pymavlink only where needed
+        from mavlink_bridge.logbook.recorded import situation_from_log  # noqa: PLC0415 - pymavlink only where needed
 
         return situation_from_log(
             log, system, any_vehicle=any_vehicle, on_damage=lambda damage: warn([f"{log}: {damage}"])

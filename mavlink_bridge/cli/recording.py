@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.errors import LogError
-from mavlink_bridge.journal import JournalWriter, journal_path
+from mavlink_bridge.replay.journal import JournalWriter, journal_path
 from mavlink_bridge.tlog import TlogWriter
 
 if TYPE_CHECKING:

@@ -173,7 +173,7 @@ def _pool(workers: int) -> ProcessPoolExecutor | None:
 
 
 def _one_after_the_other(logs: list[Path], orders: Orders, speed: float | None, teller: _Teller) -> _Results:
-    from mavlink_bridge.replay import replay_log  # noqa: PLC0415 - quick help
+    from mavlink_bridge.replay.replay import replay_log  # noqa: PLC0415 - quick help
 
     results: _Results = {}
     for log in logs:
@@ -195,7 +195,7 @@ def _one_after_the_other(logs: list[Path], orders: Orders, speed: float | None, 
 
 
 def _side_by_side(logs: list[Path], orders: Orders, pool: ProcessPoolExecutor, teller: _Teller) -> _Results:
-    from mavlink_bridge.replay import replay_to_json  # noqa: PLC0415 - quick help
+    from mavlink_bridge.replay.replay import replay_to_json  # noqa: PLC0415 - quick help
 
     results: _Results = {}
     try:
@@ -219,7 +219,7 @@ def _side_by_side(logs: list[Path], orders: Orders, pool: ProcessPoolExecutor, t
 
 def _expected(logs: list[Path], expect: Path | None) -> dict[Path | None, list[_Told]]:
     """Read what is expected: of each log by itself, or (under None) of all together."""
-    from mavlink_bridge.expectations import expectation_path, read_expectation  # noqa: PLC0415 - quick help
+    from mavlink_bridge.replay.expectations import expectation_path, read_expectation  # noqa: PLC0415 - quick help
 
     if expect is None:
         return {}
@@ -229,7 +229,7 @@ def _expected(logs: list[Path], expect: Path | None) -> dict[Path | None, list[_
 
 
 def _is_as_expected(expected: dict[Path | None, list[_Told]], results: _Results) -> bool:
-    from mavlink_bridge.expectations import differences  # noqa: PLC0415 - quick help
+    from mavlink_bridge.replay.expectations import differences  # noqa: PLC0415 - quick help
 
     found = []
     for log, events in expected.items():
@@ -245,7 +245,7 @@ def _is_as_expected(expected: dict[Path | None, list[_Told]], results: _Results)
 
 def _record(results: _Results, *, quiet: bool) -> None:
     from mavlink_bridge.cli.kept_files import write_kept  # noqa: PLC0415 - quick help
-    from mavlink_bridge.expectations import expectation_path, to_expect  # noqa: PLC0415
+    from mavlink_bridge.replay.expectations import expectation_path, to_expect  # noqa: PLC0415
 
     for log, told in results.items():
         if isinstance(told, LogError):
@@ -276,9 +276,9 @@ def _send(
     log: Path, connection: str, speed: float, system: int | None, *, any_vehicle: bool, quiet: bool
 ) -> None:
     """Play the vehicle's side of a log; what the client sends tells only that it is there."""
-    from mavlink_bridge.codec import Codec  # noqa: PLC0415 - quick help
     from mavlink_bridge.link import open_transport, parse_connection  # noqa: PLC0415
     from mavlink_bridge.logbook.playback import vehicle_frames  # noqa: PLC0415
+    from mavlink_bridge.mavlink.codec import Codec  # noqa: PLC0415 - quick help
 
     is_called = parse_connection(connection).kind == "udpin"
     frames = vehicle_frames(log, system, any_vehicle=any_vehicle)

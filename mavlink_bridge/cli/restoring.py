@@ -6,16 +6,16 @@ import sys
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from mavlink_bridge.backup.vehicle_lock import VehicleLock
+from mavlink_bridge.backup.vehicle_mark import Kinship
 from mavlink_bridge.cli.terminal import say
 from mavlink_bridge.errors import BackupError, OtherVehicleError, UsageError
-from mavlink_bridge.vehicle_lock import VehicleLock
-from mavlink_bridge.vehicle_mark import Kinship
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from mavlink_bridge.backup import Backup, BackupStore, Note
-    from mavlink_bridge.vehicle_mark import VehicleMark
+    from mavlink_bridge.backup.backup import Backup, BackupStore, Note
+    from mavlink_bridge.backup.vehicle_mark import VehicleMark
 
 _FORGET = "`pbpp upload --forget` puts the note aside"
 

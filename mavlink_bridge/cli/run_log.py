@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from mavlink_bridge.director import Event
-    from mavlink_bridge.journal import Call, JournalWriter
+    from mavlink_bridge.replay.journal import Call, JournalWriter
     from mavlink_bridge.tlog import TlogWriter
 
 

@@ -7,20 +7,26 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from mavlink_bridge.backup.vehicle_mark import VehicleMark, uid_of
 from mavlink_bridge.cli.common import warn
 from mavlink_bridge.cli.interrupting import AtHand
 from mavlink_bridge.cli.link_notes import LinkNotes
 from mavlink_bridge.errors import LinkError, OutcomeError, RefusedError
 from mavlink_bridge.link import open_link, parse_connection
-from mavlink_bridge.messages import AUTOPILOT_VERSION_ID, CommandLong, Heartbeat, ModeFlag, RequestDataStream
+from mavlink_bridge.mavlink.messages import (
+    AUTOPILOT_VERSION_ID,
+    CommandLong,
+    Heartbeat,
+    ModeFlag,
+    RequestDataStream,
+)
+from mavlink_bridge.mavlink.rover import AUTO_MODE, MODE_NAMES
+from mavlink_bridge.mavlink.vehicles import not_ardupilot
 from mavlink_bridge.protocol.ask_version import AskVersion
 from mavlink_bridge.protocol.command import SendCommand
 from mavlink_bridge.protocol.find import FindVehicle, identity_shared, identity_taken
 from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.protocol.vehicle_watch import VehicleWatch
-from mavlink_bridge.rover import AUTO_MODE, MODE_NAMES
-from mavlink_bridge.vehicle_mark import VehicleMark, uid_of
-from mavlink_bridge.vehicles import not_ardupilot
 from missions.items import Command
 
 if TYPE_CHECKING:
@@ -29,10 +35,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from mavlink_bridge.link import Link
-    from mavlink_bridge.messages import Frame, Message
+    from mavlink_bridge.mavlink.messages import Frame, Message
+    from mavlink_bridge.mavlink.signing import Signing
     from mavlink_bridge.protocol.machine import Machine
     from mavlink_bridge.protocol.vehicle_watch import Doing
-    from mavlink_bridge.signing import Signing
 
 _MODE_PATIENCE_S = 5.0
 _HEARTBEAT_PATIENCE_S = 5.0
@@ -304,7 +310,7 @@ def signing_of(key_file: Path | None) -> Signing | None:
     """
     if key_file is None:
         return None
-    from mavlink_bridge.signing import Signing, SigningKey  # noqa: PLC0415 - only where a key is given
+    from mavlink_bridge.mavlink.signing import Signing, SigningKey  # noqa: PLC0415 - only where a key is given
 
     return Signing(SigningKey.read(key_file), time.time)
 

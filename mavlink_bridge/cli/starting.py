@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.errors import BridgeError, OutcomeError, RefusedError
-from mavlink_bridge.rover import AUTO_MODE, HOLD_MODE, MODE_NAMES
+from mavlink_bridge.mavlink.rover import AUTO_MODE, HOLD_MODE, MODE_NAMES
 
 if TYPE_CHECKING:
     from mavlink_bridge.cli.session import Session

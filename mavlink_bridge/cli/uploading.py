@@ -6,26 +6,26 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from mavlink_bridge.backup import BackupStore
+from mavlink_bridge.backup.backup import BackupStore
+from mavlink_bridge.backup.vehicle_lock import VehicleLock
+from mavlink_bridge.backup.vehicle_mark import Kinship
 from mavlink_bridge.errors import LinkError, OutcomeError, RefusedError
 from mavlink_bridge.link import now_s
-from mavlink_bridge.messages import MissionType
-from mavlink_bridge.outcomes import Writing, end_of_parameters, ends_in_words, upload_trouble
+from mavlink_bridge.mavlink.messages import MissionType
 from mavlink_bridge.protocol.limits import Limits
+from mavlink_bridge.protocol.outcomes import Writing, end_of_parameters, ends_in_words, upload_trouble
 from mavlink_bridge.protocol.parameters import ReadParameters, SetParameter
 from mavlink_bridge.protocol.verified_upload import Held, VerifiedUpload
-from mavlink_bridge.vehicle_lock import VehicleLock
-from mavlink_bridge.vehicle_mark import Kinship
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from contextlib import AbstractContextManager
     from pathlib import Path
 
+    from mavlink_bridge.backup.vehicle_mark import VehicleMark
     from mavlink_bridge.cli.session import Session
     from mavlink_bridge.protocol.parameters import SetParameterOutcome
     from mavlink_bridge.protocol.verified_upload import VerifiedUploadOutcome
-    from mavlink_bridge.vehicle_mark import VehicleMark
     from missions.items import MissionItem
 
 Lists = list[tuple[MissionType, tuple["MissionItem", ...]]]

@@ -9,7 +9,6 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.director.changes import RebootWatch
 from mavlink_bridge.director.events import Event, EventName
 from mavlink_bridge.director.learning import Learning
@@ -19,16 +18,17 @@ from mavlink_bridge.director.steps import Steps
 from mavlink_bridge.director.voice import Voice
 from mavlink_bridge.errors import BridgeError, LinkError
 from mavlink_bridge.fold import fold
-from mavlink_bridge.messages import Frame
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.messages import Frame
+from mavlink_bridge.mavlink.vehicles import not_ardupilot
 from mavlink_bridge.protocol.find import FindVehicle
 from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.protocol.table_machine import TableMachine
 from mavlink_bridge.protocol.vehicle_watch import VehicleWatch
-from mavlink_bridge.vehicles import not_ardupilot
 from missions.situation import ListKind, Situation
 
 if TYPE_CHECKING:
-    from mavlink_bridge.messages import Message
+    from mavlink_bridge.mavlink.messages import Message
     from missions.errors import MissionError
 
 _SILENCE_S = 5.0

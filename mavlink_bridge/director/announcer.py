@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mavlink_bridge.messages import Statustext
+from mavlink_bridge.mavlink.messages import Statustext
 from missions.harmless import harmless
 
 _EVERY_S = 1.0

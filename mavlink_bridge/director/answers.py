@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mavlink_bridge import messages as m
+from mavlink_bridge.mavlink import messages as m
 from missions.items import Command
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from mavlink_bridge.director.targets import Target
-    from mavlink_bridge.messages import Frame, Message
+    from mavlink_bridge.mavlink.messages import Frame, Message
 
 _Asker = tuple[int, int]
 

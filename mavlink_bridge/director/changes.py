@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.fold import KINDS
+from mavlink_bridge.mavlink import messages as m
 from missions.situation import ListKind
 
 if TYPE_CHECKING:
-    from mavlink_bridge.messages import Frame, Message
+    from mavlink_bridge.mavlink.messages import Frame, Message
 
 _TEXTS = {
     "fence indexed": ListKind.FENCE,

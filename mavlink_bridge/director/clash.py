@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from mavlink_bridge.director.states import State
 
 if TYPE_CHECKING:
-    from mavlink_bridge.messages import Frame
+    from mavlink_bridge.mavlink.messages import Frame
 
 CLASHES = frozenset({State.CLASHING, State.CLASHED})
 """States in which nobody but the operator's keyboard is heeded."""

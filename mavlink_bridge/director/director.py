@@ -14,7 +14,6 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.director import clash
 from mavlink_bridge.director.drive_watch import DriveWatch
 from mavlink_bridge.director.events import EventName
@@ -27,9 +26,10 @@ from mavlink_bridge.director.stopper import Stopper
 from mavlink_bridge.director.takeover import Takeover, account_of
 from mavlink_bridge.director.targets import Target
 from mavlink_bridge.errors import OutcomeError, RefusedError
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.rover import AUTO_MODE, HOLD_MODE, mode_name
 from mavlink_bridge.protocol.command import SendCommand
 from mavlink_bridge.protocol.find import identity_shared, identity_taken
-from mavlink_bridge.rover import AUTO_MODE, HOLD_MODE, mode_name
 from missions.items import Command
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
     from mavlink_bridge.director.orders import Orders
     from mavlink_bridge.director.steps import Step
-    from mavlink_bridge.messages import Frame
+    from mavlink_bridge.mavlink.messages import Frame
     from missions.situation import Situation
 
 _MOVED_M = 1.0

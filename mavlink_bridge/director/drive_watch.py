@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from shapely import LineString, Point, prepare
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.director.events import EventName
+from mavlink_bridge.mavlink import messages as m
 from missions.geo import from_e7
 
 if TYPE_CHECKING:
     from mavlink_bridge.director.voice import Voice
-    from mavlink_bridge.messages import Frame
+    from mavlink_bridge.mavlink.messages import Frame
     from missions.geo import LatLon
-    from missions.plan import Plan
+    from missions.planning.plan import Plan
 
 OUTSIDE_M = 0.25
 """How far outside the foreseen band counts: the vehicle's own estimate of its place is off by as much."""

@@ -13,17 +13,17 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.director.events import EventName
-from mavlink_bridge.rover import HOLD_MODE, LOITER_MODE, RTL_MODE, SMART_RTL_MODE, mode_name
-from missions.fence_place import fence_place
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.rover import HOLD_MODE, LOITER_MODE, RTL_MODE, SMART_RTL_MODE, mode_name
+from missions.checking.fence_place import fence_place
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from mavlink_bridge.director.takeover import Takeover
     from mavlink_bridge.director.voice import Voice
-    from missions.fence_place import FencePlace
+    from missions.checking.fence_place import FencePlace
     from missions.request import Request
     from missions.situation import Known, Pose, Situation
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.director.acquaintance import Acquaintance
 from mavlink_bridge.director.changes import ChangeWatch
 from mavlink_bridge.director.events import EventName
@@ -14,14 +13,15 @@ from mavlink_bridge.director.learning import MISSION_TYPES, list_of, with_read_l
 from mavlink_bridge.director.orders import TargetSource
 from mavlink_bridge.director.states import State
 from mavlink_bridge.errors import BridgeError
+from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.protocol.download import Download
-from missions.remarks import no_number_remarks
+from missions.planning.remarks import no_number_remarks
 from missions.situation import ListKind
 from missions.vehicle import PARAMETER_NAMES
 
 if TYPE_CHECKING:
     from mavlink_bridge.director.orders import Orders
-    from mavlink_bridge.messages import Frame
+    from mavlink_bridge.mavlink.messages import Frame
     from missions.items import MissionItem
     from missions.situation import Situation
 

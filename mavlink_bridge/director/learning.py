@@ -6,18 +6,18 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from mavlink_bridge import messages as m
+from mavlink_bridge.backup.vehicle_mark import uid_of
 from mavlink_bridge.director.steps import Steps
 from mavlink_bridge.errors import BridgeError, LinkError
 from mavlink_bridge.fold import with_list
-from mavlink_bridge.outcomes import download_refusal
+from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.protocol.ask_version import VERSION_PATIENCE_S, AskVersion
 from mavlink_bridge.protocol.command import SendCommand
 from mavlink_bridge.protocol.download import Download
+from mavlink_bridge.protocol.outcomes import download_refusal
 from mavlink_bridge.protocol.pace import MOST_S
 from mavlink_bridge.protocol.parameters import ReadParameters
 from mavlink_bridge.protocol.transitions import DownloadState
-from mavlink_bridge.vehicle_mark import uid_of
 from missions.items import Command
 from missions.situation import ListKind
 from missions.vehicle import PARAMETER_NAMES
@@ -25,7 +25,7 @@ from missions.vehicle import PARAMETER_NAMES
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from mavlink_bridge.messages import Frame, Message
+    from mavlink_bridge.mavlink.messages import Frame, Message
     from mavlink_bridge.protocol.peer import Peer
     from missions.items import MissionItem
     from missions.situation import Situation

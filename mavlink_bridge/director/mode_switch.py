@@ -11,12 +11,12 @@ from __future__ import annotations
 from enum import StrEnum, auto
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.messages import CommandAck, CommandLong, Heartbeat, MavResult, ModeFlag
+from mavlink_bridge.mavlink.messages import CommandAck, CommandLong, Heartbeat, MavResult, ModeFlag
 from mavlink_bridge.protocol.table_machine import TableMachine
 from missions.items import Command
 
 if TYPE_CHECKING:
-    from mavlink_bridge.messages import Frame
+    from mavlink_bridge.mavlink.messages import Frame
     from mavlink_bridge.protocol.peer import Peer
 
 _HURRY_S = 0.5

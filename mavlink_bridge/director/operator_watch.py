@@ -9,13 +9,13 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.director.takeover import Takeover
-from mavlink_bridge.rover import AUTO_MODE, GUIDED_MODE, HOLD_MODE, RTL_MODE, mode_of
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.rover import AUTO_MODE, GUIDED_MODE, HOLD_MODE, RTL_MODE, mode_of
 from missions.items import Command
 
 if TYPE_CHECKING:
-    from mavlink_bridge.messages import Frame, Message
+    from mavlink_bridge.mavlink.messages import Frame, Message
 
 _STALE_S = 1.5
 """For so long after a mode change was accepted a heartbeat may still show what was before."""

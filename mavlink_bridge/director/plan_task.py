@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from missions.errors import MissionError
-from missions.plan import plan as make_plan
+from missions.planning.plan import plan as make_plan
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from missions.plan import Plan
+    from missions.planning.plan import Plan
     from missions.request import Request
     from missions.situation import Situation
 

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.messages import CommandLong, Heartbeat, ModeFlag
-from mavlink_bridge.rover import AUTO_MODE, HOLD_MODE
+from mavlink_bridge.mavlink.messages import CommandLong, Heartbeat, ModeFlag
+from mavlink_bridge.mavlink.rover import AUTO_MODE, HOLD_MODE
 from missions.items import Command
 
 if TYPE_CHECKING:
-    from mavlink_bridge.messages import Frame
+    from mavlink_bridge.mavlink.messages import Frame
     from mavlink_bridge.protocol.peer import Peer
 
 _PATIENCE_S = 4.0

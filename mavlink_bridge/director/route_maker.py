@@ -6,32 +6,32 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.grounds import Grounds
 from mavlink_bridge.director.plan_task import PlanTask
 from mavlink_bridge.director.states import Cue, State
 from mavlink_bridge.director.target_taker import TargetTaker
 from mavlink_bridge.errors import BridgeError
-from mavlink_bridge.outcomes import Writing, end_of_upload, upload_trouble
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.rover import AUTO_MODE
 from mavlink_bridge.protocol.limits import Limits
+from mavlink_bridge.protocol.outcomes import Writing, end_of_upload, upload_trouble
 from mavlink_bridge.protocol.sendable import check_items
 from mavlink_bridge.protocol.verified_upload import VerifiedUpload, VerifiedUploadOutcome
-from mavlink_bridge.rover import AUTO_MODE
+from missions.checking.recheck import recheck
 from missions.errors import MissionError
 from missions.items import with_home
-from missions.plan import asked_clearance
-from missions.recheck import recheck
+from missions.planning.plan import asked_clearance
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
     from mavlink_bridge.director.orders import Orders
-    from mavlink_bridge.messages import Frame
+    from mavlink_bridge.mavlink.messages import Frame
+    from missions.checking.recheck import Recheck
     from missions.items import MissionItem
-    from missions.plan import Plan
-    from missions.recheck import Recheck
+    from missions.planning.plan import Plan
     from missions.request import Request
     from missions.situation import Situation
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.mode_switch import ModeSwitch
 from mavlink_bridge.director.operator_watch import OperatorWatch
@@ -13,13 +12,14 @@ from mavlink_bridge.director.orders import TargetSource
 from mavlink_bridge.director.route_maker import RouteMaker
 from mavlink_bridge.director.states import Cue, State
 from mavlink_bridge.errors import OutcomeError
-from mavlink_bridge.rover import AUTO_MODE, GUIDED_MODE, HOLD_MODE
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.rover import AUTO_MODE, GUIDED_MODE, HOLD_MODE
 
 if TYPE_CHECKING:
     from mavlink_bridge.director.drive_watch import DriveWatch
     from mavlink_bridge.director.orders import Orders
     from mavlink_bridge.director.targets import Target
-    from mavlink_bridge.messages import Frame, Message
+    from mavlink_bridge.mavlink.messages import Frame, Message
     from missions.situation import Situation
 
 _STILL_MPS = 0.3

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.rover import mode_name
+from mavlink_bridge.mavlink.rover import mode_name
 
 if TYPE_CHECKING:
     from mavlink_bridge.director.incidents import Cause

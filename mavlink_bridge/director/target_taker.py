@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.director.answers import Answers, is_command_to
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.keeper import Keeper
@@ -13,12 +12,13 @@ from mavlink_bridge.director.orders import Orders, TargetSource
 from mavlink_bridge.director.states import State
 from mavlink_bridge.director.targets import Target, TargetWatch
 from mavlink_bridge.errors import RefusedError
+from mavlink_bridge.mavlink import messages as m
+from missions.checking.recheck import straight_line
 from missions.geo import distance_m
 from missions.items import Command, last_place
-from missions.recheck import straight_line
 
 if TYPE_CHECKING:
-    from mavlink_bridge.messages import Frame
+    from mavlink_bridge.mavlink.messages import Frame
     from missions.geo import LatLon
     from missions.situation import Situation
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.director.answers import is_command_to
 from mavlink_bridge.director.orders import TargetSource
-from mavlink_bridge.rover import GUIDED_MODE
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.rover import GUIDED_MODE
 from missions.geo import distance_m, from_e7
 
 if TYPE_CHECKING:
-    from mavlink_bridge.messages import Frame
+    from mavlink_bridge.mavlink.messages import Frame
     from missions.geo import LatLon
     from missions.situation import Situation
 

@@ -11,11 +11,11 @@ from missions.words import metres as metres_text
 
 if TYPE_CHECKING:
     from mavlink_bridge.director.drive_watch import DriveWatch
-    from mavlink_bridge.messages import Statustext
+    from mavlink_bridge.mavlink.messages import Statustext
+    from missions.checking.recheck import Recheck
     from missions.errors import MissionError
     from missions.geo import LatLon
-    from missions.plan import Plan
-    from missions.recheck import Recheck
+    from missions.planning.plan import Plan
     from missions.situation import Situation
 
 _NOT_ANNOUNCED = frozenset({EventName.PROGRESS, EventName.FAILSAFE})

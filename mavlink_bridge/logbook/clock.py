@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from mavlink_bridge.messages import Heartbeat
-from mavlink_bridge.vehicles import is_vehicle
+from mavlink_bridge.mavlink.messages import Heartbeat
+from mavlink_bridge.mavlink.vehicles import is_vehicle
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from mavlink_bridge.messages import Frame
+    from mavlink_bridge.mavlink.messages import Frame
     from mavlink_bridge.tlog import LogEntry
 
 NEAR_S: Final = 5.0

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from missions.fence import CircleZone, PolygonZone, ZoneKind
 
 if TYPE_CHECKING:
-    from mavlink_bridge.grade import Grade
     from mavlink_bridge.logbook.facts import Logbook, VehicleLog
+    from mavlink_bridge.logbook.grade import Grade
     from missions.fence import Fence
 
 

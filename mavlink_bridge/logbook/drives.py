@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import deque
 from typing import TYPE_CHECKING, Final
 
-from mavlink_bridge.grade import STANDING_MPS, DriveGrader, Field, Grade, way_of
-from mavlink_bridge.logbook.modes import drives_mission
+from mavlink_bridge.logbook.grade import STANDING_MPS, DriveGrader, Field, Grade, way_of
+from mavlink_bridge.mavlink.modes import drives_mission
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from mavlink_bridge.logbook.track import FenceMeter, Fix
-    from missions.local_frame import LocalFrame
+    from missions.ground.local_frame import LocalFrame
     from missions.situation import Situation
     from missions.vehicle import Vehicle
 

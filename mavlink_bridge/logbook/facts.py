@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from mavlink_bridge.grade import Grade
+    from mavlink_bridge.logbook.grade import Grade
     from mavlink_bridge.tlog import Damage, Traffic
     from missions.fence import Fence
     from missions.geo import LatLon

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from mavlink_bridge.errors import LogError, VehicleNotFoundError
-from mavlink_bridge.messages import Heartbeat
+from mavlink_bridge.mavlink.messages import Heartbeat
+from mavlink_bridge.mavlink.vehicles import choose_vehicle, vehicles_heard
 from mavlink_bridge.tlog import TlogReader
-from mavlink_bridge.vehicles import choose_vehicle, vehicles_heard
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

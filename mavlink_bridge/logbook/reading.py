@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mavlink_bridge import messages as m
-from mavlink_bridge.autopilot_facts import with_parameter
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.fold import FOLDED, fold
 from mavlink_bridge.logbook.clock import NEAR_S, SILENCE_S, Pulse, SteadyClock
 from mavlink_bridge.logbook.facts import Logbook, VehicleLog
+from mavlink_bridge.logbook.recorded import begun
 from mavlink_bridge.logbook.recorder import RECORDED, Recorder
-from mavlink_bridge.parameter_values import parameter_value
-from mavlink_bridge.recorded import begun
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.autopilot_facts import with_parameter
+from mavlink_bridge.mavlink.parameter_values import parameter_value
+from mavlink_bridge.mavlink.vehicles import Vehicle, vehicles_heard
 from mavlink_bridge.tlog import TlogReader, survey
-from mavlink_bridge.vehicles import Vehicle, vehicles_heard
 
 if TYPE_CHECKING:
     from pathlib import Path

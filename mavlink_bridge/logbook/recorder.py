@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Final, TypeVar
 
 import numpy as np
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.fold import FOLDED, fold
 from mavlink_bridge.logbook.drives import Drives
 from mavlink_bridge.logbook.facts import (
@@ -22,14 +21,15 @@ from mavlink_bridge.logbook.facts import (
     TrackPart,
     VehicleLog,
 )
-from mavlink_bridge.logbook.modes import mode_name
 from mavlink_bridge.logbook.track import FenceMeter, Fix, Odometer, pieces
 from mavlink_bridge.logbook.transfers import TRANSFER_TYPES, TransferWatch
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.modes import mode_name
 from missions.errors import MissionError
 from missions.geo import distance_m
-from missions.local_frame import MAX_LATITUDE_DEG, frame_around
-from missions.plan import ground_for
-from missions.remarks import no_number_remarks
+from missions.ground.local_frame import MAX_LATITUDE_DEG, frame_around
+from missions.planning.plan import ground_for
+from missions.planning.remarks import no_number_remarks
 from missions.vehicle import PARAMETER_NAMES, Vehicle, vehicle_from_parameters
 
 if TYPE_CHECKING:
@@ -37,10 +37,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from mavlink_bridge.messages import Frame
+    from mavlink_bridge.mavlink.messages import Frame
     from missions.fence import Fence
     from missions.geo import LatLon
-    from missions.local_frame import LocalFrame
+    from missions.ground.local_frame import LocalFrame
     from missions.situation import Known, Situation
 
 T = TypeVar("T")

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
     from missions.geo import LatLon
-    from missions.ground import Ground
+    from missions.ground.ground import Ground
 
 MOVED_M: Final = 0.3
 """A vehicle has moved when it is so far from where it was last found to have moved to: less is its position's wandering."""

@@ -6,14 +6,14 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.fold import KINDS
 from mavlink_bridge.logbook.facts import Ending, Sender, Transfer, Way
+from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.protocol.wire import mission_result
 from missions.situation import ListKind
 
 if TYPE_CHECKING:
-    from mavlink_bridge.messages import Frame, Message
+    from mavlink_bridge.mavlink.messages import Frame, Message
 
 _GUIDED = (2, 3)
 """MISSION_ITEM.current of what is no item but a target or an altitude."""

@@ -8,13 +8,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.messages import AUTOPILOT_VERSION_ID, AutopilotVersion, CommandAck, CommandLong, MavResult
+from mavlink_bridge.mavlink.messages import (
+    AUTOPILOT_VERSION_ID,
+    AutopilotVersion,
+    CommandAck,
+    CommandLong,
+    MavResult,
+)
 from mavlink_bridge.protocol.table_machine import TableMachine
 from mavlink_bridge.protocol.transitions import VERSION, VersionEvent, VersionState
 from missions.items import Command
 
 if TYPE_CHECKING:
-    from mavlink_bridge.messages import Frame
+    from mavlink_bridge.mavlink.messages import Frame
     from mavlink_bridge.protocol.peer import Peer
 
 _ASK_AGAIN_S = 0.7

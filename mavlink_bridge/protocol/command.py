@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.messages import CommandAck, CommandLong, MavResult
+from mavlink_bridge.mavlink.messages import CommandAck, CommandLong, MavResult
 from mavlink_bridge.protocol.table_machine import TableMachine
 from mavlink_bridge.protocol.texts import Reasons
 from mavlink_bridge.protocol.transitions import COMMAND, CommandEvent, CommandState
 
 if TYPE_CHECKING:
-    from mavlink_bridge.messages import CommandInt, Frame
+    from mavlink_bridge.mavlink.messages import CommandInt, Frame
     from mavlink_bridge.protocol.peer import Peer
 
 _SEND_AGAIN_S = 1.0

@@ -6,17 +6,17 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from mavlink_bridge import messages
-from mavlink_bridge.messages import MissionResult, MissionType
+from mavlink_bridge.mavlink import messages
+from mavlink_bridge.mavlink.messages import MissionResult, MissionType
+from mavlink_bridge.mavlink.stored_form import is_same_item
 from mavlink_bridge.protocol.pace import MOST_S, Pace, bound_s
 from mavlink_bridge.protocol.round_trip import RoundTrip
-from mavlink_bridge.protocol.stored_form import is_same_item
 from mavlink_bridge.protocol.table_machine import TableMachine
 from mavlink_bridge.protocol.transitions import DOWNLOAD, DownloadEvent, DownloadState
 from mavlink_bridge.protocol.wire import item_from_message, mission_result
 
 if TYPE_CHECKING:
-    from mavlink_bridge.messages import Frame
+    from mavlink_bridge.mavlink.messages import Frame
     from mavlink_bridge.protocol.peer import Peer
     from missions.items import MissionItem
 

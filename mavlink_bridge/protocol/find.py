@@ -6,13 +6,13 @@ import math
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.errors import IdentityTakenError, LinkError, OutcomeError, VehicleNotFoundError
-from mavlink_bridge.messages import Heartbeat
+from mavlink_bridge.mavlink.messages import Heartbeat
+from mavlink_bridge.mavlink.vehicles import Vehicle, choose_vehicle, is_vehicle
 from mavlink_bridge.protocol.table_machine import TableMachine
 from mavlink_bridge.protocol.transitions import FIND, FindEvent, FindState
-from mavlink_bridge.vehicles import Vehicle, choose_vehicle, is_vehicle
 
 if TYPE_CHECKING:
-    from mavlink_bridge.messages import Frame
+    from mavlink_bridge.mavlink.messages import Frame
 
 LISTEN_S = 1.2
 """How long further vehicles are listened for: a heartbeat comes every second."""

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.messages import MissionResult
-from mavlink_bridge.protocol.stored_form import differences, is_unfinished_write
+from mavlink_bridge.mavlink.messages import MissionResult
+from mavlink_bridge.mavlink.stored_form import differences, is_unfinished_write
 from mavlink_bridge.protocol.transitions import UploadState
 from mavlink_bridge.protocol.verified_outcome import Held
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from mavlink_bridge.messages import MissionType
+    from mavlink_bridge.mavlink.messages import MissionType
     from mavlink_bridge.protocol.upload import UploadOutcome
     from missions.items import MissionItem
 

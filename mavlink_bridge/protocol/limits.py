@@ -6,9 +6,9 @@ import re
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.messages import MissionType
-from missions.item_limit import MISSION_ITEMS, most_items, sd_card_bytes
+from mavlink_bridge.mavlink.messages import MissionType
 from missions.items import Command
+from missions.vehicle.item_limit import MISSION_ITEMS, most_items, sd_card_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

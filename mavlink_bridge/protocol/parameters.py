@@ -13,7 +13,7 @@ import struct
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.messages import ParamRequestList, ParamRequestRead, ParamSet, ParamValue
+from mavlink_bridge.mavlink.messages import ParamRequestList, ParamRequestRead, ParamSet, ParamValue
 from mavlink_bridge.protocol.pace import MOST_S, Pace, bound_s
 from mavlink_bridge.protocol.round_trip import RoundTrip
 from mavlink_bridge.protocol.table_machine import TableMachine
@@ -22,7 +22,7 @@ from mavlink_bridge.protocol.transitions import PARAMETERS, ParameterEvent, Para
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from mavlink_bridge.messages import Frame
+    from mavlink_bridge.mavlink.messages import Frame
     from mavlink_bridge.protocol.peer import Peer
 
 WINDOW = 20

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from mavlink_bridge.messages import Frame, MissionType
+    from mavlink_bridge.mavlink.messages import Frame, MissionType
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from missions.errors import MissionFormatError
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from mavlink_bridge.messages import MissionType
+    from mavlink_bridge.mavlink.messages import MissionType
     from missions.items import MissionItem
 
 _UINT8, _UINT16, _INT32 = (0, 2**8 - 1), (0, 2**16 - 1), (-(2**31), 2**31 - 1)

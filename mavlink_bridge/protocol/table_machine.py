@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from enum import StrEnum
 
-    from mavlink_bridge.messages import Message
+    from mavlink_bridge.mavlink.messages import Message
 
 StateT = TypeVar("StateT", bound="StrEnum")
 EventT = TypeVar("EventT", bound="StrEnum")

@@ -6,10 +6,10 @@ import math
 import re
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.messages import Statustext
+from mavlink_bridge.mavlink.messages import Statustext
 
 if TYPE_CHECKING:
-    from mavlink_bridge.messages import Frame
+    from mavlink_bridge.mavlink.messages import Frame
     from mavlink_bridge.protocol.peer import Peer
 
 MOST_TEXTS = 8

@@ -22,7 +22,7 @@ from mavlink_bridge.protocol.transitions import (
 from mavlink_bridge.protocol.write_watch import WriteWatch
 
 if TYPE_CHECKING:
-    from mavlink_bridge.messages import Frame, MissionType
+    from mavlink_bridge.mavlink.messages import Frame, MissionType
     from mavlink_bridge.protocol.download import DownloadOutcome
     from mavlink_bridge.protocol.peer import Peer
 

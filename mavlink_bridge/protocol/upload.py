@@ -9,8 +9,8 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from mavlink_bridge import messages
-from mavlink_bridge.messages import MissionResult
+from mavlink_bridge.mavlink import messages
+from mavlink_bridge.mavlink.messages import MissionResult
 from mavlink_bridge.protocol.download import PATIENCE_S, RIVAL_PATIENCE_S
 from mavlink_bridge.protocol.pace import MOST_S, Pace, bound_s
 from mavlink_bridge.protocol.round_trip import RoundTrip
@@ -21,7 +21,7 @@ from mavlink_bridge.protocol.wire import item_to_message, mission_result
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from mavlink_bridge.messages import Frame, MissionType
+    from mavlink_bridge.mavlink.messages import Frame, MissionType
     from mavlink_bridge.protocol.peer import Peer
     from missions.items import MissionItem
 

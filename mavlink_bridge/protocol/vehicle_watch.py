@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.messages import GlobalPositionInt, Heartbeat, MissionCurrent, ModeFlag
-from mavlink_bridge.rover import AUTO_MODE
+from mavlink_bridge.mavlink.messages import GlobalPositionInt, Heartbeat, MissionCurrent, ModeFlag
+from mavlink_bridge.mavlink.rover import AUTO_MODE
 
 if TYPE_CHECKING:
-    from mavlink_bridge.messages import Message
+    from mavlink_bridge.mavlink.messages import Message
 
 FRESH_S = 3.0
 """How old telemetry may be to tell what the vehicle does now: a heartbeat comes every second."""

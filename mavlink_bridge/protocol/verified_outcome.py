@@ -7,8 +7,8 @@ from enum import StrEnum, auto
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from mavlink_bridge.messages import MissionResult, MissionType
-    from mavlink_bridge.protocol.stored_form import Difference
+    from mavlink_bridge.mavlink.messages import MissionResult, MissionType
+    from mavlink_bridge.mavlink.stored_form import Difference
     from missions.items import MissionItem
 
 

@@ -22,13 +22,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.messages import Heartbeat, MissionResult
+from mavlink_bridge.mavlink.messages import Heartbeat, MissionResult
+from mavlink_bridge.mavlink.stored_form import differences
 from mavlink_bridge.protocol.download import RIVAL_PATIENCE_S
 from mavlink_bridge.protocol.judging import held_list, is_settled_refusal
 from mavlink_bridge.protocol.limits import Limits
 from mavlink_bridge.protocol.pace import MOST_S, bound_s
 from mavlink_bridge.protocol.round_trip import RoundTrip
-from mavlink_bridge.protocol.stored_form import differences
 from mavlink_bridge.protocol.table_machine import TableMachine
 from mavlink_bridge.protocol.texts import Reasons
 from mavlink_bridge.protocol.transitions import (
@@ -47,10 +47,10 @@ from mavlink_bridge.protocol.write_watch import WriteWatch
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from mavlink_bridge.messages import Frame, MissionType
+    from mavlink_bridge.mavlink.messages import Frame, MissionType
+    from mavlink_bridge.mavlink.stored_form import Difference
     from mavlink_bridge.protocol.download import DownloadOutcome
     from mavlink_bridge.protocol.peer import Peer
-    from mavlink_bridge.protocol.stored_form import Difference
     from missions.items import MissionItem
 
 __all__ = ["Held", "OutcomeKind", "VerifiedUpload", "VerifiedUploadOutcome"]

@@ -7,12 +7,12 @@ import struct
 from dataclasses import fields
 from typing import TYPE_CHECKING
 
-from mavlink_bridge import messages
-from mavlink_bridge.messages import MissionResult
+from mavlink_bridge.mavlink import messages
+from mavlink_bridge.mavlink.messages import MissionResult
 from missions.items import CoordinateFrame, MissionItem
 
 if TYPE_CHECKING:
-    from mavlink_bridge.messages import Message, MissionType
+    from mavlink_bridge.mavlink.messages import Message, MissionType
     from mavlink_bridge.protocol.peer import Peer
 
 INT32_MAX = 2**31 - 1

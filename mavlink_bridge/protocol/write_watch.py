@@ -17,12 +17,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from mavlink_bridge import messages as m
-from mavlink_bridge.messages import MissionResult, MissionType
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.messages import MissionResult, MissionType
 from mavlink_bridge.protocol.wire import wire_key
 
 if TYPE_CHECKING:
-    from mavlink_bridge.messages import Frame, Message
+    from mavlink_bridge.mavlink.messages import Frame, Message
     from mavlink_bridge.protocol.peer import Peer
 
 _WRITES = (m.MissionCount, m.MissionItem, m.MissionItemInt, m.MissionWritePartialList, m.MissionClearAll)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.messages import CommandInt, CommandLong, MavResult, Message
+from mavlink_bridge.mavlink.messages import CommandInt, CommandLong, MavResult, Message
 from mavlink_bridge.simulator import streams
 from mavlink_bridge.simulator.config import Mode
 from missions.geo import from_e7

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.messages import MissionResult, MissionType
+from mavlink_bridge.mavlink.messages import MissionResult, MissionType
 from mavlink_bridge.simulator import item_rules
 from missions.items import Command, CoordinateFrame, MissionItem
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from mavlink_bridge.messages import MissionResult
+from mavlink_bridge.mavlink.messages import MissionResult
 from mavlink_bridge.simulator.parameters import float32
 from mavlink_bridge.simulator.stored_commands import KEPT, NAN_ALLOWED, PLACED, kept_beyond_params, uint8
 from missions.items import Command, CoordinateFrame, MissionItem

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, assert_never
 
-from mavlink_bridge.messages import (
+from mavlink_bridge.mavlink.messages import (
     Frame,
     Message,
     MissionAck,

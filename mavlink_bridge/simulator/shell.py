@@ -12,8 +12,8 @@ import time
 from dataclasses import replace
 from typing import TYPE_CHECKING, Self
 
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import LinkError
+from mavlink_bridge.mavlink.codec import Codec
 from mavlink_bridge.simulator.config import SimulatorConfig
 from mavlink_bridge.simulator.faults import Faults, FaultyLink
 from mavlink_bridge.simulator.framing import FrameSplitter
@@ -22,7 +22,7 @@ from mavlink_bridge.simulator.vehicle import SimulatedVehicle
 if TYPE_CHECKING:
     from types import TracebackType
 
-    from mavlink_bridge.messages import Frame
+    from mavlink_bridge.mavlink.messages import Frame
 
 DEFAULT_LISTEN = "tcpin:127.0.0.1:5760"
 """Where ArduPilot's own simulator listens."""

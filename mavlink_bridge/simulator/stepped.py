@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.codec import Codec
+from mavlink_bridge.mavlink.codec import Codec
 
 if TYPE_CHECKING:
     from collections.abc import Hashable

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from mavlink_bridge import messages as m
+from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.simulator import streams
 from mavlink_bridge.simulator.config import Mode
 from missions.geo import to_e7

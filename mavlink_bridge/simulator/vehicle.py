@@ -10,8 +10,8 @@ import math
 import zlib
 from typing import TYPE_CHECKING
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.errors import RefusedError
+from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.simulator.commands import Commands
 from mavlink_bridge.simulator.config import Mode, SimulatorConfig
 from mavlink_bridge.simulator.item_lists import FenceList, ItemList, MissionList, RallyList

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from mavlink_bridge.messages import Message
+    from mavlink_bridge.mavlink.messages import Message
     from mavlink_bridge.tlog.scan import Scan
     from mavlink_bridge.tlog.walk import Block
 

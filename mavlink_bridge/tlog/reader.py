@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mavlink_bridge.messages import Frame, Message
+from mavlink_bridge.mavlink.messages import Frame, Message
 from mavlink_bridge.tlog.build import build
 from mavlink_bridge.tlog.damage import Damage
 from mavlink_bridge.tlog.decode import decode, payloads, select, texts, wanted_ids
@@ -53,7 +53,7 @@ class TlogReader:
     ----------
     path : pathlib.Path or str
     wanted : collection of Message types, optional
-        What to decode; all types of `mavlink_bridge.messages` by default. Of other frames only the header is looked at.
+        What to decode; all types of `mavlink_bridge.mavlink.messages` by default. Of other frames only the header is looked at.
 
     Raises
     ------

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from mavlink_bridge.codec import DIALECT
-from mavlink_bridge.messages import MESSAGES, Message, wire_name
+from mavlink_bridge.mavlink.codec import DIALECT
+from mavlink_bridge.mavlink.messages import MESSAGES, Message, wire_name
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

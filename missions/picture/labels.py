@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from shapely.geometry.base import BaseGeometry
 
-    from missions.ground import Barrier
+    from missions.ground.ground import Barrier
     from missions.picture.scene import Scene
 
 _FONT_SIZE = 8

@@ -13,7 +13,7 @@ from shapely import LineString, Polygon
 
 import pbpp
 from missions.fence import ZoneKind
-from missions.local_frame import LocalPoint
+from missions.ground.local_frame import LocalPoint
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
     from missions.geo import LatLon
-    from missions.plan import Plan
+    from missions.planning.plan import Plan
 
 _BORDER_SHARE = 0.06
 _MOST_BLOCKS = 5000

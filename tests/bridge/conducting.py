@@ -5,18 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.messages import Frame
+from mavlink_bridge.mavlink.messages import Frame
 from mavlink_bridge.simulator.faults import Faults, FaultyLink
-from missions.plan import plan as make_plan
+from missions.planning.plan import plan as make_plan
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from mavlink_bridge.director import Director, Event, EventName, State
     from mavlink_bridge.director.plan_task import PlanTask
-    from mavlink_bridge.messages import Message
+    from mavlink_bridge.mavlink.messages import Message
     from mavlink_bridge.simulator import SimulatedVehicle
-    from missions.plan import Plan
+    from missions.planning.plan import Plan
     from missions.request import Request
     from missions.situation import Situation
 

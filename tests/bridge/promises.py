@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.director import State
-from mavlink_bridge.rover import AUTO_MODE, GUIDED_MODE, HOLD_MODE
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.rover import AUTO_MODE, GUIDED_MODE, HOLD_MODE
 from missions.items import Command
 
 if TYPE_CHECKING:

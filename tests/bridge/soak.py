@@ -20,11 +20,11 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from bridge.conducting import Conductor
 from bridge.promises import Promises
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.director import Director, Orders, State
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.rover import HOLD_MODE
 from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.protocol.upload import Upload
-from mavlink_bridge.rover import HOLD_MODE
 from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig
 from mavlink_bridge.simulator.faults import Faults
 from missions.fence import CircleZone, Fence, ZoneKind, fence_to_items

@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import LineString
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.director import SCHEMA, TRANSITIONS, Director, EventName, Orders, State, TargetSource
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.rover import GUIDED_MODE, HOLD_MODE
 from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.protocol.upload import Upload
-from mavlink_bridge.rover import GUIDED_MODE, HOLD_MODE
 from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig
 from mavlink_bridge.simulator.faults import Faults
 from missions.fence import CircleZone, Fence, ZoneKind, fence_to_items

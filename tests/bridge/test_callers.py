@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mavlink_bridge.callers import FORGOTTEN_AFTER_S, MOST_CALLERS, Callers
+from mavlink_bridge.mavlink.callers import FORGOTTEN_AFTER_S, MOST_CALLERS, Callers
 
 VEHICLE = ("10.0.0.1", 14555)
 

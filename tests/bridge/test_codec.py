@@ -11,8 +11,16 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from pymavlink.generator.mavcrc import x25crc
 
-from mavlink_bridge.codec import DIALECT, Codec
-from mavlink_bridge.messages import MESSAGES, Frame, Heartbeat, Message, MissionCurrent, Statustext, wire_name
+from mavlink_bridge.mavlink.codec import DIALECT, Codec
+from mavlink_bridge.mavlink.messages import (
+    MESSAGES,
+    Frame,
+    Heartbeat,
+    Message,
+    MissionCurrent,
+    Statustext,
+    wire_name,
+)
 
 CLASSES = {one.msgname: one for one in DIALECT.values()}
 RANGES = {

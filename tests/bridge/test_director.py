@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 from bridge.conducting import Conductor
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.director import TRANSITIONS, Director, Orders, State
 from mavlink_bridge.errors import LinkError, OutcomeError, RefusedError, VehicleNotFoundError
-from mavlink_bridge.rover import AUTO_MODE, HOLD_MODE
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.rover import AUTO_MODE, HOLD_MODE
 from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig
 from mavlink_bridge.simulator.faults import Faults
 from missions.fence import fence_to_items

@@ -8,10 +8,10 @@ import pytest
 from bridge.test_bridge_director import FAR, NEAR, arm, conductor, driving, ready
 from bridge.test_takeover import MANUAL, armings_sent, modes_sent, unheard, wait
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.director import EventName, State
 from mavlink_bridge.errors import OutcomeError
-from mavlink_bridge.rover import AUTO_MODE, HOLD_MODE
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.rover import AUTO_MODE, HOLD_MODE
 from mavlink_bridge.simulator.faults import Faults
 from missions.geo import distance_m
 from missions.items import Command

@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.fold import FOLDED, fold
-from mavlink_bridge.messages import Frame, Message
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.messages import Frame, Message
 from missions.errors import FenceMissingError
 from missions.fence import CircleZone, Fence, ZoneKind, fence_to_items
 from missions.geo import LatLon
 from missions.items import MissionItem, waypoint, with_home
-from missions.plan import plan
+from missions.planning.plan import plan
 from missions.request import Request
 from missions.situation import ListKind, Mission, Pose, Situation
 

@@ -12,12 +12,12 @@ from contextlib import ExitStack, closing
 import pytest
 
 from mavlink_bridge import link as links
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.echoes import SentFrames
 from mavlink_bridge.errors import LinkError
 from mavlink_bridge.link import Link, open_link, open_transport
-from mavlink_bridge.messages import Frame, Heartbeat, MissionCount, Statustext
-from mavlink_bridge.signing import Signing, SigningKey
+from mavlink_bridge.mavlink.codec import Codec
+from mavlink_bridge.mavlink.echoes import SentFrames
+from mavlink_bridge.mavlink.messages import Frame, Heartbeat, MissionCount, Statustext
+from mavlink_bridge.mavlink.signing import Signing, SigningKey
 from mavlink_bridge.tlog import TlogReader, TlogWriter
 
 VEHICLE = Heartbeat(10, 3)

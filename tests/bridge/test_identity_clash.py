@@ -6,10 +6,10 @@ import pytest
 from bridge.test_bridge_director import FAR, HOME, NEAR, arm, conductor, driving, ready, reposition
 from bridge.test_takeover import deaf_to, modes_sent, unheard, wait
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.director import EventName, Severity, State
 from mavlink_bridge.errors import IdentityTakenError, OutcomeError
-from mavlink_bridge.rover import AUTO_MODE, GUIDED_MODE, HOLD_MODE
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.rover import AUTO_MODE, GUIDED_MODE, HOLD_MODE
 from mavlink_bridge.simulator.faults import Faults
 from missions.geo import distance_m, to_e7
 from missions.items import Command

@@ -8,10 +8,10 @@ import pytest
 from bridge.test_bridge_director import FENCE, HOME, IN_BARN, conductor, driving, ready, upload
 from bridge.test_takeover import unheard, wait
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.director import EventName, State
 from mavlink_bridge.director.operator_watch import OperatorWatch
-from mavlink_bridge.rover import AUTO_MODE, HOLD_MODE, RTL_MODE, mode_name, mode_of
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.rover import AUTO_MODE, HOLD_MODE, RTL_MODE, mode_name, mode_of
 from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig
 from missions.fence import CircleZone, Fence, ZoneKind, fence_to_items
 from missions.geo import to_e7

@@ -11,7 +11,7 @@ import pytest
 
 from mavlink_bridge.errors import LinkError
 from mavlink_bridge.link import DEFAULT_BAUD, Address, Link, open_link, parse_connection
-from mavlink_bridge.messages import Frame, Heartbeat, ParamRequestList, Statustext
+from mavlink_bridge.mavlink.messages import Frame, Heartbeat, ParamRequestList, Statustext
 from mavlink_bridge.tlog import TlogReader, TlogWriter
 
 if TYPE_CHECKING:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.link import Link
-from mavlink_bridge.messages import Heartbeat
+from mavlink_bridge.mavlink.codec import Codec
+from mavlink_bridge.mavlink.messages import Heartbeat
 
 PATIENCE_S = 5.0
 

@@ -19,13 +19,13 @@ from bridge.test_bridge_director import (
 )
 from bridge.test_takeover import modes_sent, unheard, wait
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.cli.live import PlanMaker
 from mavlink_bridge.director import EventName, State
 from mavlink_bridge.director.plan_task import PlanTask
+from mavlink_bridge.mavlink import messages as m
 from missions.fence import fence_to_items
 from missions.geo import distance_m
-from missions.plan import plan
+from missions.planning.plan import plan
 
 MANUAL = 0
 LONG_S = 5.0

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from mavlink_bridge import messages as m
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import LogError
-from mavlink_bridge.recorded import situation_from_log
+from mavlink_bridge.logbook.recorded import situation_from_log
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.codec import Codec
 from mavlink_bridge.tlog import TlogWriter
 from missions.fence import CircleZone, PolygonZone, ZoneKind
 from missions.formats import read_fence, read_mission, read_situation

@@ -6,15 +6,15 @@ from pathlib import Path
 
 from bridge.conducting import Conductor
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.director import Director, Orders, State
+from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig
 from missions.fence import fence_to_items
 from missions.formats import read_fence, read_mission
 from missions.geo import LatLon, distance_m
 from missions.items import Command, CoordinateFrame, MissionItem
 from missions.request import Request
-from missions.tour import plan_tour
+from missions.tour.tour import plan_tour
 
 FIELDS = Path(__file__).parents[1] / "fields"
 HOME = LatLon(40.071374, -105.229930)

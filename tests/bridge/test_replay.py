@@ -11,9 +11,9 @@ import pytest
 
 from mavlink_bridge.director import EventName, Orders, TargetSource
 from mavlink_bridge.errors import LogError
-from mavlink_bridge.expectations import differences, read_expectation
-from mavlink_bridge.journal import Call, JournalWriter, journal_path, read_journal
-from mavlink_bridge.replay import replay_foreign
+from mavlink_bridge.replay.expectations import differences, read_expectation
+from mavlink_bridge.replay.journal import Call, JournalWriter, journal_path, read_journal
+from mavlink_bridge.replay.replay import replay_foreign
 from mavlink_bridge.tlog import TlogReader
 from missions.geo import LatLon
 from missions.request import Request

@@ -7,10 +7,10 @@ import time
 
 import pytest
 
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import LinkError
 from mavlink_bridge.link import open_link, open_transport
-from mavlink_bridge.messages import Frame, Heartbeat, Statustext
+from mavlink_bridge.mavlink.codec import Codec
+from mavlink_bridge.mavlink.messages import Frame, Heartbeat, Statustext
 
 tty = pytest.importorskip("tty")
 

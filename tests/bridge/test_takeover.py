@@ -21,9 +21,9 @@ from bridge.test_bridge_director import (
     wall_across_the_route,
 )
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.director import EventName, State, TargetSource
-from mavlink_bridge.rover import AUTO_MODE, GUIDED_MODE, HOLD_MODE
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.rover import AUTO_MODE, GUIDED_MODE, HOLD_MODE
 from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig
 from missions.fence import fence_to_items
 from missions.geo import LatLon, distance_m, to_e7

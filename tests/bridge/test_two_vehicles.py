@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.cli.live import PlanMaker
 from mavlink_bridge.director import Director, EventName, Orders, State
 from mavlink_bridge.link import Link, open_link
+from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.simulator import SimulatedVehicle, Simulator, SimulatorConfig
 from missions.fence import CircleZone, Fence, ZoneKind, fence_to_items
 from missions.formats import read_fence

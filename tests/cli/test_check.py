@@ -14,10 +14,10 @@ from mavlink_bridge.cli.app import app
 from mavlink_bridge.cli.live import conduct
 from mavlink_bridge.director import Orders
 from mavlink_bridge.link import open_link
-from mavlink_bridge.messages import CommandLong
+from mavlink_bridge.mavlink.messages import CommandLong
+from mavlink_bridge.mavlink.rover import AUTO_MODE, HOLD_MODE
 from mavlink_bridge.protocol.command import SendCommand
 from mavlink_bridge.protocol.peer import Peer
-from mavlink_bridge.rover import AUTO_MODE, HOLD_MODE
 from mavlink_bridge.simulator import Simulator, SimulatorConfig
 from missions.errors import SituationError
 from missions.fence import Fence, PolygonZone, ZoneKind, fence_to_items

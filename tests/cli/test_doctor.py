@@ -89,7 +89,7 @@ class TestDoctor:
         def broken(*_):
             raise OSError("no such library")
 
-        monkeypatch.setattr("missions.plan.plan", broken)
+        monkeypatch.setattr("missions.planning.plan.plan", broken)
         found = findings()["test plan"]
         assert (found["verdict"], found["found"]) == ("wrong", "OSError: no such library")
 

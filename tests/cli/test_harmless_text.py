@@ -21,13 +21,13 @@ from rich.progress import Progress
 from typer.testing import CliRunner
 
 import mavlink_bridge.cli
-from mavlink_bridge import messages as m
 from mavlink_bridge.cli import common, download, terminal
 from mavlink_bridge.cli.app import app
 from mavlink_bridge.cli.bridge_view import LiveView
 from mavlink_bridge.cli.failing import ExitCode, begin_telling, report, report_defect
 from mavlink_bridge.director import Event, EventName
 from mavlink_bridge.director.announcer import Announcer
+from mavlink_bridge.mavlink import messages as m
 from missions.geo import LatLon
 from missions.harmless import harmless
 from missions.picture.track import TrackPicture, draw_track

@@ -13,15 +13,15 @@ from typer.testing import CliRunner
 
 from mavlink_bridge import link as links
 from mavlink_bridge.cli.app import app
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.link import open_link
-from mavlink_bridge.messages import (
+from mavlink_bridge.mavlink.codec import Codec
+from mavlink_bridge.mavlink.messages import (
     Heartbeat,
     MissionItemInt,
     MissionRequestInt,
     MissionRequestList,
 )
-from mavlink_bridge.rover import AUTO_MODE
+from mavlink_bridge.mavlink.rover import AUTO_MODE
 from mavlink_bridge.simulator import Simulator, SimulatorConfig
 from missions.fence import fence_to_items
 from missions.formats import read_fence

@@ -16,8 +16,7 @@ from threading import Thread
 import pytest
 from typer.testing import CliRunner
 
-from mavlink_bridge import messages as m
-from mavlink_bridge.backup import BackupStore
+from mavlink_bridge.backup.backup import BackupStore
 from mavlink_bridge.cli import interrupting
 from mavlink_bridge.cli.app import app
 from mavlink_bridge.cli.interrupting import (
@@ -33,10 +32,11 @@ from mavlink_bridge.cli.interrupting import (
 )
 from mavlink_bridge.errors import LinkError
 from mavlink_bridge.link import Link
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.rover import AUTO_MODE, HOLD_MODE
 from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.protocol.vehicle_watch import Doing, VehicleWatch
 from mavlink_bridge.protocol.verified_upload import VerifiedUpload
-from mavlink_bridge.rover import AUTO_MODE, HOLD_MODE
 from mavlink_bridge.simulator import SimulatedVehicle, Simulator, SimulatorConfig, SteppedRover
 from missions.fence import fence_to_items
 from missions.formats import read_fence

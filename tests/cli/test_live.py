@@ -14,8 +14,8 @@ import pytest
 from typer.testing import CliRunner
 
 from mavlink_bridge.cli.app import app
-from mavlink_bridge.messages import CommandLong
-from mavlink_bridge.rover import AUTO_MODE, HOLD_MODE
+from mavlink_bridge.mavlink.messages import CommandLong
+from mavlink_bridge.mavlink.rover import AUTO_MODE, HOLD_MODE
 from mavlink_bridge.simulator import Simulator, SimulatorConfig
 from missions.fence import fence_to_items
 from missions.formats import read_fence, read_situation

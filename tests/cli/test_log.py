@@ -165,7 +165,7 @@ def test_a_picture_of_nothing_or_of_several_is_refused(tmp_path, logs):
 
 
 def log_heartbeat(mav_type=6, autopilot=8):
-    from mavlink_bridge.messages import Heartbeat
+    from mavlink_bridge.mavlink.messages import Heartbeat
 
     return Heartbeat(mav_type, autopilot)
 

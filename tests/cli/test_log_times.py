@@ -10,9 +10,9 @@ from typer.testing import CliRunner
 
 from mavlink_bridge.cli.app import app
 from mavlink_bridge.cli.log_times import LogBegin, date_text, log_begin
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import LogError
-from mavlink_bridge.messages import Heartbeat
+from mavlink_bridge.mavlink.codec import Codec
+from mavlink_bridge.mavlink.messages import Heartbeat
 from mavlink_bridge.tlog import TlogWriter
 
 BEGIN_S = 1_795_313_862.5

@@ -483,8 +483,8 @@ def test_usage_that_cannot_be_read(options: tuple[str, ...]) -> None:
 
 def test_not_a_number_in_a_log_is_still_one_document(tmp_path: Path) -> None:
     """A vehicle may send a parameter that is no number; the error's details go into JSON all the same."""
-    from mavlink_bridge import messages as m
-    from mavlink_bridge.codec import Codec
+    from mavlink_bridge.mavlink import messages as m
+    from mavlink_bridge.mavlink.codec import Codec
     from mavlink_bridge.tlog import TlogWriter
 
     codec, station = Codec(1, 1), Codec(255, 190)

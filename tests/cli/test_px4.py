@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from typer.testing import CliRunner
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.cli.app import app
-from mavlink_bridge.codec import Codec
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.codec import Codec
 from mavlink_bridge.tlog import TlogWriter
 
 if TYPE_CHECKING:

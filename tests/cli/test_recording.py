@@ -14,7 +14,7 @@ from mavlink_bridge.cli.app import app
 from mavlink_bridge.cli.recording import open_recording
 from mavlink_bridge.director import Orders
 from mavlink_bridge.errors import LogError
-from mavlink_bridge.journal import read_journal
+from mavlink_bridge.replay.journal import read_journal
 
 
 def record(log, words: bytes = b""):

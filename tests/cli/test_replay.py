@@ -14,10 +14,10 @@ from typer.testing import CliRunner
 
 from mavlink_bridge.cli import replay as replay_command
 from mavlink_bridge.cli.app import app
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.expectations import differences, read_expectation, to_expect
 from mavlink_bridge.logbook.playback import vehicle_frames
-from mavlink_bridge.messages import GlobalPositionInt, Heartbeat
+from mavlink_bridge.mavlink.codec import Codec
+from mavlink_bridge.mavlink.messages import GlobalPositionInt, Heartbeat
+from mavlink_bridge.replay.expectations import differences, read_expectation, to_expect
 from mavlink_bridge.tlog import TlogReader, TlogWriter
 
 NAMES = ["mission-yard", "no-fence", "island-unreachable"]

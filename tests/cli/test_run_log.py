@@ -14,11 +14,11 @@ import pytest
 from cli.test_bridge import FAR, config  # noqa: F401 - a fixture
 
 from mavlink_bridge.cli.run_log import RunLog, SafeTeller
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.director import Event, EventName, Orders
 from mavlink_bridge.errors import LogError
-from mavlink_bridge.journal import Call, JournalWriter
-from mavlink_bridge.messages import Heartbeat
+from mavlink_bridge.mavlink.codec import Codec
+from mavlink_bridge.mavlink.messages import Heartbeat
+from mavlink_bridge.replay.journal import Call, JournalWriter
 from mavlink_bridge.simulator import Simulator
 from mavlink_bridge.tlog import TlogReader, TlogWriter
 from missions.geo import LatLon, distance_m

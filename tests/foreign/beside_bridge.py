@@ -9,7 +9,7 @@ import sys
 from console import Console, soon
 from lists import BLOCKING_FENCE, FENCE, TARGET, same, same_in
 
-from mavlink_bridge.messages import Heartbeat, MissionAck, MissionResult
+from mavlink_bridge.mavlink.messages import Heartbeat, MissionAck, MissionResult
 from mavlink_bridge.tlog import TlogReader
 from missions.formats.waypoints import format_items
 

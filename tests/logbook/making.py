@@ -7,16 +7,16 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from mavlink_bridge import messages as m
-from mavlink_bridge.codec import Codec
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.codec import Codec
+from mavlink_bridge.mavlink.rover import AUTO_MODE
 from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.protocol.wire import item_to_message
-from mavlink_bridge.rover import AUTO_MODE
 from mavlink_bridge.tlog import SENT_LINK, TlogWriter
 from missions.fence import Fence, PolygonZone, ZoneKind, fence_to_items
 from missions.geo import LatLon
+from missions.ground.local_frame import LocalFrame, LocalPoint
 from missions.items import MissionItem, waypoint, with_home
-from missions.local_frame import LocalFrame, LocalPoint
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mavlink_bridge.logbook import Pulse, SteadyClock
-from mavlink_bridge.messages import Frame, Heartbeat
+from mavlink_bridge.mavlink.messages import Frame, Heartbeat
 from mavlink_bridge.tlog import LogEntry
 
 DAY_S = 86_400.0

@@ -7,10 +7,10 @@ import math
 import pytest
 from logbook.making import FIELD, ORIGIN, ROVER, Log, place
 
-from mavlink_bridge import messages as m
-from mavlink_bridge.grade import way_of
 from mavlink_bridge.logbook import read_logbook
-from mavlink_bridge.rover import HOLD_MODE
+from mavlink_bridge.logbook.grade import way_of
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.rover import HOLD_MODE
 from missions.fence import Fence
 from missions.items import Command, MissionItem, waypoint, with_home
 

@@ -7,13 +7,13 @@ import json
 import pytest
 from logbook.making import BEGIN_S, FIELD, FRAME, PARAMETERS, ROVER, STATION, Log, place
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.logbook import read_logbook, recorder, track
 from mavlink_bridge.logbook.document import as_document
-from mavlink_bridge.logbook.modes import drives_mission, mode_name
 from mavlink_bridge.logbook.track import Fix, Odometer
-from mavlink_bridge.messages import MissionType
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.messages import MissionType
+from mavlink_bridge.mavlink.modes import drives_mission, mode_name
 from missions.fence import Fence, fence_to_items
 
 DAY_S = 86_400.0

@@ -11,8 +11,8 @@ from pyproj import Geod
 from shapely import Point, Polygon
 
 from mavlink_bridge.logbook import Ending, Way, read_logbook
-from mavlink_bridge.messages import GlobalPositionInt
-from mavlink_bridge.rover import MODE_NAMES
+from mavlink_bridge.mavlink.messages import GlobalPositionInt
+from mavlink_bridge.mavlink.rover import MODE_NAMES
 from mavlink_bridge.tlog import read_columns
 from missions.fence import CircleZone, PolygonZone, ZoneKind
 from missions.formats import read_fence

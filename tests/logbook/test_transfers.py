@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 from logbook.making import FIELD, ROVER, STATION, Log
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.fold import KINDS
 from mavlink_bridge.logbook import Ending, Way
 from mavlink_bridge.logbook.transfers import TransferWatch
-from mavlink_bridge.messages import Frame, MissionType
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.messages import Frame, MissionType
 from missions.fence import fence_to_items
 from missions.situation import ListKind
 

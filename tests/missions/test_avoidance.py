@@ -14,8 +14,8 @@ from charts import HOME, OUT, Chart, box, place
 from mavlink_bridge.simulator.config import Mode, SimulatorConfig
 from mavlink_bridge.simulator.rover import TICK_S
 from mavlink_bridge.simulator.vehicle import SimulatedVehicle
-from missions.avoidance import with_avoidance
 from missions.drive_model import envelope
+from missions.drive_model.avoidance import with_avoidance
 from missions.fence import Fence, fence_to_items
 from missions.items import waypoint
 from missions.vehicle import Vehicle, vehicle_from_parameters

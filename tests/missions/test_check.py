@@ -14,14 +14,14 @@ from pyproj import Proj
 from shapely import LineString, Point, Polygon
 from strategies import GEOD, offset
 
-from missions.check import MissionCheck, check_mission, plan_of
+from missions.checking.check import MissionCheck, check_mission, plan_of
 from missions.errors import FenceMissingError, SituationError
 from missions.fence import CircleZone, Fence, PolygonZone, Zone, ZoneKind
 from missions.formats import read_fence, read_mission
 from missions.geo import LatLon, rounded
 from missions.items import CoordinateFrame, MissionItem, waypoint
 from missions.picture import draw_plan
-from missions.plan import plan
+from missions.planning.plan import plan
 from missions.request import Request
 from missions.situation import Known, Mission, Pose, Situation
 from missions.vehicle import Footprint

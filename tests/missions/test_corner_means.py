@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from missions import corner_means, drawn
-from missions.drawn import Drawing, DrawnPoint
+from missions.fitting import corner_means, drawn
+from missions.fitting.drawn import Drawing, DrawnPoint
 
 MOST_TURN_AT_A_CHANGE_DEG = 8.0
 

@@ -7,10 +7,10 @@ import math
 import pytest
 from charts import FIELD, OUT, WALL, box, place, situation_of
 
-from missions.departure import LENGTHS_M, WAYS, departures
 from missions.drive_model import envelope
-from missions.local_frame import LocalPoint
-from missions.surroundings import ground_for
+from missions.ground.local_frame import LocalPoint
+from missions.ground.surroundings import ground_for
+from missions.routing.departure import LENGTHS_M, WAYS, departures
 from missions.vehicle import Steering, Vehicle
 
 

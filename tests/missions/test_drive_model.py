@@ -21,7 +21,7 @@ from missions.errors import InvalidPositionError, VehicleError
 from missions.fence import PolygonZone, ZoneKind
 from missions.formats import waypoints as waypoint_file
 from missions.geo import LatLon
-from missions.local_frame import LocalFrame
+from missions.ground.local_frame import LocalFrame
 from missions.vehicle import Autopilot, Steering, Vehicle
 
 DATA = Path(__file__).parent / "data"

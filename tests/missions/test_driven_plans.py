@@ -15,14 +15,14 @@ from shapely import LineString, Point
 from strategies import RandomField, random_fields
 
 from missions.drive_model import envelope
-from missions.driven_route import RouteSearch
 from missions.errors import NoRouteError, RouteError, StartBlockedError, TargetBlockedError, VehicleError
 from missions.fence import CircleZone
-from missions.fitted_route import FittedRoute
 from missions.geo import LatLon
 from missions.items import Command
-from missions.plan import Plan, plan
+from missions.planning.plan import Plan, plan
 from missions.request import Request
+from missions.routing.driven_route import RouteSearch
+from missions.routing.fitted_route import FittedRoute
 from missions.situation import Fix, Known, Pose, Situation
 from missions.vehicle import Footprint
 

@@ -11,7 +11,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from missions.fence_ahead import FenceAhead
+from missions.drive_model.fence_ahead import FenceAhead
 from missions.vehicle import Vehicle, vehicle_from_parameters
 
 AVOIDING = {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 4.0, "AVOID_ENABLE": 3.0, "FENCE_MARGIN": 2.0}

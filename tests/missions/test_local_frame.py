@@ -12,7 +12,14 @@ from strategies import GEOD, away, lat_lons
 
 from missions.errors import InvalidPositionError
 from missions.geo import LatLon
-from missions.local_frame import LocalFrame, LocalPoint, autopilot_line, autopilot_scale, bow_m, frame_around
+from missions.ground.local_frame import (
+    LocalFrame,
+    LocalPoint,
+    autopilot_line,
+    autopilot_scale,
+    bow_m,
+    frame_around,
+)
 
 bearings = st.floats(0, 360)
 within_10_km = st.floats(0, 10_000)

@@ -13,14 +13,14 @@ from charts import FIELD, HOME, OUT, WALL, box, place, situation_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from missions import fitting
-from missions.drawn import Drawing, DrawnPoint
 from missions.drive_model import envelope
 from missions.fence import Fence
-from missions.ground import lay_out
-from missions.local_frame import frame_around
-from missions.measuring import ENOUGH_M, Gauge
-from missions.surroundings import ground_for
+from missions.fitting import fitting
+from missions.fitting.drawn import Drawing, DrawnPoint
+from missions.fitting.measuring import ENOUGH_M, Gauge
+from missions.ground.ground import lay_out
+from missions.ground.local_frame import frame_around
+from missions.ground.surroundings import ground_for
 from missions.vehicle import vehicle_from_parameters
 
 STEERED = {"WP_SPEED": 5.0, "WP_RADIUS": 3.0, "FENCE_ENABLE": 1.0, "FENCE_TYPE": 4.0, "AVOID_ENABLE": 3.0}

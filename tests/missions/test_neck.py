@@ -9,10 +9,10 @@ import shapely
 from charts import HOME
 
 from missions import read_fence
-from missions.drawn import DrawnPoint
+from missions.fitting.drawn import DrawnPoint
+from missions.fitting.neck import find_neck, straight_through
 from missions.geo import LatLon
-from missions.neck import find_neck, straight_through
-from missions.plan import plan
+from missions.planning.plan import plan
 from missions.request import Request
 from missions.situation import Known, Pose, Situation
 

@@ -41,7 +41,7 @@ from missions.fence import CircleZone, Fence, PolygonZone, ZoneKind
 from missions.formats import read_fence
 from missions.geo import LatLon, rounded
 from missions.items import MissionItem, waypoint
-from missions.plan import Plan, plan
+from missions.planning.plan import Plan, plan
 from missions.request import Request
 from missions.situation import Known, ListKind, ListTransfer, Mission, Pose, Situation
 

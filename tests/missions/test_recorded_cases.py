@@ -13,7 +13,7 @@ from mavlink_bridge import situation_from_log
 from missions.errors import NoRouteError, StartBlockedError
 from missions.fence import PolygonZone, ZoneKind
 from missions.geo import LatLon
-from missions.plan import plan
+from missions.planning.plan import plan
 from missions.request import Request
 
 if TYPE_CHECKING:

@@ -10,17 +10,17 @@ import pytest
 from charts import HOME, IN, OUT, Chart, box, place
 from shapely import LineString, Polygon
 
-from missions.check import check_mission
-from missions.course import follow_mission
+from missions.checking.check import check_mission
+from missions.checking.course import follow_mission
+from missions.editing.repair import MOST_TRACKED_JUMPS, Repair, repair_mission, repaired_plan
 from missions.errors import NoRouteError, RouteError, SituationError, TargetBlockedError
 from missions.fence import Fence, Zone
 from missions.formats import read_fence, read_mission
 from missions.items import CoordinateFrame, MissionItem, change_speed, waypoint
-from missions.plan import plan
-from missions.repair import MOST_TRACKED_JUMPS, Repair, repair_mission, repaired_plan
+from missions.planning.plan import plan
 from missions.request import Request
 from missions.situation import Known, Mission, Pose, Situation
-from missions.tour import plan_tour
+from missions.tour.tour import plan_tour
 
 if TYPE_CHECKING:
     from missions.geo import LatLon
@@ -281,7 +281,7 @@ def test_slow_stretches_and_stops_of_a_route_end_with_it(monkeypatch):
             speeds=(*made.speeds[:-1], 0.5),
         )
 
-    monkeypatch.setattr("missions.repair.plan", slow_to_the_end)
+    monkeypatch.setattr("missions.editing.repair.plan", slow_to_the_end)
     found = repair(WEST, EAST, SERVO, go(120, 30))
     stopping = replace(EAST, params=(1.0, 0.0, 0.0, 0.0))
     at = kept(found, change_speed(0.5), stopping, change_speed(2.0), SERVO, go(120, 30))

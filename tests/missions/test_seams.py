@@ -7,12 +7,12 @@ import shapely
 from charts import HOME, IN, OUT, Chart, box, place, situation_of
 from shapely import LineString, Polygon
 
-from missions.check import check_mission
+from missions.checking.check import check_mission
+from missions.editing.repair import repair_mission
 from missions.errors import NoRouteError, TargetBlockedError
 from missions.fence import CircleZone
 from missions.items import waypoint
-from missions.plan import plan
-from missions.repair import repair_mission
+from missions.planning.plan import plan
 from missions.request import Request
 from missions.situation import Mission
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 from charts import IN, OUT, box, place, situation_of
 
-from missions.check import check_mission
+from missions.checking.check import check_mission
+from missions.editing.repair import repair_mission
 from missions.errors import StartBlockedError
 from missions.fence import CircleZone
 from missions.items import waypoint
-from missions.plan import plan
-from missions.repair import repair_mission
+from missions.planning.plan import plan
 from missions.request import Request
 from missions.situation import Mission
 

@@ -10,18 +10,18 @@ from charts import HOME, OUT, Chart, box, place
 from shapely import LineString, Point, Polygon
 
 from mavlink_bridge.protocol.limits import Limits
-from missions.check import check_mission
+from missions.checking.check import check_mission
+from missions.editing.repair import repair_mission
+from missions.editing.shorter_lines import meeting_place, without
+from missions.editing.storage import shortened
 from missions.errors import MissionTooLongError
 from missions.fence import CircleZone, Fence, Zone, ZoneKind
 from missions.geo import distance_m
-from missions.item_limit import most_items
 from missions.items import Command, CoordinateFrame, MissionItem, change_speed, waypoint
-from missions.repair import repair_mission
 from missions.request import Request
-from missions.shorter_lines import meeting_place, without
 from missions.situation import Known, Mission, Situation
-from missions.storage import shortened
-from missions.tour import plan_tour
+from missions.tour.tour import plan_tour
+from missions.vehicle.item_limit import most_items
 
 MAP = Chart(HOME)
 
@@ -151,8 +151,8 @@ def test_a_long_tour_fits_or_says_why_not(monkeypatch):
     request = Request(start=place(-95.0, 0.0), targets=targets, clearance_m=1.0)
     whole = plan_tour(situation, request)
     most = len(whole.items)  # one less, with home
-    monkeypatch.setattr("missions.tour.plan", lambda *_arguments, **_options: whole)
-    monkeypatch.setattr("missions.tour.most_items", lambda _parameters: most)
+    monkeypatch.setattr("missions.tour.tour.plan", lambda *_arguments, **_options: whole)
+    monkeypatch.setattr("missions.tour.tour.most_items", lambda _parameters: most)
     fitted = plan_tour(situation, request)
     assert len(fitted.items) + 1 <= most
     assert fitted.targets == whole.targets
@@ -182,7 +182,9 @@ def test_a_repaired_mission_is_shortened_by_its_routes_only(monkeypatch):
     whole = repair_mission(Mission(items, HOME), situation, request)
     count = len(whole.mission.items)
     assert count == 5
-    monkeypatch.setattr("missions.repair.most_items", lambda _parameters: count)  # one less, with home
+    monkeypatch.setattr(
+        "missions.editing.repair.most_items", lambda _parameters: count
+    )  # one less, with home
     short = repair_mission(Mission(items, HOME), situation, request)
     assert short.check.holds
     assert [item for item in short.mission.items if item in items] == list(items)
@@ -191,7 +193,7 @@ def test_a_repaired_mission_is_shortened_by_its_routes_only(monkeypatch):
     barn_at = Polygon(MAP.points([place(*corner) for corner in ((40, 20), (60, 20), (60, 40), (40, 40))]))
     line = LineString(MAP.points([HOME, *(one.position for one in short.mission.items)]))
     assert line.distance(barn_at) >= 2.0
-    monkeypatch.setattr("missions.repair.most_items", lambda _parameters: count - 1)
+    monkeypatch.setattr("missions.editing.repair.most_items", lambda _parameters: count - 1)
     with pytest.raises(
         MissionTooLongError, match="needs 5 items with home, and the vehicle holds 4: 1 of 2 items"
     ):
@@ -212,8 +214,8 @@ def test_rtl_at_the_end_needs_an_item_too(monkeypatch):
         start=place(0.0, 0.0), targets=(place(20.0, 0.0), place(40.0, 0.0)), clearance_m=1.0, end="rtl"
     )
     situation = replace(situation, home=Known(place(0.0, 0.0), None, "test"))
-    monkeypatch.setattr("missions.tour.most_items", lambda _parameters: 4)
+    monkeypatch.setattr("missions.tour.tour.most_items", lambda _parameters: 4)
     assert len(plan_tour(situation, request).items) == 3
-    monkeypatch.setattr("missions.tour.most_items", lambda _parameters: 3)
+    monkeypatch.setattr("missions.tour.tour.most_items", lambda _parameters: 3)
     with pytest.raises(MissionTooLongError, match="needs 4 items with home, and the vehicle holds 3"):
         plan_tour(situation, request)

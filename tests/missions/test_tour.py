@@ -15,10 +15,10 @@ from shapely import LineString, Polygon
 from missions.errors import NoRouteError, SituationError, TargetBlockedError
 from missions.fence import Fence, Zone
 from missions.items import Command
-from missions.plan import plan
+from missions.planning.plan import plan
 from missions.request import Request
 from missions.situation import Known, Situation
-from missions.tour import plan_tour, route_lengths_m, target_order
+from missions.tour.tour import plan_tour, route_lengths_m, target_order
 
 if TYPE_CHECKING:
     from missions.geo import LatLon

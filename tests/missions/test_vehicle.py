@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 
 from missions.drive_model import beyond_measured
 from missions.errors import VehicleError
-from missions.item_limit import most_items, storage_remarks
 from missions.vehicle import (
     Autopilot,
     FenceParameters,
@@ -18,6 +17,7 @@ from missions.vehicle import (
     vehicle_from_parameters,
     whole_number,
 )
+from missions.vehicle.item_limit import most_items, storage_remarks
 
 SKID = {"SERVO1_FUNCTION": 73, "SERVO3_FUNCTION": 74}
 ACKERMANN = {"SERVO1_FUNCTION": 26, "SERVO3_FUNCTION": 70}

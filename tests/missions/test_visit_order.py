@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from missions import visit_order
 from missions.errors import SituationError
-from missions.visit_order import MOST_BY_PROGRAMMING, length_of, shortest_order
+from missions.tour import visit_order
+from missions.tour.visit_order import MOST_BY_PROGRAMMING, length_of, shortest_order
 
 seeds = st.integers(0, 2**32 - 1)
 

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
+from missions.checking.recheck import straight_line
 from missions.errors import FenceError, MissionError
 from missions.fence import fence_from_items
 from missions.formats import read_fence
 from missions.geo import LatLon
 from missions.items import Command, MissionItem
-from missions.plan import plan
-from missions.recheck import straight_line
+from missions.planning.plan import plan
 from missions.request import Request
 from missions.situation import Known, Pose, Situation
 from missions.words import metres

@@ -8,13 +8,13 @@ import pytest
 from missions.formats import read_situation
 from missions.geo import LatLon
 from missions.picture.scene import Scene
-from missions.plan import plan
+from missions.planning.plan import plan
 from missions.request import Request
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from missions.plan import Plan
+    from missions.planning.plan import Plan
 
 START = LatLon(40.071374, -105.22993)
 REQUESTS = {

@@ -12,7 +12,7 @@ from shapely import LineString, Point, Polygon
 
 from missions.fence import CircleZone, Fence, PolygonZone, ZoneKind
 from missions.geo import LatLon
-from missions.ground import lay_out
+from missions.ground.ground import lay_out
 from missions.picture import draw_plan, style
 from missions.picture import scene as scenes
 from missions.picture.figure import plan_figure
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.transforms import Bbox
 
-    from missions.plan import Plan
+    from missions.planning.plan import Plan
 
 TOUCH_PX = 0.5
 

@@ -18,7 +18,7 @@ from missions.picture.scene import Scene
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from missions.plan import Plan
+    from missions.planning.plan import Plan
 
 
 def test_a_page_needs_no_network(plans: dict[str, Plan], tmp_path: Path) -> None:
@@ -105,7 +105,7 @@ def test_without_a_fence_near(plans: dict[str, Plan]) -> None:
     from dataclasses import replace
 
     from missions.fence import Fence
-    from missions.ground import lay_out
+    from missions.ground.ground import lay_out
 
     plan = plans["maze"]
     empty = replace(

@@ -10,12 +10,12 @@ import pytest
 from shapely import LineString, Point, box
 
 from missions.fence import Fence, PolygonZone, ZoneKind
-from missions.ground import lay_out
+from missions.ground.ground import lay_out
 from missions.picture import sketch_plan
 from missions.picture.scene import Scene
 
 if TYPE_CHECKING:
-    from missions.plan import Plan
+    from missions.planning.plan import Plan
 
 
 def cells_of(text: str) -> list[str]:

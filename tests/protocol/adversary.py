@@ -12,10 +12,10 @@ import socket
 import threading
 import time
 
-from mavlink_bridge import messages as m
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import LinkError
-from mavlink_bridge.messages import Frame, MissionResult, MissionType
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.codec import Codec
+from mavlink_bridge.mavlink.messages import Frame, MissionResult, MissionType
 from mavlink_bridge.protocol.wire import item_from_message, item_to_message
 from missions.geo import LatLon, to_e7
 from missions.items import Command, waypoint, with_home

@@ -36,7 +36,7 @@ from protocol.twin import (
     plain_mission,
 )
 
-from mavlink_bridge.messages import (
+from mavlink_bridge.mavlink.messages import (
     MissionAck,
     MissionItemInt,
     MissionRequest,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from protocol.twin import PEER
 
-from mavlink_bridge.messages import Frame
+from mavlink_bridge.mavlink.messages import Frame
 
 
 class Script:

@@ -6,12 +6,12 @@ import pytest
 from protocol.scripted import Script
 from protocol.twin import PEER
 
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.messages import AutopilotVersion, CommandAck, CommandLong, Frame, MavResult
+from mavlink_bridge.backup.vehicle_mark import uid_of
+from mavlink_bridge.mavlink.codec import Codec
+from mavlink_bridge.mavlink.messages import AutopilotVersion, CommandAck, CommandLong, Frame, MavResult
 from mavlink_bridge.protocol.ask_version import AskVersion
 from mavlink_bridge.protocol.transitions import VersionState
 from mavlink_bridge.simulator import SimulatedVehicle, Simulator, SimulatorConfig
-from mavlink_bridge.vehicle_mark import uid_of
 
 BY_MESSAGE = CommandLong(1, 1, 512, param1=148.0)
 BY_CAPABILITIES = CommandLong(1, 1, 520, param1=1.0)

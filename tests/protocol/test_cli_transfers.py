@@ -13,10 +13,10 @@ import pytest
 from protocol.twin import plain_fence, plain_mission
 from typer.testing import CliRunner
 
-from mavlink_bridge.backup import BackupStore
+from mavlink_bridge.backup.backup import BackupStore
 from mavlink_bridge.cli.app import app
-from mavlink_bridge.messages import MissionType
-from mavlink_bridge.rover import AUTO_MODE, HOLD_MODE
+from mavlink_bridge.mavlink.messages import MissionType
+from mavlink_bridge.mavlink.rover import AUTO_MODE, HOLD_MODE
 from mavlink_bridge.simulator import Simulator, SimulatorConfig
 from missions.formats import read_situation
 from missions.formats.waypoints import format_items
@@ -405,7 +405,7 @@ def test_a_vehicle_that_falls_silent(rover, monkeypatch, what):
 
 
 def test_a_vehicle_that_refuses_or_is_busy(rover, monkeypatch):
-    from mavlink_bridge.messages import MissionAck, MissionRequestList
+    from mavlink_bridge.mavlink.messages import MissionAck, MissionRequestList
 
     vehicle, results = rover.vehicle, [3]
     receive = vehicle.receive

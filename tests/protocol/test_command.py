@@ -6,7 +6,14 @@ import pytest
 from protocol.scripted import Script
 from protocol.twin import PEER
 
-from mavlink_bridge.messages import CommandAck, CommandInt, CommandLong, Heartbeat, MavResult, Statustext
+from mavlink_bridge.mavlink.messages import (
+    CommandAck,
+    CommandInt,
+    CommandLong,
+    Heartbeat,
+    MavResult,
+    Statustext,
+)
 from mavlink_bridge.protocol.command import SendCommand
 from mavlink_bridge.protocol.transitions import CommandState
 

@@ -6,7 +6,7 @@ import pytest
 from protocol.scripted import Script, seqs
 from protocol.twin import PEER, plain_mission
 
-from mavlink_bridge.messages import (
+from mavlink_bridge.mavlink.messages import (
     MissionAck,
     MissionCount,
     MissionItem,

@@ -33,11 +33,11 @@ from protocol.adversary import (
 )
 from typer.testing import CliRunner
 
-from mavlink_bridge.backup import BackupStore, read_backup
+from mavlink_bridge.backup.backup import BackupStore, read_backup
+from mavlink_bridge.backup.vehicle_lock import VehicleLock
+from mavlink_bridge.backup.vehicle_mark import VehicleMark
 from mavlink_bridge.cli.app import app
 from mavlink_bridge.link import Link
-from mavlink_bridge.vehicle_lock import VehicleLock
-from mavlink_bridge.vehicle_mark import VehicleMark
 from missions.formats.waypoints import format_items
 
 OLD, NEW = mission(3, 900), mission(6, 500)
@@ -177,7 +177,7 @@ def test_whatever_breaks_off_after_the_first_write(
 
 
 def _plan(vehicle, fields):
-    from mavlink_bridge.messages import MissionType
+    from mavlink_bridge.mavlink.messages import MissionType
     from missions.fence import fence_to_items
     from missions.formats import read_fence
 

@@ -10,10 +10,10 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from protocol.twin import PEER, plain_mission
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.director.learning import Learning
 from mavlink_bridge.director.mode_switch import ModeSwitch
-from mavlink_bridge.messages import Frame, MissionType
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.messages import Frame, MissionType
 from mavlink_bridge.protocol.command import SendCommand
 from mavlink_bridge.protocol.download import Download
 from mavlink_bridge.protocol.find import FindVehicle

@@ -5,7 +5,7 @@ from __future__ import annotations
 from protocol.scripted import Script
 
 from mavlink_bridge.errors import IdentityTakenError
-from mavlink_bridge.messages import Frame, Heartbeat, MissionCount
+from mavlink_bridge.mavlink.messages import Frame, Heartbeat, MissionCount
 from mavlink_bridge.protocol.find import FindVehicle
 from mavlink_bridge.protocol.transitions import FindState
 

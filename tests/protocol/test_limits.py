@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from protocol.twin import plain_fence, plain_mission
 
-from mavlink_bridge.messages import MissionType
+from mavlink_bridge.mavlink.messages import MissionType
 from mavlink_bridge.protocol.limits import Limits, fence_bytes, limit_in_text
 from mavlink_bridge.simulator import item_rules
 from missions.items import MissionItem

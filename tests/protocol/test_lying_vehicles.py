@@ -14,10 +14,10 @@ import pytest
 from protocol.twin import PEER, RIVAL, Client, Faults, PartialWriter, Twin, plain_mission
 from protocol.twin import Vehicle as TwinVehicle
 
-from mavlink_bridge import messages as m
-from mavlink_bridge.messages import Frame, MissionResult, MissionType
-from mavlink_bridge.outcomes import upload_trouble
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.messages import Frame, MissionResult, MissionType
 from mavlink_bridge.protocol.download import Download
+from mavlink_bridge.protocol.outcomes import upload_trouble
 from mavlink_bridge.protocol.transitions import VerifiedUploadState
 from mavlink_bridge.protocol.verified_upload import Held, OutcomeKind, VerifiedUpload
 from mavlink_bridge.protocol.wire import item_from_message

@@ -13,13 +13,13 @@ import pytest
 from protocol.adversary import Adversary, RebootsMidway, TcpVehicle, mission, places
 from typer.testing import CliRunner
 
-from mavlink_bridge.backup import BackupStore
+from mavlink_bridge.backup.backup import BackupStore
+from mavlink_bridge.backup.vehicle_lock import VehicleLock
+from mavlink_bridge.backup.vehicle_mark import VehicleMark
 from mavlink_bridge.cli import restoring
 from mavlink_bridge.cli.app import app
 from mavlink_bridge.errors import BackupError
-from mavlink_bridge.messages import MissionType
-from mavlink_bridge.vehicle_lock import VehicleLock
-from mavlink_bridge.vehicle_mark import VehicleMark
+from mavlink_bridge.mavlink.messages import MissionType
 from missions.formats.waypoints import format_items
 
 OLD, NEW = mission(3, 900), mission(6, 500)
@@ -111,8 +111,8 @@ def test_whom_a_lock_keeps_out(tmp_path, vehicle, is_free):
 
 def test_a_lock_ends_with_its_process(tmp_path):
     code = (
-        "import sys, time; from pathlib import Path; from mavlink_bridge.vehicle_lock import VehicleLock;"
-        "from mavlink_bridge.vehicle_mark import VehicleMark;"
+        "import sys, time; from pathlib import Path; from mavlink_bridge.backup.vehicle_lock import VehicleLock;"
+        "from mavlink_bridge.backup.vehicle_mark import VehicleMark;"
         "lock = VehicleLock(VehicleMark(1, '0a0b', 'tcp:127.0.0.1:5760', 3), Path(sys.argv[1]));"
         "print(lock.take(), flush=True); time.sleep(60)"
     )
@@ -193,8 +193,8 @@ def test_the_bridge_holds_the_lock_and_keeps_to_it(fields, mission_file):
 
 def test_a_replay_tells_the_same_of_an_upload_that_was_not_begun_and_of_one_that_broke_off(fields, tmp_path):
     from mavlink_bridge.director import Orders
-    from mavlink_bridge.journal import journal_path, read_journal
-    from mavlink_bridge.replay import replay_log
+    from mavlink_bridge.replay.journal import journal_path, read_journal
+    from mavlink_bridge.replay.replay import replay_log
     from missions.fence import fence_to_items
     from missions.formats import read_fence
 
@@ -229,7 +229,7 @@ def test_a_backup_that_cannot_be_written_leaves_the_vehicle_alone(mission_file, 
     def full(*_arguments, **_options):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("mavlink_bridge.backup.os.fsync", full)
+    monkeypatch.setattr("mavlink_bridge.backup.backup.os.fsync", full)
     vehicle = Adversary(OLD)
     vehicle.lists[MissionType.FENCE] = list(fence_to_items(read_fence(fields / "yard-fence.waypoints")))
     arguments = (

@@ -10,7 +10,7 @@ import pytest
 from protocol.scripted import Script
 from protocol.twin import PEER
 
-from mavlink_bridge.messages import Frame, ParamRequestList, ParamRequestRead, ParamSet, ParamValue
+from mavlink_bridge.mavlink.messages import Frame, ParamRequestList, ParamRequestRead, ParamSet, ParamValue
 from mavlink_bridge.protocol.parameters import WINDOW, ReadParameters, SetParameter
 from mavlink_bridge.protocol.transitions import ParameterState
 

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from protocol.twin import PEER, plain_mission
 
-from mavlink_bridge import messages
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.messages import CommandLong, Frame, MissionType
+from mavlink_bridge.mavlink import messages
+from mavlink_bridge.mavlink.codec import Codec
+from mavlink_bridge.mavlink.messages import CommandLong, Frame, MissionType
 from mavlink_bridge.protocol.command import SendCommand
 from mavlink_bridge.protocol.download import Download
 from mavlink_bridge.protocol.parameters import ReadParameters, SetParameter

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from protocol.twin import PEER, plain_mission
 
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.messages import MissionType
+from mavlink_bridge.mavlink.codec import Codec
+from mavlink_bridge.mavlink.messages import MissionType
 from mavlink_bridge.protocol.sendable import check_items, check_parameters
 from mavlink_bridge.protocol.wire import item_to_message
 from missions.errors import MissionFormatError

@@ -13,10 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from mavlink_bridge.codec import Codec
 from mavlink_bridge.errors import UsageError
-from mavlink_bridge.messages import Heartbeat, MissionCount
-from mavlink_bridge.signing import Signing, SigningKey
+from mavlink_bridge.mavlink.codec import Codec
+from mavlink_bridge.mavlink.messages import Heartbeat, MissionCount
+from mavlink_bridge.mavlink.signing import Signing, SigningKey
 
 SECRET = bytes(range(200, 232))
 NOW_S = 1_800_000_000.0

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from protocol.twin import Vehicle, plain_fence, plain_mission
 
-from mavlink_bridge.messages import MissionResult, MissionType
-from mavlink_bridge.protocol.stored_form import Difference, differences, is_same_item, is_unfinished_write
+from mavlink_bridge.mavlink.messages import MissionResult, MissionType
+from mavlink_bridge.mavlink.stored_form import Difference, differences, is_same_item, is_unfinished_write
 from missions.items import MissionItem
 
 MISSION, FENCE, RALLY = MissionType.MISSION, MissionType.FENCE, MissionType.RALLY

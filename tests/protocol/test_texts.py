@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from protocol.scripted import PEER
 
-from mavlink_bridge.messages import Frame, Statustext
+from mavlink_bridge.mavlink.messages import Frame, Statustext
 from mavlink_bridge.protocol.texts import MOST_TEXTS, Reasons
 
 

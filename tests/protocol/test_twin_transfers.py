@@ -6,7 +6,7 @@ import pytest
 from protocol.campaign import MOMENTS, RIVALS, Scenario, scenario_of, transfer
 from protocol.twin import PEER, RIVAL, Client, Faults, Twin, Vehicle, plain_fence, plain_mission
 
-from mavlink_bridge.messages import MissionItemInt, MissionType
+from mavlink_bridge.mavlink.messages import MissionItemInt, MissionType
 from mavlink_bridge.protocol.download import Download
 from mavlink_bridge.protocol.verified_upload import Held, OutcomeKind, VerifiedUpload
 
@@ -225,7 +225,7 @@ class _Forever:
             self._next_s, self._due = now_s + 2.0, True
 
     def messages_to_send(self):
-        from mavlink_bridge.messages import MissionCount
+        from mavlink_bridge.mavlink.messages import MissionCount
 
         due, self._due = self._due, False
         return [MissionCount(1, 1, 2)] if due else []

@@ -6,7 +6,7 @@ from protocol.scripted import Script
 from protocol.test_download import ack, count, item
 from protocol.twin import PEER
 
-from mavlink_bridge.messages import (
+from mavlink_bridge.mavlink.messages import (
     Frame,
     MissionAck,
     MissionRequest,

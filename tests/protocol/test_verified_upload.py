@@ -8,7 +8,7 @@ import pytest
 from protocol.scripted import Script
 from protocol.twin import PEER, Client, Faults, Twin, Vehicle, plain_fence, plain_mission
 
-from mavlink_bridge.messages import (
+from mavlink_bridge.mavlink.messages import (
     Frame,
     Heartbeat,
     MissionAck,

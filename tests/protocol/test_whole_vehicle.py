@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 from protocol.twin import PEER, plain_mission
 
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.messages import MissionType
+from mavlink_bridge.mavlink.codec import Codec
+from mavlink_bridge.mavlink.messages import MissionType
+from mavlink_bridge.mavlink.signing import Signing, SigningKey
 from mavlink_bridge.protocol.verified_upload import Held, OutcomeKind, VerifiedUpload
-from mavlink_bridge.signing import Signing, SigningKey
 from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig
 from mavlink_bridge.simulator.faults import Faults, FaultyLink
 

@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from protocol.twin import PEER
 
-from mavlink_bridge import messages
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.messages import Frame, Heartbeat, MissionAck, MissionResult, MissionType
+from mavlink_bridge.mavlink import messages
+from mavlink_bridge.mavlink.codec import Codec
+from mavlink_bridge.mavlink.messages import Frame, Heartbeat, MissionAck, MissionResult, MissionType
 from mavlink_bridge.protocol.wire import INT32_MAX, item_from_message, item_to_message, mission_result
 from missions.items import MissionItem
 

@@ -7,9 +7,9 @@ import math
 import pytest
 from protocol.twin import PEER, plain_mission
 
-from mavlink_bridge import messages as m
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.messages import Frame, MissionResult, MissionType
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.codec import Codec
+from mavlink_bridge.mavlink.messages import Frame, MissionResult, MissionType
 from mavlink_bridge.protocol.wire import item_to_message
 from mavlink_bridge.protocol.write_watch import WriteWatch
 from missions.items import MissionItem

@@ -13,7 +13,7 @@ import random
 from dataclasses import dataclass, field, replace
 from itertools import count
 
-from mavlink_bridge.messages import (
+from mavlink_bridge.mavlink.messages import (
     Frame,
     Heartbeat,
     Message,

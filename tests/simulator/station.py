@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from mavlink_bridge import messages as m
-from mavlink_bridge.messages import Frame, Message, MissionResult, MissionType
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.messages import Frame, Message, MissionResult, MissionType
 from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig
 from mavlink_bridge.simulator.mission_server import int_message
 from missions.geo import LatLon

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from simulator.station import HOME, TICK_S, Bench, at, line, placed, square
 
-from mavlink_bridge import messages as m
-from mavlink_bridge.messages import MissionResult, MissionType
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.messages import MissionResult, MissionType
 from mavlink_bridge.simulator import SimulatorConfig
 from missions.items import Command
 

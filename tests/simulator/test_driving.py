@@ -8,8 +8,8 @@ from dataclasses import replace
 import pytest
 from simulator.station import HOME, Bench, at, kept, line, placed, square, vertex
 
-from mavlink_bridge import messages as m
-from mavlink_bridge.messages import MavResult, MissionType
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.messages import MavResult, MissionType
 from mavlink_bridge.simulator import SimulatorConfig
 from mavlink_bridge.simulator.config import Mode
 from mavlink_bridge.simulator.fence_watch import FenceArea

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mavlink_bridge.codec import Codec
-from mavlink_bridge.messages import Heartbeat, ParamRequestList
+from mavlink_bridge.mavlink.codec import Codec
+from mavlink_bridge.mavlink.messages import Heartbeat, ParamRequestList
 from mavlink_bridge.simulator.faults import REORDER_S, Faults, FaultyLink
 from mavlink_bridge.simulator.framing import FrameSplitter
 

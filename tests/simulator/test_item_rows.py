@@ -8,8 +8,8 @@ from dataclasses import replace
 import pytest
 from simulator.station import HOME, Bench, at, kept, line, placed, square, vertex
 
-from mavlink_bridge import messages as m
-from mavlink_bridge.messages import MissionResult, MissionType
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.messages import MissionResult, MissionType
 from mavlink_bridge.simulator import SimulatorConfig
 from missions.geo import LatLon
 from missions.items import Command, CoordinateFrame, MissionItem, waypoint

@@ -7,8 +7,8 @@ from itertools import pairwise
 
 from simulator.station import HOME
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.link import Link
+from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig, SteppedRover
 
 IDENTITY = (245, 190)

@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from simulator.station import Bench, at, kept
 
-from mavlink_bridge import messages as m
-from mavlink_bridge.messages import MissionResult, MissionType
-from mavlink_bridge.protocol.stored_form import is_same_item
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.messages import MissionResult, MissionType
+from mavlink_bridge.mavlink.stored_form import is_same_item
 from mavlink_bridge.simulator import SimulatorConfig
 from mavlink_bridge.simulator.config import Mode
 from mavlink_bridge.simulator.item_rules import kept_mission_item, mission_item_result

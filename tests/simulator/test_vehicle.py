@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 from simulator.station import HOME, TICK_S, Bench, at, line, placed, square
 
-from mavlink_bridge import messages as m
 from mavlink_bridge.errors import BridgeError
-from mavlink_bridge.messages import Capability, MavResult, ModeFlag
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.messages import Capability, MavResult, ModeFlag
 from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig
 from mavlink_bridge.simulator.config import Mode
 from mavlink_bridge.simulator.parameters import DEFAULTS

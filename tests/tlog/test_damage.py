@@ -12,7 +12,7 @@ from tlog.frames import LOGS, START_US, frame_v2, heartbeat, record, records
 from tlog.fuzz_tlog import campaign
 
 from mavlink_bridge.errors import LogError
-from mavlink_bridge.messages import MissionItemInt
+from mavlink_bridge.mavlink.messages import MissionItemInt
 from mavlink_bridge.tlog import Damage, TlogReader
 from mavlink_bridge.tlog.wire import CLASS_OF_ID
 

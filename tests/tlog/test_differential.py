@@ -11,8 +11,8 @@ from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from tlog.frames import LOGS, START_US, frame_v1, frame_v2, record
 
-from mavlink_bridge.codec import to_frame
-from mavlink_bridge.messages import MESSAGES
+from mavlink_bridge.mavlink.codec import to_frame
+from mavlink_bridge.mavlink.messages import MESSAGES
 from mavlink_bridge.tlog import TlogReader, read_columns
 
 IDS = {cls.msgname: number for number, cls in dialect.mavlink_map.items() if cls.msgname in MESSAGES}

@@ -10,7 +10,7 @@ import pytest
 from tlog.frames import LOGS, START_US, frame_v1, frame_v2, heartbeat, record, records
 
 from mavlink_bridge.errors import LogError
-from mavlink_bridge.messages import GlobalPositionInt, Heartbeat, Message, ParamValue, Statustext
+from mavlink_bridge.mavlink.messages import GlobalPositionInt, Heartbeat, Message, ParamValue, Statustext
 from mavlink_bridge.tlog import Damage, TlogReader, survey
 
 MAZE = next(log for log in LOGS if log.stem == "guided-maze")

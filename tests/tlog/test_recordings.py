@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from mavlink_bridge.messages import (
+from mavlink_bridge.mavlink.messages import (
     CommandInt,
     GlobalPositionInt,
     Heartbeat,

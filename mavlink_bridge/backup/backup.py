@@ -1,0 +1,363 @@
+"""What was on a vehicle before it was overwritten, kept in a state folder; and a note of every upload under way.
+
+A backup is one JSON file with the time, the vehicle, the list and its checksum. The note beside it says that an upload has begun; it
+is taken away when the outcome is known. A note found later means that our own process died half-way: nothing is restored
+unasked, but the next run on that vehicle says so. Both know their vehicle by its `VehicleMark`: nearly every rover is system 1.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import math
+import os
+import re
+import secrets
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mavlink_bridge.backup.vehicle_mark import Kinship, VehicleMark
+from mavlink_bridge.errors import BackupError
+from mavlink_bridge.mavlink.messages import MissionType
+from mavlink_bridge.user_folders import state_folder
+from missions.items import MissionItem
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+_FORMAT = 2
+_KEPT_BACKUPS = 100
+_BACKUP_NAME = re.compile(r"system-(\d+)-(mission|fence|rally)-\d{8}T\d{6}\.\d{6}Z(-[0-9a-f]{12})?\.json")
+_NOTE_NAME = re.compile(r"upload-under-way-system-(\d+)-(mission|fence|rally)(-[0-9a-f]{12})?\.json")
+"""Before format 2 the names ended without the vehicle's key."""
+
+
+@dataclass(frozen=True, slots=True)
+class Backup:
+    """A list as it was on a vehicle.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    time : datetime
+        When it was read from the vehicle, UTC.
+    vehicle : VehicleMark
+        Which vehicle; of backups before format 2 only the system id is known.
+    mission_type : MissionType
+        Which list.
+    items : tuple of MissionItem
+        The list as it goes over the wire, for missions with home at 0.
+    """
+
+    path: Path
+    time: datetime
+    vehicle: VehicleMark
+    mission_type: MissionType
+    items: tuple[MissionItem, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """The note of an upload that never came to its outcome.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    vehicle : VehicleMark
+        Which vehicle it was, as far as the note tells.
+    mission_type : MissionType
+        Which list.
+    backup : Backup, optional
+        What was on the vehicle before; None if it cannot be read.
+    trouble : BackupError, optional
+        Why it, or the note itself, cannot be read.
+    """
+
+    path: Path
+    vehicle: VehicleMark
+    mission_type: MissionType
+    backup: Backup | None = None
+    trouble: BackupError | None = None
+
+
+class BackupStore:
+    """The state folder.
+
+    Parameters
+    ----------
+    folder : Path, optional
+        Where; the user's state folder if not given.
+    """
+
+    def __init__(self, folder: Path | None = None) -> None:
+        self.folder = folder or state_folder() / "backups"
+
+    def keep(self, vehicle: VehicleMark, mission_type: MissionType, items: Sequence[MissionItem]) -> Path:
+        """Write a backup; return its path once it is safe on disk.
+
+        Raises
+        ------
+        BackupError
+            It cannot be written; nothing should be uploaded then.
+        """
+        now = datetime.now(UTC)
+        while (path := self._backup(vehicle, mission_type, now)).exists():  # clocks may be coarse
+            now += timedelta(microseconds=1)
+        content = {
+            "format": _FORMAT,
+            "time": now.isoformat(),
+            "system": vehicle.system,
+            "vehicle": _mark_to_json(vehicle),
+            "mission_type": mission_type.name.lower(),
+            "items": [_item_to_json(item) for item in items],
+        }
+        content["sha256"] = _checksum(content)
+        self._write(path, content)
+        self._prune(vehicle.system, mission_type)
+        return path
+
+    def begin(self, vehicle: VehicleMark, mission_type: MissionType, items: Sequence[MissionItem]) -> Path:
+        """Keep a backup and note that an upload begins; return the path of the backup that is to be restored if it fails.
+
+        If an earlier upload to this vehicle was interrupted, what is on it now is its remains: the note goes on naming the older backup.
+
+        Raises
+        ------
+        BackupError
+            It cannot be written; nothing should be uploaded then.
+        """
+        path = self.keep(vehicle, mission_type, items)
+        for earlier in self.interrupted(vehicle, mission_type):
+            if earlier.backup and vehicle.kinship(earlier.vehicle) is Kinship.SAME:
+                path = earlier.backup.path
+                break
+        note = {
+            "time": datetime.now(UTC).isoformat(),
+            "backup": path.name,
+            "process": os.getpid(),
+            "vehicle": _mark_to_json(vehicle),
+        }
+        self._write(self._note(vehicle, mission_type), note)
+        return path
+
+    def end(self, vehicle: VehicleMark, mission_type: MissionType, restored: Path | None = None) -> None:
+        """Take this vehicle's notes away: the outcome of the upload is known.
+
+        Parameters
+        ----------
+        vehicle : VehicleMark
+            Which vehicle.
+        mission_type : MissionType
+            Which list.
+        restored : Path, optional
+            The backup that was put back: a note that names it is settled too, unless it is known to be of another vehicle.
+        """
+        for note in self.interrupted(vehicle, mission_type):
+            is_named = (
+                restored is not None and note.backup is not None and note.backup.path.name == restored.name
+            )
+            if is_named or vehicle.kinship(note.vehicle) is Kinship.SAME:
+                with contextlib.suppress(OSError):  # it stays, and is told of: the upload itself ended well
+                    note.path.unlink(missing_ok=True)
+
+    def interrupted(self, vehicle: VehicleMark, mission_type: MissionType | None = None) -> list[Note]:
+        """Return the notes of uploads to a vehicle that never came to their outcome, and of those that may have been to it."""
+        return [
+            note
+            for note in self.notes()
+            if mission_type in (None, note.mission_type)
+            and vehicle.kinship(note.vehicle) is not Kinship.OTHER
+        ]
+
+    def notes(self) -> list[Note]:
+        """Return the notes of all uploads that never came to their outcome."""
+        if not self.folder.is_dir():
+            return []
+        named = (
+            (path, _NOTE_NAME.fullmatch(path.name))
+            for path in sorted(self.folder.glob("upload-under-way-*.json"))
+        )
+        return [self._read_note(path, name) for path, name in named if name]
+
+    def forget(self, notes: Iterable[Note]) -> list[Path]:
+        """Put notes aside, under another name in the same folder; return their new paths.
+
+        Raises
+        ------
+        BackupError
+            The folder cannot be written.
+        """
+        put_aside = []
+        for note in notes:
+            path = note.path.with_name(f"put-aside-{datetime.now(UTC):%Y%m%dT%H%M%S.%fZ}-{note.path.name}")
+            try:
+                note.path.replace(path)
+            except OSError as error:
+                raise BackupError(f"{note.path} cannot be put aside: {error.strerror or error}") from None
+            put_aside.append(path)
+        return put_aside
+
+    def newest(self, system: int, mission_type: MissionType) -> Backup | None:
+        """Return the newest backup of a list of the vehicles with a system id; None if there is none.
+
+        Raises
+        ------
+        BackupError
+            It cannot be read.
+        """
+        paths = self._paths(system, mission_type)
+        return read_backup(paths[-1]) if paths else None
+
+    def _prune(self, system: int, mission_type: MissionType) -> None:
+        """Take the oldest backups away, but none that is still to be restored."""
+        named = {note.backup.path for note in self.notes() if note.backup}
+        for old in self._paths(system, mission_type)[:-_KEPT_BACKUPS]:
+            if old not in named:
+                with contextlib.suppress(OSError):
+                    old.unlink(missing_ok=True)
+
+    def _read_note(self, path: Path, name: re.Match[str]) -> Note:
+        vehicle, mission_type = VehicleMark(int(name[1])), MissionType[name[2].upper()]
+        try:
+            content = json.loads(path.read_text(encoding="utf-8"))
+            backup = self.folder / Path(content["backup"]).name  # it cannot lead out of the folder
+            if "vehicle" in content:
+                vehicle = _mark_from_json(int(name[1]), content["vehicle"])
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+            trouble = BackupError(f"{path}: the note of an interrupted upload cannot be read: {error}")
+            return Note(path, vehicle, mission_type, trouble=trouble)
+        try:
+            return Note(path, vehicle, mission_type, read_backup(backup))
+        except BackupError as error:
+            return Note(path, vehicle, mission_type, trouble=error)
+
+    def _paths(self, system: int, mission_type: MissionType) -> list[Path]:
+        prefix = f"system-{system}-{mission_type.name.lower()}-"
+        if not self.folder.is_dir():
+            return []
+        return sorted(
+            path for path in self.folder.glob(f"{prefix}*.json") if _BACKUP_NAME.fullmatch(path.name)
+        )
+
+    def _backup(self, vehicle: VehicleMark, mission_type: MissionType, time: datetime) -> Path:
+        stamp = f"{time:%Y%m%dT%H%M%S.%fZ}"
+        return self.folder / f"system-{vehicle.system}-{mission_type.name.lower()}-{stamp}-{vehicle.key}.json"
+
+    def _note(self, vehicle: VehicleMark, mission_type: MissionType) -> Path:
+        name = f"upload-under-way-system-{vehicle.system}-{mission_type.name.lower()}-{vehicle.key}.json"
+        return self.folder / name
+
+    def _write(self, path: Path, content: dict[str, Any]) -> None:
+        """Write a file so that after a crash there is the whole of it or nothing."""
+        unfinished = path.with_suffix(
+            f".{secrets.token_hex(8)}.part"
+        )  # nobody else's, nor guessed beforehand
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            with unfinished.open("x", encoding="utf-8") as file:
+                json.dump(content, file, allow_nan=False, indent=1)
+                file.flush()
+                os.fsync(file.fileno())
+            unfinished.replace(path)
+            _sync_folder(self.folder)
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                unfinished.unlink(missing_ok=True)
+            raise BackupError(
+                f"the backup cannot be written to {path}: {error.strerror or error}; nothing was written to the vehicle",
+                path=str(path),
+                advice="make room on the disk, or let XDG_STATE_HOME name a folder that can be written",
+            ) from None
+
+
+def read_backup(path: Path) -> Backup:
+    """Read a backup file and check its checksum.
+
+    Raises
+    ------
+    BackupError
+        The file is missing, is none, or has been changed.
+    """
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        claimed = content.pop("sha256")
+        backup = Backup(
+            path,
+            datetime.fromisoformat(content["time"]),
+            _mark_from_json(int(content["system"]), content.get("vehicle", {})),
+            MissionType[content["mission_type"].upper()],
+            tuple(_item_from_json(item) for item in content["items"]),
+        )
+    except OSError as error:
+        raise BackupError(
+            f"the backup {path} cannot be read: {error.strerror or error}", path=str(path)
+        ) from None
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
+        raise BackupError(f"{path} is no backup: {error!r}", path=str(path)) from None
+    if claimed != _checksum(content):
+        raise BackupError(f"the backup {path} is damaged: its checksum does not match", path=str(path))
+    return backup
+
+
+def _mark_to_json(vehicle: VehicleMark) -> dict[str, Any]:
+    return {"uid": vehicle.uid, "connection": vehicle.connection, "autopilot": vehicle.autopilot}
+
+
+def _mark_from_json(system: int, content: dict[str, Any]) -> VehicleMark:
+    autopilot = content.get("autopilot")
+    return VehicleMark(
+        system,
+        str(content.get("uid", "")),
+        str(content.get("connection", "")),
+        None if autopilot is None else int(autopilot),
+    )
+
+
+def _checksum(content: dict[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True, allow_nan=False).encode()).hexdigest()
+
+
+def _item_to_json(item: MissionItem) -> dict[str, Any]:
+    return {
+        "command": int(item.command),
+        "frame": int(item.frame),
+        "params": [_number_to_json(value) for value in item.params],
+        "lat_e7": item.lat_e7,
+        "lon_e7": item.lon_e7,
+        "alt_m": _number_to_json(item.alt_m),
+        "current": item.current,
+        "autocontinue": item.autocontinue,
+    }
+
+
+def _item_from_json(item: dict[str, Any]) -> MissionItem:
+    param1, param2, param3, param4 = (float(value) for value in item["params"])
+    return MissionItem(
+        int(item["command"]),
+        int(item["frame"]),
+        (param1, param2, param3, param4),
+        int(item["lat_e7"]),
+        int(item["lon_e7"]),
+        float(item["alt_m"]),
+        bool(item["current"]),
+        bool(item["autocontinue"]),
+    )
+
+
+def _number_to_json(value: float) -> float | str:
+    return value if math.isfinite(value) else str(value)
+
+
+def _sync_folder(folder: Path) -> None:
+    if os.name != "posix":
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,72 @@
+"""Situations from recorded logs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from mavlink_bridge.errors import LogError, VehicleNotFoundError
+from mavlink_bridge.fold import FOLDED, fold
+from mavlink_bridge.mavlink.messages import AutopilotVersion, Heartbeat, Statustext
+from mavlink_bridge.mavlink.vehicles import Vehicle, choose_vehicle, vehicles_heard
+from mavlink_bridge.tlog import TlogReader
+from missions.situation import Situation
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from mavlink_bridge.tlog import Damage
+
+
+def begun(path: Path | str, vehicle: Vehicle) -> Situation:
+    """Return what is known of a vehicle before a log's first frame: its ids, and what the whole log tells of its autopilot.
+
+    How parameters are encoded, and the version, were so before they were told.
+    """
+    situation = Situation(system=vehicle.system, component=vehicle.component, vehicle_type=vehicle.type)
+    for entry in TlogReader(path, {Heartbeat, AutopilotVersion, Statustext}):
+        told = fold(situation, entry.frame, entry.time_s)
+        situation = replace(
+            situation, ardupilot=told.ardupilot, bytewise=told.bytewise, firmware=told.firmware
+        )
+    return situation
+
+
+def situation_from_log(
+    path: Path | str,
+    system: int | None = None,
+    *,
+    any_vehicle: bool = False,
+    on_damage: Callable[[Damage], None] | None = None,
+) -> Situation:
+    """Fold a whole log into the situation at its end.
+
+    Parameters
+    ----------
+    path : Path or str
+        A ``.tlog``.
+    system : int, optional
+        Which vehicle, by MAVLink system id; needed where several were heard.
+    any_vehicle : bool
+        Take vehicles that are neither rover nor boat too.
+    on_damage : callable, optional
+        Told what of the log could not be read, if anything.
+
+    Raises
+    ------
+    LogError
+        The log is missing, empty or not one; or it holds no such vehicle, or several and none was chosen.
+    """
+    vehicles = vehicles_heard(entry.frame for entry in TlogReader(path, {Heartbeat}))
+    try:
+        vehicle = choose_vehicle(vehicles, system, any_vehicle=any_vehicle)
+    except VehicleNotFoundError as error:
+        raise LogError(f"{path}: {error}", file=str(path)) from None
+    situation = begun(path, vehicle)
+    reader = TlogReader(path, FOLDED)
+    for entry in reader:
+        situation = fold(situation, entry.frame, entry.time_s)
+    if on_damage is not None and not reader.damage.is_clean:
+        on_damage(reader.damage)
+    return situation

@@ -1,0 +1,32 @@
+"""What a PARAM_VALUE means: MAVLink puts every parameter into a float, and autopilots differ in how.
+
+ArduPilot casts (3 is sent as 3.0). PX4 sends the bits: the float's four bytes hold the integer (MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE).
+A signalling NaN's bits do not survive on their way through Python: INT32 values of 2139095041 to 2143289343 and their negatives come out wrong.
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from mavlink_bridge.mavlink.messages import ParamValue
+
+_WHOLE_NUMBERS = {1: "<Bxxx", 2: "<bxxx", 3: "<Hxx", 4: "<hxx", 5: "<I", 6: "<i"}
+"""MAV_PARAM_TYPE: UINT8, INT8, UINT16, INT16, UINT32, INT32, as PARAM_VALUE's union lays them out."""
+
+
+def parameter_value(message: ParamValue, *, bytewise: bool) -> float:
+    """Return the value that a PARAM_VALUE tells; it may be no number.
+
+    Parameters
+    ----------
+    message : ParamValue
+        What the vehicle said.
+    bytewise : bool
+        Whether its autopilot sends whole numbers as bits.
+    """
+    layout = _WHOLE_NUMBERS.get(message.param_type) if bytewise else None
+    if layout is None:
+        return message.param_value
+    return float(struct.unpack(layout, struct.pack("<f", message.param_value))[0])

@@ -1,0 +1,1 @@
+"""Checking missions, whoever wrote them, against a fence: what each leg keeps while drawn and while driven. Knows nothing of planning."""

@@ -1,0 +1,463 @@
+"""Checking a mission, whoever wrote it, against a fence: what each leg keeps while it is drawn and while it is driven."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+from shapely import LineString, Point
+from shapely.ops import nearest_points
+
+from missions.checking.course import CIRCLE_M, Course, CourseLeg, follow_mission
+from missions.checking.mission_end import crossed_zones, end_warnings, return_place, return_warnings
+from missions.clearance import known_vehicle, promise
+from missions.drive_model import Envelope, beyond_measured, envelope
+from missions.drive_model.avoidance import with_avoidance
+from missions.errors import SituationError, StartBlockedError
+from missions.geo import LatLon, bearing_deg, distance_m
+from missions.ground.ground import EDGE_BOW_M, Ground
+from missions.ground.known_fence import fence_warnings, known_fence
+from missions.ground.local_frame import LocalPoint
+from missions.ground.seams import Seam, first_stop, is_seam, seam_advice, seam_reason, seams_of
+from missions.ground.start_hazard import start_hazard
+from missions.planning.plan import Plan, drawn_leg, ground_for
+from missions.planning.remarks import parameter_remarks
+from missions.request import Request
+from missions.situation import Known
+from missions.vehicle import real_number
+from missions.words import metres
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+    from shapely.geometry.base import BaseGeometry
+
+    from missions.fence import Fence
+    from missions.situation import Mission, Situation
+    from missions.vehicle import Vehicle
+
+_FAR_M = 50_000.0
+_STEP_M = 0.5
+_ANYTHING = Request()
+
+TOLERANCE_M = 0.01
+"""A leg that falls short by no more than this keeps its promise: positions are rounded to degE7."""
+
+
+@dataclass(frozen=True, slots=True)
+class CheckedLeg:
+    """What one leg keeps.
+
+    Parameters
+    ----------
+    leg : CourseLeg
+        From where to where.
+    length_m : float
+        Its drawn length.
+    drawn_clearance_m : float
+        The least distance of its straight line to forbidden ground; 0 where it crosses it, infinite without a fence.
+    driven_clearance_m : float
+        The least distance foreseen for the driven track, the corner at its end included.
+    asked_m : float
+        What the driven track has to keep: the clearance, on a first leg no more than the start itself has.
+    fence : str or None
+        The zone that is nearest.
+    at : LatLon or None
+        Where on the leg it is nearest; where it crosses forbidden ground, the first place of that.
+    crosses : tuple of str
+        The zones whose forbidden ground the straight line crosses, and seams of a union before which the vehicle stops.
+    time_s : float
+        Time from the place before to this leg's end.
+    """
+
+    leg: CourseLeg
+    length_m: float
+    drawn_clearance_m: float
+    driven_clearance_m: float
+    asked_m: float
+    fence: str | None
+    at: LatLon | None
+    crosses: tuple[str, ...]
+    time_s: float
+
+    @property
+    def stops_at_seam(self) -> bool:
+        """Whether the vehicle would stop before a seam of the union."""
+        return any(is_seam(name) for name in self.crosses)
+
+    @property
+    def breaks(self) -> bool:
+        """Whether it breaks the promise."""
+        return bool(self.crosses) or self.driven_clearance_m < self.asked_m - TOLERANCE_M
+
+    @property
+    def name(self) -> str:
+        """The leg by its items: ``2 → 3``, ``5 → 2 (jump 6)``, ``3 → home``."""
+        jump = f" (jump {self.leg.jump_item})" if self.leg.jump_item else ""
+        goal = "home" if self.leg.is_return else str(self.leg.last_item)
+        return f"{self.leg.first_item or 'start'} → {goal}{jump}"
+
+
+@dataclass(frozen=True, eq=False)
+class MissionCheck:
+    """A mission and what its legs keep.
+
+    Parameters
+    ----------
+    mission : Mission
+        What was checked.
+    course : Course
+        What it has the vehicle drive.
+    legs : tuple of CheckedLeg
+        Each as often as it is driven.
+    clearance_m : float
+        What was to be kept while driving.
+    duration_s : float
+        The time for all of it; of a mission without end for one time round.
+    troubles : tuple of str
+        What was not understood; with any of these the mission does not hold.
+    dangers : tuple of str
+        What is known to end in the fence, whatever the legs keep; with any of these the mission does not hold.
+    warnings : tuple of str
+        What else a person should know.
+    envelope : Envelope
+        The band that the vehicle is foreseen to stay in.
+    """
+
+    mission: Mission
+    course: Course
+    legs: tuple[CheckedLeg, ...]
+    clearance_m: float
+    duration_s: float
+    troubles: tuple[str, ...]
+    dangers: tuple[str, ...]
+    warnings: tuple[str, ...]
+    fence: Fence
+    ground: Ground
+    vehicle: Vehicle
+    envelope: Envelope
+
+    @property
+    def broken(self) -> tuple[CheckedLeg, ...]:
+        """The legs that break the promise."""
+        return tuple(leg for leg in self.legs if leg.breaks)
+
+    @property
+    def holds(self) -> bool:
+        """Whether every leg keeps its clearance, everything was understood, and nothing is known to end in the fence."""
+        return not self.broken and not self.troubles and not self.dangers
+
+    @property
+    def length_m(self) -> float:
+        """The drawn length of all legs."""
+        return sum(leg.length_m for leg in self.legs)
+
+    @property
+    def drawn_clearance_m(self) -> float:
+        """The least drawn clearance of all legs."""
+        return min(leg.drawn_clearance_m for leg in self.legs)
+
+    @property
+    def driven_clearance_m(self) -> float:
+        """The least foreseen clearance of all legs."""
+        return min(leg.driven_clearance_m for leg in self.legs)
+
+    @property
+    def path(self) -> tuple[LatLon, ...]:
+        """The drawn lines, start first."""
+        return (self.legs[0].leg.start, *(leg.leg.end for leg in self.legs))
+
+
+def check_mission(mission: Mission, situation: Situation, request: Request = _ANYTHING) -> MissionCheck:
+    """Check every leg of a mission against the situation's fence, for the situation's vehicle.
+
+    Parameters
+    ----------
+    mission : Mission
+        The items, without the home item.
+    situation : Situation
+        Fence, parameters, home and where the vehicle is.
+    request : Request
+        What every leg has to keep while driving, as for plans: clearance, reserve, the position's error, the vehicle's size. Where the vehicle
+        starts; default: where it is, else home. The rest of it says nothing here: places and speeds are the mission's.
+
+    Raises
+    ------
+    FenceMissingError
+        No fence is known.
+    SituationError
+        The mission drives nowhere, or a place is too far away.
+    FenceError, VehicleError, InvalidPositionError
+        The fence, a parameter or a position cannot be used.
+    """
+    fence = known_fence(situation)
+    request = replace(request, widest=False, speed_mps=None, corner_allowance_m=None)
+    vehicle = known_vehicle(situation, request)
+    asked = promise(situation, request, vehicle)
+    home = situation.home.value if situation.home else mission.home
+    if home and not situation.home:
+        situation = replace(situation, home=Known(home, None, "the mission"))
+    pose = situation.pose.value if situation.pose else None
+    start = request.start or (pose.position if pose else home)
+    course = _course(mission, situation, vehicle, start, home)
+    path = (course.legs[0].start, *(leg.end for leg in course.legs))
+    near_home = [home] if home and distance_m(home, path[0]) < _FAR_M else []
+    ground = ground_for(situation, vehicle, (*path, *near_home))
+    heading_deg = pose.heading_deg if pose and pose.position == start else None
+    forecast = _forecast(course, ground, vehicle, heading_deg)
+    legs = _checked_legs(course, ground, forecast, asked.required_m, seams_of(ground, vehicle))
+    hazard = start_hazard(ground, ground.frame.to_local(start), vehicle) if start else None
+    dangers = (f"{hazard}; {hazard.details['advice']}",) if isinstance(hazard, StartBlockedError) else ()
+    warnings = [
+        *parameter_remarks(situation),
+        *fence_warnings(vehicle, situation),
+        *ground.warnings,
+        *asked.warnings,
+        *course.notes,
+    ]
+    warnings += [hazard] if isinstance(hazard, str) else []
+    if any(leg.stops_at_seam for leg in legs):
+        warnings.append(f"{seam_reason(vehicle)}; {seam_advice(vehicle)}")
+    warnings += _start_warnings(start, heading_deg, legs[0], asked.required_m)
+    warnings += _drive_warnings(vehicle, forecast, course)
+    warnings += return_warnings(situation, vehicle, ground, path)
+    warnings += end_warnings(situation, vehicle, course)
+    return MissionCheck(
+        mission=mission,
+        course=course,
+        legs=legs,
+        clearance_m=asked.promised_m,
+        duration_s=forecast.duration_s,
+        troubles=course.troubles,
+        dangers=dangers,
+        warnings=tuple(dict.fromkeys(warnings)),
+        fence=fence,
+        ground=ground,
+        vehicle=vehicle,
+        envelope=forecast,
+    )
+
+
+def plan_of(check: MissionCheck, situation: Situation, *, method: str = "optimal") -> Plan:
+    """Give a mission that was checked as a plan: for pictures, files, uploads and drives."""
+    path = check.path
+    home = situation.home.value if situation.home else check.mission.home
+    return Plan(
+        items=check.mission.items,
+        path=path,
+        seqs=(0, *(leg.leg.last_item for leg in check.legs)),
+        speeds=tuple(leg.leg.speed_mps for leg in check.legs),
+        start=path[0],
+        targets=path[-1:],
+        method=method,
+        length_m=check.length_m,
+        straight_line_m=distance_m(path[0], path[-1]),
+        duration_s=check.duration_s,
+        clearance_m=check.clearance_m,
+        asked_m=max(leg.asked_m for leg in check.legs),
+        drawn_clearance_m=check.drawn_clearance_m,
+        driven_clearance_m=check.driven_clearance_m,
+        blocks=0,
+        fence=check.fence,
+        ground=check.ground,
+        vehicle=check.vehicle,
+        envelope=check.envelope,
+        home=home,
+        warnings=check.warnings,
+    )
+
+
+def _course(
+    mission: Mission, situation: Situation, vehicle: Vehicle, start: LatLon | None, home: LatLon | None
+) -> Course:
+    """Follow the mission as this vehicle drives it."""
+    course = follow_mission(
+        mission,
+        start,
+        home=home,
+        return_to=partial(return_place, situation),
+        return_speed_mps=real_number(situation.parameters, "RTL_SPEED", 0.0) or None,
+        circle_m=real_number(situation.parameters, "CIRC_RADIUS", CIRCLE_M),
+        own_speed_mps=vehicle.speed_mps,
+    )
+    if not course.legs:
+        raise SituationError("; ".join(["the mission holds no leg to check", *course.troubles]))
+    return course
+
+
+def _forecast(course: Course, ground: Ground, vehicle: Vehicle, heading_deg: float | None) -> Envelope:
+    places = [course.legs[0].start, *(leg.end for leg in course.legs)]
+    points = ground.frame.to_local_array(places)
+    if heading_deg is None:  # as plans do
+        heading_deg = bearing_deg(*places[:2])
+    forecast = envelope(
+        points,
+        vehicle,
+        heading_deg=heading_deg,
+        speeds=[leg.speed_mps for leg in course.legs],
+        stops={number: leg.stop_s for number, leg in enumerate(course.legs, 1) if leg.stop_s is not None},
+    )
+    return with_avoidance(forecast, vehicle, ground.edge)
+
+
+def _checked_legs(
+    course: Course, ground: Ground, forecast: Envelope, promised_m: float, seams: tuple[Seam, ...]
+) -> tuple[CheckedLeg, ...]:
+    times_s = np.diff(forecast.arrivals_s)
+    driven_m = _driven_m(forecast, ground, len(course.legs))
+    known: dict[BaseGeometry, _Drawn] = {}
+    checked = []
+    circle_before_m = 0.0
+    for number, leg in enumerate(course.legs):
+        shape = _shape(ground, leg, circle_before_m)
+        drawn = known.get(shape) or known.setdefault(shape, _Drawn.of(ground, shape, seams))
+        leg_driven_m = min(float(driven_m[number]), drawn.clearance_m)
+        if leg.circle_m or circle_before_m:
+            leg_driven_m = min(leg_driven_m, max(0.0, drawn.clearance_m - forecast_band_m(forecast)))
+        asked_m = promised_m
+        if leg.first_item == 0 and number == 0:
+            asked_m = _asked_of_first_leg_m(ground, leg, forecast_band_m(forecast), promised_m)
+        checked.append(
+            CheckedLeg(
+                leg=leg,
+                length_m=distance_m(leg.start, leg.end),
+                drawn_clearance_m=drawn.clearance_m,
+                driven_clearance_m=leg_driven_m,
+                asked_m=asked_m,
+                fence=drawn.fence,
+                at=drawn.at,
+                crosses=drawn.crosses,
+                time_s=float(times_s[number]),
+            )
+        )
+        circle_before_m = leg.circle_m
+    return tuple(checked)
+
+
+def _asked_of_first_leg_m(ground: Ground, leg: CourseLeg, band_m: float, promised_m: float) -> float:
+    """Give what the leg from the start has to keep: less than the others where the start is near a fence and the leg leads away from it."""
+    line = drawn_leg(ground, leg.start, leg.end)
+    if not isinstance(line, LineString) or not ground.allowed.covers(line):
+        return promised_m
+    at_m = np.arange(0.0, line.length + _STEP_M, _STEP_M)
+    clearances_m = shapely.distance(shapely.line_interpolate_point(line, at_m), ground.edge)
+    far = np.flatnonzero(clearances_m >= promised_m + band_m)
+    if len(far) and clearances_m[far[0] :].min() < promised_m + band_m - TOLERANCE_M:
+        return promised_m  # it has led away, and comes near a fence again
+    return min(promised_m, max(0.0, float(clearances_m[0]) - band_m))
+
+
+def forecast_band_m(forecast: Envelope) -> float:
+    """Give the widest straight-line band of a drive."""
+    return max((leg.half_width_m for leg in forecast.legs), default=0.0)
+
+
+def _shape(ground: Ground, leg: CourseLeg, circle_before_m: float) -> BaseGeometry:
+    """Give where a leg's drawn line may run: a circle is left, and come to, anywhere on it."""
+    line: BaseGeometry = drawn_leg(ground, leg.start, leg.end)
+    if circle_before_m:
+        disc = Point(ground.frame.to_local(leg.start)).buffer(circle_before_m * CIRCLE_PAD)
+        line = shapely.union_all([disc, line]).convex_hull
+    if leg.circle_m:
+        disc = Point(ground.frame.to_local(leg.end)).buffer(leg.circle_m * CIRCLE_PAD)
+        line = shapely.union_all([disc, line])
+    return line
+
+
+CIRCLE_PAD = 1.01
+"""A polygon about a circle holds it if its corners stand so much farther out; 16 a quarter need 1.0012, the rest is the autopilot's metre."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Drawn:
+    """What a drawn shape keeps."""
+
+    clearance_m: float
+    fence: str | None
+    at: LatLon | None
+    crosses: tuple[str, ...]
+
+    @classmethod
+    def of(cls, ground: Ground, shape: BaseGeometry, seams: tuple[Seam, ...]) -> _Drawn:
+        if not ground.allowed.covers(shape):
+            crossed = crossed_zones(ground, shape)
+            return cls(0.0, crossed[0], _position(ground, _first_outside(ground, shape)), crossed)
+        if (stop := first_stop(seams, shape)) is not None:
+            name, place = stop
+            return cls(0.0, name, _position(ground, place), (name,))
+        nearest, _ = ground.nearest(shape)
+        at, _ = nearest_points(shape, ground.edge)
+        clearance_m = max(0.0, ground.clearance_m(shape) - EDGE_BOW_M)
+        return cls(clearance_m, nearest.name if nearest else None, _position(ground, at), ())
+
+
+def _first_outside(ground: Ground, shape: BaseGeometry) -> Point:
+    """Give the first place of a shape, in its own direction, that is on forbidden ground."""
+    outside = shape.difference(ground.allowed)
+    if not isinstance(shape, LineString) or outside.is_empty:
+        return outside.representative_point() if not outside.is_empty else shape.representative_point()
+    along_m = min(shape.project(Point(place)) for place in shapely.get_coordinates(outside))
+    return Point(shape.interpolate(along_m))
+
+
+def _position(ground: Ground, point: Point) -> LatLon:
+    return ground.frame.to_lat_lon(LocalPoint(point.x, point.y))
+
+
+def _driven_m(forecast: Envelope, ground: Ground, count: int) -> NDArray[np.float64]:
+    """Give the least foreseen clearance of each leg, with the corner at its end."""
+    pieces_m = np.maximum(forecast.clearances_m(ground.edge), 0.0)
+    pieces_m[~shapely.covers(ground.allowed, forecast.cores)] = 0.0
+    legs_m = np.full(count, np.inf)
+    np.minimum.at(legs_m, np.clip(forecast.waypoints - 1, 0, count - 1), pieces_m)
+    # Places that lie on one another are one to the drive model: the last of them, at the mission's end the first.
+    bare = set(range(count)) - set((forecast.waypoints - 1).tolist())
+    for number in sorted(bare - {count - 1}, reverse=True):
+        legs_m[number] = min(legs_m[number], legs_m[number + 1])
+    for number in sorted(bare - {0}):
+        legs_m[number] = min(legs_m[number], legs_m[number - 1])
+    return legs_m
+
+
+def _start_warnings(
+    start: LatLon | None, heading_deg: float | None, first: CheckedLeg, required_m: float
+) -> list[str]:
+    """Say what is not known of the start, and what its first leg cannot keep."""
+    if start is None:
+        return [
+            f"where the vehicle starts is not known: how it comes to item {first.leg.first_item} was not checked"
+        ]
+    warnings = []
+    if heading_deg is None:
+        warnings.append("where the vehicle heads at the start is not known: taken along its first leg")
+    if first.asked_m < required_m and not first.crosses:
+        warnings.append(
+            f"the start stands nearer to a fence than {metres(required_m)}: its first leg has to keep {metres(first.asked_m)}, "
+            "as much as the vehicle has now"
+        )
+    return warnings
+
+
+def _drive_warnings(vehicle: Vehicle, forecast: Envelope, course: Course) -> list[str]:
+    """Say where the drive model does not hold, and which parameters were not known."""
+    items = [course.legs[0].first_item, *(leg.last_item for leg in course.legs)]
+    warnings = [
+        f"item {items[corner.waypoint]}: a turn of {abs(corner.turn_deg):.0f}° between short legs; "
+        "measured rovers swung out farther there than the drive model foresees"
+        for corner in forecast.corners
+        if not corner.bounded
+    ]
+    warnings += beyond_measured(
+        vehicle, min((leg.speed_mps for leg in course.legs if leg.speed_mps), default=None)
+    )
+    assumed = [f"{one.parameter} {one.value:g}" for one in vehicle.assumed if one.parameter in _DRIVING]
+    if assumed:
+        warnings.append(f"not known of the vehicle, so these defaults count: {', '.join(assumed)}")
+    return warnings
+
+
+_DRIVING = frozenset(
+    {"WP_RADIUS", "WP_SPEED", "TURN_RADIUS", "FENCE_MARGIN", "SERVO1_FUNCTION", "NAV_ACC_RAD", "RO_SPEED_LIM"}
+)

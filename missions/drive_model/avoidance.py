@@ -1,0 +1,237 @@
+"""What the vehicle's own avoidance does to its corners: it slows down for a fence ahead, falls behind, and cuts more.
+
+ArduPilot's avoidance (AVOID_ENABLE, FENCE_MARGIN) limits the speed towards a fence to the position gain times the distance that is
+left to the margin. A rover that comes to a corner before a fence is slowed while its target point goes on round the corner, and
+drives beside the line until the error dies away. The target point waits for it in part (AR_WPNav's time scaling). Target point and
+rover are followed here, the rover as a point without inertia, to see how far it gets behind.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from dataclasses import replace
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+
+from missions.drive_model.corner import GRAVITY_MPS2, INSIDE_BAND_M
+from missions.drive_model.fence_ahead import FenceAhead
+from missions.drive_model.profile import LegProfile, Ramp
+from missions.vehicle import Steering
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+    from shapely.geometry.base import BaseGeometry
+
+    from missions.drive_model import Envelope, Leg
+    from missions.vehicle import Vehicle
+
+LAG_RESERVE = 1.3
+"""So many times what it is reckoned to be behind counts."""
+
+NEGLIGIBLE_M = 0.1
+"""Less is within the band of any drive."""
+
+ASIDE_DEG = 5.0
+"""It may look so far to either side of the way that it is meant to go."""
+
+_STEP_S = 0.3
+_SETTLE_S = 1.0
+_LEAST_SCALE = 0.1
+_LEAST_MPS = 0.05
+_SAMPLES_A_PIECE = 3
+_SLOWED_SHARE = 0.97
+_NO_LAG_M = 0.1
+_LEAST_TURN_DEG = 8.0
+_ABOUT_CORNER_S = 7.0
+_SIDES = np.exp(1j * np.radians([0.0, ASIDE_DEG, -ASIDE_DEG]))
+
+
+def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry) -> Envelope:
+    """Give an envelope with what corners before a fence need more, where the vehicle's avoidance is on.
+
+    Parameters
+    ----------
+    band : Envelope
+        The drive without avoidance.
+    vehicle : Vehicle
+        What drives.
+    fence : shapely geometry
+        The lines it avoids, metres.
+
+    Returns
+    -------
+    Envelope
+        The same where nothing is near, else with more pieces where the rover falls behind.
+    """
+    if not vehicle.avoids_fence or fence.is_empty or not band.legs:
+        return band
+    target = _Target(band, vehicle)
+    lags = target.lags(vehicle, FenceAhead(fence, target.places, vehicle))
+    pieces = target.pieces(lags)
+    if not pieces:
+        return band
+    cores, bands_m, waypoints = zip(*pieces, strict=True)
+    return replace(
+        band,
+        cores=np.concatenate([band.cores, np.array(cores, dtype=np.object_)]),
+        bands_m=np.concatenate([band.bands_m, np.array(bands_m)]),
+        waypoints=np.concatenate([band.waypoints, np.array(waypoints, dtype=np.int64)]),
+    )
+
+
+class _Target:
+    """How the target point moves along all legs: each leg's motion begins while the one before still ends.
+
+    Parameters
+    ----------
+    band : Envelope
+        The drive.
+    vehicle : Vehicle
+        Its limits.
+    """
+
+    def __init__(self, band: Envelope, vehicle: Vehicle) -> None:
+        self.band = band
+        profiles = [_profile(leg, vehicle) for leg in band.legs]
+        begins_s = [0.0]
+        self._passed_s = []
+        """When it passes each corner."""
+        for number, corner in enumerate(band.corners):
+            ramps = (profiles[number].ramp, profiles[number + 1].ramp)
+            half_s = min(ramps, key=lambda ramp: ramp.duration_s).time_s(corner.middle_m)
+            self._passed_s.append(begins_s[-1] + profiles[number].duration_s - half_s)
+            begins_s.append(self._passed_s[-1] - half_s)
+        whole_s = begins_s[-1] + profiles[-1].duration_s
+        self.times_s = np.arange(0.0, whole_s + _STEP_S, _STEP_S)
+        points = band.points[:, 0] + 1j * band.points[:, 1]
+        self.places: NDArray[np.complex128] = np.full(len(self.times_s), points[0])
+        for leg, profile, begin_s in zip(band.legs, profiles, begins_s, strict=True):
+            step = points[leg.first + 1] - points[leg.first]
+            self.places += np.interp(self.times_s - begin_s, *_shares(profile)) * step
+
+    def lags(self, vehicle: Vehicle, fence: FenceAhead) -> list[complex]:
+        """Give at each time how far the rover is behind, east and north; an empty list where it never is."""
+        steps = np.diff(self.places)
+        moved_m = np.maximum(np.abs(steps), _LEAST_MPS * _STEP_S)
+        is_slowed = np.zeros(len(steps), dtype=np.bool_)
+        near = self._near_corners()[:-1]
+        for side in _SIDES:
+            allowed_mps = fence.speeds_mps(self.places[:-1][near], side * (steps / moved_m)[near])
+            is_slowed[near] |= allowed_mps < _SLOWED_SHARE * moved_m[near] / _STEP_S
+        if not is_slowed.any():
+            return []
+        return _followed(self.places.tolist(), is_slowed.tolist(), vehicle, fence)
+
+    def _near_corners(self) -> NDArray[np.bool_]:
+        """Tell when it is about a corner: falling behind on a straight line does not matter."""
+        near = np.zeros(len(self.times_s), dtype=np.bool_)
+        for corner, passed_s in zip(self.band.corners, self._passed_s, strict=True):
+            if not corner.stops and abs(corner.turn_deg) >= _LEAST_TURN_DEG:
+                near |= np.abs(self.times_s - passed_s) <= _ABOUT_CORNER_S
+        return near
+
+    def pieces(self, lags: list[complex]) -> list[tuple[BaseGeometry, float, int]]:
+        """Give the ground between target point and rover where that is behind, piece by piece."""
+        behind = np.array(lags)
+        far = np.flatnonzero(np.abs(behind) >= NEGLIGIBLE_M)
+        # A piece holds the first sample of the next one too.
+        whole, ends = far - far % _SAMPLES_A_PIECE, far[far % _SAMPLES_A_PIECE == 0] - _SAMPLES_A_PIECE
+        begins = np.union1d(whole, ends[ends >= 0])
+        return [self._piece(behind, begin) for begin in begins.tolist()]
+
+    def _piece(self, behind: NDArray[np.complex128], begin: int) -> tuple[BaseGeometry, float, int]:
+        span = slice(begin, min(begin + _SAMPLES_A_PIECE + 1, len(behind)))
+        targets = self.places[span]
+        ground = np.concatenate([targets, targets - LAG_RESERVE * behind[span]])
+        core = shapely.MultiPoint(np.column_stack((ground.real, ground.imag))).convex_hull
+        leg = int(np.searchsorted(self._passed_s, self.times_s[begin]))
+        return (
+            core,
+            min(self.band.legs[leg].half_width_m, INSIDE_BAND_M),
+            self._waypoint(float(self.times_s[begin])),
+        )
+
+    def _waypoint(self, time_s: float) -> int:
+        """Give the waypoint that a time is nearest to."""
+        if not self._passed_s:
+            return self.band.legs[-1].first + 1
+        nearest = min(range(len(self._passed_s)), key=lambda number: abs(self._passed_s[number] - time_s))
+        return self.band.corners[nearest].waypoint
+
+
+def _profile(leg: Leg, vehicle: Vehicle) -> LegProfile:
+    return LegProfile(leg.length_m, Ramp(leg.top_speed_mps, vehicle.accel_max_mps2, vehicle.jerk_mps3))
+
+
+def _shares(profile: LegProfile) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Give times since a leg's start, and what share of it is driven by then."""
+    leg_s = np.append(np.arange(0.0, profile.duration_s, _STEP_S), profile.duration_s)
+    return leg_s, np.array([profile.travelled_m(time_s) / profile.length_m for time_s in leg_s.tolist()])
+
+
+def _followed(
+    places: list[complex], is_slowed: list[bool], vehicle: Vehicle, fence: FenceAhead
+) -> list[complex]:
+    """Follow a target point as AR_PosControl does, within the speed that is allowed at the rover's own place.
+
+    The target's acceleration is passed on as it is. A rover that is slowed turns too fast by it, and drives to the inside of the turn.
+    """
+    lags = [0j] * len(is_slowed)
+    velocities = [(after - before) / _STEP_S for before, after in pairwise(places)]
+    velocities.append(velocities[-1])
+    top_mps = max(map(abs, velocities))
+    behind, scale, at = 0j, 1.0, 0.0
+    rover = _Rover(vehicle)
+    while (sample := int(at)) < len(is_slowed):
+        velocity = velocities[sample]
+        if not is_slowed[sample] and abs(behind) < _NO_LAG_M:
+            behind, scale, at = 0j, 1.0, sample + 1.0
+            rover.velocity = velocity
+            continue
+        here = places[sample] + (at - sample) * _STEP_S * velocity - behind
+        wanted = velocity + vehicle.position_gain_per_s * behind
+        wanted_mps = abs(wanted) or 1.0
+        allowed_mps = fence.speed_mps(here, wanted / wanted_mps, top_mps)
+        wanted *= min(1.0, top_mps / wanted_mps, allowed_mps / wanted_mps)
+        rover.follow(wanted, (velocities[sample + 1] - velocity) / _STEP_S)
+        scale += (_scale(velocity, behind, rover.velocity, vehicle) - scale) * _STEP_S / _SETTLE_S
+        behind += (scale * velocity - rover.velocity) * _STEP_S
+        lags[sample] = max(lags[sample], behind, key=abs)
+        at += scale
+    return lags
+
+
+class _Rover:
+    """A rover that turns as its controllers tell it, and takes on the speed wanted at once."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        self.velocity = 0j
+        self._is_steered = vehicle.steering is Steering.ACKERMANN
+        self._turn_radius_m = max(vehicle.turn_radius_m, 0.1)
+        self._turn_mps = 0.0
+        if self._is_steered:
+            self._turn_mps = math.sqrt(vehicle.turn_max_g * GRAVITY_MPS2 / 2 * vehicle.turn_radius_m)
+
+    def follow(self, wanted: complex, accel: complex) -> None:
+        """Drive on for one step."""
+        now_mps, wanted_mps = abs(self.velocity), abs(wanted)
+        heading = self.velocity / now_mps if now_mps > _LEAST_MPS else wanted / (wanted_mps or 1.0)
+        turn_radps = ((wanted + accel) * heading.conjugate()).imag / max(now_mps, 1.0)
+        if self._is_steered:
+            most_radps = now_mps / self._turn_radius_m
+            turn_radps = min(max(turn_radps, -most_radps), most_radps)
+        heading *= cmath.rect(1.0, turn_radps * _STEP_S)
+        self.velocity = heading * max(
+            min(wanted_mps, self._turn_mps), (wanted * heading.conjugate()).real, 0.0
+        )
+
+
+def _scale(velocity: complex, behind: complex, driven: complex, vehicle: Vehicle) -> float:
+    """Give how fast time runs for the target point: it waits for a rover that cannot keep up (AR_WPNav)."""
+    target_mps = max(abs(velocity), _LEAST_MPS)
+    along_mps = ((driven - vehicle.position_gain_per_s * behind) * velocity.conjugate()).real / target_mps
+    return min(max(0.05 + along_mps / target_mps, _LEAST_SCALE), 1.0)

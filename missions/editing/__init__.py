@@ -1,0 +1,1 @@
+"""Missions changed: repaired around fences, and shortened to what a vehicle holds."""

@@ -1,0 +1,332 @@
+"""Repairing a mission: legs that break the clearance are replaced by routes; everything else keeps its place and meaning."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from missions.checking.check import MissionCheck, check_mission, plan_of
+from missions.editing.item_list import ItemList
+from missions.editing.storage import shortened
+from missions.errors import NoRouteError, RouteError, SituationError, StartBlockedError
+from missions.geo import bearing_deg, distance_m, to_e7
+from missions.items import change_speed
+from missions.planning.lines import ROUNDING_RESERVE_M
+from missions.planning.plan import Plan, plan
+from missions.situation import Known, Mission, Pose
+from missions.vehicle.item_limit import most_items
+from missions.words import metres
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from missions.checking.check import CheckedLeg
+    from missions.checking.course import CourseLeg
+    from missions.editing.item_list import LegKey
+    from missions.geo import LatLon
+    from missions.items import MissionItem
+    from missions.request import Request
+    from missions.situation import Situation
+
+_ROUNDS = 8
+_EXTRA_M, _MOST_EXTRA_M = 0.1, 0.5
+"""More room for routes where the corners between them and their neighbours need it."""
+
+MOST_TRACKED_JUMPS = 15
+"""ArduPilot counts so many DO_JUMPs on small boards (AP_MISSION_MAX_NUM_DO_JUMP_COMMANDS); further ones are never taken."""
+
+
+@dataclass(frozen=True, eq=False)
+class Repair:
+    """A repaired mission.
+
+    Parameters
+    ----------
+    mission : Mission
+        The items as they are now.
+    check : MissionCheck
+        What they keep: `holds` is true.
+    changes : tuple of str
+        What was changed, by the numbers that the items had.
+    """
+
+    mission: Mission
+    check: MissionCheck
+    changes: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Detour:
+    """What takes the place of one leg: items before the place it leads to, that place's item, items after it."""
+
+    before: tuple[MissionItem, ...]
+    goal: MissionItem
+    after: tuple[MissionItem, ...]
+
+
+def repaired_plan(
+    situation: Situation, request: Request, *, should_stop: Callable[[], bool] | None = None
+) -> Plan:
+    """Repair the request's mission, else the situation's, and give it as a plan.
+
+    Raises
+    ------
+    SituationError
+        No mission is known.
+    MissionError
+        As `repair_mission`.
+    """
+    mission = request.via or (situation.mission.value if situation.mission else None)
+    if mission is None or not mission.items:
+        raise SituationError("there is no mission to repair: none was told (--via-mission FILE gives one)")
+    repair = repair_mission(mission, situation, request, should_stop=should_stop)
+    made = plan_of(repair.check, situation, method=request.method)
+    return replace(made, warnings=(*repair.changes, *made.warnings))
+
+
+def repair_mission(
+    mission: Mission,
+    situation: Situation,
+    request: Request,
+    *,
+    should_stop: Callable[[], bool] | None = None,
+) -> Repair:
+    """Replace the legs of a mission that break the clearance by routes around the fences.
+
+    A route's corners bear upon the legs beside it, so that what was repaired is checked again as a whole, and legs that break then, or
+    stand beside one that still does, are routed too.
+
+    Parameters
+    ----------
+    mission : Mission
+        The items, without the home item.
+    situation : Situation
+        Fence, parameters, home and where the vehicle is.
+    request : Request
+        Start, clearance, ``snap_m`` for places that are blocked, method; its targets say nothing here.
+
+    Raises
+    ------
+    RouteError
+        A leg cannot be replaced (says which and why), or the corners between legs keep breaking the promise.
+    SituationError
+        Something in the mission is not understood, so that where it leads is not known.
+    FenceMissingError, FenceError, VehicleError, InvalidPositionError
+        As `missions.checking.check.check_mission`.
+    """
+    asked = check_mission(mission, situation, request)
+    if asked.troubles:
+        raise SituationError(f"the mission cannot be repaired: {'; '.join(asked.troubles)}")
+    if asked.dangers:
+        raise StartBlockedError(f"the mission cannot be repaired: {'; '.join(asked.dangers)}")
+    repaired, checked = ItemList(mission), asked
+    keys = {_key(leg.leg) for leg in asked.broken}
+    clearance_m = asked.clearance_m
+    for _ in range(_ROUNDS):
+        if checked.holds:
+            _check_jumps(repaired)
+            changes = _changes(repaired)
+            most = most_items(situation.parameters) - 1
+            if len(checked.mission.items) > most:
+                long = checked.mission
+                checked = shortened(
+                    long, repaired.own_seqs, situation, request, most=most, should_stop=should_stop
+                )
+                left_out = len(long.items) - len(checked.mission.items)
+                changes = (
+                    *changes,
+                    f"{left_out} item{'s' * (left_out != 1)} of the routes left out so that the vehicle can hold it ({most + 1})",
+                )
+            return Repair(checked.mission, checked, changes)
+        try:
+            routed = _routed(asked, keys, situation, replace(request, clearance_m=clearance_m), should_stop)
+        except RouteError:
+            if clearance_m > asked.clearance_m:
+                break  # there is no more room: what was found before is to be told
+            raise
+        repaired = routed
+        checked = check_mission(repaired.mission(), situation, request)
+        found = {repaired.origin(leg.leg) for leg in checked.broken}
+        more = found if not found <= keys else _beside(asked, found)
+        if more <= keys and checked.broken:
+            missing_m = max(leg.asked_m - leg.driven_clearance_m for leg in checked.broken)
+            clearance_m += min(missing_m, _MOST_EXTRA_M) + _EXTRA_M
+        keys |= more
+    worst = min(checked.broken, key=lambda leg: leg.driven_clearance_m - leg.asked_m)
+    raise NoRouteError(
+        f"the mission cannot be repaired: about {_names(repaired.origin(worst.leg))} the vehicle would still come "
+        f"{metres(worst.driven_clearance_m)} near {worst.fence} at {worst.at}; {metres(worst.asked_m)} are to be kept",
+        driven_clearance_m=round(worst.driven_clearance_m, 3),
+        fences=[worst.fence],
+    )
+
+
+def _routed(
+    asked: MissionCheck,
+    keys: set[LegKey],
+    situation: Situation,
+    request: Request,
+    should_stop: Callable[[], bool] | None,
+) -> ItemList:
+    """Give the mission with routes in the place of some legs."""
+    repaired = ItemList(asked.mission)
+    moved: dict[int, LatLon] = {}
+
+    def put(run: Sequence[CourseLeg]) -> None:
+        there = [_where_moved(leg, moved) for leg in run]
+        for leg, detour in zip(run, _detours(there, asked, situation, request, should_stop), strict=True):
+            repaired.replace_leg(_key(leg), detour.before, detour.goal, detour.after)
+            if detour.goal.is_placed:
+                moved[leg.last_item] = detour.goal.position
+
+    for run in _runs(asked, keys):
+        try:
+            put(run)
+        except RouteError:
+            if len(run) == 1:
+                raise
+            for (
+                leg
+            ) in run:  # one by one; whether the corners between them keep the promise is checked afterwards
+                put([leg])
+    return repaired
+
+
+def _key(leg: CourseLeg) -> LegKey:
+    return leg.first_item, leg.last_item, leg.jump_item
+
+
+def _names(key: LegKey) -> str:
+    first, last, jump = key
+    return f"leg {first or 'start'} → {last}{f' (jump {jump})' if jump else ''}"
+
+
+def _where_moved(leg: CourseLeg, moved: Mapping[int, LatLon]) -> CourseLeg:
+    """Give a leg between the places where its ends are now."""
+    return replace(leg, start=moved.get(leg.first_item, leg.start), end=moved.get(leg.last_item, leg.end))
+
+
+def _first_driven(checked: MissionCheck) -> list[tuple[int, CheckedLeg]]:
+    """Give each leg once, where it is driven first, with its number in the course."""
+    found: dict[LegKey, tuple[int, CheckedLeg]] = {}
+    for number, leg in enumerate(checked.legs):
+        found.setdefault(_key(leg.leg), (number, leg))
+    return list(found.values())
+
+
+def _runs(asked: MissionCheck, keys: set[LegKey]) -> list[list[CourseLeg]]:
+    """Give the legs to be routed, those together that are driven one after another with one speed."""
+    runs: list[list[CourseLeg]] = []
+    before = -2
+    for number, checked in _first_driven(asked):
+        leg = checked.leg
+        if _key(leg) not in keys:
+            continue
+        follows = runs and number == before + 1 and runs[-1][-1].speed_mps == leg.speed_mps
+        if follows and runs[-1][-1].stop_s is None:
+            runs[-1].append(leg)
+        else:
+            runs.append([leg])
+        before = number
+    return runs
+
+
+def _beside(asked: MissionCheck, keys: set[LegKey]) -> set[LegKey]:
+    """Give the legs driven just before and after some legs."""
+    order = [_key(leg.leg) for leg in asked.legs]
+    places = [number for number, key in enumerate(order) if key in keys]
+    return {order[near] for number in places for near in (number - 1, number + 1) if 0 <= near < len(order)}
+
+
+def _detours(
+    run: Sequence[CourseLeg],
+    asked: MissionCheck,
+    situation: Situation,
+    request: Request,
+    should_stop: Callable[[], bool] | None,
+) -> list[_Detour]:
+    """Plan a run of legs.
+
+    Raises
+    ------
+    RouteError
+        There is no route; says for which legs.
+    """
+    first = run[0]
+    local = replace(situation, pose=_pose(first, asked, situation), mission=None)
+    wanted = replace(
+        request,
+        start=first.start,
+        targets=tuple(leg.end for leg in run),
+        via=None,
+        via_own=False,
+        speed_mps=first.speed_mps,
+    )
+    try:
+        planned = plan(local, wanted, should_stop=should_stop)
+    except RouteError as error:
+        names = " and ".join(_names(_key(leg)) for leg in run)
+        raise type(error)(f"{names}: {error}", **error.details) from None
+    return _split(planned, run, asked.mission)
+
+
+def _pose(first: CourseLeg, asked: MissionCheck, situation: Situation) -> Known[Pose] | None:
+    """Give where and how the vehicle comes to the first leg of a run."""
+    number = next(n for n, leg in enumerate(asked.legs) if _key(leg.leg) == _key(first))
+    if number == 0:
+        return situation.pose
+    before = [leg.leg for leg in asked.legs[:number] if leg.length_m > 0]
+    heading_deg = bearing_deg(before[-1].start, before[-1].end) if before else None
+    return Known(Pose(first.start, heading_deg), None, "the mission")
+
+
+def _split(planned: Plan, run: Sequence[CourseLeg], mission: Mission) -> list[_Detour]:
+    """Give what of a plan belongs to each leg of a run."""
+    detours = []
+    begin = int(run[0].speed_mps is not None)  # the mission sets its speed itself
+    point = 0
+    for leg, target in zip(run, planned.targets, strict=True):
+        goal = mission.items[leg.last_item - 1]
+        if not leg.is_return and distance_m(goal.position, target) > ROUNDING_RESERVE_M:
+            lat_e7, lon_e7 = to_e7(target)
+            goal = replace(goal, lat_e7=lat_e7, lon_e7=lon_e7)
+        before_point = point
+        point = next(index for index in range(point, len(planned.path)) if planned.path[index] == target)
+        if point == before_point:  # it leads to where it begins
+            detours.append(_Detour((), goal, ()))
+            continue
+        end = planned.seqs[point]
+        before, there = planned.items[begin : end - 1], planned.items[end - 1]
+        if leg.is_return:
+            before = (*before, there)
+        elif there.params[0] > 0 and not goal.params[0] > 0:
+            goal = replace(goal, params=(there.params[0], *goal.params[1:]))
+        detours.append(_Detour(before, goal, ()))
+        begin = end
+    last_mps = planned.speeds[point - 1] if point else None
+    if last_mps is not None and last_mps != planned.vehicle.speed_mps:
+        detours[-1] = replace(detours[-1], after=(change_speed(planned.vehicle.speed_mps),))
+    return detours
+
+
+def _check_jumps(repaired: ItemList) -> None:
+    if repaired.jumps > MOST_TRACKED_JUMPS:
+        raise SituationError(
+            f"the repaired mission holds {repaired.jumps} jumps; the autopilot counts {MOST_TRACKED_JUMPS}",
+            jumps=repaired.jumps,
+        )
+
+
+def _changes(repaired: ItemList) -> tuple[str, ...]:
+    """Say what was changed."""
+    texts = []
+    for key, count in repaired.added.items():
+        texts.append(f"{_names(key)}: replaced by a route with {count} waypoint{'s' * (count != 1)} more")
+    for seq, (old, new) in repaired.changed.items():
+        if old.position != new.position:
+            texts.append(
+                f"item {seq} was blocked: moved {distance_m(old.position, new.position):.2f} m to {new.position}"
+            )
+        if old.params != new.params:
+            texts.append(f"item {seq}: the vehicle waits {new.params[0]:g} s there, so as to turn from rest")
+    return tuple(texts)

@@ -1,0 +1,1 @@
+"""Drawn lines bent until the band that the vehicle is predicted to drive in keeps the promise."""

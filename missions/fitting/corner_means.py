@@ -1,0 +1,286 @@
+"""What can be done where the band of drawn lines comes too near to a fence: other lines, or a slower stretch.
+
+Each means takes lines and the number of a point and yields lines that may do better; which of them does is measured elsewhere.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from missions.fitting import drawn
+from missions.fitting.drawn import Drawing, Vector, shifted
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+MOVES = (0.5, 1.0, 1.5, 2.5)
+"""In lengths of what is missing."""
+
+PROLONGED_M = (3.0, 6.0, 10.0, 15.0)
+SPACINGS_M = (6.0, 10.0, 15.0, 20.0)
+SLOW_MPS = (3.0, 2.0, 1.0)
+SLOW_BEFORE_M = {3.0: 10.0, 2.0: 10.0, 1.0: 5.0}
+SLOW_AFTER_M = (6.0, 15.0)
+"""Measured on corners: 1 m/s from 5 m before to 6 m after takes away the cut (docs/drive-model.md); narrow lanes are longer."""
+
+APART_M = 3.0
+"""Turns nearer to one another are one turn to a rover."""
+
+CHANGE_TURN_DEG, CHANGE_AWAY_M = 8.0, 4.0
+"""The speed changes on a straight line only, so far from a corner: so it was measured."""
+
+STOP_S = 1.0
+CRAWL_M = 18.0
+HEAD_M = (5.0, 9.0, 15.0)
+SIDE_DEG = (0.0, 35.0, -35.0, 70.0, -70.0)
+APPROACHES = 8
+APPROACH_M = (8.0, 16.0)
+SHARP_DEG = 110.0
+
+
+def moved(drawing: Drawing, index: int, missing_m: float) -> Iterator[Drawing]:
+    """Move a corner outwards; where that does not help, inwards or sideways."""
+    if drawn.is_end_or_fixed(drawing, index):
+        return
+    out = drawn.outward(drawing, index)
+    if out is None:
+        ahead = drawn.direction(drawing[index - 1], drawing[index])
+        out = (-ahead[1], ahead[0])
+    along = (-out[1], out[0])
+    ways = (out, (-out[0], -out[1]), *(_between(out, side) for side in (along, (-along[0], -along[1]))))
+    half_rad = math.radians(abs(drawn.turn_deg(drawing, index))) / 2
+    unit_m = missing_m / max(math.cos(half_rad), 0.4) + 0.05
+    for way in (*ways, along, (-along[0], -along[1])):
+        for share in MOVES:
+            yield _with(drawing, index, shifted(drawing[index].place, way, unit_m * share))
+
+
+def eased(drawing: Drawing, index: int, step_m: float) -> Iterator[Drawing]:
+    """Move a corner a step back towards the straight line, or along its legs; a change of speed along its line."""
+    if drawn.is_end_or_fixed(drawing, index):
+        return
+    out = drawn.outward(drawing, index)
+    if out is None or abs(drawn.turn_deg(drawing, index)) < CHANGE_TURN_DEG:
+        for other in (index - 1, index + 1):
+            if math.dist(drawing[index].place, drawing[other].place) > step_m + APART_M:
+                way = drawn.direction(drawing[index], drawing[other])
+                yield _with(drawing, index, shifted(drawing[index].place, way, step_m))
+    if out is None:
+        return
+    along = (-out[1], out[0])
+    back = (-out[0], -out[1])
+    for way in (back, along, (out[1], -out[0])):
+        yield _with(drawing, index, shifted(drawing[index].place, way, step_m))
+
+
+def bent(drawing: Drawing, index: int, place: Vector, away: Vector, missing_m: float) -> Iterator[Drawing]:
+    """Bend the leg to a point, or the one after it, away from a fence by a corner at a place beside it."""
+    along = drawn.distances_m(drawing)
+    longer, there = drawn.with_point_at(drawing, _along_m(drawing, along, place, index), APART_M)
+    if len(longer) > len(drawing):
+        for share in (1.0, 1.6, 2.5):
+            yield _with(longer, there, shifted(longer[there].place, away, share * missing_m + 0.05))
+
+
+def together(drawing: Drawing, index: int, missing_m: float) -> Iterator[Drawing]:
+    """Move a corner and the next one, or the one before, the same way."""
+    for other in (index - 1, index + 1):
+        if drawn.is_end_or_fixed(drawing, index) or drawn.is_end_or_fixed(drawing, other):
+            continue
+        for number in range(8):
+            way = _vector(45.0 * number)
+            for share in (0.7, 1.5, 3.0):
+                by_m = share * missing_m + 0.02
+                both = _with(drawing, index, shifted(drawing[index].place, way, by_m))
+                yield _with(both, other, shifted(drawing[other].place, way, by_m))
+
+
+def prolonged(drawing: Drawing, index: int) -> Iterator[Drawing]:
+    """Turn later, or earlier, on the line of one of its legs; the corner itself may stay as a point of the line."""
+    if drawn.is_end_or_fixed(drawing, index):
+        return
+    here = drawing[index]
+    before = drawn.direction(drawing[index - 1], here)
+    after = drawn.direction(here, drawing[index + 1])
+    for length_m in PROLONGED_M:
+        later = here.at(shifted(here.place, before, length_m))
+        earlier = here.at(shifted(here.place, after, -length_m))
+        yield (*drawing[:index], later, *drawing[index + 1 :])
+        yield (*drawing[:index], earlier, *drawing[index + 1 :])
+        yield (*drawing[:index], earlier, later, *drawing[index + 1 :])
+        yield (*drawing[:index], here, later, *drawing[index + 1 :])
+        yield (*drawing[:index], earlier, here, *drawing[index + 1 :])
+
+
+def without(drawing: Drawing, index: int) -> Iterator[Drawing]:
+    """Leave a corner out."""
+    if not drawn.is_end_or_fixed(drawing, index):
+        yield (*drawing[:index], *drawing[index + 1 :])
+
+
+def merged(drawing: Drawing, index: int) -> Iterator[Drawing]:
+    """Make one corner of this one and the next: where the outer legs meet, or half-way."""
+    if drawn.is_end_or_fixed(drawing, index) or drawn.is_end_or_fixed(drawing, index + 1):
+        return
+    here, following = drawing[index], drawing[index + 1]
+    middle = ((here.east_m + following.east_m) / 2, (here.north_m + following.north_m) / 2)
+    meeting = drawn.crossing(drawing[index - 1], here, following, drawing[index + 2])
+    for place in (meeting, middle):
+        if place is not None and math.dist(place, middle) < 3 * math.dist(here.place, following.place):
+            yield (*drawing[:index], following.at(place), *drawing[index + 2 :])
+
+
+def split(drawing: Drawing, index: int) -> Iterator[Drawing]:
+    """Make two gentler corners of one, or three: round the outside of it."""
+    out = None if drawn.is_end_or_fixed(drawing, index) else drawn.outward(drawing, index)
+    if out is None:
+        return
+    turn_deg = abs(drawn.turn_deg(drawing, index))
+    before, after = (
+        drawn.direction(drawing[index - 1], drawing[index]),
+        drawn.direction(drawing[index], drawing[index + 1]),
+    )
+    middle = _between(before, after) if turn_deg < 175 else (-out[1], out[0])
+    here = drawing[index]
+    for spacing_m in SPACINGS_M:
+        for out_m in (0.0, 0.35 * spacing_m):
+            first = shifted(shifted(here.place, out, out_m), middle, -spacing_m / 2)
+            second = shifted(shifted(here.place, out, out_m), middle, spacing_m / 2)
+            yield (*drawing[:index], here.at(first), here.at(second), *drawing[index + 1 :])
+        if turn_deg > SHARP_DEG:
+            top = here.at(shifted(here.place, out, spacing_m * 0.7))
+            sides = [here.at(shifted(here.place, middle, side * spacing_m * 0.7)) for side in (-1, 1)]
+            yield (*drawing[:index], sides[0], top, sides[1], *drawing[index + 1 :])
+    for side in (-1, 1):  # round by one side: off one leg, and back across the corner
+        for spacing_m in SPACINGS_M[1:]:
+            other = shifted(shifted(here.place, out, spacing_m / 2), middle, side * spacing_m)
+            pair = (here, here.at(other)) if side > 0 else (here.at(other), here)
+            yield (*drawing[:index], *pair, *drawing[index + 1 :])
+
+
+def slowed(drawing: Drawing, index: int, place: Vector, speed_mps: float) -> Iterator[Drawing]:
+    """Drive a stretch slower than at a speed: from before a place near a point, or the leg to it, to behind it."""
+    along = drawn.distances_m(drawing)
+    at_m = _along_m(drawing, along, place, index)
+    for slow_mps, after_m in itertools.product((slow for slow in SLOW_MPS if slow < speed_mps), SLOW_AFTER_M):
+        begin_m = max(at_m - max(SLOW_BEFORE_M[slow_mps], after_m - 1.0), 0.0)
+        end_m = min(at_m + after_m, along[-1])
+        longer, first = _with_change(drawing, begin_m, -1.0)
+        longer, last = _with_change(longer, end_m, 1.0)
+        if last > first:
+            yield tuple(
+                _slower(point, slow_mps) if first < number <= last else point
+                for number, point in enumerate(longer)
+            )
+
+
+def crawling(drawing: Drawing, spots: list[Vector], speed_mps: float) -> Drawing:
+    """Drive at the slowest speed for a good way about each of some spots near the lines."""
+    slow_mps = min(SLOW_MPS)
+    if slow_mps >= speed_mps:
+        return drawing
+    stretches = []
+    for spot in spots:
+        along = drawn.distances_m(drawing)
+        at_m = min(
+            (_along_m(drawing, along, spot, index) for index in range(1, len(drawing))),
+            key=lambda there_m: math.dist(drawn.place_at(drawing, there_m), spot),
+        )
+        begin_m, end_m = max(at_m - CRAWL_M, 0.0), min(at_m + CRAWL_M, along[-1])
+        drawing, first = _with_change(drawing, begin_m, -1.0)
+        drawing, last = _with_change(drawing, end_m, 1.0)
+        along = drawn.distances_m(drawing)
+        stretches.append((along[first] - 0.01, along[last] + 0.01))
+    along = drawn.distances_m(drawing)
+    return tuple(
+        _slower(point, slow_mps)
+        if number
+        and any(begin_m <= along[number - 1] and along[number] <= end_m for begin_m, end_m in stretches)
+        else point
+        for number, point in enumerate(drawing)
+    )
+
+
+def stopped(drawing: Drawing, index: int) -> Iterator[Drawing]:
+    """Stop at a corner (for rovers that turn on the spot)."""
+    if 0 < index < len(drawing) - 1:
+        yield (*drawing[:index], replace(drawing[index], stop_s=STOP_S), *drawing[index + 1 :])
+
+
+def headed(drawing: Drawing, heading_deg: float) -> Iterator[Drawing]:
+    """Begin with a leg the way the vehicle faces, or with two that bring it round."""
+    start = drawing[0]
+    for length_m in HEAD_M:
+        for side_deg in SIDE_DEG:
+            first = start.at(shifted(start.place, _vector(heading_deg + side_deg), length_m))
+            first = replace(first, is_fixed=False)
+            yield (start, first, *drawing[1:])
+            if side_deg:
+                second = first.at(shifted(first.place, _vector(heading_deg + 2.5 * side_deg), length_m))
+                yield (start, first, second, *drawing[1:])
+
+
+def approached(drawing: Drawing, index: int) -> Iterator[Drawing]:
+    """Come to a fixed point, or leave it, from another side."""
+    here = drawing[index]
+    for number in range(APPROACHES):
+        way = _vector(360.0 * number / APPROACHES)
+        for length_m in APPROACH_M:
+            point = replace(here.at(shifted(here.place, way, length_m)), is_fixed=False, stop_s=None)
+            if index:
+                yield (*drawing[:index], point, *drawing[index:])
+            if index < len(drawing) - 1:
+                yield (*drawing[: index + 1], point, *drawing[index + 1 :])
+
+
+def _with(drawing: Drawing, index: int, place: Vector) -> Drawing:
+    return (*drawing[:index], drawing[index].at(place), *drawing[index + 1 :])
+
+
+def _between(a: Vector, b: Vector) -> Vector:
+    length = math.hypot(a[0] + b[0], a[1] + b[1]) or 1.0
+    return ((a[0] + b[0]) / length, (a[1] + b[1]) / length)
+
+
+def _vector(bearing_deg: float) -> Vector:
+    return (math.sin(math.radians(bearing_deg)), math.cos(math.radians(bearing_deg)))
+
+
+def _with_change(drawing: Drawing, along_m: float, way: float) -> tuple[Drawing, int]:
+    """Give the lines with a point where the speed may change, and its number: on a straight line, farther on than a corner nearby."""
+    for _ in drawing:
+        along = drawn.distances_m(drawing)
+        corner_m = next(
+            (
+                along[index]
+                for index in range(1, len(drawing) - 1)
+                if abs(along[index] - along_m) < CHANGE_AWAY_M
+                and abs(drawn.turn_deg(drawing, index)) > CHANGE_TURN_DEG
+            ),
+            None,
+        )
+        if corner_m is None:
+            break
+        along_m = corner_m + way * (CHANGE_AWAY_M + 0.01)
+    return drawn.with_point_at(drawing, min(max(along_m, 0.0), along[-1]), APART_M)
+
+
+def _slower(point: drawn.DrawnPoint, speed_mps: float) -> drawn.DrawnPoint:
+    return replace(point, speed_mps=speed_mps if point.speed_mps is None else min(speed_mps, point.speed_mps))
+
+
+def _along_m(drawing: Drawing, along: list[float], place: Vector, index: int) -> float:
+    """Give how far along the leg to a point, or the one after it, a place lies."""
+    best = (math.inf, along[index])
+    for leg in (index - 1, index):
+        if 0 <= leg < len(drawing) - 1:
+            ahead = drawn.direction(drawing[leg], drawing[leg + 1])
+            length_m = along[leg + 1] - along[leg]
+            off = (place[0] - drawing[leg].east_m, place[1] - drawing[leg].north_m)
+            there_m = min(max(off[0] * ahead[0] + off[1] * ahead[1], 0.0), length_m)
+            away_m = math.dist(place, shifted(drawing[leg].place, ahead, there_m))
+            best = min(best, (away_m, along[leg] + there_m))
+    return best[1]

@@ -1,0 +1,324 @@
+"""Fitting drawn lines to a vehicle: until the band it is foreseen to drive in keeps what is required, at the least time.
+
+A descent: where the band comes too near, every means is tried at that corner and measured by the drive model; the best is kept. What
+is measured decides, not the means.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import shapely
+
+from missions.fitting import corner_means, drawn
+from missions.fitting.measuring import ENOUGH_M, Gauge
+from missions.fitting.neck import find_neck, straight_through
+from missions.geo import rounded
+from missions.ground.local_frame import LocalPoint
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+
+    from missions.fitting.drawn import Drawing, Vector
+    from missions.fitting.measuring import Measured, Trial
+    from missions.ground.ground import Ground
+    from missions.vehicle import Vehicle
+
+
+FIT_MEASUREMENTS, CRAWL_MEASUREMENTS, MOST_MEASUREMENTS = 500, 350, 1500
+"""Taken for one route, for a slow one, and for all that are tried: a search that is not done by then is given up."""
+
+_SHORT_LEG_M = 12.0
+_LEAST_GAIN_S = 0.05
+_CONTEXT = 3
+_MORE_TRIES = 12
+_TRIED_WHOLE = 3
+_EASING_STEPS_M = (6.0, 1.6, 0.5)
+_TINY_LEG_M = 2.5
+_JOINED_TURN_DEG = 80.0
+_GRID_TRIES, _GRID_MEASUREMENTS = 4, 150
+
+
+@dataclass(eq=False)
+class Fitting:
+    """Lines, a vehicle and a field; `fit` betters the lines.
+
+    Parameters
+    ----------
+    ground : Ground
+        The field.
+    vehicle : Vehicle
+        What drives.
+    heading_deg : float or None
+        Where it faces at the start; None along its first leg.
+    should_stop : callable, optional
+        Asked now and then; True ends the search.
+    most_measurements : int
+        For all lines that are fitted.
+    """
+
+    ground: Ground
+    vehicle: Vehicle
+    heading_deg: float | None
+    should_stop: Callable[[], bool] | None = None
+    most_measurements: int = MOST_MEASUREMENTS
+    measurements: int = field(default=0, init=False)
+    _until: int = field(default=0, init=False)
+
+    def fit(self, drawing: Drawing) -> tuple[Drawing, Measured]:
+        """Better lines until their band keeps what is required, or nothing helps."""
+        drawn_first = _joined(drawing)
+        self._allow(FIT_MEASUREMENTS)
+        drawing, measured = self._fitted(self._fewer(drawn_first))
+        if not measured.is_enough:
+            # Many small corners in little room: begin again, slowly all about them.
+            spots = [
+                drawing[index].place if math.isnan(place[0]) else place
+                for index, (missing_m, place) in enumerate(
+                    zip(measured.missing_m, measured.worst, strict=True)
+                )
+                if missing_m > ENOUGH_M
+            ]
+            slow = corner_means.crawling(drawn_first, spots, self.vehicle.speed_mps)
+            self._allow(CRAWL_MEASUREMENTS)
+            other, found = self._fitted(slow)
+            if sum(found.missing_m) < sum(measured.missing_m):
+                drawing, measured = other, found
+        return self._on_grid(drawing, measured)
+
+    def _on_grid(self, drawing: Drawing, measured: Measured) -> tuple[Drawing, Measured]:
+        """Round lines as the mission's items will be: the model has steps, and a millimetre may be one too many."""
+        for _ in range(_GRID_TRIES):
+            if not measured.is_enough:
+                break
+            drawing = tuple(point.at(self._rounded(point.place)) for point in drawing)
+            measured = self.measure(drawing)
+            if measured.is_enough:
+                break
+            self._allow(_GRID_MEASUREMENTS)
+            drawing = self._descend(drawing, self._all)
+            measured = self.measure(drawing)
+        return drawing, measured
+
+    def _rounded(self, place: Vector) -> Vector:
+        frame = self.ground.frame
+        east_m, north_m = frame.to_local(rounded(frame.to_lat_lon(LocalPoint(*place))))
+        return (east_m, north_m)
+
+    def _allow(self, measurements: int) -> None:
+        self._until = min(self.measurements + measurements, self.most_measurements)
+
+    def _fitted(self, drawing: Drawing) -> tuple[Drawing, Measured]:
+        for means in (self._gentle, self._all):
+            drawing = self._descend(drawing, means)
+            if self.measure(drawing).is_enough:
+                drawing = self._eased(self._fewer(drawing))
+                break
+        return drawing, self.measure(drawing)
+
+    def measure(self, drawing: Drawing) -> Measured:
+        """Measure whole lines."""
+        self.measurements += 1
+        return self._gauge.measure(drawing)
+
+    @cached_property
+    def _gauge(self) -> Gauge:
+        return Gauge(self.ground, self.vehicle, self.heading_deg)
+
+    def _away(self, place: Vector) -> Vector:
+        """Give the unit vector from the nearest fence to a place."""
+        line = shapely.shortest_line(self.ground.edge, shapely.Point(place))
+        (east_a, north_a), (east_b, north_b) = shapely.get_coordinates(line).tolist()
+        length_m = math.dist((east_a, north_a), (east_b, north_b)) or 1.0
+        return ((east_b - east_a) / length_m, (north_b - north_a) / length_m)
+
+    def _gentle(self, drawing: Drawing, index: int, measured: Measured) -> Iterator[Drawing]:
+        """Give the means that cost little time."""
+        missing_m, place = measured.missing_m[index], measured.worst[index]
+        yield from corner_means.moved(drawing, index, missing_m)
+        if not math.isnan(place[0]):
+            ahead = drawn.direction(drawing[max(index - 1, 0)], drawing[max(index, 1)])
+            narrow = find_neck(self.ground.edge, place, ahead)
+            if narrow is not None:
+                yield from straight_through(drawing, index, narrow)
+            yield from corner_means.bent(drawing, index, place, self._away(place), missing_m)
+        yield from corner_means.together(drawing, index, missing_m)
+        yield from corner_means.without(drawing, index)
+        yield from corner_means.merged(drawing, index)
+        yield from corner_means.merged(drawing, index - 1)
+        if _is_corner(drawing, index) and abs(drawn.turn_deg(drawing, index)) > 25.0:
+            yield from corner_means.split(drawing, index)
+            yield from corner_means.prolonged(drawing, index)
+        if index <= 1 and self.heading_deg is not None:
+            yield from corner_means.headed(drawing, self.heading_deg)
+        if drawing[index].is_fixed:
+            yield from corner_means.approached(drawing, index)
+
+    def _all(self, drawing: Drawing, index: int, measured: Measured) -> Iterator[Drawing]:
+        place = measured.worst[index]
+        if not math.isnan(place[0]):
+            yield from corner_means.slowed(drawing, index, place, self.vehicle.speed_mps)
+        if _is_corner(drawing, index):
+            yield from corner_means.slowed(drawing, index, drawing[index].place, self.vehicle.speed_mps)
+            if self.vehicle.can_pivot:
+                yield from corner_means.stopped(drawing, index)
+        yield from self._gentle(drawing, index, measured)
+
+    def _descend(
+        self, drawing: Drawing, means: Callable[[Drawing, int, Measured], Iterable[Drawing]]
+    ) -> Drawing:
+        """Use means at the worst points until nothing is missing or nothing helps."""
+        measured = self.measure(drawing)
+        while not measured.is_enough and not self._is_over():
+            for index in sorted(range(len(drawing)), key=lambda number: -measured.missing_m[number]):
+                if measured.missing_m[index] <= ENOUGH_M:
+                    return drawing
+                better = self._best(drawing, measured, means(drawing, index, measured))
+                if better is not None:
+                    drawing, measured = better
+                    break
+        return drawing
+
+    def _fewer(self, drawing: Drawing) -> Drawing:
+        """Leave out and merge points as long as that loses neither time nor clearance."""
+        measured = self.measure(drawing)
+        index = 1
+        while index < len(drawing) - 1 and not self._is_over():
+            candidates = list(corner_means.without(drawing, index))
+            if math.dist(drawing[index].place, drawing[index + 1].place) < _SHORT_LEG_M:
+                candidates += corner_means.merged(drawing, index)
+            better = self._best(drawing, measured, candidates)
+            if better is None:
+                index += 1
+            else:
+                drawing, measured = better
+                index = max(index - 1, 1)
+        return drawing
+
+    def _eased(self, drawing: Drawing) -> Drawing:
+        """Take back, step by step, what the route does not need."""
+        measured = self.measure(drawing)
+        for step_m in _EASING_STEPS_M:
+            for index in range(1, len(drawing) - 1):
+                while not self._is_over():
+                    better = self._best(drawing, measured, corner_means.eased(drawing, index, step_m))
+                    if better is None:
+                        break
+                    drawing, measured = better
+        return drawing
+
+    def _best(
+        self, drawing: Drawing, measured: Measured, candidates: Iterable[Drawing]
+    ) -> tuple[Drawing, Measured] | None:
+        """Give the lines that gain most, if any do, judged by the part that changes and then on the whole."""
+        trials: list[_Tried] = []
+        known_s: dict[tuple[int, int], float] = {}
+        solved_at = None
+        for number, candidate in enumerate(candidates):
+            begin, kept = _changed(drawing, candidate)
+            span = (begin, len(drawing) - kept)
+            if span not in known_s:
+                self.measurements += 1
+                known_s[span] = self._gauge.trial(drawing, *span).finish().cost_s
+            self.measurements += 1
+            trial = self._gauge.trial(candidate, begin, len(candidate) - kept)
+            tried = _Tried(known_s[span], number, trial, candidate)
+            if tried.is_enough() and solved_at is None:
+                solved_at = number
+            trials.append(tried)
+            # The means come with the cheapest first: once one has done it, a few more are looked at.
+            if self._is_over() or (solved_at is not None and number >= solved_at + _MORE_TRIES):
+                break
+        for tried in itertools.islice(_best_first(trials), _TRIED_WHOLE):
+            found = self.measure(tried.drawing)
+            more_m = sum(found.missing_m) - sum(measured.missing_m)
+            if found.cost_s < measured.cost_s - _LEAST_GAIN_S and more_m <= ENOUGH_M:
+                return tried.drawing, found
+        return None
+
+    def _is_over(self) -> bool:
+        stop = self.should_stop is not None and self.should_stop()
+        return stop or self.measurements > self._until
+
+
+def _joined(drawing: Drawing) -> Drawing:
+    """Give lines without tiny legs: pairs of points become one where the outer legs meet, or half-way."""
+    while True:
+        pairs = [
+            (math.dist(drawing[index].place, drawing[index + 1].place), index)
+            for index in range(1, len(drawing) - 2)
+            if not (drawing[index].is_fixed or drawing[index + 1].is_fixed)
+        ]
+        for length_m, index in sorted(pairs):
+            turn_deg = drawn.turn_deg(drawing, index) + drawn.turn_deg(drawing, index + 1)
+            if length_m < _TINY_LEG_M and abs(turn_deg) < _JOINED_TURN_DEG:
+                drawing = next(iter(corner_means.merged(drawing, index)), drawing)
+                break
+        else:
+            return drawing
+
+
+def _is_corner(drawing: Drawing, index: int) -> bool:
+    return 0 < index < len(drawing) - 1
+
+
+@dataclass(frozen=True, slots=True)
+class _Tried:
+    """Lines tried in the place of others, as far as they were measured.
+
+    Parameters
+    ----------
+    known_s : float
+        What the part costs that changes.
+    number : int
+        Which of those that are tried.
+    trial : Trial
+        What the part becomes.
+    drawing : tuple of DrawnPoint
+        The whole lines.
+    """
+
+    known_s: float
+    number: int
+    trial: Trial
+    drawing: Drawing
+
+    @property
+    def gain_s(self) -> float:
+        """What is gained, or less."""
+        return self.known_s - self.trial.cost_s
+
+    def is_enough(self) -> bool:
+        """Measure as far as need be to tell whether the part gains and its band keeps what is required."""
+        while self.gain_s > _LEAST_GAIN_S and self.trial.may_be_enough:
+            if not self.trial.refine():
+                return self.gain_s > _LEAST_GAIN_S and self.trial.may_be_enough
+        return False
+
+
+def _best_first(trials: Iterable[_Tried]) -> Iterator[_Tried]:
+    """Give those that gain, the one that gains most first; the others are measured only as far as it takes to know."""
+    waiting = [(-tried.gain_s, tried.number, tried) for tried in trials]
+    heapq.heapify(waiting)
+    while waiting:
+        lost_s, number, tried = heapq.heappop(waiting)
+        if -lost_s <= _LEAST_GAIN_S:
+            return
+        if tried.trial.is_finished:
+            yield tried
+        else:
+            tried.trial.refine()
+            heapq.heappush(waiting, (-tried.gain_s, number, tried))
+
+
+def _changed(old: Drawing, new: Drawing) -> tuple[int, int]:
+    """Give where the part begins in which lines differ, some points before, and how many points after it are the same."""
+    shorter = min(len(old), len(new))
+    same = next((i for i in range(shorter) if old[i] != new[i]), shorter)
+    rest = next((i for i in range(shorter - same) if old[-1 - i] != new[-1 - i]), shorter - same)
+    return max(0, same - _CONTEXT), max(0, rest - _CONTEXT)

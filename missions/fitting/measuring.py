@@ -1,0 +1,317 @@
+"""Measuring drawn lines by the drive model, step by step: what they cost in time, and what their band misses of what is required.
+
+Most lines that a search tries are worse than those it has, and mostly the first look shows it: a line through a fence, a way round. So
+the steps go from the cheapest to the dearest, each can only make lines cost more, and who compares stops as soon as the answer is sure.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+
+from missions.drive_model import convex, plan_drive
+from missions.drive_model.avoidance import with_avoidance
+from missions.fitting import corner_means, drawn
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from missions.drive_model import Drive
+    from missions.fitting.drawn import Drawing, Vector
+    from missions.ground.ground import Ground
+    from missions.vehicle import Vehicle
+
+ENOUGH_M = 0.002
+"""What may be missing: less than rounding to degE7 adds, which is required on top."""
+
+UNBOUNDED_EXTRA_M = 2.0
+"""What corners that left the model when measured (by up to 1.6 m) have to keep on top."""
+
+TURN_BACK_DEG, TURN_BACK_EXTRA_M = 165.0, 4.0
+"""A turn so sharp may be driven round either side; the model tells of one."""
+
+_MISSING_COST_S_PER_M = 100.0
+_CROSSING_COST_S = 10_000.0
+_POINT_COST_S = 0.3
+_NEAR_TURNS_COST_S = 3.0
+_TURN_DEG = 5.0
+_FAR_FROM_ENOUGH_M = 0.7
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """What the drive model says of lines.
+
+    Parameters
+    ----------
+    missing_m : tuple of float
+        What is missing of the required clearance at each point, 0 where nothing is.
+    worst : tuple of (float, float)
+        Where the band comes nearest to a fence, for each point; nan where nothing is missing.
+    cost_s : float
+        Time, and what is missing as time.
+    """
+
+    missing_m: tuple[float, ...]
+    worst: tuple[Vector, ...]
+    cost_s: float
+
+    @property
+    def worst_index(self) -> int:
+        """The point where most is missing; the first of several."""
+        return max(range(len(self.missing_m)), key=lambda number: self.missing_m[number])
+
+    @property
+    def is_enough(self) -> bool:
+        """Whether the band keeps what is required."""
+        return max(self.missing_m) <= ENOUGH_M
+
+
+class Gauge:
+    """Measures lines on a field; what was measured once, whole lines or one leg of them, is known.
+
+    Parameters
+    ----------
+    ground : Ground
+        The field.
+    vehicle : Vehicle
+        What drives.
+    heading_deg : float or None
+        Where it faces at the start; None along its first leg.
+    """
+
+    def __init__(self, ground: Ground, vehicle: Vehicle, heading_deg: float | None) -> None:
+        self.ground, self.vehicle = ground, vehicle
+        self._heading_deg = heading_deg
+        self._trials: dict[tuple[Drawing, bool, bool], Trial] = {}
+        self._legs_m: dict[tuple[Vector, Vector], float] = {}
+
+    def trial(self, drawing: Drawing, begin: int, end: int) -> Trial:
+        """Give the points from ``begin`` to before ``end`` for measuring; ends of it that are no ends of the lines do not count."""
+        key = (drawing[begin:end], begin == 0, end == len(drawing))
+        trial = self._trials.get(key)
+        if trial is None:
+            trial = self._trials[key] = Trial(self, *key)
+        return trial
+
+    def measure(self, drawing: Drawing) -> Measured:
+        """Measure whole lines."""
+        return self.trial(drawing, 0, len(drawing)).measured()
+
+    def heading_deg(self, part: Drawing, *, is_first: bool) -> float:
+        """Give where the vehicle faces as a part of the lines begins."""
+        if is_first and self._heading_deg is not None:
+            return self._heading_deg
+        east, north = drawn.direction(part[0], part[1])
+        return math.degrees(math.atan2(east, north))
+
+    def legs_m(self, part: Drawing) -> list[float]:
+        """Give the distance of each drawn leg from the fence."""
+        legs = [(a.place, b.place) for a, b in pairwise(part)]
+        new = [leg for leg in legs if leg not in self._legs_m]
+        if new:
+            self._legs_m |= zip(new, self.distances_m(shapely.linestrings(new)).tolist(), strict=True)
+        return [self._legs_m[leg] for leg in legs]
+
+    def distances_m(self, shapes: NDArray[np.object_]) -> NDArray[np.float64]:
+        """Give the distance of shapes from the fence; infinite without one."""
+        edge = self.ground.edge
+        return np.full(len(shapes), np.inf) if edge.is_empty else np.asarray(shapely.distance(shapes, edge))
+
+
+class Trial:
+    """Lines, or a part of them, as far as they were measured.
+
+    Parameters
+    ----------
+    gauge : Gauge
+        What measures.
+    part : tuple of DrawnPoint
+        The points.
+    is_first, is_last : bool
+        Whether the part begins and ends where the lines do; else its first and last point do not count.
+    """
+
+    __slots__ = (
+        "_asked_lines_m",
+        "_bands_m",
+        "_clearances_m",
+        "_cores",
+        "_drive",
+        "_duration_s",
+        "_gauge",
+        "_is_first",
+        "_is_last",
+        "_measured",
+        "_near_turns",
+        "_other_cost_s",
+        "_part",
+        "_required_m",
+        "_steps",
+        "_waypoints",
+        "cost_s",
+        "missing_m",
+    )
+
+    missing_m: NDArray[np.float64]
+    """What is missing at each point by the steps taken; more may be."""
+
+    cost_s: float
+    """What the lines cost by the steps taken, or more."""
+
+    _drive: Drive
+    _cores: NDArray[np.object_]
+    _bands_m: NDArray[np.float64]
+    _waypoints: NDArray[np.int64]
+    _clearances_m: NDArray[np.float64]
+
+    def __init__(self, gauge: Gauge, part: Drawing, is_first: bool, is_last: bool) -> None:  # noqa: FBT001 - two of a kind
+        self._gauge, self._part = gauge, part
+        self._is_first, self._is_last = is_first, is_last
+        self._required_m = np.array([point.required_m for point in part])
+        self._duration_s = 0.0
+        self._near_turns = _near_turns(part)
+        self._measured: Measured | None = None
+        self._steps: list[Callable[[], None]] = [self._avoid, self._dive, self._look_at_band, self._time]
+        self._look_at_lines()
+
+    def refine(self) -> bool:
+        """Take the next step; False where all are taken."""
+        if self._steps:
+            self._steps.pop()()
+        return not self.is_finished
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether all steps are taken."""
+        return not self._steps
+
+    @property
+    def may_be_enough(self) -> bool:
+        """Whether nothing is known to be missing; with all steps taken, whether the band keeps what is required."""
+        return bool(self.missing_m.max() <= ENOUGH_M)
+
+    def finish(self) -> Trial:
+        """Take all steps."""
+        while self.refine():
+            pass
+        return self
+
+    def measured(self) -> Measured:
+        """Give what was found, all steps taken, and where the band comes too near."""
+        if self._measured is None:
+            self.finish()
+            self._measured = Measured(tuple(self.missing_m.tolist()), self._worst(), self.cost_s)
+        return self._measured
+
+    def _look_at_lines(self) -> None:
+        lines_m = np.array([np.inf, *self._gauge.legs_m(self._part)])
+        asked_m = np.array([point.line_m for point in self._part])
+        self._asked_lines_m = np.maximum(asked_m - lines_m, 0.0)
+        self._other_cost_s = _CROSSING_COST_S * int(((lines_m <= 0) & np.isfinite(asked_m)).sum())
+        self._miss(self._asked_lines_m.copy())
+
+    def _time(self) -> None:
+        part = self._part
+        self._drive = plan_drive(
+            drawn.places(part),
+            self._gauge.vehicle,
+            heading_deg=self._gauge.heading_deg(part, is_first=self._is_first),
+            speeds=drawn.speeds(part),
+            stops=drawn.stops(part),
+        )
+        self._duration_s = float(self._drive.arrivals_s[-1])
+        self._add_up()
+
+    def _look_at_band(self) -> None:
+        pieces = self._drive.pieces
+        self._cores = convex(pieces.hulls)
+        self._bands_m, self._waypoints = np.array(pieces.bands_m), np.array(pieces.waypoints)
+        self._clearances_m = self._gauge.distances_m(self._cores) - self._bands_m
+        self._settle()
+
+    def _dive(self, begin: int = 0) -> None:
+        """Count pieces inside a fence for more, the deeper they lie."""
+        inside = begin + np.flatnonzero(self._clearances_m[begin:] <= -self._bands_m[begin:])
+        if len(inside):
+            beyond = shapely.difference(self._cores[inside], self._gauge.ground.allowed)
+            self._clearances_m[inside] -= np.sqrt(shapely.area(beyond)) + shapely.length(beyond) / 10
+            self._settle()
+
+    def _avoid(self) -> None:
+        """Count what the vehicle's avoidance adds, where the band is not far from enough without it."""
+        gauge = self._gauge
+        if (self._required_m[self._waypoints] - self._clearances_m).max() >= _FAR_FROM_ENOUGH_M:
+            return
+        band = self._drive.with_cores(self._cores)
+        slowed = with_avoidance(band, gauge.vehicle, gauge.ground.edge)
+        if slowed is not band:
+            plain = len(self._cores)
+            more_m = gauge.distances_m(slowed.cores[plain:]) - slowed.bands_m[plain:]
+            self._cores, self._bands_m, self._waypoints = slowed.cores, slowed.bands_m, slowed.waypoints
+            self._clearances_m = np.concatenate([self._clearances_m, more_m])
+            self._steps.append(partial(self._dive, plain))
+            self._settle()
+
+    def _settle(self) -> None:
+        """Count what the band misses at each point."""
+        required_m = self._required_m
+        least_m = np.full(len(required_m), np.inf)
+        np.minimum.at(least_m, self._waypoints, self._clearances_m)
+        missing_m = np.maximum(required_m - least_m, self._asked_lines_m)
+        for corner in self._drive.routes[0].corners:
+            turns_back = abs(corner.turn_deg) > TURN_BACK_DEG and not corner.pivots
+            if not corner.bounded or turns_back:
+                here = slice(corner.waypoint, corner.waypoint + 2)
+                extra_m = TURN_BACK_EXTRA_M if turns_back else UNBOUNDED_EXTRA_M
+                missing_m[here] = np.maximum(missing_m[here], required_m[here] + extra_m - least_m[here])
+        self._miss(missing_m)
+
+    def _miss(self, missing_m: NDArray[np.float64]) -> None:
+        if not self._is_first:
+            missing_m[0] = 0.0
+        if not self._is_last:
+            missing_m[-1] = 0.0
+        self.missing_m = missing_m
+        self._add_up()
+
+    def _add_up(self) -> None:
+        self.cost_s = (
+            self._duration_s
+            + _POINT_COST_S * len(self._part)
+            + _NEAR_TURNS_COST_S * self._near_turns
+            + _MISSING_COST_S_PER_M * float(self.missing_m.sum())
+            + self._other_cost_s
+        )
+
+    def _worst(self) -> tuple[Vector, ...]:
+        pieces = np.full(len(self._part), -1)
+        for piece in np.argsort(-self._clearances_m):
+            pieces[self._waypoints[piece]] = piece
+        return tuple(
+            self._nearest(int(piece)) if missing > ENOUGH_M and piece >= 0 else (math.nan, math.nan)
+            for piece, missing in zip(pieces, self.missing_m, strict=True)
+        )
+
+    def _nearest(self, piece: int) -> Vector:
+        line = shapely.shortest_line(self._cores[piece], self._gauge.ground.edge)
+        east_m, north_m = shapely.get_coordinates(line)[0].tolist()
+        return (east_m, north_m)
+
+
+def _near_turns(drawing: Drawing) -> int:
+    """Count turns so near to the next that a rover drives them as one."""
+    turns = [abs(drawn.turn_deg(drawing, index)) > _TURN_DEG for index in range(1, len(drawing) - 1)]
+    return sum(
+        math.dist(drawing[index + 1].place, drawing[index + 2].place) < corner_means.APART_M
+        for index, (turn, following) in enumerate(pairwise(turns))
+        if turn and following
+    )

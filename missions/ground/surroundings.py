@@ -1,0 +1,125 @@
+"""What a plan starts from: the ends of the route, the heading, and the ground about them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from missions.errors import NoRouteError, SituationError
+from missions.fence import PolygonZone
+from missions.geo import distance_m
+from missions.ground.ground import Ground, check_ground, lay_out
+from missions.ground.known_fence import known_fence
+from missions.ground.local_frame import check_latitude, frame_around
+from missions.ground.seams import with_seams
+from missions.items import last_place
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from missions.geo import LatLon
+    from missions.request import Request
+    from missions.situation import Situation
+    from missions.vehicle import Vehicle
+
+MAX_FIELD_M = 100_000.0
+"""No place of a plan is further from the fence's centre: the local plane's distances are good for a field, not for a country."""
+
+
+def route_ends(situation: Situation, request: Request) -> tuple[LatLon, tuple[LatLon, ...]]:
+    """Give start and targets: what is asked for, else what the situation tells.
+
+    Raises
+    ------
+    SituationError
+        One of them is not known.
+    """
+    start = request.start
+    if start is None and situation.pose is not None:
+        start = situation.pose.value.position
+    if start is None and situation.home is not None:
+        start = situation.home.value
+    if start is None:
+        raise SituationError("the start is not known: no position and no home; give one (--start LAT,LON)")
+    targets = request.targets
+    if not targets and situation.target is not None:
+        targets = (situation.target.value,)
+    if not targets and situation.mission is not None:
+        place = last_place(situation.mission.value.items)
+        targets = (place,) if place else ()
+    if not targets:
+        raise SituationError(
+            "the target is not known: none was sent and no mission holds one; give one (--target LAT,LON)"
+        )
+    return start, targets
+
+
+def heading_at(situation: Situation, start: LatLon) -> float | None:
+    """Give the vehicle's heading where the route starts from where it stands, degrees clockwise from north."""
+    pose = situation.pose
+    return pose.value.heading_deg if pose is not None and pose.value.position == start else None
+
+
+def ground_for(situation: Situation, vehicle: Vehicle, ends: Sequence[LatLon]) -> Ground:
+    """Lay the situation's fence out in the plane as the vehicle's parameters say.
+
+    Raises
+    ------
+    FenceMissingError, FenceError, InvalidPositionError, SituationError, NoRouteError
+        As `missions.planning.plan.plan`.
+    """
+    fence = known_fence(situation)
+    positions = [
+        position
+        for zone in fence.zones
+        for position in (zone.vertices if isinstance(zone, PolygonZone) else (zone.centre,))
+    ]
+    frame = frame_around(positions)
+    home = situation.home.value if situation.home and vehicle.fence.enforces_home_circle else None
+    named = [*(("", position) for position in positions), *([("home ", home)] if home else [])]
+    for name, position in named:
+        if (away_m := distance_m(frame.origin, position)) > MAX_FIELD_M:
+            raise SituationError(f"{name}{_too_far(position, frame.origin, away_m)}", distance_m=away_m)
+        check_latitude(position)
+    near = [end for end in ends if distance_m(frame.origin, end) <= MAX_FIELD_M]
+    for end in near:
+        check_latitude(end)
+    ground = lay_out(
+        fence,
+        frame,
+        union=vehicle.fence.union,
+        home=home,
+        home_radius_m=vehicle.fence.radius_m if vehicle.fence.enforces_home_circle else None,
+        around=near,
+    )
+    check_ground(ground)
+    for end in ends:  # last: a fence that cannot be used is no matter of the target
+        _check_reach(end, frame.origin)
+    return ground
+
+
+def route_ground(situation: Situation, vehicle: Vehicle, ends: Sequence[LatLon]) -> Ground:
+    """Return the ground for a route: as `ground_for`, and the seams at which the vehicle would stop are obstacles too."""
+    return with_seams(ground_for(situation, vehicle, ends), vehicle)
+
+
+def _check_reach(end: LatLon, centre: LatLon) -> None:
+    """Refuse a start or target so far away that no plane holds it and the fence: nothing can be driven there.
+
+    Raises
+    ------
+    NoRouteError
+        It is too far away.
+    """
+    if (away_m := distance_m(centre, end)) > MAX_FIELD_M:
+        raise NoRouteError(
+            f"no route: {_too_far(end, centre, away_m)}",
+            distance_m=away_m,
+            advice="is it the right place and the right fence? Latitude comes first: LAT,LON",
+        )
+
+
+def _too_far(position: LatLon, centre: LatLon, away_m: float) -> str:
+    return (
+        f"{position} is {away_m / 1000:.0f} km from the fence's centre {centre}; "
+        f"at most {MAX_FIELD_M / 1000:.0f} km can be planned"
+    )

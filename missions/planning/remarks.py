@@ -1,0 +1,113 @@
+"""What is to be said of a plan beside its figures."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from missions.drive_model import beyond_measured
+from missions.geo import distance_m
+from missions.planning.lines import ROUNDING_RESERVE_M
+from missions.vehicle.item_limit import storage_remarks
+from missions.words import metres
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from missions.clearance import Promise
+    from missions.geo import LatLon
+    from missions.routing.driven_route import DrivenRoute
+    from missions.situation import Situation
+    from missions.vehicle import Vehicle
+
+
+_DRIVEN_BY = frozenset(
+    {
+        "WP_SPEED",
+        "WP_RADIUS",
+        "TURN_RADIUS",
+        "ATC_TURN_MAX_G",
+        "ATC_ACCEL_MAX",
+        "WP_PIVOT_ANGLE",
+        "SERVO1_FUNCTION",
+        "NAV_ACC_RAD",
+        "RO_SPEED_LIM",
+        "CA_AIRFRAME",
+    }
+)
+"""Parameters whose defaults a driver should see when they stand in for the vehicle's own."""
+
+
+_MOST_NAMED = 5
+
+
+def parameter_remarks(situation: Situation) -> list[str]:
+    """Return what the vehicle told of its parameters that cannot be."""
+    return [
+        *no_number_remarks(situation.no_numbers, situation.parameters),
+        *storage_remarks(situation.parameters),
+    ]
+
+
+def no_number_remarks(no_numbers: Mapping[str, str], parameters: Mapping[str, float]) -> list[str]:
+    """Return which parameters came as no number, and what counts in their place."""
+    remarks = [
+        f"{name} came as {came}, which is no number: "
+        + (f"it stays at {parameters[name]:g}, as it was told before" if name in parameters else "not known")
+        for name, came in no_numbers.items()
+    ]
+    more = len(remarks) - _MOST_NAMED
+    return [*remarks[:_MOST_NAMED], f"and {more} more parameters"] if more > 0 else remarks
+
+
+def lead_away_remarks(found: DrivenRoute, least_m: float) -> list[str]:
+    """Say how near the start stands to a fence, and what the route does about it."""
+    if not found.lead_away:
+        return []
+    if found.start_clearance_m < 0:
+        return [
+            f"the start is on forbidden ground, {-found.start_clearance_m:.2f} m from free ground: the first leg drives out of it"
+        ]
+    if found.lead_away_m is None:
+        distance = f"{metres(found.start_clearance_m)} from a fence, nearer than {metres(least_m)}"
+        return [f"the start stands {distance}: the route first leads away, never nearer than that"]
+    distance = (
+        f"{metres(found.start_clearance_m)} from a fence, too near to leave it with {metres(least_m)} kept"
+    )
+    nearest_m = max(found.lead_away_m, 0.0)
+    return [
+        f"the start stands {distance}: the route first leads away; turning there the vehicle may come as near as {nearest_m:.2f} m"
+    ]
+
+
+def moved_target_remarks(targets: Sequence[LatLon], reached: Sequence[LatLon]) -> list[str]:
+    """Say which targets were moved, and how far."""
+    return [
+        f"the target {asked} is blocked: moved {distance_m(asked, found):.2f} m to {found}"
+        for asked, found in zip(targets, reached, strict=True)
+        if distance_m(asked, found) > ROUNDING_RESERVE_M
+    ]
+
+
+def drive_remarks(
+    vehicle: Vehicle,
+    slowest_mps: float | None,
+    heading_deg: float | None,
+    asked: Promise,
+    driven_m: float,
+    found: DrivenRoute,
+) -> list[str]:
+    """Return what the drive model's word rests on."""
+    if asked.allowance_m == 0:
+        return []
+    warnings = list(beyond_measured(vehicle, slowest_mps))
+    if heading_deg is None:
+        warnings.append("the vehicle's heading is not told: it is taken to face along the first leg")
+    assumed = [f"{one.parameter} {one.value:g}" for one in vehicle.assumed if one.parameter in _DRIVEN_BY]
+    if assumed:
+        warnings.append(f"how the vehicle drives is not told in full; taken as {', '.join(assumed)}")
+    if asked.allowance_m and driven_m < asked.promised_m - 0.005 and not found.lead_away:
+        warnings.append(
+            f"the drive model foresees {metres(driven_m)} at the nearest while driving, less than the {metres(asked.promised_m)} promised "
+            f"with an allowance of {asked.allowance_m:g} m"
+        )
+    return warnings

@@ -1,0 +1,68 @@
+"""Leaving the start: which ways a vehicle can take from where it stands and faces, and what it keeps to the fences meanwhile."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from missions.drive_model import envelope
+from missions.ground.local_frame import LocalPoint
+
+if TYPE_CHECKING:
+    from missions.ground.ground import Ground
+    from missions.vehicle import Vehicle
+
+WAYS = 24
+LENGTHS_M = (16.0, 8.0, 4.0)
+ROOM_M = 6.5
+"""With so much more room than it has to keep a vehicle can turn any way: measured swings reach 3.6 m."""
+
+
+@dataclass(frozen=True, slots=True)
+class Departure:
+    """A straight first leg.
+
+    Parameters
+    ----------
+    there : LocalPoint
+        Where it leads.
+    kept_m : float
+        What the driven band keeps to any fence.
+    turn_deg : float
+        How far the vehicle has to turn for it.
+    """
+
+    there: LocalPoint
+    kept_m: float
+    turn_deg: float
+
+
+def departures(
+    ground: Ground, vehicle: Vehicle, start: LocalPoint, heading_deg: float | None
+) -> list[Departure]:
+    """Give first legs all round, the one that keeps most first.
+
+    Parameters
+    ----------
+    ground : Ground
+        The field.
+    vehicle : Vehicle
+        What drives.
+    start : LocalPoint
+        Where it stands.
+    heading_deg : float or None
+        Where it faces, clockwise from north; None is along each leg.
+    """
+    found = []
+    for number in range(WAYS):
+        # Ways beside the present heading: straight on is the first of them.
+        course_deg = (heading_deg or 0.0) + 360.0 * number / WAYS
+        east, north = math.sin(math.radians(course_deg)), math.cos(math.radians(course_deg))
+        for length_m in LENGTHS_M:
+            there = LocalPoint(start.east_m + length_m * east, start.north_m + length_m * north)
+            facing_deg = course_deg if heading_deg is None else heading_deg
+            band = envelope([start, there], vehicle, heading_deg=facing_deg % 360.0)
+            turn_deg = abs((course_deg - facing_deg + 180.0) % 360.0 - 180.0)
+            found.append(Departure(there, band.clearance_m(ground.edge), turn_deg))
+    return sorted(found, key=lambda one: -one.kept_m)

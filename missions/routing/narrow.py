@@ -1,0 +1,94 @@
+"""Narrow ground: the widest route there is, and between which fences its narrowest place lies."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+import pbpp
+from missions.fence import ZoneKind
+from missions.ground.local_frame import LocalPoint
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from missions.geo import LatLon
+    from missions.ground.ground import Ground
+
+
+@dataclass(frozen=True, slots=True)
+class NarrowestPlace:
+    """The narrowest place of the widest route between two points.
+
+    Parameters
+    ----------
+    clearance_m : float
+        The most clearance any route between them keeps; infinite without a fence.
+    between : tuple of str
+        The fences that face each other there; one where an end stands near a fence.
+    at : LatLon or None
+        The place.
+    """
+
+    clearance_m: float
+    between: tuple[str, ...]
+    at: LatLon | None
+
+    @property
+    def where(self) -> str:
+        """Say where, after a comma; nothing where it is not known."""
+        if self.at is None:
+            return ""
+        fences = " and ".join(dict.fromkeys(self.between))
+        between = "between" if len(set(self.between)) > 1 else "at"
+        return f", narrowest {between} {fences} at {self.at}" if fences else f", narrowest at {self.at}"
+
+    def __str__(self) -> str:
+        return f"the widest keeps {self.clearance_m:.2f} m{self.where}" if self.at else "any width is free"
+
+
+def narrowest_place(
+    ground: Ground,
+    start: LocalPoint,
+    goal: LocalPoint,
+    should_stop: Callable[[], bool] | None = None,
+) -> NarrowestPlace | None:
+    """Find the widest route between two points and its narrowest place; None where there is no route at all."""
+    inclusions, exclusions = ground.areas(ZoneKind.INCLUSION), ground.areas(ZoneKind.EXCLUSION)
+    try:
+        way = pbpp.widest(inclusions, exclusions, start, goal, union=ground.union, should_stop=should_stop)
+    except pbpp.PlanningError:
+        return None
+    if not way.parts:
+        return NarrowestPlace(way.clearance_m, (), None)
+    middle = np.mean(way.points, axis=0)
+    at = ground.frame.to_lat_lon(LocalPoint(float(middle[0]), float(middle[1])))
+    return NarrowestPlace(way.clearance_m, tuple(_part_name(ground, part) for part in way.parts), at)
+
+
+def narrowest_places(
+    ground: Ground, points: Sequence[LocalPoint], should_stop: Callable[[], bool] | None = None
+) -> list[NarrowestPlace | None]:
+    """Find the narrowest place on the way from each point to the next."""
+    return [narrowest_place(ground, a, b, should_stop) for a, b in itertools.pairwise(points)]
+
+
+def widest_clearance_m(
+    ground: Ground, points: Sequence[LocalPoint], should_stop: Callable[[], bool] | None = None
+) -> float:
+    """Give the most clearance a route over all points keeps; 0 where there is no route."""
+    return kept_m(narrowest_places(ground, points, should_stop))
+
+
+def kept_m(places: Sequence[NarrowestPlace | None]) -> float:
+    """Give what a route by all these places keeps; 0 where there is no route."""
+    return min((place.clearance_m if place else 0.0 for place in places), default=0.0)
+
+
+def _part_name(ground: Ground, part: tuple[str, int]) -> str:
+    kind, index = part
+    names = [barrier.name for barrier in ground.barriers if barrier.kind == kind]
+    return names[index] if names else "the edge of the field"

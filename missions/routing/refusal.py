@@ -1,0 +1,77 @@
+"""Where a route could not be fitted: said in words, and kept away from by the next one."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import shapely
+from shapely import Point
+
+from missions.errors import NoRouteError
+from missions.fitting import drawn
+from missions.ground.local_frame import LocalPoint
+from missions.words import metres
+
+if TYPE_CHECKING:
+    from shapely import Polygon
+
+    from missions.fitting.drawn import Drawing
+    from missions.fitting.measuring import Measured
+    from missions.ground.ground import Ground
+    from missions.routing.route import Route
+
+_START_ADVICE = "the vehicle has no room to turn where it stands: turn it by hand to face its way, or move it, or ask for less with --clearance"
+AT_START = 2
+"""Points where most is missing because of how the route begins."""
+
+_BLOCK_M = 0.5
+_BLOCK_AWAY_M = 8.0
+
+
+def refusal(
+    ground: Ground,
+    required_m: float,
+    reserve_m: float,
+    drawing: Drawing,
+    measured: Measured,
+    *,
+    held_at_start: bool,
+) -> NoRouteError:
+    """Say which corner refused, by how much, and at which fence; and whether it is that the vehicle cannot turn where it stands."""
+    index = measured.worst_index
+    point = drawing[index]
+    position = ground.frame.to_lat_lon(LocalPoint(*point.place))
+    barrier, _ = ground.nearest(Point(measured.worst[index]))
+    fence = barrier.name if barrier else "no fence in particular"
+    turn_deg = drawn.turn_deg(drawing, index) if 0 < index < len(drawing) - 1 else 0.0
+    kept_m = point.required_m - reserve_m - measured.missing_m[index]
+    where = (
+        "the start"
+        if index == 0
+        else "the target"
+        if index == len(drawing) - 1
+        else f"the corner of {abs(turn_deg):.0f}° at {position}"
+    )
+    advice = {"advice": _START_ADVICE} if index == 0 or held_at_start else {}
+    return NoRouteError(
+        f"no route keeps {metres(required_m)} while driving: at {where} this vehicle would come as near as "
+        f"{metres(max(kept_m, 0.0))} to {fence}, whatever was tried",
+        clearance_m=round(required_m, 3),
+        corner=list(position),
+        turn_deg=round(turn_deg, 1),
+        kept_m=round(max(kept_m, 0.0), 3),
+        fences=[fence],
+        at_start=index <= AT_START,
+        **advice,
+    )
+
+
+def block(route: Route, drawing: Drawing, measured: Measured) -> Polygon:
+    """Give a small square on a route near where most is missing, to send the next one elsewhere."""
+    index = measured.worst_index
+    place = measured.worst[index] if not math.isnan(measured.worst[index][0]) else drawing[index].place
+    line = shapely.LineString(route.points)
+    margin_m = min(_BLOCK_AWAY_M, line.length / 3)
+    along_m = min(max(line.project(Point(place)), margin_m), line.length - margin_m)
+    return line.interpolate(along_m).buffer(_BLOCK_M, cap_style="square")

@@ -1,0 +1,385 @@
+"""A drawn route in the plane: from start over targets, keeping the clearance, leading away first where the start is nearer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+from shapely import LineString, MultiPolygon, Point, Polygon
+
+import pbpp
+from missions.errors import NoRouteError, RouteError, StartBlockedError, TargetBlockedError
+from missions.fence import ZoneKind
+from missions.geo import bearing_deg, distance_m
+from missions.ground.local_frame import LocalPoint
+from missions.routing.narrow import narrowest_place
+from missions.words import metres
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from missions.geo import LatLon
+    from missions.ground.ground import Ground
+
+_INSIDE_M = 0.005
+"""Points put on the edge of free space stand this far inside it, so that rounding leaves them there."""
+
+_ROUNDED_EXCESS_M = 0.005
+"""What pbpp's round offsets may keep beyond the clearance, and a little."""
+
+_WIDER = (1, 4, 16, 64)
+
+_CHORDS = 64
+_CHORD_SHARE = 1.0002
+"""By so much an arc of that many chords a quarter turn must be wider to keep its distance all along."""
+
+
+@dataclass(frozen=True, eq=False)
+class Route:
+    """Straight lines through local points.
+
+    Parameters
+    ----------
+    points : (n, 2) array
+        East and north in metres, start first.
+    lead_away : int
+        How many of the first legs lead away from a fence that the start stands nearer to than the clearance.
+    start_clearance_m : float
+        The start's distance to the nearest fence; negative on forbidden ground, by the distance to free ground.
+    target_indices : tuple of int
+        Which points are the targets, in order.
+    blocks : int
+        Blocks of the partition the planner searched.
+    """
+
+    points: NDArray[np.float64]
+    lead_away: int
+    start_clearance_m: float
+    target_indices: tuple[int, ...]
+    blocks: int
+
+    @property
+    def length_m(self) -> float:
+        """How long the lines are."""
+        return float(np.hypot(*np.diff(self.points, axis=0).T).sum())
+
+
+def find_route(  # noqa: PLR0913 - what is sought, and how
+    ground: Ground,
+    start: LocalPoint,
+    targets: list[LocalPoint],
+    clearance_m: float,
+    *,
+    promised_m: float | None = None,
+    blocked: Sequence[Polygon] = (),
+    method: str = "optimal",
+    snap_m: float = 0.0,
+    escape: bool = False,
+    should_stop: Callable[[], bool] | None = None,
+) -> Route:
+    """Find the shortest route over the targets in the order given.
+
+    Parameters
+    ----------
+    ground : Ground
+        The field.
+    start, targets : LocalPoint
+        Where from, and where to.
+    clearance_m : float
+        What the drawn lines keep to any fence; where the start is nearer, the route first leads away, never nearer than the start is.
+    promised_m : float, optional
+        What of it is promised while driving, for errors to say.
+    blocked : sequence of shapely polygon
+        Places to keep away from as from exclusions, to find another way round.
+    method : str
+        ``optimal``, ``pbpp-taut`` or ``pbpp``.
+    snap_m : float
+        A blocked target is moved to free ground within this distance.
+    escape : bool
+        Whether a start on forbidden ground is left by the shortest straight line that crosses no other forbidden ground.
+    should_stop : callable, optional
+        Asked now and then; True ends the search.
+
+    Raises
+    ------
+    StartBlockedError, TargetBlockedError, NoRouteError
+        With the fences that are to blame and the distances in metres.
+    """
+    planner = pbpp.Planner(
+        ground.areas(ZoneKind.INCLUSION),
+        [*ground.areas(ZoneKind.EXCLUSION), *blocked],
+        clearance_m=clearance_m,
+        union=ground.union,
+    )
+    search = _Search(ground, planner, clearance_m, method, should_stop, promised_m, bool(blocked))
+    start_clearance_m = search.check_start(start, escape=escape)
+    goals = [search.free_target(target, snap_m, start) for target in targets]
+    lead: list[LocalPoint] = [start]
+    if start_clearance_m < 0:
+        lead = search.escape(start, goals[0])
+    elif not search.is_free(start):
+        lead = search.lead_away(start, start_clearance_m, goals[0])
+    points = [np.array(lead)]
+    target_indices = []
+    blocks = 0
+    here = lead[-1]
+    for goal in goals:
+        path = search.path(here, goal)
+        points.append(path.points[1:])
+        target_indices.append(sum(map(len, points)) - 1)
+        blocks = max(blocks, path.blocks)
+        here = goal
+    return Route(np.concatenate(points), len(lead) - 1, start_clearance_m, tuple(target_indices), blocks)
+
+
+def simplified(ground: Ground, route: Route, clearance_m: float) -> Route:
+    """Give the route with fewer points: those left out whose neighbours a straight line joins at the clearance."""
+    fixed = {*range(route.lead_away + 1), *route.target_indices}
+    kept = [0]
+    while kept[-1] < len(route.points) - 1:
+        here = kept[-1]
+        last = min(index for index in fixed | {len(route.points) - 1} if index > here)
+        reachable = (
+            index
+            for index in range(last, here + 1, -1)
+            if ground.clearance_m(LineString(route.points[[here, index]])) >= clearance_m
+        )
+        kept.append(next(reachable, here + 1))
+    return replace(
+        route,
+        points=route.points[kept],
+        target_indices=tuple(kept.index(index) for index in route.target_indices),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """One planner and the field it plans in."""
+
+    ground: Ground
+    planner: pbpp.Planner
+    clearance_m: float
+    method: str
+    should_stop: Callable[[], bool] | None
+    promised_m: float | None = None
+    is_other_way: bool = False
+
+    @property
+    def asked(self) -> str:
+        """The clearance in words."""
+        if self.promised_m is None:
+            return metres(self.clearance_m)
+        return f"{metres(self.promised_m)} while driving ({metres(self.clearance_m)} drawn)"
+
+    def is_free(self, point: LocalPoint) -> bool:
+        """Whether the planner takes a point: mitred offsets hold it, or its true distance is what round ones hold."""
+        here = Point(point)
+        if self.planner.free_space.covers(here):
+            return True
+        return self.ground.clearance_m(here) >= self.clearance_m + _ROUNDED_EXCESS_M
+
+    @cached_property
+    def roomy(self) -> list[Polygon]:
+        """Where points are free with some millimetres to spare, part by part.
+
+        Raises
+        ------
+        NoRouteError
+            There is no such place.
+        """
+        reach_m = self.clearance_m * _CHORD_SHARE + _ROUNDED_EXCESS_M + _INSIDE_M
+        inner = self.ground.allowed.buffer(-reach_m, quad_segs=_CHORDS)
+        parts: list[Polygon] = [part for part in shapely.get_parts(inner) if not part.is_empty]
+        if not parts:
+            raise NoRouteError(
+                f"nowhere in the field is {metres(self.clearance_m)} away from every fence",
+                clearance_m=self.clearance_m,
+            )
+        return parts
+
+    def check_start(self, start: LocalPoint, *, escape: bool) -> float:
+        """Give the start's clearance; on ground that it may escape from, the distance to free ground below 0.
+
+        Raises
+        ------
+        StartBlockedError
+            The start is on forbidden ground.
+        """
+        point = Point(start)
+        forbidding = self.ground.forbidding(point)
+        if not forbidding and self.ground.allowed.covers(point):
+            return self.ground.clearance_m(point)
+        free = self.ground.nearest_point(self.ground.allowed, point)
+        distance, bearing, position = self._way(start, free)
+        if escape:
+            return -max(distance, _INSIDE_M)
+        names = _names([barrier.name for barrier in forbidding])
+        raise StartBlockedError(
+            f"the start is on forbidden ground ({self._position(start)}): {names}; "
+            f"free ground is {distance:.2f} m away, bearing {round(bearing) % 360}°, at {position}",
+            fences=[barrier.name for barrier in forbidding],
+            distance_m=round(distance, 3),
+            bearing_deg=round(bearing, 1),
+            nearest_free=list(position),
+        )
+
+    def free_target(self, target: LocalPoint, snap_m: float, start: LocalPoint) -> LocalPoint:
+        """Give the target, or the nearest free point within ``snap_m``, on the start's side of the fences if there is one."""
+        if self.is_free(target):
+            return target
+        point = Point(target)
+        free = self.ground.nearest_point(self._component(start), point)
+        if not snap_m or point.distance(free) > snap_m:
+            free = self.ground.nearest_point(MultiPolygon(self.roomy), point)
+        distance, bearing, position = self._way(target, free)
+        if distance <= snap_m:
+            return LocalPoint(free.x, free.y)
+        forbidding = self.ground.forbidding(point)
+        nearest, gap_m = self.ground.nearest(point)
+        if forbidding:
+            names = [barrier.name for barrier in forbidding]
+            problem = f"the target is on forbidden ground ({self._position(target)}): {_names(names)}"
+        else:
+            names = [nearest.name] if nearest else []
+            problem = f"the target is {metres(gap_m)} from {_names(names)}, nearer than {self.asked}"
+        raise TargetBlockedError(
+            f"{problem}; the nearest free point is {distance:.2f} m away, bearing {round(bearing) % 360}°, at {position}",
+            fences=names,
+            clearance_m=round(self.clearance_m, 3),
+            distance_m=round(distance, 3),
+            bearing_deg=round(bearing, 1),
+            nearest_free=list(position),
+        )
+
+    def path(self, start: LocalPoint, goal: LocalPoint) -> pbpp.PlannedPath:
+        """Plan between two free points."""
+        try:
+            return self.planner.plan(start, goal, method=self.method, should_stop=self.should_stop)
+        except (pbpp.NoPathError, pbpp.StartBlockedError, pbpp.GoalBlockedError):
+            raise self._no_route(start, goal) from None
+
+    def lead_away(self, start: LocalPoint, start_clearance_m: float, goal: LocalPoint) -> list[LocalPoint]:
+        """Give the first points of a route that leaves a fence's neighbourhood without ever coming nearer to one.
+
+        Little further than need be: of the places not much farther than the nearest, the one most on the way.
+        """
+        free = self._component(goal)
+        nearest = self.ground.nearest_point(free, Point(start))
+        onward = self.path(LocalPoint(nearest.x, nearest.y), goal).points[1]
+        reach_m = 2 * Point(start).distance(nearest) + 1.0
+        for wider in _WIDER:  # out of a corridor it may be far
+            exits = self._exits(start, start_clearance_m, free, wider * reach_m)
+            if len(exits):
+                detours_m = np.hypot(*(exits - start).T) + np.hypot(*(exits - onward).T)
+                east_m, north_m = exits[np.argmin(detours_m)].tolist()
+                return [start, LocalPoint(east_m, north_m)]
+        raise self._no_route(start, goal)
+
+    def escape(self, start: LocalPoint, goal: LocalPoint) -> list[LocalPoint]:
+        """Give the first points of a route off forbidden ground: straight out, across no other forbidden ground.
+
+        Raises
+        ------
+        StartBlockedError
+            Every such line crosses other forbidden ground.
+        """
+        ground = self.ground
+        free = self._component(goal)
+        forbidding = ground.forbidding(Point(start))
+        own = shapely.union_all(
+            [
+                barrier.area if barrier.kind is ZoneKind.EXCLUSION else ground.bounds.difference(barrier.area)
+                for barrier in forbidding
+            ]
+        )
+        for wider in _WIDER:
+            reach_m = wider * (2 * Point(start).distance(free) + 1.0)
+            near = free.boundary.intersection(Point(start).buffer(reach_m))
+            exits = shapely.get_coordinates(near.segmentize(max(0.25, reach_m / 200)))
+            legs = shapely.linestrings([[start, xy] for xy in exits]) if len(exits) else np.array([])
+            outside = shapely.difference(legs, ground.allowed)
+            # Straight out: forbidden ground ahead is that of the start, in one piece.
+            keeps = (shapely.length(shapely.difference(outside, own)) < _INSIDE_M) & (
+                shapely.get_num_geometries(outside) == 1
+            )
+            if keeps.any():
+                east_m, north_m = exits[keeps][np.argmin(shapely.length(legs[keeps]))].tolist()
+                return [start, LocalPoint(east_m, north_m)]
+        names = [barrier.name for barrier in forbidding]
+        raise StartBlockedError(
+            f"the start is on forbidden ground ({self._position(start)}): {_names(names)}; every straight way out crosses other "
+            "forbidden ground",
+            fences=names,
+        )
+
+    def _exits(
+        self, start: LocalPoint, start_clearance_m: float, free: Polygon, reach_m: float
+    ) -> NDArray[np.float64]:
+        """Give the points on a free part's edge that a straight line reaches without coming nearer to a fence, (n, 2)."""
+        near = free.boundary.intersection(Point(start).buffer(reach_m))
+        nearest = shapely.shortest_line(free, Point(start))
+        exits: NDArray[np.float64] = np.vstack(
+            [
+                shapely.get_coordinates(nearest)[:1],
+                shapely.get_coordinates(near.segmentize(max(0.25, reach_m / 200))),
+            ]
+        )
+        legs = shapely.linestrings([[start, xy] for xy in exits])
+        keeps: NDArray[np.bool_] = shapely.distance(self.ground.edge, legs) >= start_clearance_m - 1e-9
+        keeps[keeps] = shapely.covers(self.ground.allowed, legs[keeps])
+        return np.asarray(exits[keeps])
+
+    def _component(self, point: LocalPoint) -> Polygon:
+        """Give the part of free ground that a point is on, or nearest to."""
+        return min(self.roomy, key=lambda part: float(part.distance(Point(point))))
+
+    def _no_route(self, start: LocalPoint, goal: LocalPoint) -> RouteError:
+        """Say how wide a route there is, or which fences part start and target: those along the edge of the smaller area."""
+        if self.is_other_way:
+            return NoRouteError(
+                f"no other way round keeps {self.asked}", clearance_m=round(self.clearance_m, 3)
+            )
+        place = narrowest_place(self.ground, start, goal, self.should_stop)
+        if place is not None:
+            return NoRouteError(
+                f"no route keeps {self.asked}; {place}",
+                clearance_m=round(self.clearance_m, 3),
+                widest_m=round(place.clearance_m, 3),
+                fences=list(place.between),
+                narrowest_at=list(place.at) if place.at else None,
+            )
+        areas = {"start": self._component(start), "target": self._component(goal)}
+        walled = min(areas, key=lambda end: areas[end].area)
+        outline = areas[walled].exterior
+        reach_m = self.clearance_m * 1.01 + 2 * _INSIDE_M + 0.01
+        names = [b.name for b in self.ground.barriers if self.ground.distance_m(b, outline) <= reach_m]
+        return NoRouteError(
+            f"no route exists, at any clearance: the {walled} is walled in by {_names(names)}",
+            clearance_m=round(self.clearance_m, 3),
+            walled_in=walled,
+            fences=names,
+            advice=f"no clearance helps: open a way through {_names(names)}, or choose another target"
+            if walled == "target"
+            else f"no clearance helps: open a way through {_names(names)}, or drive it out by hand",
+        )
+
+    def _way(self, point: LocalPoint, to: Point) -> tuple[float, float, LatLon]:
+        """Give distance, bearing and position of another point, on Earth."""
+        here = self._position(point)
+        there = self.ground.frame.to_lat_lon(LocalPoint(to.x, to.y))
+        return distance_m(here, there), bearing_deg(here, there), there
+
+    def _position(self, point: LocalPoint) -> LatLon:
+        return self.ground.frame.to_lat_lon(point)
+
+
+def _names(names: list[str]) -> str:
+    """Join names as a sentence does."""
+    if len(names) < 2:
+        return "".join(names) or "no fence in particular"
+    return f"{', '.join(names[:-1])} and {names[-1]}"

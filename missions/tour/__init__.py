@@ -1,0 +1,1 @@
+"""Several targets: the order of visits, the way home, the end of the mission."""

@@ -30,10 +30,10 @@ from mavlink_bridge.simulator.vehicle import SimulatedVehicle
 from missions.errors import MissionError
 from missions.fence import fence_to_items
 from missions.geo import distance_m
-from missions.ground.surroundings import ground_for
+from missions.ground.from_situation import ground_for
 from missions.planning.plan import Plan, plan
 from missions.request import Request
-from missions.routing.narrow import widest_clearance_m
+from missions.routing.bottleneck import widest_clearance_m
 from missions.situation import Known, Pose, Situation
 from missions.vehicle import vehicle_from_parameters
 

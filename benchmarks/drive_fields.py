@@ -12,7 +12,7 @@ from shapely import LineString, Point, Polygon, affinity
 
 from missions.fence import CircleZone, Fence, PolygonZone, ZoneKind
 from missions.geo import LatLon, rounded
-from missions.ground.local_frame import LocalFrame, LocalPoint, frame_around
+from missions.ground.frame import LocalFrame, LocalPoint, frame_around
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry

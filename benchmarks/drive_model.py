@@ -21,7 +21,7 @@ import shapely
 
 from missions.drive_model import Corner, Envelope, envelope
 from missions.geo import LatLon
-from missions.ground.local_frame import LocalFrame
+from missions.ground.frame import LocalFrame
 from missions.vehicle import Steering, Vehicle
 
 if TYPE_CHECKING:

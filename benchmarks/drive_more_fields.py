@@ -11,7 +11,7 @@ from drive_fields import CENTRE, Field, place_of, polygon_zone
 from shapely import LineString, Point, Polygon, affinity
 
 from missions.fence import CircleZone, Fence, ZoneKind
-from missions.ground.local_frame import frame_around
+from missions.ground.frame import frame_around
 
 if TYPE_CHECKING:
     from collections.abc import Callable

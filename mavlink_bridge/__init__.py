@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.director import Director, Orders
     from mavlink_bridge.errors import BridgeError
     from mavlink_bridge.link import Link, open_link
-    from mavlink_bridge.logbook.recorded import situation_from_log
+    from mavlink_bridge.logbook.log_situation import situation_from_log
     from mavlink_bridge.mavlink.messages import Frame
     from mavlink_bridge.simulator import Simulator, SimulatorConfig
     from mavlink_bridge.tlog import TlogReader, TlogWriter
@@ -42,7 +42,7 @@ _HOMES = {
     "TlogReader": "tlog",
     "TlogWriter": "tlog",
     "open_link": "link",
-    "situation_from_log": "logbook.recorded",
+    "situation_from_log": "logbook.log_situation",
 }
 
 

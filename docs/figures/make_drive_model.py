@@ -13,7 +13,7 @@ from shapely.plotting import plot_polygon
 
 from missions.drive_model import envelope
 from missions.geo import LatLon
-from missions.ground.local_frame import LocalFrame
+from missions.ground.frame import LocalFrame
 from missions.vehicle import Steering, Vehicle
 
 HERE = Path(__file__).parent

@@ -133,7 +133,7 @@ def check(
     situation: Situation | None = None
     unknown: list[str] = []
     if log is not None:
-        from mavlink_bridge.logbook.recorded import situation_from_log  # noqa: PLC0415 - pymavlink only where needed
+        from mavlink_bridge.logbook.log_situation import situation_from_log  # noqa: PLC0415 - pymavlink only where needed
         from mavlink_bridge.mavlink.vehicles import not_ardupilot  # noqa: PLC0415
 
         situation = situation_from_log(log, system, any_vehicle=any_vehicle)

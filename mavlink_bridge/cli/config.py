@@ -56,7 +56,7 @@ def config(
     if template:
         echo_lines(_TEMPLATE.splitlines())
         return
-    from mavlink_bridge.backup.backup import BackupStore  # noqa: PLC0415 - quick help
+    from mavlink_bridge.backup.store import BackupStore  # noqa: PLC0415 - quick help
 
     own = user_file()
     settings = settings_of(own, is_asked_for=False) if is_there(own) else []

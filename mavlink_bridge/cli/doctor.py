@@ -176,7 +176,7 @@ def _key(path: Path | None) -> Iterator[_Finding]:
 
 
 def _backups() -> Iterator[_Finding]:
-    from mavlink_bridge.backup.backup import BackupStore  # noqa: PLC0415 - quick help
+    from mavlink_bridge.backup.store import BackupStore  # noqa: PLC0415 - quick help
 
     folder = BackupStore().folder
     above = next(path for path in (folder, *folder.parents) if path.exists())

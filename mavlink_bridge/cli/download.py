@@ -65,7 +65,7 @@ def download(
     outputs = output or []
     _check(what, connect, outputs)
 
-    from mavlink_bridge.backup.backup import BackupStore  # noqa: PLC0415 - usage errors need not wait for it
+    from mavlink_bridge.backup.store import BackupStore  # noqa: PLC0415 - usage errors need not wait for it
     from mavlink_bridge.cli.session import Address, open_session  # noqa: PLC0415
 
     address = Address(connect, (source_system, source_component), system, any_vehicle, timeout, signing_key)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from threading import Thread
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.backup.backup import BackupStore
+from mavlink_bridge.backup.store import BackupStore
 from mavlink_bridge.backup.vehicle_lock import VehicleLock
 from mavlink_bridge.backup.vehicle_mark import Kinship, VehicleMark
 from mavlink_bridge.cli.common import progress_bar, warn
@@ -25,7 +25,7 @@ from mavlink_bridge.mavlink.messages import Autopilot, MissionType
 from mavlink_bridge.protocol.outcomes import Writing, ends_in_words, held_text
 from mavlink_bridge.protocol.vehicle_watch import Doing
 from mavlink_bridge.protocol.verified_upload import Held, OutcomeKind
-from missions.checking.course import follow_mission
+from missions.checking.execution import follow_mission
 from missions.errors import SituationError
 from missions.formats import read_parameters
 from missions.items import Command

@@ -309,7 +309,7 @@ def _offline_situation(
     fence: Path | None, log: Path | None, system: int | None, *, any_vehicle: bool
 ) -> Situation:
     if log is not None:
-        from mavlink_bridge.logbook.recorded import situation_from_log  # noqa: PLC0415 - pymavlink only where needed
+        from mavlink_bridge.logbook.log_situation import situation_from_log  # noqa: PLC0415 - pymavlink only where needed
 
         return situation_from_log(
             log, system, any_vehicle=any_vehicle, on_damage=lambda damage: warn([f"{log}: {damage}"])

@@ -14,7 +14,7 @@ from mavlink_bridge.errors import BackupError, OtherVehicleError, UsageError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from mavlink_bridge.backup.backup import Backup, BackupStore, Note
+    from mavlink_bridge.backup.store import Backup, BackupStore, Note
     from mavlink_bridge.backup.vehicle_mark import VehicleMark
 
 _FORGET = "`pbpp upload --forget` puts the note aside"

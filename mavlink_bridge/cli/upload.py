@@ -26,7 +26,7 @@ from mavlink_bridge.errors import UsageError
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from mavlink_bridge.backup.backup import BackupStore
+    from mavlink_bridge.backup.store import BackupStore
     from mavlink_bridge.cli.session import Address, Session
     from mavlink_bridge.cli.uploading import Done, Lists
     from missions.items import MissionItem
@@ -111,7 +111,7 @@ def upload(
     restoration = _restoration(file, for_another=other_vehicle) if restore else None
     lists, parameters = _content(file, only or [], restoration)
 
-    from mavlink_bridge.backup.backup import BackupStore  # noqa: PLC0415 - usage errors need not wait for it
+    from mavlink_bridge.backup.store import BackupStore  # noqa: PLC0415 - usage errors need not wait for it
     from mavlink_bridge.cli.interrupting import interruptible, terminable  # noqa: PLC0415
     from mavlink_bridge.cli.session import Address, open_session  # noqa: PLC0415
     from mavlink_bridge.cli.starting import make_ready, start_driving  # noqa: PLC0415
@@ -146,7 +146,7 @@ def upload(
 
 
 def _restoration(file: Path | None, *, for_another: bool) -> Restoration:
-    from mavlink_bridge.backup.backup import read_backup  # noqa: PLC0415 - usage errors need not wait for it
+    from mavlink_bridge.backup.store import read_backup  # noqa: PLC0415 - usage errors need not wait for it
 
     return Restoration(read_backup(file) if file else None, for_another)
 

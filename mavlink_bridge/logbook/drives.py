@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from mavlink_bridge.logbook.track import FenceMeter, Fix
-    from missions.ground.local_frame import LocalFrame
+    from missions.ground.frame import LocalFrame
     from missions.situation import Situation
     from missions.vehicle import Vehicle
 

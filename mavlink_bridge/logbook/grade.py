@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.logbook.track import FenceMeter, Fix
     from missions.drive_model import Envelope
     from missions.geo import LatLon
-    from missions.ground.local_frame import LocalFrame
+    from missions.ground.frame import LocalFrame
     from missions.items import MissionItem
     from missions.vehicle import Vehicle
 

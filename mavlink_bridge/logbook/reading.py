@@ -11,7 +11,7 @@ from mavlink_bridge.errors import LogError
 from mavlink_bridge.fold import FOLDED, fold
 from mavlink_bridge.logbook.clock import NEAR_S, SILENCE_S, Pulse, SteadyClock
 from mavlink_bridge.logbook.facts import Logbook, VehicleLog
-from mavlink_bridge.logbook.recorded import begun
+from mavlink_bridge.logbook.log_situation import begun
 from mavlink_bridge.logbook.recorder import RECORDED, Recorder
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.autopilot_facts import with_parameter

@@ -27,9 +27,9 @@ from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.modes import mode_name
 from missions.errors import MissionError
 from missions.geo import distance_m
-from missions.ground.local_frame import MAX_LATITUDE_DEG, frame_around
+from missions.ground.frame import MAX_LATITUDE_DEG, frame_around
 from missions.planning.plan import ground_for
-from missions.planning.remarks import no_number_remarks
+from missions.planning.warnings import no_number_remarks
 from missions.vehicle import PARAMETER_NAMES, Vehicle, vehicle_from_parameters
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.mavlink.messages import Frame
     from missions.fence import Fence
     from missions.geo import LatLon
-    from missions.ground.local_frame import LocalFrame
+    from missions.ground.frame import LocalFrame
     from missions.situation import Known, Situation
 
 T = TypeVar("T")

@@ -11,20 +11,20 @@ import shapely
 from shapely import LineString, Point
 from shapely.ops import nearest_points
 
-from missions.checking.course import CIRCLE_M, Course, CourseLeg, follow_mission
+from missions.checking.execution import CIRCLE_M, Course, CourseLeg, follow_mission
 from missions.checking.mission_end import crossed_zones, end_warnings, return_place, return_warnings
-from missions.clearance import known_vehicle, promise
 from missions.drive_model import Envelope, beyond_measured, envelope
 from missions.drive_model.avoidance import with_avoidance
 from missions.errors import SituationError, StartBlockedError
 from missions.geo import LatLon, bearing_deg, distance_m
+from missions.ground.frame import LocalPoint
 from missions.ground.ground import EDGE_BOW_M, Ground
 from missions.ground.known_fence import fence_warnings, known_fence
-from missions.ground.local_frame import LocalPoint
 from missions.ground.seams import Seam, first_stop, is_seam, seam_advice, seam_reason, seams_of
 from missions.ground.start_hazard import start_hazard
 from missions.planning.plan import Plan, drawn_leg, ground_for
-from missions.planning.remarks import parameter_remarks
+from missions.planning.warnings import parameter_remarks
+from missions.promise import known_vehicle, promise
 from missions.request import Request
 from missions.situation import Known
 from missions.vehicle import real_number

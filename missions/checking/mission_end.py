@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from shapely.geometry.base import BaseGeometry
 
-    from missions.checking.course import Course
+    from missions.checking.execution import Course
     from missions.ground.ground import Ground
     from missions.situation import Situation
     from missions.vehicle import Vehicle

@@ -10,8 +10,8 @@ from shapely import LineString, Point
 
 from missions.errors import MissionError
 from missions.geo import distance_m
-from missions.ground.surroundings import route_ground
-from missions.planning.lines import drawn_leg
+from missions.ground.from_situation import route_ground
+from missions.planning.mission_lines import drawn_leg
 from missions.planning.plan import asked_clearance
 
 if TYPE_CHECKING:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from missions.drive_model.band import convex
-from missions.drive_model.build import Drive, corner_forecast, envelope, plan_drive
+from missions.drive_model.calibrated_range import beyond_measured
 from missions.drive_model.envelope import Corner, Envelope, Leg
-from missions.drive_model.measured import beyond_measured
+from missions.drive_model.predict import Drive, corner_forecast, envelope, plan_drive
 
 __all__ = [
     "Corner",

@@ -19,7 +19,7 @@ import shapely
 
 from missions.drive_model.corner import GRAVITY_MPS2, INSIDE_BAND_M
 from missions.drive_model.fence_ahead import FenceAhead
-from missions.drive_model.profile import LegProfile, Ramp
+from missions.drive_model.motion import LegProfile, Ramp
 from missions.vehicle import Steering
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 
 from missions.drive_model import corner as at_corner
-from missions.drive_model.route import Stray, Vector
+from missions.drive_model.legs_and_corners import Stray, Vector
 from missions.vehicle import Autopilot
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from missions.drive_model.route import Route
+    from missions.drive_model.legs_and_corners import Route
 
 BLEND_SAMPLES = 6
 NEGLIGIBLE_M = 0.03

@@ -15,7 +15,7 @@ import numpy as np
 from missions.vehicle import Steering
 
 if TYPE_CHECKING:
-    from missions.drive_model.profile import LegProfile
+    from missions.drive_model.motion import LegProfile
     from missions.vehicle import Vehicle
 
 GRAVITY_MPS2 = 9.80665

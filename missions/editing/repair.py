@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from missions.checking.check import MissionCheck, check_mission, plan_of
-from missions.editing.item_list import ItemList
-from missions.editing.storage import shortened
+from missions.editing.edited_mission import ItemList
+from missions.editing.shorten import shortened
 from missions.errors import NoRouteError, RouteError, SituationError, StartBlockedError
 from missions.geo import bearing_deg, distance_m, to_e7
 from missions.items import change_speed
-from missions.planning.lines import ROUNDING_RESERVE_M
+from missions.planning.mission_lines import ROUNDING_RESERVE_M
 from missions.planning.plan import Plan, plan
 from missions.situation import Known, Mission, Pose
 from missions.vehicle.item_limit import most_items
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from missions.checking.check import CheckedLeg
-    from missions.checking.course import CourseLeg
-    from missions.editing.item_list import LegKey
+    from missions.checking.execution import CourseLeg
+    from missions.editing.edited_mission import LegKey
     from missions.geo import LatLon
     from missions.items import MissionItem
     from missions.request import Request

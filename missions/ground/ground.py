@@ -20,7 +20,7 @@ from shapely.ops import nearest_points
 from missions.errors import FenceError, SituationError
 from missions.fence import CircleZone, PolygonZone, Zone, ZoneKind
 from missions.geo import distance_m
-from missions.ground.local_frame import LocalFrame, autopilot_line, autopilot_scale, bow_m
+from missions.ground.frame import LocalFrame, autopilot_line, autopilot_scale, bow_m
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -16,8 +16,8 @@ from missions.fence import ZoneKind
 from missions.vehicle import Steering
 
 if TYPE_CHECKING:
+    from missions.ground.frame import LocalPoint
     from missions.ground.ground import Ground
-    from missions.ground.local_frame import LocalPoint
     from missions.vehicle import Vehicle
 
 _LEAVES_FROM_M = 0.05

@@ -12,8 +12,8 @@ import shapely
 from missions.errors import MissionFormatError
 from missions.fence import PolygonZone, ZoneKind
 from missions.formats.files import write_file
+from missions.ground.frame import frame_around
 from missions.ground.ground import lay_out
-from missions.ground.local_frame import frame_around
 from missions.harmless import harmless
 from missions.picture import check_picture_format, style
 from missions.picture.scene import polygons
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from missions.fence import Fence
     from missions.formats.files import Writer
     from missions.geo import LatLon
+    from missions.ground.frame import LocalFrame
     from missions.ground.ground import Ground
-    from missions.ground.local_frame import LocalFrame
 
 _BORDER_SHARE = 0.06
 _MODE_COLOURS: Final = ("#0072B2", "#CC79A7", "#000000", "#56B4E9", "#E69F00", "#8A8A8A")

@@ -7,17 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from missions.clearance import known_vehicle, promise
 from missions.drive_model import envelope
 from missions.drive_model.avoidance import with_avoidance
 from missions.errors import PlanCheckError, RouteError, StartBlockedError
 from missions.geo import bearing_deg, rounded
+from missions.ground.from_situation import MAX_FIELD_M, ground_for, heading_at, route_ends
 from missions.ground.known_fence import fence_warnings, known_fence
 from missions.ground.seams import explained, with_seams
 from missions.ground.start_hazard import start_hazard
-from missions.ground.surroundings import MAX_FIELD_M, ground_for, heading_at, route_ends
 from missions.planned import Plan
-from missions.planning.lines import (
+from missions.planning.mission_lines import (
     MAX_LEG_M,
     ROUNDING_RESERVE_M,
     Lines,
@@ -27,24 +26,25 @@ from missions.planning.lines import (
     mission_items,
     path_length_m,
 )
-from missions.planning.remarks import (
+from missions.planning.warnings import (
     drive_remarks,
     lead_away_remarks,
     moved_target_remarks,
     parameter_remarks,
 )
+from missions.promise import known_vehicle, promise
 from missions.routing.fitted_route import FittedRoute
 from missions.routing.uniform_route import uniform_route
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from missions.clearance import Promise
     from missions.drive_model import Envelope
+    from missions.ground.frame import LocalPoint
     from missions.ground.ground import Ground
-    from missions.ground.local_frame import LocalPoint
+    from missions.promise import Promise
     from missions.request import Request
-    from missions.routing.driven_route import DrivenRoute
+    from missions.routing.route_search import DrivenRoute
     from missions.situation import Situation
     from missions.vehicle import Vehicle
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from missions.drive_model import envelope
-from missions.ground.local_frame import LocalPoint
+from missions.ground.frame import LocalPoint
 
 if TYPE_CHECKING:
     from missions.ground.ground import Ground

@@ -6,21 +6,21 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from missions.clearance import NARROWEST_BAND_M
 from missions.errors import NoRouteError, RouteError
-from missions.planning.lines import reserve_m
-from missions.routing.driven_route import DrivenRoute, RouteSearch
-from missions.routing.narrow import kept_m, narrowest_places
+from missions.planning.mission_lines import reserve_m
+from missions.promise import NARROWEST_BAND_M
+from missions.routing.bottleneck import kept_m, narrowest_places
+from missions.routing.route_search import DrivenRoute, RouteSearch
 from missions.words import metres
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from missions.clearance import Promise
+    from missions.ground.frame import LocalPoint
     from missions.ground.ground import Ground
-    from missions.ground.local_frame import LocalPoint
+    from missions.promise import Promise
     from missions.request import Request
-    from missions.routing.narrow import NarrowestPlace
+    from missions.routing.bottleneck import NarrowestPlace
     from missions.vehicle import Vehicle
 
 _SHARES = (1.0, 0.9, 0.8, 0.65, 0.5, 0.35, 0.2, 0.1, 0.0)

@@ -9,17 +9,17 @@ import shapely
 from shapely import Point
 
 from missions.errors import NoRouteError
-from missions.fitting import drawn
-from missions.ground.local_frame import LocalPoint
+from missions.fitting import polyline as drawn
+from missions.ground.frame import LocalPoint
 from missions.words import metres
 
 if TYPE_CHECKING:
     from shapely import Polygon
 
-    from missions.fitting.drawn import Drawing
-    from missions.fitting.measuring import Measured
+    from missions.fitting.cost import Measured
+    from missions.fitting.polyline import Drawing
     from missions.ground.ground import Ground
-    from missions.routing.route import Route
+    from missions.routing.drawn_route import Route
 
 _START_ADVICE = "the vehicle has no room to turn where it stands: turn it by hand to face its way, or move it, or ask for less with --clearance"
 AT_START = 2

@@ -9,20 +9,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from missions.errors import NoRouteError, TargetBlockedError
-from missions.fitting.drawn import DrawnPoint
-from missions.ground.local_frame import LocalPoint
-from missions.planning.lines import reserve_m
-from missions.routing.driven_route import DrivenRoute
-from missions.routing.narrow import widest_clearance_m
-from missions.routing.route import find_route, simplified
+from missions.fitting.polyline import DrawnPoint
+from missions.ground.frame import LocalPoint
+from missions.planning.mission_lines import reserve_m
+from missions.routing.bottleneck import widest_clearance_m
+from missions.routing.drawn_route import find_route, simplified
+from missions.routing.route_search import DrivenRoute
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from missions.clearance import Promise
     from missions.ground.ground import Ground
+    from missions.promise import Promise
     from missions.request import Request
-    from missions.routing.route import Route
+    from missions.routing.drawn_route import Route
 
 _TINY_LEG_M = 1.5
 _WIDER_M = (0.3, 0.1, 0.03)

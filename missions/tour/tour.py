@@ -12,16 +12,16 @@ from shapely import Point
 import pbpp
 from missions.checking.check import check_mission, plan_of
 from missions.checking.mission_end import End, ending
-from missions.clearance import known_vehicle, promise
 from missions.drive_model import corner_forecast
 from missions.editing.repair import repaired_plan
-from missions.editing.storage import shortened
+from missions.editing.shorten import shortened
 from missions.errors import NoRouteError, SituationError
 from missions.fence import ZoneKind
-from missions.ground.local_frame import LocalPoint
-from missions.ground.surroundings import route_ends, route_ground
+from missions.ground.frame import LocalPoint
+from missions.ground.from_situation import route_ends, route_ground
 from missions.planning.plan import Plan, plan
-from missions.routing.narrow import widest_clearance_m
+from missions.promise import known_vehicle, promise
+from missions.routing.bottleneck import widest_clearance_m
 from missions.situation import Mission
 from missions.tour.visit_order import VisitOrder, length_of, shortest_order
 from missions.vehicle.item_limit import most_items

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from mavlink_bridge.errors import LogError
-from mavlink_bridge.logbook.recorded import situation_from_log
+from mavlink_bridge.logbook.log_situation import situation_from_log
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.codec import Codec
 from mavlink_bridge.tlog import TlogWriter

@@ -16,7 +16,7 @@ from threading import Thread
 import pytest
 from typer.testing import CliRunner
 
-from mavlink_bridge.backup.backup import BackupStore
+from mavlink_bridge.backup.store import BackupStore
 from mavlink_bridge.cli import interrupting
 from mavlink_bridge.cli.app import app
 from mavlink_bridge.cli.interrupting import (

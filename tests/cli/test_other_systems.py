@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from mavlink_bridge.backup.backup import BackupStore
+from mavlink_bridge.backup.store import BackupStore
 from mavlink_bridge.cli import bridge as bridge_command
 from mavlink_bridge.cli import failing
 from mavlink_bridge.cli import keyboard as keyboard_module

@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import pytest
 
-from missions.fitting import corner_means, drawn
-from missions.fitting.drawn import Drawing, DrawnPoint
+from missions.fitting import moves as corner_means
+from missions.fitting import polyline as drawn
+from missions.fitting.polyline import Drawing, DrawnPoint
 
 MOST_TURN_AT_A_CHANGE_DEG = 8.0
 

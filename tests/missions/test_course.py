@@ -7,7 +7,7 @@ import math
 import pytest
 from strategies import offset
 
-from missions.checking.course import MOST_LEGS, Course, follow_mission
+from missions.checking.execution import MOST_LEGS, Course, follow_mission
 from missions.geo import LatLon, rounded
 from missions.items import CoordinateFrame, MissionItem, waypoint
 from missions.situation import Mission

@@ -16,12 +16,12 @@ from shapely import LineString, Point, Polygon
 
 from missions.drive_model import Corner, Envelope, beyond_measured, corner_forecast, envelope
 from missions.drive_model.corner import blend
-from missions.drive_model.profile import LegProfile, leg_profile
+from missions.drive_model.motion import LegProfile, leg_profile
 from missions.errors import InvalidPositionError, VehicleError
 from missions.fence import PolygonZone, ZoneKind
 from missions.formats import waypoints as waypoint_file
 from missions.geo import LatLon
-from missions.ground.local_frame import LocalFrame
+from missions.ground.frame import LocalFrame
 from missions.vehicle import Autopilot, Steering, Vehicle
 
 DATA = Path(__file__).parent / "data"

@@ -21,8 +21,8 @@ from missions.geo import LatLon
 from missions.items import Command
 from missions.planning.plan import Plan, plan
 from missions.request import Request
-from missions.routing.driven_route import RouteSearch
 from missions.routing.fitted_route import FittedRoute
+from missions.routing.route_search import RouteSearch
 from missions.situation import Fix, Known, Pose, Situation
 from missions.vehicle import Footprint
 

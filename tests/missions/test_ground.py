@@ -14,8 +14,8 @@ from strategies import GEOD, away, offset
 from missions.errors import FenceError, SituationError
 from missions.fence import CircleZone, Fence, PolygonZone, ZoneKind
 from missions.geo import LatLon, rounded, wrap_lon_deg
+from missions.ground.frame import LocalFrame
 from missions.ground.ground import Ground, check_ground, lay_out
-from missions.ground.local_frame import LocalFrame
 
 HOME = LatLon(40.071374, -105.22993)
 FRAME = LocalFrame(HOME)

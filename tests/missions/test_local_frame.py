@@ -12,7 +12,7 @@ from strategies import GEOD, away, lat_lons
 
 from missions.errors import InvalidPositionError
 from missions.geo import LatLon
-from missions.ground.local_frame import (
+from missions.ground.frame import (
     LocalFrame,
     LocalPoint,
     autopilot_line,

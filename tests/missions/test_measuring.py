@@ -15,12 +15,12 @@ from hypothesis import strategies as st
 
 from missions.drive_model import envelope
 from missions.fence import Fence
-from missions.fitting import fitting
-from missions.fitting.drawn import Drawing, DrawnPoint
-from missions.fitting.measuring import ENOUGH_M, Gauge
+from missions.fitting import local_search as fitting
+from missions.fitting.cost import ENOUGH_M, Gauge
+from missions.fitting.polyline import Drawing, DrawnPoint
+from missions.ground.frame import frame_around
+from missions.ground.from_situation import ground_for
 from missions.ground.ground import lay_out
-from missions.ground.local_frame import frame_around
-from missions.ground.surroundings import ground_for
 from missions.vehicle import vehicle_from_parameters
 
 STEERED = {"WP_SPEED": 5.0, "WP_RADIUS": 3.0, "FENCE_ENABLE": 1.0, "FENCE_TYPE": 4.0, "AVOID_ENABLE": 3.0}

@@ -9,8 +9,8 @@ import shapely
 from charts import HOME
 
 from missions import read_fence
-from missions.fitting.drawn import DrawnPoint
-from missions.fitting.neck import find_neck, straight_through
+from missions.fitting.gap import find_neck, straight_through
+from missions.fitting.polyline import DrawnPoint
 from missions.geo import LatLon
 from missions.planning.plan import plan
 from missions.request import Request

@@ -11,7 +11,7 @@ from charts import HOME, IN, OUT, Chart, box, place
 from shapely import LineString, Polygon
 
 from missions.checking.check import check_mission
-from missions.checking.course import follow_mission
+from missions.checking.execution import follow_mission
 from missions.editing.repair import MOST_TRACKED_JUMPS, Repair, repair_mission, repaired_plan
 from missions.errors import NoRouteError, RouteError, SituationError, TargetBlockedError
 from missions.fence import Fence, Zone

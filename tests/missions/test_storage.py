@@ -12,8 +12,8 @@ from shapely import LineString, Point, Polygon
 from mavlink_bridge.protocol.limits import Limits
 from missions.checking.check import check_mission
 from missions.editing.repair import repair_mission
+from missions.editing.shorten import shortened
 from missions.editing.shorter_lines import meeting_place, without
-from missions.editing.storage import shortened
 from missions.errors import MissionTooLongError
 from missions.fence import CircleZone, Fence, Zone, ZoneKind
 from missions.geo import distance_m

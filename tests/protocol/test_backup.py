@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from protocol.test_wire import ITEMS
 from protocol.twin import plain_fence, plain_mission
 
-from mavlink_bridge.backup.backup import BackupStore, read_backup
+from mavlink_bridge.backup.store import BackupStore, read_backup
 from mavlink_bridge.backup.vehicle_mark import Kinship, VehicleMark, uid_of
 from mavlink_bridge.errors import BackupError, OutcomeError
 from mavlink_bridge.mavlink.messages import AutopilotVersion, MissionType
@@ -77,7 +77,7 @@ def test_what_cannot_be_written_is_an_outcome(tmp_path):
 
 
 def test_backups_are_kept_apart_and_the_oldest_go(tmp_path, monkeypatch):
-    monkeypatch.setattr("mavlink_bridge.backup.backup._KEPT_BACKUPS", 3)
+    monkeypatch.setattr("mavlink_bridge.backup.store._KEPT_BACKUPS", 3)
     store = BackupStore(tmp_path)
     store.keep(VehicleMark(11), MISSION, plain_mission(9))
     store.keep(ONE, FENCE, plain_fence(1))
@@ -164,7 +164,7 @@ def test_after_an_interruption_the_older_backup_counts(tmp_path):
 
 
 def test_a_backup_that_is_still_to_be_restored_is_never_pruned(tmp_path, monkeypatch):
-    monkeypatch.setattr("mavlink_bridge.backup.backup._KEPT_BACKUPS", 2)
+    monkeypatch.setattr("mavlink_bridge.backup.store._KEPT_BACKUPS", 2)
     store = BackupStore(tmp_path)
     first = store.begin(OTHER, MISSION, plain_mission(4))
     for length in range(5, 9):
@@ -208,7 +208,7 @@ def test_two_backups_within_a_tick_of_the_clock_are_both_kept(tmp_path, monkeypa
         def now(cls, tz=None):
             return cls(2026, 11, 22, 12, tzinfo=tz)
 
-    monkeypatch.setattr("mavlink_bridge.backup.backup.datetime", Coarse)
+    monkeypatch.setattr("mavlink_bridge.backup.store.datetime", Coarse)
     store = BackupStore(tmp_path)
     kept = [store.keep(ONE, MISSION, plain_mission(count)) for count in (4, 5, 6)]
     assert [len(read_backup(path).items) for path in kept] == [4, 5, 6]

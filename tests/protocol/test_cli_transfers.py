@@ -13,7 +13,7 @@ import pytest
 from protocol.twin import plain_fence, plain_mission
 from typer.testing import CliRunner
 
-from mavlink_bridge.backup.backup import BackupStore
+from mavlink_bridge.backup.store import BackupStore
 from mavlink_bridge.cli.app import app
 from mavlink_bridge.mavlink.messages import MissionType
 from mavlink_bridge.mavlink.rover import AUTO_MODE, HOLD_MODE

@@ -33,7 +33,7 @@ from protocol.adversary import (
 )
 from typer.testing import CliRunner
 
-from mavlink_bridge.backup.backup import BackupStore, read_backup
+from mavlink_bridge.backup.store import BackupStore, read_backup
 from mavlink_bridge.backup.vehicle_lock import VehicleLock
 from mavlink_bridge.backup.vehicle_mark import VehicleMark
 from mavlink_bridge.cli.app import app

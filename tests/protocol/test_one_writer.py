@@ -13,7 +13,7 @@ import pytest
 from protocol.adversary import Adversary, RebootsMidway, TcpVehicle, mission, places
 from typer.testing import CliRunner
 
-from mavlink_bridge.backup.backup import BackupStore
+from mavlink_bridge.backup.store import BackupStore
 from mavlink_bridge.backup.vehicle_lock import VehicleLock
 from mavlink_bridge.backup.vehicle_mark import VehicleMark
 from mavlink_bridge.cli import restoring
@@ -229,7 +229,7 @@ def test_a_backup_that_cannot_be_written_leaves_the_vehicle_alone(mission_file, 
     def full(*_arguments, **_options):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("mavlink_bridge.backup.backup.os.fsync", full)
+    monkeypatch.setattr("mavlink_bridge.backup.store.os.fsync", full)
     vehicle = Adversary(OLD)
     vehicle.lists[MissionType.FENCE] = list(fence_to_items(read_fence(fields / "yard-fence.waypoints")))
     arguments = (

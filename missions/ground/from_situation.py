@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 from missions.errors import NoRouteError, SituationError
 from missions.fence import PolygonZone
 from missions.geo import distance_m
+from missions.ground.frame import check_latitude, frame_around
 from missions.ground.ground import Ground, check_ground, lay_out
 from missions.ground.known_fence import known_fence
-from missions.ground.local_frame import check_latitude, frame_around
 from missions.ground.seams import with_seams
 from missions.items import last_place
 

@@ -14,7 +14,7 @@ from missions.vehicle import Autopilot
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from missions.drive_model.route import LegPlan, Route
+    from missions.drive_model.legs_and_corners import LegPlan, Route
 
 START_AND_END_LAG_S = 2.0
 

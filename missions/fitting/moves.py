@@ -10,8 +10,8 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from missions.fitting import drawn
-from missions.fitting.drawn import Drawing, Vector, shifted
+from missions.fitting import polyline as drawn
+from missions.fitting.polyline import Drawing, Vector, shifted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

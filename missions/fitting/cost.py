@@ -17,7 +17,8 @@ import shapely
 
 from missions.drive_model import convex, plan_drive
 from missions.drive_model.avoidance import with_avoidance
-from missions.fitting import corner_means, drawn
+from missions.fitting import moves as corner_means
+from missions.fitting import polyline as drawn
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from missions.drive_model import Drive
-    from missions.fitting.drawn import Drawing, Vector
+    from missions.fitting.polyline import Drawing, Vector
     from missions.ground.ground import Ground
     from missions.vehicle import Vehicle
 

@@ -7,8 +7,8 @@ import math
 from typing import TYPE_CHECKING
 
 from missions.drive_model import corner as at_corner
-from missions.drive_model.profile import leg_profile
-from missions.drive_model.route import Bend, CornerPlan, LegPlan, Route, Stray, Vector
+from missions.drive_model.legs_and_corners import Bend, CornerPlan, LegPlan, Route, Stray, Vector
+from missions.drive_model.motion import leg_profile
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -16,22 +16,22 @@ from shapely import Point
 
 from missions.drive_model import corner_forecast
 from missions.errors import RouteError
-from missions.fitting.drawn import Drawing, DrawnPoint
-from missions.fitting.fitting import MOST_MEASUREMENTS, Fitting
-from missions.ground.local_frame import LocalPoint
+from missions.fitting.local_search import MOST_MEASUREMENTS, Fitting
+from missions.fitting.polyline import Drawing, DrawnPoint
+from missions.ground.frame import LocalPoint
 from missions.routing.departure import ROOM_M, departures
+from missions.routing.drawn_route import find_route
 from missions.routing.refusal import AT_START, block, refusal
-from missions.routing.route import find_route
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from shapely import Polygon
 
-    from missions.fitting.measuring import Measured
+    from missions.fitting.cost import Measured
     from missions.ground.ground import Ground
     from missions.routing.departure import Departure
-    from missions.routing.route import Route
+    from missions.routing.drawn_route import Route
     from missions.vehicle import Vehicle
 
 SLOW_MPS = 1.0

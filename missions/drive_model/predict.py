@@ -12,9 +12,9 @@ import numpy as np
 from missions.drive_model import corner as at_corner
 from missions.drive_model.band import Pieces, add_corner, add_end, add_leg, add_start, convex
 from missions.drive_model.envelope import Envelope
-from missions.drive_model.plan import SAME_PLACE_M, plan_route
-from missions.drive_model.route import Stray
-from missions.drive_model.told import arrivals_s, told_corner, told_leg
+from missions.drive_model.from_points import SAME_PLACE_M, plan_route
+from missions.drive_model.legs_and_corners import Stray
+from missions.drive_model.summary import arrivals_s, told_corner, told_leg
 from missions.errors import InvalidPositionError, VehicleError
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from missions.drive_model.envelope import Corner
-    from missions.drive_model.route import Route
+    from missions.drive_model.legs_and_corners import Route
     from missions.vehicle import Vehicle
 
 

@@ -6,16 +6,16 @@ from typing import TYPE_CHECKING
 
 from missions.drive_model import beyond_measured
 from missions.geo import distance_m
-from missions.planning.lines import ROUNDING_RESERVE_M
+from missions.planning.mission_lines import ROUNDING_RESERVE_M
 from missions.vehicle.item_limit import storage_remarks
 from missions.words import metres
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from missions.clearance import Promise
     from missions.geo import LatLon
-    from missions.routing.driven_route import DrivenRoute
+    from missions.promise import Promise
+    from missions.routing.route_search import DrivenRoute
     from missions.situation import Situation
     from missions.vehicle import Vehicle
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from missions.checking.course import is_navigation
+from missions.checking.execution import is_navigation
 from missions.items import Command, CoordinateFrame, MissionItem
 from missions.situation import Mission
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from missions.checking.course import CourseLeg
+    from missions.checking.execution import CourseLeg
 
 LegKey = tuple[int, int, int | None]
 """A leg by its items: from seq, to seq, the jump taken in between."""

@@ -10,7 +10,7 @@ from missions.drive_model import corner as at_corner
 
 if TYPE_CHECKING:
     from missions.drive_model.corner import Blend
-    from missions.drive_model.profile import LegProfile
+    from missions.drive_model.motion import LegProfile
     from missions.vehicle import Vehicle
 
 Vector = tuple[float, float]

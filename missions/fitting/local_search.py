@@ -15,17 +15,18 @@ from typing import TYPE_CHECKING
 
 import shapely
 
-from missions.fitting import corner_means, drawn
-from missions.fitting.measuring import ENOUGH_M, Gauge
-from missions.fitting.neck import find_neck, straight_through
+from missions.fitting import moves as corner_means
+from missions.fitting import polyline as drawn
+from missions.fitting.cost import ENOUGH_M, Gauge
+from missions.fitting.gap import find_neck, straight_through
 from missions.geo import rounded
-from missions.ground.local_frame import LocalPoint
+from missions.ground.frame import LocalPoint
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
-    from missions.fitting.drawn import Drawing, Vector
-    from missions.fitting.measuring import Measured, Trial
+    from missions.fitting.cost import Measured, Trial
+    from missions.fitting.polyline import Drawing, Vector
     from missions.ground.ground import Ground
     from missions.vehicle import Vehicle
 

@@ -14,8 +14,8 @@ import pbpp
 from missions.errors import NoRouteError, RouteError, StartBlockedError, TargetBlockedError
 from missions.fence import ZoneKind
 from missions.geo import bearing_deg, distance_m
-from missions.ground.local_frame import LocalPoint
-from missions.routing.narrow import narrowest_place
+from missions.ground.frame import LocalPoint
+from missions.routing.bottleneck import narrowest_place
 from missions.words import metres
 
 if TYPE_CHECKING:

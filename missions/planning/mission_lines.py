@@ -11,14 +11,14 @@ from shapely import LineString, Point
 
 from missions.errors import PlanCheckError
 from missions.geo import distance_m, rounded
+from missions.ground.frame import MAX_LATITUDE_DEG, LocalPoint, autopilot_line, bow_m
 from missions.ground.ground import EDGE_BOW_M
-from missions.ground.local_frame import MAX_LATITUDE_DEG, LocalPoint, autopilot_line, bow_m
 from missions.items import change_speed, waypoint
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from missions.fitting.drawn import Drawing
+    from missions.fitting.polyline import Drawing
     from missions.geo import LatLon
     from missions.ground.ground import Ground
     from missions.items import MissionItem

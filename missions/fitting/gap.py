@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import shapely
 
-from missions.fitting import drawn
-from missions.fitting.drawn import Drawing, DrawnPoint, Vector, shifted
+from missions.fitting import polyline as drawn
+from missions.fitting.polyline import Drawing, DrawnPoint, Vector, shifted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

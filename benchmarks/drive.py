@@ -21,6 +21,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from typing import TYPE_CHECKING
+
 from drive_fields import Field, make_field
 from drive_more_fields import make_more
 
@@ -31,11 +33,14 @@ from missions.errors import MissionError
 from missions.fence import fence_to_items
 from missions.geo import distance_m
 from missions.ground.from_situation import ground_for
-from missions.planning.plan import Plan, plan
+from missions.planning.plan import plan
 from missions.request import Request
 from missions.routing.bottleneck import widest_clearance_m
 from missions.situation import Known, Pose, Situation
 from missions.vehicle import vehicle_from_parameters
+
+if TYPE_CHECKING:
+    from missions.planned import Plan
 
 TOLERANCE_M = 0.10
 SPARE_M = 0.5

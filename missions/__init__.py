@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     )
     from missions.geo import LatLon
     from missions.items import MissionItem, waypoint
-    from missions.planning.plan import Plan
+    from missions.planned import Plan
     from missions.planning.plan import plan as plan_mission
     from missions.request import Request
     from missions.situation import Known, Mission, Situation
@@ -71,7 +71,7 @@ _HOMES = {
     "MissionCheck": "checking.check",
     "MissionError": "errors",
     "MissionItem": "items",
-    "Plan": "planning.plan",
+    "Plan": "planned",
     "PolygonZone": "fence",
     "Repair": "editing.repair",
     "Request": "request",

@@ -114,6 +114,12 @@ def promise(situation: Situation, request: Request, vehicle: Vehicle) -> Promise
     return Promise(promised_m, error_m + request.reserve_m, None, (*warnings, *told))
 
 
+def asked_clearance(situation: Situation, request: Request) -> tuple[Vehicle, float]:
+    """Give the situation's vehicle and the clearance that a plan would promise."""
+    vehicle = known_vehicle(situation, request)
+    return vehicle, promise(situation, request, vehicle).promised_m
+
+
 def margin_remarks(vehicle: Vehicle) -> list[str]:
     """Return what is to be said of a margin that is less than measured rovers needed."""
     if not vehicle.avoids_fence or vehicle.stops_within_m >= LEAST_MARGIN_M:

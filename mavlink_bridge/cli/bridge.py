@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.mavlink.signing import Signing
     from mavlink_bridge.replay.journal import JournalWriter
     from mavlink_bridge.tlog import TlogWriter
-    from missions.planning.plan import Plan
+    from missions.planned import Plan
 
 _BACKOFF_S = (0.5, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0)
 _LINK_LOOK_S = 0.25

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.simulator import SteppedRover
     from missions.fence import Fence
     from missions.geo import LatLon
-    from missions.planning.plan import Plan
+    from missions.planned import Plan
 
 _HOME = (40.071374, -105.229930)
 _TARGET = (40.0726316, -105.2290497)

@@ -29,7 +29,7 @@ from missions.checking.execution import follow_mission
 from missions.errors import SituationError
 from missions.formats import read_parameters
 from missions.items import Command
-from missions.planning.plan import Plan
+from missions.planned import Plan
 from missions.planning.plan import plan as make_plan
 from missions.situation import Mission, Situation
 

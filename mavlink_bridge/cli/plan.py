@@ -44,7 +44,7 @@ from mavlink_bridge.cli.vehicle_options import (
 from mavlink_bridge.errors import LogError, UsageError
 
 if TYPE_CHECKING:
-    from missions.planning.plan import Plan
+    from missions.planned import Plan
     from missions.request import Request
     from missions.situation import Situation
 

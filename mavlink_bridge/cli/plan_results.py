@@ -14,7 +14,7 @@ from mavlink_bridge.cli.terminal import echo, echo_lines
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from missions.planning.plan import Plan
+    from missions.planned import Plan
     from missions.situation import Situation
 
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.director.voice import Voice
     from mavlink_bridge.mavlink.messages import Frame
     from missions.geo import LatLon
-    from missions.planning.plan import Plan
+    from missions.planned import Plan
 
 OUTSIDE_M = 0.25
 """How far outside the foreseen band counts: the vehicle's own estimate of its place is off by as much."""

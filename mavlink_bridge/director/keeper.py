@@ -15,9 +15,9 @@ from mavlink_bridge.director.states import State
 from mavlink_bridge.errors import BridgeError
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.protocol.download import Download
-from missions.planning.warnings import no_number_remarks
 from missions.situation import ListKind
 from missions.vehicle import PARAMETER_NAMES
+from missions.vehicle.parameter_remarks import no_number_remarks
 
 if TYPE_CHECKING:
     from mavlink_bridge.director.orders import Orders

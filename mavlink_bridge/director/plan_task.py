@@ -11,7 +11,7 @@ from missions.planning.plan import plan as make_plan
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from missions.planning.plan import Plan
+    from missions.planned import Plan
     from missions.request import Request
     from missions.situation import Situation
 

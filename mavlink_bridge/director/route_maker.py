@@ -21,7 +21,7 @@ from mavlink_bridge.protocol.verified_upload import VerifiedUpload, VerifiedUplo
 from missions.checking.recheck import recheck
 from missions.errors import MissionError
 from missions.items import with_home
-from missions.planning.plan import asked_clearance
+from missions.promise import asked_clearance
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.mavlink.messages import Frame
     from missions.checking.recheck import Recheck
     from missions.items import MissionItem
-    from missions.planning.plan import Plan
+    from missions.planned import Plan
     from missions.request import Request
     from missions.situation import Situation
 

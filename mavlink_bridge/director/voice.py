@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from missions.checking.recheck import Recheck
     from missions.errors import MissionError
     from missions.geo import LatLon
-    from missions.planning.plan import Plan
+    from missions.planned import Plan
     from missions.situation import Situation
 
 _NOT_ANNOUNCED = frozenset({EventName.PROGRESS, EventName.FAILSAFE})

@@ -28,9 +28,9 @@ from mavlink_bridge.mavlink.modes import mode_name
 from missions.errors import MissionError
 from missions.geo import distance_m
 from missions.ground.frame import MAX_LATITUDE_DEG, frame_around
-from missions.planning.plan import ground_for
-from missions.planning.warnings import no_number_remarks
+from missions.ground.from_situation import ground_for
 from missions.vehicle import PARAMETER_NAMES, Vehicle, vehicle_from_parameters
+from missions.vehicle.parameter_remarks import no_number_remarks
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

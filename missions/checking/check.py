@@ -18,16 +18,18 @@ from missions.drive_model.avoidance import with_avoidance
 from missions.errors import SituationError, StartBlockedError
 from missions.geo import LatLon, bearing_deg, distance_m
 from missions.ground.frame import LocalPoint
+from missions.ground.from_situation import ground_for
 from missions.ground.ground import EDGE_BOW_M, Ground
 from missions.ground.known_fence import fence_warnings, known_fence
+from missions.ground.legs import drawn_leg
 from missions.ground.seams import Seam, first_stop, is_seam, seam_advice, seam_reason, seams_of
 from missions.ground.start_hazard import start_hazard
-from missions.planning.plan import Plan, drawn_leg, ground_for
-from missions.planning.warnings import parameter_remarks
+from missions.planned import Plan
 from missions.promise import known_vehicle, promise
 from missions.request import Request
 from missions.situation import Known
 from missions.vehicle import real_number
+from missions.vehicle.parameter_remarks import parameter_remarks
 from missions.words import metres
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from shapely import Point
 from missions.errors import MissionError
 from missions.fence import ZoneKind
 from missions.ground.from_situation import ground_for
-from missions.planning.plan import asked_clearance
+from missions.promise import asked_clearance
 from missions.vehicle import Vehicle
 
 if TYPE_CHECKING:

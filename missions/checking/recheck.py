@@ -11,13 +11,13 @@ from shapely import LineString, Point
 from missions.errors import MissionError
 from missions.geo import distance_m
 from missions.ground.from_situation import route_ground
-from missions.planning.mission_lines import drawn_leg
-from missions.planning.plan import asked_clearance
+from missions.ground.legs import drawn_leg
+from missions.promise import asked_clearance
 
 if TYPE_CHECKING:
     from missions.geo import LatLon
     from missions.ground.ground import Ground
-    from missions.planning.plan import Plan
+    from missions.planned import Plan
     from missions.request import Request
     from missions.situation import Situation
 

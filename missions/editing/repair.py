@@ -10,9 +10,9 @@ from missions.editing.edited_mission import ItemList
 from missions.editing.shorten import shortened
 from missions.errors import NoRouteError, RouteError, SituationError, StartBlockedError
 from missions.geo import bearing_deg, distance_m, to_e7
+from missions.ground.legs import ROUNDING_RESERVE_M
 from missions.items import change_speed
-from missions.planning.mission_lines import ROUNDING_RESERVE_M
-from missions.planning.plan import Plan, plan
+from missions.planning.plan import plan
 from missions.situation import Known, Mission, Pose
 from missions.vehicle.item_limit import most_items
 from missions.words import metres
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from missions.editing.edited_mission import LegKey
     from missions.geo import LatLon
     from missions.items import MissionItem
+    from missions.planned import Plan
     from missions.request import Request
     from missions.situation import Situation
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from missions.formats.files import Writer
     from missions.geo import LatLon
-    from missions.planning.plan import Plan
+    from missions.planned import Plan
 
 __all__ = ["PICTURE_SUFFIXES", "TERMINAL", "check_picture_format", "draw_plan", "sketch_plan"]
 

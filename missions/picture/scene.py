@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
     from missions.geo import LatLon
-    from missions.planning.plan import Plan
+    from missions.planned import Plan
 
 _BORDER_SHARE = 0.06
 _MOST_BLOCKS = 5000

@@ -7,29 +7,18 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from shapely import LineString, Point
-
 from missions.errors import PlanCheckError
-from missions.geo import distance_m, rounded
-from missions.ground.frame import MAX_LATITUDE_DEG, LocalPoint, autopilot_line, bow_m
+from missions.geo import rounded
+from missions.ground.frame import LocalPoint
 from missions.ground.ground import EDGE_BOW_M
+from missions.ground.legs import MAX_LEG_M, ROUNDING_RESERVE_M, drawn_leg
 from missions.items import change_speed, waypoint
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from missions.fitting.polyline import Drawing
     from missions.geo import LatLon
     from missions.ground.ground import Ground
     from missions.items import MissionItem
-
-MAX_LEG_M = 1000.0
-"""Longer legs are split: the autopilot's straight line bows off ours with the square of the length."""
-
-ROUNDING_RESERVE_M = 0.01
-"""Rounding to degE7 moves a waypoint by 8 mm at most."""
-
-_SAMPLE_M = 50.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,14 +41,6 @@ class Lines:
     speeds: tuple[float | None, ...]
     stops: dict[int, float]
     lead_away: int
-
-
-def reserve_m(ground: Ground) -> float:
-    """Give by how much rounding and the autopilot's own idea of a straight line may bring drawn lines nearer to a fence."""
-    east_min_m, north_min_m, east_max_m, north_max_m = ground.allowed.bounds
-    diagonal_m = math.hypot(east_max_m - east_min_m, north_max_m - north_min_m)
-    farthest_lat_deg = min(abs(ground.frame.origin.lat_deg) + diagonal_m / 1.1e5, MAX_LATITUDE_DEG)
-    return ROUNDING_RESERVE_M + bow_m(min(diagonal_m, MAX_LEG_M), farthest_lat_deg)
 
 
 def finished(ground: Ground, drawing: Drawing, lead_away: int) -> Lines:
@@ -136,15 +117,3 @@ def check_lines(ground: Ground, lines: Lines, start_clearance_m: float, asked_m:
                 asked_m=least_m[name],
             )
     return min(clearances_m)
-
-
-def drawn_leg(ground: Ground, a: LatLon, b: LatLon) -> LineString | Point:
-    """Give the autopilot's straight line between two positions, in the plane."""
-    pieces = max(1, math.ceil(distance_m(a, b) / _SAMPLE_M))
-    line = ground.frame.to_local_array(autopilot_line(a, b, pieces))
-    return Point(line[0]) if a == b else LineString(line)
-
-
-def path_length_m(path: Sequence[LatLon]) -> float:
-    """Give how long lines through positions are."""
-    return sum(distance_m(a, b) for a, b in pairwise(path))

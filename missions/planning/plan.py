@@ -11,30 +11,18 @@ from missions.drive_model import envelope
 from missions.drive_model.avoidance import with_avoidance
 from missions.errors import PlanCheckError, RouteError, StartBlockedError
 from missions.geo import bearing_deg, rounded
-from missions.ground.from_situation import MAX_FIELD_M, ground_for, heading_at, route_ends
+from missions.ground.from_situation import ground_for, heading_at, route_ends
 from missions.ground.known_fence import fence_warnings, known_fence
+from missions.ground.legs import path_length_m
 from missions.ground.seams import explained, with_seams
 from missions.ground.start_hazard import start_hazard
 from missions.planned import Plan
-from missions.planning.mission_lines import (
-    MAX_LEG_M,
-    ROUNDING_RESERVE_M,
-    Lines,
-    check_lines,
-    drawn_leg,
-    finished,
-    mission_items,
-    path_length_m,
-)
-from missions.planning.warnings import (
-    drive_remarks,
-    lead_away_remarks,
-    moved_target_remarks,
-    parameter_remarks,
-)
+from missions.planning.mission_lines import Lines, check_lines, finished, mission_items
+from missions.planning.warnings import drive_remarks, lead_away_remarks, moved_target_remarks
 from missions.promise import known_vehicle, promise
 from missions.routing.fitted_route import FittedRoute
 from missions.routing.uniform_route import uniform_route
+from missions.vehicle.parameter_remarks import parameter_remarks
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -47,17 +35,6 @@ if TYPE_CHECKING:
     from missions.routing.route_search import DrivenRoute
     from missions.situation import Situation
     from missions.vehicle import Vehicle
-
-__all__ = [
-    "MAX_FIELD_M",
-    "MAX_LEG_M",
-    "ROUNDING_RESERVE_M",
-    "Plan",
-    "asked_clearance",
-    "drawn_leg",
-    "ground_for",
-    "plan",
-]
 
 _ROUNDING_M = 1e-6
 
@@ -163,12 +140,6 @@ def _start_remarks(ground: Ground, start: LocalPoint, vehicle: Vehicle) -> list[
     if isinstance(hazard, StartBlockedError):
         raise hazard
     return [hazard] if hazard else []
-
-
-def asked_clearance(situation: Situation, request: Request) -> tuple[Vehicle, float]:
-    """Give the situation's vehicle and the clearance that a plan would promise."""
-    vehicle = known_vehicle(situation, request)
-    return vehicle, promise(situation, request, vehicle).promised_m
 
 
 def _promised_m(asked: Promise, driven_m: float) -> float | None:

@@ -6,17 +6,15 @@ from typing import TYPE_CHECKING
 
 from missions.drive_model import beyond_measured
 from missions.geo import distance_m
-from missions.planning.mission_lines import ROUNDING_RESERVE_M
-from missions.vehicle.item_limit import storage_remarks
+from missions.ground.legs import ROUNDING_RESERVE_M
 from missions.words import metres
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from missions.geo import LatLon
     from missions.promise import Promise
     from missions.routing.route_search import DrivenRoute
-    from missions.situation import Situation
     from missions.vehicle import Vehicle
 
 
@@ -35,28 +33,6 @@ _DRIVEN_BY = frozenset(
     }
 )
 """Parameters whose defaults a driver should see when they stand in for the vehicle's own."""
-
-
-_MOST_NAMED = 5
-
-
-def parameter_remarks(situation: Situation) -> list[str]:
-    """Return what the vehicle told of its parameters that cannot be."""
-    return [
-        *no_number_remarks(situation.no_numbers, situation.parameters),
-        *storage_remarks(situation.parameters),
-    ]
-
-
-def no_number_remarks(no_numbers: Mapping[str, str], parameters: Mapping[str, float]) -> list[str]:
-    """Return which parameters came as no number, and what counts in their place."""
-    remarks = [
-        f"{name} came as {came}, which is no number: "
-        + (f"it stays at {parameters[name]:g}, as it was told before" if name in parameters else "not known")
-        for name, came in no_numbers.items()
-    ]
-    more = len(remarks) - _MOST_NAMED
-    return [*remarks[:_MOST_NAMED], f"and {more} more parameters"] if more > 0 else remarks
 
 
 def lead_away_remarks(found: DrivenRoute, least_m: float) -> list[str]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from missions.errors import NoRouteError, RouteError
-from missions.planning.mission_lines import reserve_m
+from missions.ground.legs import reserve_m
 from missions.promise import NARROWEST_BAND_M
 from missions.routing.bottleneck import kept_m, narrowest_places
 from missions.routing.route_search import DrivenRoute, RouteSearch

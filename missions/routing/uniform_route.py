@@ -11,7 +11,7 @@ import numpy as np
 from missions.errors import NoRouteError, TargetBlockedError
 from missions.fitting.polyline import DrawnPoint
 from missions.ground.frame import LocalPoint
-from missions.planning.mission_lines import reserve_m
+from missions.ground.legs import reserve_m
 from missions.routing.bottleneck import widest_clearance_m
 from missions.routing.drawn_route import find_route, simplified
 from missions.routing.route_search import DrivenRoute

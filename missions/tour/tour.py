@@ -19,7 +19,7 @@ from missions.errors import NoRouteError, SituationError
 from missions.fence import ZoneKind
 from missions.ground.frame import LocalPoint
 from missions.ground.from_situation import route_ends, route_ground
-from missions.planning.plan import Plan, plan
+from missions.planning.plan import plan
 from missions.promise import known_vehicle, promise
 from missions.routing.bottleneck import widest_clearance_m
 from missions.situation import Mission
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
     from missions.geo import LatLon
     from missions.ground.ground import Ground
+    from missions.planned import Plan
     from missions.request import Request
     from missions.situation import Situation
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.director.plan_task import PlanTask
     from mavlink_bridge.mavlink.messages import Message
     from mavlink_bridge.simulator import SimulatedVehicle
-    from missions.planning.plan import Plan
+    from missions.planned import Plan
     from missions.request import Request
     from missions.situation import Situation
 

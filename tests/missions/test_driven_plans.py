@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -19,12 +20,15 @@ from missions.errors import NoRouteError, RouteError, StartBlockedError, TargetB
 from missions.fence import CircleZone
 from missions.geo import LatLon
 from missions.items import Command
-from missions.planning.plan import Plan, plan
+from missions.planning.plan import plan
 from missions.request import Request
 from missions.routing.fitted_route import FittedRoute
 from missions.routing.route_search import RouteSearch
 from missions.situation import Fix, Known, Pose, Situation
 from missions.vehicle import Footprint
+
+if TYPE_CHECKING:
+    from missions.planned import Plan
 
 VEHICLES = [
     {"WP_SPEED": 2.0, "WP_RADIUS": 2.0},

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -41,9 +42,12 @@ from missions.fence import CircleZone, Fence, PolygonZone, ZoneKind
 from missions.formats import read_fence
 from missions.geo import LatLon, rounded
 from missions.items import MissionItem, waypoint
-from missions.planning.plan import Plan, plan
+from missions.planning.plan import plan
 from missions.request import Request
 from missions.situation import Known, ListKind, ListTransfer, Mission, Pose, Situation
+
+if TYPE_CHECKING:
+    from missions.planned import Plan
 
 
 def drawn(situation: Situation, start: LatLon, *targets: LatLon, clearance_m: float = 2.0, **options) -> Plan:

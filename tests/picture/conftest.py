@@ -14,7 +14,7 @@ from missions.request import Request
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from missions.planning.plan import Plan
+    from missions.planned import Plan
 
 START = LatLon(40.071374, -105.22993)
 REQUESTS = {

@@ -14,7 +14,7 @@ from missions.errors import MissionFormatError
 from missions.picture import PICTURE_SUFFIXES, check_picture_format, draw_plan
 
 if TYPE_CHECKING:
-    from missions.planning.plan import Plan
+    from missions.planned import Plan
 
 
 def test_known_suffixes() -> None:

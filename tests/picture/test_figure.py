@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.transforms import Bbox
 
-    from missions.planning.plan import Plan
+    from missions.planned import Plan
 
 TOUCH_PX = 0.5
 

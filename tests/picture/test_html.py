@@ -18,7 +18,7 @@ from missions.picture.scene import Scene
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from missions.planning.plan import Plan
+    from missions.planned import Plan
 
 
 def test_a_page_needs_no_network(plans: dict[str, Plan], tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from missions.picture import sketch_plan
 from missions.picture.scene import Scene
 
 if TYPE_CHECKING:
-    from missions.planning.plan import Plan
+    from missions.planned import Plan
 
 
 def cells_of(text: str) -> list[str]:

@@ -1,0 +1,33 @@
+"""What is said of parameters that cannot be as they came."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from missions.vehicle.item_limit import storage_remarks
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from missions.situation import Situation
+
+_MOST_NAMED = 5
+
+
+def parameter_remarks(situation: Situation) -> list[str]:
+    """Return what the vehicle told of its parameters that cannot be."""
+    return [
+        *no_number_remarks(situation.no_numbers, situation.parameters),
+        *storage_remarks(situation.parameters),
+    ]
+
+
+def no_number_remarks(no_numbers: Mapping[str, str], parameters: Mapping[str, float]) -> list[str]:
+    """Return which parameters came as no number, and what counts in their place."""
+    remarks = [
+        f"{name} came as {came}, which is no number: "
+        + (f"it stays at {parameters[name]:g}, as it was told before" if name in parameters else "not known")
+        for name, came in no_numbers.items()
+    ]
+    more = len(remarks) - _MOST_NAMED
+    return [*remarks[:_MOST_NAMED], f"and {more} more parameters"] if more > 0 else remarks

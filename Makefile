@@ -34,7 +34,7 @@ test: .venv/dev.stamp
 	@touch $@
 
 # The parts that promises rest on: the planner, missions, and all that decides or speaks a protocol without sockets.
-PROMISING := pbpp/*,missions/*,mavlink_bridge/protocol/*,mavlink_bridge/director/*,mavlink_bridge/tlog/*,mavlink_bridge/logbook/*,mavlink_bridge/fold.py
+PROMISING := pbpp/*,missions/*,mavlink_bridge/mavlink/*,mavlink_bridge/protocol/*,mavlink_bridge/director/*,mavlink_bridge/backup/*,mavlink_bridge/tlog/*,mavlink_bridge/logbook/*,mavlink_bridge/replay/*,mavlink_bridge/fold.py
 COVERING := tests/pbpp tests/missions tests/formats tests/picture tests/protocol tests/bridge tests/tlog tests/logbook
 
 coverage: .venv/dev.stamp

@@ -50,7 +50,7 @@ _HEADING_UNKNOWN = 65535
 
 
 def fold(situation: Situation, frame: Frame, time_s: float) -> Situation:
-    """Give the situation after a frame.
+    """Return the situation after a frame.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def fold(situation: Situation, frame: Frame, time_s: float) -> Situation:
 
 
 def _is_the_vehicles(situation: Situation, frame: Frame) -> bool:
-    """Tell whether a frame is the autopilot's word; companions share its system id, and what they send are requests."""
+    """Return whether a frame comes from the autopilot itself; companions share its system id, and what they send are requests."""
     if frame.system != situation.system:
         return False
     return situation.component in (None, frame.component) or isinstance(frame.message, m.ParamValue)
@@ -298,7 +298,7 @@ def _add_item(situation: Situation, message: Any, time_s: float, *, to_vehicle: 
 
 
 def _is_held(situation: Situation, kind: ListKind, seq: int, item: MissionItem) -> bool:
-    """Tell whether an item is one that the vehicle is known to hold there."""
+    """Return whether an item is one that the vehicle is known to hold there."""
     held: tuple[MissionItem, ...] = ()
     if kind is ListKind.FENCE and situation.fence is not None:
         held = fence_to_items(situation.fence.value)
@@ -390,7 +390,7 @@ def _targeted(situation: Situation, position: LatLon | None, time_s: float, sour
 
 
 def _place(lat_e7: int, lon_e7: int) -> LatLon | None:
-    """Give a position; None for (0, 0), which says "no fix" or "here", and for what is none."""
+    """Return a position; None for (0, 0), which means "no fix" or "here", and for an impossible one."""
     if (lat_e7, lon_e7) == (0, 0):
         return None
     try:

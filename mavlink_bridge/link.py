@@ -47,7 +47,7 @@ _EPOCH_S = time.time() - time.monotonic()
 
 
 def now_s() -> float:
-    """Give the time that machines on links run by: seconds since 1970, but only ever forward."""
+    """Return the time that machines on links run by: seconds since 1970, but only ever forward."""
     return _EPOCH_S + time.monotonic()
 
 

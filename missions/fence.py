@@ -115,7 +115,7 @@ def fence_from_items(items: Sequence[MissionItem]) -> Fence:
 
 
 def fence_to_items(fence: Fence) -> tuple[MissionItem, ...]:
-    """Give a fence as mission items, the way ArduPilot reads them back (frame 0, z 0)."""
+    """Return a fence as mission items, as ArduPilot reads them back (frame 0, z 0)."""
     items: list[MissionItem] = []
     for zone in fence.zones:
         if isinstance(zone, PolygonZone):

@@ -72,7 +72,7 @@ class Plan:
     warnings: tuple[str, ...]
 
     def path_index(self, seq: int, after: int = 0) -> int:
-        """Give which point of the path a mission item drives to; for a change of speed the one that it is for.
+        """Return which point of the path a mission item drives to; for a change of speed, the one that it is for.
 
         Of an item that is driven to several times the first time from point ``after`` on, else the first of all.
         """

@@ -61,7 +61,7 @@ class Promise:
 
 
 def known_vehicle(situation: Situation, request: Request) -> Vehicle:
-    """Give the vehicle, with the speed that is asked for.
+    """Return the vehicle, with the speed that is asked for.
 
     Raises
     ------
@@ -84,7 +84,7 @@ def known_vehicle(situation: Situation, request: Request) -> Vehicle:
 
 
 def promise(situation: Situation, request: Request, vehicle: Vehicle) -> Promise:
-    """Give the clearance to promise: what is asked, but no less than the vehicle's own avoidance and its corners need."""
+    """Return the clearance to promise: what is asked, but no less than the vehicle's own avoidance and its corners need."""
     warnings: list[str] = []
     promised_m = request.clearance_m
     if promised_m is None:
@@ -115,7 +115,7 @@ def promise(situation: Situation, request: Request, vehicle: Vehicle) -> Promise
 
 
 def asked_clearance(situation: Situation, request: Request) -> tuple[Vehicle, float]:
-    """Give the situation's vehicle and the clearance that a plan would promise."""
+    """Return the situation's vehicle and the clearance that a plan would promise."""
     vehicle = known_vehicle(situation, request)
     return vehicle, promise(situation, request, vehicle).promised_m
 

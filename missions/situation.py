@@ -91,7 +91,7 @@ class ListTransfer:
         return self.count is not None and all(seq in self.items for seq in range(self.count))
 
     def in_order(self) -> tuple[MissionItem, ...]:
-        """Give the items of a complete list in order."""
+        """Return the items of a complete list in order."""
         return tuple(self.items[seq] for seq in range(self.count or 0))
 
 

@@ -114,7 +114,7 @@ class VehicleLock:
         return None
 
     def free(self) -> None:
-        """Give the lock back; harmless if it is not ours."""
+        """Release the lock; harmless if it is not ours."""
         _close(self._files)
         self._files = []
 

@@ -42,11 +42,11 @@ class Commands(TyperGroup):
     """A group that imports a command's module when the command is called: help and usage errors need none of them."""
 
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ANN401, ARG002 - the parser library is typer's own affair
-        """Give the names, in the order of help."""
+        """Return the names, in the order of help."""
         return list(COMMANDS)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:  # noqa: ANN401 - as above
-        """Give a command that was called before, or what help needs to know of it."""
+        """Return a command that was called before, or what help needs to know of it."""
         known = super().get_command(ctx, cmd_name)
         if known is None and cmd_name in COMMANDS:
             return TyperCommand(cmd_name, help=COMMANDS[cmd_name])
@@ -78,7 +78,7 @@ class Commands(TyperGroup):
 
 
 def load(name: str) -> Any:  # noqa: ANN401 - a command of the parser library that typer uses
-    """Give a command, with its options."""
+    """Return a command, with its options."""
     from mavlink_bridge.cli.common import guarded  # noqa: PLC0415 - quick help
 
     function = getattr(import_module(f"mavlink_bridge.cli.{name}"), name)

@@ -373,14 +373,14 @@ class _Shell:
             self.director.take_target(typed.target, now)
 
     def _note(self, text: str, *, is_warning: bool) -> None:
-        """Say something that is no event, where it does not disturb: above the view, else on stderr."""
+        """Print a note that is not an event, where it does not disturb: above the view, else on stderr."""
         if self._view is not None:
             self._view.note(text, is_warning=is_warning)
         elif is_warning or not self._quiet:
             say(text, typer.colors.YELLOW if is_warning else None)
 
     def _ask_for_yes(self) -> None:
-        """Say once of each plan that it waits for a yes."""
+        """Print once for each plan that it waits for a yes."""
         from mavlink_bridge.cli.typed import CONFIRM  # noqa: PLC0415 - quick help
 
         plan = self.director.plan if self.director.awaits_confirmation else None
@@ -406,7 +406,7 @@ def _view(stack: contextlib.ExitStack, director: Director, *, is_wanted: bool) -
 
 
 def _teller(*, wants_json: bool, quiet: bool) -> Callable[[Event], None]:
-    """Give what tells events: JSON lines, or lines for people."""
+    """Return what prints events: JSON lines, or lines for people."""
     if wants_json:
         return lambda event: _flushed_json(event.as_json())
     if quiet:

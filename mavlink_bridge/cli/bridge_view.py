@@ -150,7 +150,7 @@ class LiveView:
         return table
 
     def _link_rows(self, now_s: float) -> list[tuple[str, str | Text]]:
-        """Say that the vehicle is not heard, since when, and what is done about it."""
+        """Return the rows of a lost link: that the vehicle is not heard, since when, and what is done about it."""
         heard_s, why = self._director.heard_s, self.link_trouble
         silent_s = None if heard_s is None else max(0.0, now_s - heard_s)
         is_lost = why is not None or self._director.state is State.LOST

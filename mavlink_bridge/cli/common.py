@@ -194,7 +194,7 @@ def warn(texts: Iterable[str]) -> None:
 
 
 def is_same_file(one: Path, other: Path) -> bool:
-    """Tell whether two paths lead to one file that is there, however they are written: Windows and macOS heed no capitals."""
+    """Return whether two paths lead to one existing file, however they are written: Windows and macOS ignore capitals."""
     return one.exists() and other.exists() and one.samefile(other)
 
 
@@ -210,7 +210,7 @@ class Shown:
 
 
 class _Lines(Shown):
-    """Tells progress in lines, one for each new text."""
+    """Prints progress in lines, one for each new text."""
 
     def __init__(self) -> None:
         self._last = ""

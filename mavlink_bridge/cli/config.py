@@ -90,7 +90,7 @@ def config(
 
 
 def settings_of(path: Path, *, is_asked_for: bool) -> list[Setting]:
-    """Give what a file sets, for each command that it touches.
+    """Return what a file sets, for each command that it touches.
 
     Raises
     ------

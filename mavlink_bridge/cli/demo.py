@@ -108,7 +108,7 @@ def demo(
 
 
 def _rover(speedup: float) -> SteppedRover:
-    """Give a rover in the maze, on a link that no slow computer breaks."""
+    """Return a rover in the maze, on a link that no slow computer breaks."""
     import secrets  # noqa: PLC0415 - quick help
 
     from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig, SteppedRover  # noqa: PLC0415 - quick help
@@ -144,7 +144,7 @@ def _observe(drive: _Drive, frames: list[Frame]) -> None:
 
 
 def _driven(plan: Plan, track: list[LatLon]) -> tuple[float, float]:
-    """Give the driven track's least clearance and its length, in metres."""
+    """Return the driven track's least clearance and its length, in metres."""
     from shapely import LineString  # noqa: PLC0415 - quick help
 
     line = LineString(plan.ground.frame.to_local_array(track))

@@ -219,5 +219,5 @@ def _details(what: str, items: tuple[MissionItem, ...], parameters: Mapping[str,
 
 
 def _number(value: float) -> float | None:
-    """Give a number JSON can hold."""
+    """Return a number as JSON can hold it."""
     return value if math.isfinite(value) else None

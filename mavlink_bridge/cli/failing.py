@@ -84,7 +84,7 @@ _telling: ContextVar[Telling | None] = ContextVar("telling", default=None)
 
 
 def telling() -> Telling:
-    """Give how much the command that runs is to tell."""
+    """Return how much the running command prints."""
     return _telling.get() or begin_telling("", verbose=False)
 
 
@@ -96,12 +96,12 @@ def begin_telling(command: str, *, verbose: bool) -> Telling:
 
 
 def exit_code_of(error: Exception) -> ExitCode:
-    """Give the exit code of an error."""
+    """Return the exit code of an error."""
     return next(code for kind, code in _EXIT_CODES if isinstance(error, kind))
 
 
 def is_reader_gone(error: Exception) -> bool:
-    """Tell whether nobody reads the standard output any more; Windows calls that an invalid argument."""
+    """Return whether nobody reads the standard output any more; Windows calls that an invalid argument."""
     if isinstance(error, BrokenPipeError):
         return True
     if not _IS_WINDOWS or not isinstance(error, OSError) or error.errno != errno.EINVAL:
@@ -170,7 +170,7 @@ def report(
     *,
     wants_json: bool,
 ) -> None:
-    """Tell an error: what and why in a line, what to do in another; with JSON wanted as one document too."""
+    """Print an error: what and why in a line, what to do in another; with JSON wanted as one document too."""
     rest = dict(details or {})
     advice = rest.pop("advice", None)
     if wants_json:
@@ -194,7 +194,7 @@ def report(
 
 
 def _advice(command: str, error: Exception) -> str | None:
-    """Say what to do, where the message itself does not."""
+    """Return what to do, where the message itself does not say it."""
     if isinstance(error, bridge_errors.UsageError):
         return f"see `pbpp {command} --help`"
     found = next((_ADVICE[kind] for kind in type(error).__mro__ if kind in _ADVICE), None)

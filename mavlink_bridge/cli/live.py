@@ -287,11 +287,11 @@ class PlanMaker:
         self._made: Future[Plan | MissionError] = Future()
 
     def longest_wait_s(self) -> float:
-        """Give how long the shell may wait for messages before it looks here again."""
+        """Return how long the shell may wait for messages before it calls again."""
         return _IDLE_S if self._task is None else _BUSY_S
 
     def take(self) -> tuple[PlanTask, Plan | MissionError] | None:
-        """Give what was made for the director and was not given yet; begin what it waits for."""
+        """Return what was made for the director since the last call; begin what it waits for."""
         task = self._task
         if task is not None and self._made.done():
             self._task = None

@@ -287,7 +287,7 @@ def _vehicle_tables(vehicle: VehicleLog) -> Iterable[Table]:
 
 
 def _rows(table: Table, rows: Sequence[Row]) -> Sequence[Row]:
-    """Give the rows of a table, the last ones where they are too many."""
+    """Return the rows of a table, the last ones where they are too many."""
     if len(rows) > _MOST_ROWS:
         table.caption = f"the last {_MOST_ROWS} of {len(rows)}; all with --json"
     return rows[-_MOST_ROWS:]

@@ -52,7 +52,7 @@ def draw(planned: Plan, plots: list[Path], *, title: str | None = None, blocks: 
 
 
 def plan_document(planned: Plan) -> dict[str, object]:
-    """Give what the JSON document tells of a plan."""
+    """Return the JSON document of a plan."""
     from missions.fence import CircleZone, PolygonZone, ZoneKind  # noqa: PLC0415 - quick help
 
     fence = planned.fence
@@ -110,7 +110,7 @@ class Told:
         self._written: list[Path] = []
 
     def tell(self, planned: Plan, planning_s: float, situation: Situation) -> None:
-        """Tell a plan; a later one is the route made anew."""
+        """Report a plan; a later one is the route made anew."""
         warn(planned.warnings)
         self._written = write_outputs(planned, situation, self._outputs, self._plots, blocks=self._blocks)
         if not self._is_silent:
@@ -137,7 +137,7 @@ def arrival_document(arrival: Mapping[str, object] | None) -> dict[str, object]:
 
 
 def report_plan(planned: Plan, written: list[Path]) -> None:
-    """Tell people of a plan, and where it was written."""
+    """Print a plan for people, and where it was written."""
     promise = (
         f"{planned.clearance_m:g} m promised while driving"
         if planned.clearance_m is not None
@@ -155,7 +155,7 @@ def report_plan(planned: Plan, written: list[Path]) -> None:
 
 
 def report_end(arrival: Mapping[str, object] | None, backup: Path | None, *, verified: bool) -> None:
-    """Tell people what was done with a plan."""
+    """Print for people what was done with a plan."""
     if verified:
         echo("Uploaded and verified")
     if backup is not None:

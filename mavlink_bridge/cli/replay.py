@@ -126,7 +126,7 @@ class _Teller:
         self._begin_s = 0.0
 
     def begin(self, log: Path) -> None:
-        """Tell when a log begins; what is told from now on is of this log."""
+        """Note that a log begins; events that follow belong to it."""
         if self._wants_json or self._is_silent:
             return
         from mavlink_bridge.cli.log_times import log_begin  # noqa: PLC0415 - quick help
@@ -143,7 +143,7 @@ class _Teller:
             echo(f"{prefix}{event['time_s'] - self._begin_s:8.2f} s  {event['event']}: {event['text']}")
 
     def fail(self, log: Path, error: LogError) -> None:
-        """Tell of a log among several that cannot be used; the others are replayed all the same."""
+        """Report that one log of several cannot be used; the others are replayed all the same."""
         if self._wants_json:
             print_json({"log": log.name, "status": "error", "error": "LogError", "message": str(error)})
         say(f"error: {error}", typer.colors.RED)
@@ -164,7 +164,7 @@ def _replayed(
 
 
 def _pool(workers: int) -> ProcessPoolExecutor | None:
-    """Give worker processes; None where there can be none, as in a sandbox without shared memory."""
+    """Return worker processes; None where there can be none, as in a sandbox without shared memory."""
     context = multiprocessing.get_context("spawn")  # a fork would copy the progress bar's thread half alive
     try:
         return ProcessPoolExecutor(workers, mp_context=context)
@@ -268,7 +268,7 @@ class _Pace:
         time.sleep(max(0.0, self.left_s(elapsed_s)))
 
     def left_s(self, elapsed_s: float) -> float:
-        """Tell how long that is yet."""
+        """Return how long it is until so many of the log's seconds have passed."""
         return self._begun_s + elapsed_s / self._speed - time.monotonic()
 
 
@@ -324,7 +324,7 @@ def _play(
 
 
 def _elapsed(frames: Iterable[tuple[float, bytes]]) -> Iterator[tuple[float, bytes]]:
-    """Give the seconds since the first frame, by a clock that only goes forward."""
+    """Return the seconds since the first frame, by a clock that only goes forward."""
     from mavlink_bridge.logbook import SteadyClock  # noqa: PLC0415 - quick help
 
     clock = SteadyClock()

@@ -67,7 +67,7 @@ class RunLog:
 
 
 class SafeTeller:
-    """Tells events on the standard output as long as they can be written there.
+    """Prints events on the standard output as long as they can be written there.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class SafeTeller:
         self._may_end = may_end
 
     def __call__(self, event: Event) -> None:
-        """Tell an event.
+        """Print an event.
 
         Raises
         ------

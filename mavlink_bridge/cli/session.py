@@ -301,7 +301,7 @@ class Session:
 
 
 def signing_of(key_file: Path | None) -> Signing | None:
-    """Give the signing that a key file asks for.
+    """Return the signing that a key file asks for.
 
     Raises
     ------

@@ -76,7 +76,7 @@ class Drives:
             self._grader.drive(before, clearances_m)
 
     def _from_standing(self, first: Fix) -> list[Fix]:
-        """Give the positions shortly before, from the last at which it stood; none where it still stands or none is known."""
+        """Return the positions shortly before, from the last at which it stood; none where it still stands or none is known."""
         if first.speed_mps <= STANDING_MPS:
             return []
         before = [fix for fix in self._recent if first.time_s - fix.time_s <= _HEARTBEAT_S]

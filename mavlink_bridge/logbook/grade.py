@@ -133,7 +133,7 @@ class MissionWay(NamedTuple):
 
 
 def way_of(items: Sequence[MissionItem], first_item: int, *, home_first: bool) -> MissionWay:
-    """Give the way that a mission describes from an item on.
+    """Return the way that a mission describes from an item on.
 
     Parameters
     ----------
@@ -250,7 +250,7 @@ class DriveGrader:
             self._tally.farthest = max(self._tally.farthest, number)
 
     def finish(self) -> Grade | None:
-        """Give the grade; None where the vehicle hardly moved."""
+        """Return the grade; None where the vehicle hardly moved."""
         tally, way = self._tally, self.way
         if not tally.fixes or tally.driven_m < _LEAST_DRIVEN_M:
             return None

@@ -108,7 +108,7 @@ class Recorder:
             self._take_own(frame.message, now_s)
 
     def finish(self, now_s: float) -> VehicleLog:
-        """Give what was noted, at the log's end."""
+        """Return what was noted, at the log's end."""
         self._flush()
         self._drives.end()
         if self._modes:
@@ -355,7 +355,7 @@ def _value(known: Known[T] | None) -> T | None:
 
 
 def _is_other_ground(before: Situation, after: Situation) -> bool:
-    """Tell whether the same fence means other ground now: home or a parameter changed."""
+    """Return whether the same fence means other ground now: home or a parameter changed."""
     if _value(before.home) != _value(after.home):
         return True
     return before.parameters is not after.parameters and any(

@@ -52,7 +52,7 @@ class Fix(NamedTuple):
 
 
 def pieces(fixes: list[Fix], points: NDArray[np.float64]) -> NDArray[np.object_]:
-    """Give the track fix by fix as lines from the one before; as points at the first and where something is missing.
+    """Return the track fix by fix as lines from the one before; as points at the first and where something is missing.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ class FenceMeter:
         return clearances_m, depths_m
 
     def at_points(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Give the clearances of points by themselves."""
+        """Return the clearances of points by themselves."""
         return self.measure(_as_points(points), points)[0]
 
     def zone_near(self, piece: BaseGeometry, point: NDArray[np.float64]) -> str:

@@ -138,7 +138,7 @@ class Codec:
         self._packer.srcSystem, self._packer.srcComponent = identity
 
     def encode(self, message: Message) -> bytes:
-        """Give the bytes of one MAVLink 2 frame and count the sequence number up."""
+        """Return the bytes of one MAVLink 2 frame and count the sequence number up."""
         if self._signing is not None:
             self._packer.signing.timestamp = self._signing.next_timestamp()
         packed: bytes = _to_dialect(message).pack(self._packer)

@@ -531,7 +531,7 @@ class Frame:
 
 
 def wire_name(message_class: type[Message]) -> str:
-    """Give the MAVLink name of a message class: ``MissionItemInt`` is ``MISSION_ITEM_INT``."""
+    """Return the MAVLink name of a message class: ``MissionItemInt`` is ``MISSION_ITEM_INT``."""
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", message_class.__name__).upper()
 
 

@@ -59,7 +59,7 @@ class SigningKey:
 
     @classmethod
     def from_passphrase(cls, passphrase: str) -> SigningKey:
-        """Give the key of a passphrase, as MAVProxy and Mission Planner make it: its SHA-256."""
+        """Return the key of a passphrase, as MAVProxy and Mission Planner make it: its SHA-256."""
         return cls(hashlib.sha256(passphrase.encode()).digest())
 
     @classmethod
@@ -95,11 +95,11 @@ class SigningKey:
         return cls(decoded) if len(decoded) == KEY_BYTES else cls.from_passphrase(text)
 
     def signature(self, signed_bytes: bytes) -> bytes:
-        """Give the 6 signature bytes of a frame without them."""
+        """Return the 6 signature bytes of a frame without them."""
         return hashlib.sha256(self._secret + signed_bytes).digest()[:6]
 
     def hand_to(self, take: Callable[[bytes], None]) -> None:
-        """Give the secret to the packer."""
+        """Set the secret on the packer."""
         take(self._secret)
 
 
@@ -124,7 +124,7 @@ class Signing:
         self._streams: dict[tuple[int, int, int], int] = {}
 
     def next_timestamp(self) -> int:
-        """Give the timestamp for the next frame: the clock's, and always later than any before."""
+        """Return the timestamp for the next frame: the clock's, and always later than any before."""
         self._ticks = max(self._ticks + 1, self._clock_ticks())
         return self._ticks
 
@@ -133,7 +133,7 @@ class Signing:
         self._streams[_stream(frame)] = _ticks(frame)
 
     def accepts(self, frame: bytes) -> bool:
-        """Tell whether a received frame is signed with our key and not a replay; an accepted one is remembered."""
+        """Return whether a received frame is signed with our key and not a replay; an accepted one is remembered."""
         if len(frame) < _SIGNATURE_BYTES or frame[0] != _MAVLINK_2 or not frame[2] & _FLAG_SIGNED:
             return False
         if not hmac.compare_digest(self.key.signature(frame[:-6]), frame[-6:]):

@@ -424,7 +424,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         self._repeat(overtaken, now_s)
 
     def _overdue_at_s(self) -> float:
-        """Give the time at which the oldest request counts as lost: long after it and after anything that came since."""
+        """Return the time at which the oldest request counts as lost: long after it and after anything that came since."""
         overdue_s = self._round_trip.timeout_s(_LEAST_OVERDUE_S, _MOST_OVERDUE_S)
         oldest = next(iter(self._in_flight.values()))
         return max(oldest.sent_s, self._heard_s) + overdue_s

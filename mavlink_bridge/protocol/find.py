@@ -137,7 +137,7 @@ class FindVehicle(TableMachine[FindState, FindEvent]):
             self.trouble = identity_taken(identity)
 
     def _unheard(self) -> VehicleNotFoundError:
-        """Say that no vehicle was heard, and whether anybody else was: that is another trouble than a dead line."""
+        """Return the error for a vehicle not heard; it notes whether anybody else was heard, which is another trouble than a dead line."""
         within = f"no vehicle's HEARTBEAT was heard within {self._patience_s:g} s"
         if not self._senders:
             return VehicleNotFoundError(f"{within}, nor anything else", advice=_SILENT_ADVICE)

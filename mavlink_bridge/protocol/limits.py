@@ -38,7 +38,7 @@ class Limits:
 
     @classmethod
     def from_parameters(cls, parameters: Mapping[str, float]) -> Limits:
-        """Give a vehicle's limits from its parameters: BRD_SD_MISSION and BRD_SD_FENCE are storage on the SD card, in KB."""
+        """Return a vehicle's limits from its parameters: BRD_SD_MISSION and BRD_SD_FENCE are storage on the SD card, in KB."""
         limits = cls(mission_items=most_items(parameters))
         fence_bytes = sd_card_bytes(parameters, "BRD_SD_FENCE")
         if fence_bytes > 0:
@@ -48,7 +48,7 @@ class Limits:
         return limits
 
     def problem(self, items: Sequence[MissionItem], mission_type: MissionType) -> str | None:
-        """Say why a list does not fit; None if it does."""
+        """Return why a list does not fit; None if it does."""
         most = {MissionType.MISSION: self.mission_items, MissionType.FENCE: self.fence_items}.get(
             mission_type
         )
@@ -60,7 +60,7 @@ class Limits:
 
 
 def fence_bytes(items: Sequence[MissionItem]) -> int:
-    """Give the storage a fence needs on ArduPilot, in bytes."""
+    """Return the storage a fence needs on ArduPilot, in bytes."""
     vertices = [item for item in items if item.command in _POLYGON]
     polygons = sum(1 / item.params[0] for item in vertices if item.params[0] >= 1)
     circles = sum(item.command in _CIRCLE for item in items)

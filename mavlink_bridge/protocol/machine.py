@@ -44,5 +44,5 @@ class Machine(Protocol):
         ...
 
     def messages_to_send(self) -> list[Message]:
-        """Give and forget what is to be sent now, in order."""
+        """Return what is to be sent now, in order, and forget it."""
         ...

@@ -297,7 +297,7 @@ class ReadParameters(TableMachine[ParameterState, ParameterEvent]):
             self._ask_control()
 
     def _tries_enough(self) -> int:
-        """Give how often one must ask until an unanswered name is a missing one, judged by what others needed."""
+        """Return how often to ask until an unanswered name is a missing one, judged by what others needed."""
         if not self._answered:
             return _MOST_TRIES
         failures = (max(self._answered_tries - self._answered, 0) + 1) / (self._answered_tries + 4)
@@ -414,7 +414,7 @@ class SetParameter(TableMachine[ParameterState, ParameterEvent]):
 
 
 def _float32(value: float) -> float:
-    """Give the value as it goes over the wire."""
+    """Return the value as it goes over the wire."""
     try:
         return float(struct.unpack("<f", struct.pack("<f", value))[0])
     except OverflowError:

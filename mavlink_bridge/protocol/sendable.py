@@ -105,7 +105,7 @@ def _misfit(item: MissionItem, *, allow_infinite: bool) -> tuple[str, float, str
 
 
 def _is_float32(value: float) -> bool:
-    """Tell whether a number is within the range of 32-bit floats; NaN and the infinities are among them."""
+    """Return whether a number is within the range of 32-bit floats; NaN and the infinities are among them."""
     try:
         struct.pack("<f", value)
     except OverflowError:

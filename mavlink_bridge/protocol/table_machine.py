@@ -36,7 +36,7 @@ class TableMachine(Generic[StateT, EventT]):
         return not self._table[self.state]
 
     def messages_to_send(self) -> list[Message]:
-        """Give and forget what is to be sent now, in order."""
+        """Return what is to be sent now, in order, and forget it."""
         outgoing, self._outgoing = self._outgoing, []
         return outgoing
 

@@ -243,7 +243,7 @@ class Upload(TableMachine[UploadState, UploadEvent]):
         self._act_at_s = now_s + self._probe_after_s()
 
     def _probe_after_s(self) -> float:
-        """Give the silence that is worth a question: sooner when only the final word is missing."""
+        """Return the silence after which to ask: shorter when only the final ACK is missing."""
         at_end = self._wanted == len(self._messages) - 1
         if not at_end:
             return _PROBE_AFTER_S
@@ -332,7 +332,7 @@ class Upload(TableMachine[UploadState, UploadEvent]):
             self._gap_at_s = begins_s + min(max(settle_s, _LEAST_SETTLE_S), _MOST_SETTLE_S)
 
     def _answered_at_s(self) -> float:
-        """Give when the item wanted, as last sent, is answered; what is heard before is about copies sent before."""
+        """Return when the item wanted, as last sent, is answered; what is heard before is about copies sent before."""
         return self._sent_s.get(self._wanted, -math.inf) + self._round_trip.mean_s
 
     def _fill_gap(self, now_s: float) -> None:

@@ -30,12 +30,12 @@ _SHARES: Final = {"length_m": 0.05}
 
 
 def expectation_path(log: Path) -> Path:
-    """Give where the expectation of a log lies: beside it."""
+    """Return where the expectation of a log lies: beside it."""
     return log.with_suffix(".events.jsonl")
 
 
 def to_expect(events: Sequence[Mapping[str, Any]]) -> str:
-    """Give the text of an expectation file for the events that were told."""
+    """Return the text of an expectation file for a replay's events."""
     left_out = {*_WORDING, *_DETAILS}
     kept = [{key: value for key, value in event.items() if key not in left_out} for event in events]
     return "".join(json.dumps(event) + "\n" for event in kept)
@@ -70,7 +70,7 @@ def read_expectation(path: Path) -> list[dict[str, Any]]:
 
 
 def differences(expected: Sequence[Mapping[str, Any]], told: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Say line by line what was told otherwise than expected; nothing where all is as it should be.
+    """Return line by line where the events differ from the expected ones; nothing where all is as it should be.
 
     ``-`` stands before events that were expected and did not come, ``+`` before others that came, ``~`` before those that came otherwise.
     """

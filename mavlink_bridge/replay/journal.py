@@ -106,7 +106,7 @@ class JournalWriter:
 
 
 def journal_path(log: Path) -> Path:
-    """Give where the journal of a log lies."""
+    """Return where the journal of a log lies."""
     return log.with_suffix(".journal.jsonl")
 
 

@@ -33,7 +33,7 @@ _STILL_ADVICE = "fence, mission and targets are in it all the same: `pbpp log FI
 
 
 def replay_log(log: Path, orders: Orders, wait: Callable[[float], None] | None = None) -> Iterator[Event]:
-    """Give the director's events over a log; with its journal where there is one.
+    """Return the director's events over a log; with its journal where there is one.
 
     Parameters
     ----------

@@ -54,7 +54,7 @@ class ItemList(ABC):
         return len(self.items)
 
     def read(self, seq: int) -> MissionItem | None:
-        """Give an item as it reads back, None past the end."""
+        """Return an item as it reads back, None past the end."""
         return self.items[seq] if seq < len(self.items) else None
 
     @abstractmethod
@@ -122,7 +122,7 @@ class MissionList(_InPlaceList):
         self.items.append(_home_item(home()))
 
     def read(self, seq: int) -> MissionItem | None:
-        """Give an item as it reads back: at 0 the vehicle's home."""
+        """Return an item as it reads back: at 0 the vehicle's home."""
         if seq == 0 and self.items:
             return _home_item(self._home())
         return super().read(seq)
@@ -135,7 +135,7 @@ class MissionList(_InPlaceList):
         return self._put(seq, item_rules.kept_mission_item(item))
 
     def finish(self) -> MissionResult:
-        """Say that the plan has come."""
+        """Note with ArduPilot's text that the list is complete; return that it is accepted."""
         self.texts.append("Flight plan received")
         return MissionResult.ACCEPTED
 

@@ -90,7 +90,7 @@ class TransferServer:
         return min(self._upload.requested_s + REQUEST_AGAIN_S, self._upload.received_s + UPLOAD_TIMEOUT_S)
 
     def messages_to_send(self) -> list[Message]:
-        """Give and forget what is to be sent."""
+        """Return what is to be sent, and forget it."""
         outbox, self._outbox = self._outbox, []
         return outbox
 
@@ -261,7 +261,7 @@ class MissionServer:
             self._outbox += server.messages_to_send()
 
     def messages_to_send(self) -> list[Message]:
-        """Give and forget what is to be sent."""
+        """Return what is to be sent, and forget it."""
         outbox, self._outbox = self._outbox, []
         return outbox
 
@@ -275,7 +275,7 @@ class MissionServer:
 def int_message(
     client: tuple[int, int], seq: int, item: items.MissionItem, mission_type: int
 ) -> MissionItemInt:
-    """Give an item as the message that carries it."""
+    """Return the message that carries an item."""
     return MissionItemInt(
         *client,
         seq,

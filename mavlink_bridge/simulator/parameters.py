@@ -58,7 +58,7 @@ _TYPES = {
 
 
 def float32(value: float) -> float:
-    """Give the value as it is after a trip through a float of four bytes."""
+    """Return the value as it is after a trip through a float of four bytes."""
     try:
         return float(struct.unpack("<f", struct.pack("<f", value))[0])
     except OverflowError:
@@ -121,14 +121,14 @@ class ParameterStore:
         self._values[name] = float(int(value)) if kind(name) != REAL32 else float32(value)
 
     def name_at(self, index: int) -> str | None:
-        """Give the name at an index of the list, None past its ends."""
+        """Return the name at an index of the list, None past its ends."""
         return self._names[index] if 0 <= index < len(self._names) else None
 
     def index_of(self, name: str) -> int:
-        """Give a parameter's place in the list."""
+        """Return a parameter's place in the list."""
         return self._names.index(name)
 
 
 def kind(name: str) -> int:
-    """Give a parameter's MAV_PARAM_TYPE."""
+    """Return a parameter's MAV_PARAM_TYPE."""
     return _TYPES.get(name, REAL32)

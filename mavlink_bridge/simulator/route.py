@@ -133,7 +133,7 @@ class Route:
         return None
 
     def _after(self, seq: int, jumps: dict[int, int]) -> int:
-        """Give what follows an item, counting jumps in ``jumps``."""
+        """Return what follows an item, counting jumps in ``jumps``."""
         item = self._items()[seq]
         if item.command != Command.DO_JUMP:
             return seq + 1
@@ -145,7 +145,7 @@ class Route:
         return target
 
     def _next_place(self, seq: int) -> complex | None:
-        """Give the place after an item at which the rover need not stop; None if it must."""
+        """Return the place after an item at which the rover need not stop; None if it must."""
         items = self._items()
         if items[seq].command != Command.NAV_WAYPOINT or items[seq].params[0] > 0:
             return None

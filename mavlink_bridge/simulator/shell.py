@@ -49,7 +49,7 @@ class _Client:
         self._relays: dict[tuple[int, int], Codec] = {}
 
     def relay(self, frame: Frame) -> bytes:
-        """Give the bytes of someone else's frame, under the sender's identity."""
+        """Return the bytes of someone else's frame, under the sender's identity."""
         identity = (frame.system, frame.component)
         codec = self._relays.setdefault(identity, Codec(*identity))
         return codec.encode(frame.message)
@@ -222,7 +222,7 @@ class Simulator:
         return max(0.0, min(next_s - self._real_s(), _LONGEST_WAIT_S))
 
     def _advance(self, real_s: float) -> float:
-        """Give the rover's time.
+        """Advance the rover's time.
 
         Where the computer does not keep up, or stood still, the rover's time falls behind: made up for at once, more would pass with
         each turn than in the one before, and the rover would fall silent.

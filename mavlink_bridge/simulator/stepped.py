@@ -47,11 +47,11 @@ class SteppedRover:
         self._vehicle_s = 0.0
 
     def now_s(self) -> float:
-        """Give the time by which the rover and its link run: seconds since 1970."""
+        """Return the time by which the rover and its link run: seconds since 1970."""
         return self._epoch_s + self._vehicle_s
 
     def send(self, data: bytes) -> None:
-        """Give the rover what was sent to it."""
+        """Deliver bytes to the rover."""
         for frame in self._codec.decode(data):
             self.vehicle.receive(frame, self._vehicle_s)
 

@@ -77,7 +77,7 @@ class Streams:
         return min(self._due_s.values())
 
     def due(self, now_s: float) -> list[int]:
-        """Give the ids of what is due and put each off by its interval."""
+        """Return the ids of what is due and put each off by its interval."""
         due = [message_id for message_id, due_s in self._due_s.items() if due_s <= now_s + 1e-9]
         for message_id in due:
             interval_s = self._intervals_s[message_id]

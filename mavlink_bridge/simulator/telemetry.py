@@ -56,7 +56,7 @@ class State:
 
 
 def telemetry(message_id: int, state: State) -> m.Message | None:
-    """Give a message by its id, None where there is nothing to tell."""
+    """Return a message by its id, None where the rover has no such message."""
     build = _BUILDERS.get(message_id)
     return build(state) if build else None
 

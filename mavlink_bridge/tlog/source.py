@@ -26,7 +26,7 @@ class Source(Protocol):
     """Whether the log's packing (gzip) broke before its end."""
 
     def window(self, begin: int) -> tuple[bytes, bool]:
-        """Give up to `WINDOW_BYTES` bytes from an offset on, and whether they reach the log's end."""
+        """Return up to `WINDOW_BYTES` bytes from an offset on, and whether they reach the log's end."""
         ...
 
 

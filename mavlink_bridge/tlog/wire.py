@@ -127,7 +127,7 @@ NAME_OF_ID: Final[dict[int, str]] = {number: cls.msgname for number, cls in _dia
 
 
 def layout_of(message_class: type[Message]) -> Layout:
-    """Give the layout of one of our messages.
+    """Return the layout of one of our messages.
 
     Raises
     ------

@@ -243,7 +243,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
 
 
 def plan_of(check: MissionCheck, situation: Situation, *, method: str = "optimal") -> Plan:
-    """Give a mission that was checked as a plan: for pictures, files, uploads and drives."""
+    """Return a checked mission as a plan: for pictures, files, uploads and drives."""
     path = check.path
     home = situation.home.value if situation.home else check.mission.home
     return Plan(
@@ -339,7 +339,7 @@ def _checked_legs(
 
 
 def _asked_of_first_leg_m(ground: Ground, leg: CourseLeg, band_m: float, promised_m: float) -> float:
-    """Give what the leg from the start has to keep: less than the others where the start is near a fence and the leg leads away from it."""
+    """Return the clearance that the leg from the start must keep: less than the others where the start is near a fence and the leg leads away from it."""
     line = drawn_leg(ground, leg.start, leg.end)
     if not isinstance(line, LineString) or not ground.allowed.covers(line):
         return promised_m
@@ -352,12 +352,12 @@ def _asked_of_first_leg_m(ground: Ground, leg: CourseLeg, band_m: float, promise
 
 
 def forecast_band_m(forecast: Envelope) -> float:
-    """Give the widest straight-line band of a drive."""
+    """Return the widest straight-line band of a drive."""
     return max((leg.half_width_m for leg in forecast.legs), default=0.0)
 
 
 def _shape(ground: Ground, leg: CourseLeg, circle_before_m: float) -> BaseGeometry:
-    """Give where a leg's drawn line may run: a circle is left, and come to, anywhere on it."""
+    """Return where a leg's drawn line may run: a circle may be left, and come to, anywhere on it."""
     line: BaseGeometry = drawn_leg(ground, leg.start, leg.end)
     if circle_before_m:
         disc = Point(ground.frame.to_local(leg.start)).buffer(circle_before_m * CIRCLE_PAD)
@@ -396,7 +396,7 @@ class _Drawn:
 
 
 def _first_outside(ground: Ground, shape: BaseGeometry) -> Point:
-    """Give the first place of a shape, in its own direction, that is on forbidden ground."""
+    """Return the first place of a shape, in its own direction, that is on forbidden ground."""
     outside = shape.difference(ground.allowed)
     if not isinstance(shape, LineString) or outside.is_empty:
         return outside.representative_point() if not outside.is_empty else shape.representative_point()
@@ -409,7 +409,7 @@ def _position(ground: Ground, point: Point) -> LatLon:
 
 
 def _driven_m(forecast: Envelope, ground: Ground, count: int) -> NDArray[np.float64]:
-    """Give the least foreseen clearance of each leg, with the corner at its end."""
+    """Return the least predicted clearance of each leg, with the corner at its end."""
     pieces_m = np.maximum(forecast.clearances_m(ground.edge), 0.0)
     pieces_m[~shapely.covers(ground.allowed, forecast.cores)] = 0.0
     legs_m = np.full(count, np.inf)
@@ -426,7 +426,7 @@ def _driven_m(forecast: Envelope, ground: Ground, count: int) -> NDArray[np.floa
 def _start_warnings(
     start: LatLon | None, heading_deg: float | None, first: CheckedLeg, required_m: float
 ) -> list[str]:
-    """Say what is not known of the start, and what its first leg cannot keep."""
+    """Return warnings of what is unknown at the start, and of what its first leg cannot keep."""
     if start is None:
         return [
             f"where the vehicle starts is not known: how it comes to item {first.leg.first_item} was not checked"
@@ -443,7 +443,7 @@ def _start_warnings(
 
 
 def _drive_warnings(vehicle: Vehicle, forecast: Envelope, course: Course) -> list[str]:
-    """Say where the drive model does not hold, and which parameters were not known."""
+    """Return warnings of where the drive model does not hold, and of parameters that were not known."""
     items = [course.legs[0].first_item, *(leg.last_item for leg in course.legs)]
     warnings = [
         f"item {items[corner.waypoint]}: a turn of {abs(corner.turn_deg):.0f}° between short legs; "

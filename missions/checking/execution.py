@@ -96,7 +96,7 @@ class Course:
 
 
 def is_navigation(item: MissionItem) -> bool:
-    """Tell whether an item is a navigation command: one that the vehicle is busy with until it is done (AP_Mission::is_nav_cmd)."""
+    """Return whether an item is a navigation command: one that the vehicle is busy with until it is done (AP_Mission::is_nav_cmd)."""
     return 0 < item.command <= Command.NAV_LAST or item.command in _STRAYING
 
 
@@ -309,7 +309,7 @@ class _Walk:
         self.speed_mps = speed_mps
 
     def _jump(self, index: int) -> int | None:
-        """Give the index that the mission goes on with; None where it ends here."""
+        """Return the index at which the mission goes on; None where it ends here."""
         item = self.items[index]
         goal = self._jump_goal(item)
         if goal is None:
@@ -336,7 +336,7 @@ class _Walk:
         return goal
 
     def _jump_goal(self, item: MissionItem) -> int | None:
-        """Give the index that a jump leads to; None where there is no such item."""
+        """Return the index that a jump leads to; None where there is no such item."""
         wanted = item.params[0]
         if item.command == _DO_JUMP_TAG:
             tags = (

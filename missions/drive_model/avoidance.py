@@ -51,7 +51,7 @@ _SIDES = np.exp(1j * np.radians([0.0, ASIDE_DEG, -ASIDE_DEG]))
 
 
 def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry) -> Envelope:
-    """Give an envelope with what corners before a fence need more, where the vehicle's avoidance is on.
+    """Return an envelope with the extra room that corners before a fence need where the vehicle's avoidance is on.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ class _Target:
             self.places += np.interp(self.times_s - begin_s, *_shares(profile)) * step
 
     def lags(self, vehicle: Vehicle, fence: FenceAhead) -> list[complex]:
-        """Give at each time how far the rover is behind, east and north; an empty list where it never is."""
+        """Return at each time how far the rover is behind, east and north; an empty list where it never is."""
         steps = np.diff(self.places)
         moved_m = np.maximum(np.abs(steps), _LEAST_MPS * _STEP_S)
         is_slowed = np.zeros(len(steps), dtype=np.bool_)
@@ -127,7 +127,7 @@ class _Target:
         return _followed(self.places.tolist(), is_slowed.tolist(), vehicle, fence)
 
     def _near_corners(self) -> NDArray[np.bool_]:
-        """Tell when it is about a corner: falling behind on a straight line does not matter."""
+        """Return which times lie near a corner: falling behind on a straight line does not matter."""
         near = np.zeros(len(self.times_s), dtype=np.bool_)
         for corner, passed_s in zip(self.band.corners, self._passed_s, strict=True):
             if not corner.stops and abs(corner.turn_deg) >= _LEAST_TURN_DEG:
@@ -135,7 +135,7 @@ class _Target:
         return near
 
     def pieces(self, lags: list[complex]) -> list[tuple[BaseGeometry, float, int]]:
-        """Give the ground between target point and rover where that is behind, piece by piece."""
+        """Return the ground between target point and rover where the rover is behind, piece by piece."""
         behind = np.array(lags)
         far = np.flatnonzero(np.abs(behind) >= NEGLIGIBLE_M)
         # A piece holds the first sample of the next one too.
@@ -156,7 +156,7 @@ class _Target:
         )
 
     def _waypoint(self, time_s: float) -> int:
-        """Give the waypoint that a time is nearest to."""
+        """Return the waypoint nearest to a time."""
         if not self._passed_s:
             return self.band.legs[-1].first + 1
         nearest = min(range(len(self._passed_s)), key=lambda number: abs(self._passed_s[number] - time_s))
@@ -168,7 +168,7 @@ def _profile(leg: Leg, vehicle: Vehicle) -> LegProfile:
 
 
 def _shares(profile: LegProfile) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Give times since a leg's start, and what share of it is driven by then."""
+    """Return times since a leg's start, and the share of the leg that is driven by each."""
     leg_s = np.append(np.arange(0.0, profile.duration_s, _STEP_S), profile.duration_s)
     return leg_s, np.array([profile.travelled_m(time_s) / profile.length_m for time_s in leg_s.tolist()])
 
@@ -231,7 +231,7 @@ class _Rover:
 
 
 def _scale(velocity: complex, behind: complex, driven: complex, vehicle: Vehicle) -> float:
-    """Give how fast time runs for the target point: it waits for a rover that cannot keep up (AR_WPNav)."""
+    """Return how fast time runs for the target point: it waits for a rover that cannot keep up (AR_WPNav)."""
     target_mps = max(abs(velocity), _LEAST_MPS)
     along_mps = ((driven - vehicle.position_gain_per_s * behind) * velocity.conjugate()).real / target_mps
     return min(max(0.05 + along_mps / target_mps, _LEAST_SCALE), 1.0)

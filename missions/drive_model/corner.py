@@ -89,12 +89,12 @@ STANDSTILL = Blend(0.0, 0.0)
 
 
 def band_m(vehicle: Vehicle, speed_mps: float) -> float:
-    """Give how far a rover strays to either side of the path its autopilot means to drive."""
+    """Return how far a rover strays to either side of the path that its autopilot aims for."""
     return BAND_AT_REST_M + BAND_HEADING_ERROR * speed_mps / vehicle.position_gain_per_s
 
 
 def blend(vehicle: Vehicle, before: LegProfile, after: LegProfile, turn_deg: float) -> Blend:
-    """Give the overlap of two legs' motions at a corner.
+    """Return the overlap of two legs' motions at a corner.
 
     The next leg starts as early as the middle of the turn lies within the waypoint radius and its acceleration within
     ATC_TURN_MAX_G, at the earliest when the present leg begins to brake (SCurve::advance_target_along_track).
@@ -117,7 +117,7 @@ def blend(vehicle: Vehicle, before: LegProfile, after: LegProfile, turn_deg: flo
 
 
 def corner_swing_m(vehicle: Vehicle, turn_deg: float, reach_m: float, shorter_leg_m: float) -> float:
-    """Give how far a rover is carried out beyond its band after a corner that it does not stop at.
+    """Return how far a rover is carried out beyond its band after a corner that it does not stop at.
 
     Steered wheels cannot follow a sharp blend; a blend that starts early gives room back. On short legs a rover is still swinging from
     one corner when the next begins.
@@ -133,22 +133,22 @@ def corner_swing_m(vehicle: Vehicle, turn_deg: float, reach_m: float, shorter_le
 
 
 def swing_length_m(vehicle: Vehicle) -> float:
-    """Give how far along its next leg a rover comes before a swing is at its widest."""
+    """Return how far along its next leg a rover comes before a swing is at its widest."""
     return SWING_LENGTHS * max(vehicle.turn_radius_m, MEASURED_TURN_RADIUS_M)
 
 
 def pivot_swing_m(shorter_leg_m: float) -> float:
-    """Give how far beyond its band a rover strays that pivots between short legs."""
+    """Return how far beyond its band a rover strays that pivots between short legs."""
     return PIVOT_SWING_M * math.exp(-shorter_leg_m / SHORT_LEG_M)
 
 
 def start_swing_m(vehicle: Vehicle, error_deg: float) -> float:
-    """Give how far off its line, beyond its band, a rover swings that starts with its heading wrong."""
+    """Return how far off its line, beyond its band, a rover swings that starts with its heading wrong."""
     return _start(vehicle, error_deg, START_SWING_M)
 
 
 def start_behind_m(vehicle: Vehicle, error_deg: float) -> float:
-    """Give how far behind its start a rover comes that starts with its heading wrong."""
+    """Return how far behind its start a rover comes that starts with its heading wrong."""
     return _start(vehicle, error_deg, START_BEHIND_M)
 
 
@@ -164,7 +164,7 @@ def is_bounded(vehicle: Vehicle, turn_deg: float, shorter_leg_m: float) -> bool:
 
 
 def pivot_time_s(vehicle: Vehicle, turn_deg: float) -> float:
-    """Give how long a turn on the spot takes; a rate of 0 is no limit."""
+    """Return how long a turn on the spot takes; a rate of 0 is no limit."""
     return abs(turn_deg) / vehicle.pivot_rate_dps if vehicle.pivot_rate_dps > 0 else 0.0
 
 
@@ -174,7 +174,7 @@ def may_pivot_or_cut(vehicle: Vehicle, turn_deg: float) -> bool:
 
 
 def swing_time_s(swing_m: float, speed_mps: float) -> float:
-    """Give the time lost on the way out and back, beyond that of the motion."""
+    """Return the time lost on the way out and back, beyond that of the motion."""
     return swing_m * (0.7 + 0.4 / max(speed_mps, 0.5))
 
 

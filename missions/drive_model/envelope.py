@@ -127,7 +127,7 @@ class Envelope:
         return pieces
 
     def clearances_m(self, obstacle: BaseGeometry) -> NDArray[np.float64]:
-        """Give the distance of each piece from a geometry, negative by its band at most where they meet.
+        """Return the distance of each piece from a geometry, negative by its band at most where they meet.
 
         Parameters
         ----------
@@ -144,5 +144,5 @@ class Envelope:
         return np.asarray(shapely.distance(self.cores, obstacle) - self.bands_m, dtype=np.float64)
 
     def clearance_m(self, obstacle: BaseGeometry) -> float:
-        """Give the least distance of the driven track from a geometry: what `clearances_m` says at its worst."""
+        """Return the least distance of the driven track from a geometry: the least of `clearances_m`."""
         return float(self.clearances_m(obstacle).min(initial=np.inf))

@@ -121,7 +121,7 @@ class Drive:
         return self.with_cores(convex(self.pieces.hulls))
 
     def with_cores(self, cores: NDArray[np.object_]) -> Envelope:
-        """Give the band, the convex hulls of its pieces being known already."""
+        """Return the band from the convex hulls of its pieces, already known."""
         route = self.routes[0]
         return Envelope(
             points=self.points,
@@ -144,7 +144,7 @@ def _add_route(pieces: Pieces, route: Route, points: NDArray[np.float64], behind
 
 
 def _bearing_deg(points: NDArray[np.float64]) -> float:
-    """Give the bearing of the first leg that leads anywhere."""
+    """Return the bearing of the first leg that has a length."""
     away = points[np.hypot(*(points - points[0]).T) > SAME_PLACE_M]
     if not len(away):
         return 0.0
@@ -208,7 +208,7 @@ def _check_speeds(speeds: Sequence[float | None] | None, legs: int) -> None:
 
 
 def _start(array: NDArray[np.float64], vehicle: Vehicle, heading_deg: float | None) -> tuple[Stray, float]:
-    """Give the swing at the start, and how far behind its place it takes the rover."""
+    """Return the swing at the start, and how far behind its place it takes the rover."""
     steps = array - array[0]
     far = np.flatnonzero(np.hypot(steps[:, 0], steps[:, 1]) >= SAME_PLACE_M)
     if not len(far):

@@ -20,7 +20,7 @@ START_AND_END_LAG_S = 2.0
 
 
 def told_corner(route: Route, number: int) -> Corner:
-    """Give what is foreseen at a corner."""
+    """Return the summary of what is predicted at a corner."""
     plan, before, after = route.corners[number], route.legs[number], route.legs[number + 1]
     band_m = max(before.band_m, after.band_m)
     blend_s = before.profile.duration_s - plan.blend.duration_s
@@ -53,7 +53,7 @@ def _cut_m(route: Route, number: int) -> float:
 
 
 def told_leg(route: Route, number: int) -> Leg:
-    """Give what is foreseen on a leg."""
+    """Return the summary of what is predicted on a leg."""
     leg: LegPlan = route.legs[number]
     begin_s, _ = route.span_s(number)
     stray = route.stray_at(number, begin_s)
@@ -68,7 +68,7 @@ def told_leg(route: Route, number: int) -> Leg:
 
 
 def arrivals_s(route: Route, count: int) -> NDArray[np.float64]:
-    """Give when each point is passed: the motions of the legs one after another, less what they overlap."""
+    """Return when each point is passed: the motions of the legs one after another, less their overlaps."""
     times_s = np.zeros(count)
     clock_s = (
         START_AND_END_LAG_S / 2 + at_corner.swing_time_s(route.strays[0].widest_m, route.vehicle.speed_mps)

@@ -169,7 +169,7 @@ def _routed(
     request: Request,
     should_stop: Callable[[], bool] | None,
 ) -> ItemList:
-    """Give the mission with routes in the place of some legs."""
+    """Return the mission with routes in place of some legs."""
     repaired = ItemList(asked.mission)
     moved: dict[int, LatLon] = {}
 
@@ -203,12 +203,12 @@ def _names(key: LegKey) -> str:
 
 
 def _where_moved(leg: CourseLeg, moved: Mapping[int, LatLon]) -> CourseLeg:
-    """Give a leg between the places where its ends are now."""
+    """Return a leg between the places where its ends are now."""
     return replace(leg, start=moved.get(leg.first_item, leg.start), end=moved.get(leg.last_item, leg.end))
 
 
 def _first_driven(checked: MissionCheck) -> list[tuple[int, CheckedLeg]]:
-    """Give each leg once, where it is driven first, with its number in the course."""
+    """Return each leg once, where it is driven first, with its number in the course."""
     found: dict[LegKey, tuple[int, CheckedLeg]] = {}
     for number, leg in enumerate(checked.legs):
         found.setdefault(_key(leg.leg), (number, leg))
@@ -216,7 +216,7 @@ def _first_driven(checked: MissionCheck) -> list[tuple[int, CheckedLeg]]:
 
 
 def _runs(asked: MissionCheck, keys: set[LegKey]) -> list[list[CourseLeg]]:
-    """Give the legs to be routed, those together that are driven one after another with one speed."""
+    """Return the legs to be routed, grouped where they are driven one after another at one speed."""
     runs: list[list[CourseLeg]] = []
     before = -2
     for number, checked in _first_driven(asked):
@@ -233,7 +233,7 @@ def _runs(asked: MissionCheck, keys: set[LegKey]) -> list[list[CourseLeg]]:
 
 
 def _beside(asked: MissionCheck, keys: set[LegKey]) -> set[LegKey]:
-    """Give the legs driven just before and after some legs."""
+    """Return the legs driven just before and after some legs."""
     order = [_key(leg.leg) for leg in asked.legs]
     places = [number for number, key in enumerate(order) if key in keys]
     return {order[near] for number in places for near in (number - 1, number + 1) if 0 <= near < len(order)}
@@ -272,7 +272,7 @@ def _detours(
 
 
 def _pose(first: CourseLeg, asked: MissionCheck, situation: Situation) -> Known[Pose] | None:
-    """Give where and how the vehicle comes to the first leg of a run."""
+    """Return where and how the vehicle comes to the first leg of a run."""
     number = next(n for n, leg in enumerate(asked.legs) if _key(leg.leg) == _key(first))
     if number == 0:
         return situation.pose
@@ -282,7 +282,7 @@ def _pose(first: CourseLeg, asked: MissionCheck, situation: Situation) -> Known[
 
 
 def _split(planned: Plan, run: Sequence[CourseLeg], mission: Mission) -> list[_Detour]:
-    """Give what of a plan belongs to each leg of a run."""
+    """Return the part of a plan that belongs to each leg of a run."""
     detours = []
     begin = int(run[0].speed_mps is not None)  # the mission sets its speed itself
     point = 0
@@ -319,7 +319,7 @@ def _check_jumps(repaired: ItemList) -> None:
 
 
 def _changes(repaired: ItemList) -> tuple[str, ...]:
-    """Say what was changed."""
+    """Return sentences that list what was changed."""
     texts = []
     for key, count in repaired.added.items():
         texts.append(f"{_names(key)}: replaced by a route with {count} waypoint{'s' * (count != 1)} more")

@@ -148,7 +148,7 @@ class _Search:
         return replace(self.mission, items=tuple(items))
 
     def waypoints(self) -> list[_Step]:
-        """Give waypoints that may be left out, those first whose leaving moves the line the least."""
+        """Return waypoints that may be left out, first those whose removal moves the line the least."""
         found = []
         for before, seq, after in runs(self._rest(), 3):
             items = [self._item(one) for one in (before, seq, after)]
@@ -157,7 +157,7 @@ class _Search:
         return [_Step((seq,)) for _, seq in sorted(found)]
 
     def corners(self) -> list[_Step]:
-        """Give pairs of corners that may become one, those first that lengthen the way the least."""
+        """Return pairs of corners that may become one, first those that lengthen the way the least."""
         found = []
         for before, first, last, after in runs(self._rest(), 4):
             a, b, c, d = (self._item(one) for one in (before, first, last, after))
@@ -172,7 +172,7 @@ class _Search:
         return [_Step((first, last), put) for _, first, last, put in sorted(found, key=lambda one: one[:3])]
 
     def _is_corner(self, seq: int) -> bool:
-        """Tell whether it may be moved: only the second of two is left where it may not be left out by itself."""
+        """Return whether an item is a plain waypoint of the route's own that may be moved: beside others that must stay, it may not."""
         item = self.mission.items[seq - 1]
         return (
             seq in self.own
@@ -182,7 +182,7 @@ class _Search:
         )
 
     def quick_stretches(self) -> list[_Step]:
-        """Give changes to a higher speed, with the change back where that has nothing left to do; those first that save the least time."""
+        """Return changes to a higher speed, with the change back where it has nothing left to do, first those that save the least time."""
         goals = {int(item.params[0]) for item in self.mission.items if item.command in _JUMPS}
         found = []
         before_mps = self.check.vehicle.speed_mps
@@ -224,7 +224,7 @@ class _Search:
         )
 
     def _needed(self, steps: Sequence[_Step]) -> list[_Step]:
-        """Give so many of the better half as are needed, no two of them beside one another."""
+        """Return as many of the better half as are needed, no two of them neighbours."""
         taken: list[_Step] = []
         blocked: set[int] = set()
         place = {seq: number for number, seq in enumerate(self._rest())}
@@ -242,12 +242,12 @@ class _Search:
         return taken
 
     def _is_worse(self, leg: CheckedLeg, seqs: Sequence[int]) -> bool:
-        """Tell whether a broken leg was none before, or less so."""
+        """Return whether a broken leg kept its clearance before, or broke it by less."""
         key = (_seq(seqs, leg.leg.first_item), _seq(seqs, leg.leg.last_item))
         return leg.driven_clearance_m < self._tolerated.get(key, math.inf) - _WORSE_M
 
     def _guilty(self, steps: Iterable[_Step], worse: Iterable[CheckedLeg], seqs: Sequence[int]) -> set[_Step]:
-        """Give the steps that lie on the legs that broke, or on those beside them."""
+        """Return the steps that lie on the legs that broke, or on legs beside them."""
         guilty = set()
         for leg in worse:
             first, last = sorted((leg.leg.first_item, leg.leg.last_item))
@@ -257,5 +257,5 @@ class _Search:
 
 
 def _seq(seqs: Sequence[int], number: int) -> int:
-    """Give the seq that an item had; 0 is the start."""
+    """Return the seq that an item had; 0 is the start."""
     return seqs[number - 1] if number else 0

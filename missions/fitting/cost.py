@@ -96,7 +96,7 @@ class Gauge:
         self._legs_m: dict[tuple[Vector, Vector], float] = {}
 
     def trial(self, drawing: Drawing, begin: int, end: int) -> Trial:
-        """Give the points from ``begin`` to before ``end`` for measuring; ends of it that are no ends of the lines do not count."""
+        """Return the points from ``begin`` to before ``end``, for measuring; its ends that are not ends of the lines do not count."""
         key = (drawing[begin:end], begin == 0, end == len(drawing))
         trial = self._trials.get(key)
         if trial is None:
@@ -108,14 +108,14 @@ class Gauge:
         return self.trial(drawing, 0, len(drawing)).measured()
 
     def heading_deg(self, part: Drawing, *, is_first: bool) -> float:
-        """Give where the vehicle faces as a part of the lines begins."""
+        """Return the vehicle's heading where a part of the lines begins."""
         if is_first and self._heading_deg is not None:
             return self._heading_deg
         east, north = drawn.direction(part[0], part[1])
         return math.degrees(math.atan2(east, north))
 
     def legs_m(self, part: Drawing) -> list[float]:
-        """Give the distance of each drawn leg from the fence."""
+        """Return the distance of each drawn leg from the fence."""
         legs = [(a.place, b.place) for a, b in pairwise(part)]
         new = [leg for leg in legs if leg not in self._legs_m]
         if new:
@@ -123,7 +123,7 @@ class Gauge:
         return [self._legs_m[leg] for leg in legs]
 
     def distances_m(self, shapes: NDArray[np.object_]) -> NDArray[np.float64]:
-        """Give the distance of shapes from the fence; infinite without one."""
+        """Return the distance of shapes from the fence; infinite without one."""
         edge = self.ground.edge
         return np.full(len(shapes), np.inf) if edge.is_empty else np.asarray(shapely.distance(shapes, edge))
 
@@ -207,7 +207,7 @@ class Trial:
         return self
 
     def measured(self) -> Measured:
-        """Give what was found, all steps taken, and where the band comes too near."""
+        """Return the measured lines once all steps are done: their time, and where the band comes too near."""
         if self._measured is None:
             self.finish()
             self._measured = Measured(tuple(self.missing_m.tolist()), self._worst(), self.cost_s)

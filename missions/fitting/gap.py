@@ -45,7 +45,7 @@ class Neck:
     through: Vector
 
     def off(self, point: DrawnPoint) -> tuple[float, float]:
-        """Give how far behind the narrowest place a point lies, and how far beside the way through."""
+        """Return how far behind the narrowest place a point lies, and how far beside the way through."""
         east_m, north_m = point.east_m - self.middle[0], point.north_m - self.middle[1]
         along_m = east_m * self.through[0] + north_m * self.through[1]
         return along_m, abs(east_m * self.through[1] - north_m * self.through[0])
@@ -87,14 +87,14 @@ def find_neck(edge: BaseGeometry, place: Vector, ahead: Vector) -> Neck | None:
 
 
 def _free_m(edge: BaseGeometry, place: Vector, ahead: Vector, way_m: float) -> float:
-    """Give how far a leg can be followed one way without meeting a fence: what lies behind one is on no side."""
+    """Return how far a leg can be followed in one direction without meeting a fence: what lies behind a fence is on no side."""
     ray = shapely.LineString([place, shifted(place, ahead, way_m)])
     met = shapely.intersection(ray, edge)
     return way_m if met.is_empty else _SHY * math.copysign(shapely.distance(shapely.Point(place), met), way_m)
 
 
 def straight_through(drawing: Drawing, index: int, neck: Neck) -> Iterator[Drawing]:
-    """Give lines with one straight leg through a narrow place, instead of the corners near it.
+    """Return lines with one straight leg through a narrow place, instead of the corners near it.
 
     Parameters
     ----------

@@ -132,14 +132,14 @@ class Fitting:
         return Gauge(self.ground, self.vehicle, self.heading_deg)
 
     def _away(self, place: Vector) -> Vector:
-        """Give the unit vector from the nearest fence to a place."""
+        """Return the unit vector from the nearest fence to a place."""
         line = shapely.shortest_line(self.ground.edge, shapely.Point(place))
         (east_a, north_a), (east_b, north_b) = shapely.get_coordinates(line).tolist()
         length_m = math.dist((east_a, north_a), (east_b, north_b)) or 1.0
         return ((east_b - east_a) / length_m, (north_b - north_a) / length_m)
 
     def _gentle(self, drawing: Drawing, index: int, measured: Measured) -> Iterator[Drawing]:
-        """Give the means that cost little time."""
+        """Return the moves that cost little time."""
         missing_m, place = measured.missing_m[index], measured.worst[index]
         yield from corner_means.moved(drawing, index, missing_m)
         if not math.isnan(place[0]):
@@ -216,7 +216,7 @@ class Fitting:
     def _best(
         self, drawing: Drawing, measured: Measured, candidates: Iterable[Drawing]
     ) -> tuple[Drawing, Measured] | None:
-        """Give the lines that gain most, if any do, judged by the part that changes and then on the whole."""
+        """Return the lines that gain most, if any do, judged by the part that changes and then on the whole."""
         trials: list[_Tried] = []
         known_s: dict[tuple[int, int], float] = {}
         solved_at = None
@@ -248,7 +248,7 @@ class Fitting:
 
 
 def _joined(drawing: Drawing) -> Drawing:
-    """Give lines without tiny legs: pairs of points become one where the outer legs meet, or half-way."""
+    """Return lines without tiny legs: pairs of points become one where the outer legs meet, or half-way."""
     while True:
         pairs = [
             (math.dist(drawing[index].place, drawing[index + 1].place), index)
@@ -303,7 +303,7 @@ class _Tried:
 
 
 def _best_first(trials: Iterable[_Tried]) -> Iterator[_Tried]:
-    """Give those that gain, the one that gains most first; the others are measured only as far as it takes to know."""
+    """Return the candidates that gain, best first; a candidate is measured only as far as it takes to decide."""
     waiting = [(-tried.gain_s, tried.number, tried) for tried in trials]
     heapq.heapify(waiting)
     while waiting:
@@ -318,7 +318,7 @@ def _best_first(trials: Iterable[_Tried]) -> Iterator[_Tried]:
 
 
 def _changed(old: Drawing, new: Drawing) -> tuple[int, int]:
-    """Give where the part begins in which lines differ, some points before, and how many points after it are the same."""
+    """Return where the part begins in which two lines differ, some points before, and how many points after it are the same."""
     shorter = min(len(old), len(new))
     same = next((i for i in range(shorter) if old[i] != new[i]), shorter)
     rest = next((i for i in range(shorter - same) if old[-1 - i] != new[-1 - i]), shorter - same)

@@ -250,7 +250,7 @@ def _vector(bearing_deg: float) -> Vector:
 
 
 def _with_change(drawing: Drawing, along_m: float, way: float) -> tuple[Drawing, int]:
-    """Give the lines with a point where the speed may change, and its number: on a straight line, farther on than a corner nearby."""
+    """Return the lines with a point where the speed may change, and its number: on a straight line, beyond any corner nearby."""
     for _ in drawing:
         along = drawn.distances_m(drawing)
         corner_m = next(
@@ -273,7 +273,7 @@ def _slower(point: drawn.DrawnPoint, speed_mps: float) -> drawn.DrawnPoint:
 
 
 def _along_m(drawing: Drawing, along: list[float], place: Vector, index: int) -> float:
-    """Give how far along the leg to a point, or the one after it, a place lies."""
+    """Return how far a place lies along the leg to a point, or along the one after it."""
     best = (math.inf, along[index])
     for leg in (index - 1, index):
         if 0 <= leg < len(drawing) - 1:

@@ -247,7 +247,7 @@ def check_writable_format(path: Path, part: Part = Part.MISSION) -> None:
 
 
 def format_of(path: Path, verb: str = "read", part: Part | None = None) -> Format:
-    """Give the format of a path's suffix, wanted to ``read`` or to ``write`` a part.
+    """Return the format of a path's suffix that can ``read`` or ``write`` a part.
 
     Raises
     ------

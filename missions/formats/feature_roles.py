@@ -39,7 +39,7 @@ _POSSIBLE = {
 
 
 def role_of(feature: Feature) -> Role | None:
-    """Tell what a feature is: what its properties say, else its name, else its folders, innermost first; None where nothing does.
+    """Return what a feature is, by its properties, else its name, else its folders, innermost first; None where none of them names a role.
 
     Raises
     ------

@@ -52,7 +52,7 @@ def read_text(path: Path) -> str:
 
 
 def _unzipped(path: Path) -> bytes:
-    """Give the first KML of a zip file, as KMZ wants it."""
+    """Return the first KML of a zip file, as KMZ wants it."""
     import zipfile  # noqa: PLC0415 - slow to come, only for these
     import zlib  # noqa: PLC0415
 
@@ -152,7 +152,7 @@ def keep_aside(path: Path) -> Path:
 
 
 def _put_beside(path: Path, aside: Path) -> None:
-    """Give a file a second name that nothing has yet, by a link or else a copy.
+    """Create a second name for a file, not yet taken, by a link or else a copy.
 
     Raises
     ------

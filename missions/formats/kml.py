@@ -50,7 +50,7 @@ def read(text: str, source: str) -> Situation:
 
 
 def write(situation: Situation) -> str:
-    """Give the text of a file with the situation's fence, mission, rally points and home."""
+    """Return the text of a file with the situation's fence, mission, rally points and home."""
     zones, others = features_of(situation)
     drawn = [_drawing(zone) for zone in zones if "radius_m" in zone.properties]
     return "\n".join(
@@ -195,7 +195,7 @@ def _coordinates(positions: Iterable[LatLon]) -> str:
 
 
 def _drawing(zone: Feature) -> Feature:
-    """Give a polygon to see a circle by: around an exclusion, inside an inclusion."""
+    """Return a polygon that draws a circle: around an exclusion, inside an inclusion."""
     from pyproj import Geod  # noqa: PLC0415 - slow to come, only for circles
 
     radius_m = float(str(zone.properties["radius_m"]))

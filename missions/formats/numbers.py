@@ -12,7 +12,7 @@ _COMMANDS_WITHOUT_PLACES = range(96, 5000)
 
 
 def place_e7(command: int, lat_deg: float, lon_deg: float) -> tuple[int, int]:
-    """Give an item's params 5 and 6 as degE7.
+    """Return an item's params 5 and 6 as degE7.
 
     Conditions and DO_ commands may hold anything there that fits the wire.
 
@@ -46,7 +46,7 @@ def number(text: str) -> float:
 
 
 def whole(value: float, name: str, most: int) -> int:
-    """Give a whole number from 0 to ``most``.
+    """Return a whole number from 0 to ``most``.
 
     Raises
     ------

@@ -49,7 +49,7 @@ def read(text: str, source: str) -> Situation:
 
 
 def write(situation: Situation) -> str:
-    """Give the text of a file with the situation's parameters by name, as exact as the wire's 32 bits."""
+    """Return the text of a file with the situation's parameters by name, as exact as the 32-bit floats of MAVLink."""
     rows = [f"{name:<16} {value:.9g}\n" for name, value in sorted(situation.parameters.items())]
     return "".join(rows)
 

@@ -32,19 +32,19 @@ class Element:
     text: str = ""
 
     def error(self, problem: str) -> MissionFormatError:
-        """Give an error that names file and line."""
+        """Return an error that names file and line."""
         return MissionFormatError(f"{self.where}: {problem}", where=self.where)
 
     def all(self, *names: str) -> Iterator[Element]:
-        """Give the children of a name."""
+        """Return the children of a name."""
         return (child for child in self.children if child.name in names)
 
     def first(self, name: str) -> Element | None:
-        """Give the first child of a name."""
+        """Return the first child of a name."""
         return next(self.all(name), None)
 
     def text_of(self, name: str) -> str:
-        """Give the text of the first child of a name, empty without one."""
+        """Return the text of the first child of a name, empty without one."""
         child = self.first(name)
         return child.text.strip() if child else ""
 

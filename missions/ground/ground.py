@@ -78,7 +78,7 @@ class Ground:
     warnings: tuple[str, ...]
 
     def areas(self, kind: ZoneKind) -> list[Area]:
-        """Give the areas of one kind; the bounds where there is no inclusion."""
+        """Return the areas of one kind; the bounds where there is no inclusion."""
         found = [barrier.area for barrier in self.barriers if barrier.kind is kind]
         return found or ([self.bounds] if kind is ZoneKind.INCLUSION else [])
 
@@ -104,13 +104,13 @@ class Ground:
         return self.allowed.boundary.difference(self.bounds.boundary.buffer(_WALL_M))
 
     def clearance_m(self, shape: BaseGeometry) -> float:
-        """Give a shape's least distance to forbidden ground; 0 where it touches it, infinite where there is none."""
+        """Return a shape's least distance to forbidden ground; 0 where it touches it, infinite without any."""
         if not self.allowed.covers(shape):
             return 0.0
         return math.inf if self.edge.is_empty else float(shape.distance(self.edge))
 
     def nearest(self, shape: BaseGeometry) -> tuple[Barrier | None, float]:
-        """Give the barrier nearest to a shape and its distance in metres."""
+        """Return the barrier nearest to a shape and its distance in metres."""
         distances = [(self.distance_m(barrier, shape), i) for i, barrier in enumerate(self.barriers)]
         if not distances:
             return None, math.inf
@@ -118,7 +118,7 @@ class Ground:
         return self.barriers[index], distance_m
 
     def distance_m(self, barrier: Barrier, shape: BaseGeometry) -> float:
-        """Give a shape's distance to a barrier: to an exclusion's area, to an inclusion's edge."""
+        """Return a shape's distance to a barrier: to an exclusion's area, to an inclusion's edge."""
         if barrier.kind is ZoneKind.EXCLUSION:
             return float(barrier.area.distance(shape))
         if self.union:  # an inclusion's edge inside another one is no edge
@@ -127,7 +127,7 @@ class Ground:
         return float(barrier.area.boundary.distance(shape))
 
     def forbidding(self, point: Point) -> list[Barrier]:
-        """Give the barriers that forbid a point: exclusions around it, inclusions it is outside of."""
+        """Return the barriers that forbid a point: exclusions around it, inclusions it is outside of."""
         outside = [b for b in self.barriers if b.kind is ZoneKind.INCLUSION and not b.area.covers(point)]
         inclusions = sum(barrier.kind is ZoneKind.INCLUSION for barrier in self.barriers)
         if self.union and len(outside) < inclusions:
@@ -135,7 +135,7 @@ class Ground:
         return [b for b in self.barriers if b.kind is ZoneKind.EXCLUSION and b.area.covers(point)] + outside
 
     def nearest_point(self, area: BaseGeometry, point: Point) -> Point:
-        """Give the point of an area nearest to a point."""
+        """Return the point of an area nearest to a point."""
         return nearest_points(area, point)[0]
 
 
@@ -273,7 +273,7 @@ def _autopilot_ring(vertices: Sequence[LatLon]) -> list[LatLon]:
 
 
 def _even_odd(ring: NDArray[np.float64]) -> Area:
-    """Give the area of a self-crossing ring that a ray from a point crosses an odd number of times to leave."""
+    """Return the area of a self-crossing ring that a ray from a point crosses an odd number of times to leave."""
     lines = shapely.union_all([LinearRing(ring)])
     faces = shapely.get_parts(shapely.polygonize([lines]))
     inside = [face for face in faces if _crossings(ring, face.representative_point()) % 2]
@@ -281,7 +281,7 @@ def _even_odd(ring: NDArray[np.float64]) -> Area:
 
 
 def _walls(ring: NDArray[np.float64]) -> BaseGeometry:
-    """Give a ring's line as a thin wall, edge by edge: buffered whole, a line that doubles back can lose an end."""
+    """Return a ring's line as a thin wall, edge by edge: buffered whole, a line that doubles back can lose an end."""
     edges = shapely.linestrings(np.stack((ring, np.roll(ring, -1, axis=0)), axis=1))
     return shapely.union_all(shapely.buffer(edges, _WALL_M, cap_style="square"))
 
@@ -301,7 +301,7 @@ def _crossings(ring: NDArray[np.float64], point: Point) -> int:
 
 
 def _circle(zone: CircleZone, frame: LocalFrame) -> Polygon:
-    """Give a polygon around an exclusion circle, or inside an inclusion circle."""
+    """Return a polygon around an exclusion circle, or inside an inclusion circle."""
     half_deg = zone.radius_m / 1.1e5
     south_deg, north_deg = zone.centre.lat_deg - half_deg, zone.centre.lat_deg + half_deg
     # The autopilot's metre grows towards the poles: it is least and most at the circle's ends, or on the equator.

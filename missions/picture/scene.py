@@ -120,7 +120,7 @@ class Scene:
         return [self.plan.ground.clearance_m(LineString(leg)) for leg in legs]
 
     def blocks(self) -> list[NDArray[np.float64]]:
-        """Give the corners of the blocks of the free space at the drawn clearance; none where there are too many to see."""
+        """Return the corners of the blocks of the free space at the drawn clearance; none where there are too many to see."""
         ground, plan = self.plan.ground, self.plan
         clearance_m = 0.99 * plan.drawn_clearance_m if math.isfinite(plan.drawn_clearance_m) else 0.0
         areas = ground.areas(ZoneKind.INCLUSION), ground.areas(ZoneKind.EXCLUSION)
@@ -137,7 +137,7 @@ class Scene:
         return [partition.outline(block) + origin_m for block in range(len(partition))]
 
     def title(self) -> str:
-        """Say how long the route is and what it keeps."""
+        """Return the title: how long the route is and what it keeps."""
         plan = self.plan
         drawn = (
             f", clearance {plan.drawn_clearance_m:.2f} m drawn"
@@ -148,12 +148,12 @@ class Scene:
         return f"{plan.length_m:.1f} m, about {plan.duration_s:.0f} s{drawn}{promised}"
 
     def scale_m(self, share: float = 0.2) -> int:
-        """Give a round length of at most a share of the picture's width."""
+        """Return a round length of at most a share of the picture's width."""
         width_m = self.bounds_m[2] - self.bounds_m[0]
         return max((step for step in _SCALE_STEPS_M if step <= share * width_m), default=1)
 
 
 def polygons(area: BaseGeometry) -> list[Polygon]:
-    """Give the polygons of a geometry, outer rings counter-clockwise and holes clockwise."""
+    """Return the polygons of a geometry, outer rings counter-clockwise and holes clockwise."""
     parts = [part for part in shapely.get_parts(area) if isinstance(part, Polygon) and not part.is_empty]
     return list(shapely.orient_polygons(parts)) if parts else []

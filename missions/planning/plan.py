@@ -143,7 +143,7 @@ def _start_remarks(ground: Ground, start: LocalPoint, vehicle: Vehicle) -> list[
 
 
 def _promised_m(asked: Promise, driven_m: float) -> float | None:
-    """Give what is promised: what was asked for, or less where the start leaves less; nothing for drawn lines only."""
+    """Return the promised clearance: what was asked for, or less where the start leaves less; nothing for drawn lines only."""
     if asked.allowance_m is not None:
         return asked.promised_m if asked.allowance_m else None
     kept_m = math.floor(100 * max(driven_m - asked.error_m, 0.0)) / 100

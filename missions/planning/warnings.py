@@ -36,7 +36,7 @@ _DRIVEN_BY = frozenset(
 
 
 def lead_away_remarks(found: DrivenRoute, least_m: float) -> list[str]:
-    """Say how near the start stands to a fence, and what the route does about it."""
+    """Return remarks on how near the start is to a fence, and what the route does about it."""
     if not found.lead_away:
         return []
     if found.start_clearance_m < 0:
@@ -56,7 +56,7 @@ def lead_away_remarks(found: DrivenRoute, least_m: float) -> list[str]:
 
 
 def moved_target_remarks(targets: Sequence[LatLon], reached: Sequence[LatLon]) -> list[str]:
-    """Say which targets were moved, and how far."""
+    """Return remarks on which targets were moved, and how far."""
     return [
         f"the target {asked} is blocked: moved {distance_m(asked, found):.2f} m to {found}"
         for asked, found in zip(targets, reached, strict=True)

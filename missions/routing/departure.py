@@ -41,7 +41,7 @@ class Departure:
 def departures(
     ground: Ground, vehicle: Vehicle, start: LocalPoint, heading_deg: float | None
 ) -> list[Departure]:
-    """Give first legs all round, the one that keeps most first.
+    """Return first legs in all directions, the one that keeps most first.
 
     Parameters
     ----------

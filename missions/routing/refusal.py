@@ -38,7 +38,7 @@ def refusal(
     *,
     held_at_start: bool,
 ) -> NoRouteError:
-    """Say which corner refused, by how much, and at which fence; and whether it is that the vehicle cannot turn where it stands."""
+    """Return the error that names the corner that refused, by how much and at which fence; with advice where the vehicle cannot turn at its start."""
     index = measured.worst_index
     point = drawing[index]
     position = ground.frame.to_lat_lon(LocalPoint(*point.place))
@@ -68,7 +68,7 @@ def refusal(
 
 
 def block(route: Route, drawing: Drawing, measured: Measured) -> Polygon:
-    """Give a small square on a route near where most is missing, to send the next one elsewhere."""
+    """Return a small square on a route near where most is missing, to send the next one elsewhere."""
     index = measured.worst_index
     place = measured.worst[index] if not math.isnan(measured.worst[index][0]) else drawing[index].place
     line = shapely.LineString(route.points)

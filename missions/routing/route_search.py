@@ -159,7 +159,7 @@ class RouteSearch:
         return min(found, key=lambda one: one[0])[1]
 
     def _is_held_at_start(self, refused: Sequence[tuple[Drawing, Measured]], narrower_m: float) -> bool:
-        """Tell whether nothing more is worth trying, as the vehicle cannot turn at its start.
+        """Return whether nothing more is worth trying, as the vehicle cannot turn at its start.
 
         However slowly it drives it swings as far where it starts with its heading wrong; only its band becomes narrower.
         """
@@ -208,7 +208,7 @@ class RouteSearch:
         return fast_m, corner_forecast(0.0, self.vehicle, speed_mps=slow_mps).outside_overshoot_m
 
     def _first_routes(self, fast_m: float, slow_m: float) -> list[tuple[Route, float]]:
-        """Give the shortest route at full speed's band, and that at the slow one's."""
+        """Return the shortest route at full speed's band, and the one at the slow speed's."""
         routes = []
         try:
             routes.append((self._draw(fast_m, ()), fast_m))
@@ -268,7 +268,7 @@ class RouteSearch:
         found.append((measured.cost_s, driven))
 
     def _drawing(self, route: Route) -> Drawing:
-        """Give a route's lines with what each point has to keep: where it leads away, no less than the start does."""
+        """Return a route's lines with what each point has to keep: where the route leads away, no less than the start does."""
         required_m = self.required_m + self.reserve_m
         near_m = self._least_departing_m(route) + self.reserve_m
         line_m = min(required_m, route.start_clearance_m) if route.start_clearance_m >= 0 else -math.inf
@@ -303,7 +303,7 @@ class RouteSearch:
         return departures(self.ground, self.vehicle, self.start, self.heading_deg)
 
     def _departing_routes(self, band_m: float) -> Iterator[Route]:
-        """Give routes by the first legs that the vehicle can drive as it faces, the shortest first."""
+        """Return routes by the first legs that the vehicle can drive as it faces, the shortest first."""
         keeps_m = self.departure_m + self.reserve_m
         routes = []
         for departure in self._departures:
@@ -327,11 +327,11 @@ class RouteSearch:
         yield from (route for _, route in routes[:_DEPARTURES_TRIED])
 
     def _least_departing_m(self, route: Route) -> float:
-        """Give what the band has to keep while the route leads away; nothing while it leaves forbidden ground."""
+        """Return what the band has to keep while the route leads away; nothing while it leaves forbidden ground."""
         return self.departure_m if route.start_clearance_m >= 0 else -math.inf
 
     def _lead_away(self, drawing: Drawing) -> int:
-        """Give how many of the first legs lead away."""
+        """Return how many of the first legs lead away."""
         near = [point.required_m < self.required_m for point in drawing[1:]]
         return near.index(False) if False in near else len(near)
 
@@ -340,14 +340,14 @@ class RouteSearch:
 
 
 def _turn_at_deg(start: LocalPoint, onward: Route) -> float:
-    """Give how far a route turns where a first leg from the start ends."""
+    """Return how far a route turns where a first leg from the start ends."""
     here, after = onward.points[0], onward.points[1]
     turn_rad = math.atan2(*(after - here)) - math.atan2(*(here - np.array(start)))
     return abs(math.degrees((turn_rad + math.pi) % (2 * math.pi) - math.pi))
 
 
 def _turned_deg(route: Route) -> float:
-    """Give how far the lines turn in all."""
+    """Return how far the lines turn in all."""
     east_m, north_m = np.diff(route.points, axis=0).T
     turns_rad = np.diff(np.arctan2(east_m, north_m))
     return float(np.degrees(np.abs((turns_rad + np.pi) % (2 * np.pi) - np.pi)).sum())

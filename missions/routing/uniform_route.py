@@ -38,7 +38,7 @@ def uniform_route(
     request: Request,
     should_stop: Callable[[], bool] | None = None,
 ) -> tuple[Promise, DrivenRoute]:
-    """Give the shortest route at the promise and its allowance, or the widest one; and what can be promised for it.
+    """Return the shortest route at the promise and its allowance, or the widest one; and what can be promised for it.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def uniform_route(
 
 
 def _sparse_route(ground: Ground, find: Callable[..., Route], clearance_m: float) -> Route:
-    """Give the route at a clearance; where it winds round corners in tiny legs, one a little wider off with fewer waypoints."""
+    """Return the route at a clearance; where it winds round corners in tiny legs, one a little wider off with fewer waypoints."""
     route = find(clearance_m=clearance_m)
     for wider_m in _WIDER_M:
         if not _has_tiny_legs(route):
@@ -95,7 +95,7 @@ def _has_tiny_legs(route: Route) -> bool:
 
 
 def _widest_route(find: Callable[..., Route], clearance_m: float) -> tuple[Route, float]:
-    """Give the route at the widest clearance, and that clearance: a little less where corners are mitred in the narrowest place."""
+    """Return the route at the widest clearance, and that clearance: a little less where corners are mitred in the narrowest place."""
     for _ in range(_WIDEST_TRIES):
         try:
             return find(clearance_m=clearance_m), clearance_m

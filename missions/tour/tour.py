@@ -128,7 +128,7 @@ def route_lengths_m(
     *,
     should_stop: Callable[[], bool] | None = None,
 ) -> NDArray[np.float64]:
-    """Give the lengths of the routes around the fences between all places, in metres.
+    """Return the lengths of the routes around the fences between all places, in metres.
 
     Places too near to a fence are taken where the nearest free ground is.
 
@@ -160,7 +160,7 @@ def route_lengths_m(
 
 
 def _anchor(ground: Ground, planner: pbpp.Planner, place: LocalPoint) -> LocalPoint:
-    """Give the place, or the nearest free one."""
+    """Return the place, or the nearest free one."""
     here = Point(place)
     if planner.free_space.covers(here):
         return place
@@ -183,7 +183,7 @@ def _length_m(
 def with_room(
     planned: Plan, situation: Situation, request: Request, *, should_stop: Callable[[], bool] | None = None
 ) -> Plan:
-    """Give a plan that fits into the vehicle's storage, with what can be left out of its route left out.
+    """Return a plan that fits into the vehicle's storage, without what can be left out of its route.
 
     Raises
     ------
@@ -215,7 +215,7 @@ def with_room(
 
 
 def _own_items(planned: Plan, request: Request) -> frozenset[int]:
-    """Give the seqs of a plan's items that nobody asked for: all but the targets, and the speed that is set first."""
+    """Return the seqs of a plan's own items: all but the targets, and the speed that is set first."""
     kept = {1} if request.speed_mps is not None else set()
     points = iter(range(1, len(planned.path)))
     for target in planned.targets:
@@ -224,7 +224,7 @@ def _own_items(planned: Plan, request: Request) -> frozenset[int]:
 
 
 def with_end(planned: Plan, situation: Situation, request: Request) -> Plan:
-    """Give a plan with the end that is asked for.
+    """Return a plan with the end that is asked for.
 
     Raises
     ------
@@ -273,7 +273,7 @@ def with_end(planned: Plan, situation: Situation, request: Request) -> Plan:
 
 
 def _order_text(found: TargetOrder) -> list[str]:
-    """Say which order it is, where it is not the one given."""
+    """Return a sentence on the order, where it is not the one given."""
     texts = []
     if found.indices != tuple(range(len(found.indices))):
         numbers = ", ".join(str(index + 1) for index in found.indices)

@@ -142,7 +142,7 @@ class Link:
     signing : Signing, optional
         Sends signed frames and believes no others.
     clock : callable, optional
-        Gives the time by which everything on the link runs, in seconds; `now_s` if not given. A simulated vehicle may bring its own.
+        Returns the time by which everything on the link runs, in seconds; `now_s` if not given. A simulated vehicle may bring its own.
     sent : SentFrames, optional
         What was sent on the link before this one, where that is opened again: its echoes are left out too.
 
@@ -281,7 +281,7 @@ class Link:
         until : callable, optional
             Ends the run early when it gives True; nothing more is sent then.
         longest_wait_s : callable, optional
-            Gives the longest time between two steps.
+            Returns the longest time between two steps.
 
         Raises
         ------
@@ -327,7 +327,7 @@ def open_link(
     Raises
     ------
     LinkError
-        The string is none, or the device cannot be opened; says why.
+        The string is none, or the device cannot be opened; the message says why.
     """
     return Link(open_transport(connection, timeout_s=timeout_s), identity, recorder, signing, sent=sent)
 
@@ -338,7 +338,7 @@ def open_transport(connection: str, *, timeout_s: float = 10.0) -> Transport:
     Raises
     ------
     LinkError
-        The string is none, or the device cannot be opened; says why.
+        The string is none, or the device cannot be opened; the message says why.
     """
     address = parse_connection(connection)
     try:

@@ -36,7 +36,7 @@ class Plan:
     drawn_clearance_m : float
         The least distance of the drawn lines, as rounded and as the autopilot draws them, to any fence (infinite without a fence near).
     driven_clearance_m : float
-        The least distance of the band that the vehicle is foreseen to drive in.
+        The least distance of the band that the vehicle is predicted to drive in.
     blocks : int
         Blocks of the partition that was searched.
     fence, ground : Fence, Ground
@@ -44,7 +44,7 @@ class Plan:
     vehicle : Vehicle
         What was known of the vehicle.
     envelope : Envelope
-        The band that the vehicle is foreseen to stay in, and its times.
+        The band that the vehicle is predicted to stay in, and its times.
     home : LatLon or None
         For the mission's home item.
     """

@@ -1,4 +1,4 @@
-"""The clearance that is promised while driving, and what the foreseen track has to keep for it."""
+"""The clearance that is promised while driving, and what the predicted track has to keep for it."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ MARGIN_RESERVE_M = 0.1
 LEAST_MARGIN_M = 0.1
 """With less FENCE_MARGIN measured rovers stopped at the fence or past it (0: 0.02 to 0.04 m past, 0.05: 0.02 m before)."""
 
+# Chosen, not measured: what is promised where nothing is asked for, so much beyond FENCE_MARGIN and no less than a metre.
 DEFAULT_BEYOND_MARGIN_M = 0.5
 LEAST_DEFAULT_M = 1.0
 
@@ -56,7 +57,7 @@ class Promise:
 
     @property
     def required_m(self) -> float:
-        """What the foreseen track has to keep."""
+        """What the predicted track has to keep."""
         return self.promised_m + self.error_m
 
 
@@ -68,7 +69,7 @@ def known_vehicle(situation: Situation, request: Request) -> Vehicle:
     VehicleError
         A parameter or the speed cannot be used.
     """
-    # What the vehicle told, but as no number, must not be taken for what it did not tell: a default in its place would be a guess.
+    # What the vehicle reported, but as no number, must not be taken for what it did not tell: a default in its place would be a guess.
     no_numbers = {name: float(came) for name, came in situation.no_numbers.items()}
     vehicle = vehicle_from_parameters(
         {**no_numbers, **situation.parameters},

@@ -56,7 +56,7 @@ class Request:
     via : Mission, optional
         A mission to repair, in the place of targets (`missions.editing.repair`).
     via_own : bool
-        Repair the mission that the situation tells of.
+        Repair the mission that the situation holds.
     """
 
     start: LatLon | None = None

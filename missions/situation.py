@@ -112,7 +112,7 @@ class Situation:
     target : Known of LatLon
         The newest place somebody asked the vehicle to drive to.
     bytewise : bool or None
-        Whether the autopilot tells whole-number parameters as the bits of a float (PX4), not as its value.
+        Whether the autopilot reports whole-number parameters as the bits of a float (PX4), not as its value.
     firmware : tuple of int or None
         The autopilot's version: major, minor, patch.
     parameters : mapping of str to float

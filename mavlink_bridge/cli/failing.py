@@ -114,13 +114,13 @@ def is_reader_gone(error: Exception) -> bool:
 
 
 def drop_stdout() -> int:
-    """Let go of a standard output that nobody reads any more (``pbpp log … | head``); give the exit code, as a shell tells of SIGPIPE."""
+    """Let go of a standard output that nobody reads any more (``pbpp log … | head``); return the exit code, as a shell tells of SIGPIPE."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 128 + 13
 
 
 def report_error(command: str, error: Exception, *, wants_json: bool) -> ExitCode:
-    """Report an error of ours; give its exit code."""
+    """Report an error of ours; return its exit code."""
     code = exit_code_of(error)
     details = dict(getattr(error, "details", {}))
     if "advice" not in details and (advice := _advice(command, error)):
@@ -155,7 +155,7 @@ def _trace_of(error: BaseException, *, wanted: bool) -> dict[str, str]:
 
 
 def report_defect(command: str, error: BaseException, *, wants_json: bool, verbose: bool = False) -> ExitCode:
-    """Report what should never happen, in a line that says what broke and where; give its exit code."""
+    """Report what should never happen, in a line that says what broke and where; return its exit code."""
     details: dict[str, object] = {"advice": _REPORT, **_trace_of(error, wanted=verbose)}
     report(command, "InternalError", _defect_line(error), ExitCode.INTERNAL, details, wants_json=wants_json)
     return ExitCode.INTERNAL

@@ -112,12 +112,12 @@ class Ending:
     changed: bool = False
 
     def message(self) -> str:
-        """Return what people are told."""
+        """Return what people read."""
         on_it = self.on_it or ("" if self.said else "nothing was written to it")
         return "; ".join(filter(None, (self.said or "interrupted", self._deed(), on_it)))
 
     def details(self) -> dict[str, object]:
-        """Return what scripts are told."""
+        """Return what scripts read."""
         doing = self.doing
         return {
             "mode": _mode_name(doing.mode),

@@ -1,4 +1,4 @@
-"""What people are told of a link that is odd, but works."""
+"""What people read of a link that is odd, but works."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def write_outputs(
     planned: Plan, situation: Situation, outputs: list[Path], plots: list[Path], *, blocks: bool = False
 ) -> list[Path]:
-    """Write the mission and draw the plan; give the files."""
+    """Write the mission and draw the plan; return the files."""
     from mavlink_bridge.cli.kept_files import write_kept  # noqa: PLC0415 - quick help
     from missions.formats import write_mission  # noqa: PLC0415
     from missions.situation import Known, Mission  # noqa: PLC0415
@@ -36,7 +36,7 @@ def write_outputs(
 
 
 def draw(planned: Plan, plots: list[Path], *, title: str | None = None, blocks: bool = False) -> list[Path]:
-    """Draw the plan to files, and to the terminal where ``-`` is among them; give the files."""
+    """Draw the plan to files, and to the terminal where ``-`` is among them; return the files."""
     if not plots:
         return []
     from mavlink_bridge.cli.kept_files import write_kept  # noqa: PLC0415 - quick help

@@ -94,7 +94,7 @@ class Session:
     link : Link
         The open link.
     watch : VehicleWatch
-        What the vehicle told of itself.
+        What the vehicle reported about itself.
     drives_by_us : bool
         Whether it drives because of us, or is about to.
     listeners : list of callable
@@ -150,7 +150,7 @@ class Session:
 
     @property
     def doing(self) -> Doing:
-        """What it does, as last told."""
+        """What it does, as last reported."""
         return self.watch.doing(self.link.now_s())
 
     def at_hand(self, aside: Callable[[], AbstractContextManager[Any]], on_it: Callable[[], str]) -> AtHand:

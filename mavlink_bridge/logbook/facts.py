@@ -164,7 +164,7 @@ class TrackPart:
 
 @dataclass(frozen=True, eq=False)
 class VehicleLog:
-    """What a log tells of one vehicle.
+    """What a log reports of one vehicle.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ class VehicleLog:
     parameters : mapping of str to float
         Those that matter to planning and driving, at the end.
     parameters_seen : int
-        How many parameters the log tells in all.
+        How many parameters the log reports in all.
     driven_m : float
         The track's length, without the wandering of a standing vehicle's position.
     positions, positions_without_fix : int

@@ -1,6 +1,6 @@
-"""Grading a drive: how near to the fence it came, how far off the mission's lines, how long it took, and what was foreseen.
+"""Grading a drive: how near to the fence it came, how far off the mission's lines, how long it took, and what was predicted.
 
-What is foreseen comes from the drive model (`missions.drive_model`), for the mission as it stood on the vehicle, from where the vehicle was.
+What is predicted comes from the drive model (`missions.drive_model`), for the mission as it stood on the vehicle, from where the vehicle was.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from missions.vehicle import Vehicle
 
 OUTSIDE_M: Final = 0.25
-"""How far outside the foreseen band still counts as within: the vehicle's own estimate of its place is off by as much."""
+"""How far outside the predicted band still counts as within: the vehicle's own estimate of its place is off by as much."""
 
 STANDING_MPS: Final = 0.1
 _LEAST_DRIVEN_M = 1.0
@@ -46,7 +46,7 @@ _ODD = frozenset(
         Command.CONDITION_DISTANCE,
     }
 )
-"""Commands that change the way or its time as the drive model cannot foresee; so do all navigation commands but plain waypoints."""
+"""Commands that change the way or its time as the drive model cannot predict; so do all navigation commands but plain waypoints."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +93,7 @@ class Grade:
     deviation_m, mean_deviation_m : float
         Off the mission's lines: the farthest, and the mean over all positions.
     outside_m : float or None
-        The farthest outside the band that was foreseen; None where none could be foreseen.
+        The farthest outside the band that was predicted; None where none could be predicted.
     foreseen : Foreseen or None
         None where the mission holds what the drive model does not foretell.
     notes : tuple of str
@@ -118,7 +118,7 @@ class Grade:
 
     @property
     def is_as_foreseen(self) -> bool | None:
-        """Whether the track stayed within the band that was foreseen; None where none could be."""
+        """Whether the track stayed within the band that was predicted; None where none could be."""
         return None if self.outside_m is None else self.outside_m <= OUTSIDE_M
 
 

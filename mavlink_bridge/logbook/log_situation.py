@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def begun(path: Path | str, vehicle: Vehicle) -> Situation:
-    """Return what is known of a vehicle before a log's first frame: its ids, and what the whole log tells of its autopilot.
+    """Return what is known of a vehicle before a log's first frame: its ids, and what the whole log reports of its autopilot.
 
     How parameters are encoded, and the version, were so before they were told.
     """

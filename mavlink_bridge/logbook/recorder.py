@@ -60,7 +60,7 @@ class Recorder:
     Parameters
     ----------
     situation : Situation
-        What holds from the beginning: the vehicle's ids, what the log tells later but was so before.
+        What holds from the beginning: the vehicle's ids, what the log reports later but was so before.
     """
 
     def __init__(self, situation: Situation) -> None:
@@ -204,7 +204,7 @@ class Recorder:
             else mode_name(situation.mode, situation.vehicle_type, ardupilot=situation.ardupilot)
         )
 
-    # What the vehicle tells
+    # What the vehicle reports
 
     def _take_own(self, message: m.Message, now_s: float) -> None:
         if isinstance(message, m.GlobalPositionInt):

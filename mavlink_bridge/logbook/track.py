@@ -167,7 +167,7 @@ class Odometer:
         self._kept: tuple[float, float] | None = None
 
     def drive(self, mode: str, fixes: list[Fix], points: NDArray[np.float64]) -> float:
-        """Take positions driven in a mode; give how far that was, in metres."""
+        """Take positions driven in a mode; return how far that was, in metres."""
         if not self.parts or self.parts[-1][0] != mode:
             joint = [self.parts[-1][1][-1]] if self.parts else []
             self.parts.append((mode, joint))

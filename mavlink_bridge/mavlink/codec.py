@@ -149,7 +149,7 @@ class Codec:
         return packed
 
     def decode(self, data: bytes) -> list[Frame]:
-        """Take received bytes; give the complete frames of known types in them, damaged ones left out."""
+        """Take received bytes; return the complete frames of known types in them, damaged ones left out."""
         return [frame for _, frame in self.decode_with_bytes(data) if frame is not None]
 
     def decode_with_bytes(self, data: bytes, source: Hashable = None) -> list[tuple[bytes, Frame | None]]:

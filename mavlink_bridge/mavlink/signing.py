@@ -111,7 +111,7 @@ class Signing:
     key : SigningKey
         The shared secret.
     clock : callable
-        Gives the time in seconds since 1970 (`time.time`).
+        Returns the time in seconds since 1970 (`time.time`).
     link_id : int
         Our link's number.
     """

@@ -1,6 +1,6 @@
 """Asking a vehicle which one it is: AUTOPILOT_VERSION, whose uid no other board has.
 
-Asked for by REQUEST_MESSAGE, and in turn by the older REQUEST_AUTOPILOT_CAPABILITIES. Not every vehicle tells it, and nothing waits long for it:
+Asked for by REQUEST_MESSAGE, and in turn by the older REQUEST_AUTOPILOT_CAPABILITIES. Not every vehicle reports it, and nothing waits long for it:
 a vehicle without a uid is known again by how it was connected.
 """
 

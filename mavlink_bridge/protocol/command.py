@@ -77,7 +77,7 @@ class SendCommand(TableMachine[CommandState, CommandEvent]):
 
     @property
     def progress(self) -> tuple[int, int]:
-        """Percent done, as far as the vehicle tells."""
+        """Percent done, as far as the vehicle reports."""
         return (100, 100) if self.is_done else (self._percent, 100)
 
     @property

@@ -264,7 +264,7 @@ class Upload(TableMachine[UploadState, UploadEvent]):
         self._next = max(self._next, seq)
 
     def _measure(self, seq: int, now_s: float) -> bool:
-        """Take the time in which an item sent once was answered; tell whether so long that it has waited in a queue."""
+        """Take the time in which an item sent once was answered; return whether so long that it has waited in a queue."""
         if seq not in self._sent_s or seq in self._repeated:
             return False
         took_s = now_s - self._sent_s[seq]

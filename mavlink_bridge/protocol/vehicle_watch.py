@@ -16,7 +16,7 @@ FRESH_S = 3.0
 """How old telemetry may be to tell what the vehicle does now: a heartbeat comes every second."""
 
 MISSION_COMPLETE = 5
-"""MISSION_STATE_COMPLETE in MISSION_CURRENT.mission_state; ArduPilot tells it, 0 is from those that do not."""
+"""MISSION_STATE_COMPLETE in MISSION_CURRENT.mission_state; ArduPilot reports it, 0 is from those that do not."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ class Doing:
 
 
 class VehicleWatch:
-    """Keeps the newest of what a vehicle tells of itself; the caller gives it that vehicle's messages only."""
+    """Keeps the newest of what a vehicle reports about itself; the caller gives it that vehicle's messages only."""
 
     def __init__(self) -> None:
         self._heartbeat: Heartbeat | None = None
@@ -81,7 +81,7 @@ class VehicleWatch:
             self._mission_state, self._mission_s = message.mission_state, now_s
 
     def doing(self, now_s: float) -> Doing:
-        """Return what the vehicle does, as last told."""
+        """Return what the vehicle does, as last reported."""
         heartbeat = self._heartbeat
         if heartbeat is None:
             return Doing()

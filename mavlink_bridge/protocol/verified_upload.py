@@ -143,7 +143,7 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         self._outcome: VerifiedUploadOutcome | None = None
 
     def know_vehicle(self, watch: VehicleWatch, now_s: float) -> None:
-        """Take over what the vehicle told of itself before the start."""
+        """Take over what the vehicle reported about itself before the start."""
         self._vehicle = watch
         self._is_active = watch.is_active(now_s)
 

@@ -5,7 +5,7 @@ vehicle asks the other station for the item and acknowledges it, and the other s
 no writing: stations read lists all the time, so MISSION_REQUEST_LIST, item requests to the vehicle, and the vehicle's counts and items to others
 say nothing.
 
-What is addressed to us, or comes with our ids, may be a late copy of our own upload's. It counts from the moment when the vehicle told the length of
+What is addressed to us, or comes with our ids, may be a late copy of our own upload's. It counts from the moment when the vehicle reported the length of
 the list: a vehicle that does so is taking no items from us. What comes with our ids counts unless we have sent the same.
 
 What no message on this link tells cannot be heard: a write on another port of the vehicle, by MAVFTP, or one of which every message was lost here.
@@ -165,7 +165,7 @@ class WriteWatch:
             self._disturb(self._own if may_be_ours else target, now_s)
 
     def _compare(self, name: str, value: float, now_s: float) -> None:
-        """Notice that a number changed which the vehicle tells of the list."""
+        """Notice that a number changed which the vehicle reports of the list."""
         if self._is_counted and self._told.setdefault(name, value) != value:
             self._told[name] = value
             self._disturb(None, now_s)

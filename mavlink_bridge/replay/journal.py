@@ -116,7 +116,7 @@ def read_journal(path: Path) -> Journal:
     Raises
     ------
     LogError
-        It cannot be read; says at which line.
+        It cannot be read; the message says at which line.
     """
     calls: list[Call] = []
     events: list[dict[str, Any]] = []

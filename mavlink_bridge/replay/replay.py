@@ -59,12 +59,12 @@ def replay_log(log: Path, orders: Orders, wait: Callable[[float], None] | None =
 
 
 def replay_to_json(log: Path, orders: Orders) -> list[dict[str, object]]:
-    """Replay a whole log; give its events as JSON objects, with the log's name. For worker processes."""
+    """Replay a whole log; return its events as JSON objects, with the log's name. For worker processes."""
     return [{"log": log.name, **event.as_json()} for event in replay_log(log, orders)]
 
 
 def replay_recorded(entries: Iterable[LogEntry], journal: Journal) -> Iterator[Event]:
-    """Repeat a bridge's run from its log and journal; give its events."""
+    """Repeat a bridge's run from its log and journal; return its events."""
     director = Director(journal.orders, Situation(parameters=journal.parameters))
     calls = iter(journal.calls)
     following = next(calls, None)
@@ -84,7 +84,7 @@ def replay_recorded(entries: Iterable[LogEntry], journal: Journal) -> Iterator[E
 
 
 def replay_foreign(entries: Iterable[LogEntry], orders: Orders) -> Iterator[Event]:
-    """Let the director listen to a log that somebody else recorded; give its events, at the log's times.
+    """Let the director listen to a log that somebody else recorded; return its events, at the log's times.
 
     The director's own time only goes forward: where the log's clock was set, it goes on from where it was.
 

@@ -39,9 +39,9 @@ class Commands:
     rover : Rover
         Whose commands they are.
     streams_of : callable
-        Gives the timetable of telemetry.
+        Returns the timetable of telemetry.
     report : callable
-        Gives a message by its id, None where it is not known.
+        Returns a message by its id, None where it is not known.
     renew : callable
         Is called after a parameter has changed, with its name.
     is_ready : callable
@@ -63,7 +63,7 @@ class Commands:
         self._is_ready = is_ready
 
     def execute(self, command: CommandLong | CommandInt, now_s: float) -> tuple[MavResult, list[Message]]:
-        """Do a command; give its result and what else is to be sent."""
+        """Do a command; return its result and what else is to be sent."""
         if not all(math.isfinite(getattr(command, name)) for name in _WHOLE.get(command.command, ())):
             return MavResult.DENIED, []  # what a microcontroller makes of NaN as a whole number is its own
         if command.command == Command.DO_REPOSITION:

@@ -53,7 +53,7 @@ class SimulatorConfig:
     list_ids : bool
         Whether MISSION_CURRENT carries ids of the lists, as PX4's does and ArduPilot's does not.
     uid : bytes
-        What AUTOPILOT_VERSION tells this board from others by, at most 18 bytes; empty: it tells none.
+        What AUTOPILOT_VERSION reports this board from others by, at most 18 bytes; empty: it tells none.
     """
 
     system: int = 1

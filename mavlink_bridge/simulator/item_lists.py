@@ -77,7 +77,7 @@ class ItemList(ABC):
         """Forget what an unfinished upload holds in memory."""
 
     def clear(self) -> bool:
-        """Empty the list; tell whether that was allowed."""
+        """Empty the list; return whether that was allowed."""
         self.items = []
         return True
 
@@ -102,7 +102,7 @@ class MissionList(_InPlaceList):
     Parameters
     ----------
     home : callable
-        Gives the vehicle's home.
+        Returns the vehicle's home.
     is_running : callable
         Tells whether the vehicle is armed in AUTO.
     sd_kb : int

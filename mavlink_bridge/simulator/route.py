@@ -24,7 +24,7 @@ class Route:
     Parameters
     ----------
     items : callable
-        Gives the mission as it reads back; item 0 is home.
+        Returns the mission as it reads back; item 0 is home.
     drive : Drive
         The driver.
     frame : FlatFrame
@@ -62,7 +62,7 @@ class Route:
         self._jumps.clear()
 
     def set_current(self, seq: int, *, now_s: float, driving: bool) -> bool:
-        """Go to an item; tell whether there is one."""
+        """Go to an item; return whether there is one."""
         if not 0 <= seq < max(1, len(self._items())):
             return False
         self.seq = max(1, seq)

@@ -149,7 +149,7 @@ class Rover:
         self._measure_clearance()
 
     def set_mode(self, number: int, now_s: float) -> bool:
-        """Change the mode; tell whether that was possible."""
+        """Change the mode; return whether that was possible."""
         try:
             mode = Mode(number)
         except ValueError:
@@ -174,7 +174,7 @@ class Rover:
         return True
 
     def set_current_item(self, seq: int, *, restart: bool, now_s: float) -> bool:
-        """Go to a mission item; tell whether there is one."""
+        """Go to a mission item; return whether there is one."""
         if restart:
             self.route.restart()
         driving = self.mode == Mode.AUTO

@@ -29,7 +29,7 @@ DEFAULT_LISTEN = "tcpin:127.0.0.1:5760"
 
 _READ_BYTES = 65_536
 _UID_BYTES = 12
-"""As long as the unique id of an STM32, which is what ArduPilot tells."""
+"""As long as the unique id of an STM32, which is what ArduPilot reports."""
 _MAX_BACKLOG_BYTES = 4_000_000
 _LONGEST_WAIT_S = 0.5
 _MOST_AT_ONCE_S, _MOST_REAL_AT_ONCE_S = 1.0, 0.1

@@ -1,4 +1,4 @@
-"""What the rover tells about itself, message by message."""
+"""What the rover reports about itself, message by message."""
 
 from __future__ import annotations
 

@@ -40,8 +40,10 @@ if TYPE_CHECKING:
     from missions.situation import Mission, Situation
     from missions.vehicle import Vehicle
 
-_FAR_M = 50_000.0
-_STEP_M = 0.5
+_FAR_M = (
+    50_000.0  # a home farther off is not laid out with the mission. Chosen, not measured: it bounds the frame
+)
+_STEP_M = 0.5  # between the places of the first leg that are asked for their clearance; chosen, not measured
 _ANYTHING = Request()
 
 TOLERANCE_M = 0.01
@@ -61,7 +63,7 @@ class CheckedLeg:
     drawn_clearance_m : float
         The least distance of its straight line to forbidden ground; 0 where it crosses it, infinite without a fence.
     driven_clearance_m : float
-        The least distance foreseen for the driven track, the corner at its end included.
+        The least distance predicted for the driven track, the corner at its end included.
     asked_m : float
         What the driven track has to keep: the clearance, on a first leg no more than the start itself has.
     fence : str or None
@@ -125,7 +127,7 @@ class MissionCheck:
     warnings : tuple of str
         What else a person should know.
     envelope : Envelope
-        The band that the vehicle is foreseen to stay in.
+        The band that the vehicle is predicted to stay in.
     """
 
     mission: Mission
@@ -163,7 +165,7 @@ class MissionCheck:
 
     @property
     def driven_clearance_m(self) -> float:
-        """The least foreseen clearance of all legs."""
+        """The least predicted clearance of all legs."""
         return min(leg.driven_clearance_m for leg in self.legs)
 
     @property

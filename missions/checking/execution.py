@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 MOST_LEGS = 2000
 """Missions that repeat themselves longer than this are followed with each jump taken twice: every leg there is occurs in that."""
 
-_FEW_TIMES = 2
+_FEW_TIMES = 2  # a jump taken twice and then passed: every leg that a repeated jump makes occurs
 _SKIPPED = {Command.NAV_TAKEOFF: "TAKEOFF", Command.NAV_LAND: "LAND"}
 _STRAYING = {
     Command.NAV_GUIDED_ENABLE: "hands the vehicle to another computer (NAV_GUIDED_ENABLE)",
@@ -205,7 +205,7 @@ class _Walk:
         self.notes.append(f"item {index + 1} {text}")
 
     def _navigate(self, index: int) -> bool:
-        """Execute a navigation command; tell whether the mission goes on after it."""
+        """Execute a navigation command; return whether the mission goes on after it."""
         item = self.items[index]
         if item.command == Command.NAV_RETURN_TO_LAUNCH:
             self._return(index)

@@ -38,15 +38,16 @@ NEGLIGIBLE_M = 0.1
 ASIDE_DEG = 5.0
 """It may look so far to either side of the way that it is meant to go."""
 
+# Steps of the pursuit: chosen, not measured; how well the whole holds against driven tracks stands in docs/drive-model.md, 4.
 _STEP_S = 0.3
-_SETTLE_S = 1.0
-_LEAST_SCALE = 0.1
-_LEAST_MPS = 0.05
-_SAMPLES_A_PIECE = 3
-_SLOWED_SHARE = 0.97
-_NO_LAG_M = 0.1
-_LEAST_TURN_DEG = 8.0
-_ABOUT_CORNER_S = 7.0
+_SETTLE_S = 1.0  # of the target's time scale: acceleration over jerk in AR_WPNav, 1 s with the measured 1 m/s² and 1 m/s³
+_LEAST_SCALE = 0.1  # of the target's time scale, as in AR_WPNav: its time never stands still
+_LEAST_MPS = 0.05  # so that nothing is divided by 0
+_SAMPLES_A_PIECE = 3  # in the convex hull of one piece of ground, 0.9 s
+_SLOWED_SHARE = 0.97  # allowed less than this share of its speed a rover counts as slowed
+_NO_LAG_M = 0.1  # nearer than this it has caught up: no more than a band holds
+_LEAST_TURN_DEG = 8.0  # gentler corners are straight on
+_ABOUT_CORNER_S = 7.0  # before and after a corner; chosen, not measured
 _SIDES = np.exp(1j * np.radians([0.0, ASIDE_DEG, -ASIDE_DEG]))
 
 

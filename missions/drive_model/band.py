@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
     from missions.drive_model.legs_and_corners import Route
 
-BLEND_SAMPLES = 6
-NEGLIGIBLE_M = 0.03
+BLEND_SAMPLES = 6  # straight pieces of a blend; chosen, not measured
+NEGLIGIBLE_M = 0.03  # a swing below this is left out; chosen: about a tenth of the band, 0.25 to 0.45 m
 TAIL_TIMES_S = (2.0, 4.5, 8.0, 14.0)
 """Where a leg's band is cut, in seconds since its corner; between them a tail is taken as straight, which is never too narrow."""
 

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from missions.vehicle import Vehicle
 
 TOP_SPEED_MPS = {Steering.ACKERMANN: 5.0, Steering.SKID: 3.0}
+"""The fastest rows of benchmarks/data: the skid-steered model's own top speed was 4 m/s (docs/drive-model.md)."""
 
 
 SLOW_MPS = 1.0

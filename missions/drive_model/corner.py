@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from missions.drive_model.motion import LegProfile
     from missions.vehicle import Vehicle
 
-GRAVITY_MPS2 = 9.80665
+GRAVITY_MPS2 = 9.80665  # standard gravity; ArduPilot's GRAVITY_MSS
 
-BAND_AT_REST_M = 0.20
+BAND_AT_REST_M = 0.20  # the part of the band that does not grow with speed: measured (docs/drive-model.md, 2)
 BAND_HEADING_ERROR = 0.01
 """A heading known wrong by this angle (rad) holds a rover off its line by ``speed * angle / position gain``."""
 
@@ -45,10 +45,12 @@ NEAR_M = 3.0
 STRAIGHT_ON_DEG = 10.0
 """Legs that turn less than this are one leg where short legs are asked for."""
 
+# Fitted to the rows of 5 and 10 m legs in benchmarks/data (docs/drive-model.md, 3).
 SHORT_LEG_M = 5.0
 PIVOT_SWING_M = 0.7
 """How swings grow on short legs: by e^(-leg / 5 m) of 150 %, and of 0.7 m where it pivots."""
 
+# Measured starts, and stops for a delay, less the band (docs/drive-model.md, 3).
 START_SWING_M = ((0.0, 0.0), (90.0, 0.9), (135.0, 1.5), (150.0, 1.75), (165.0, 2.3), (180.0, 2.7))
 START_BEHIND_M = ((0.0, 0.0), (90.0, 0.0), (135.0, 0.3), (170.0, 1.4), (180.0, 3.6))
 """Heading error in degrees at a start or after a stop; how far off the line, and how far behind the point, at a turning radius of 0.9 m."""
@@ -61,8 +63,9 @@ START_HOLD_S = 1.5
 
 END_OVERRUN_M = 0.5
 STOP_LAG_S = 2.0
-"""Past the last waypoint; time to settle at a stop."""
+"""Past the last waypoint, the farthest measured; time to settle at a stop (docs/drive-model.md, 3 and 5)."""
 
+# Measured: all but two of the 83 rows that left the band by more than 0.1 m turn sharper, on shorter legs (docs/drive-model.md).
 UNBOUNDED_TURN_DEG = 115.0
 UNBOUNDED_LEG_M = 15.0
 PIVOT_DOUBT_DEG = 2.0

@@ -13,14 +13,16 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
 
-QUARTER_SEGMENTS = 8
+QUARTER_SEGMENTS = (
+    8  # chords in a quarter circle of a buffered band, which is widened so that they lie outside the circle
+)
 _ROUNDING_M = 2e-6
 """What joining many polygons may take from their outline."""
 
 
 @dataclass(frozen=True, slots=True)
 class Corner:
-    """What is foreseen at one waypoint between two legs.
+    """What is predicted at one waypoint between two legs.
 
     Parameters
     ----------
@@ -57,7 +59,7 @@ class Corner:
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """What is foreseen on one leg, between two points of the list.
+    """What is predicted on one leg, between two points of the list.
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ def envelope(
     speeds: Sequence[float | None] | None = None,
     stops: Mapping[int, float] | None = None,
 ) -> Envelope:
-    """Foresee how a vehicle drives a list of points.
+    """Predict how a vehicle drives a list of points.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def plan_drive(
     speeds: Sequence[float | None] | None = None,
     stops: Mapping[int, float] | None = None,
 ) -> Drive:
-    """Foresee a drive step by step: first its time, and only if need be its band; see `envelope`."""
+    """Predict a drive step by step: first its time, and only if need be its band; see `envelope`."""
     array = _checked(points)
     _check_speeds(speeds, len(array) - 1)
     starts = [_start(array, vehicle, heading_deg)]
@@ -161,7 +161,7 @@ def corner_forecast(
     speed_mps: float | None = None,
     stop_s: float | None = None,
 ) -> Corner:
-    """Foresee one corner by itself, without the tails of others.
+    """Predict one corner by itself, without the tails of others.
 
     Parameters
     ----------
@@ -227,3 +227,4 @@ def _start(array: NDArray[np.float64], vehicle: Vehicle, heading_deg: float | No
 
 
 EITHER_SIDE_DEG = 165.0
+"""A start that faces farther back than this may swing to either side. Chosen, not measured: it bounds where little decides on the side."""

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from missions.drive_model.legs_and_corners import LegPlan, Route
 
 START_AND_END_LAG_S = 2.0
+"""For both together, besides the motions of the legs (docs/drive-model.md, 5)."""
 
 
 def told_corner(route: Route, number: int) -> Corner:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from missions.situation import Mission, Situation
 
 _JUMPS = (Command.DO_JUMP, 601)
-_WORSE_M = 0.01
+_WORSE_M = 0.01  # a leg that breaks the promise already may lose so much more to a shorter mission; chosen, not measured
 
 
 def shortened(
@@ -65,7 +65,7 @@ def shortened(
     Raises
     ------
     MissionTooLongError
-        It cannot be shortened so far; says how far.
+        It cannot be shortened so far; the message says how far.
     """
     search = _Search(mission, frozenset(own), situation, request, most, may_slow, should_stop)
     search.leave_out(search.waypoints)

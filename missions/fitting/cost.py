@@ -2,6 +2,14 @@
 
 Most lines that a search tries are worse than those it has, and mostly the first look shows it: a line through a fence, a way round. So
 the steps go from the cheapest to the dearest, each can only make lines cost more, and who compares stops as soon as the answer is sure.
+
+**The steps.** The drawn lines against the fence (distances of legs, remembered leg by leg); the time; the band's pieces against the fence,
+taken as convex hulls; pieces that lie inside a fence, the deeper the worse, so that a search is led out of it; and what the vehicle's own
+avoidance adds, only where the rest is nearly enough. After any of them ``cost_s`` is a lower bound of the finished cost.
+
+**The cost** is one number in seconds, so that candidates can be ordered while clearance is still missing: the predicted time, a little for each
+waypoint and for turns that follow at once, and prices for missing clearance and for drawn legs through a fence. The prices only order the
+candidates of a search. What is promised does not rest on them: `is_enough` asks for the clearance itself.
 """
 
 from __future__ import annotations
@@ -34,22 +42,27 @@ ENOUGH_M = 0.002
 """What may be missing: less than rounding to degE7 adds, which is required on top."""
 
 UNBOUNDED_EXTRA_M = 2.0
-"""What corners that left the model when measured (by up to 1.6 m) have to keep on top."""
+"""What unbounded corners have to keep on top: measured ones left the band by up to 1.6 m (docs/drive-model.md, "Where it does not hold")."""
 
 TURN_BACK_DEG, TURN_BACK_EXTRA_M = 165.0, 4.0
-"""A turn so sharp may be driven round either side; the model tells of one."""
+"""A turn so sharp may be driven round either side, and the model predicts one: swings reach 3.6 m there (docs/drive-model.md)."""
 
-_MISSING_COST_S_PER_M = 100.0
-_CROSSING_COST_S = 10_000.0
-_POINT_COST_S = 0.3
-_NEAR_TURNS_COST_S = 3.0
-_TURN_DEG = 5.0
-_FAR_FROM_ENOUGH_M = 0.7
+# Chosen, not measured: prices that order the candidates of a search.
+_MISSING_COST_S_PER_M = (
+    100.0  # a slow stretch costs 8 to 18 s when measured: worth it for some 0.1 m that would else be missing
+)
+_CROSSING_COST_S = 10_000.0  # more than any drive takes or misses: a leg through a fence is never worth it
+_POINT_COST_S = 0.3  # between equal lines the one with fewer waypoints
+_NEAR_TURNS_COST_S = 3.0  # two turns within `moves.APART_M`: driven as one, and less surely predicted
+_TURN_DEG = 5.0  # what counts as a turn for that
+_FAR_FROM_ENOUGH_M = (
+    0.7  # with more than this missing the avoidance is not reckoned: it is the dearest step and can only add
+)
 
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """What the drive model says of lines.
+    """What the drive model predicts for drawn lines.
 
     Parameters
     ----------

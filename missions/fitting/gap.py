@@ -1,6 +1,12 @@
-"""Narrow places: where the fences on both sides of a leg come nearest to one another, and a straight leg through between them.
+"""Gaps: where the fences on both sides of a leg come nearest to one another, and a straight leg through between them.
 
-A rover keeps its line best where the line is straight: it turns in the open before and behind.
+**How.** From a place on a leg the leg is followed both ways until a fence ends it. The fence on its left and that on its right, within
+reach, are joined by their shortest line: that is the gap. A straight leg is laid across the middle of that line at a right angle, with a few
+lengths before and behind it, and the corners that it replaces go.
+
+**Why.** A rover keeps its line best where the line is straight (no cut, no new swing), so it should turn in the open before and behind. And
+the moves of one corner cannot find this: with a corner on either side of a gate, moving only one of them turns the leg across the gate and
+makes the band worse, so a descent stops there.
 """
 
 from __future__ import annotations
@@ -20,18 +26,21 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
 REACH_M = 8.0
-"""How far about a place the fences on both sides are looked at, and how far beside the new leg old corners give way to it."""
+"""How far around a place the fences on both sides are looked at, and how far beside the new leg old corners give way to it.
+
+Chosen, not measured: it bounds what counts as a gap.
+"""
 
 ENDS_M = (6.0, 12.0, 20.0, 30.0)
-"""How far before and behind the narrowest place the straight leg may begin and end."""
+"""How far before and behind the narrowest place the straight leg may begin and end; swings die away over 25 m at 5 m/s (docs/drive-model.md)."""
 
-_APART_M = 3.0
-_SHY = 0.95
+_APART_M = 3.0  # old corners this near to the new leg's ends go too: nearer turns are one turn to a rover (`moves.APART_M`)
+_SHY = 0.95  # of the way to a fence ahead: stops short of it, so that the fence ahead is on neither side
 
 
 @dataclass(frozen=True, slots=True)
 class Neck:
-    """A narrow place.
+    """A gap between the fences on both sides of a leg.
 
     Parameters
     ----------

@@ -1,7 +1,23 @@
-"""Fitting drawn lines to a vehicle: until the band it is foreseen to drive in keeps what is required, at the least time.
+"""Fitting drawn lines to a vehicle, until the band it is predicted to drive in keeps what is required, in the least time that is found.
 
-A descent: where the band comes too near, every means is tried at that corner and measured by the drive model; the best is kept. What
-is measured decides, not the means.
+**How.** A greedy descent over whole drawings. Each round takes the point where most clearance is missing, tries every move of `moves` (and
+of `gap`) there, measures the lines that result with the drive model, and keeps those that lower the cost most (`cost`: the predicted time,
+with missing clearance priced as time). Where no move gains at that point, the next worst one is tried. The descent ends when nothing is
+missing, when no move gains anywhere, or when the measurements allowed are used up.
+
+Moves that cost little time come first (`_gentle`); slower stretches and stops (`_all`) only where those do not suffice. What has become
+enough is then made cheaper: points are left out (`_fewer`), and corners taken back towards the straight line (`_eased`). What has not is
+begun again from the first lines, driven slowly around each place where clearance was missing. At the end the points are rounded to degE7, as
+the mission will hold them, and measured and mended once more.
+
+**Why.** The band is no smooth function of the points: a corner pivots or blends, a leg is too short for two ramps, a rounded coordinate
+decides, and what is left of a swing reaches the corners behind it. There is no gradient to follow, and no formula for one corner decides;
+so moves only propose, and the drive model judges. Since nearly all candidates lose, only the part of the lines that changes is measured,
+with some points before and after it, and only as far as needed: the steps of a measurement can only add cost, so the first candidate that
+comes out of the heap fully measured is the best one, as in A*. The winner is then measured as a whole, and what is returned always was.
+
+Every change that is kept lowers the cost by a least gain, so the descent ends. It is a heuristic: lines that fail here do not show that no
+route exists, and `routing.route_search` tries others.
 """
 
 from __future__ import annotations
@@ -32,22 +48,28 @@ if TYPE_CHECKING:
 
 
 FIT_MEASUREMENTS, CRAWL_MEASUREMENTS, MOST_MEASUREMENTS = 500, 350, 1500
-"""Taken for one route, for a slow one, and for all that are tried: a search that is not done by then is given up."""
+"""Taken for one route, for a slow one, and for all that are tried: a search that is not done by then is given up.
 
-_SHORT_LEG_M = 12.0
-_LEAST_GAIN_S = 0.05
-_CONTEXT = 3
-_MORE_TRIES = 12
-_TRIED_WHOLE = 3
-_EASING_STEPS_M = (6.0, 1.6, 0.5)
-_TINY_LEG_M = 2.5
-_JOINED_TURN_DEG = 80.0
-_GRID_TRIES, _GRID_MEASUREMENTS = 4, 150
+Chosen, not measured: they bound the planning time, which docs/drive-bench.md reports.
+"""
+
+# Chosen, not measured: no experiment is recorded for any of these. They bound the search; whether lines are enough is always measured.
+_SHORT_LEG_M = 12.0  # corners farther apart are not merged to save a point
+_LEAST_GAIN_S = 0.05  # what a change must gain to be kept: it ends the descent
+_CONTEXT = (
+    3  # points before and after a change that are measured with it; the whole lines are measured afterwards
+)
+_MORE_TRIES = 12  # candidates still looked at after the first that suffices: the gentle ones come first
+_TRIED_WHOLE = 3  # candidates that gained in part and are measured whole
+_EASING_STEPS_M = (6.0, 1.6, 0.5)  # coarse to fine; what is left over is at most the last
+_TINY_LEG_M = 2.5  # shorter legs within gentle turns become one corner before the search
+_JOINED_TURN_DEG = 80.0  # both corners together; sharper ones stay two
+_GRID_TRIES, _GRID_MEASUREMENTS = 4, 150  # to mend what rounding to degE7 (at most 5.6 mm) broke
 
 
 @dataclass(eq=False)
 class Fitting:
-    """Lines, a vehicle and a field; `fit` betters the lines.
+    """The search for one vehicle on one field; `fit` improves drawn lines.
 
     Parameters
     ----------
@@ -72,7 +94,7 @@ class Fitting:
     _until: int = field(default=0, init=False)
 
     def fit(self, drawing: Drawing) -> tuple[Drawing, Measured]:
-        """Better lines until their band keeps what is required, or nothing helps."""
+        """Improve lines until their band keeps what is required, or nothing helps."""
         drawn_first = _joined(drawing)
         self._allow(FIT_MEASUREMENTS)
         drawing, measured = self._fitted(self._fewer(drawn_first))
@@ -173,7 +195,7 @@ class Fitting:
     def _descend(
         self, drawing: Drawing, means: Callable[[Drawing, int, Measured], Iterable[Drawing]]
     ) -> Drawing:
-        """Use means at the worst points until nothing is missing or nothing helps."""
+        """Try moves at the worst points until nothing is missing or nothing helps."""
         measured = self.measure(drawing)
         while not measured.is_enough and not self._is_over():
             for index in sorted(range(len(drawing)), key=lambda number: -measured.missing_m[number]):
@@ -232,7 +254,7 @@ class Fitting:
             if tried.is_enough() and solved_at is None:
                 solved_at = number
             trials.append(tried)
-            # The means come with the cheapest first: once one has done it, a few more are looked at.
+            # The moves come with the cheapest first: once one suffices, a few more are looked at.
             if self._is_over() or (solved_at is not None and number >= solved_at + _MORE_TRIES):
                 break
         for tried in itertools.islice(_best_first(trials), _TRIED_WHOLE):
@@ -291,11 +313,11 @@ class _Tried:
 
     @property
     def gain_s(self) -> float:
-        """What is gained, or less."""
+        """What is gained, at most: steps not yet taken can only lower it."""
         return self.known_s - self.trial.cost_s
 
     def is_enough(self) -> bool:
-        """Measure as far as need be to tell whether the part gains and its band keeps what is required."""
+        """Measure only as far as needed; return whether the part gains and its band keeps what is required."""
         while self.gain_s > _LEAST_GAIN_S and self.trial.may_be_enough:
             if not self.trial.refine():
                 return self.gain_s > _LEAST_GAIN_S and self.trial.may_be_enough

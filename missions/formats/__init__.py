@@ -89,7 +89,7 @@ def read_situation(path: Path | str) -> Situation:
     Raises
     ------
     MissionFormatError
-        The file is missing, its suffix is unknown, or it cannot be read as its format; says where.
+        The file is missing, its suffix is unknown, or it cannot be read as its format; the message says where.
     """
     path = Path(path)
     read = format_of(path).read

@@ -31,7 +31,7 @@ def situation_of(features: Iterable[Feature], source: str) -> Situation:
     Raises
     ------
     MissionFormatError
-        A feature means nothing, or what cannot be; says which and what was expected.
+        A feature means nothing, or what cannot be; the message says which and what was expected.
     """
     found: dict[Role, list[Feature]] = {role: [] for role in Role}
     zones: list[tuple[Feature, Role | None]] = []

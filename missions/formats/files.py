@@ -31,7 +31,7 @@ def read_text(path: Path) -> str:
     Raises
     ------
     MissionFormatError
-        The file is missing or is no text; says where.
+        The file is missing or is no text; the message says where.
     """
     try:
         data = _unzipped(path) if path.suffix.lower() == ".kmz" else path.read_bytes()
@@ -98,7 +98,7 @@ def write_file(path: Path, data: bytes, make_way: Callable[[], object] = lambda:
     """
     try:
         mode = mode_of(path)
-        # Beside it, so that nobody ever finds half a mission; by a name that nobody can foresee.
+        # Beside it, so that nobody ever finds half a mission; by a name that nobody can guess.
         unfinished = path.with_name(f".pbpp-{secrets.token_hex(8)}.part")
         descriptor = create_exclusively(unfinished)
         try:

@@ -19,7 +19,7 @@ def parse_json(text: str, source: str) -> JsonNode:
     Raises
     ------
     MissionFormatError
-        It is none; says in which line.
+        It is none; the message says in which line.
     """
     try:
         return JsonNode(json.loads(text), source, "")

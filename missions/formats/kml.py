@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 _FOLDERS = ("kml", "Document", "Folder")
 _SHAPES = ("Point", "LineString", "LinearRing", "Polygon", "MultiGeometry")
 _OTHER_SHAPES = ("Model", "Track", "MultiTrack")
-_CIRCLE_CORNERS = 72
+_CIRCLE_CORNERS = 72  # every 5°: to look at; pbpp reads the circle's own data back
 _STYLES = {  # colours of the pictures, as KML writes them: opacity, blue, green, red
     Role.INCLUSION: "<LineStyle><color>ff739e00</color><width>3</width></LineStyle><PolyStyle><fill>0</fill></PolyStyle>",
     Role.EXCLUSION: "<LineStyle><color>ff005ed5</color><width>2</width></LineStyle><PolyStyle><color>66005ed5</color></PolyStyle>",

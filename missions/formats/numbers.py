@@ -7,7 +7,7 @@ import math
 from missions.errors import InvalidPositionError
 from missions.geo import LatLon, checked_lat_lon, to_e7
 
-_INT32_MAX = 2**31 - 1
+_INT32_MAX = 2**31 - 1  # degE7 is a 32-bit integer in MAVLink
 _COMMANDS_WITHOUT_PLACES = range(96, 5000)
 
 

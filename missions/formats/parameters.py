@@ -26,7 +26,7 @@ def read_parameters(path: Path | str) -> dict[str, float]:
     Raises
     ------
     MissionFormatError
-        The file is missing or a line is not a name and a number; says which.
+        The file is missing or a line is not a name and a number; the message says which.
     """
     return dict(read(read_text(Path(path)), str(path)).parameters)
 

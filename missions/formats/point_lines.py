@@ -43,7 +43,7 @@ def lone_inclusion(fence: Fence, suffix: str) -> PolygonZone:
     Raises
     ------
     MissionFormatError
-        The fence is anything else; says what it is.
+        The fence is anything else; the message says what it is.
     """
     zone = fence.zones[0] if len(fence.zones) == 1 else None
     if isinstance(zone, PolygonZone) and zone.kind is ZoneKind.INCLUSION:

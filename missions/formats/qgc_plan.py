@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from missions.formats.json_node import JsonNode
 
 _TRANSECTS = "TransectStyleComplexItem"
-_MOST_ITEMS = 65535
-_FIRMWARE_ARDUPILOT = 3
-_VEHICLE_ROVER = 10
+_MOST_ITEMS = 65535  # seq is 16 bits in MAVLink
+_FIRMWARE_ARDUPILOT = 3  # MAV_AUTOPILOT_ARDUPILOTMEGA
+_VEHICLE_ROVER = 10  # MAV_TYPE_GROUND_ROVER
 
 
 def read(text: str, source: str) -> Situation:

@@ -10,7 +10,9 @@ from missions.errors import MissionFormatError
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-_MOST_DEEP = 100
+_MOST_DEEP = (
+    100  # chosen, not measured: bounds what a hostile file can make of the readers that follow its nesting
+)
 
 
 @dataclass(slots=True)
@@ -55,7 +57,7 @@ def parse_xml(text: str, source: str) -> Element:
     Raises
     ------
     MissionFormatError
-        It is none, or has what is refused; says in which line.
+        It is none, or has what is refused; the message says in which line.
     """
     from xml.parsers import expat  # noqa: PLC0415 - quick help; document types are refused below
 

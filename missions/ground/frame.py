@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 MAX_LATITUDE_DEG = 85.0
 """Beyond this the autopilot's flat frame is of no use."""
 
-_WGS84_A_M = 6378137.0
-_WGS84_E2 = 6.69437999014e-3
+_WGS84_A_M = 6378137.0  # semi-major axis, by definition
+_WGS84_E2 = 6.69437999014e-3  # first eccentricity squared, from the flattening 1/298.257223563
 _AUTOPILOT_M_PER_DEG = 1.113195e5  # AP_Math's LATLON_TO_M
 
 

@@ -25,7 +25,7 @@ def known_fence(situation: Situation) -> Fence:
     Raises
     ------
     FenceMissingError
-        None is known, or it is empty; says why and what to do.
+        None is known, or it is empty; the message says why and what to do.
     """
     known = situation.fence
     if known is None:

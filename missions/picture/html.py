@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from missions.picture.scene import Scene
 
-_HOVERS_PER_LEG = 25
+_HOVERS_PER_LEG = 25  # so that any place of a leg answers the pointer
 _HATCH = {
     "shape": "/",
     "fgcolor": style.EXCLUSION,

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from missions.ground.ground import Barrier
     from missions.picture.scene import Scene
 
-_FONT_SIZE = 8
-_GAP_PX = 3.0
-_MARKER_PX = 16.0
+_FONT_SIZE = 8  # points
+_GAP_PX = 3.0  # around a name
+_MARKER_PX = 16.0  # radius kept free around start and targets
 _BOX = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.0}
 
 

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from missions.geo import LatLon
     from missions.planned import Plan
 
-_BORDER_SHARE = 0.06
-_MOST_BLOCKS = 5000
+_BORDER_SHARE = 0.06  # white around the drawing
+_MOST_BLOCKS = 5000  # more cannot be told apart
 _SCALE_STEPS_M = tuple(step * 10**power for power in range(5) for step in (1, 2, 5))
 
 
@@ -110,7 +110,7 @@ class Scene:
 
     @property
     def envelope(self) -> BaseGeometry:
-        """The band that the vehicle is foreseen to stay in."""
+        """The band that the vehicle is predicted to stay in."""
         return self.plan.envelope.area.intersection(self.frame)
 
     @property

@@ -15,14 +15,14 @@ if TYPE_CHECKING:
 
     from missions.picture.scene import Scene
 
-_MOST_ROWS = 40
-_FEWEST_COLUMNS = 40
+_MOST_ROWS = 40  # so that a sketch fits a terminal's screen
+_FEWEST_COLUMNS = 40  # narrower terminals wrap
 _CELL_SHAPE = 2.0
 """A terminal's cell is about twice as high as wide."""
 
-_COVERED_SHARE = 0.4
-_THIN_SHARE = 0.05
-_BRAILLE = 0x2800
+_COVERED_SHARE = 0.4  # of a cell
+_THIN_SHARE = 0.05  # of a cell, where the rest of an area shows nowhere
+_BRAILLE = 0x2800  # U+2800, the empty pattern; its eight low bits are the dots
 _DOT_BITS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
 
 

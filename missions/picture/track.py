@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from missions.ground.frame import LocalFrame
     from missions.ground.ground import Ground
 
-_BORDER_SHARE = 0.06
+_BORDER_SHARE = 0.06  # as in `scene`
 _MODE_COLOURS: Final = ("#0072B2", "#CC79A7", "#000000", "#56B4E9", "#E69F00", "#8A8A8A")
 """Okabe and Ito's, without those that the fence and the targets have."""
 

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from missions.situation import Situation
     from missions.vehicle import Vehicle
 
-_ROUNDING_M = 1e-6
+_ROUNDING_M = 1e-6  # a micrometre: differences of floating point, nothing that can be driven
 
 
 def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bool] | None = None) -> Plan:
@@ -151,7 +151,7 @@ def _promised_m(asked: Promise, driven_m: float) -> float | None:
 
 
 def _band(ground: Ground, lines: Lines, vehicle: Vehicle, heading_deg: float | None) -> Envelope:
-    """Foresee the drive; a heading that is not known is taken along the first leg."""
+    """Predict the drive; a heading that is not known is taken along the first leg."""
     if heading_deg is None:
         heading_deg = bearing_deg(*lines.path[:2])
     band = envelope(

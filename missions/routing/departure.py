@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from missions.ground.ground import Ground
     from missions.vehicle import Vehicle
 
+# Chosen, not measured: a first leg every 15° from the heading on, and its lengths.
 WAYS = 24
 LENGTHS_M = (16.0, 8.0, 4.0)
 ROOM_M = 6.5

@@ -32,9 +32,9 @@ _INSIDE_M = 0.005
 _ROUNDED_EXCESS_M = 0.005
 """What pbpp's round offsets may keep beyond the clearance, and a little."""
 
-_WIDER = (1, 4, 16, 64)
+_WIDER = (1, 4, 16, 64)  # multiples of the reach within which free ground is looked for, nearest first
 
-_CHORDS = 64
+_CHORDS = 64  # in a quarter circle
 _CHORD_SHARE = 1.0002
 """By so much an arc of that many chords a quarter turn must be wider to keep its distance all along."""
 

@@ -25,6 +25,7 @@ _START_ADVICE = "the vehicle has no room to turn where it stands: turn it by han
 AT_START = 2
 """Points where most is missing because of how the route begins."""
 
+# Chosen, not measured: half the square's side, and how far along the route it keeps from both ends, so that these stay free.
 _BLOCK_M = 0.5
 _BLOCK_AWAY_M = 8.0
 

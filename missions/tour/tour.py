@@ -37,8 +37,10 @@ if TYPE_CHECKING:
     from missions.request import Request
     from missions.situation import Situation
 
-_WIDEST_SHARE = 0.9
-_INSIDE_M = 0.01
+_WIDEST_SHARE = 0.9  # of the widest, to measure lengths where no route keeps the asked clearance: chosen, so that all places stay connected
+_INSIDE_M = (
+    0.01  # so that a place moved to free ground is not on its edge; more than degE7's rounding of 5.6 mm
+)
 
 
 @dataclass(frozen=True, slots=True)

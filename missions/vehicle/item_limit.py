@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 MISSION_ITEMS = 655
 """Items that ArduPilot holds with 16 KB of storage, home included, as measured."""
 
-_SD_BYTES_PER_ITEM = 15
-_SD_HEADER_BYTES = 4
+_SD_BYTES_PER_ITEM = 15  # AP_MISSION_EEPROM_COMMAND_SIZE
+_SD_HEADER_BYTES = 4  # storage format's version
 _MOST_SD_KB = 1024
 """ArduPilot's documentation allows 64; more than a megabyte no list of 16-bit numbers can fill."""
 

@@ -8,7 +8,7 @@ from enum import StrEnum
 
 from missions.errors import VehicleError
 
-MAV_TYPE_GROUND_ROVER = 10
+MAV_TYPE_GROUND_ROVER = 10  # from MAVLink's common.xml, as is the next
 MAV_TYPE_SURFACE_BOAT = 11
 
 

@@ -11,11 +11,11 @@ if TYPE_CHECKING:
 
     from missions.situation import Situation
 
-_MOST_NAMED = 5
+_MOST_NAMED = 5  # chosen: remarks that fit a screen; the rest is counted
 
 
 def parameter_remarks(situation: Situation) -> list[str]:
-    """Return what the vehicle told of its parameters that cannot be."""
+    """Return what the vehicle reported of its parameters that cannot be."""
     return [
         *no_number_remarks(situation.no_numbers, situation.parameters),
         *storage_remarks(situation.parameters),

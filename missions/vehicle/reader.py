@@ -29,7 +29,7 @@ def real_number(
     Raises
     ------
     VehicleError
-        It is no number, or none that it can be; says what is possible.
+        It is no number, or none that it can be; the message says what is possible.
     """
     value = parameters.get(name)
     if value is None:

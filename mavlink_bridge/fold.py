@@ -1,4 +1,4 @@
-"""Messages folded into a situation: the one way in which a live link, a log and the simulator tell what is known.
+"""Messages folded into a situation: the one way from a live link, a log and the simulator to what is known.
 
 `fold` is pure: a situation and a frame give the next situation. It believes the vehicle's own words (its acknowledgements, its
 read-backs) and takes what others send to it as requests.

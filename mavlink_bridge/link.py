@@ -72,7 +72,7 @@ def parse_connection(text: str) -> Address:
     Raises
     ------
     LinkError
-        The string is none of these.
+        The string has none of these forms.
     """
     kind, _, rest = text.partition(":")
     if kind in ("udpin", "udpout", "udp", "tcp", "tcpin"):
@@ -343,7 +343,7 @@ def open_transport(connection: str, *, timeout_s: float = 10.0) -> Transport:
     address = parse_connection(connection)
     try:
         return _OPENERS[address.kind](address, timeout_s)
-    except (OSError, UnicodeError) as error:  # a host's name may be none
+    except (OSError, UnicodeError) as error:  # a host's name may be invalid
         reason = getattr(error, "strerror", None) or error
         advice = {} if address.kind == "serial" else {"advice": _NETWORK_ADVICE}
         raise LinkError(f"{address} cannot be opened: {reason}", connection=str(address), **advice) from None

@@ -3,7 +3,7 @@
 ::
 
     MissionError
-    ├── InvalidPositionError     a latitude or longitude that is none, or too near a pole
+    ├── InvalidPositionError     a latitude or longitude out of range, or too near a pole
     ├── FenceError               a fence that cannot be used: which polygon, which item
     ├── FenceMissingError        no fence is known, or only a part of it
     ├── MissionFormatError       a file that cannot be read: file, line, what was expected
@@ -45,7 +45,7 @@ class MissionFormatError(MissionError):
 
 
 class VehicleError(MissionError):
-    """A parameter out of its range, or a footprint that is none; the message says which and its value."""
+    """A parameter out of its range, or an invalid footprint; the message says which and its value."""
 
 
 class SituationError(MissionError):

@@ -110,7 +110,7 @@ class MissionItem:
 
     @property
     def is_placed(self) -> bool:
-        """Whether the item sends a rover to a place on Earth; (0, 0) means "here" in MAVLink and is none."""
+        """Whether the item sends a rover to a place on Earth; (0, 0) means "here" in MAVLink, so it does not."""
         return (
             self.command in PLACED_COMMANDS
             and self.frame not in _FRAMES_WITHOUT_PLACES

@@ -1,4 +1,4 @@
-"""What a planning gives: a mission and what it promises."""
+"""The result of planning: a mission and what it promises."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ _FIX_NOT_TOLD = (
 )
 
 FIX_ERRORS_M = {3: 1.5, 4: 0.6, 5: 0.3, 6: 0.05}
-"""By GPS_FIX_TYPE (3D, DGPS, RTK float, RTK fixed), where the receiver does not tell its own error."""
+"""By GPS_FIX_TYPE (3D, DGPS, RTK float, RTK fixed), where the receiver does not report its own error (h_acc). Chosen, not measured: what is kept for its error."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,7 @@ class Promise:
     allowance_m : float or None
         Room asked for everywhere on top of the promise; None where the route is fitted to the drive model.
     warnings : tuple of str
-        What is to be said about them.
+        Remarks about both.
     """
 
     promised_m: float
@@ -69,7 +69,7 @@ def known_vehicle(situation: Situation, request: Request) -> Vehicle:
     VehicleError
         A parameter or the speed cannot be used.
     """
-    # What the vehicle reported, but as no number, must not be taken for what it did not tell: a default in its place would be a guess.
+    # What the vehicle reported, but as no number, must not be taken for what it did not report: a default in its place would be a guess.
     no_numbers = {name: float(came) for name, came in situation.no_numbers.items()}
     vehicle = vehicle_from_parameters(
         {**no_numbers, **situation.parameters},
@@ -122,7 +122,7 @@ def asked_clearance(situation: Situation, request: Request) -> tuple[Vehicle, fl
 
 
 def margin_remarks(vehicle: Vehicle) -> list[str]:
-    """Return what is to be said of a margin that is less than measured rovers needed."""
+    """Return remarks on a margin that is less than measured rovers needed."""
     if not vehicle.avoids_fence or vehicle.stops_within_m >= LEAST_MARGIN_M:
         return []
     return [

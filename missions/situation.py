@@ -52,7 +52,7 @@ class Fix:
     kind : int
         GPS_FIX_TYPE: 3 is 3D, 4 DGPS, 5 RTK float, 6 RTK fixed.
     error_m : float or None
-        The receiver's own word for its horizontal error (GPS_RAW_INT.h_acc), None where it gives none.
+        The receiver's own figure for its horizontal error (GPS_RAW_INT.h_acc), None without one.
     """
 
     kind: int

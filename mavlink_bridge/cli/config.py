@@ -95,7 +95,7 @@ def settings_of(path: Path, *, is_asked_for: bool) -> list[Setting]:
     Raises
     ------
     typer.BadParameter
-        The file is none, or sets what there is not.
+        The file is not an options file, or sets an option that does not exist.
     """
     from mavlink_bridge.cli.app import COMMANDS, load  # noqa: PLC0415 - which loads this module
 

@@ -1,4 +1,4 @@
-"""How a command ends: exit codes, and errors told to people and scripts."""
+"""How a command ends: exit codes, and errors reported to people and scripts."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ _REPORT = (
 
 @dataclass(slots=True)
 class Telling:
-    """Which command runs, how much it tells, and which warnings it has told."""
+    """Which command runs, how much it prints, and which warnings it has printed."""
 
     command: str = ""
     verbose: bool = False
@@ -114,7 +114,7 @@ def is_reader_gone(error: Exception) -> bool:
 
 
 def drop_stdout() -> int:
-    """Let go of a standard output that nobody reads any more (``pbpp log … | head``); return the exit code, as a shell tells of SIGPIPE."""
+    """Let go of a standard output that nobody reads any more (``pbpp log … | head``); return the exit code, as a shell reports SIGPIPE."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 128 + 13
 

@@ -1,4 +1,4 @@
-"""What people read of a link that is odd, but works."""
+"""Notes on a link that is odd, but works."""
 
 from __future__ import annotations
 

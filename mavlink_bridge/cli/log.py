@@ -119,7 +119,7 @@ def _draw(book: Logbook, path: Path) -> None:
 
 
 def _is_union(vehicle: VehicleLog) -> bool:
-    """Return whether one inclusion is enough; of a FENCE_OPTIONS that is none the notes tell."""
+    """Return whether one inclusion is enough; the notes name an impossible FENCE_OPTIONS."""
     from missions.errors import VehicleError  # noqa: PLC0415 - quick help
     from missions.vehicle import bits  # noqa: PLC0415
 

@@ -78,7 +78,7 @@ def options_for(path: Path, command: str, known: set[str], *, is_asked_for: bool
     Raises
     ------
     typer.BadParameter
-        The file is none, or sets what the command does not know or what only the command line may.
+        The file is not an options file, or sets what the command does not know or what only the command line may.
     """
     tables = read_tables(path)
     own = tables.get(command, {})

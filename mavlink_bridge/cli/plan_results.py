@@ -88,7 +88,7 @@ def _finite(value_m: float | None) -> float | None:
 
 
 class Told:
-    """A plan as it is told: warnings, files and pictures, and the report for people; before anything is done with it.
+    """A plan as it is printed: warnings, files and pictures, and the report for people; before anything is done with it.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ class Told:
         self._plan, self._planning_s = planned, planning_s
 
     def document(self) -> dict[str, object]:
-        """Return what the JSON document tells of the newest plan."""
+        """Return the newest plan for the JSON document."""
         assert self._plan is not None
         return {
             **plan_document(self._plan),
@@ -131,7 +131,7 @@ class Told:
 
 
 def arrival_document(arrival: Mapping[str, object] | None) -> dict[str, object]:
-    """Return what the JSON document tells of a drive: the event's data, null where nothing was driven."""
+    """Return a drive for the JSON document: the event's data, null where nothing was driven."""
     names = ("driven_m", "took_s", "least_clearance_m", "breaches")
     return {"arrived": arrival is not None, "drive": arrival and {name: arrival[name] for name in names}}
 

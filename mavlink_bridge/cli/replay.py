@@ -155,7 +155,7 @@ _Results = dict[Path, list[_Told] | LogError]
 def _replayed(
     logs: list[Path], orders: Orders, speed: float | None, jobs: int | None, teller: _Teller
 ) -> _Results:
-    """Replay the logs; tell each one's events in the order in which the logs were given."""
+    """Replay the logs; print each one's events in the order in which the logs were given."""
     workers = min(jobs or os.cpu_count() or 1, len(logs))
     pool = None if len(logs) == 1 or speed is not None or workers == 1 else _pool(workers)
     if pool is None:
@@ -275,7 +275,7 @@ class _Pace:
 def _send(
     log: Path, connection: str, speed: float, system: int | None, *, any_vehicle: bool, quiet: bool
 ) -> None:
-    """Play the vehicle's side of a log; what the client sends tells only that it is there."""
+    """Play the vehicle's side of a log; what the client sends shows only that it is there."""
     from mavlink_bridge.link import open_transport, parse_connection  # noqa: PLC0415
     from mavlink_bridge.logbook.playback import vehicle_frames  # noqa: PLC0415
     from mavlink_bridge.mavlink.codec import Codec  # noqa: PLC0415 - quick help

@@ -1,4 +1,4 @@
-"""What the bridge writes beside what it does: where it cannot be written, that is told once, and the drive goes on."""
+"""What the bridge writes beside what it does: where it cannot be written, one note says so, and the drive goes on."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class SafeTeller:
     Parameters
     ----------
     tell : callable
-        Tells one.
+        Prints one.
     may_end : callable
         Whether the bridge may end where nobody reads any more (``pbpp bridge --json | head``): nothing is under way on the vehicle.
     """

@@ -252,7 +252,7 @@ class Session:
         )
 
     def listen_until(self, is_enough: Callable[[], bool], for_s: float) -> bool:
-        """Listen until something is so, no longer than a time; give whether it is."""
+        """Listen until a condition holds, no longer than a time; return whether it does."""
         self.link.run(_Listen(for_s), on_frames=self._listen, until=is_enough)
         return is_enough()
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from missions.vehicle import Vehicle
 
 _HEARTBEAT_S: Final = 1.5
-"""A mode change is told by the next heartbeat: the drive may have begun so long before."""
+"""A mode change is reported by the next heartbeat: the drive may have begun so long before."""
 
 _MOST_RECENT = 64
 

@@ -72,7 +72,7 @@ class Transfer:
 
 @dataclass(frozen=True, slots=True)
 class TargetSeen:
-    """A place somebody sent the vehicle to: by which message, who, and how often it was said within seconds."""
+    """A place somebody sent the vehicle to: by which message, who, and how often it was repeated within seconds."""
 
     time_s: float
     position: LatLon
@@ -83,7 +83,7 @@ class TargetSeen:
 
 @dataclass(frozen=True, slots=True)
 class ModeSpan:
-    """A stretch in one mode, armed or not, as the heartbeats tell."""
+    """A stretch in one mode, armed or not, as the heartbeats report."""
 
     mode: int
     name: str
@@ -185,7 +185,7 @@ class VehicleLog:
     nearest : Nearest or None
         None without a fence, or where it never drove.
     notes : tuple of str
-        What could not be told, and why.
+        What could not be reported, and why.
     """
 
     system: int

@@ -114,7 +114,7 @@ def _vehicles(path: Path, system: int | None) -> list[Vehicle]:
 def _first_situations(path: Path, vehicles: list[Vehicle]) -> list[Situation]:
     """Return the situation of each vehicle when the log begins.
 
-    A parameter or home that is told later held before, and so did a fence that is first seen when it is read from the vehicle.
+    A parameter or home that is reported later held before, and so did a fence that is first seen when it is read from the vehicle.
     """
     now = {vehicle.system: begun(path, vehicle) for vehicle in vehicles}
     first = dict(now)

@@ -331,7 +331,7 @@ class Recorder:
         points: NDArray[np.float64],
         depths_m: NDArray[np.float64],
     ) -> None:
-        """Note stretches on forbidden ground; a depth of 0 is a line that crossed it from fix to fix, a negative one is none."""
+        """Note stretches on forbidden ground; a depth of 0 is a line that crossed it from fix to fix, a negative one is outside."""
         assert self._meter is not None
         for fix, piece, point, depth_m in zip(fixes, track, points, depths_m.tolist(), strict=True):
             if depth_m < 0:

@@ -27,7 +27,7 @@ _MOST_POINTS: Final = 20_000
 
 
 class Fix(NamedTuple):
-    """A position as GLOBAL_POSITION_INT tells it.
+    """A position as GLOBAL_POSITION_INT reports it.
 
     Parameters
     ----------

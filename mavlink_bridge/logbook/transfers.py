@@ -120,7 +120,7 @@ class TransferWatch:
         key = (kind, way is not Way.READ_BACK)
         known = self._open.get(key)
         if known and (known.way, known.station, known.announced) == (way, station, count) and not known.seen:
-            known.ended_s = now_s  # said again
+            known.ended_s = now_s  # repeated
             return
         self._close(key)
         self._open[key] = _Open(kind, way, station, now_s, now_s, count)

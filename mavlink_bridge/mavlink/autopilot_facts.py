@@ -18,9 +18,9 @@ _BANNER = re.compile(r"(?:ArduRover|APMrover2|Rover) V(\d{1,2})\.(\d{1,2})(?:\.(
 
 
 def with_parameter(situation: Situation, name: str, value: float) -> Situation:
-    """Return the situation with a parameter that was told.
+    """Return the situation with a parameter that was reported.
 
-    What is no number is none of the vehicle's parameters: what was known before stands, and what came is noted.
+    A value that is not a number is not taken: what was known before stands, and what came is noted.
     """
     if not math.isfinite(value):
         if situation.no_numbers.get(name) == str(value):

@@ -457,7 +457,7 @@ class PositionTargetGlobalInt(Message):
 
 @dataclass(frozen=True, slots=True)
 class AutopilotVersion(Message):
-    """AUTOPILOT_VERSION (148); a version is major, minor, patch and type, a byte each from the top, and ids of 0 are not told."""
+    """AUTOPILOT_VERSION (148); a version is major, minor, patch and type, a byte each from the top, and ids of 0 are unknown."""
 
     capabilities: int
     flight_sw_version: int = 0

@@ -34,7 +34,7 @@ _MOST_MODE = 0xFFFFFFFF
 
 
 def mode_name(mode: int | None) -> str:
-    """Return a mode's name; its number, said to be unknown, where Rover has no such mode."""
+    """Return a mode's name; its number, marked as unknown, where Rover has no such mode."""
     if mode is None:
         return "another mode"
     return MODE_NAMES.get(mode, f"mode {mode} (unknown)")

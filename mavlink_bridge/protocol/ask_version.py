@@ -45,7 +45,7 @@ class AskVersion(TableMachine[VersionState, VersionEvent]):
     Attributes
     ----------
     version : AutopilotVersion or None
-        What it told; None while it runs, and where nothing came.
+        What it reported; None while it runs, and where nothing came.
     """
 
     def __init__(self, peer: Peer) -> None:

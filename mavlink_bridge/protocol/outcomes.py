@@ -1,4 +1,4 @@
-"""Outcomes of transfers in words: what people read, and which error it is.
+"""Outcomes of transfers in words: the messages for people, and which error it is.
 
 However an upload ends, by its own outcome, a broken link, an interrupt, or a defect of ours, `end_of_upload` says what may be on the vehicle
 and where the old list lies. Every shell that writes lists passes what ended it through there.

@@ -2,7 +2,7 @@
 
 ArduPilot sends every parameter as a 32-bit float, whole numbers too. It does not answer when asked for a parameter it does not have:
 a name counts as missing when it was asked for so often that, as the link loses messages, an answer would have come. A question counts
-only where the vehicle has answered a later one: a link or a vehicle that stands still for a while tells nothing of its parameters. So
+only where the vehicle has answered a later one: a link or a vehicle that stands still for a while shows nothing of its parameters. So
 that there is a later one, a parameter that is there is asked for again after each repeated question.
 """
 

@@ -23,7 +23,7 @@ class Peer:
     Raises
     ------
     ValueError
-        Both ends are the same: our own echoes could not be told from answers.
+        Both ends are the same: our own echoes could not be distinguished from answers.
     """
 
     system: int

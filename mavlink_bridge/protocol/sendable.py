@@ -31,7 +31,7 @@ def check_items(
 ) -> None:
     """Refuse a list that cannot be sent as it is.
 
-    Numbers that are none (NaN) pass: ground stations write them for "not set", and the vehicle refuses them where it wants one. Infinite ones
+    NaN passes: ground stations write them for "not set", and the vehicle refuses them where it wants one. Infinite ones
     mean nothing in any field.
 
     Parameters

@@ -20,7 +20,7 @@ class TableMachine(Generic[StateT, EventT]):
     Parameters
     ----------
     table : mapping
-        For each state the events it heeds and where they lead; a state that heeds none is an end.
+        For each state the events it accepts and where they lead; a state that accepts none is an end.
     state : StateT
         Where the machine begins.
     """
@@ -41,7 +41,7 @@ class TableMachine(Generic[StateT, EventT]):
         return outgoing
 
     def _move(self, event: EventT) -> bool:
-        """Go where the table says; False if the state does not heed the event."""
+        """Go where the table says; False if the state does not accept the event."""
         following = self._table[self.state].get(event)
         if following is None:
             return False

@@ -1,4 +1,4 @@
-"""What the vehicle says for its reasons: the STATUSTEXTs that have to do with a refusal, told from all else that it says meanwhile."""
+"""What the vehicle says for its reasons: the STATUSTEXTs that have to do with a refusal, separated from all else that it sends meanwhile."""
 
 from __future__ import annotations
 

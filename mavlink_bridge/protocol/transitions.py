@@ -127,7 +127,7 @@ class UploadState(StrEnum):
     ACCEPTED = auto()
     REFUSED = auto()
     BUSY = auto()
-    UNCONFIRMED = auto()  # over, and only a read-back tells how
+    UNCONFIRMED = auto()  # over, and only a read-back shows how
 
 
 class UploadEvent(StrEnum):

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.mavlink.messages import Message
 
 FRESH_S = 3.0
-"""How old telemetry may be to tell what the vehicle does now: a heartbeat comes every second."""
+"""How old telemetry may be to show what the vehicle does now: a heartbeat comes every second."""
 
 MISSION_COMPLETE = 5
 """MISSION_STATE_COMPLETE in MISSION_CURRENT.mission_state; ArduPilot reports it, 0 is from those that do not."""
@@ -21,7 +21,7 @@ MISSION_COMPLETE = 5
 
 @dataclass(frozen=True, slots=True)
 class Doing:
-    """What a vehicle does, as far as it has told.
+    """What a vehicle does, as far as it has reported.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ class Doing:
     is_armed : bool, optional
         Whether it is armed; None before the first heartbeat.
     speed_mps : float, optional
-        Its speed over ground; None if it told none.
+        Its speed over ground; None if it reported none.
     has_completed : bool
         Whether its mission is driven to its end, by its own word.
     age_s : float
@@ -48,7 +48,7 @@ class Doing:
 
     @property
     def is_fresh(self) -> bool:
-        """Whether the heartbeat is young enough to tell what the vehicle does now."""
+        """Whether the heartbeat is young enough to show what the vehicle does now."""
         return self.age_s <= FRESH_S
 
     @property
@@ -85,7 +85,7 @@ class VehicleWatch:
         heartbeat = self._heartbeat
         if heartbeat is None:
             return Doing()
-        # A mission may be started anew: an old word of its end is none.
+        # A mission may be started anew: an old report of its end does not count.
         has_completed = self._mission_state == MISSION_COMPLETE and now_s - self._mission_s <= FRESH_S
         return Doing(
             heartbeat.custom_mode,

@@ -57,9 +57,8 @@ __all__ = ["Held", "OutcomeKind", "VerifiedUpload", "VerifiedUploadOutcome"]
 
 MOST_PUSHES = 4
 MOST_RESTORES = 3
-_MOST_READS = (
-    6  # of the list after one push; two mostly agree, late copies on a link that reorders may need one more
-)
+# of the list after one push; two mostly agree, late copies on a link that reorders may need one more
+_MOST_READS = 6
 _MOST_BACKUPS = 3  # as often as the old list is read because others wrote it before we could
 _LAST_PUSH_S = MOST_S / 2  # later than this no push begins
 _READ_RESERVE_S = 45.0  # kept for reading what a push left: 655 items at 40 % loss took up to 25 s, the 8 s included for which a vehicle left half-way refuses

@@ -69,7 +69,7 @@ def item_from_message(message: messages.MissionItemInt | messages.MissionItem) -
 
 
 def wire_key(message: Message) -> tuple[object, ...]:
-    """Return what tells a message from all others as it goes over the wire: floats as their 32 bits, so that NaN equals itself."""
+    """Return what distinguishes a message from all others as it goes over the wire: floats as their 32 bits, so that NaN equals itself."""
     values = ((field, getattr(message, field.name)) for field in fields(message))
     return (type(message), *(_bits(value) if field.type == "float" else value for field, value in values))
 

@@ -1,4 +1,4 @@
-"""What a replay is expected to tell, and how what it told differs from that.
+"""The events that a replay is expected to report, and how its own differ from those.
 
 An expectation is a file of JSON lines, one an event. Of each event only the keys that stand there count, so that lines can be shortened by hand
 to what matters.

@@ -1,4 +1,4 @@
-"""The journal beside a recorded log: what the director was told otherwise than by frames, so that a replay decides the same.
+"""The journal beside a recorded log: what reached the director otherwise than by frames, so that a replay decides the same.
 
 A JSON line each: first the orders, then every call of the director that is no frame, with its time and the number of frames received before
 it, and every event.

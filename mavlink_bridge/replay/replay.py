@@ -1,7 +1,7 @@
 """The director over a recorded log, in the log's own time.
 
 A log that the bridge recorded comes with a journal: its replay makes the same calls between the same frames and so decides the same. Over any
-other log the director only listens: it learns from what others transferred, and tells what it would have planned.
+other log the director only listens: it learns from what others transferred, and reports what it would have planned.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ SENT_LINK = 3
 """MAVProxy's link number, and ours, for what the recording side sent."""
 
 _NO_BACKUP = {"backup_failed": BackupError, "in_use": VehicleInUseError}
-"""Calls that tell why nothing can be uploaded."""
+"""Calls that report why nothing can be uploaded."""
 _STILL_ADVICE = "fence, mission and targets are in it all the same: `pbpp log FILE`, `pbpp plan --log FILE`"
 
 
@@ -91,7 +91,7 @@ def replay_foreign(entries: Iterable[LogEntry], orders: Orders) -> Iterator[Even
     Raises
     ------
     LogError
-        The log's clock stands still: the director, who waits for seconds to pass, can tell nothing of it.
+        The log's clock stands still: the director, who waits for seconds to pass, can report nothing of it.
     """
     director = Director(replace(orders, passive=True, upload=False, drive=False, arm=False, once=False))
     clock = SteadyClock()

@@ -45,7 +45,7 @@ class Commands:
     renew : callable
         Is called after a parameter has changed, with its name.
     is_ready : callable
-        Tells at a moment whether the rover may be armed.
+        Returns whether the rover may be armed at a moment.
     """
 
     def __init__(

@@ -104,7 +104,7 @@ class MissionList(_InPlaceList):
     home : callable
         Returns the vehicle's home.
     is_running : callable
-        Tells whether the vehicle is armed in AUTO.
+        Returns whether the vehicle is armed in AUTO.
     sd_kb : int
         BRD_SD_MISSION: storage on the SD card instead of the default one.
     """

@@ -42,7 +42,7 @@ UPLOAD_TIMEOUT_S = 8.1
 
 WARNING = 4
 INFO = 6
-"""MAV_SEVERITY of what is said about transfers."""
+"""MAV_SEVERITY of texts about transfers."""
 
 MissionMessage = (
     MissionCount

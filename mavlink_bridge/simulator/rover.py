@@ -50,7 +50,7 @@ class Rover:
     Attributes
     ----------
     texts : list of tuple of int and str
-        What it says: severity and text; the caller empties it.
+        Its status texts with their severity; the caller empties it.
     reached : list of int
         The numbers of items reached; the caller empties it.
     least_clearance_m : float

@@ -44,7 +44,7 @@ _BOUNDARY = 3
 class State:
     """What telemetry is about: the rover, the items in its mission (home included), its time since boot, whether it has a position.
 
-    The ids are those of mission, fence and rally points, 0 where none are told; the uid is the board's own.
+    The ids are those of mission, fence and rally points, 0 where none are known; the uid is the board's own.
     """
 
     rover: Rover

@@ -99,7 +99,7 @@ class SimulatedVehicle:
 
     @property
     def deadline_s(self) -> float:
-        """When `handle_timer` wants to be called; never None: a vehicle always has something to tell."""
+        """When `handle_timer` wants to be called; never None: a vehicle always has something to send."""
         return self._time_of(self._wake_tick())
 
     @property

@@ -41,7 +41,7 @@ def crc_matches(
     frame_at, crc_at : (n,) array
         Where each frame's magic byte and its checksum stand in the buffer.
     ids : (n,) array
-        Message ids; of an id outside the dialect the answer means nothing.
+        Message ids; for an id outside the dialect the answer is worthless.
 
     Returns
     -------

@@ -112,7 +112,7 @@ class Follower:
             self._count_skipped(len(data) - loose)
 
     def _open_run(self, index: int, loose: int) -> None:
-        # Count what lies before a frame that does not simply follow, and say whether the 8 bytes before it are its timestamp.
+        # Count what lies before a frame that does not simply follow, and find whether the 8 bytes before it are its timestamp.
         scan = self._scan
         begin = int(scan.at[index]) - self._gap_bytes
         has_time = begin == loose or (

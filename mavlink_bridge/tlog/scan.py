@@ -163,7 +163,7 @@ class Scan:
         return step
 
     def _sound(self, step: NDArray[np.int32]) -> NDArray[np.bool_]:
-        # Without timestamps nothing but the checksum tells a frame from noise.
+        # Without timestamps nothing but the checksum distinguishes a frame from noise.
         good = self.intact(np.arange(len(self.at)))
         sound: NDArray[np.bool_] = good | (~self.is_known & (step >= 0) & good[step])
         return sound

@@ -40,9 +40,8 @@ if TYPE_CHECKING:
     from missions.situation import Mission, Situation
     from missions.vehicle import Vehicle
 
-_FAR_M = (
-    50_000.0  # a home farther off is not laid out with the mission. Chosen, not measured: it bounds the frame
-)
+# A home farther off is not laid out with the mission. Chosen, not measured: it bounds the frame
+_FAR_M = 50_000.0
 _STEP_M = 0.5  # between the places of the first leg that are asked for their clearance; chosen, not measured
 _ANYTHING = Request()
 

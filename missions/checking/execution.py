@@ -81,7 +81,7 @@ class Course:
     troubles : tuple of str
         What was not understood: where the vehicle goes then is not known.
     notes : tuple of str
-        What else is to be said.
+        Further remarks.
     is_endless : bool
         Whether the mission goes round without end.
     ends_in_loiter : bool
@@ -125,7 +125,7 @@ def follow_mission(
     return_speed_mps : float, optional
         The speed of RTL (RTL_SPEED); default: the vehicle's own.
     circle_m : float
-        The radius of LOITER_TURNS that tell none (CIRC_RADIUS).
+        The radius of LOITER_TURNS without one of their own (CIRC_RADIUS).
     own_speed_mps : float
         The vehicle's own speed, which holds until the mission changes it.
     """

@@ -207,7 +207,7 @@ def _followed(
 
 
 class _Rover:
-    """A rover that turns as its controllers tell it, and takes on the speed wanted at once."""
+    """A rover that turns as its controllers demand, and takes on the speed wanted at once."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         self.velocity = 0j

@@ -13,16 +13,15 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
 
-QUARTER_SEGMENTS = (
-    8  # chords in a quarter circle of a buffered band, which is widened so that they lie outside the circle
-)
+# Chords in a quarter circle of a buffered band, which is widened so that they lie outside the circle
+QUARTER_SEGMENTS = 8
 _ROUNDING_M = 2e-6
 """What joining many polygons may take from their outline."""
 
 
 @dataclass(frozen=True, slots=True)
 class Corner:
-    """What is predicted at one waypoint between two legs.
+    """The prediction at one waypoint between two legs.
 
     Parameters
     ----------
@@ -59,7 +58,7 @@ class Corner:
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """What is predicted on one leg, between two points of the list.
+    """The prediction on one leg, between two points of the list.
 
     Parameters
     ----------

@@ -117,7 +117,7 @@ class Drive:
 
     @property
     def envelope(self) -> Envelope:
-        """The band, with what is told of corners and legs."""
+        """The band, with the predictions for corners and legs."""
         return self.with_cores(convex(self.pieces.hulls))
 
     def with_cores(self, cores: NDArray[np.object_]) -> Envelope:

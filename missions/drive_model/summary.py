@@ -1,4 +1,4 @@
-"""What is told of a drive: its corners, its legs, and when it comes to each point."""
+"""The summary of a predicted drive: its corners, its legs, and when it comes to each point."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ START_AND_END_LAG_S = 2.0
 
 
 def told_corner(route: Route, number: int) -> Corner:
-    """Return the summary of what is predicted at a corner."""
+    """Return the prediction for a corner."""
     plan, before, after = route.corners[number], route.legs[number], route.legs[number + 1]
     band_m = max(before.band_m, after.band_m)
     blend_s = before.profile.duration_s - plan.blend.duration_s
@@ -54,7 +54,7 @@ def _cut_m(route: Route, number: int) -> float:
 
 
 def told_leg(route: Route, number: int) -> Leg:
-    """Return the summary of what is predicted on a leg."""
+    """Return the prediction for a leg."""
     leg: LegPlan = route.legs[number]
     begin_s, _ = route.span_s(number)
     stray = route.stray_at(number, begin_s)

@@ -29,9 +29,8 @@ if TYPE_CHECKING:
     from missions.request import Request
     from missions.situation import Situation
 
-_ROUNDS = (
-    8  # chosen, not measured: routes that break the legs beside them are made anew so often; bounds the time
-)
+# Chosen, not measured: routes that break the legs beside them are made anew so often; bounds the time
+_ROUNDS = 8
 _EXTRA_M, _MOST_EXTRA_M = 0.1, 0.5
 """More room for routes where the corners between them and their neighbours need it."""
 
@@ -70,7 +69,7 @@ class _Detour:
 def repaired_plan(
     situation: Situation, request: Request, *, should_stop: Callable[[], bool] | None = None
 ) -> Plan:
-    """Repair the request's mission, else the situation's, and give it as a plan.
+    """Repair the request's mission, else the situation's, and return it as a plan.
 
     Raises
     ------
@@ -106,12 +105,12 @@ def repair_mission(
     situation : Situation
         Fence, parameters, home and where the vehicle is.
     request : Request
-        Start, clearance, ``snap_m`` for places that are blocked, method; its targets say nothing here.
+        Start, clearance, ``snap_m`` for places that are blocked, method; its targets are not used.
 
     Raises
     ------
     RouteError
-        A leg cannot be replaced (says which and why), or the corners between legs keep breaking the promise.
+        A leg cannot be replaced (the message says which and why), or the corners between legs keep breaking the promise.
     SituationError
         Something in the mission is not understood, so that where it leads is not known.
     FenceMissingError, FenceError, VehicleError, InvalidPositionError
@@ -145,7 +144,7 @@ def repair_mission(
             routed = _routed(asked, keys, situation, replace(request, clearance_m=clearance_m), should_stop)
         except RouteError:
             if clearance_m > asked.clearance_m:
-                break  # there is no more room: what was found before is to be told
+                break  # there is no more room: the error found before is raised
             raise
         repaired = routed
         checked = check_mission(repaired.mission(), situation, request)

@@ -45,19 +45,17 @@ UNBOUNDED_EXTRA_M = 2.0
 """What unbounded corners have to keep on top: measured ones left the band by up to 1.6 m (docs/drive-model.md, "Where it does not hold")."""
 
 TURN_BACK_DEG, TURN_BACK_EXTRA_M = 165.0, 4.0
-"""A turn so sharp may be driven round either side, and the model predicts one: swings reach 3.6 m there (docs/drive-model.md)."""
+"""A turn so sharp may be driven round either side, and the model predicts one; a steered rover that came back at 1 m/s swung out by 3.6 m (docs/drive-model.md)."""
 
 # Chosen, not measured: prices that order the candidates of a search.
-_MISSING_COST_S_PER_M = (
-    100.0  # a slow stretch costs 8 to 18 s when measured: worth it for some 0.1 m that would else be missing
-)
+# A slow stretch costs 8 to 18 s when measured: worth it for some 0.1 m that would else be missing
+_MISSING_COST_S_PER_M = 100.0
 _CROSSING_COST_S = 10_000.0  # more than any drive takes or misses: a leg through a fence is never worth it
 _POINT_COST_S = 0.3  # between equal lines the one with fewer waypoints
 _NEAR_TURNS_COST_S = 3.0  # two turns within `moves.APART_M`: driven as one, and less surely predicted
 _TURN_DEG = 5.0  # what counts as a turn for that
-_FAR_FROM_ENOUGH_M = (
-    0.7  # with more than this missing the avoidance is not reckoned: it is the dearest step and can only add
-)
+# With more than this missing the avoidance is not reckoned: it is the dearest step and can only add
+_FAR_FROM_ENOUGH_M = 0.7
 
 
 @dataclass(frozen=True, slots=True)

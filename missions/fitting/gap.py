@@ -75,7 +75,7 @@ def find_neck(edge: BaseGeometry, place: Vector, ahead: Vector) -> Neck | None:
     Returns
     -------
     Neck or None
-        None where no fence is near on one of the sides.
+        None where one of the sides has no fence near.
     """
     begin, end = (shifted(place, ahead, _free_m(edge, place, ahead, way_m)) for way_m in (-REACH_M, REACH_M))
     sides = []

@@ -56,9 +56,8 @@ Chosen, not measured: they bound the planning time, which docs/drive-bench.md re
 # Chosen, not measured: no experiment is recorded for any of these. They bound the search; whether lines are enough is always measured.
 _SHORT_LEG_M = 12.0  # corners farther apart are not merged to save a point
 _LEAST_GAIN_S = 0.05  # what a change must gain to be kept: it ends the descent
-_CONTEXT = (
-    3  # points before and after a change that are measured with it; the whole lines are measured afterwards
-)
+# Points before and after a change that are measured with it; the whole lines are measured afterwards
+_CONTEXT = 3
 _MORE_TRIES = 12  # candidates still looked at after the first that suffices: the gentle ones come first
 _TRIED_WHOLE = 3  # candidates that gained in part and are measured whole
 _EASING_STEPS_M = (6.0, 1.6, 0.5)  # coarse to fine; what is left over is at most the last

@@ -30,12 +30,8 @@ if TYPE_CHECKING:
 MOVES = (0.5, 1.0, 1.5, 2.5)
 """How far `moved` moves a corner, in multiples of what is missing. Chosen, not measured."""
 
-PROLONGED_M = (
-    3.0,
-    6.0,
-    10.0,
-    15.0,
-)  # how far a turn is put off; chosen, not measured: bounds the candidates to 20 a corner
+# How far a turn is put off; chosen, not measured: bounds the candidates to 20 a corner
+PROLONGED_M = (3.0, 6.0, 10.0, 15.0)
 SPACINGS_M = (6.0, 10.0, 15.0, 20.0)  # between the corners that one is split into; chosen, not measured
 SLOW_MPS = (3.0, 2.0, 1.0)
 SLOW_BEFORE_M = {3.0: 10.0, 2.0: 10.0, 1.0: 5.0}

@@ -84,7 +84,7 @@ FORMATS: dict[str, Format] = {
 
 
 def read_situation(path: Path | str) -> Situation:
-    """Read what a file tells: fence, mission, rally points, home, parameters.
+    """Read what a file holds: fence, mission, rally points, home, parameters.
 
     Raises
     ------

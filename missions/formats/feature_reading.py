@@ -1,6 +1,6 @@
 """From the features of a GeoJSON or KML file to a situation.
 
-A polygon of which nothing is said is an inclusion if it is the only zone, and an error otherwise.
+A polygon without a role is an inclusion if it is the only zone, and an error otherwise.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def situation_of(features: Iterable[Feature], source: str) -> Situation:
     Raises
     ------
     MissionFormatError
-        A feature means nothing, or what cannot be; the message says which and what was expected.
+        A feature without a role, or with an impossible one; the message says which and what was expected.
     """
     found: dict[Role, list[Feature]] = {role: [] for role in Role}
     zones: list[tuple[Feature, Role | None]] = []

@@ -40,7 +40,7 @@ class Role(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Feature:
-    """A shape with what is said of it.
+    """A shape with its properties.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ _MOST_BYTES = 100_000_000
 
 
 def read_text(path: Path) -> str:
-    """Read a text file: UTF-8, or what its byte order mark says; of a zipped KML (.kmz) the KML in it.
+    """Read a text file: UTF-8, or the encoding of its byte order mark; of a zipped KML (.kmz) the KML in it.
 
     Raises
     ------

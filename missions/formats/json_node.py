@@ -1,4 +1,4 @@
-"""JSON read with care: every value knows where it stands, so that errors can say it."""
+"""JSON read with care: every value knows where it stands, so that errors can name the place."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def parse_json(text: str, source: str) -> JsonNode:
     Raises
     ------
     MissionFormatError
-        It is none; the message says in which line.
+        The text is not JSON; the message names the line.
     """
     try:
         return JsonNode(json.loads(text), source, "")

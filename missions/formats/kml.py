@@ -1,6 +1,6 @@
 """KML (OGC 2.2): fences, missions, rally points and home as placemarks; positions are longitude first.
 
-Folders and names tell what a placemark is; so do ``Data`` and ``SimpleData`` of its ``ExtendedData``. KML has no circles: they are points
+Folders and names give a placemark its role; so do ``Data`` and ``SimpleData`` of its ``ExtendedData``. KML has no circles: they are points
 with a radius, and for the eye a polygon beside each that reading leaves out.
 """
 

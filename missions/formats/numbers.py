@@ -19,7 +19,7 @@ def place_e7(command: int, lat_deg: float, lon_deg: float) -> tuple[int, int]:
     Raises
     ------
     InvalidPositionError
-        A place that is none.
+        Not a valid position.
     """
     if command not in _COMMANDS_WITHOUT_PLACES:
         return to_e7(checked_lat_lon(lat_deg, lon_deg))

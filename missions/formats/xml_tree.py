@@ -10,9 +10,8 @@ from missions.errors import MissionFormatError
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-_MOST_DEEP = (
-    100  # chosen, not measured: bounds what a hostile file can make of the readers that follow its nesting
-)
+# Chosen, not measured: bounds what a hostile file can make of the readers that follow its nesting
+_MOST_DEEP = 100
 
 
 @dataclass(slots=True)
@@ -57,7 +56,7 @@ def parse_xml(text: str, source: str) -> Element:
     Raises
     ------
     MissionFormatError
-        It is none, or has what is refused; the message says in which line.
+        The text is not XML, or has what is refused; the message names the line.
     """
     from xml.parsers import expat  # noqa: PLC0415 - quick help; document types are refused below
 

@@ -2,7 +2,7 @@
 
 An azimuthal equidistant projection of the WGS 84 ellipsoid. Within 10 km of the origin distances agree with the geodesic to
 1 mm + 1e-6. ArduPilot drives straight in a flat frame of its own (1.113195e5 m a degree, longitude shortened by the cosine of the
-latitude); `autopilot_scale` and `bow_m` tell how far the two differ, so that plans can be padded to the safe side.
+latitude); `autopilot_scale` and `bow_m` are how far the two differ, so that plans can be padded to the safe side.
 """
 
 from __future__ import annotations

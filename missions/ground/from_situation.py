@@ -60,7 +60,7 @@ def heading_at(situation: Situation, start: LatLon) -> float | None:
 
 
 def ground_for(situation: Situation, vehicle: Vehicle, ends: Sequence[LatLon]) -> Ground:
-    """Lay the situation's fence out in the plane as the vehicle's parameters say.
+    """Lay the situation's fence out in the plane as the vehicle's parameters require.
 
     Raises
     ------

@@ -100,7 +100,7 @@ class Ground:
 
     @cached_property
     def edge(self) -> BaseGeometry:
-        """The line the vehicle must keep off; the bounds are none of it."""
+        """The line the vehicle must keep off, without the bounds."""
         return self.allowed.boundary.difference(self.bounds.boundary.buffer(_WALL_M))
 
     def clearance_m(self, shape: BaseGeometry) -> float:
@@ -161,7 +161,7 @@ def lay_out(
     home : LatLon, optional
         The centre of the home circle.
     home_radius_m : float, optional
-        FENCE_RADIUS where the autopilot enforces it; it holds whatever ``union`` says.
+        FENCE_RADIUS where the autopilot enforces it; it holds whatever ``union`` is.
     around : sequence of LatLon
         Places that must lie within the bounds where the fence has no inclusion.
 
@@ -197,7 +197,7 @@ def check_ground(ground: Ground) -> None:
     Raises
     ------
     FenceError
-        Says which zones leave none.
+        No allowed ground is left; the message names the zones.
     """
     if not ground.allowed.is_empty:
         return
@@ -210,7 +210,7 @@ def check_ground(ground: Ground) -> None:
 
 
 def _within(barriers: list[Barrier], circle: Area, name: str) -> list[Barrier]:
-    """Cut a union's inclusions to the home circle, which limits even the union; those beyond it are none."""
+    """Cut a union's inclusions to the home circle, which limits even the union; inclusions beyond it are left out."""
     found = []
     for barrier in barriers:
         area = _polygons(barrier.area.intersection(circle))

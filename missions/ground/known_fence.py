@@ -1,4 +1,4 @@
-"""The fence that is known of a vehicle: which one counts, and what is to be said about it."""
+"""The fence that is known of a vehicle: which one counts, and the remarks about it."""
 
 from __future__ import annotations
 

@@ -23,9 +23,8 @@ MAX_LEG_M = 1000.0
 ROUNDING_RESERVE_M = 0.01
 """Rounding to degE7 moves a waypoint by 8 mm at most."""
 
-_SAMPLE_M = (
-    50.0  # longest straight piece of the autopilot's line, which bows in the frame; chosen, not measured
-)
+# Longest straight piece of the autopilot's line, which bows in the frame; chosen, not measured
+_SAMPLE_M = 50.0
 
 
 def reserve_m(ground: Ground) -> float:

@@ -194,7 +194,7 @@ def _leg_hovers(scene: Scene) -> go.Scatter:
 
 
 def _names(scene: Scene) -> go.Scatter:
-    """Return the exclusions' short names; hovering shows them in full."""
+    """Return the exclusions' short names; hovering shows the full ones."""
     shown = [
         (zone.area.intersection(scene.frame).representative_point(), short_name(zone.name))
         for zone in scene.plan.ground.barriers

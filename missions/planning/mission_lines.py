@@ -94,7 +94,7 @@ def mission_items(
 
 
 def check_lines(ground: Ground, lines: Lines, start_clearance_m: float, asked_m: float) -> float:
-    """Measure the finished lines, as the autopilot draws them, and give their least clearance.
+    """Measure the finished lines, as the autopilot draws them, and return their least clearance.
 
     Raises
     ------

@@ -129,7 +129,7 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
 
 
 def _start_remarks(ground: Ground, start: LocalPoint, vehicle: Vehicle) -> list[str]:
-    """Return what is to be said of the start.
+    """Return remarks on the start.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What is to be said of a plan beside its figures."""
+"""Remarks on a plan beside its figures."""
 
 from __future__ import annotations
 

@@ -93,7 +93,7 @@ def find_route(  # noqa: PLR0913 - what is sought, and how
     clearance_m : float
         What the drawn lines keep to any fence; where the start is nearer, the route first leads away, never nearer than the start is.
     promised_m : float, optional
-        What of it is promised while driving, for errors to say.
+        What of it is promised while driving, for error messages.
     blocked : sequence of shapely polygon
         Places to keep away from as from exclusions, to find another way round.
     method : str

@@ -1,4 +1,4 @@
-"""A route whose driven band keeps the promise; where there is none, the widest one, or an error that tells of it."""
+"""A route whose driven band keeps the promise; where there is none, the widest one, or an error that names its clearance."""
 
 from __future__ import annotations
 

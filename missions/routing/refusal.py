@@ -1,4 +1,4 @@
-"""Where a route could not be fitted: said in words, and kept away from by the next one."""
+"""Where a route could not be fitted: the error that names the place, and the block that keeps the next route away from it."""
 
 from __future__ import annotations
 

@@ -55,19 +55,16 @@ LATER_MEASUREMENTS = 500
 
 # Chosen, not measured, but the turn at the end of a first leg.
 _OTHER_WAYS = 5  # squares laid over refusing places before the search gives up
-_HELD_M = (
-    0.05  # missing at the start beyond what a slower, narrower band could win back: nothing else is tried
-)
+# Missing at the start beyond what a slower, narrower band could win back: nothing else is tried
+_HELD_M = 0.05
 _DEPARTURES_TRIED = 8  # of the first legs, the shortest routes
-_DEPARTURE_SLACK_M = (
-    0.05  # what the first leg may keep less than the best departure, for rounding and bending
-)
+# What the first leg may keep less than the best departure, for rounding and bending
+_DEPARTURE_SLACK_M = 0.05
 _TURN_COST_M_PER_DEG = 0.1  # orders the departures: a turn of 90° counts as 9 m
 _MOST_TURN_DEG = 100.0
 """At the end of a first leg: tried with more, rovers that came back the way they went left the band."""
-_SHORTER_SHARE = (
-    0.97  # the slow speed's path is fitted too where it is shorter than this share of the fast one's
-)
+# The slow speed's path is fitted too where it is shorter than this share of the fast one's
+_SHORTER_SHARE = 0.97
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,11 +25,8 @@ if TYPE_CHECKING:
     from missions.routing.drawn_route import Route
 
 _TINY_LEG_M = 1.5  # two shorter legs mean that the route winds round a corner; chosen, not measured
-_WIDER_M = (
-    0.3,
-    0.1,
-    0.03,
-)  # added to the clearance to draw rounder corners, widest first; chosen, not measured
+# Added to the clearance to draw rounder corners, widest first; chosen, not measured
+_WIDER_M = (0.3, 0.1, 0.03)
 _WIDEST_TRIES = 40  # each takes 2 % off: 40 come down to 45 % of the widest clearance. Chosen, not measured: it bounds the time
 _WIDEST_SHARE = 0.97
 """What of the widest clearance a route keeps: round corners of the last millimetre would need a waypoint every half metre."""

@@ -38,9 +38,8 @@ if TYPE_CHECKING:
     from missions.situation import Situation
 
 _WIDEST_SHARE = 0.9  # of the widest, to measure lengths where no route keeps the asked clearance: chosen, so that all places stay connected
-_INSIDE_M = (
-    0.01  # so that a place moved to free ground is not on its edge; more than degE7's rounding of 5.6 mm
-)
+# So that a place moved to free ground is not on its edge; more than degE7's rounding of 5.6 mm
+_INSIDE_M = 0.01
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +84,7 @@ def plan_tour(
         said = _order_text(found)
     if request.comes_back:
         targets = (*targets, situation.home.value if situation.home else start)
-    # The targets are given only where they have to be: else the plan says itself where they come from.
+    # The targets are given only where they have to be: else the plan itself notes where they come from.
     asked = replace(request, targets=targets) if len(targets) > 1 or request.targets else request
     planned = plan(situation, asked, should_stop=should_stop)
     planned = with_end(planned, situation, request)
@@ -198,7 +197,7 @@ def with_room(
     wanted = replace(request, clearance_m=planned.clearance_m, start=planned.start)
     is_fitted = (
         request.corner_allowance_m is None
-    )  # else drawn lines were asked for, which a check says nothing of
+    )  # else drawn lines were asked for, which a check does not judge
     own = _own_items(planned, request) if is_fitted else ()
     mission = Mission(planned.items, planned.home)
     checked = shortened(mission, own, situation, wanted, most=most, may_slow=True, should_stop=should_stop)

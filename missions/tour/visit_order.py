@@ -3,7 +3,7 @@
 Up to 12 places: Held and Karp, "A dynamic programming approach to sequencing problems", 1962. More: the integer program of Dantzig,
 Fulkerson and Johnson, "Solution of a large-scale traveling-salesman problem", 1954, which HiGHS solves while the cuts that forbid
 subtours are added as they are needed. HiGHS (highspy, MIT licence) is kept by the University of Edinburgh and needs nothing but
-numpy; being exact it also tells how far an answer may be from the best where it is stopped early.
+numpy; being exact it also bounds how far an answer may be from the best where it is stopped early.
 """
 
 from __future__ import annotations

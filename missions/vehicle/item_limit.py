@@ -26,7 +26,7 @@ def most_items(parameters: Mapping[str, float]) -> int:
 
 
 def sd_card_bytes(parameters: Mapping[str, float], name: str) -> int:
-    """Return the storage on the SD card that BRD_SD_MISSION or BRD_SD_FENCE tell in KB; 0, the least of all, where that is none."""
+    """Return the storage on the SD card that BRD_SD_MISSION or BRD_SD_FENCE set in KB; 0, the least of all, where the value is impossible."""
     try:
         return whole_number(parameters, name, 0, most=_MOST_SD_KB) * 1024
     except VehicleError:
@@ -34,7 +34,7 @@ def sd_card_bytes(parameters: Mapping[str, float], name: str) -> int:
 
 
 def storage_remarks(parameters: Mapping[str, float]) -> list[str]:
-    """Return what is to be said of storage that no vehicle can have."""
+    """Return remarks on storage that no vehicle can have."""
     remarks = []
     for name in ("BRD_SD_MISSION", "BRD_SD_FENCE"):
         try:

@@ -114,7 +114,7 @@ class Vehicle:
     mav_type : int or None
         MAV_TYPE of its heartbeat, where one was heard.
     firmware : tuple of int or None
-        The autopilot's version, major, minor and patch, where it told.
+        The autopilot's version, major, minor and patch, where it was reported.
     """
 
     waypoint_radius_m: float = 2.0

@@ -52,7 +52,7 @@ def px4_vehicle(
 
 
 def _steering(read: ParameterReader) -> Steering:
-    # A rover build of PX4 has the parameters of all its rovers; the airframe tells which one drives.
+    # A rover build of PX4 has the parameters of all its rovers; the airframe decides which one drives.
     airframe = read.known("CA_AIRFRAME")
     if airframe in {6.0, 13.0}:
         return Steering.SKID

@@ -44,9 +44,9 @@ _GLOBAL_FRAMES = frozenset(
         CoordinateFrame.GLOBAL_TERRAIN_ALT_INT,
     }
 )
-_IGNORE_X_OR_Y = 0b11
+_IGNORE_X_OR_Y = 0b11  # POSITION_TARGET_TYPEMASK_X_IGNORE and _Y_IGNORE
 _GUIDED_TARGET, _GUIDED_ALTITUDE = 2, 3
-_HEADING_UNKNOWN = 65535
+_HEADING_UNKNOWN = 65535  # UINT16_MAX, as GLOBAL_POSITION_INT.hdg is defined
 
 
 def fold(situation: Situation, frame: Frame, time_s: float) -> Situation:

@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 ONE_SHOT_IDENTITY = (245, 190)
 """System and component id of one-shot commands: nobody else's by custom."""
 
-DEFAULT_BAUD = 57600
-_HEARTBEAT_EVERY_S = 1.0
-_DATAGRAM_BYTES = 65536
+DEFAULT_BAUD = 57600  # of SiK telemetry radios, and ArduPilot's SERIAL1_BAUD
+_HEARTBEAT_EVERY_S = 1.0  # as MAVLink's heartbeat protocol wants it
+_DATAGRAM_BYTES = 65536  # the largest that UDP carries
 _STREAM_BYTES = 16384
 """What is taken of a stream at once: a third of a second of the quickest serial port, and little enough to be soon done with."""
 
@@ -37,8 +37,8 @@ _MOST_DATAGRAMS, _MOST_DATAGRAM_BYTES = 256, 65536
 """What is taken of datagrams at once: about as many small ones as Linux keeps by default (208 KiB), or a few huge ones; the worst garbage takes
 a third of a second to look through, so that no flood keeps timers from running."""
 
-_LINK_SENT = 3
-_SERIAL_WAIT_S = 0.01
+_LINK_SENT = 3  # the link number under which our own messages stand in a recorded log
+_SERIAL_WAIT_S = 0.01  # for bytes, at a time; chosen, so that timers run on time
 _SERIAL_SEND_S = 30.0
 """As patient as TCP by default: a radio that takes nothing for so long is broken, and the bridge opens it again."""
 

@@ -28,8 +28,8 @@ from missions.items import MissionItem
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-_FORMAT = 2
-_KEPT_BACKUPS = 100
+_FORMAT = 2  # of the file; since 2 it holds the mark of its vehicle
+_KEPT_BACKUPS = 100  # of each list; chosen, not measured: bounds the folder
 _BACKUP_NAME = re.compile(r"system-(\d+)-(mission|fence|rally)-\d{8}T\d{6}\.\d{6}Z(-[0-9a-f]{12})?\.json")
 _NOTE_NAME = re.compile(r"upload-under-way-system-(\d+)-(mission|fence|rally)(-[0-9a-f]{12})?\.json")
 """Before format 2 the names ended without the vehicle's key."""

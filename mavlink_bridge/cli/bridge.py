@@ -45,9 +45,10 @@ if TYPE_CHECKING:
     from mavlink_bridge.tlog import TlogWriter
     from missions.planned import Plan
 
+# Between attempts to open a link anew: doubled up to half a minute. Chosen, not measured.
 _BACKOFF_S = (0.5, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0)
-_LINK_LOOK_S = 0.25
-_OPENING_LOOK_S = 0.05
+_LINK_LOOK_S = 0.25  # how soon an interrupt is seen while waiting for that
+_OPENING_LOOK_S = 0.05  # and while a link is being opened
 
 
 def bridge(

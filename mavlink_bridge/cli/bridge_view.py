@@ -29,10 +29,11 @@ if TYPE_CHECKING:
     from mavlink_bridge.director import Director, Event
     from missions.geo import LatLon
 
+# Chosen, not measured: quick enough to watch; the map takes longer to draw and changes slowly.
 _TABLE_EVERY_S = 0.5
 _MAP_EVERY_S = 10.0
 _MAP_COLUMNS = 72
-_MOST_PLACES = 2000
+_MOST_PLACES = 2000  # of the track on the map; chosen, bounds the memory of a long drive
 _OLD_S = 3.0
 """A heartbeat comes every second, positions more often: what is older than this is said to be old."""
 

@@ -22,10 +22,11 @@ if TYPE_CHECKING:
     from missions.geo import LatLon
     from missions.planned import Plan
 
+# The maze of the recorded logs: its start, a target in it and a clearance that leaves a route.
 _HOME = (40.071374, -105.229930)
 _TARGET = (40.0726316, -105.2290497)
 _CLEARANCE_M = 2.5
-_IDENTITY = (245, 190)
+_IDENTITY = (245, 190)  # the one-shot commands' own, `link.ONE_SHOT_IDENTITY`
 
 
 @dataclass(slots=True)

@@ -26,11 +26,11 @@ if TYPE_CHECKING:
     from mavlink_bridge.protocol.peer import Peer
     from mavlink_bridge.protocol.vehicle_watch import Doing, VehicleWatch
 
-_LOOK_S = 0.1
+_LOOK_S = 0.1  # listened to at a time; chosen, not measured
 _LISTEN_S = 1.5
 """Without a question: for so long the vehicle is listened to, so that what is reported of it is true now. A heartbeat comes every second."""
 
-_OLD_S = 2.0
+_OLD_S = 2.0  # two heartbeats: older telemetry is shown with its age
 
 
 class Terminated(KeyboardInterrupt):

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.logbook.grade import Grade
 
 Row = TypeVar("Row")
-_MOST_ROWS = 40
+_MOST_ROWS = 40  # of a table, so that it fits a terminal's screen; chosen
 _UNION_BIT = 2
 """FENCE_OPTIONS: inside one inclusion is enough."""
 

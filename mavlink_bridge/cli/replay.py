@@ -36,7 +36,7 @@ _Told = dict[str, Any]
 MOST_SPEED = 1e6
 """A day of a log in a tenth of a second: faster than any computer."""
 
-MOST_JOBS = 1024
+MOST_JOBS = 1024  # chosen: more processes than any computer has cores are a mistake in typing
 
 
 def replay(

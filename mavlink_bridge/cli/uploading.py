@@ -32,7 +32,7 @@ Lists = list[tuple[MissionType, tuple["MissionItem", ...]]]
 
 _LOCK_PATIENCE_S = 5.0
 """Most uploads take less; who waits longer wants to know for whom."""
-_LOCK_LOOK_S = 0.2
+_LOCK_LOOK_S = 0.2  # between attempts at another process's lock; chosen, not measured
 
 
 @dataclass(frozen=True, slots=True)

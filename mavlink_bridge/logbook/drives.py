@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _HEARTBEAT_S: Final = 1.5
 """A mode change is reported by the next heartbeat: the drive may have begun so long before."""
 
-_MOST_RECENT = 64
+_MOST_RECENT = 64  # positions kept; chosen: more than come within `_HEARTBEAT_S` at usual rates
 
 
 class Drives:

@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 OUTSIDE_M: Final = 0.25
 """How far outside the predicted band still counts as within: the vehicle's own estimate of its place is off by as much."""
 
-STANDING_MPS: Final = 0.1
-_LEAST_DRIVEN_M = 1.0
+STANDING_MPS: Final = 0.1  # slower is standing; chosen, not measured
+_LEAST_DRIVEN_M = 1.0  # less is no drive; chosen, not measured
 _PLAIN = frozenset({Command.NAV_WAYPOINT, Command.NAV_DELAY, Command.DO_CHANGE_SPEED})
 _ODD = frozenset(
     {

@@ -23,7 +23,7 @@ MOVED_M: Final = 0.3
 _JOINED_M, _JOINED_S = 20.0, 3.0
 """Positions farther apart are not joined by a line: between them something is missing."""
 
-_MOST_POINTS: Final = 20_000
+_MOST_POINTS: Final = 20_000  # of a track's parts; chosen, bounds memory and pictures
 
 
 class Fix(NamedTuple):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+# HEARTBEAT.custom_mode of ArduPilot Rover (ROVER_MODE in ardupilotmega.xml).
 AUTO_MODE = 10
 HOLD_MODE = 4
 LOITER_MODE = 5

@@ -20,14 +20,17 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+# MAVLink 2 message signing, as its guide defines it: key, frame flag, signature block, time in 10 µs since 2015.
 KEY_BYTES = 32
-_MOST_FILE_BYTES = 4096
+_MOST_FILE_BYTES = 4096  # chosen: longer than any passphrase; a wrong file is not read whole
 _MAVLINK_2 = 0xFD
 _FLAG_SIGNED = 1
 _SIGNATURE_BYTES = 13
 _EPOCH_2015_S = 1_420_070_400
 _TICKS_PER_S = 100_000
-_NEW_STREAM_BEHIND_TICKS = 60 * _TICKS_PER_S
+_NEW_STREAM_BEHIND_TICKS = (
+    60 * _TICKS_PER_S
+)  # a sender not heard before may be a minute behind, as the signing guide has it
 
 
 class SigningKey:

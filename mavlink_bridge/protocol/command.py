@@ -14,10 +14,11 @@ if TYPE_CHECKING:
     from mavlink_bridge.mavlink.messages import CommandInt, Frame
     from mavlink_bridge.protocol.peer import Peer
 
+# Chosen: at 40 % loss each way six sends leave 7 commands of 100 unanswered.
 _SEND_AGAIN_S = 1.0
 _MOST_SENDS = 6
-_PROGRESS_PATIENCE_S = 10.0
-_PROGRESS_UNKNOWN = 255
+_PROGRESS_PATIENCE_S = 10.0  # since the last report of progress
+_PROGRESS_UNKNOWN = 255  # UINT8_MAX, as COMMAND_ACK.progress is defined
 _MOST_S = 60.0  # however long the vehicle says that it is at it: nothing that is sent here takes longer
 _RESULTS = {int(result): result for result in MavResult}
 

@@ -24,17 +24,20 @@ FIRST_WINDOW = 50
 WINDOW = 100
 """Requests in flight: ArduPilot is fastest with 50 to 100 and loses requests at 500."""
 
+# Of silence (a vehicle gives up after 8 s), and of a rival station that keeps the list (docs/transfers.md, "Patience").
 PATIENCE_S = 10.0
 RIVAL_PATIENCE_S = 30.0
-_ASK_AGAIN_S = 0.5
-_RIVAL_AGAIN_S = 1.0
-_REFUSALS_BELIEVED = 3
-_STALE_PATIENCE_S = 30.0
+_ASK_AGAIN_S = 0.5  # for the list's length, and to check it; chosen, not measured
+_RIVAL_AGAIN_S = 1.0  # after DENIED; chosen, not measured
+_REFUSALS_BELIEVED = 3  # alike, as one may be a late copy; chosen, not measured
+_STALE_PATIENCE_S = 30.0  # a refusal about items may answer a transfer before; chosen, not measured
 _OUT_OF_ORDER = (MissionResult.ERROR, MissionResult.INVALID_SEQUENCE)
-_OVERTAKEN_BY = 3
+_OVERTAKEN_BY = 3  # so many later answers mean lost, not reordered; chosen, not measured
+# The old request is tried after so long without an answer to the exact one. Chosen, not measured.
 _FLOAT_FORM_AFTER_S = 6.0
 _DOUBT_S = 8.0
 """So long the exact form is asked for before a list in the old form is believed: it may only have been lost."""
+# Bounds of the timeout that the measured round trip gives. Chosen, not measured.
 _LEAST_OVERDUE_S = 0.15
 _MOST_OVERDUE_S = 2.0
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from missions.items import MissionItem
 
-_SD_FENCE_ITEMS = 4096
+_SD_FENCE_ITEMS = 4096  # measured on ArduPilot Rover 4.7.0-dev, with storage on an SD card
 _POLYGON = frozenset({Command.FENCE_POLYGON_VERTEX_INCLUSION, Command.FENCE_POLYGON_VERTEX_EXCLUSION})
 _CIRCLE = frozenset({Command.FENCE_CIRCLE_INCLUSION, Command.FENCE_CIRCLE_EXCLUSION})
 

@@ -25,15 +25,15 @@ if TYPE_CHECKING:
     from mavlink_bridge.mavlink.messages import Frame
     from mavlink_bridge.protocol.peer import Peer
 
-WINDOW = 20
-PATIENCE_S = 10.0
+WINDOW = 20  # requests in flight; chosen, not measured
+PATIENCE_S = 10.0  # of silence, as for lists
 REAL32 = 9
 """MAV_PARAM_TYPE_REAL32."""
 
-_LIST_AGAIN_S = 1.5
-_QUIET_S = 1.0
-_SET_AGAIN_S = 0.7
-_ANSWERS_BELIEVED = 3
+_LIST_AGAIN_S = 1.5  # without anything of the list; chosen, not measured
+_QUIET_S = 1.0  # after the last of the stream: what it left out is asked for; chosen, not measured
+_SET_AGAIN_S = 0.7  # above the round trip of most links; chosen, not measured
+_ANSWERS_BELIEVED = 3  # with another value, as one may answer somebody else; chosen, not measured
 _LEAST_OVERDUE_S, _MOST_OVERDUE_S = 0.2, 2.0
 _LEAST_TRIES, _MOST_TRIES = 3, 14
 _PATIENT_ROUNDS = 2  # of repeated questions without any answer, until they are asked ever more seldom

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.mavlink.messages import Frame
     from mavlink_bridge.protocol.peer import Peer
 
-MOST_TEXTS = 8
+MOST_TEXTS = 8  # chosen, not measured: bounds the message
 
 _MOST_SEVERITY = 5
 """MAV_SEVERITY_NOTICE: ArduPilot gives reasons as notices ("No Mission. Can't set AUTO.") and graver; what is lighter says what goes well."""

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.protocol.download import DownloadOutcome
     from mavlink_bridge.protocol.peer import Peer
 
-MOST_READS = 4
+MOST_READS = 4  # chosen, not measured: bounds the time where others keep writing
 _QUIET_S = 1.5
 """ArduPilot asks a writer again every second: quiet for longer, it is not being written to. What was sent twice has arrived by then, too."""
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-_FORMAT = 2
+_FORMAT = 2  # of the file; others are not read
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,7 +27,7 @@ _WHOLE: dict[int, tuple[str, ...]] = {
 }
 """The parameters that have to be a number."""
 
-_CHANGE_MODE = 1
+_CHANGE_MODE = 1  # MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
 _LOCAL_FRAMES = (CoordinateFrame.LOCAL_NED, CoordinateFrame.MISSION)
 
 

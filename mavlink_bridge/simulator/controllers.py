@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.simulator.body import Body
     from mavlink_bridge.simulator.parameters import ParameterStore
 
-GRAVITY_MPS2 = 9.80665
+GRAVITY_MPS2 = 9.80665  # standard gravity; ArduPilot's GRAVITY_MSS
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from missions.geo import LatLon
     from missions.items import MissionItem
 
-_FAR_M = 1e6
-_CIRCLE_SEGMENTS = 64
+_FAR_M = 1e6  # farther than any fence: stands for no edge at all
+_CIRCLE_SEGMENTS = 64  # chords a quarter turn: they leave a 50 m circle by 4 mm
 
 
 class Plane(Protocol):

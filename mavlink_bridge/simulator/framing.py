@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 _V1, _V2 = 0xFE, 0xFD
-_SIGNED = 1
+_SIGNED = 1  # MAVLINK_IFLAG_SIGNED
 
 
 class FrameSplitter:

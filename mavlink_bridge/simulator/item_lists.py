@@ -23,6 +23,7 @@ FENCE_BYTES = 672
 SD_FENCE_LIMIT = 4096
 """Fence items at most, however large the SD card's storage."""
 
+# How ArduPilot counts storage on an SD card: bytes an item, and a mission's header.
 _BYTES_PER_FENCE_ITEM = 8
 _BYTES_PER_MISSION_ITEM = 15
 _HEADER_BYTES = 4

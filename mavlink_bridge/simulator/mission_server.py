@@ -40,7 +40,7 @@ REQUEST_AGAIN_S = 1.0
 UPLOAD_TIMEOUT_S = 8.1
 """An upload without a good item for this long is given up."""
 
-WARNING = 4
+WARNING = 4  # MAV_SEVERITY_WARNING
 INFO = 6
 """MAV_SEVERITY of texts about transfers."""
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 _TURNS = (Command.NAV_LOITER_TURNS, Command.NAV_LOITER_TIME)
 _PLACED = (Command.NAV_WAYPOINT, Command.NAV_LOITER_UNLIM, Command.NAV_LAND, Command.NAV_TAKEOFF, *_TURNS)
 _NAVIGATION = (*_PLACED, Command.NAV_RETURN_TO_LAUNCH, Command.NAV_DELAY)
-_MAX_COMMANDS = 64
+_MAX_COMMANDS = 64  # passed at once, so that jumps in a circle end; chosen, not measured
 
 
 class Route:

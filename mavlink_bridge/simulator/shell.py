@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 DEFAULT_LISTEN = "tcpin:127.0.0.1:5760"
 """Where ArduPilot's own simulator listens."""
 
-_READ_BYTES = 65_536
+_READ_BYTES = 65_536  # the largest datagram
 _UID_BYTES = 12
 """As long as the unique id of an STM32, which is what ArduPilot reports."""
-_MAX_BACKLOG_BYTES = 4_000_000
-_LONGEST_WAIT_S = 0.5
+_MAX_BACKLOG_BYTES = 4_000_000  # a client that reads nothing loses what comes after; chosen, bounds memory
+_LONGEST_WAIT_S = 0.5  # chosen, not measured: the shell looks up at least so often
 _MOST_AT_ONCE_S, _MOST_REAL_AT_ONCE_S = 1.0, 0.1
 
 Address = tuple[str, int]

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from mavlink_bridge.simulator.vehicle import SimulatedVehicle
 
-_CATCH_UP_S = 0.1
+_CATCH_UP_S = 0.1  # what it is behind by more is not caught up; chosen, not measured
 
 
 class SteppedRover:

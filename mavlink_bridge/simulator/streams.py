@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+# Message ids in MAVLink's common.xml and ardupilotmega.xml.
 HEARTBEAT = 0
 SYS_STATUS = 1
 GPS_RAW_INT = 24
@@ -38,7 +39,7 @@ DEFAULT_RATES_HZ: Mapping[int, float] = {
 MAX_RATE_HZ = 40.0
 """0.8 of the loop's rate; faster is refused."""
 
-_ALL = 0
+_ALL = 0  # MAV_DATA_STREAM_ALL
 _GROUPS = {
     2: (
         SYS_STATUS,

@@ -16,13 +16,14 @@ if TYPE_CHECKING:
 
     from mavlink_bridge.simulator.rover import Rover
 
+# Bits of MAV_SYS_STATUS_SENSOR: enabled and healthy, present, and three single ones.
 _SENSORS = 322_011_183
 _SENSORS_PRESENT = 322_034_735
 _FENCE_SENSOR = 1 << 20
 _GPS_SENSOR = 1 << 5
 _PREARM_OK = 1 << 28
 _EKF_GOOD, _EKF_UNINITIALISED = 831, 1024
-_POSITION_ONLY = 65_016
+_POSITION_ONLY = 65_016  # POSITION_TARGET_TYPEMASK: all ignored but the position
 _CAPABILITIES = (
     m.Capability.MISSION_FLOAT
     | m.Capability.PARAM_FLOAT
@@ -34,10 +35,10 @@ _CAPABILITIES = (
     | m.Capability.MISSION_RALLY
     | m.Capability.PARAM_ENCODE_C_CAST
 )
-_VERSION_4_7_0_DEV = 4 << 24 | 7 << 16
+_VERSION_4_7_0_DEV = 4 << 24 | 7 << 16  # major and minor in the two top bytes; type 0 is development
 _STANDBY, _ACTIVE, _CALIBRATING = 3, 4, 2
 _NO_MISSION, _NOT_STARTED, _ACTIVE_MISSION, _PAUSED, _COMPLETE = 1, 2, 3, 4, 5
-_BOUNDARY = 3
+_BOUNDARY = 3  # FENCE_BREACH_BOUNDARY
 
 
 @dataclass(frozen=True, slots=True)

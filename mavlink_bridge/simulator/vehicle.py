@@ -38,10 +38,10 @@ PARAMETERS_A_TICK = 10
 BOOT_S = 3.0
 """How long a rebooted vehicle is silent."""
 
-_POSITION_IGNORED = 3
-_GUIDED_ITEM = 2
-_HIGHER_ITEM = 3
-_NO_INDEX = 65_535
+_POSITION_IGNORED = 3  # POSITION_TARGET_TYPEMASK_X_IGNORE and _Y_IGNORE
+_GUIDED_ITEM = 2  # MISSION_ITEM.current: go there now
+_HIGHER_ITEM = 3  # MISSION_ITEM.current: change the altitude, which Rover does not
+_NO_INDEX = 65_535  # UINT16_MAX: PARAM_VALUE.param_index outside a list
 _BOOT_TEXTS = ("ArduRover V4.7.0-dev (simulated)", "ArduPilot Ready")
 
 

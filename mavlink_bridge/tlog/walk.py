@@ -26,7 +26,9 @@ if TYPE_CHECKING:
 
     from mavlink_bridge.tlog.source import LogFile, Source
 
-_OVERLAP_BYTES: Final = 4 * MAX_FRAME_BYTES
+_OVERLAP_BYTES: Final = (
+    4 * MAX_FRAME_BYTES
+)  # a frame proves itself by the next ones, which must lie in the same window
 
 
 @dataclass(frozen=True, slots=True)

@@ -45,7 +45,10 @@ _GLOBAL_FRAMES = frozenset(
     }
 )
 _IGNORE_X_OR_Y = 0b11  # POSITION_TARGET_TYPEMASK_X_IGNORE and _Y_IGNORE
-_GUIDED_TARGET, _GUIDED_ALTITUDE = 2, 3
+_GUIDED_TARGET, _GUIDED_ALTITUDE = (
+    2,
+    3,
+)  # MISSION_ITEM.current outside a mission: go there; change the altitude
 _HEADING_UNKNOWN = 65535  # UINT16_MAX, as GLOBAL_POSITION_INT.hdg is defined
 
 

@@ -327,7 +327,7 @@ def open_link(
     Raises
     ------
     LinkError
-        The string is none, or the device cannot be opened; the message says why.
+        The string has no known form, or the device cannot be opened; the message says why.
     """
     return Link(open_transport(connection, timeout_s=timeout_s), identity, recorder, signing, sent=sent)
 
@@ -338,7 +338,7 @@ def open_transport(connection: str, *, timeout_s: float = 10.0) -> Transport:
     Raises
     ------
     LinkError
-        The string is none, or the device cannot be opened; the message says why.
+        The string has no known form, or the device cannot be opened; the message says why.
     """
     address = parse_connection(connection)
     try:

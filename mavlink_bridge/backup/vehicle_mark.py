@@ -1,6 +1,6 @@
 """By what a vehicle is known again: the uid of its board, else how it was connected.
 
-System ids do not tell vehicles apart: nearly every rover is system 1.
+System ids do not distinguish vehicles: nearly every rover is system 1.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class VehicleMark:
     def kinship(self, other: VehicleMark) -> Kinship:
         """Return whether another mark is of the same vehicle.
 
-        Uids settle it. Of two vehicles without one the connection, the system id and the autopilot must be the same. A vehicle that told its uid
+        Uids settle it. Of two vehicles without one the connection, the system id and the autopilot must be the same. A vehicle that reported its uid
         only once, and one of which nothing was noted, may be this one or another.
         """
         if self.uid and other.uid:

@@ -96,7 +96,7 @@ def _exit_code(run: Any, words: list[str]) -> int:  # noqa: ANN401 - a function 
     except typer.Abort:
         report(command, "Interrupted", "aborted", ExitCode.INTERRUPTED, wants_json=wants_json)
         return ExitCode.INTERRUPTED
-    except Exception as error:  # noqa: BLE001 - the last place where one can be told
+    except Exception as error:  # noqa: BLE001 - the last place where one can be reported
         if is_reader_gone(error):
             return drop_stdout()
         if getattr(error, "exit_code", None) == ExitCode.USAGE and hasattr(error, "format_message"):

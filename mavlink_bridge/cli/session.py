@@ -145,7 +145,7 @@ class Session:
 
     @property
     def is_active(self) -> bool | None:
-        """Whether it drives its mission in AUTO; None if its last heartbeat is too old to tell."""
+        """Whether it drives its mission in AUTO; None if its last heartbeat is too old."""
         return self.watch.is_active(self.link.now_s())
 
     @property

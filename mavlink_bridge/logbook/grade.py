@@ -51,7 +51,7 @@ _ODD = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class Foreseen:
-    """What the drive model foretells, as far as the vehicle came.
+    """What the drive model predicts, as far as the vehicle came.
 
     Parameters
     ----------

@@ -50,8 +50,8 @@ RECORDED = FOLDED | TRANSFER_TYPES | {m.MissionCurrent, m.MissionItemReached, m.
 
 _PX4_PREFIXES = ("NAV_ACC_RAD", "RA_", "RD_", "RO_", "GF_")
 _BATCH: Final = 4096  # positions measured against the fence at once; chosen, it changes no answer
-_MOST_TARGETS, _MOST_INTRUSIONS = 1000, 1000
-_SAME_M, _SAID_AGAIN_S = 0.2, 3.0
+_MOST_TARGETS, _MOST_INTRUSIONS = 1000, 1000  # the last ones are kept; chosen, bounds memory
+_SAME_M, _SAID_AGAIN_S = 0.2, 3.0  # within both a target is the same one repeated; chosen, not measured
 
 
 class Recorder:

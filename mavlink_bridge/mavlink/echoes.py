@@ -1,6 +1,6 @@
 """What was sent lately, so that an echo of it is not taken for somebody else with our ids.
 
-A half-duplex radio, a hub that repeats to everybody, or somebody who reflects what he hears: what comes back byte for byte as we sent it tells
+A half-duplex radio, a hub that repeats to everybody, or somebody who reflects what he hears: what comes back byte for byte as we sent it shows
 nothing about anybody else, whatever it says and whether it is signed or not.
 """
 

@@ -27,7 +27,7 @@ _PX4_AUTO: Final = {
     8: "FOLLOW",
     9: "PRECLAND",
 }
-_PX4_AUTO_MAIN, _PX4_MISSION = 4, 4
+_PX4_AUTO_MAIN, _PX4_MISSION = 4, 4  # PX4_CUSTOM_MAIN_MODE_AUTO, PX4_CUSTOM_SUB_MODE_AUTO_MISSION
 
 
 def mode_name(mode: int, mav_type: int | None, *, ardupilot: bool | None) -> str:

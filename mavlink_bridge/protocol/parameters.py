@@ -34,11 +34,12 @@ _LIST_AGAIN_S = 1.5  # without anything of the list; chosen, not measured
 _QUIET_S = 1.0  # after the last of the stream: what it left out is asked for; chosen, not measured
 _SET_AGAIN_S = 0.7  # above the round trip of most links; chosen, not measured
 _ANSWERS_BELIEVED = 3  # with another value, as one may answer somebody else; chosen, not measured
+# Bounds of the measured round trip's timeout, and of the questions until a name is missing. Chosen, not measured.
 _LEAST_OVERDUE_S, _MOST_OVERDUE_S = 0.2, 2.0
 _LEAST_TRIES, _MOST_TRIES = 3, 14
 _PATIENT_ROUNDS = 2  # of repeated questions without any answer, until they are asked ever more seldom
 _WRONGLY_MISSING = 1e-4  # how likely a parameter may be called missing that is there
-_NO_INDEX = 65535
+_NO_INDEX = 65535  # UINT16_MAX: PARAM_VALUE.param_index outside a list
 
 
 @dataclass(frozen=True, slots=True)

@@ -97,6 +97,6 @@ class VehicleWatch:
         )
 
     def is_active(self, now_s: float) -> bool | None:
-        """Return whether the vehicle drives its mission; None if its last heartbeat is too old to tell."""
+        """Return whether the vehicle drives its mission; None if its last heartbeat is too old."""
         doing = self.doing(now_s)
         return doing.drives_mission if doing.is_fresh else None

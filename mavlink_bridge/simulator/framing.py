@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-_V1, _V2 = 0xFE, 0xFD
+_V1, _V2 = 0xFE, 0xFD  # the first byte of a frame
 _SIGNED = 1  # MAVLINK_IFLAG_SIGNED
 
 

@@ -27,7 +27,7 @@ TICK_S = 0.02
 GIVE_UP_M = 100.0
 """Further outside a fence than this the rover stops instead of driving home."""
 
-_CIRCLE, _POLYGON = 2, 4
+_CIRCLE, _POLYGON = 2, 4  # bits 1 and 2 of FENCE_TYPE
 _UNION = 2  # FENCE_OPTIONS bit 1
 _AVOID_FENCE = 1  # AVOID_ENABLE bit 0
 _DRIVING = (Mode.AUTO, Mode.GUIDED, Mode.RTL)

@@ -32,7 +32,7 @@ _UID_BYTES = 12
 """As long as the unique id of an STM32, which is what ArduPilot reports."""
 _MAX_BACKLOG_BYTES = 4_000_000  # a client that reads nothing loses what comes after; chosen, bounds memory
 _LONGEST_WAIT_S = 0.5  # chosen, not measured: the shell looks up at least so often
-_MOST_AT_ONCE_S, _MOST_REAL_AT_ONCE_S = 1.0, 0.1
+_MOST_AT_ONCE_S, _MOST_REAL_AT_ONCE_S = 1.0, 0.1  # of the rover's time in one turn, see `_advance`; chosen
 
 Address = tuple[str, int]
 

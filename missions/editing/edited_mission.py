@@ -18,7 +18,7 @@ LegKey = tuple[int, int, int | None]
 """A leg by its items: from seq, to seq, the jump taken in between."""
 
 _CONDITION_DISTANCE = 114  # MAV_CMD_CONDITION_DISTANCE
-_JUMP_TAG, _DO_JUMP_TAG = 600, 601
+_JUMP_TAG, _DO_JUMP_TAG = 600, 601  # MAV_CMD_JUMP_TAG, MAV_CMD_DO_JUMP_TAG
 _FOREVER = -1.0  # DO_JUMP param2: repeat without end
 
 

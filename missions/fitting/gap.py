@@ -112,7 +112,7 @@ def straight_through(drawing: Drawing, index: int, neck: Neck) -> Iterator[Drawi
     index : int
         The point that comes too near to a fence, or the end of the leg that does.
     neck : Neck
-        The narrow place.
+        The gap.
     """
     off = [neck.off(point) for point in drawing]
 

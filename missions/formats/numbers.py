@@ -38,7 +38,7 @@ def number(text: str) -> float:
     Raises
     ------
     ValueError
-        It is none.
+        It is not such a number.
     """
     if "_" in text:  # 4_0 is 40 to Python, and a slip of the pen to everybody else
         raise ValueError(f"could not convert string to float: {text!r}")
@@ -51,7 +51,7 @@ def whole(value: float, name: str, most: int) -> int:
     Raises
     ------
     ValueError
-        It is none.
+        It is not such a number.
     """
     if not (0 <= value <= most and value == int(value)):
         raise ValueError(f"{name} {value:g} is not a whole number from 0 to {most}")

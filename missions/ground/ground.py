@@ -41,7 +41,7 @@ EDGE_BOW_M = 1e-3
 
 _WALL_M = 1e-3  # thickness of a line made an area: a millimetre, below degE7's 11 mm
 _CIRCLE_PAD_M = 1e-4  # what the autopilot's flat metres lose on a circle of kilometres
-_OPEN_GROUND_M = 500.0
+_OPEN_GROUND_M = 500.0  # of ground around everything where no inclusion bounds it; chosen, not measured
 
 
 @dataclass(frozen=True, eq=False)

@@ -42,6 +42,7 @@ _CONFIG = {
 }
 
 
+# The picture's size and place in pixels and shares of it: by eye.
 _NORTH = {
     "text": "<b>N</b><br>↑",
     "showarrow": False,

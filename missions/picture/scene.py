@@ -115,7 +115,7 @@ class Scene:
 
     @property
     def leg_clearances_m(self) -> list[float]:
-        """The least distance of each drawn leg to a fence, infinite where there is none."""
+        """The least distance of each drawn leg to a fence, infinite without a fence."""
         legs = zip(self.route[:-1], self.route[1:], strict=True)
         return [self.plan.ground.clearance_m(LineString(leg)) for leg in legs]
 

@@ -8,8 +8,8 @@ from enum import StrEnum
 
 from missions.errors import VehicleError
 
-MAV_TYPE_GROUND_ROVER = 10  # from MAVLink's common.xml, as is the next
-MAV_TYPE_SURFACE_BOAT = 11
+MAV_TYPE_GROUND_ROVER = 10  # MAV_TYPE of MAVLink's common.xml
+MAV_TYPE_SURFACE_BOAT = 11  # the same
 
 
 class Autopilot(StrEnum):

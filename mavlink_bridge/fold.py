@@ -45,10 +45,8 @@ _GLOBAL_FRAMES = frozenset(
     }
 )
 _IGNORE_X_OR_Y = 0b11  # POSITION_TARGET_TYPEMASK_X_IGNORE and _Y_IGNORE
-_GUIDED_TARGET, _GUIDED_ALTITUDE = (
-    2,
-    3,
-)  # MISSION_ITEM.current outside a mission: go there; change the altitude
+# MISSION_ITEM.current outside a mission: go there; change the altitude.
+_GUIDED_TARGET, _GUIDED_ALTITUDE = 2, 3
 _HEADING_UNKNOWN = 65535  # UINT16_MAX, as GLOBAL_POSITION_INT.hdg is defined
 
 
@@ -73,7 +71,7 @@ def fold(situation: Situation, frame: Frame, time_s: float) -> Situation:
     return asked(situation, frame.message, time_s)
 
 
-# What the vehicle says.
+# What the vehicle reports.
 
 
 def _is_the_vehicles(situation: Situation, frame: Frame) -> bool:
@@ -353,7 +351,7 @@ def with_list(
     time_s, source
         When and from what it is known.
     tells_home : bool
-        Whether item 0 of a mission is the vehicle's word on its home (not in an upload: what is sent there is not stored).
+        Whether item 0 of a mission is the vehicle's report of its home (not in an upload: what is sent there is not stored).
     """
     # A finished transfer settles what half-seen ones before it left open.
     for to_vehicle in (True, False):

@@ -112,7 +112,7 @@ class Transport(Protocol):
         ...
 
     def heard(self, source: Hashable) -> None:
-        """Take notice that MAVLink came from there, and is to be believed: whoever is answered on an open port is answered there."""
+        """Note that MAVLink came from there, and is to be believed: whoever is answered on an open port is answered there."""
         ...
 
     def close(self) -> None:
@@ -385,7 +385,10 @@ class _Udp:
                 data, source = self._socket.recvfrom(_DATAGRAM_BYTES)
                 received.append((source, data))
                 left -= len(data)
-        except (BlockingIOError, ConnectionError):  # all is read; Windows says "reset" of a port that refused
+        except (
+            BlockingIOError,
+            ConnectionError,
+        ):  # all is read; Windows reports "reset" for a port that refused
             pass
         except OSError as error:
             if not received:

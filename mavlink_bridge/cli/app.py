@@ -35,7 +35,7 @@ COMMANDS = {
     "doctor": "Look at this installation: versions, ports, keys, a test plan.",
     "config": "Show where options may be kept, and which are set.",
 }
-"""Every command and what help says of it in a line; the module of the same name holds it."""
+"""Every command and its line in help; the module of the same name holds it."""
 
 
 class Commands(TyperGroup):

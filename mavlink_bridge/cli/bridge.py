@@ -217,7 +217,7 @@ class _Shell:
         self._plans = PlanMaker(self.director)
         self._keyboard = Keyboard()
         self._quiet = quiet
-        self._asked_for: Plan | None = None  # the plan that was said to wait for a yes
+        self._asked_for: Plan | None = None  # the plan that waits for a yes, as was printed
 
     def run(self, signing: Signing | None, timeout_s: float) -> None:
         """Run until the single job is done, or for ever; a link that breaks is opened again."""
@@ -246,7 +246,7 @@ class _Shell:
 
     @contextlib.contextmanager
     def _interrupt_in_words(self) -> Iterator[None]:
-        """Let an interrupt say what an upload under way has left; a link that breaks is no end of it."""
+        """Let an interrupt report what an upload under way has left; a link that breaks does not end it."""
         from mavlink_bridge.protocol.outcomes import end_of_upload  # noqa: PLC0415 - quick help
 
         try:

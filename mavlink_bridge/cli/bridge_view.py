@@ -35,7 +35,7 @@ _MAP_EVERY_S = 10.0
 _MAP_COLUMNS = 72
 _MOST_PLACES = 2000  # of the track on the map; chosen, bounds the memory of a long drive
 _OLD_S = 3.0
-"""A heartbeat comes every second, positions more often: what is older than this is said to be old."""
+"""A heartbeat comes every second, positions more often: what is older than this is marked as old."""
 
 _STYLES = {
     Severity.CRITICAL: "bold red",
@@ -164,7 +164,7 @@ class LiveView:
 
 
 def _of_then(text: str, time_s: float | None, now_s: float) -> Text:
-    """Return a text that says how old it is, where it is not of now."""
+    """Return a text, with its age where it is not current."""
     if time_s is None or now_s - time_s < _OLD_S:
         return cell(text)
     return cell(f"{text} (old: {_age(now_s - time_s)} ago)", "yellow")

@@ -204,7 +204,7 @@ def _with_files(
             found, fence=told.fence, fence_trouble=None, transfers={}, home=found.home or told.home
         )
     if mission is not None:
-        read_mission(mission)  # which says what is wrong where there is none
+        read_mission(mission)  # which names what is wrong where no fence can be used
         told = read_situation(mission)
         assert told.mission is not None
         home = told.mission.value.home

@@ -120,7 +120,7 @@ def _rover(speedup: float) -> SteppedRover:
         home=LatLon(*_HOME),
         fence=fence_to_items(_maze()),
         parameters={"FENCE_ENABLE": 1.0, "WP_RADIUS": 2.0, "WP_SPEED": 4.0},
-        uid=secrets.token_bytes(12),  # each demo is a new rover: an interrupted one says nothing of the next
+        uid=secrets.token_bytes(12),  # each demo is a new rover: an interrupted one does not bear on the next
     )
     return SteppedRover(SimulatedVehicle(config), speedup)
 

@@ -194,7 +194,7 @@ def report(
 
 
 def _advice(command: str, error: Exception) -> str | None:
-    """Return what to do, where the message itself does not say it."""
+    """Return advice, where the message itself has none."""
     if isinstance(error, bridge_errors.UsageError):
         return f"see `pbpp {command} --help`"
     found = next((_ADVICE[kind] for kind in type(error).__mro__ if kind in _ADVICE), None)

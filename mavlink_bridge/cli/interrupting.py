@@ -85,7 +85,7 @@ class Ending:
     Parameters
     ----------
     said : str
-        What the part that was interrupted says of itself; empty if nothing.
+        The message of the part that was interrupted; empty without one.
     doing : Doing
         What the vehicle does.
     on_it : str

@@ -45,7 +45,7 @@ def log(
 ) -> None:
     """Tell what telemetry logs hold: who speaks, fences and missions transferred, targets, modes, the drive and its clearance.
 
-    Drives of a mission (AUTO) are graded: least clearance, deviation and time against what the drive model predicts.
+    Drives of a mission (AUTO) are graded: least clearance, deviation and time against what the drive model foresees.
 
     For example:
 

@@ -204,7 +204,7 @@ class Session:
         self._has_written = self._has_written or getattr(machine, "has_written", False)
 
     def change_mode(self, mode: int) -> None:
-        """Switch the vehicle's mode and wait until its heartbeat says so.
+        """Switch the vehicle's mode and wait until its heartbeat reports it.
 
         Raises
         ------
@@ -278,7 +278,7 @@ class Session:
         self.watch.receive(message, self.link.now_s())
 
     def _take_clash(self) -> None:
-        """End before anything is written; later go on, for what is under way is checked against what the vehicle holds, and say so."""
+        """End before anything is written; later go on, for what is under way is checked against what the vehicle holds, and report it."""
         self._has_clashed = True
         is_going_to_write = not getattr(self._machine, "has_written", True)
         self._is_refused = is_going_to_write and not self._has_written

@@ -90,7 +90,7 @@ class Uploads:
         self._verified: list[str] = []
 
     def begin(self) -> AbstractContextManager[None]:
-        """Lock the vehicle for a block that writes to it; whatever ends the block says what it left on the vehicle.
+        """Lock the vehicle for a block that writes to it; whatever ends the block reports what it left on the vehicle.
 
         Raises
         ------

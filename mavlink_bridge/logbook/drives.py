@@ -52,7 +52,7 @@ class Drives:
         self._recent.extend(fixes)
 
     def reached(self, seq: int) -> None:
-        """Take notice that a mission item was reached at the latest position."""
+        """Note that a mission item was reached at the latest position."""
         if self._grader is not None:
             self._grader.reached(seq, self._recent[-1].boot_s)
 

@@ -171,7 +171,7 @@ def way_of(items: Sequence[MissionItem], first_item: int, *, home_first: bool) -
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """What a drive is measured in: the plane, the fence where one is known, the vehicle as its parameters say."""
+    """What a drive is measured in: the plane, the fence where one is known, the vehicle by its parameters."""
 
     frame: LocalFrame
     meter: FenceMeter | None
@@ -243,7 +243,7 @@ class DriveGrader:
         self._last = fixes[-1]
 
     def reached(self, seq: int, boot_s: float) -> None:
-        """Take notice that a mission item was reached, by MISSION_ITEM_REACHED."""
+        """Note that a mission item was reached, by MISSION_ITEM_REACHED."""
         if seq in self.way.seqs:
             number = self.way.seqs.index(seq) + 1
             self._tally.reached_s.setdefault(number, boot_s)

@@ -38,7 +38,7 @@ def with_parameter(situation: Situation, name: str, value: float) -> Situation:
 def with_autopilot(situation: Situation, autopilot: int) -> Situation:
     """Return the situation with what a HEARTBEAT's MAV_AUTOPILOT reports: whose it is, and how that one encodes parameters.
 
-    ArduPilot always casts whole numbers and PX4 never does, whatever their AUTOPILOT_VERSION says; of others that one counts.
+    ArduPilot always casts whole numbers and PX4 never does, whatever their AUTOPILOT_VERSION claims; for others that one counts.
     """
     ardupilot = autopilot == Autopilot.ARDUPILOTMEGA
     bytewise = situation.bytewise

@@ -30,7 +30,7 @@ class SentFrames:
         return frame in self._frames
 
     def remember(self, frame: bytes) -> None:
-        """Take notice of a frame that is sent now."""
+        """Note a frame that is sent now."""
         self._frames.pop(frame, None)  # its number comes round every 256 frames: it is as young as this one
         self._frames[frame] = None
         if len(self._frames) > self._most:

@@ -22,7 +22,7 @@ def parameter_value(message: ParamValue, *, bytewise: bool) -> float:
     Parameters
     ----------
     message : ParamValue
-        What the vehicle said.
+        The message.
     bytewise : bool
         Whether its autopilot sends whole numbers as bits.
     """

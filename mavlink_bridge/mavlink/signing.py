@@ -28,9 +28,8 @@ _FLAG_SIGNED = 1
 _SIGNATURE_BYTES = 13
 _EPOCH_2015_S = 1_420_070_400
 _TICKS_PER_S = 100_000
-_NEW_STREAM_BEHIND_TICKS = (
-    60 * _TICKS_PER_S
-)  # a sender not heard before may be a minute behind, as the signing guide has it
+# A sender not heard before may be a minute behind, as the signing guide has it.
+_NEW_STREAM_BEHIND_TICKS = 60 * _TICKS_PER_S
 
 
 class SigningKey:
@@ -132,7 +131,7 @@ class Signing:
         return self._ticks
 
     def sent(self, frame: bytes) -> None:
-        """Take notice of a signed frame of ours: nothing as old in our own stream is news, however late it comes back."""
+        """Note a signed frame of ours: nothing as old in our own stream is news, however late it comes back."""
         self._streams[_stream(frame)] = _ticks(frame)
 
     def accepts(self, frame: bytes) -> bool:

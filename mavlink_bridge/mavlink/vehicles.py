@@ -48,7 +48,7 @@ def choose_vehicle(heard: Sequence[Vehicle], system: int | None, *, any_vehicle:
     Raises
     ------
     VehicleNotFoundError
-        Nobody fits, or several do and no system id was given; says who was heard.
+        Nobody fits, or several do and no system id was given; the message names who was heard.
     """
     names = ", ".join(f"system {v.system} (MAV_TYPE {v.type})" for v in heard)
     fitting = [v for v in heard if system in (None, v.system)]

@@ -92,7 +92,7 @@ class AskVersion(TableMachine[VersionState, VersionEvent]):
             self._take_ack(message, now_s)
 
     def handle_timer(self, now_s: float) -> None:
-        """Take notice that time has passed."""
+        """Do what is due by now."""
         if self.state is not VersionState.ASKING:
             return
         if now_s >= self._give_up_s:

@@ -225,7 +225,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
             self._take_ack(message.type, now_s)
 
     def handle_timer(self, now_s: float) -> None:
-        """Take notice that time has passed."""
+        """Do what is due by now."""
         if self.is_done or self.state is DownloadState.IDLE:
             return
         self._ended_s = now_s

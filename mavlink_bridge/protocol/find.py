@@ -112,7 +112,7 @@ class FindVehicle(TableMachine[FindState, FindEvent]):
             self._until_s = now_s + LISTEN_S
 
     def handle_timer(self, now_s: float) -> None:
-        """Take notice that time has passed."""
+        """Do what is due by now."""
         if not self.is_done and self.state is not FindState.IDLE and now_s >= self._until_s:
             self._choose(FindEvent.TIME_IS_UP, now_s)
 

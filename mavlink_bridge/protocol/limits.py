@@ -69,6 +69,6 @@ def fence_bytes(items: Sequence[MissionItem]) -> int:
 
 
 def limit_in_text(text: str) -> int | None:
-    """Read the item limit from ArduPilot's STATUSTEXT "Only 655 items are supported"; None if it says nothing of it."""
+    """Read the item limit from ArduPilot's STATUSTEXT "Only 655 items are supported"; None if it holds no limit."""
     found = re.search(r"Only (\d+) items are supported", text)
     return int(found[1]) if found else None

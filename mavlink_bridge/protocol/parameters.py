@@ -191,7 +191,7 @@ class ReadParameters(TableMachine[ParameterState, ParameterEvent]):
             self._no_numbers[name] = str(value)
 
     def handle_timer(self, now_s: float) -> None:
-        """Take notice that time has passed."""
+        """Do what is due by now."""
         if self.is_done or self.state is ParameterState.IDLE:
             return
         if now_s >= self._heard_s + PATIENCE_S or self._pace.is_over(now_s):
@@ -314,7 +314,7 @@ class SetParameterOutcome:
     name : str
         Which one.
     value : float, optional
-        What the vehicle holds now, by its own word; None if it never answered (unknown name, or silence).
+        What the vehicle holds now, as it reported; None if it never answered (unknown name, or silence).
     is_confirmed : bool
         Whether that is what was wanted.
     """
@@ -325,7 +325,7 @@ class SetParameterOutcome:
 
 
 class SetParameter(TableMachine[ParameterState, ParameterEvent]):
-    """Sets one parameter and waits for the vehicle to say so; the outcome is None until `is_done`.
+    """Sets one parameter and waits for the vehicle to confirm it; the outcome is None until `is_done`.
 
     Parameters
     ----------
@@ -399,7 +399,7 @@ class SetParameter(TableMachine[ParameterState, ParameterEvent]):
                 self._move(ParameterEvent.GIVEN_UP)
 
     def handle_timer(self, now_s: float) -> None:
-        """Take notice that time has passed."""
+        """Do what is due by now."""
         if self.state is not ParameterState.SETTING:
             return
         if now_s >= self._give_up_s:

@@ -46,7 +46,7 @@ def check_items(
     Raises
     ------
     MissionFormatError
-        Says which item and field, and what MAVLink carries there.
+        A number cannot be sent; the message names item and field, and what MAVLink carries there.
     """
     name = mission_type.name.lower()
     if len(items) > _MOST_ITEMS:
@@ -70,7 +70,7 @@ def check_parameters(parameters: Mapping[str, float]) -> None:
     Raises
     ------
     MissionFormatError
-        Says which one and why.
+        One cannot be sent; the message names it and says why.
     """
     for name, value in parameters.items():
         problem = None

@@ -15,7 +15,7 @@ EventT = TypeVar("EventT", bound="StrEnum")
 
 
 class TableMachine(Generic[StateT, EventT]):
-    """A state that moves only as its table says.
+    """A state that moves only by its table.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class TableMachine(Generic[StateT, EventT]):
         return outgoing
 
     def _move(self, event: EventT) -> bool:
-        """Go where the table says; False if the state does not accept the event."""
+        """Go where the table leads; False if the state does not accept the event."""
         following = self._table[self.state].get(event)
         if following is None:
             return False

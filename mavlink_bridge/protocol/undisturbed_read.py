@@ -125,7 +125,7 @@ class UndisturbedRead(TableMachine[UndisturbedReadState, UndisturbedReadEvent]):
             self._advance(now_s)
 
     def handle_timer(self, now_s: float) -> None:
-        """Take notice that time has passed."""
+        """Do what is due by now."""
         if self.state is UndisturbedReadState.SETTLING:
             self._settle(now_s)
         elif self._download is not None:

@@ -182,7 +182,7 @@ class Upload(TableMachine[UploadState, UploadEvent]):
             self._move(UploadEvent.COUNT)
 
     def handle_timer(self, now_s: float) -> None:
-        """Take notice that time has passed."""
+        """Do what is due by now."""
         if self.is_done or self.state is UploadState.IDLE:
             return
         is_waiting = self.state is UploadState.WAITING
@@ -321,7 +321,7 @@ class Upload(TableMachine[UploadState, UploadEvent]):
                 self._rival_since_s = now_s if self._rival_since_s is None else self._rival_since_s
                 self._act_at_s = now_s + _ANNOUNCE_AGAIN_S
         else:
-            # After so long a stall the vehicle has given up, and ERROR only says that it waits for no item.
+            # After so long a stall the vehicle has given up, and ERROR only means that it waits for no item.
             has_given_up = result is MissionResult.ERROR and now_s >= self._advanced_s + _GIVEN_UP_AFTER_S
             is_cancelled = result is MissionResult.OPERATION_CANCELLED or has_given_up
             if self._move(UploadEvent.CANCELLED if is_cancelled else UploadEvent.REFUSAL):

@@ -32,7 +32,7 @@ class Doing:
     speed_mps : float, optional
         Its speed over ground; None if it reported none.
     has_completed : bool
-        Whether its mission is driven to its end, by its own word.
+        Whether it reports its mission as complete.
     age_s : float
         How old the newest heartbeat is; infinite before the first.
     speed_age_s : float

@@ -5,7 +5,7 @@ word can be lost. So the vehicle's acknowledgement decides nothing here; what is
 
 1. *Only a whole read counts, and only one that nobody disturbed.* Every read is an `UndisturbedRead`: traffic which shows that somebody else wrote this
    list while it was read makes it worthless (an item already read may have been replaced), and it is read again, a bounded number of times. So the
-   list was on the vehicle as a whole at one moment of the last read, and whatever was heard since says nothing else.
+   list was on the vehicle as a whole at one moment of the last read, and nothing heard since contradicts it.
 2. *The wanted list is believed at once, anything else only when two reads agree.* A read of something else may be a late copy of an earlier answer; so one
    more read costs little. Reads that never agree end as unknown. Lists are compared as the vehicle stores them, NaN equal to NaN: every list is equal to
    itself.
@@ -242,7 +242,7 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
             self._start_reading(now_s)
 
     def backup_stored(self, now_s: float) -> None:
-        """Take notice that the old list is safe; only now is anything written."""
+        """Note that the old list is safe; only now is anything written."""
         if self._move(VerifiedUploadEvent.BACKUP_STORED):
             self._begun_s += now_s - self._waits_since_s
             self._check_until_s = now_s + _HEARTBEAT_PATIENCE_S
@@ -266,7 +266,7 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
             self._advance(now_s)
 
     def handle_timer(self, now_s: float) -> None:
-        """Take notice that time has passed."""
+        """Do what is due by now."""
         if self.is_done or self.state is VerifiedUploadState.STORING_BACKUP:
             return
         if self.state is VerifiedUploadState.CHECKING_VEHICLE and now_s >= self._check_until_s:

@@ -102,7 +102,7 @@ class WriteWatch:
         self._told.clear()
 
     def counted(self) -> None:
-        """Take notice that the vehicle has sent the length of the list: it takes no items from us."""
+        """Note that the vehicle has sent the length of the list: it takes no items from us."""
         self._is_counted = True
 
     def note_sent(self, message: Message) -> None:

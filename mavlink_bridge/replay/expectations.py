@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 _WORDING: Final = ("log", "severity", "text", "warnings")
 _DETAILS: Final = ("details", "path", "waypoints", "drawn_clearance_m", "duration_s")
-"""What no expectation is recorded of: wording, and details of routes and errors, which may change for the better."""
+"""Left out of recorded expectations: wording, and details of routes and errors, which may change for the better."""
 
 _TOLERANCES: Final = {"time_s": 1e-3, "position": 2e-7, "path": 2e-7}  # a millisecond, and two units of degE7
 _TOLERANCE: Final = 0.02

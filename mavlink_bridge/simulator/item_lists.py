@@ -40,7 +40,7 @@ class ItemList(ABC):
     items : list of MissionItem
         What is stored now.
     texts : list of str
-        What the vehicle says about the last call, for STATUSTEXT; the caller empties it.
+        The vehicle's texts about the last call, for STATUSTEXT; the caller empties it.
     """
 
     mission_type: MissionType
@@ -60,18 +60,18 @@ class ItemList(ABC):
 
     @abstractmethod
     def begin(self, count: int) -> None:
-        """Take notice that ``count`` items will come."""
+        """Note that ``count`` items will come."""
 
     @abstractmethod
     def begin_part(self) -> None:
-        """Take notice that some items will be overwritten."""
+        """Note that some items will be overwritten."""
 
     @abstractmethod
     def write(self, seq: int, item: MissionItem, count: int) -> MissionResult:
         """Take one item of an upload that ends with ``count`` items."""
 
     def finish(self) -> MissionResult:
-        """Take notice that the last item has come."""
+        """Note that the last item has come."""
         return MissionResult.ACCEPTED
 
     def abandon(self) -> None:  # noqa: B027 - only the fence has something to forget

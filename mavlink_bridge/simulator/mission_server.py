@@ -255,7 +255,7 @@ class MissionServer:
         self._outbox += server.messages_to_send()
 
     def handle_timer(self, now_s: float) -> None:
-        """Take notice that time has passed."""
+        """Do what is due by now."""
         for server in self._servers.values():
             server.handle_timer(now_s)
             self._outbox += server.messages_to_send()

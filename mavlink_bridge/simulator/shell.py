@@ -250,7 +250,7 @@ class Simulator:
             self._selector.register(connection, selectors.EVENT_READ)
             self._peer(connection)
             return
-        with contextlib.suppress(BlockingIOError, ConnectionError):  # a peer that is gone says so here
+        with contextlib.suppress(BlockingIOError, ConnectionError):  # a peer that is gone shows here
             while True:
                 data, address = self._socket.recvfrom(_READ_BYTES)
                 self._take(self._peer(address), data)

@@ -56,7 +56,7 @@ class SteppedRover:
             self.vehicle.receive(frame, self._vehicle_s)
 
     def receive(self, timeout_s: float) -> list[tuple[Hashable, bytes]]:
-        """Let time pass until the rover says something, at most so long."""
+        """Let time pass until the rover sends something, at most so long."""
         until_s = self._vehicle_s + timeout_s
         while True:
             self._pass_until(min(until_s, max(self._vehicle_s, self.vehicle.deadline_s)))

@@ -143,7 +143,7 @@ class SimulatedVehicle:
         return self.rover.breaches
 
     def receive(self, frame: m.Frame, now_s: float) -> None:
-        """Take a frame; the next tick looks at it. A vehicle that boots hears nothing."""
+        """Take a frame; the next tick looks at it. A vehicle that boots receives nothing."""
         self.handle_timer(now_s)
         if now_s < self._boot_s:
             return

@@ -13,9 +13,8 @@ if TYPE_CHECKING:
     from contextlib import AbstractContextManager
     from pathlib import Path
 
-WINDOW_BYTES: Final = (
-    1 << 19
-)  # half a megabyte: many frames at once for numpy, and little memory for any log; chosen
+# Half a megabyte: many frames at once for numpy, and little memory for any log. Chosen, not measured.
+WINDOW_BYTES: Final = 1 << 19
 _GZIP: Final = 31
 """What zlib calls a stream with gzip's header and checksum."""
 _PACKED_BYTES: Final = 1 << 10  # of a packed log, read at once

@@ -26,9 +26,8 @@ if TYPE_CHECKING:
 
     from mavlink_bridge.tlog.source import LogFile, Source
 
-_OVERLAP_BYTES: Final = (
-    4 * MAX_FRAME_BYTES
-)  # a frame proves itself by the next ones, which must lie in the same window
+# A frame proves itself by the next ones, which must lie in the same window.
+_OVERLAP_BYTES: Final = 4 * MAX_FRAME_BYTES
 
 
 @dataclass(frozen=True, slots=True)

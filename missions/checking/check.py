@@ -184,7 +184,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
         Fence, parameters, home and where the vehicle is.
     request : Request
         What every leg has to keep while driving, as for plans: clearance, reserve, the position's error, the vehicle's size. Where the vehicle
-        starts; default: where it is, else home. The rest of it says nothing here: places and speeds are the mission's.
+        starts; default: where it is, else home. The rest of it is not used: places and speeds are the mission's.
 
     Raises
     ------

@@ -25,7 +25,7 @@ import shapely
 
 from missions.drive_model import convex, plan_drive
 from missions.drive_model.avoidance import with_avoidance
-from missions.fitting import moves as corner_means
+from missions.fitting import moves
 from missions.fitting import polyline as drawn
 
 if TYPE_CHECKING:
@@ -323,7 +323,7 @@ def _near_turns(drawing: Drawing) -> int:
     """Count turns so near to the next that a rover drives them as one."""
     turns = [abs(drawn.turn_deg(drawing, index)) > _TURN_DEG for index in range(1, len(drawing) - 1)]
     return sum(
-        math.dist(drawing[index + 1].place, drawing[index + 2].place) < corner_means.APART_M
+        math.dist(drawing[index + 1].place, drawing[index + 2].place) < moves.APART_M
         for index, (turn, following) in enumerate(pairwise(turns))
         if turn and following
     )

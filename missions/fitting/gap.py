@@ -39,7 +39,7 @@ _SHY = 0.95  # of the way to a fence ahead: stops short of it, so that the fence
 
 
 @dataclass(frozen=True, slots=True)
-class Neck:
+class Gap:
     """A gap between the fences on both sides of a leg.
 
     Parameters
@@ -60,7 +60,7 @@ class Neck:
         return along_m, abs(east_m * self.through[1] - north_m * self.through[0])
 
 
-def find_neck(edge: BaseGeometry, place: Vector, ahead: Vector) -> Neck | None:
+def find_gap(edge: BaseGeometry, place: Vector, ahead: Vector) -> Gap | None:
     """Find the narrow place that a leg leads through.
 
     Parameters
@@ -74,7 +74,7 @@ def find_neck(edge: BaseGeometry, place: Vector, ahead: Vector) -> Neck | None:
 
     Returns
     -------
-    Neck or None
+    Gap or None
         None where one of the sides has no fence near.
     """
     begin, end = (shifted(place, ahead, _free_m(edge, place, ahead, way_m)) for way_m in (-REACH_M, REACH_M))
@@ -92,7 +92,7 @@ def find_neck(edge: BaseGeometry, place: Vector, ahead: Vector) -> Neck | None:
     through = ((north_a - north_b) / width_m, (east_b - east_a) / width_m)
     if through[0] * ahead[0] + through[1] * ahead[1] < 0:
         through = (-through[0], -through[1])
-    return Neck(((east_a + east_b) / 2, (north_a + north_b) / 2), through)
+    return Gap(((east_a + east_b) / 2, (north_a + north_b) / 2), through)
 
 
 def _free_m(edge: BaseGeometry, place: Vector, ahead: Vector, way_m: float) -> float:
@@ -102,7 +102,7 @@ def _free_m(edge: BaseGeometry, place: Vector, ahead: Vector, way_m: float) -> f
     return way_m if met.is_empty else _SHY * math.copysign(shapely.distance(shapely.Point(place), met), way_m)
 
 
-def straight_through(drawing: Drawing, index: int, neck: Neck) -> Iterator[Drawing]:
+def straight_through(drawing: Drawing, index: int, gap: Gap) -> Iterator[Drawing]:
     """Return lines with one straight leg through a narrow place, instead of the corners near it.
 
     Parameters
@@ -111,10 +111,10 @@ def straight_through(drawing: Drawing, index: int, neck: Neck) -> Iterator[Drawi
         The lines.
     index : int
         The point that comes too near to a fence, or the end of the leg that does.
-    neck : Neck
+    gap : Gap
         The gap.
     """
-    off = [neck.off(point) for point in drawing]
+    off = [gap.off(point) for point in drawing]
 
     def gives_way(number: int, before_m: float, behind_m: float) -> bool:
         along_m, beside_m = off[number]
@@ -130,7 +130,7 @@ def straight_through(drawing: Drawing, index: int, neck: Neck) -> Iterator[Drawi
                 last += 1
             point = replace(drawing[last], is_fixed=False, stop_s=None)
             ends = (
-                point.at(shifted(neck.middle, neck.through, -before_m)),
-                point.at(shifted(neck.middle, neck.through, behind_m)),
+                point.at(shifted(gap.middle, gap.through, -before_m)),
+                point.at(shifted(gap.middle, gap.through, behind_m)),
             )
             yield (*drawing[:first], *ends, *drawing[last:])

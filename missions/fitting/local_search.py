@@ -31,10 +31,10 @@ from typing import TYPE_CHECKING
 
 import shapely
 
-from missions.fitting import moves as corner_means
+from missions.fitting import moves
 from missions.fitting import polyline as drawn
 from missions.fitting.cost import ENOUGH_M, Gauge
-from missions.fitting.gap import find_neck, straight_through
+from missions.fitting.gap import find_gap, straight_through
 from missions.geo import rounded
 from missions.ground.frame import LocalPoint
 
@@ -106,7 +106,7 @@ class Fitting:
                 )
                 if missing_m > ENOUGH_M
             ]
-            slow = corner_means.crawling(drawn_first, spots, self.vehicle.speed_mps)
+            slow = moves.crawling(drawn_first, spots, self.vehicle.speed_mps)
             self._allow(CRAWL_MEASUREMENTS)
             other, found = self._fitted(slow)
             if sum(found.missing_m) < sum(measured.missing_m):
@@ -136,8 +136,8 @@ class Fitting:
         self._until = min(self.measurements + measurements, self.most_measurements)
 
     def _fitted(self, drawing: Drawing) -> tuple[Drawing, Measured]:
-        for means in (self._gentle, self._all):
-            drawing = self._descend(drawing, means)
+        for propose in (self._gentle, self._all):
+            drawing = self._descend(drawing, propose)
             if self.measure(drawing).is_enough:
                 drawing = self._eased(self._fewer(drawing))
                 break
@@ -162,37 +162,37 @@ class Fitting:
     def _gentle(self, drawing: Drawing, index: int, measured: Measured) -> Iterator[Drawing]:
         """Return the moves that cost little time."""
         missing_m, place = measured.missing_m[index], measured.worst[index]
-        yield from corner_means.moved(drawing, index, missing_m)
+        yield from moves.moved(drawing, index, missing_m)
         if not math.isnan(place[0]):
             ahead = drawn.direction(drawing[max(index - 1, 0)], drawing[max(index, 1)])
-            narrow = find_neck(self.ground.edge, place, ahead)
+            narrow = find_gap(self.ground.edge, place, ahead)
             if narrow is not None:
                 yield from straight_through(drawing, index, narrow)
-            yield from corner_means.bent(drawing, index, place, self._away(place), missing_m)
-        yield from corner_means.together(drawing, index, missing_m)
-        yield from corner_means.without(drawing, index)
-        yield from corner_means.merged(drawing, index)
-        yield from corner_means.merged(drawing, index - 1)
+            yield from moves.bent(drawing, index, place, self._away(place), missing_m)
+        yield from moves.together(drawing, index, missing_m)
+        yield from moves.without(drawing, index)
+        yield from moves.merged(drawing, index)
+        yield from moves.merged(drawing, index - 1)
         if _is_corner(drawing, index) and abs(drawn.turn_deg(drawing, index)) > 25.0:
-            yield from corner_means.split(drawing, index)
-            yield from corner_means.prolonged(drawing, index)
+            yield from moves.split(drawing, index)
+            yield from moves.prolonged(drawing, index)
         if index <= 1 and self.heading_deg is not None:
-            yield from corner_means.headed(drawing, self.heading_deg)
+            yield from moves.headed(drawing, self.heading_deg)
         if drawing[index].is_fixed:
-            yield from corner_means.approached(drawing, index)
+            yield from moves.approached(drawing, index)
 
     def _all(self, drawing: Drawing, index: int, measured: Measured) -> Iterator[Drawing]:
         place = measured.worst[index]
         if not math.isnan(place[0]):
-            yield from corner_means.slowed(drawing, index, place, self.vehicle.speed_mps)
+            yield from moves.slowed(drawing, index, place, self.vehicle.speed_mps)
         if _is_corner(drawing, index):
-            yield from corner_means.slowed(drawing, index, drawing[index].place, self.vehicle.speed_mps)
+            yield from moves.slowed(drawing, index, drawing[index].place, self.vehicle.speed_mps)
             if self.vehicle.can_pivot:
-                yield from corner_means.stopped(drawing, index)
+                yield from moves.stopped(drawing, index)
         yield from self._gentle(drawing, index, measured)
 
     def _descend(
-        self, drawing: Drawing, means: Callable[[Drawing, int, Measured], Iterable[Drawing]]
+        self, drawing: Drawing, propose: Callable[[Drawing, int, Measured], Iterable[Drawing]]
     ) -> Drawing:
         """Try moves at the worst points until nothing is missing or nothing helps."""
         measured = self.measure(drawing)
@@ -200,7 +200,7 @@ class Fitting:
             for index in sorted(range(len(drawing)), key=lambda number: -measured.missing_m[number]):
                 if measured.missing_m[index] <= ENOUGH_M:
                     return drawing
-                better = self._best(drawing, measured, means(drawing, index, measured))
+                better = self._best(drawing, measured, propose(drawing, index, measured))
                 if better is not None:
                     drawing, measured = better
                     break
@@ -211,9 +211,9 @@ class Fitting:
         measured = self.measure(drawing)
         index = 1
         while index < len(drawing) - 1 and not self._is_over():
-            candidates = list(corner_means.without(drawing, index))
+            candidates = list(moves.without(drawing, index))
             if math.dist(drawing[index].place, drawing[index + 1].place) < _SHORT_LEG_M:
-                candidates += corner_means.merged(drawing, index)
+                candidates += moves.merged(drawing, index)
             better = self._best(drawing, measured, candidates)
             if better is None:
                 index += 1
@@ -228,7 +228,7 @@ class Fitting:
         for step_m in _EASING_STEPS_M:
             for index in range(1, len(drawing) - 1):
                 while not self._is_over():
-                    better = self._best(drawing, measured, corner_means.eased(drawing, index, step_m))
+                    better = self._best(drawing, measured, moves.eased(drawing, index, step_m))
                     if better is None:
                         break
                     drawing, measured = better
@@ -279,7 +279,7 @@ def _joined(drawing: Drawing) -> Drawing:
         for length_m, index in sorted(pairs):
             turn_deg = drawn.turn_deg(drawing, index) + drawn.turn_deg(drawing, index + 1)
             if length_m < _TINY_LEG_M and abs(turn_deg) < _JOINED_TURN_DEG:
-                drawing = next(iter(corner_means.merged(drawing, index)), drawing)
+                drawing = next(iter(moves.merged(drawing, index)), drawing)
                 break
         else:
             return drawing

@@ -209,7 +209,7 @@ class Shown:
         return nullcontext()
 
 
-class _Lines(Shown):
+class _LineProgress(Shown):
     """Prints progress in lines, one for each new text."""
 
     def __init__(self) -> None:
@@ -244,7 +244,7 @@ class _Bar(Shown):
 def progress_bar(*, quiet: bool) -> Iterator[Shown]:
     """Show a progress bar on stderr where that is a terminal; yields what moves it."""
     if not sys.stderr.isatty() or quiet:
-        yield _Lines() if telling().verbose and not quiet else Shown()
+        yield _LineProgress() if telling().verbose and not quiet else Shown()
         return
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn  # noqa: PLC0415 - quick help
 

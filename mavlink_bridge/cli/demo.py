@@ -30,7 +30,7 @@ _IDENTITY = (245, 190)  # the one-shot commands' own, `link.ONE_SHOT_IDENTITY`
 
 
 @dataclass(slots=True)
-class _Drive:
+class _Heard:
     """What was heard while driving."""
 
     track: list[LatLon] = field(default_factory=list)
@@ -65,7 +65,7 @@ def demo(
 
     out.mkdir(parents=True, exist_ok=True)
     make_room(out / "demo.tlog")
-    drive = _Drive()
+    drive = _Heard()
     begun_s = time.monotonic()
     with ExitStack() as stack:
         recorder = stack.enter_context(TlogWriter(out / "demo.tlog"))
@@ -132,7 +132,7 @@ def _maze() -> Fence:
         return read_fence(path)
 
 
-def _observe(drive: _Drive, frames: list[Frame]) -> None:
+def _observe(drive: _Heard, frames: list[Frame]) -> None:
     """Keep the track and the breaches that the vehicle reports."""
     from mavlink_bridge.mavlink.messages import FenceStatus, GlobalPositionInt  # noqa: PLC0415 - quick help
     from missions.geo import from_e7  # noqa: PLC0415

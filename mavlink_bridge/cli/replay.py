@@ -177,7 +177,7 @@ def _one_after_the_other(logs: list[Path], orders: Orders, speed: float | None, 
 
     results: _Results = {}
     for log in logs:
-        wait = None if speed is None else _Pace(speed).wait
+        wait = None if speed is None else _PlaySpeed(speed).wait
         told: list[_Told] = []
         try:
             teller.begin(log)
@@ -256,7 +256,7 @@ def _record(results: _Results, *, quiet: bool) -> None:
             echo(f"Wrote {path}")
 
 
-class _Pace:
+class _PlaySpeed:
     """Lets a log's time pass, so many times faster than it did."""
 
     def __init__(self, speed: float) -> None:
@@ -311,7 +311,7 @@ def _play(
     listen: Callable[[float], bool],
     show: Callable[[str, int, int], None],
 ) -> int:
-    pace = _Pace(speed)
+    pace = _PlaySpeed(speed)
     count = 0
     for elapsed_s, data in _elapsed(frames):
         while (left_s := pace.left_s(elapsed_s)) > 0:

@@ -92,7 +92,7 @@ class DownloadOutcome:
 
 
 @dataclass(slots=True)
-class _Request:
+class _ItemRequest:
     order: int
     sent_s: float
     is_repeat: bool
@@ -140,7 +140,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         self._count = 0
         self._most_count = 0
         self._items: dict[int, MissionItem] = {}
-        self._in_flight: dict[int, _Request] = {}  # in order of sending
+        self._in_flight: dict[int, _ItemRequest] = {}  # in order of sending
         self._next = 0
         self._orders = 0
         self._newest_answered = 0
@@ -407,7 +407,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
 
     def _request(self, seq: int, now_s: float, *, is_repeat: bool) -> None:
         self._orders += 1
-        self._in_flight[seq] = _Request(self._orders, now_s, is_repeat)
+        self._in_flight[seq] = _ItemRequest(self._orders, now_s, is_repeat)
         message_class = messages.MissionRequest if self._float_form else messages.MissionRequestInt
         self._send(message_class(self._peer.system, self._peer.component, seq, int(self._mission_type)))
 

@@ -130,7 +130,7 @@ def follow_mission(
         The vehicle's own speed, which holds until the mission changes it.
     """
     for most_repeats in (None, _FEW_TIMES):
-        walk = _Walk(
+        walk = _Execution(
             mission.items, start, home, return_to, return_speed_mps, circle_m, own_speed_mps, most_repeats
         )
         walk.run()
@@ -154,7 +154,7 @@ def follow_mission(
 
 
 @dataclass
-class _Walk:
+class _Execution:
     """The autopilot's state while it executes a mission."""
 
     items: tuple[MissionItem, ...]

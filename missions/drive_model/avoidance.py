@@ -70,7 +70,7 @@ def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry) -> Env
     """
     if not vehicle.avoids_fence or fence.is_empty or not band.legs:
         return band
-    target = _Target(band, vehicle)
+    target = _TargetPoint(band, vehicle)
     lags = target.lags(vehicle, FenceAhead(fence, target.places, vehicle))
     pieces = target.pieces(lags)
     if not pieces:
@@ -84,7 +84,7 @@ def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry) -> Env
     )
 
 
-class _Target:
+class _TargetPoint:
     """How the target point moves along all legs: each leg's motion begins while the one before still ends.
 
     Parameters
@@ -186,7 +186,7 @@ def _followed(
     velocities.append(velocities[-1])
     top_mps = max(map(abs, velocities))
     behind, scale, at = 0j, 1.0, 0.0
-    rover = _Rover(vehicle)
+    rover = _FollowingRover(vehicle)
     while (sample := int(at)) < len(is_slowed):
         velocity = velocities[sample]
         if not is_slowed[sample] and abs(behind) < _NO_LAG_M:
@@ -206,7 +206,7 @@ def _followed(
     return lags
 
 
-class _Rover:
+class _FollowingRover:
     """A rover that turns as its controllers demand, and takes on the speed wanted at once."""
 
     def __init__(self, vehicle: Vehicle) -> None:

@@ -67,7 +67,7 @@ def shortened(
     MissionTooLongError
         It cannot be shortened so far; the message says how far.
     """
-    search = _Search(mission, frozenset(own), situation, request, most, may_slow, should_stop)
+    search = _Shortening(mission, frozenset(own), situation, request, most, may_slow, should_stop)
     search.leave_out(search.waypoints)
     search.leave_out(search.corners)
     search.leave_out(search.quick_stretches)
@@ -85,7 +85,7 @@ def shortened(
 
 
 @dataclass(frozen=True, slots=True)
-class _Step:
+class _Removal:
     """Seqs of items that are left out together; where ``put`` is given, it stands in the place of the last of them."""
 
     seqs: tuple[int, ...]
@@ -97,7 +97,7 @@ class _Step:
 
 
 @dataclass
-class _Search:
+class _Shortening:
     """What is left out, by the seqs of the mission as it was."""
 
     mission: Mission
@@ -124,7 +124,7 @@ class _Search:
         """How many items there are now."""
         return len(self.mission.items) - len(self.out)
 
-    def leave_out(self, candidates: Callable[[], list[_Step]]) -> None:
+    def leave_out(self, candidates: Callable[[], list[_Removal]]) -> None:
         """Take the best candidates, as many as are needed, until it fits or there are no more."""
         while self.count > self.most and not (self.should_stop and self.should_stop()):
             steps = self._needed(candidates())
@@ -147,16 +147,16 @@ class _Search:
         items = (put.get(seq, item) for seq, item in enumerate(self.mission.items, 1))
         return replace(self.mission, items=tuple(items))
 
-    def waypoints(self) -> list[_Step]:
+    def waypoints(self) -> list[_Removal]:
         """Return waypoints that may be left out, first those whose removal moves the line the least."""
         found = []
         for before, seq, after in runs(self._rest(), 3):
             items = [self._item(one) for one in (before, seq, after)]
             if self._may_go(seq, Command.NAV_WAYPOINT) and all(item.is_placed for item in items):
                 found.append((deviation_m(*items), seq))
-        return [_Step((seq,)) for _, seq in sorted(found)]
+        return [_Removal((seq,)) for _, seq in sorted(found)]
 
-    def corners(self) -> list[_Step]:
+    def corners(self) -> list[_Removal]:
         """Return pairs of corners that may become one, first those that lengthen the way the least."""
         found = []
         for before, first, last, after in runs(self._rest(), 4):
@@ -169,7 +169,9 @@ class _Search:
                 there_m = distance_m(b.position, meeting) + distance_m(meeting, c.position)
                 put = replace(c, lat_e7=lat_e7, lon_e7=lon_e7)
                 found.append((there_m - distance_m(b.position, c.position), first, last, put))
-        return [_Step((first, last), put) for _, first, last, put in sorted(found, key=lambda one: one[:3])]
+        return [
+            _Removal((first, last), put) for _, first, last, put in sorted(found, key=lambda one: one[:3])
+        ]
 
     def _is_corner(self, seq: int) -> bool:
         """Return whether an item is a plain waypoint of the route's own that may be moved: beside others that must stay, it may not."""
@@ -181,7 +183,7 @@ class _Search:
             and seq not in self._near
         )
 
-    def quick_stretches(self) -> list[_Step]:
+    def quick_stretches(self) -> list[_Removal]:
         """Return changes to a higher speed, with the change back where it has nothing left to do, first those that save the least time."""
         goals = {int(item.params[0]) for item in self.mission.items if item.command in _JUMPS}
         found = []
@@ -200,7 +202,7 @@ class _Search:
                 seqs = (seq, last) if next_mps == before_mps else (seq,)
                 found.append((length_m([self._item(one) for one in between]), seqs))
             before_mps = mps
-        return [_Step(seqs) for _, seqs in sorted(found)]
+        return [_Removal(seqs) for _, seqs in sorted(found)]
 
     def _item(self, seq: int) -> MissionItem:
         return self.put.get(seq, self.mission.items[seq - 1])
@@ -223,9 +225,9 @@ class _Search:
             and not (command == Command.NAV_WAYPOINT and item.params[0] > 0)
         )
 
-    def _needed(self, steps: Sequence[_Step]) -> list[_Step]:
+    def _needed(self, steps: Sequence[_Removal]) -> list[_Removal]:
         """Return as many of the better half as are needed, no two of them neighbours."""
-        taken: list[_Step] = []
+        taken: list[_Removal] = []
         blocked: set[int] = set()
         place = {seq: number for number, seq in enumerate(self._rest())}
         missing = self.count - self.most
@@ -246,7 +248,9 @@ class _Search:
         key = (_seq(seqs, leg.leg.first_item), _seq(seqs, leg.leg.last_item))
         return leg.driven_clearance_m < self._tolerated.get(key, math.inf) - _WORSE_M
 
-    def _guilty(self, steps: Iterable[_Step], worse: Iterable[CheckedLeg], seqs: Sequence[int]) -> set[_Step]:
+    def _guilty(
+        self, steps: Iterable[_Removal], worse: Iterable[CheckedLeg], seqs: Sequence[int]
+    ) -> set[_Removal]:
         """Return the steps that lie on the legs that broke, or on legs beside them."""
         guilty = set()
         for leg in worse:

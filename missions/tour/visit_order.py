@@ -131,7 +131,7 @@ def _by_cuts(
         round_m = np.zeros((places + 1, places + 1))
         round_m[:places, :places] = distances_m
         closing = places
-    trip = _RoundTrip(round_m, closing)
+    trip = _RoundTripProgram(round_m, closing)
     trip.relax(should_stop)
     successors, bound_m = trip.solve(should_stop)
     order = tuple(place for place in successors if place < places)
@@ -140,7 +140,7 @@ def _by_cuts(
     return VisitOrder(order, length_m, min(length_m, bound_m - closing_m))
 
 
-class _RoundTrip:
+class _RoundTripProgram:
     """An integer program: which pairs of places follow one another on the shortest round trip.
 
     Parameters

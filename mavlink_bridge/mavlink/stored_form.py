@@ -310,4 +310,5 @@ def _is_near(a_m: float, b_m: float) -> bool:
     """Return whether two altitudes can be the same whole number of centimetres, cut or rounded."""
     if not (math.isfinite(a_m) and math.isfinite(b_m)):
         return str(a_m) == str(b_m)
+    # Cut and rounded differ by at most 1.5 cm; the share is what 32-bit floats lose.
     return abs(a_m - b_m) < 0.0151 + 1e-6 * abs(a_m)

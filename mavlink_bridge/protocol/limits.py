@@ -65,6 +65,7 @@ def fence_bytes(items: Sequence[MissionItem]) -> int:
     polygons = sum(1 / item.params[0] for item in vertices if item.params[0] >= 1)
     circles = sum(item.command in _CIRCLE for item in items)
     return_points = sum(item.command == Command.FENCE_RETURN_POINT for item in items)
+    # As measured on ArduPilot Rover 4.7.0-dev: 672 bytes hold one polygon of 83 vertices, 25 triangles or 51 circles.
     return 4 + 2 * round(polygons) + 8 * len(vertices) + 13 * circles + 9 * return_points
 
 

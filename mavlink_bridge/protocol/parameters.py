@@ -102,7 +102,7 @@ class ReadParameters(TableMachine[ParameterState, ParameterEvent]):
         self._waiting: list[str | int] = []  # in reverse order
         self._asks: dict[str | int, _Ask] = {}  # in order of sending
         self._missing: list[str | int] = []
-        self._round_trip = RoundTrip(0.3)
+        self._round_trip = RoundTrip(0.3)  # seconds taken until one is measured; chosen
         self._answered = 0
         self._answered_tries = 0
         self._sent = 0

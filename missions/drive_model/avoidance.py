@@ -235,4 +235,6 @@ def _scale(velocity: complex, behind: complex, driven: complex, vehicle: Vehicle
     """Return how fast time runs for the target point: it waits for a rover that cannot keep up (AR_WPNav)."""
     target_mps = max(abs(velocity), _LEAST_MPS)
     along_mps = ((driven - vehicle.position_gain_per_s * behind) * velocity.conjugate()).real / target_mps
-    return min(max(0.05 + along_mps / target_mps, _LEAST_SCALE), 1.0)
+    return min(
+        max(0.05 + along_mps / target_mps, _LEAST_SCALE), 1.0
+    )  # 0.05 as in the simulator's `drive`, after AR_WPNav

@@ -128,6 +128,7 @@ def corner_swing_m(vehicle: Vehicle, turn_deg: float, reach_m: float, shorter_le
     if vehicle.can_pivot:
         return 0.0
     radius_m = max(vehicle.turn_radius_m, MEASURED_TURN_RADIUS_M)
+    # The exponents and their bounds are fitted to benchmarks/data (docs/drive-model.md, 3): 2.5 where the blend or a leg is short, to 6.
     short = math.exp(-shorter_leg_m / SHORT_LEG_M)
     early = np.interp(reach_m, (0.2 * radius_m, 0.6 * radius_m), (0.0, 1.0))
     half_turn = math.sin(math.radians(abs(turn_deg)) / 2) ** 2
@@ -178,6 +179,7 @@ def may_pivot_or_cut(vehicle: Vehicle, turn_deg: float) -> bool:
 
 def swing_time_s(swing_m: float, speed_mps: float) -> float:
     """Return the time lost on the way out and back, beyond that of the motion."""
+    # No source is recorded for these two; docs/drive-model.md ("How well it holds") has the time errors that they leave.
     return swing_m * (0.7 + 0.4 / max(speed_mps, 0.5))
 
 

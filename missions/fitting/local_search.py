@@ -173,6 +173,7 @@ class Fitting:
         yield from moves.without(drawing, index)
         yield from moves.merged(drawing, index)
         yield from moves.merged(drawing, index - 1)
+        # Chosen, not measured: gentler corners hardly cut, and splitting them only adds waypoints.
         if _is_corner(drawing, index) and abs(drawn.turn_deg(drawing, index)) > 25.0:
             yield from moves.split(drawing, index)
             yield from moves.prolonged(drawing, index)

@@ -67,6 +67,7 @@ def moved(drawing: Drawing, index: int, missing_m: float) -> Iterator[Drawing]:
     along = (-out[1], out[0])
     ways = (out, (-out[0], -out[1]), *(_between(out, side) for side in (along, (-along[0], -along[1]))))
     half_rad = math.radians(abs(drawn.turn_deg(drawing, index))) / 2
+    # Moved out by d, a corner takes its legs d cos(half the turn) away; 5 cm more, so that little missing moves it too.
     unit_m = missing_m / max(math.cos(half_rad), 0.4) + 0.05
     for way in (*ways, along, (-along[0], -along[1])):
         for share in MOVES:
@@ -96,7 +97,7 @@ def bent(drawing: Drawing, index: int, place: Vector, away: Vector, missing_m: f
     along = drawn.distances_m(drawing)
     longer, there = drawn.with_point_at(drawing, _along_m(drawing, along, place, index), APART_M)
     if len(longer) > len(drawing):
-        for share in (1.0, 1.6, 2.5):
+        for share in (1.0, 1.6, 2.5):  # as coarse as `MOVES`, and 5 cm on top
             yield _with(longer, there, shifted(longer[there].place, away, share * missing_m + 0.05))
 
 
@@ -107,7 +108,7 @@ def together(drawing: Drawing, index: int, missing_m: float) -> Iterator[Drawing
             continue
         for number in range(8):
             way = _vector(45.0 * number)
-            for share in (0.7, 1.5, 3.0):
+            for share in (0.7, 1.5, 3.0):  # as coarse as `MOVES`, in eight directions
                 by_m = share * missing_m + 0.02
                 both = _with(drawing, index, shifted(drawing[index].place, way, by_m))
                 yield _with(both, other, shifted(drawing[other].place, way, by_m))
@@ -160,6 +161,7 @@ def split(drawing: Drawing, index: int) -> Iterator[Drawing]:
     )
     middle = _between(before, after) if turn_deg < 175 else (-out[1], out[0])
     here = drawing[index]
+    # The shares of a spacing below are chosen, not measured: shapes to try.
     for spacing_m in SPACINGS_M:
         for out_m in (0.0, 0.35 * spacing_m):
             first = shifted(shifted(here.place, out, out_m), middle, -spacing_m / 2)
@@ -234,6 +236,7 @@ def headed(drawing: Drawing, heading_deg: float) -> Iterator[Drawing]:
             first = replace(first, is_fixed=False)
             yield (start, first, *drawing[1:])
             if side_deg:
+                # Chosen: on round to the same side, to come back to the route behind.
                 second = first.at(shifted(first.place, _vector(heading_deg + 2.5 * side_deg), length_m))
                 yield (start, first, second, *drawing[1:])
 

@@ -81,6 +81,7 @@ def drive_remarks(
     assumed = [f"{one.parameter} {one.value:g}" for one in vehicle.assumed if one.parameter in _DRIVEN_BY]
     if assumed:
         warnings.append(f"how the vehicle drives is not told in full; taken as {', '.join(assumed)}")
+    # Half a centimetre is not worth a warning; chosen, not measured.
     if asked.allowance_m and driven_m < asked.promised_m - 0.005 and not found.lead_away:
         warnings.append(
             f"the drive model foresees {metres(driven_m)} at the nearest while driving, less than the {metres(asked.promised_m)} promised "

@@ -141,7 +141,7 @@ def with_home(items: Sequence[MissionItem], home: LatLon) -> tuple[MissionItem, 
 
 
 def without_home(items: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
-    """Take the home item off a list as ArduPilot holds it."""
+    """Return a list as ArduPilot holds it without its home item."""
     return tuple(items[1:])
 
 

@@ -93,7 +93,7 @@ class Fitting:
     _until: int = field(default=0, init=False)
 
     def fit(self, drawing: Drawing) -> tuple[Drawing, Measured]:
-        """Improve lines until their band keeps what is required, or nothing helps."""
+        """Return lines improved until their band keeps what is required or nothing helps, and how they measure."""
         drawn_first = _joined(drawing)
         self._allow(FIT_MEASUREMENTS)
         drawing, measured = self._fitted(self._fewer(drawn_first))
@@ -195,7 +195,7 @@ class Fitting:
     def _descend(
         self, drawing: Drawing, propose: Callable[[Drawing, int, Measured], Iterable[Drawing]]
     ) -> Drawing:
-        """Try moves at the worst points until nothing is missing or nothing helps."""
+        """Return the lines after moves at the worst points, until nothing is missing or nothing helps."""
         measured = self.measure(drawing)
         while not measured.is_enough and not self._is_over():
             for index in sorted(range(len(drawing)), key=lambda number: -measured.missing_m[number]):
@@ -208,7 +208,7 @@ class Fitting:
         return drawing
 
     def _fewer(self, drawing: Drawing) -> Drawing:
-        """Leave out and merge points as long as that loses neither time nor clearance."""
+        """Return the lines with points left out and merged as long as that loses neither time nor clearance."""
         measured = self.measure(drawing)
         index = 1
         while index < len(drawing) - 1 and not self._is_over():
@@ -224,7 +224,7 @@ class Fitting:
         return drawing
 
     def _eased(self, drawing: Drawing) -> Drawing:
-        """Take back, step by step, what the route does not need."""
+        """Return the lines with their moves taken back, step by step, as far as clearance and time allow."""
         measured = self.measure(drawing)
         for step_m in _EASING_STEPS_M:
             for index in range(1, len(drawing) - 1):

@@ -8,7 +8,7 @@
     ├── LinkError                no connection, no heartbeat, silence
     ├── IdentityTakenError       somebody else had our system and component id before anything was written
     ├── VehicleNotFoundError     nobody there is the vehicle asked for
-    ├── RefusedError             the vehicle said no
+    ├── RefusedError             the vehicle refused
     │   └── VehicleInUseError    another pbpp on this computer is writing to it
     └── OutcomeError             what is on the vehicle is not what was wanted, or unknown
         ├── DefectError          a bug of ours, after something was written

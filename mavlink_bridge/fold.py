@@ -1,4 +1,4 @@
-"""Messages folded into a situation: the one way in which a live link, a log and the simulator tell what is known.
+"""Messages folded into a situation: the one way from a live link, a log and the simulator to what is known.
 
 `fold` is pure: a situation and a frame give the next situation. It believes the vehicle's own words (its acknowledgements, its
 read-backs) and takes what others send to it as requests.
@@ -44,13 +44,14 @@ _GLOBAL_FRAMES = frozenset(
         CoordinateFrame.GLOBAL_TERRAIN_ALT_INT,
     }
 )
-_IGNORE_X_OR_Y = 0b11
+_IGNORE_X_OR_Y = 0b11  # POSITION_TARGET_TYPEMASK_X_IGNORE and _Y_IGNORE
+# MISSION_ITEM.current outside a mission: go there; change the altitude.
 _GUIDED_TARGET, _GUIDED_ALTITUDE = 2, 3
-_HEADING_UNKNOWN = 65535
+_HEADING_UNKNOWN = 65535  # UINT16_MAX, as GLOBAL_POSITION_INT.hdg is defined
 
 
 def fold(situation: Situation, frame: Frame, time_s: float) -> Situation:
-    """Give the situation after a frame.
+    """Return the situation after a frame.
 
     Parameters
     ----------
@@ -70,11 +71,11 @@ def fold(situation: Situation, frame: Frame, time_s: float) -> Situation:
     return asked(situation, frame.message, time_s)
 
 
-# What the vehicle says.
+# What the vehicle reports.
 
 
 def _is_the_vehicles(situation: Situation, frame: Frame) -> bool:
-    """Tell whether a frame is the autopilot's word; companions share its system id, and what they send are requests."""
+    """Return whether a frame comes from the autopilot itself; companions share its system id, and what they send are requests."""
     if frame.system != situation.system:
         return False
     return situation.component in (None, frame.component) or isinstance(frame.message, m.ParamValue)
@@ -298,7 +299,7 @@ def _add_item(situation: Situation, message: Any, time_s: float, *, to_vehicle: 
 
 
 def _is_held(situation: Situation, kind: ListKind, seq: int, item: MissionItem) -> bool:
-    """Tell whether an item is one that the vehicle is known to hold there."""
+    """Return whether an item is one that the vehicle is known to hold there."""
     held: tuple[MissionItem, ...] = ()
     if kind is ListKind.FENCE and situation.fence is not None:
         held = fence_to_items(situation.fence.value)
@@ -350,7 +351,7 @@ def with_list(
     time_s, source
         When and from what it is known.
     tells_home : bool
-        Whether item 0 of a mission is the vehicle's word on its home (not in an upload: what is sent there is not stored).
+        Whether item 0 of a mission is the vehicle's report of its home (not in an upload: what is sent there is not stored).
     """
     # A finished transfer settles what half-seen ones before it left open.
     for to_vehicle in (True, False):
@@ -390,7 +391,7 @@ def _targeted(situation: Situation, position: LatLon | None, time_s: float, sour
 
 
 def _place(lat_e7: int, lon_e7: int) -> LatLon | None:
-    """Give a position; None for (0, 0), which says "no fix" or "here", and for what is none."""
+    """Return a position; None for (0, 0), which means "no fix" or "here", and for an impossible one."""
     if (lat_e7, lon_e7) == (0, 0):
         return None
     try:

@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 ONE_SHOT_IDENTITY = (245, 190)
 """System and component id of one-shot commands: nobody else's by custom."""
 
-DEFAULT_BAUD = 57600
-_HEARTBEAT_EVERY_S = 1.0
-_DATAGRAM_BYTES = 65536
+DEFAULT_BAUD = 57600  # of SiK telemetry radios, and ArduPilot's SERIAL1_BAUD
+_HEARTBEAT_EVERY_S = 1.0  # as MAVLink's heartbeat protocol wants it
+_DATAGRAM_BYTES = 65536  # the largest that UDP carries
 _STREAM_BYTES = 16384
 """What is taken of a stream at once: a third of a second of the quickest serial port, and little enough to be soon done with."""
 
@@ -37,8 +37,8 @@ _MOST_DATAGRAMS, _MOST_DATAGRAM_BYTES = 256, 65536
 """What is taken of datagrams at once: about as many small ones as Linux keeps by default (208 KiB), or a few huge ones; the worst garbage takes
 a third of a second to look through, so that no flood keeps timers from running."""
 
-_LINK_SENT = 3
-_SERIAL_WAIT_S = 0.01
+_LINK_SENT = 3  # the link number under which our own messages stand in a recorded log
+_SERIAL_WAIT_S = 0.01  # for bytes, at a time; chosen, so that timers run on time
 _SERIAL_SEND_S = 30.0
 """As patient as TCP by default: a radio that takes nothing for so long is broken, and the bridge opens it again."""
 
@@ -47,7 +47,7 @@ _EPOCH_S = time.time() - time.monotonic()
 
 
 def now_s() -> float:
-    """Give the time that machines on links run by: seconds since 1970, but only ever forward."""
+    """Return the time that machines on links run by: seconds since 1970, but only ever forward."""
     return _EPOCH_S + time.monotonic()
 
 
@@ -72,7 +72,7 @@ def parse_connection(text: str) -> Address:
     Raises
     ------
     LinkError
-        The string is none of these.
+        The string has none of these forms.
     """
     kind, _, rest = text.partition(":")
     if kind in ("udpin", "udpout", "udp", "tcp", "tcpin"):
@@ -112,7 +112,7 @@ class Transport(Protocol):
         ...
 
     def heard(self, source: Hashable) -> None:
-        """Take notice that MAVLink came from there, and is to be believed: whoever is answered on an open port is answered there."""
+        """Note that MAVLink came from there, and is to be believed: whoever is answered on an open port is answered there."""
         ...
 
     def close(self) -> None:
@@ -142,7 +142,7 @@ class Link:
     signing : Signing, optional
         Sends signed frames and believes no others.
     clock : callable, optional
-        Gives the time by which everything on the link runs, in seconds; `now_s` if not given. A simulated vehicle may bring its own.
+        Returns the time by which everything on the link runs, in seconds; `now_s` if not given. A simulated vehicle may bring its own.
     sent : SentFrames, optional
         What was sent on the link before this one, where that is opened again: its echoes are left out too.
 
@@ -281,7 +281,7 @@ class Link:
         until : callable, optional
             Ends the run early when it gives True; nothing more is sent then.
         longest_wait_s : callable, optional
-            Gives the longest time between two steps.
+            Returns the longest time between two steps.
 
         Raises
         ------
@@ -327,7 +327,7 @@ def open_link(
     Raises
     ------
     LinkError
-        The string is none, or the device cannot be opened; says why.
+        The string has no known form, or the device cannot be opened; the message says why.
     """
     return Link(open_transport(connection, timeout_s=timeout_s), identity, recorder, signing, sent=sent)
 
@@ -338,12 +338,12 @@ def open_transport(connection: str, *, timeout_s: float = 10.0) -> Transport:
     Raises
     ------
     LinkError
-        The string is none, or the device cannot be opened; says why.
+        The string has no known form, or the device cannot be opened; the message says why.
     """
     address = parse_connection(connection)
     try:
         return _OPENERS[address.kind](address, timeout_s)
-    except (OSError, UnicodeError) as error:  # a host's name may be none
+    except (OSError, UnicodeError) as error:  # a host's name may be invalid
         reason = getattr(error, "strerror", None) or error
         advice = {} if address.kind == "serial" else {"advice": _NETWORK_ADVICE}
         raise LinkError(f"{address} cannot be opened: {reason}", connection=str(address), **advice) from None
@@ -385,7 +385,10 @@ class _Udp:
                 data, source = self._socket.recvfrom(_DATAGRAM_BYTES)
                 received.append((source, data))
                 left -= len(data)
-        except (BlockingIOError, ConnectionError):  # all is read; Windows says "reset" of a port that refused
+        except (
+            BlockingIOError,
+            ConnectionError,
+        ):  # all is read; Windows reports "reset" for a port that refused
             pass
         except OSError as error:
             if not received:

@@ -3,7 +3,7 @@
 ::
 
     MissionError
-    ├── InvalidPositionError     a latitude or longitude that is none, or too near a pole
+    ├── InvalidPositionError     a latitude or longitude out of range, or too near a pole
     ├── FenceError               a fence that cannot be used: which polygon, which item
     ├── FenceMissingError        no fence is known, or only a part of it
     ├── MissionFormatError       a file that cannot be read: file, line, what was expected
@@ -33,7 +33,7 @@ class InvalidPositionError(MissionError):
 
 
 class FenceError(MissionError):
-    """A fence that cannot be used; says which polygon or item and why."""
+    """A fence that cannot be used; the message says which polygon or item and why."""
 
 
 class FenceMissingError(MissionError):
@@ -41,11 +41,11 @@ class FenceMissingError(MissionError):
 
 
 class MissionFormatError(MissionError):
-    """A file that cannot be read; says which file, where, and what was expected."""
+    """A file that cannot be read; the message says which file, where, and what was expected."""
 
 
 class VehicleError(MissionError):
-    """A parameter out of its range, or a footprint that is none; says which and its value."""
+    """A parameter out of its range, or an invalid footprint; the message says which and its value."""
 
 
 class SituationError(MissionError):
@@ -57,19 +57,19 @@ class RouteError(MissionError):
 
 
 class StartBlockedError(RouteError):
-    """The vehicle stands on forbidden ground; says in which fence, how far in, and where free ground is."""
+    """The vehicle stands on forbidden ground; the message says in which fence, how far in, and where free ground is."""
 
 
 class TargetBlockedError(RouteError):
-    """The target lies on forbidden ground or too near a fence; says which, and the nearest free point."""
+    """The target lies on forbidden ground or too near a fence; the message says which, and the nearest free point."""
 
 
 class NoRouteError(RouteError):
-    """Start and target are not connected; says which fences part them."""
+    """Start and target are not connected; the message says which fences part them."""
 
 
 class MissionTooLongError(RouteError):
-    """The mission needs more items than the vehicle holds; says how many it needs and what it holds."""
+    """The mission needs more items than the vehicle holds; the message says how many it needs and what it holds."""
 
 
 class PlanCheckError(MissionError):

@@ -84,13 +84,13 @@ _CIRCLE_COMMANDS = {kind: command for command, kind in _CIRCLE_KINDS.items()}
 def fence_from_items(items: Sequence[MissionItem]) -> Fence:
     """Read a fence from its mission items (MAV_CMD 5000 to 5004).
 
-    A polygon is exactly the number of vertices that its ``param1`` tells: two neighbours of the same kind and count stay two.
+    A polygon is exactly the number of vertices that its ``param1`` gives: two neighbours of the same kind and count stay two.
 
     Raises
     ------
     FenceError
         With the item's number: an unknown command, a polygon of fewer than three vertices or with vertices missing, a radius that
-        is not positive, a position that is none, two return points.
+        is not positive, an invalid position, two return points.
     """
     zones: list[Zone] = []
     return_point = None
@@ -115,7 +115,7 @@ def fence_from_items(items: Sequence[MissionItem]) -> Fence:
 
 
 def fence_to_items(fence: Fence) -> tuple[MissionItem, ...]:
-    """Give a fence as mission items, the way ArduPilot reads them back (frame 0, z 0)."""
+    """Return a fence as mission items, as ArduPilot reads them back (frame 0, z 0)."""
     items: list[MissionItem] = []
     for zone in fence.zones:
         if isinstance(zone, PolygonZone):

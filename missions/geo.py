@@ -23,7 +23,7 @@ class LatLon(NamedTuple):
 
 
 def checked_lat_lon(lat_deg: float, lon_deg: float) -> LatLon:
-    """Give a `LatLon` of two numbers from outside.
+    """Return a `LatLon` of two numbers from outside.
 
     Raises
     ------
@@ -58,27 +58,27 @@ def parse_lat_lon(text: str) -> LatLon:
 
 
 def from_e7(lat_e7: int, lon_e7: int) -> LatLon:
-    """Give the position of a MAVLink degE7 pair."""
+    """Return the position of a MAVLink degE7 pair."""
     return LatLon(lat_e7 / 1e7, lon_e7 / 1e7)
 
 
 def to_e7(position: LatLon) -> tuple[int, int]:
-    """Give MAVLink's degE7 pair, rounded to the nearest (at most 5.6 mm off)."""
+    """Return MAVLink's degE7 pair, rounded to the nearest (at most 5.6 mm off)."""
     return round(position.lat_deg * 1e7), round(position.lon_deg * 1e7)
 
 
 def rounded(position: LatLon) -> LatLon:
-    """Give the position as it stands in a mission item."""
+    """Return the position as it stands in a mission item."""
     return from_e7(*to_e7(position))
 
 
 def distance_m(a: LatLon, b: LatLon) -> float:
-    """Give the geodesic distance in metres."""
+    """Return the geodesic distance in metres."""
     return float(_geod().inv(a.lon_deg, a.lat_deg, b.lon_deg, b.lat_deg)[2])
 
 
 def bearing_deg(a: LatLon, b: LatLon) -> float:
-    """Give the geodesic's bearing at ``a``, in degrees clockwise from north, 0 to 360."""
+    """Return the geodesic's bearing at ``a``, in degrees clockwise from north, 0 to 360."""
     return float(_geod().inv(a.lon_deg, a.lat_deg, b.lon_deg, b.lat_deg)[0]) % 360.0
 
 

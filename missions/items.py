@@ -110,7 +110,7 @@ class MissionItem:
 
     @property
     def is_placed(self) -> bool:
-        """Whether the item sends a rover to a place on Earth; (0, 0) means "here" in MAVLink and is none."""
+        """Whether the item sends a rover to a place on Earth; (0, 0) means "here" in MAVLink, so it does not."""
         return (
             self.command in PLACED_COMMANDS
             and self.frame not in _FRAMES_WITHOUT_PLACES
@@ -121,13 +121,13 @@ class MissionItem:
 
 
 def waypoint(position: LatLon) -> MissionItem:
-    """Give a NAV_WAYPOINT at a position, altitude 0 above home."""
+    """Return a NAV_WAYPOINT at a position, altitude 0 above home."""
     lat_e7, lon_e7 = to_e7(position)
     return MissionItem(Command.NAV_WAYPOINT, lat_e7=lat_e7, lon_e7=lon_e7)
 
 
 def change_speed(speed_mps: float) -> MissionItem:
-    """Give a DO_CHANGE_SPEED of the ground speed (param1 1), throttle unchanged (param3 -1)."""
+    """Return a DO_CHANGE_SPEED of the ground speed (param1 1), throttle unchanged (param3 -1)."""
     return MissionItem(Command.DO_CHANGE_SPEED, CoordinateFrame.MISSION, params=(1.0, speed_mps, -1.0, 0.0))
 
 
@@ -141,12 +141,12 @@ def with_home(items: Sequence[MissionItem], home: LatLon) -> tuple[MissionItem, 
 
 
 def without_home(items: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
-    """Take the home item off a list as ArduPilot holds it."""
+    """Return a list as ArduPilot holds it without its home item."""
     return tuple(items[1:])
 
 
 def file_frame(frame: int) -> int:
-    """Give a MAV_FRAME as files name it: ground stations write no ``_INT`` frames."""
+    """Return a MAV_FRAME as files name it: ground stations write no ``_INT`` frames."""
     return _FILE_FRAMES.get(frame, frame)
 
 
@@ -158,5 +158,5 @@ _FILE_FRAMES: dict[int, int] = {
 
 
 def last_place(items: Sequence[MissionItem]) -> LatLon | None:
-    """Give the place of the last navigation item, None where there is none."""
+    """Return the place of the last navigation item, None without one."""
     return next((item.position for item in reversed(items) if item.is_placed), None)

@@ -1,4 +1,4 @@
-"""What a planning gives: a mission and what it promises."""
+"""The result of planning: a mission and what it promises."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Plan:
     drawn_clearance_m : float
         The least distance of the drawn lines, as rounded and as the autopilot draws them, to any fence (infinite without a fence near).
     driven_clearance_m : float
-        The least distance of the band that the vehicle is foreseen to drive in.
+        The least distance of the band that the vehicle is predicted to drive in.
     blocks : int
         Blocks of the partition that was searched.
     fence, ground : Fence, Ground
@@ -44,7 +44,7 @@ class Plan:
     vehicle : Vehicle
         What was known of the vehicle.
     envelope : Envelope
-        The band that the vehicle is foreseen to stay in, and its times.
+        The band that the vehicle is predicted to stay in, and its times.
     home : LatLon or None
         For the mission's home item.
     """
@@ -72,7 +72,7 @@ class Plan:
     warnings: tuple[str, ...]
 
     def path_index(self, seq: int, after: int = 0) -> int:
-        """Give which point of the path a mission item drives to; for a change of speed the one that it is for.
+        """Return which point of the path a mission item drives to; for a change of speed, the one that it is for.
 
         Of an item that is driven to several times the first time from point ``after`` on, else the first of all.
         """

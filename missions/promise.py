@@ -1,4 +1,4 @@
-"""The clearance that is promised while driving, and what the foreseen track has to keep for it."""
+"""The clearance that is promised while driving, and what the predicted track has to keep for it."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ MARGIN_RESERVE_M = 0.1
 LEAST_MARGIN_M = 0.1
 """With less FENCE_MARGIN measured rovers stopped at the fence or past it (0: 0.02 to 0.04 m past, 0.05: 0.02 m before)."""
 
+# Chosen, not measured: what is promised where nothing is asked for, so much beyond FENCE_MARGIN and no less than a metre.
 DEFAULT_BEYOND_MARGIN_M = 0.5
 LEAST_DEFAULT_M = 1.0
 
@@ -30,7 +31,7 @@ _FIX_NOT_TOLD = (
 )
 
 FIX_ERRORS_M = {3: 1.5, 4: 0.6, 5: 0.3, 6: 0.05}
-"""By GPS_FIX_TYPE (3D, DGPS, RTK float, RTK fixed), where the receiver does not tell its own error."""
+"""By GPS_FIX_TYPE (3D, DGPS, RTK float, RTK fixed), where the receiver does not report its own error (h_acc). Chosen, not measured: what is kept for its error."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +47,7 @@ class Promise:
     allowance_m : float or None
         Room asked for everywhere on top of the promise; None where the route is fitted to the drive model.
     warnings : tuple of str
-        What is to be said about them.
+        Remarks about both.
     """
 
     promised_m: float
@@ -56,19 +57,19 @@ class Promise:
 
     @property
     def required_m(self) -> float:
-        """What the foreseen track has to keep."""
+        """What the predicted track has to keep."""
         return self.promised_m + self.error_m
 
 
 def known_vehicle(situation: Situation, request: Request) -> Vehicle:
-    """Give the vehicle, with the speed that is asked for.
+    """Return the vehicle, with the speed that is asked for.
 
     Raises
     ------
     VehicleError
         A parameter or the speed cannot be used.
     """
-    # What the vehicle told, but as no number, must not be taken for what it did not tell: a default in its place would be a guess.
+    # What the vehicle reported, but as no number, must not be taken for what it did not report: a default in its place would be a guess.
     no_numbers = {name: float(came) for name, came in situation.no_numbers.items()}
     vehicle = vehicle_from_parameters(
         {**no_numbers, **situation.parameters},
@@ -84,7 +85,7 @@ def known_vehicle(situation: Situation, request: Request) -> Vehicle:
 
 
 def promise(situation: Situation, request: Request, vehicle: Vehicle) -> Promise:
-    """Give the clearance to promise: what is asked, but no less than the vehicle's own avoidance and its corners need."""
+    """Return the clearance to promise: what is asked, but no less than the vehicle's own avoidance and its corners need."""
     warnings: list[str] = []
     promised_m = request.clearance_m
     if promised_m is None:
@@ -115,13 +116,13 @@ def promise(situation: Situation, request: Request, vehicle: Vehicle) -> Promise
 
 
 def asked_clearance(situation: Situation, request: Request) -> tuple[Vehicle, float]:
-    """Give the situation's vehicle and the clearance that a plan would promise."""
+    """Return the situation's vehicle and the clearance that a plan would promise."""
     vehicle = known_vehicle(situation, request)
     return vehicle, promise(situation, request, vehicle).promised_m
 
 
 def margin_remarks(vehicle: Vehicle) -> list[str]:
-    """Return what is to be said of a margin that is less than measured rovers needed."""
+    """Return remarks on a margin that is less than measured rovers needed."""
     if not vehicle.avoids_fence or vehicle.stops_within_m >= LEAST_MARGIN_M:
         return []
     return [

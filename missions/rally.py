@@ -27,31 +27,31 @@ class RallyPoint(LatLon):
     alt_m: float = 0.0
 
     def __new__(cls, lat_deg: float, lon_deg: float, alt_m: float = 0.0) -> Self:
-        """Give a place with its altitude."""
+        """Return a place with its altitude."""
         point = super().__new__(cls, lat_deg, lon_deg)
         point.alt_m = alt_m
         return point
 
     def __eq__(self, other: object) -> bool:
-        """Tell whether places, and of rally points also the altitudes, are equal."""
+        """Return whether places, and for rally points also the altitudes, are equal."""
         return tuple.__eq__(self, other) is True and getattr(other, "alt_m", self.alt_m) == self.alt_m
 
     def __ne__(self, other: object) -> bool:
-        """Tell whether they are not."""
+        """Return whether they are unequal."""
         return not self == other
 
     __hash__ = tuple.__hash__
 
 
 def rally_from_items(items: Iterable[MissionItem]) -> tuple[RallyPoint, ...]:
-    """Give the rally points in mission items; an altitude that is not above home is left out."""
+    """Return the rally points in mission items; an altitude that is not above home is left out."""
     return tuple(
         RallyPoint(*item.position, item.alt_m if item.frame in _RELATIVE_FRAMES else 0.0) for item in items
     )
 
 
 def rally_to_items(points: Iterable[RallyPoint]) -> tuple[MissionItem, ...]:
-    """Give rally points as mission items, in the frame in which ArduPilot reads them back."""
+    """Return rally points as mission items, in the frame in which ArduPilot reads them back."""
     return tuple(
         MissionItem(
             Command.RALLY_POINT,

@@ -29,7 +29,7 @@ class Request:
     clearance_m : float, optional
         Promised for the rover as it drives. Default: from FENCE_MARGIN.
     widest : bool
-        Take the widest route there is; `clearance_m` then says nothing.
+        Take the widest route there is; `clearance_m` is then not used.
     corner_allowance_m : float, optional
         Room for cut corners and tracking error everywhere on top of the clearance; 0 plans the drawn lines only. Default: the route is
         fitted to the drive model, with no more room than each corner needs.
@@ -56,7 +56,7 @@ class Request:
     via : Mission, optional
         A mission to repair, in the place of targets (`missions.editing.repair`).
     via_own : bool
-        Repair the mission that the situation tells of.
+        Repair the mission that the situation holds.
     """
 
     start: LatLon | None = None

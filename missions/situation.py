@@ -52,7 +52,7 @@ class Fix:
     kind : int
         GPS_FIX_TYPE: 3 is 3D, 4 DGPS, 5 RTK float, 6 RTK fixed.
     error_m : float or None
-        The receiver's own word for its horizontal error (GPS_RAW_INT.h_acc), None where it gives none.
+        The receiver's own figure for its horizontal error (GPS_RAW_INT.h_acc), None without one.
     """
 
     kind: int
@@ -91,7 +91,7 @@ class ListTransfer:
         return self.count is not None and all(seq in self.items for seq in range(self.count))
 
     def in_order(self) -> tuple[MissionItem, ...]:
-        """Give the items of a complete list in order."""
+        """Return the items of a complete list in order."""
         return tuple(self.items[seq] for seq in range(self.count or 0))
 
 
@@ -112,7 +112,7 @@ class Situation:
     target : Known of LatLon
         The newest place somebody asked the vehicle to drive to.
     bytewise : bool or None
-        Whether the autopilot tells whole-number parameters as the bits of a float (PX4), not as its value.
+        Whether the autopilot reports whole-number parameters as the bits of a float (PX4), not as its value.
     firmware : tuple of int or None
         The autopilot's version: major, minor, patch.
     parameters : mapping of str to float

@@ -1,4 +1,4 @@
-"""Numbers in texts, short whatever they are: what a vehicle or a file tells may be anything."""
+"""Numbers in texts, short whatever they are: a vehicle or a file may report anything."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ __all__ = ["BlockGraph", "Crossing", "block_sequence"]
 Crossing = tuple[Point, Point]
 """The common points of two neighbouring blocks, the paper's adj: a portal's two ends, or one corner twice."""
 
-_SIDE_STEP, _DIAGONAL_STEP = 1.0, 1.4
+_SIDE_STEP, _DIAGONAL_STEP = 1.0, 1.4  # the paper's costs of a step over a side and over a corner
 
 
 class BlockGraph:

@@ -34,6 +34,7 @@ ROUND_EXCESS_M = 0.0025
 _PAD_M = 4e-9
 """Added to every offset, so that rounding at map coordinates of some thousand kilometres takes nothing away."""
 
+# Each adds one and a half times what was missing; what is still short then is put together from strips. Chosen, not measured.
 _ATTEMPTS = 4
 _MENDABLE = 0.01  # in clearances: an offset that lacks more has lost a part of its geometry
 _AREAL = (shapely.GeometryType.POLYGON, shapely.GeometryType.MULTIPOLYGON)

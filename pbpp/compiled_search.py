@@ -27,12 +27,13 @@ if TYPE_CHECKING:
 
 __all__ = ["FlatSlabs", "flatten", "search"]
 
-_GOAL, _TURN = -1, -2
-_SLACK_M = 1e-10
+_GOAL, _TURN = -1, -2  # marks in the place of a block's number
+_SLACK_M = 1e-10  # as in `any_angle`: the paths must be the same
 _EAST, _WEST = 1, 0
-_RIGHT, _LEFT = 0, 1
+_RIGHT, _LEFT = 0, 1  # indices
+# Entries of the queue at first; where they do not suffice the search begins again with four times as many.
 _CAPACITY = 4096
-_MARGIN = 32
+_MARGIN = 32  # entries kept free for one step's own
 
 _compiled: Callable[..., Any] = numba.njit(cache=True, error_model="numpy")
 

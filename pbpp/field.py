@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = ["BOUNDARY_TOLERANCE_M", "Field"]
 
+# Rounding of the two sums of areas: a share, and a strip along all edges; and of a block's height. Chosen, not measured.
 _AREA_SLACK = 1e-9
 _AREA_SLACK_M = 1e-8
 _HEIGHT_SLACK_M = 1e-7

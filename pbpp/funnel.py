@@ -30,7 +30,7 @@ def taut_path(
     crossings : sequence of ((east, north), (east, north))
         What each block has in common with the next: an edge's two ends, or one corner twice.
     centers : sequence of (east, north)
-        A point inside each block: tells which end of an edge is on the left on leaving it.
+        A point inside each block: from it follows which end of an edge is on the left on leaving it.
 
     Returns
     -------

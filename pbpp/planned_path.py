@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Drawing", "PlannedPath", "length_of", "straightened"]
 
-_STRAIGHT_M = 1e-9
+_STRAIGHT_M = 1e-9  # rounding: a point that lies no farther beside the straight line is on it
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 __all__ = ["plot_path"]
 
 _FREE, _EDGE, _BLOCK, _SEQUENCE, _PATH = "#eef3f7", "#3b4a57", "#b7c4cf", "#f6d58a", "#c0392b"
-_MOST_BLOCKS = 5_000
+_MOST_BLOCKS = 5_000  # more cannot be told apart in a picture
 
 
 def plot_path(path: PlannedPath, ax: Any = None, *, show_blocks: bool = True) -> Any:  # noqa: ANN401 - matplotlib is an extra

@@ -9,7 +9,7 @@ With A and B the ends of the common edge and Gp the goal:
 Three things are read otherwise than printed. The paper moves the point to ``|A_x - range|``, which goes the wrong way when B lies to the
 east or north: here it always moves towards the other end. Its third condition ``|AG|² + |BG|² >= |AB|²`` is nearly always true: it
 is the else branch. Its area formula gives only the distance to Q: Q itself comes from a projection, kept `range_m` away from both ends. An
-edge shorter than two radii has no such point; it is crossed in its middle, and `passable` tells.
+edge shorter than two radii has no such point; it is crossed in its middle, and `passable` is False.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """What was on a vehicle before it was overwritten, kept in a state folder; and a note of every upload under way.
 
-A backup is one JSON file with the time, the vehicle, the list and its checksum. The note beside it says that an upload has begun; it
+A backup is one JSON file with the time, the vehicle, the list and its checksum. The note beside it marks that an upload has begun; it
 is taken away when the outcome is known. A note found later means that our own process died half-way: nothing is restored
 unasked, but the next run on that vehicle says so. Both know their vehicle by its `VehicleMark`: nearly every rover is system 1.
 """
@@ -28,8 +28,8 @@ from missions.items import MissionItem
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-_FORMAT = 2
-_KEPT_BACKUPS = 100
+_FORMAT = 2  # of the file; since 2 it holds the mark of its vehicle
+_KEPT_BACKUPS = 100  # of each list; chosen, not measured: bounds the folder
 _BACKUP_NAME = re.compile(r"system-(\d+)-(mission|fence|rally)-\d{8}T\d{6}\.\d{6}Z(-[0-9a-f]{12})?\.json")
 _NOTE_NAME = re.compile(r"upload-under-way-system-(\d+)-(mission|fence|rally)(-[0-9a-f]{12})?\.json")
 """Before format 2 the names ended without the vehicle's key."""
@@ -69,7 +69,7 @@ class Note:
     path : Path
         The file.
     vehicle : VehicleMark
-        Which vehicle it was, as far as the note tells.
+        Which vehicle it was, as far as the note has it.
     mission_type : MissionType
         Which list.
     backup : Backup, optional
@@ -162,7 +162,7 @@ class BackupStore:
                 restored is not None and note.backup is not None and note.backup.path.name == restored.name
             )
             if is_named or vehicle.kinship(note.vehicle) is Kinship.SAME:
-                with contextlib.suppress(OSError):  # it stays, and is told of: the upload itself ended well
+                with contextlib.suppress(OSError):  # it stays, and is reported: the upload itself ended well
                     note.path.unlink(missing_ok=True)
 
     def interrupted(self, vehicle: VehicleMark, mission_type: MissionType | None = None) -> list[Note]:
@@ -281,7 +281,7 @@ def read_backup(path: Path) -> Backup:
     Raises
     ------
     BackupError
-        The file is missing, is none, or has been changed.
+        The file is missing, is not a backup, or has been changed.
     """
     try:
         content = json.loads(path.read_text(encoding="utf-8"))

@@ -2,7 +2,7 @@
 
 Two uploads to one vehicle would take each other's half-written list for what was there before. The operating system's own file locks are
 used: they are freed when a process ends, however it does. A vehicle is locked under its uid and under the way it is connected, so that two
-processes meet that know the same vehicle by different means.
+processes meet that know the same vehicle by different marks.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ class VehicleLock:
         return None
 
     def free(self) -> None:
-        """Give the lock back; harmless if it is not ours."""
+        """Release the lock; harmless if it is not ours."""
         _close(self._files)
         self._files = []
 

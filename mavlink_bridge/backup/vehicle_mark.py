@@ -1,6 +1,6 @@
 """By what a vehicle is known again: the uid of its board, else how it was connected.
 
-System ids do not tell vehicles apart: nearly every rover is system 1.
+System ids do not distinguish vehicles: nearly every rover is system 1.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Kinship(StrEnum):
-    """What two marks say of their vehicles."""
+    """Whether two marks are of one vehicle."""
 
     SAME = auto()
     OTHER = auto()
@@ -31,7 +31,7 @@ class VehicleMark:
     system : int
         Its system id.
     uid : str
-        The uid of its board (AUTOPILOT_VERSION's ``uid2``, else ``uid``) in hexadecimal; empty where it tells none.
+        The uid of its board (AUTOPILOT_VERSION's ``uid2``, else ``uid``) in hexadecimal; empty without one.
     connection : str
         The connection string it was reached by; empty where that is not known.
     autopilot : int, optional
@@ -58,7 +58,7 @@ class VehicleMark:
     def kinship(self, other: VehicleMark) -> Kinship:
         """Return whether another mark is of the same vehicle.
 
-        Uids settle it. Of two vehicles that tell none the connection, the system id and the autopilot must be the same. A vehicle that told its uid
+        Uids settle it. Of two vehicles without one the connection, the system id and the autopilot must be the same. A vehicle that reported its uid
         only once, and one of which nothing was noted, may be this one or another.
         """
         if self.uid and other.uid:
@@ -72,7 +72,7 @@ class VehicleMark:
 
 
 def uid_of(version: AutopilotVersion | None) -> str:
-    """Return the board's uid in hexadecimal, empty where none is told."""
+    """Return the board's uid in hexadecimal, empty where none was reported."""
     if version is None:
         return ""
     if any(version.uid2):

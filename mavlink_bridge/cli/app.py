@@ -35,18 +35,18 @@ COMMANDS = {
     "doctor": "Look at this installation: versions, ports, keys, a test plan.",
     "config": "Show where options may be kept, and which are set.",
 }
-"""Every command and what help says of it in a line; the module of the same name holds it."""
+"""Every command and its line in help; the module of the same name holds it."""
 
 
 class Commands(TyperGroup):
     """A group that imports a command's module when the command is called: help and usage errors need none of them."""
 
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ANN401, ARG002 - the parser library is typer's own affair
-        """Give the names, in the order of help."""
+        """Return the names, in the order of help."""
         return list(COMMANDS)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:  # noqa: ANN401 - as above
-        """Give a command that was called before, or what help needs to know of it."""
+        """Return a command that was called before, or what help needs to know of it."""
         known = super().get_command(ctx, cmd_name)
         if known is None and cmd_name in COMMANDS:
             return TyperCommand(cmd_name, help=COMMANDS[cmd_name])
@@ -78,7 +78,7 @@ class Commands(TyperGroup):
 
 
 def load(name: str) -> Any:  # noqa: ANN401 - a command of the parser library that typer uses
-    """Give a command, with its options."""
+    """Return a command, with its options."""
     from mavlink_bridge.cli.common import guarded  # noqa: PLC0415 - quick help
 
     function = getattr(import_module(f"mavlink_bridge.cli.{name}"), name)
@@ -96,7 +96,7 @@ def _exit_code(run: Any, words: list[str]) -> int:  # noqa: ANN401 - a function 
     except typer.Abort:
         report(command, "Interrupted", "aborted", ExitCode.INTERRUPTED, wants_json=wants_json)
         return ExitCode.INTERRUPTED
-    except Exception as error:  # noqa: BLE001 - the last place where one can be told
+    except Exception as error:  # noqa: BLE001 - the last place where one can be reported
         if is_reader_gone(error):
             return drop_stdout()
         if getattr(error, "exit_code", None) == ExitCode.USAGE and hasattr(error, "format_message"):

@@ -45,9 +45,10 @@ if TYPE_CHECKING:
     from mavlink_bridge.tlog import TlogWriter
     from missions.planned import Plan
 
+# Between attempts to open a link anew: doubled up to half a minute. Chosen, not measured.
 _BACKOFF_S = (0.5, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0)
-_LINK_LOOK_S = 0.25
-_OPENING_LOOK_S = 0.05
+_LINK_LOOK_S = 0.25  # how soon an interrupt is seen while waiting for that
+_OPENING_LOOK_S = 0.05  # and while a link is being opened
 
 
 def bridge(
@@ -216,7 +217,7 @@ class _Shell:
         self._plans = PlanMaker(self.director)
         self._keyboard = Keyboard()
         self._quiet = quiet
-        self._asked_for: Plan | None = None  # the plan that was said to wait for a yes
+        self._asked_for: Plan | None = None  # the plan that waits for a yes, as was printed
 
     def run(self, signing: Signing | None, timeout_s: float) -> None:
         """Run until the single job is done, or for ever; a link that breaks is opened again."""
@@ -245,7 +246,7 @@ class _Shell:
 
     @contextlib.contextmanager
     def _interrupt_in_words(self) -> Iterator[None]:
-        """Let an interrupt say what an upload under way has left; a link that breaks is no end of it."""
+        """Let an interrupt report what an upload under way has left; a link that breaks does not end it."""
         from mavlink_bridge.protocol.outcomes import end_of_upload  # noqa: PLC0415 - quick help
 
         try:
@@ -373,14 +374,14 @@ class _Shell:
             self.director.take_target(typed.target, now)
 
     def _note(self, text: str, *, is_warning: bool) -> None:
-        """Say something that is no event, where it does not disturb: above the view, else on stderr."""
+        """Print a note that is not an event, where it does not disturb: above the view, else on stderr."""
         if self._view is not None:
             self._view.note(text, is_warning=is_warning)
         elif is_warning or not self._quiet:
             say(text, typer.colors.YELLOW if is_warning else None)
 
     def _ask_for_yes(self) -> None:
-        """Say once of each plan that it waits for a yes."""
+        """Print once for each plan that it waits for a yes."""
         from mavlink_bridge.cli.typed import CONFIRM  # noqa: PLC0415 - quick help
 
         plan = self.director.plan if self.director.awaits_confirmation else None
@@ -406,7 +407,7 @@ def _view(stack: contextlib.ExitStack, director: Director, *, is_wanted: bool) -
 
 
 def _teller(*, wants_json: bool, quiet: bool) -> Callable[[Event], None]:
-    """Give what tells events: JSON lines, or lines for people."""
+    """Return what prints events: JSON lines, or lines for people."""
     if wants_json:
         return lambda event: _flushed_json(event.as_json())
     if quiet:

@@ -29,12 +29,13 @@ if TYPE_CHECKING:
     from mavlink_bridge.director import Director, Event
     from missions.geo import LatLon
 
+# Chosen, not measured: quick enough to watch; the map takes longer to draw and changes slowly.
 _TABLE_EVERY_S = 0.5
 _MAP_EVERY_S = 10.0
 _MAP_COLUMNS = 72
-_MOST_PLACES = 2000
+_MOST_PLACES = 2000  # of the track on the map; chosen, bounds the memory of a long drive
 _OLD_S = 3.0
-"""A heartbeat comes every second, positions more often: what is older than this is said to be old."""
+"""A heartbeat comes every second, positions more often: what is older than this is marked as old."""
 
 _STYLES = {
     Severity.CRITICAL: "bold red",
@@ -150,7 +151,7 @@ class LiveView:
         return table
 
     def _link_rows(self, now_s: float) -> list[tuple[str, str | Text]]:
-        """Say that the vehicle is not heard, since when, and what is done about it."""
+        """Return the rows of a lost link: that the vehicle is not heard, since when, and what is done about it."""
         heard_s, why = self._director.heard_s, self.link_trouble
         silent_s = None if heard_s is None else max(0.0, now_s - heard_s)
         is_lost = why is not None or self._director.state is State.LOST
@@ -163,7 +164,7 @@ class LiveView:
 
 
 def _of_then(text: str, time_s: float | None, now_s: float) -> Text:
-    """Return a text that says how old it is, where it is not of now."""
+    """Return a text, with its age where it is not current."""
     if time_s is None or now_s - time_s < _OLD_S:
         return cell(text)
     return cell(f"{text} (old: {_age(now_s - time_s)} ago)", "yellow")

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from missions.situation import Situation
 
 _TELEMETRY_PATIENCE_S = 5.0
-"""A vehicle that tells its position does so at least once a second."""
+"""A vehicle that reports its position does so at least once a second."""
 
 
 def check(
@@ -190,7 +190,7 @@ def _storage_warnings(items: Sequence[MissionItem], situation: Situation) -> lis
 def _with_files(
     source: Situation | None, mission: Path | None, fence: Path | None, vehicle: Path | None
 ) -> Situation:
-    """Put what files tell in the place of what the log or the link told; of parameters the vehicle's own count more."""
+    """Put what files hold in the place of what the log or the link reported; of parameters the vehicle's own count more."""
     from missions.errors import FenceMissingError  # noqa: PLC0415 - quick help
     from missions.formats import read_mission, read_parameters, read_situation  # noqa: PLC0415
     from missions.situation import Known, Situation  # noqa: PLC0415
@@ -204,7 +204,7 @@ def _with_files(
             found, fence=told.fence, fence_trouble=None, transfers={}, home=found.home or told.home
         )
     if mission is not None:
-        read_mission(mission)  # which says what is wrong where there is none
+        read_mission(mission)  # which names what is wrong where no fence can be used
         told = read_situation(mission)
         assert told.mission is not None
         home = told.mission.value.home
@@ -221,7 +221,7 @@ def _with_files(
 
 
 def _live_situation(address: Address, *, quiet: bool) -> tuple[Situation, list[str]]:
-    """Read mission, fence, rally points and parameters from the vehicle; nothing is written to it. Give what it did not tell, too.
+    """Read mission, fence, rally points and parameters from the vehicle; nothing is written to it. Return also what it did not report.
 
     Raises
     ------

@@ -194,7 +194,7 @@ def warn(texts: Iterable[str]) -> None:
 
 
 def is_same_file(one: Path, other: Path) -> bool:
-    """Tell whether two paths lead to one file that is there, however they are written: Windows and macOS heed no capitals."""
+    """Return whether two paths lead to one existing file, however they are written: Windows and macOS ignore capitals."""
     return one.exists() and other.exists() and one.samefile(other)
 
 
@@ -209,8 +209,8 @@ class Shown:
         return nullcontext()
 
 
-class _Lines(Shown):
-    """Tells progress in lines, one for each new text."""
+class _LineProgress(Shown):
+    """Prints progress in lines, one for each new text."""
 
     def __init__(self) -> None:
         self._last = ""
@@ -244,7 +244,7 @@ class _Bar(Shown):
 def progress_bar(*, quiet: bool) -> Iterator[Shown]:
     """Show a progress bar on stderr where that is a terminal; yields what moves it."""
     if not sys.stderr.isatty() or quiet:
-        yield _Lines() if telling().verbose and not quiet else Shown()
+        yield _LineProgress() if telling().verbose and not quiet else Shown()
         return
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn  # noqa: PLC0415 - quick help
 

@@ -90,12 +90,12 @@ def config(
 
 
 def settings_of(path: Path, *, is_asked_for: bool) -> list[Setting]:
-    """Give what a file sets, for each command that it touches.
+    """Return what a file sets, for each command that it touches.
 
     Raises
     ------
     typer.BadParameter
-        The file is none, or sets what there is not.
+        The file is not an options file, or sets an option that does not exist.
     """
     from mavlink_bridge.cli.app import COMMANDS, load  # noqa: PLC0415 - which loads this module
 

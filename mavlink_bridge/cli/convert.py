@@ -129,7 +129,7 @@ def _left_out(situation: Situation, written: tuple[Part, ...], output: Path) -> 
 
 
 def _count(situation: Situation, part: Part) -> str:
-    """Say how much of a part there is."""
+    """Return how much of a part there is, in words."""
     mission, fence, rally = situation.mission, situation.fence, situation.rally
     counts = {
         "mission": (len(mission.value.items) if mission else 0, "mission item"),

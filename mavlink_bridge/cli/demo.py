@@ -22,14 +22,15 @@ if TYPE_CHECKING:
     from missions.geo import LatLon
     from missions.planned import Plan
 
+# The maze of the recorded logs: its start, a target in it and a clearance that leaves a route.
 _HOME = (40.071374, -105.229930)
 _TARGET = (40.0726316, -105.2290497)
 _CLEARANCE_M = 2.5
-_IDENTITY = (245, 190)
+_IDENTITY = (245, 190)  # the one-shot commands' own, `link.ONE_SHOT_IDENTITY`
 
 
 @dataclass(slots=True)
-class _Drive:
+class _Heard:
     """What was heard while driving."""
 
     track: list[LatLon] = field(default_factory=list)
@@ -64,7 +65,7 @@ def demo(
 
     out.mkdir(parents=True, exist_ok=True)
     make_room(out / "demo.tlog")
-    drive = _Drive()
+    drive = _Heard()
     begun_s = time.monotonic()
     with ExitStack() as stack:
         recorder = stack.enter_context(TlogWriter(out / "demo.tlog"))
@@ -108,7 +109,7 @@ def demo(
 
 
 def _rover(speedup: float) -> SteppedRover:
-    """Give a rover in the maze, on a link that no slow computer breaks."""
+    """Return a rover in the maze, on a link that no slow computer breaks."""
     import secrets  # noqa: PLC0415 - quick help
 
     from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig, SteppedRover  # noqa: PLC0415 - quick help
@@ -119,7 +120,7 @@ def _rover(speedup: float) -> SteppedRover:
         home=LatLon(*_HOME),
         fence=fence_to_items(_maze()),
         parameters={"FENCE_ENABLE": 1.0, "WP_RADIUS": 2.0, "WP_SPEED": 4.0},
-        uid=secrets.token_bytes(12),  # each demo is a new rover: an interrupted one says nothing of the next
+        uid=secrets.token_bytes(12),  # each demo is a new rover: an interrupted one does not bear on the next
     )
     return SteppedRover(SimulatedVehicle(config), speedup)
 
@@ -131,7 +132,7 @@ def _maze() -> Fence:
         return read_fence(path)
 
 
-def _observe(drive: _Drive, frames: list[Frame]) -> None:
+def _observe(drive: _Heard, frames: list[Frame]) -> None:
     """Keep the track and the breaches that the vehicle reports."""
     from mavlink_bridge.mavlink.messages import FenceStatus, GlobalPositionInt  # noqa: PLC0415 - quick help
     from missions.geo import from_e7  # noqa: PLC0415
@@ -144,7 +145,7 @@ def _observe(drive: _Drive, frames: list[Frame]) -> None:
 
 
 def _driven(plan: Plan, track: list[LatLon]) -> tuple[float, float]:
-    """Give the driven track's least clearance and its length, in metres."""
+    """Return the driven track's least clearance and its length, in metres."""
     from shapely import LineString  # noqa: PLC0415 - quick help
 
     line = LineString(plan.ground.frame.to_local_array(track))

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 _NEEDED = ("numpy", "shapely", "pyproj", "pymavlink", "pyserial", "typer", "rich", "platformdirs")
 _WANTED = {"matplotlib": "pictures (.png, .svg, .pdf)", "plotly": "interactive pages (.html)"}
 _START, _TARGET = (40.071374, -105.229930), (40.0726316, -105.2290497)
-_CLEARANCE_M = 2.5
+_CLEARANCE_M = 2.5  # of the test plan, for which `SHORTEST_M` holds
 SHORTEST_M = 163.1
 """No route of the test plan can be shorter: by a visibility graph around the same fence (a test of this project)."""
 

@@ -71,7 +71,7 @@ def download(
     address = Address(connect, (source_system, source_component), system, any_vehicle, timeout, signing_key)
     with progress_bar(quiet=quiet or json_output) as show, open_session(address, show) as session:
         store = BackupStore()
-        if store.notes():  # else there is nothing to be told apart
+        if store.notes():  # else nothing needs to be distinguished
             warn(reader_warnings(store, session.which_vehicle()))
         if what == "parameters":
             parameters = _read_parameters(session)
@@ -219,5 +219,5 @@ def _details(what: str, items: tuple[MissionItem, ...], parameters: Mapping[str,
 
 
 def _number(value: float) -> float | None:
-    """Give a number JSON can hold."""
+    """Return a number as JSON can hold it."""
     return value if math.isfinite(value) else None

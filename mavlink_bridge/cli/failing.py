@@ -1,4 +1,4 @@
-"""How a command ends: exit codes, and errors told to people and scripts."""
+"""How a command ends: exit codes, and errors reported to people and scripts."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ _REPORT = (
 
 @dataclass(slots=True)
 class Telling:
-    """Which command runs, how much it tells, and which warnings it has told."""
+    """Which command runs, how much it prints, and which warnings it has printed."""
 
     command: str = ""
     verbose: bool = False
@@ -84,7 +84,7 @@ _telling: ContextVar[Telling | None] = ContextVar("telling", default=None)
 
 
 def telling() -> Telling:
-    """Give how much the command that runs is to tell."""
+    """Return how much the running command prints."""
     return _telling.get() or begin_telling("", verbose=False)
 
 
@@ -96,12 +96,12 @@ def begin_telling(command: str, *, verbose: bool) -> Telling:
 
 
 def exit_code_of(error: Exception) -> ExitCode:
-    """Give the exit code of an error."""
+    """Return the exit code of an error."""
     return next(code for kind, code in _EXIT_CODES if isinstance(error, kind))
 
 
 def is_reader_gone(error: Exception) -> bool:
-    """Tell whether nobody reads the standard output any more; Windows calls that an invalid argument."""
+    """Return whether nobody reads the standard output any more; Windows calls that an invalid argument."""
     if isinstance(error, BrokenPipeError):
         return True
     if not _IS_WINDOWS or not isinstance(error, OSError) or error.errno != errno.EINVAL:
@@ -114,13 +114,13 @@ def is_reader_gone(error: Exception) -> bool:
 
 
 def drop_stdout() -> int:
-    """Let go of a standard output that nobody reads any more (``pbpp log … | head``); give the exit code, as a shell tells of SIGPIPE."""
+    """Let go of a standard output that nobody reads any more (``pbpp log … | head``); return the exit code, as a shell reports SIGPIPE."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 128 + 13
 
 
 def report_error(command: str, error: Exception, *, wants_json: bool) -> ExitCode:
-    """Report an error of ours; give its exit code."""
+    """Report an error of ours; return its exit code."""
     code = exit_code_of(error)
     details = dict(getattr(error, "details", {}))
     if "advice" not in details and (advice := _advice(command, error)):
@@ -155,7 +155,7 @@ def _trace_of(error: BaseException, *, wanted: bool) -> dict[str, str]:
 
 
 def report_defect(command: str, error: BaseException, *, wants_json: bool, verbose: bool = False) -> ExitCode:
-    """Report what should never happen, in a line that says what broke and where; give its exit code."""
+    """Report what should never happen, in a line that says what broke and where; return its exit code."""
     details: dict[str, object] = {"advice": _REPORT, **_trace_of(error, wanted=verbose)}
     report(command, "InternalError", _defect_line(error), ExitCode.INTERNAL, details, wants_json=wants_json)
     return ExitCode.INTERNAL
@@ -170,7 +170,7 @@ def report(
     *,
     wants_json: bool,
 ) -> None:
-    """Tell an error: what and why in a line, what to do in another; with JSON wanted as one document too."""
+    """Print an error: what and why in a line, what to do in another; with JSON wanted as one document too."""
     rest = dict(details or {})
     advice = rest.pop("advice", None)
     if wants_json:
@@ -194,7 +194,7 @@ def report(
 
 
 def _advice(command: str, error: Exception) -> str | None:
-    """Say what to do, where the message itself does not."""
+    """Return advice, where the message itself has none."""
     if isinstance(error, bridge_errors.UsageError):
         return f"see `pbpp {command} --help`"
     found = next((_ADVICE[kind] for kind in type(error).__mro__ if kind in _ADVICE), None)

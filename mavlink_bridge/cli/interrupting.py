@@ -1,4 +1,4 @@
-"""What an interrupt leads to: what the vehicle does is said, and while it drives because of us a person is asked whether to stop it.
+"""What an interrupt leads to: what the vehicle does is reported, and while it drives because of us a person is asked whether to stop it.
 
 On a terminal the first Ctrl-C asks "HOLD? [Y/n]"; at a second one nothing more is sent. Without a terminal, and on SIGTERM, nothing is sent at
 all: whoever ends a service does not ask for a vehicle to be stopped. The command ends with 130 whatever the answer.
@@ -26,11 +26,11 @@ if TYPE_CHECKING:
     from mavlink_bridge.protocol.peer import Peer
     from mavlink_bridge.protocol.vehicle_watch import Doing, VehicleWatch
 
-_LOOK_S = 0.1
+_LOOK_S = 0.1  # listened to at a time; chosen, not measured
 _LISTEN_S = 1.5
-"""Without a question: for so long the vehicle is listened to, so that what is said of it is true now. A heartbeat comes every second."""
+"""Without a question: for so long the vehicle is listened to, so that what is reported of it is true now. A heartbeat comes every second."""
 
-_OLD_S = 2.0
+_OLD_S = 2.0  # two heartbeats: older telemetry is shown with its age
 
 
 class Terminated(KeyboardInterrupt):
@@ -38,7 +38,7 @@ class Terminated(KeyboardInterrupt):
 
 
 class Interrupted(KeyboardInterrupt):
-    """An interrupt with what is to be said of it; ``details`` is for scripts."""
+    """An interrupt with its message; ``details`` is for scripts."""
 
     def __init__(self, message: str, details: Mapping[str, object]) -> None:
         super().__init__(message)
@@ -69,7 +69,7 @@ def first_step(*, drives: bool, can_ask: bool, is_terminated: bool) -> Step:
 
 
 def step_after(answer: str | None) -> Step:
-    """Return what an answer to "HOLD? [Y/n]" leads to; None is none: a second interrupt, or the end of the input."""
+    """Return what an answer to "HOLD? [Y/n]" leads to; None is no answer: a second interrupt, or the end of the input."""
     if answer is None:
         return Step.REPORT
     word = answer.strip().lower()
@@ -85,7 +85,7 @@ class Ending:
     Parameters
     ----------
     said : str
-        What the part that was interrupted says of itself; empty if nothing.
+        The message of the part that was interrupted; empty without one.
     doing : Doing
         What the vehicle does.
     on_it : str
@@ -112,12 +112,12 @@ class Ending:
     changed: bool = False
 
     def message(self) -> str:
-        """Return what people are told."""
+        """Return the message for people."""
         on_it = self.on_it or ("" if self.said else "nothing was written to it")
         return "; ".join(filter(None, (self.said or "interrupted", self._deed(), on_it)))
 
     def details(self) -> dict[str, object]:
-        """Return what scripts are told."""
+        """Return the details for scripts."""
         doing = self.doing
         return {
             "mode": _mode_name(doing.mode),
@@ -170,7 +170,7 @@ class AtHand:
     peer : callable
         Returns the vehicle, None before it was found.
     watch : callable
-        Returns what it told of itself.
+        Returns what it reported about itself.
     drives : callable
         Returns whether it drives because of us.
     on_it : callable
@@ -278,7 +278,7 @@ def _hold(at_hand: AtHand) -> bool:
 
 
 def _listen(at_hand: AtHand) -> None:
-    """Listen for a heartbeat, so that what is said of the vehicle is true now."""
+    """Listen for a heartbeat, so that what is reported of the vehicle is true now."""
     assert at_hand.link is not None
     begun_s = at_hand.link.now_s()
     while at_hand.watch().heartbeat_s < begun_s and at_hand.link.now_s() < begun_s + _LISTEN_S:
@@ -305,7 +305,7 @@ def _now_s() -> float:
 
 
 def _heed_no_more() -> None:
-    """Let no further Ctrl-C spoil what is said last."""
+    """Let no further Ctrl-C spoil the last message."""
     with contextlib.suppress(ValueError):  # not the main thread: no signals come here
         signal.signal(signal.SIGINT, signal.SIG_IGN)
 

@@ -1,6 +1,6 @@
 """Files that commands write: what pbpp wrote is replaced, anybody else's is first kept as ``NAME.bak``.
 
-Whether pbpp wrote a file is told by a list of checksums in the state folder: not every format has room for a mark, and a mark outlives
+Whether pbpp wrote a file is known from a list of checksums in the state folder: not every format has room for a mark, and a mark outlives
 what somebody else changes afterwards, a checksum does not. A file that is not in the list (changed since, from another computer, the list lost) is
 somebody else's.
 """
@@ -31,7 +31,7 @@ _PLANNING = ("plan", "demo")
 
 
 def write_kept(path: Path, data: bytes) -> None:
-    """Write a whole file or nothing; what somebody else wrote there is first kept, and told of.
+    """Write a whole file or nothing; what somebody else wrote there is first kept, with a note.
 
     A file that holds just that already is left alone: it stays whoever's it is.
 
@@ -48,7 +48,7 @@ def write_kept(path: Path, data: bytes) -> None:
 
 
 def open_kept(path: Path) -> TextIO:
-    """Open a new text file that is written bit by bit; whatever was there is first kept, and told of.
+    """Open a new text file that is written bit by bit; whatever was there is first kept, with a note.
 
     Raises
     ------

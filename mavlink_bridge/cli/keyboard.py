@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-STDIN = 0
+STDIN = 0  # the file descriptor
 
 
 class Keyboard:

@@ -1,4 +1,4 @@
-"""What people are told of a link that is odd, but works."""
+"""Notes on a link that is odd, but works."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ if TYPE_CHECKING:
 
 
 class LinkNotes:
-    """Tells of a link's echoes, once, also where it is opened again; not where little is to be told (``-q``)."""
+    """Reports a link's echoes, once, also where the link is opened again; silent with ``-q``."""
 
     def __init__(self) -> None:
         self._was_told = telling().quiet
 
     def tell(self, link: Link) -> None:
-        """Tell what there is to tell of a link and was not told yet."""
+        """Report what there is to note about a link and was not reported yet."""
         if link.echoes and not self._was_told:
             self._was_told = True
             say("note: our own messages come back on this link; they are left out", typer.colors.BRIGHT_BLACK)

@@ -237,7 +237,7 @@ def _has_changed(director: Director) -> bool:
 
 
 def _mission_on_it(director: Director) -> str:
-    """Return which mission is on the vehicle, for people; empty while one is uploaded, of which `ends_in_words` says what it left."""
+    """Return which mission is on the vehicle, for people; empty while one is uploaded, as `ends_in_words` reports what that left."""
     outcome = director.upload_outcome
     if outcome is None or director.is_uploading:
         return ""
@@ -247,7 +247,7 @@ def _mission_on_it(director: Director) -> str:
 
 
 def _check_drivable(planned: Plan) -> None:
-    """Refuse to drive what cannot be watched to its end, or what the drive model says nothing of.
+    """Refuse to drive what cannot be watched to its end, or what the drive model does not cover.
 
     Raises
     ------
@@ -287,11 +287,11 @@ class PlanMaker:
         self._made: Future[Plan | MissionError] = Future()
 
     def longest_wait_s(self) -> float:
-        """Give how long the shell may wait for messages before it looks here again."""
+        """Return how long the shell may wait for messages before it calls again."""
         return _IDLE_S if self._task is None else _BUSY_S
 
     def take(self) -> tuple[PlanTask, Plan | MissionError] | None:
-        """Give what was made for the director and was not given yet; begin what it waits for."""
+        """Return what was made for the director since the last call; begin what it waits for."""
         task = self._task
         if task is not None and self._made.done():
             self._task = None

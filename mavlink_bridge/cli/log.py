@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.logbook.grade import Grade
 
 Row = TypeVar("Row")
-_MOST_ROWS = 40
+_MOST_ROWS = 40  # of a table, so that it fits a terminal's screen; chosen
 _UNION_BIT = 2
 """FENCE_OPTIONS: inside one inclusion is enough."""
 
@@ -119,7 +119,7 @@ def _draw(book: Logbook, path: Path) -> None:
 
 
 def _is_union(vehicle: VehicleLog) -> bool:
-    """Return whether one inclusion is enough; of a FENCE_OPTIONS that is none the notes tell."""
+    """Return whether one inclusion is enough; the notes name an impossible FENCE_OPTIONS."""
     from missions.errors import VehicleError  # noqa: PLC0415 - quick help
     from missions.vehicle import bits  # noqa: PLC0415
 
@@ -287,7 +287,7 @@ def _vehicle_tables(vehicle: VehicleLog) -> Iterable[Table]:
 
 
 def _rows(table: Table, rows: Sequence[Row]) -> Sequence[Row]:
-    """Give the rows of a table, the last ones where they are too many."""
+    """Return the rows of a table, the last ones where they are too many."""
     if len(rows) > _MOST_ROWS:
         table.caption = f"the last {_MOST_ROWS} of {len(rows)}; all with --json"
     return rows[-_MOST_ROWS:]

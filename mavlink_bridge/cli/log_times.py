@@ -47,7 +47,7 @@ def log_begin(log: Path) -> LogBegin:
 
 
 def date_text(time_s: float) -> str:
-    """Give a time as a date in UTC.
+    """Return a time as a date in UTC.
 
     Parameters
     ----------

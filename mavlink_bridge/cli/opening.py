@@ -48,4 +48,4 @@ class Opening:
             self._error = error
 
 
-_QUICK_S = 0.1
+_QUICK_S = 0.1  # most links are open by then; chosen, not measured

@@ -20,12 +20,12 @@ DARING = ("upload", "drive", "arm", "replace_active", "hold", "restore", "other_
 
 
 def user_file() -> Path:
-    """Give the path of the user's options, whether there are any or not."""
+    """Return the path of the user's options file, whether it exists or not."""
     return config_folder() / FILE_NAME
 
 
 def is_there(path: Path) -> bool:
-    """Tell whether there is such a file; one in a folder that may not be looked into is none of ours."""
+    """Return whether a file exists; one in a folder that we may not look into counts as missing."""
     try:
         return path.is_file()
     except OSError:
@@ -62,7 +62,7 @@ def read_tables(path: Path) -> dict[str, dict[str, Any]]:
 
 
 def options_for(path: Path, command: str, known: set[str], *, is_asked_for: bool) -> dict[str, Any]:
-    """Give the options that a file sets for a command.
+    """Return the options that a file sets for a command.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def options_for(path: Path, command: str, known: set[str], *, is_asked_for: bool
     Raises
     ------
     typer.BadParameter
-        The file is none, or sets what the command does not know or what only the command line may.
+        The file is not an options file, or sets what the command does not know or what only the command line may.
     """
     tables = read_tables(path)
     own = tables.get(command, {})
@@ -117,7 +117,7 @@ def take_options(context: typer.Context, path: Path | None) -> Path | None:
 
 
 def _as_typed(value: object) -> object:
-    """Give a value as if it had been typed: the commands read numbers from text."""
+    """Return a value as if it had been typed: the commands read numbers from text."""
     if isinstance(value, list):
         return [_as_typed(one) for one in value]
     return value if isinstance(value, bool) else str(value)

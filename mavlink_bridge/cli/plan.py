@@ -254,7 +254,7 @@ def plan(
 
 
 def timed_plan(situation: Situation, request: Request) -> tuple[Plan, float]:
-    """Plan, and tell how long it took."""
+    """Return a plan, and how long planning took."""
     from missions.tour.tour import plan_tour  # noqa: PLC0415 - quick help
 
     begun_s = time.perf_counter()
@@ -263,7 +263,7 @@ def timed_plan(situation: Situation, request: Request) -> tuple[Plan, float]:
 
 
 def with_parameter_file(situation: Situation, vehicle: Path | None) -> Situation:
-    """Add the parameters of a file to those that the vehicle itself told."""
+    """Add the parameters of a file to those that the vehicle itself reported."""
     if vehicle is None:
         return situation
     from missions.formats import read_parameters  # noqa: PLC0415 - quick help

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def write_outputs(
     planned: Plan, situation: Situation, outputs: list[Path], plots: list[Path], *, blocks: bool = False
 ) -> list[Path]:
-    """Write the mission and draw the plan; give the files."""
+    """Write the mission and draw the plan; return the files."""
     from mavlink_bridge.cli.kept_files import write_kept  # noqa: PLC0415 - quick help
     from missions.formats import write_mission  # noqa: PLC0415
     from missions.situation import Known, Mission  # noqa: PLC0415
@@ -36,7 +36,7 @@ def write_outputs(
 
 
 def draw(planned: Plan, plots: list[Path], *, title: str | None = None, blocks: bool = False) -> list[Path]:
-    """Draw the plan to files, and to the terminal where ``-`` is among them; give the files."""
+    """Draw the plan to files, and to the terminal where ``-`` is among them; return the files."""
     if not plots:
         return []
     from mavlink_bridge.cli.kept_files import write_kept  # noqa: PLC0415 - quick help
@@ -52,7 +52,7 @@ def draw(planned: Plan, plots: list[Path], *, title: str | None = None, blocks: 
 
 
 def plan_document(planned: Plan) -> dict[str, object]:
-    """Give what the JSON document tells of a plan."""
+    """Return the JSON document of a plan."""
     from missions.fence import CircleZone, PolygonZone, ZoneKind  # noqa: PLC0415 - quick help
 
     fence = planned.fence
@@ -88,7 +88,7 @@ def _finite(value_m: float | None) -> float | None:
 
 
 class Told:
-    """A plan as it is told: warnings, files and pictures, and the report for people; before anything is done with it.
+    """A plan as it is printed: warnings, files and pictures, and the report for people; before anything is done with it.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ class Told:
         self._written: list[Path] = []
 
     def tell(self, planned: Plan, planning_s: float, situation: Situation) -> None:
-        """Tell a plan; a later one is the route made anew."""
+        """Report a plan; a later one is the route made anew."""
         warn(planned.warnings)
         self._written = write_outputs(planned, situation, self._outputs, self._plots, blocks=self._blocks)
         if not self._is_silent:
@@ -121,7 +121,7 @@ class Told:
         self._plan, self._planning_s = planned, planning_s
 
     def document(self) -> dict[str, object]:
-        """Return what the JSON document tells of the newest plan."""
+        """Return the newest plan for the JSON document."""
         assert self._plan is not None
         return {
             **plan_document(self._plan),
@@ -131,13 +131,13 @@ class Told:
 
 
 def arrival_document(arrival: Mapping[str, object] | None) -> dict[str, object]:
-    """Return what the JSON document tells of a drive: the event's data, null where nothing was driven."""
+    """Return a drive for the JSON document: the event's data, null where nothing was driven."""
     names = ("driven_m", "took_s", "least_clearance_m", "breaches")
     return {"arrived": arrival is not None, "drive": arrival and {name: arrival[name] for name in names}}
 
 
 def report_plan(planned: Plan, written: list[Path]) -> None:
-    """Tell people of a plan, and where it was written."""
+    """Print a plan for people, and where it was written."""
     promise = (
         f"{planned.clearance_m:g} m promised while driving"
         if planned.clearance_m is not None
@@ -155,7 +155,7 @@ def report_plan(planned: Plan, written: list[Path]) -> None:
 
 
 def report_end(arrival: Mapping[str, object] | None, backup: Path | None, *, verified: bool) -> None:
-    """Tell people what was done with a plan."""
+    """Print for people what was done with a plan."""
     if verified:
         echo("Uploaded and verified")
     if backup is not None:

@@ -36,7 +36,7 @@ _Told = dict[str, Any]
 MOST_SPEED = 1e6
 """A day of a log in a tenth of a second: faster than any computer."""
 
-MOST_JOBS = 1024
+MOST_JOBS = 1024  # chosen: more processes than any computer has cores are a mistake in typing
 
 
 def replay(
@@ -126,7 +126,7 @@ class _Teller:
         self._begin_s = 0.0
 
     def begin(self, log: Path) -> None:
-        """Tell when a log begins; what is told from now on is of this log."""
+        """Note that a log begins; events that follow belong to it."""
         if self._wants_json or self._is_silent:
             return
         from mavlink_bridge.cli.log_times import log_begin  # noqa: PLC0415 - quick help
@@ -143,7 +143,7 @@ class _Teller:
             echo(f"{prefix}{event['time_s'] - self._begin_s:8.2f} s  {event['event']}: {event['text']}")
 
     def fail(self, log: Path, error: LogError) -> None:
-        """Tell of a log among several that cannot be used; the others are replayed all the same."""
+        """Report that one log of several cannot be used; the others are replayed all the same."""
         if self._wants_json:
             print_json({"log": log.name, "status": "error", "error": "LogError", "message": str(error)})
         say(f"error: {error}", typer.colors.RED)
@@ -155,7 +155,7 @@ _Results = dict[Path, list[_Told] | LogError]
 def _replayed(
     logs: list[Path], orders: Orders, speed: float | None, jobs: int | None, teller: _Teller
 ) -> _Results:
-    """Replay the logs; tell each one's events in the order in which the logs were given."""
+    """Replay the logs; print each one's events in the order in which the logs were given."""
     workers = min(jobs or os.cpu_count() or 1, len(logs))
     pool = None if len(logs) == 1 or speed is not None or workers == 1 else _pool(workers)
     if pool is None:
@@ -164,7 +164,7 @@ def _replayed(
 
 
 def _pool(workers: int) -> ProcessPoolExecutor | None:
-    """Give worker processes; None where there can be none, as in a sandbox without shared memory."""
+    """Return worker processes; None where there can be none, as in a sandbox without shared memory."""
     context = multiprocessing.get_context("spawn")  # a fork would copy the progress bar's thread half alive
     try:
         return ProcessPoolExecutor(workers, mp_context=context)
@@ -177,7 +177,7 @@ def _one_after_the_other(logs: list[Path], orders: Orders, speed: float | None, 
 
     results: _Results = {}
     for log in logs:
-        wait = None if speed is None else _Pace(speed).wait
+        wait = None if speed is None else _PlaySpeed(speed).wait
         told: list[_Told] = []
         try:
             teller.begin(log)
@@ -256,7 +256,7 @@ def _record(results: _Results, *, quiet: bool) -> None:
             echo(f"Wrote {path}")
 
 
-class _Pace:
+class _PlaySpeed:
     """Lets a log's time pass, so many times faster than it did."""
 
     def __init__(self, speed: float) -> None:
@@ -268,14 +268,14 @@ class _Pace:
         time.sleep(max(0.0, self.left_s(elapsed_s)))
 
     def left_s(self, elapsed_s: float) -> float:
-        """Tell how long that is yet."""
+        """Return how long it is until so many of the log's seconds have passed."""
         return self._begun_s + elapsed_s / self._speed - time.monotonic()
 
 
 def _send(
     log: Path, connection: str, speed: float, system: int | None, *, any_vehicle: bool, quiet: bool
 ) -> None:
-    """Play the vehicle's side of a log; what the client sends tells only that it is there."""
+    """Play the vehicle's side of a log; what the client sends shows only that it is there."""
     from mavlink_bridge.link import open_transport, parse_connection  # noqa: PLC0415
     from mavlink_bridge.logbook.playback import vehicle_frames  # noqa: PLC0415
     from mavlink_bridge.mavlink.codec import Codec  # noqa: PLC0415 - quick help
@@ -311,7 +311,7 @@ def _play(
     listen: Callable[[float], bool],
     show: Callable[[str, int, int], None],
 ) -> int:
-    pace = _Pace(speed)
+    pace = _PlaySpeed(speed)
     count = 0
     for elapsed_s, data in _elapsed(frames):
         while (left_s := pace.left_s(elapsed_s)) > 0:
@@ -324,7 +324,7 @@ def _play(
 
 
 def _elapsed(frames: Iterable[tuple[float, bytes]]) -> Iterator[tuple[float, bytes]]:
-    """Give the seconds since the first frame, by a clock that only goes forward."""
+    """Return the seconds since the first frame, by a clock that only goes forward."""
     from mavlink_bridge.logbook import SteadyClock  # noqa: PLC0415 - quick help
 
     clock = SteadyClock()

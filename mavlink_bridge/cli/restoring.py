@@ -81,7 +81,7 @@ def backups_to_restore(store: BackupStore, vehicle: VehicleMark, wanted: Restora
     BackupError
         What an interrupted upload replaced is not known any more.
     UsageError
-        There are none.
+        There is no such backup.
     """
     if wanted.backup is not None:
         if not wanted.for_another:

@@ -1,4 +1,4 @@
-"""What the bridge writes beside what it does: where it cannot be written, that is told once, and the drive goes on."""
+"""What the bridge writes beside what it does: where it cannot be written, one note says so, and the drive goes on."""
 
 from __future__ import annotations
 
@@ -67,12 +67,12 @@ class RunLog:
 
 
 class SafeTeller:
-    """Tells events on the standard output as long as they can be written there.
+    """Prints events on the standard output as long as they can be written there.
 
     Parameters
     ----------
     tell : callable
-        Tells one.
+        Prints one.
     may_end : callable
         Whether the bridge may end where nobody reads any more (``pbpp bridge --json | head``): nothing is under way on the vehicle.
     """
@@ -82,7 +82,7 @@ class SafeTeller:
         self._may_end = may_end
 
     def __call__(self, event: Event) -> None:
-        """Tell an event.
+        """Print an event.
 
         Raises
         ------

@@ -46,7 +46,7 @@ _HEARTBEAT_PATIENCE_S = 5.0
 
 _STREAMS = (6, 2)
 """MAV_DATA_STREAM_POSITION and _EXTENDED_STATUS, which holds GPS_RAW_INT."""
-_STREAM_HZ = 4
+_STREAM_HZ = 4  # positions often enough to follow a drive; chosen, not measured
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +94,7 @@ class Session:
     link : Link
         The open link.
     watch : VehicleWatch
-        What the vehicle told of itself.
+        What the vehicle reported about itself.
     drives_by_us : bool
         Whether it drives because of us, or is about to.
     listeners : list of callable
@@ -145,12 +145,12 @@ class Session:
 
     @property
     def is_active(self) -> bool | None:
-        """Whether it drives its mission in AUTO; None if its last heartbeat is too old to tell."""
+        """Whether it drives its mission in AUTO; None if its last heartbeat is too old."""
         return self.watch.is_active(self.link.now_s())
 
     @property
     def doing(self) -> Doing:
-        """What it does, as last told."""
+        """What it does, as last reported."""
         return self.watch.doing(self.link.now_s())
 
     def at_hand(self, aside: Callable[[], AbstractContextManager[Any]], on_it: Callable[[], str]) -> AtHand:
@@ -204,7 +204,7 @@ class Session:
         self._has_written = self._has_written or getattr(machine, "has_written", False)
 
     def change_mode(self, mode: int) -> None:
-        """Switch the vehicle's mode and wait until its heartbeat says so.
+        """Switch the vehicle's mode and wait until its heartbeat reports it.
 
         Raises
         ------
@@ -252,7 +252,7 @@ class Session:
         )
 
     def listen_until(self, is_enough: Callable[[], bool], for_s: float) -> bool:
-        """Listen until something is so, no longer than a time; give whether it is."""
+        """Listen until a condition holds, no longer than a time; return whether it does."""
         self.link.run(_Listen(for_s), on_frames=self._listen, until=is_enough)
         return is_enough()
 
@@ -278,7 +278,7 @@ class Session:
         self.watch.receive(message, self.link.now_s())
 
     def _take_clash(self) -> None:
-        """End before anything is written; later go on, for what is under way is checked against what the vehicle holds, and say so."""
+        """End before anything is written; later go on, for what is under way is checked against what the vehicle holds, and report it."""
         self._has_clashed = True
         is_going_to_write = not getattr(self._machine, "has_written", True)
         self._is_refused = is_going_to_write and not self._has_written
@@ -301,7 +301,7 @@ class Session:
 
 
 def signing_of(key_file: Path | None) -> Signing | None:
-    """Give the signing that a key file asks for.
+    """Return the signing that a key file asks for.
 
     Raises
     ------

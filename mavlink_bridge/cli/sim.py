@@ -76,7 +76,7 @@ def sim(
 
     `pbpp sim --listen udpout:127.0.0.1:14550 --loss 0.1 --latency 0.2`
     """
-    del quiet  # one line is all there is to tell
+    del quiet  # one line is all there is to print
     import signal  # noqa: PLC0415 - with the other imports below: a usage error need not wait for them
     import threading  # noqa: PLC0415
 

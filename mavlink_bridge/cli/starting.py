@@ -22,11 +22,13 @@ def make_ready(session: Session, *, hold: bool, replace_active: bool) -> None:
     Raises
     ------
     RefusedError
-        It drives its mission, and nobody said what to do about that.
+        It drives its mission, and no option says what to do about that.
     OutcomeError
         It does not go to HOLD.
     """
-    if session.is_active:  # a mission that is complete is not driven: the vehicle may not have told so yet
+    if (
+        session.is_active
+    ):  # a mission that is complete is not driven: the vehicle may not have reported it yet
         session.ask_telemetry()
         session.listen_until(lambda: session.is_active is False, _STATE_PATIENCE_S)
     if not session.is_active:
@@ -46,7 +48,7 @@ def start_driving(session: Session) -> None:
     Raises
     ------
     OutcomeError
-        It is not armed, or tells nothing: its mode was left alone. Or it was disarmed meanwhile.
+        It is not armed, or reports nothing: its mode was left alone. Or it was disarmed meanwhile.
     RefusedError
         It refused AUTO.
     """

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 HELP = "LAT,LON gives a target, yes uploads a plan that waits for it"
 CONFIRM = "type yes to upload the plan, or another target"
 _YES = frozenset({"yes", "y", "go"})
-_MOST_SHOWN = 40
+_MOST_SHOWN = 40  # characters of what was typed, in an answer of one line; chosen
 _LATER = {
     State.LISTENING: "as soon as a vehicle is heard",
     State.LEARNING: "as soon as the vehicle is known",

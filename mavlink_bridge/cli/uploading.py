@@ -1,4 +1,4 @@
-"""Lists and parameters on their way to one vehicle: made ready, locked, backed up, uploaded, verified; and what is said if that breaks off."""
+"""Lists and parameters on their way to one vehicle: made ready, locked, backed up, uploaded, verified; and the message if that breaks off."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ Lists = list[tuple[MissionType, tuple["MissionItem", ...]]]
 
 _LOCK_PATIENCE_S = 5.0
 """Most uploads take less; who waits longer wants to know for whom."""
-_LOCK_LOOK_S = 0.2
+_LOCK_LOOK_S = 0.2  # between attempts at another process's lock; chosen, not measured
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +90,7 @@ class Uploads:
         self._verified: list[str] = []
 
     def begin(self) -> AbstractContextManager[None]:
-        """Lock the vehicle for a block that writes to it; whatever ends the block says what it left on the vehicle.
+        """Lock the vehicle for a block that writes to it; whatever ends the block reports what it left on the vehicle.
 
         Raises
         ------
@@ -232,7 +232,7 @@ def _limits(session: Session, lists: Sequence[tuple[MissionType, tuple[MissionIt
     limits = Limits()
     if not any(limits.problem(items, mission_type) for mission_type, items in lists):
         return limits
-    # ARMING_CHECK is on every vehicle: an answer to it tells a missing parameter from a lossy link.
+    # ARMING_CHECK is on every vehicle: an answer to it distinguishes a missing parameter from a lossy link.
     reading = ReadParameters(session.vehicle, ("ARMING_CHECK", "BRD_SD_MISSION", "BRD_SD_FENCE"))
     session.run(reading, "reading the vehicle's limits")
     return Limits.from_parameters(reading.outcome.values) if reading.outcome else limits

@@ -1,4 +1,4 @@
-"""Numbers and positions in options, each with its range: what is none of them is wrong usage, said before anything is done."""
+"""Numbers and positions in options, each with its range: anything else is wrong usage, refused before anything is done."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def position_from(option: str, text: str) -> LatLon:
     Raises
     ------
     UsageError
-        It is none.
+        Not such a value.
     """
     from missions.errors import InvalidPositionError  # noqa: PLC0415 - quick help
     from missions.geo import parse_lat_lon  # noqa: PLC0415

@@ -1,4 +1,4 @@
-"""Options that say what a vehicle needs: speed, size, how well its position is known, a reserve of the owner's."""
+"""Options for what a vehicle needs: speed, size, how well its position is known, a reserve of the owner's."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def with_vehicle(
 
 
 def with_home_option(situation: Situation, home: str | None) -> Situation:
-    """Let home be where the user says.
+    """Set home to where the user wants it.
 
     Raises
     ------

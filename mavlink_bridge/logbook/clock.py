@@ -26,7 +26,7 @@ LEAST_BEAT_S: Final = 0.1
 
 
 class Pulse:
-    """Tells a log whose clock stands still, by its heartbeats: nothing in it can be timed.
+    """Detects a log whose clock stands still, by its heartbeats: nothing in it can be timed.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Pulse:
 
     @property
     def trouble(self) -> str | None:
-        """Say that the clock stands still; None where it runs."""
+        """Return a message that the clock stands still; None where it runs."""
         if self.beats < LEAST_BEATS or self._elapsed_s >= LEAST_BEAT_S * self.beats:
             return None
         return (
@@ -80,7 +80,7 @@ class SteadyClock:
         self._now_s: float | None = None
 
     def over(self, entries: Iterable[LogEntry]) -> Iterator[tuple[LogEntry, float]]:
-        """Give each entry with the clock's time; looks one entry ahead."""
+        """Return each entry with the clock's time; looks one entry ahead."""
         before: LogEntry | None = None
         for entry in entries:
             if before is not None:
@@ -90,7 +90,7 @@ class SteadyClock:
             yield before, self.advance(before.time_s, None)
 
     def advance(self, time_s: float, next_s: float | None) -> float:
-        """Give the clock's time at a record.
+        """Return the clock's time at a record.
 
         Parameters
         ----------

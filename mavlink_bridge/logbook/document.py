@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def as_document(book: Logbook) -> dict[str, Any]:
-    """Give what ``pbpp log --json`` tells of a log: numbers rounded to what they are worth, times in seconds since its begin."""
+    """Return the document of ``pbpp log --json``: numbers rounded to what they are worth, times in seconds since the log's beginning."""
     return {
         "log": book.name,
         "begins_s": round(book.begins_s, 6),
@@ -90,7 +90,7 @@ def _fence(fence: Fence) -> dict[str, int]:
 
 
 def _plain(value: Any, name: str = "") -> Any:  # noqa: ANN401 - any value of a logbook
-    """Give dataclasses as objects, tuples as lists, numbers rounded (positions not), what is no number as null."""
+    """Return dataclasses as objects, tuples as lists, numbers rounded (positions not), and null for a number that is not finite."""
     if hasattr(value, "__dataclass_fields__"):
         return {field.name: _plain(getattr(value, field.name), field.name) for field in fields(value)}
     if isinstance(value, dict):

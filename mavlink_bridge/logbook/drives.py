@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from missions.vehicle import Vehicle
 
 _HEARTBEAT_S: Final = 1.5
-"""A mode change is told by the next heartbeat: the drive may have begun so long before."""
+"""A mode change is reported by the next heartbeat: the drive may have begun so long before."""
 
-_MOST_RECENT = 64
+_MOST_RECENT = 64  # positions kept; chosen: more than come within `_HEARTBEAT_S` at usual rates
 
 
 class Drives:
@@ -52,7 +52,7 @@ class Drives:
         self._recent.extend(fixes)
 
     def reached(self, seq: int) -> None:
-        """Take notice that a mission item was reached at the latest position."""
+        """Note that a mission item was reached at the latest position."""
         if self._grader is not None:
             self._grader.reached(seq, self._recent[-1].boot_s)
 
@@ -76,7 +76,7 @@ class Drives:
             self._grader.drive(before, clearances_m)
 
     def _from_standing(self, first: Fix) -> list[Fix]:
-        """Give the positions shortly before, from the last at which it stood; none where it still stands or none is known."""
+        """Return the positions shortly before, from the last at which it stood; none where it still stands or none is known."""
         if first.speed_mps <= STANDING_MPS:
             return []
         before = [fix for fix in self._recent if first.time_s - fix.time_s <= _HEARTBEAT_S]

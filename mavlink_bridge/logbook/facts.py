@@ -72,7 +72,7 @@ class Transfer:
 
 @dataclass(frozen=True, slots=True)
 class TargetSeen:
-    """A place somebody sent the vehicle to: by which message, who, and how often it was said within seconds."""
+    """A place somebody sent the vehicle to: by which message, who, and how often it was repeated within seconds."""
 
     time_s: float
     position: LatLon
@@ -83,7 +83,7 @@ class TargetSeen:
 
 @dataclass(frozen=True, slots=True)
 class ModeSpan:
-    """A stretch in one mode, armed or not, as the heartbeats tell."""
+    """A stretch in one mode, armed or not, as the heartbeats report."""
 
     mode: int
     name: str
@@ -164,7 +164,7 @@ class TrackPart:
 
 @dataclass(frozen=True, eq=False)
 class VehicleLog:
-    """What a log tells of one vehicle.
+    """What a log reports of one vehicle.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ class VehicleLog:
     parameters : mapping of str to float
         Those that matter to planning and driving, at the end.
     parameters_seen : int
-        How many parameters the log tells in all.
+        How many parameters the log reports in all.
     driven_m : float
         The track's length, without the wandering of a standing vehicle's position.
     positions, positions_without_fix : int
@@ -185,7 +185,7 @@ class VehicleLog:
     nearest : Nearest or None
         None without a fence, or where it never drove.
     notes : tuple of str
-        What could not be told, and why.
+        What could not be reported, and why.
     """
 
     system: int

@@ -1,6 +1,6 @@
-"""Grading a drive: how near to the fence it came, how far off the mission's lines, how long it took, and what was foreseen.
+"""Grading a drive: how near to the fence it came, how far off the mission's lines, how long it took, and what was predicted.
 
-What is foreseen comes from the drive model (`missions.drive_model`), for the mission as it stood on the vehicle, from where the vehicle was.
+What is predicted comes from the drive model (`missions.drive_model`), for the mission as it stood on the vehicle, from where the vehicle was.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ if TYPE_CHECKING:
     from missions.vehicle import Vehicle
 
 OUTSIDE_M: Final = 0.25
-"""How far outside the foreseen band still counts as within: the vehicle's own estimate of its place is off by as much."""
+"""How far outside the predicted band still counts as within: the vehicle's own estimate of its place is off by as much."""
 
-STANDING_MPS: Final = 0.1
-_LEAST_DRIVEN_M = 1.0
+STANDING_MPS: Final = 0.1  # slower is standing; chosen, not measured
+_LEAST_DRIVEN_M = 1.0  # less is no drive; chosen, not measured
 _PLAIN = frozenset({Command.NAV_WAYPOINT, Command.NAV_DELAY, Command.DO_CHANGE_SPEED})
 _ODD = frozenset(
     {
@@ -46,12 +46,12 @@ _ODD = frozenset(
         Command.CONDITION_DISTANCE,
     }
 )
-"""Commands that change the way or its time as the drive model cannot foresee; so do all navigation commands but plain waypoints."""
+"""Commands that change the way or its time as the drive model cannot predict; so do all navigation commands but plain waypoints."""
 
 
 @dataclass(frozen=True, slots=True)
 class Foreseen:
-    """What the drive model foretells, as far as the vehicle came.
+    """What the drive model predicts, as far as the vehicle came.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ class Grade:
     deviation_m, mean_deviation_m : float
         Off the mission's lines: the farthest, and the mean over all positions.
     outside_m : float or None
-        The farthest outside the band that was foreseen; None where none could be foreseen.
+        The farthest outside the band that was predicted; None where none could be predicted.
     foreseen : Foreseen or None
         None where the mission holds what the drive model does not foretell.
     notes : tuple of str
@@ -118,7 +118,7 @@ class Grade:
 
     @property
     def is_as_foreseen(self) -> bool | None:
-        """Whether the track stayed within the band that was foreseen; None where none could be."""
+        """Whether the track stayed within the band that was predicted; None where none could be."""
         return None if self.outside_m is None else self.outside_m <= OUTSIDE_M
 
 
@@ -133,7 +133,7 @@ class MissionWay(NamedTuple):
 
 
 def way_of(items: Sequence[MissionItem], first_item: int, *, home_first: bool) -> MissionWay:
-    """Give the way that a mission describes from an item on.
+    """Return the way that a mission describes from an item on.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def way_of(items: Sequence[MissionItem], first_item: int, *, home_first: bool) -
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """What a drive is measured in: the plane, the fence where one is known, the vehicle as its parameters say."""
+    """What a drive is measured in: the plane, the fence where one is known, the vehicle by its parameters."""
 
     frame: LocalFrame
     meter: FenceMeter | None
@@ -243,14 +243,14 @@ class DriveGrader:
         self._last = fixes[-1]
 
     def reached(self, seq: int, boot_s: float) -> None:
-        """Take notice that a mission item was reached, by MISSION_ITEM_REACHED."""
+        """Note that a mission item was reached, by MISSION_ITEM_REACHED."""
         if seq in self.way.seqs:
             number = self.way.seqs.index(seq) + 1
             self._tally.reached_s.setdefault(number, boot_s)
             self._tally.farthest = max(self._tally.farthest, number)
 
     def finish(self) -> Grade | None:
-        """Give the grade; None where the vehicle hardly moved."""
+        """Return the grade; None where the vehicle hardly moved."""
         tally, way = self._tally, self.way
         if not tally.fixes or tally.driven_m < _LEAST_DRIVEN_M:
             return None

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 
 def begun(path: Path | str, vehicle: Vehicle) -> Situation:
-    """Return what is known of a vehicle before a log's first frame: its ids, and what the whole log tells of its autopilot.
+    """Return what is known of a vehicle before a log's first frame: its ids, and what the whole log reports of its autopilot.
 
-    How parameters are encoded, and the version, were so before they were told.
+    How parameters are encoded, and the version, were so before they were reported.
     """
     situation = Situation(system=vehicle.system, component=vehicle.component, vehicle_type=vehicle.type)
     for entry in TlogReader(path, {Heartbeat, AutopilotVersion, Statustext}):

@@ -22,7 +22,7 @@ _PATH_PLANNER: Final = 195
 def vehicle_frames(
     path: Path, system: int | None = None, *, any_vehicle: bool = False
 ) -> Iterator[tuple[float, bytes]]:
-    """Give what a log's vehicle and its companions sent, frame by frame: the log's time, and the bytes as recorded.
+    """Return what a log's vehicle and its companions sent, frame by frame: the log's time, and the bytes as recorded.
 
     Frames with a wrong checksum are left out; those of ids foreign to us, whose checksum cannot be checked, are not.
 

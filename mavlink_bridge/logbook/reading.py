@@ -31,7 +31,7 @@ _AUTOPILOT = 1
 
 
 def read_logbook(path: Path, system: int | None = None) -> Logbook:
-    """Tell what a log holds.
+    """Return what a log holds.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def read_logbook(path: Path, system: int | None = None) -> Logbook:
 
 
 def _span(path: Path) -> tuple[float, float, int]:
-    """Give when a log begins, how long it is by a clock that only runs forward, and how often its own was set."""
+    """Return when a log begins, how long it is by a clock that only runs forward, and how often its own was set."""
     begins_s: float | None = None
     last_s = duration_s = 0.0
     jumps = 0
@@ -89,7 +89,7 @@ def _span(path: Path) -> tuple[float, float, int]:
 
 
 def _without_outliers(times_s: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Give lone times that lie off both neighbours the time before."""
+    """Return the times with each lone outlier replaced by the time before it: one that lies off both its neighbours."""
     if len(times_s) > 2:
         before, here, after = times_s[:-2], times_s[1:-1], times_s[2:]
         alone = (np.abs(here - before) > NEAR_S) & (np.abs(after - before) <= NEAR_S)
@@ -98,7 +98,7 @@ def _without_outliers(times_s: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _vehicles(path: Path, system: int | None) -> list[Vehicle]:
-    """Give the vehicles that are heard, one a system: its autopilot."""
+    """Return the vehicles that are heard, one for each system: its autopilot."""
     heard = vehicles_heard(entry.frame for entry in TlogReader(path, {m.Heartbeat}))
     # The last of a system's entries counts: the autopilot's own component where there is one.
     heard.sort(key=lambda vehicle: (vehicle.system, vehicle.component == _AUTOPILOT))
@@ -112,9 +112,9 @@ def _vehicles(path: Path, system: int | None) -> list[Vehicle]:
 
 
 def _first_situations(path: Path, vehicles: list[Vehicle]) -> list[Situation]:
-    """Give what held when the log begins.
+    """Return the situation of each vehicle when the log begins.
 
-    A parameter or home that is told later held before, and so did a fence that is first seen when it is read from the vehicle.
+    A parameter or home that is reported later held before, and so did a fence that is first seen when it is read from the vehicle.
     """
     now = {vehicle.system: begun(path, vehicle) for vehicle in vehicles}
     first = dict(now)

@@ -49,9 +49,9 @@ RECORDED = FOLDED | TRANSFER_TYPES | {m.MissionCurrent, m.MissionItemReached, m.
 """The message types that a recorder looks at."""
 
 _PX4_PREFIXES = ("NAV_ACC_RAD", "RA_", "RD_", "RO_", "GF_")
-_BATCH: Final = 4096
-_MOST_TARGETS, _MOST_INTRUSIONS = 1000, 1000
-_SAME_M, _SAID_AGAIN_S = 0.2, 3.0
+_BATCH: Final = 4096  # positions measured against the fence at once; chosen, it changes no answer
+_MOST_TARGETS, _MOST_INTRUSIONS = 1000, 1000  # the last ones are kept; chosen, bounds memory
+_SAME_M, _SAID_AGAIN_S = 0.2, 3.0  # within both a target is the same one repeated; chosen, not measured
 
 
 class Recorder:
@@ -60,7 +60,7 @@ class Recorder:
     Parameters
     ----------
     situation : Situation
-        What holds from the beginning: the vehicle's ids, what the log tells later but was so before.
+        What holds from the beginning: the vehicle's ids, what the log reports later but was so before.
     """
 
     def __init__(self, situation: Situation) -> None:
@@ -108,7 +108,7 @@ class Recorder:
             self._take_own(frame.message, now_s)
 
     def finish(self, now_s: float) -> VehicleLog:
-        """Give what was noted, at the log's end."""
+        """Return what was noted, at the log's end."""
         self._flush()
         self._drives.end()
         if self._modes:
@@ -204,7 +204,7 @@ class Recorder:
             else mode_name(situation.mode, situation.vehicle_type, ardupilot=situation.ardupilot)
         )
 
-    # What the vehicle tells
+    # What the vehicle reports
 
     def _take_own(self, message: m.Message, now_s: float) -> None:
         if isinstance(message, m.GlobalPositionInt):
@@ -331,7 +331,7 @@ class Recorder:
         points: NDArray[np.float64],
         depths_m: NDArray[np.float64],
     ) -> None:
-        """Note stretches on forbidden ground; a depth of 0 is a line that crossed it from fix to fix, a negative one is none."""
+        """Note stretches on forbidden ground; a depth of 0 is a line that crossed it from fix to fix, a negative one is outside."""
         assert self._meter is not None
         for fix, piece, point, depth_m in zip(fixes, track, points, depths_m.tolist(), strict=True):
             if depth_m < 0:
@@ -355,7 +355,7 @@ def _value(known: Known[T] | None) -> T | None:
 
 
 def _is_other_ground(before: Situation, after: Situation) -> bool:
-    """Tell whether the same fence means other ground now: home or a parameter changed."""
+    """Return whether the same fence means other ground now: home or a parameter changed."""
     if _value(before.home) != _value(after.home):
         return True
     return before.parameters is not after.parameters and any(

@@ -23,11 +23,11 @@ MOVED_M: Final = 0.3
 _JOINED_M, _JOINED_S = 20.0, 3.0
 """Positions farther apart are not joined by a line: between them something is missing."""
 
-_MOST_POINTS: Final = 20_000
+_MOST_POINTS: Final = 20_000  # of a track's parts; chosen, bounds memory and pictures
 
 
 class Fix(NamedTuple):
-    """A position as GLOBAL_POSITION_INT tells it.
+    """A position as GLOBAL_POSITION_INT reports it.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class Fix(NamedTuple):
 
 
 def pieces(fixes: list[Fix], points: NDArray[np.float64]) -> NDArray[np.object_]:
-    """Give the track fix by fix as lines from the one before; as points at the first and where something is missing.
+    """Return the track fix by fix as lines from the one before; as points at the first and where something is missing.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ class FenceMeter:
         return clearances_m, depths_m
 
     def at_points(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Give the clearances of points by themselves."""
+        """Return the clearances of points by themselves."""
         return self.measure(_as_points(points), points)[0]
 
     def zone_near(self, piece: BaseGeometry, point: NDArray[np.float64]) -> str:
@@ -167,7 +167,7 @@ class Odometer:
         self._kept: tuple[float, float] | None = None
 
     def drive(self, mode: str, fixes: list[Fix], points: NDArray[np.float64]) -> float:
-        """Take positions driven in a mode; give how far that was, in metres."""
+        """Take positions driven in a mode; return how far that was, in metres."""
         if not self.parts or self.parts[-1][0] != mode:
             joint = [self.parts[-1][1][-1]] if self.parts else []
             self.parts.append((mode, joint))

@@ -78,7 +78,7 @@ class TransferWatch:
             self._asked(message, sender, now_s)
 
     def finish(self) -> tuple[Transfer, ...]:
-        """Give all transfers in the order of their beginning; what is still open ends here."""
+        """Return all transfers in the order of their beginning; what is still open ends here."""
         for key in list(self._open):
             self._close(key)
         return tuple(sorted(self._finished, key=lambda transfer: transfer.begun_s))
@@ -120,7 +120,7 @@ class TransferWatch:
         key = (kind, way is not Way.READ_BACK)
         known = self._open.get(key)
         if known and (known.way, known.station, known.announced) == (way, station, count) and not known.seen:
-            known.ended_s = now_s  # said again
+            known.ended_s = now_s  # repeated
             return
         self._close(key)
         self._open[key] = _Open(kind, way, station, now_s, now_s, count)
@@ -136,7 +136,7 @@ class TransferWatch:
             self._close((kind, False))
 
     def _reach(self, kind: ListKind, way: Way, station: Sender | None, now_s: float) -> _Open | None:
-        """Give the transfer under way, or one whose announcement was not seen; None for what comes late."""
+        """Return the transfer under way, or one whose announcement was not seen; None for a message that comes late."""
         key = (kind, way is not Way.READ_BACK)
         if key not in self._open:
             if now_s <= self._ended_s.get(key, -math.inf) + _LATE_S:

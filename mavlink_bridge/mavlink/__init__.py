@@ -1,1 +1,1 @@
-"""MAVLink itself: messages, frames to bytes and back, signing, modes, how autopilots store items and tell parameters, who is heard."""
+"""MAVLink itself: messages, frames to bytes and back, signing, modes, how autopilots store items and report parameters, who is heard."""

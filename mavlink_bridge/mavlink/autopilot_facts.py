@@ -1,4 +1,4 @@
-"""What an autopilot tells of itself, put into a situation: whose it is, its version, how it encodes parameters, and those."""
+"""What an autopilot reports about itself, put into a situation: whose it is, its version, how it encodes parameters, and those."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ _BANNER = re.compile(r"(?:ArduRover|APMrover2|Rover) V(\d{1,2})\.(\d{1,2})(?:\.(
 
 
 def with_parameter(situation: Situation, name: str, value: float) -> Situation:
-    """Return the situation with a parameter that was told.
+    """Return the situation with a parameter that was reported.
 
-    What is no number is none of the vehicle's parameters: what was known before stands, and what came is noted.
+    A value that is not a number is not taken: what was known before stands, and what came is noted.
     """
     if not math.isfinite(value):
         if situation.no_numbers.get(name) == str(value):
@@ -36,9 +36,9 @@ def with_parameter(situation: Situation, name: str, value: float) -> Situation:
 
 
 def with_autopilot(situation: Situation, autopilot: int) -> Situation:
-    """Return the situation with what a HEARTBEAT's MAV_AUTOPILOT tells: whose it is, and how that one encodes parameters.
+    """Return the situation with what a HEARTBEAT's MAV_AUTOPILOT reports: whose it is, and how that one encodes parameters.
 
-    ArduPilot always casts whole numbers and PX4 never does, whatever their AUTOPILOT_VERSION says; of others that one counts.
+    ArduPilot always casts whole numbers and PX4 never does, whatever their AUTOPILOT_VERSION claims; for others that one counts.
     """
     ardupilot = autopilot == Autopilot.ARDUPILOTMEGA
     bytewise = situation.bytewise
@@ -50,7 +50,7 @@ def with_autopilot(situation: Situation, autopilot: int) -> Situation:
 
 
 def with_version(situation: Situation, message: AutopilotVersion) -> Situation:
-    """Return the situation with what AUTOPILOT_VERSION tells."""
+    """Return the situation with what AUTOPILOT_VERSION reports."""
     bytewise = situation.bytewise
     if bytewise is None:
         bytewise = bool(message.capabilities & Capability.PARAM_ENCODE_BYTEWISE)
@@ -60,7 +60,7 @@ def with_version(situation: Situation, message: AutopilotVersion) -> Situation:
 
 
 def with_banner(situation: Situation, text: str) -> Situation:
-    """Return the situation with the version that ArduPilot's banner tells, "ArduRover V4.5.7 (0358a9c2)"."""
+    """Return the situation with the version that ArduPilot's banner reports, "ArduRover V4.5.7 (0358a9c2)"."""
     found = _BANNER.match(text)
     if found is None:
         return situation

@@ -45,7 +45,7 @@ class Callers(Generic[SourceT]):
         self._callers: dict[SourceT, _Caller] = {}
 
     def heard(self, source: SourceT, now_s: float) -> None:
-        """Take notice that MAVLink came from a source."""
+        """Note that MAVLink came from a source."""
         self._forget(now_s)
         caller = self._callers.get(source)
         if caller is not None:

@@ -138,7 +138,7 @@ class Codec:
         self._packer.srcSystem, self._packer.srcComponent = identity
 
     def encode(self, message: Message) -> bytes:
-        """Give the bytes of one MAVLink 2 frame and count the sequence number up."""
+        """Return the bytes of one MAVLink 2 frame and count the sequence number up."""
         if self._signing is not None:
             self._packer.signing.timestamp = self._signing.next_timestamp()
         packed: bytes = _to_dialect(message).pack(self._packer)
@@ -149,7 +149,7 @@ class Codec:
         return packed
 
     def decode(self, data: bytes) -> list[Frame]:
-        """Take received bytes; give the complete frames of known types in them, damaged ones left out."""
+        """Take received bytes; return the complete frames of known types in them, damaged ones left out."""
         return [frame for _, frame in self.decode_with_bytes(data) if frame is not None]
 
     def decode_with_bytes(self, data: bytes, source: Hashable = None) -> list[tuple[bytes, Frame | None]]:

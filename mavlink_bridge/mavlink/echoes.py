@@ -1,6 +1,6 @@
 """What was sent lately, so that an echo of it is not taken for somebody else with our ids.
 
-A half-duplex radio, a hub that repeats to everybody, or somebody who reflects what he hears: what comes back byte for byte as we sent it tells
+A half-duplex radio, a hub that repeats to everybody, or somebody who reflects what he hears: what comes back byte for byte as we sent it shows
 nothing about anybody else, whatever it says and whether it is signed or not.
 """
 
@@ -30,7 +30,7 @@ class SentFrames:
         return frame in self._frames
 
     def remember(self, frame: bytes) -> None:
-        """Take notice of a frame that is sent now."""
+        """Note a frame that is sent now."""
         self._frames.pop(frame, None)  # its number comes round every 256 frames: it is as young as this one
         self._frames[frame] = None
         if len(self._frames) > self._most:

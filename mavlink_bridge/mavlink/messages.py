@@ -457,7 +457,7 @@ class PositionTargetGlobalInt(Message):
 
 @dataclass(frozen=True, slots=True)
 class AutopilotVersion(Message):
-    """AUTOPILOT_VERSION (148); a version is major, minor, patch and type, a byte each from the top, and ids of 0 are not told."""
+    """AUTOPILOT_VERSION (148); a version is major, minor, patch and type, a byte each from the top, and ids of 0 are unknown."""
 
     capabilities: int
     flight_sw_version: int = 0
@@ -531,7 +531,7 @@ class Frame:
 
 
 def wire_name(message_class: type[Message]) -> str:
-    """Give the MAVLink name of a message class: ``MissionItemInt`` is ``MISSION_ITEM_INT``."""
+    """Return the MAVLink name of a message class: ``MissionItemInt`` is ``MISSION_ITEM_INT``."""
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", message_class.__name__).upper()
 
 

@@ -27,11 +27,11 @@ _PX4_AUTO: Final = {
     8: "FOLLOW",
     9: "PRECLAND",
 }
-_PX4_AUTO_MAIN, _PX4_MISSION = 4, 4
+_PX4_AUTO_MAIN, _PX4_MISSION = 4, 4  # PX4_CUSTOM_MAIN_MODE_AUTO, PX4_CUSTOM_SUB_MODE_AUTO_MISSION
 
 
 def mode_name(mode: int, mav_type: int | None, *, ardupilot: bool | None) -> str:
-    """Give a mode's name, or its number where the vehicle's modes are not known here.
+    """Return a mode's name, or its number where the vehicle's modes are not known here.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def mode_name(mode: int, mav_type: int | None, *, ardupilot: bool | None) -> str
 
 
 def drives_mission(mode: int | None, mav_type: int | None, *, ardupilot: bool | None) -> bool:
-    """Tell whether a mode drives the mission: AUTO, on PX4 AUTO.MISSION."""
+    """Return whether a mode drives the mission: AUTO, on PX4 AUTO.MISSION."""
     if mode is None:
         return False
     if ardupilot is False:

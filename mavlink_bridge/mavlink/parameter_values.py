@@ -17,12 +17,12 @@ _WHOLE_NUMBERS = {1: "<Bxxx", 2: "<bxxx", 3: "<Hxx", 4: "<hxx", 5: "<I", 6: "<i"
 
 
 def parameter_value(message: ParamValue, *, bytewise: bool) -> float:
-    """Return the value that a PARAM_VALUE tells; it may be no number.
+    """Return the value of a PARAM_VALUE; it may be no number.
 
     Parameters
     ----------
     message : ParamValue
-        What the vehicle said.
+        The message.
     bytewise : bool
         Whether its autopilot sends whole numbers as bits.
     """

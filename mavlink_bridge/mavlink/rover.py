@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+# HEARTBEAT.custom_mode of ArduPilot Rover (ROVER_MODE in ardupilotmega.xml).
 AUTO_MODE = 10
 HOLD_MODE = 4
 LOITER_MODE = 5
@@ -34,7 +35,7 @@ _MOST_MODE = 0xFFFFFFFF
 
 
 def mode_name(mode: int | None) -> str:
-    """Return a mode's name; its number, said to be unknown, where Rover has no such mode."""
+    """Return a mode's name; its number, marked as unknown, where Rover has no such mode."""
     if mode is None:
         return "another mode"
     return MODE_NAMES.get(mode, f"mode {mode} (unknown)")

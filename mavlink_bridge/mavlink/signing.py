@@ -20,13 +20,15 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+# MAVLink 2 message signing, as its guide defines it: key, frame flag, signature block, time in 10 µs since 2015.
 KEY_BYTES = 32
-_MOST_FILE_BYTES = 4096
+_MOST_FILE_BYTES = 4096  # chosen: longer than any passphrase; a wrong file is not read whole
 _MAVLINK_2 = 0xFD
 _FLAG_SIGNED = 1
 _SIGNATURE_BYTES = 13
 _EPOCH_2015_S = 1_420_070_400
 _TICKS_PER_S = 100_000
+# A sender not heard before may be a minute behind, as the signing guide has it.
 _NEW_STREAM_BEHIND_TICKS = 60 * _TICKS_PER_S
 
 
@@ -59,7 +61,7 @@ class SigningKey:
 
     @classmethod
     def from_passphrase(cls, passphrase: str) -> SigningKey:
-        """Give the key of a passphrase, as MAVProxy and Mission Planner make it: its SHA-256."""
+        """Return the key of a passphrase, as MAVProxy and Mission Planner make it: its SHA-256."""
         return cls(hashlib.sha256(passphrase.encode()).digest())
 
     @classmethod
@@ -95,11 +97,11 @@ class SigningKey:
         return cls(decoded) if len(decoded) == KEY_BYTES else cls.from_passphrase(text)
 
     def signature(self, signed_bytes: bytes) -> bytes:
-        """Give the 6 signature bytes of a frame without them."""
+        """Return the 6 signature bytes of a frame without them."""
         return hashlib.sha256(self._secret + signed_bytes).digest()[:6]
 
     def hand_to(self, take: Callable[[bytes], None]) -> None:
-        """Give the secret to the packer."""
+        """Set the secret on the packer."""
         take(self._secret)
 
 
@@ -111,7 +113,7 @@ class Signing:
     key : SigningKey
         The shared secret.
     clock : callable
-        Gives the time in seconds since 1970 (`time.time`).
+        Returns the time in seconds since 1970 (`time.time`).
     link_id : int
         Our link's number.
     """
@@ -124,16 +126,16 @@ class Signing:
         self._streams: dict[tuple[int, int, int], int] = {}
 
     def next_timestamp(self) -> int:
-        """Give the timestamp for the next frame: the clock's, and always later than any before."""
+        """Return the timestamp for the next frame: the clock's, and always later than any before."""
         self._ticks = max(self._ticks + 1, self._clock_ticks())
         return self._ticks
 
     def sent(self, frame: bytes) -> None:
-        """Take notice of a signed frame of ours: nothing as old in our own stream is news, however late it comes back."""
+        """Note a signed frame of ours: nothing as old in our own stream is news, however late it comes back."""
         self._streams[_stream(frame)] = _ticks(frame)
 
     def accepts(self, frame: bytes) -> bool:
-        """Tell whether a received frame is signed with our key and not a replay; an accepted one is remembered."""
+        """Return whether a received frame is signed with our key and not a replay; an accepted one is remembered."""
         if len(frame) < _SIGNATURE_BYTES or frame[0] != _MAVLINK_2 or not frame[2] & _FLAG_SIGNED:
             return False
         if not hmac.compare_digest(self.key.signature(frame[:-6]), frame[-6:]):

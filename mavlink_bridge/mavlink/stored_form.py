@@ -216,7 +216,7 @@ def _brief(item: MissionItem) -> str:
 
 
 def is_same_item(a: MissionItem, b: MissionItem, mission_type: MissionType, *, coarse: bool = False) -> bool:
-    """Tell whether two items are the same once stored; ``coarse`` compares positions as 32-bit floats carry them."""
+    """Return whether two items are the same once stored; ``coarse`` compares positions as 32-bit floats carry them."""
     if a == b:
         return True
     stored_a, stored_b = _stored(a, mission_type), _stored(b, mission_type)
@@ -240,7 +240,7 @@ def differences(
     *,
     coarse: bool = False,
 ) -> tuple[Difference, ...]:
-    """Give the items in which a list as read back differs from the one wanted, home left out.
+    """Return the items in which a list as read back differs from the one wanted, home left out.
 
     A mission of only the home item is an empty mission.
     """
@@ -263,7 +263,7 @@ def is_unfinished_write(
     *,
     coarse: bool = False,
 ) -> bool:
-    """Tell whether a list can be what an abandoned upload of ``new`` over ``old`` leaves: the old cut short, overwritten from the front.
+    """Return whether a list can be what an abandoned upload of ``new`` over ``old`` leaves: the old cut short, overwritten from the front.
 
     ArduPilot cuts a mission to the shorter length at MISSION_COUNT and then writes each item as it comes.
     """
@@ -307,7 +307,8 @@ def _has_none(stored: _StoredItem) -> bool:
 
 
 def _is_near(a_m: float, b_m: float) -> bool:
-    """Tell whether two altitudes can be the same whole number of centimetres, cut or rounded."""
+    """Return whether two altitudes can be the same whole number of centimetres, cut or rounded."""
     if not (math.isfinite(a_m) and math.isfinite(b_m)):
         return str(a_m) == str(b_m)
+    # Cut and rounded differ by at most 1.5 cm; the share is what 32-bit floats lose.
     return abs(a_m - b_m) < 0.0151 + 1e-6 * abs(a_m)

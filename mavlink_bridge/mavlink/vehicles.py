@@ -27,7 +27,7 @@ class Vehicle(NamedTuple):
 
 
 def vehicles_heard(frames: Iterable[Frame]) -> list[Vehicle]:
-    """Give the vehicles (not ground stations, companions or other components) that sent a HEARTBEAT, in order of system id."""
+    """Return the vehicles (not ground stations, companions or other components) that sent a HEARTBEAT, in order of system id."""
     return sorted(
         {
             Vehicle(frame.system, frame.component, frame.message.type)
@@ -38,7 +38,7 @@ def vehicles_heard(frames: Iterable[Frame]) -> list[Vehicle]:
 
 
 def is_vehicle(heartbeat: m.Heartbeat) -> bool:
-    """Tell whether a HEARTBEAT is an autopilot's."""
+    """Return whether a HEARTBEAT is an autopilot's."""
     return heartbeat.autopilot != m.Autopilot.INVALID and heartbeat.type != m.MavType.GCS
 
 
@@ -48,7 +48,7 @@ def choose_vehicle(heard: Sequence[Vehicle], system: int | None, *, any_vehicle:
     Raises
     ------
     VehicleNotFoundError
-        Nobody fits, or several do and no system id was given; says who was heard.
+        Nobody fits, or several do and no system id was given; the message names who was heard.
     """
     names = ", ".join(f"system {v.system} (MAV_TYPE {v.type})" for v in heard)
     fitting = [v for v in heard if system in (None, v.system)]

@@ -1,6 +1,6 @@
 """Asking a vehicle which one it is: AUTOPILOT_VERSION, whose uid no other board has.
 
-Asked for by REQUEST_MESSAGE, and in turn by the older REQUEST_AUTOPILOT_CAPABILITIES. Not every vehicle tells it, and nothing waits long for it:
+Asked for by REQUEST_MESSAGE, and in turn by the older REQUEST_AUTOPILOT_CAPABILITIES. Not every vehicle reports it, and nothing waits long for it:
 a vehicle without a uid is known again by how it was connected.
 """
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.mavlink.messages import Frame
     from mavlink_bridge.protocol.peer import Peer
 
-_ASK_AGAIN_S = 0.7
+_ASK_AGAIN_S = 0.7  # above the round trip of most links; chosen, not measured
 VERSION_PATIENCE_S = 5.0
 """At 40 % loss each way eight questions leave one vehicle in forty unknown."""
 _MOST_EMPTY_GRANTS = 2
@@ -45,7 +45,7 @@ class AskVersion(TableMachine[VersionState, VersionEvent]):
     Attributes
     ----------
     version : AutopilotVersion or None
-        What it told; None while it runs, and where nothing came.
+        What it reported; None while it runs, and where nothing came.
     """
 
     def __init__(self, peer: Peer) -> None:
@@ -92,7 +92,7 @@ class AskVersion(TableMachine[VersionState, VersionEvent]):
             self._take_ack(message, now_s)
 
     def handle_timer(self, now_s: float) -> None:
-        """Take notice that time has passed."""
+        """Do what is due by now."""
         if self.state is not VersionState.ASKING:
             return
         if now_s >= self._give_up_s:

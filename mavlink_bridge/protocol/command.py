@@ -14,11 +14,12 @@ if TYPE_CHECKING:
     from mavlink_bridge.mavlink.messages import CommandInt, Frame
     from mavlink_bridge.protocol.peer import Peer
 
+# Chosen: at 40 % loss each way six sends leave 7 commands of 100 unanswered.
 _SEND_AGAIN_S = 1.0
 _MOST_SENDS = 6
-_PROGRESS_PATIENCE_S = 10.0
-_PROGRESS_UNKNOWN = 255
-_MOST_S = 60.0  # however long the vehicle says that it is at it: nothing that is sent here takes longer
+_PROGRESS_PATIENCE_S = 10.0  # since the last report of progress
+_PROGRESS_UNKNOWN = 255  # UINT8_MAX, as COMMAND_ACK.progress is defined
+_MOST_S = 60.0  # however long the vehicle reports progress: nothing that is sent here takes longer
 _RESULTS = {int(result): result for result in MavResult}
 
 
@@ -77,7 +78,7 @@ class SendCommand(TableMachine[CommandState, CommandEvent]):
 
     @property
     def progress(self) -> tuple[int, int]:
-        """Percent done, as far as the vehicle tells."""
+        """Percent done, as far as the vehicle reports."""
         return (100, 100) if self.is_done else (self._percent, 100)
 
     @property
@@ -107,7 +108,7 @@ class SendCommand(TableMachine[CommandState, CommandEvent]):
             self._take_ack(message, now_s)
 
     def handle_timer(self, now_s: float) -> None:
-        """Take notice that time has passed."""
+        """Do what is due by now."""
         if self.is_done or self.state is CommandState.IDLE or now_s < self._deadline_s:
             return
         if self.state is CommandState.SENT and self._sends < _MOST_SENDS:

@@ -24,17 +24,20 @@ FIRST_WINDOW = 50
 WINDOW = 100
 """Requests in flight: ArduPilot is fastest with 50 to 100 and loses requests at 500."""
 
+# Of silence (a vehicle gives up after 8 s), and of a rival station that keeps the list (docs/transfers.md, "Patience").
 PATIENCE_S = 10.0
 RIVAL_PATIENCE_S = 30.0
-_ASK_AGAIN_S = 0.5
-_RIVAL_AGAIN_S = 1.0
-_REFUSALS_BELIEVED = 3
-_STALE_PATIENCE_S = 30.0
+_ASK_AGAIN_S = 0.5  # for the list's length, and to check it; chosen, not measured
+_RIVAL_AGAIN_S = 1.0  # after DENIED; chosen, not measured
+_REFUSALS_BELIEVED = 3  # alike, as one may be a late copy; chosen, not measured
+_STALE_PATIENCE_S = 30.0  # a refusal about items may answer a transfer before; chosen, not measured
 _OUT_OF_ORDER = (MissionResult.ERROR, MissionResult.INVALID_SEQUENCE)
-_OVERTAKEN_BY = 3
+_OVERTAKEN_BY = 3  # so many later answers mean lost, not reordered; chosen, not measured
+# The old request is tried after so long without an answer to the exact one. Chosen, not measured.
 _FLOAT_FORM_AFTER_S = 6.0
 _DOUBT_S = 8.0
 """So long the exact form is asked for before a list in the old form is believed: it may only have been lost."""
+# Bounds of the timeout that the measured round trip gives. Chosen, not measured.
 _LEAST_OVERDUE_S = 0.15
 _MOST_OVERDUE_S = 2.0
 
@@ -89,7 +92,7 @@ class DownloadOutcome:
 
 
 @dataclass(slots=True)
-class _Request:
+class _ItemRequest:
     order: int
     sent_s: float
     is_repeat: bool
@@ -137,7 +140,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         self._count = 0
         self._most_count = 0
         self._items: dict[int, MissionItem] = {}
-        self._in_flight: dict[int, _Request] = {}  # in order of sending
+        self._in_flight: dict[int, _ItemRequest] = {}  # in order of sending
         self._next = 0
         self._orders = 0
         self._newest_answered = 0
@@ -222,7 +225,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
             self._take_ack(message.type, now_s)
 
     def handle_timer(self, now_s: float) -> None:
-        """Take notice that time has passed."""
+        """Do what is due by now."""
         if self.is_done or self.state is DownloadState.IDLE:
             return
         self._ended_s = now_s
@@ -404,7 +407,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
 
     def _request(self, seq: int, now_s: float, *, is_repeat: bool) -> None:
         self._orders += 1
-        self._in_flight[seq] = _Request(self._orders, now_s, is_repeat)
+        self._in_flight[seq] = _ItemRequest(self._orders, now_s, is_repeat)
         message_class = messages.MissionRequest if self._float_form else messages.MissionRequestInt
         self._send(message_class(self._peer.system, self._peer.component, seq, int(self._mission_type)))
 
@@ -424,7 +427,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         self._repeat(overtaken, now_s)
 
     def _overdue_at_s(self) -> float:
-        """Give the time at which the oldest request counts as lost: long after it and after anything that came since."""
+        """Return the time at which the oldest request counts as lost: long after it and after anything that came since."""
         overdue_s = self._round_trip.timeout_s(_LEAST_OVERDUE_S, _MOST_OVERDUE_S)
         oldest = next(iter(self._in_flight.values()))
         return max(oldest.sent_s, self._heard_s) + overdue_s

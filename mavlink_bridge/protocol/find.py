@@ -112,7 +112,7 @@ class FindVehicle(TableMachine[FindState, FindEvent]):
             self._until_s = now_s + LISTEN_S
 
     def handle_timer(self, now_s: float) -> None:
-        """Take notice that time has passed."""
+        """Do what is due by now."""
         if not self.is_done and self.state is not FindState.IDLE and now_s >= self._until_s:
             self._choose(FindEvent.TIME_IS_UP, now_s)
 
@@ -137,7 +137,7 @@ class FindVehicle(TableMachine[FindState, FindEvent]):
             self.trouble = identity_taken(identity)
 
     def _unheard(self) -> VehicleNotFoundError:
-        """Say that no vehicle was heard, and whether anybody else was: that is another trouble than a dead line."""
+        """Return the error for a vehicle not heard; it notes whether anybody else was heard, which is another trouble than a dead line."""
         within = f"no vehicle's HEARTBEAT was heard within {self._patience_s:g} s"
         if not self._senders:
             return VehicleNotFoundError(f"{within}, nor anything else", advice=_SILENT_ADVICE)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from missions.items import MissionItem
 
-_SD_FENCE_ITEMS = 4096
+_SD_FENCE_ITEMS = 4096  # measured on ArduPilot Rover 4.7.0-dev, with storage on an SD card
 _POLYGON = frozenset({Command.FENCE_POLYGON_VERTEX_INCLUSION, Command.FENCE_POLYGON_VERTEX_EXCLUSION})
 _CIRCLE = frozenset({Command.FENCE_CIRCLE_INCLUSION, Command.FENCE_CIRCLE_EXCLUSION})
 
@@ -38,7 +38,7 @@ class Limits:
 
     @classmethod
     def from_parameters(cls, parameters: Mapping[str, float]) -> Limits:
-        """Give a vehicle's limits from its parameters: BRD_SD_MISSION and BRD_SD_FENCE are storage on the SD card, in KB."""
+        """Return a vehicle's limits from its parameters: BRD_SD_MISSION and BRD_SD_FENCE are storage on the SD card, in KB."""
         limits = cls(mission_items=most_items(parameters))
         fence_bytes = sd_card_bytes(parameters, "BRD_SD_FENCE")
         if fence_bytes > 0:
@@ -48,7 +48,7 @@ class Limits:
         return limits
 
     def problem(self, items: Sequence[MissionItem], mission_type: MissionType) -> str | None:
-        """Say why a list does not fit; None if it does."""
+        """Return why a list does not fit; None if it does."""
         most = {MissionType.MISSION: self.mission_items, MissionType.FENCE: self.fence_items}.get(
             mission_type
         )
@@ -60,15 +60,16 @@ class Limits:
 
 
 def fence_bytes(items: Sequence[MissionItem]) -> int:
-    """Give the storage a fence needs on ArduPilot, in bytes."""
+    """Return the storage a fence needs on ArduPilot, in bytes."""
     vertices = [item for item in items if item.command in _POLYGON]
     polygons = sum(1 / item.params[0] for item in vertices if item.params[0] >= 1)
     circles = sum(item.command in _CIRCLE for item in items)
     return_points = sum(item.command == Command.FENCE_RETURN_POINT for item in items)
+    # As measured on ArduPilot Rover 4.7.0-dev: 672 bytes hold one polygon of 83 vertices, 25 triangles or 51 circles.
     return 4 + 2 * round(polygons) + 8 * len(vertices) + 13 * circles + 9 * return_points
 
 
 def limit_in_text(text: str) -> int | None:
-    """Read the item limit from ArduPilot's STATUSTEXT "Only 655 items are supported"; None if it says nothing of it."""
+    """Read the item limit from ArduPilot's STATUSTEXT "Only 655 items are supported"; None if it holds no limit."""
     found = re.search(r"Only (\d+) items are supported", text)
     return int(found[1]) if found else None

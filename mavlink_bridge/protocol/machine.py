@@ -40,9 +40,9 @@ class Machine(Protocol):
         ...
 
     def handle_timer(self, now_s: float) -> None:
-        """Take notice that time has passed; harmless when called early or twice."""
+        """Do what is due by now; harmless when called early or twice."""
         ...
 
     def messages_to_send(self) -> list[Message]:
-        """Give and forget what is to be sent now, in order."""
+        """Return what is to be sent now, in order, and forget it."""
         ...

@@ -1,6 +1,6 @@
-"""Outcomes of transfers in words: what people are told, and which error it is.
+"""Outcomes of transfers in words: the messages for people, and which error it is.
 
-However an upload ends, by its own outcome, a broken link, an interrupt, or a defect of ours, `end_of_upload` says what may be on the vehicle
+However an upload ends, by its own outcome, a broken link, an interrupt, or a defect of ours, `end_of_upload` reports what may be on the vehicle
 and where the old list lies. Every shell that writes lists passes what ended it through there.
 """
 
@@ -116,7 +116,7 @@ def ends_in_words(
     verified: Sequence[str] = (),
     last_words: Callable[[], None] = lambda: None,
 ) -> Iterator[None]:
-    """Run a block that writes lists to a vehicle; whatever ends it before its time ends as `end_of_upload` says.
+    """Run a block that writes lists to a vehicle; whatever ends it before its time ends as in `end_of_upload`.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How long a transfer may take: so that every machine ends, whatever the vehicle does, and says beforehand when.
+"""How long a transfer may take: so that every machine ends, whatever the vehicle does, and it is known beforehand when.
 
 A transfer has `ALLOWANCE_S` in hand. Time takes from it, each new item gives a second back, never beyond what there was at first. So a
 vehicle that sends nothing new is left after that long, one that sends less than an item a second soon after, and a list of n items takes no
@@ -50,7 +50,7 @@ class Pace:
         self._stalls_at_s = now_s + ALLOWANCE_S
 
     def advance(self, done: int, now_s: float) -> None:
-        """Take notice of how many items are done; what was done once before gives nothing back."""
+        """Note how many items are done; what was done once before gives nothing back."""
         if done > self._done:
             self._stalls_at_s = min(self._stalls_at_s + (done - self._done), now_s + ALLOWANCE_S)
             self._done = done

@@ -2,7 +2,7 @@
 
 ArduPilot sends every parameter as a 32-bit float, whole numbers too. It does not answer when asked for a parameter it does not have:
 a name counts as missing when it was asked for so often that, as the link loses messages, an answer would have come. A question counts
-only where the vehicle has answered a later one: a link or a vehicle that stands still for a while tells nothing of its parameters. So
+only where the vehicle has answered a later one: a link or a vehicle that stands still for a while shows nothing of its parameters. So
 that there is a later one, a parameter that is there is asked for again after each repeated question.
 """
 
@@ -25,20 +25,21 @@ if TYPE_CHECKING:
     from mavlink_bridge.mavlink.messages import Frame
     from mavlink_bridge.protocol.peer import Peer
 
-WINDOW = 20
-PATIENCE_S = 10.0
+WINDOW = 20  # requests in flight; chosen, not measured
+PATIENCE_S = 10.0  # of silence, as for lists
 REAL32 = 9
 """MAV_PARAM_TYPE_REAL32."""
 
-_LIST_AGAIN_S = 1.5
-_QUIET_S = 1.0
-_SET_AGAIN_S = 0.7
-_ANSWERS_BELIEVED = 3
+_LIST_AGAIN_S = 1.5  # without anything of the list; chosen, not measured
+_QUIET_S = 1.0  # after the last of the stream: what it left out is asked for; chosen, not measured
+_SET_AGAIN_S = 0.7  # above the round trip of most links; chosen, not measured
+_ANSWERS_BELIEVED = 3  # with another value, as one may answer somebody else; chosen, not measured
+# Bounds of the measured round trip's timeout, and of the questions until a name is missing. Chosen, not measured.
 _LEAST_OVERDUE_S, _MOST_OVERDUE_S = 0.2, 2.0
 _LEAST_TRIES, _MOST_TRIES = 3, 14
 _PATIENT_ROUNDS = 2  # of repeated questions without any answer, until they are asked ever more seldom
 _WRONGLY_MISSING = 1e-4  # how likely a parameter may be called missing that is there
-_NO_INDEX = 65535
+_NO_INDEX = 65535  # UINT16_MAX: PARAM_VALUE.param_index outside a list
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +102,7 @@ class ReadParameters(TableMachine[ParameterState, ParameterEvent]):
         self._waiting: list[str | int] = []  # in reverse order
         self._asks: dict[str | int, _Ask] = {}  # in order of sending
         self._missing: list[str | int] = []
-        self._round_trip = RoundTrip(0.3)
+        self._round_trip = RoundTrip(0.3)  # seconds taken until one is measured; chosen
         self._answered = 0
         self._answered_tries = 0
         self._sent = 0
@@ -190,7 +191,7 @@ class ReadParameters(TableMachine[ParameterState, ParameterEvent]):
             self._no_numbers[name] = str(value)
 
     def handle_timer(self, now_s: float) -> None:
-        """Take notice that time has passed."""
+        """Do what is due by now."""
         if self.is_done or self.state is ParameterState.IDLE:
             return
         if now_s >= self._heard_s + PATIENCE_S or self._pace.is_over(now_s):
@@ -297,7 +298,7 @@ class ReadParameters(TableMachine[ParameterState, ParameterEvent]):
             self._ask_control()
 
     def _tries_enough(self) -> int:
-        """Give how often one must ask until an unanswered name is a missing one, judged by what others needed."""
+        """Return how often to ask until an unanswered name is a missing one, judged by what others needed."""
         if not self._answered:
             return _MOST_TRIES
         failures = (max(self._answered_tries - self._answered, 0) + 1) / (self._answered_tries + 4)
@@ -313,7 +314,7 @@ class SetParameterOutcome:
     name : str
         Which one.
     value : float, optional
-        What the vehicle holds now, by its own word; None if it never answered (unknown name, or silence).
+        What the vehicle holds now, as it reported; None if it never answered (unknown name, or silence).
     is_confirmed : bool
         Whether that is what was wanted.
     """
@@ -324,7 +325,7 @@ class SetParameterOutcome:
 
 
 class SetParameter(TableMachine[ParameterState, ParameterEvent]):
-    """Sets one parameter and waits for the vehicle to say so; the outcome is None until `is_done`.
+    """Sets one parameter and waits for the vehicle to confirm it; the outcome is None until `is_done`.
 
     Parameters
     ----------
@@ -398,7 +399,7 @@ class SetParameter(TableMachine[ParameterState, ParameterEvent]):
                 self._move(ParameterEvent.GIVEN_UP)
 
     def handle_timer(self, now_s: float) -> None:
-        """Take notice that time has passed."""
+        """Do what is due by now."""
         if self.state is not ParameterState.SETTING:
             return
         if now_s >= self._give_up_s:
@@ -414,7 +415,7 @@ class SetParameter(TableMachine[ParameterState, ParameterEvent]):
 
 
 def _float32(value: float) -> float:
-    """Give the value as it goes over the wire."""
+    """Return the value as it goes over the wire."""
     try:
         return float(struct.unpack("<f", struct.pack("<f", value))[0])
     except OverflowError:

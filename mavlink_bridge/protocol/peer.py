@@ -23,7 +23,7 @@ class Peer:
     Raises
     ------
     ValueError
-        Both ends are the same: our own echoes could not be told from answers.
+        Both ends are the same: our own echoes could not be distinguished from answers.
     """
 
     system: int
@@ -36,7 +36,7 @@ class Peer:
             raise ValueError(f"we cannot talk to ourselves ({self.system}/{self.component})")
 
     def accepts(self, frame: Frame, mission_type: MissionType | None = None) -> bool:
-        """Tell whether a frame comes from the peer, is meant for us or for everyone, and has the mission type asked for.
+        """Return whether a frame comes from the peer, is meant for us or for everyone, and has the mission type asked for.
 
         Messages without a target or without a mission type pass those parts of the test.
         """

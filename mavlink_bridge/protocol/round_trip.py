@@ -49,5 +49,5 @@ class RoundTrip:
         self._mean_s += (sample_s - self._mean_s) / 8
 
     def timeout_s(self, least_s: float, most_s: float) -> float:
-        """Give the time after which an answer is overdue."""
+        """Return the time after which an answer is overdue."""
         return min(max(self._mean_s + 4 * self._variation_s, least_s), most_s)

@@ -31,7 +31,7 @@ def check_items(
 ) -> None:
     """Refuse a list that cannot be sent as it is.
 
-    Numbers that are none (NaN) pass: ground stations write them for "not set", and the vehicle refuses them where it wants one. Infinite ones
+    NaN passes: ground stations write them for "not set", and the vehicle refuses them where it wants one. Infinite ones
     mean nothing in any field.
 
     Parameters
@@ -46,7 +46,7 @@ def check_items(
     Raises
     ------
     MissionFormatError
-        Says which item and field, and what MAVLink carries there.
+        A number cannot be sent; the message names item and field, and what MAVLink carries there.
     """
     name = mission_type.name.lower()
     if len(items) > _MOST_ITEMS:
@@ -70,7 +70,7 @@ def check_parameters(parameters: Mapping[str, float]) -> None:
     Raises
     ------
     MissionFormatError
-        Says which one and why.
+        One cannot be sent; the message names it and says why.
     """
     for name, value in parameters.items():
         problem = None
@@ -105,7 +105,7 @@ def _misfit(item: MissionItem, *, allow_infinite: bool) -> tuple[str, float, str
 
 
 def _is_float32(value: float) -> bool:
-    """Tell whether a number is within the range of 32-bit floats; NaN and the infinities are among them."""
+    """Return whether a number is within the range of 32-bit floats; NaN and the infinities are among them."""
     try:
         struct.pack("<f", value)
     except OverflowError:

@@ -15,12 +15,12 @@ EventT = TypeVar("EventT", bound="StrEnum")
 
 
 class TableMachine(Generic[StateT, EventT]):
-    """A state that moves only as its table says.
+    """A state that moves only by its table.
 
     Parameters
     ----------
     table : mapping
-        For each state the events it heeds and where they lead; a state that heeds none is an end.
+        For each state the events it accepts and where they lead; a state that accepts none is an end.
     state : StateT
         Where the machine begins.
     """
@@ -36,12 +36,12 @@ class TableMachine(Generic[StateT, EventT]):
         return not self._table[self.state]
 
     def messages_to_send(self) -> list[Message]:
-        """Give and forget what is to be sent now, in order."""
+        """Return what is to be sent now, in order, and forget it."""
         outgoing, self._outgoing = self._outgoing, []
         return outgoing
 
     def _move(self, event: EventT) -> bool:
-        """Go where the table says; False if the state does not heed the event."""
+        """Go where the table leads; False if the state does not accept the event."""
         following = self._table[self.state].get(event)
         if following is None:
             return False

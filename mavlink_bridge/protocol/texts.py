@@ -1,4 +1,4 @@
-"""What the vehicle says for its reasons: the STATUSTEXTs that have to do with a refusal, told from all else that it says meanwhile."""
+"""The vehicle's reasons: the STATUSTEXTs that have to do with a refusal, separated from all else that it sends meanwhile."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ if TYPE_CHECKING:
     from mavlink_bridge.mavlink.messages import Frame
     from mavlink_bridge.protocol.peer import Peer
 
-MOST_TEXTS = 8
+MOST_TEXTS = 8  # chosen, not measured: bounds the message
 
 _MOST_SEVERITY = 5
-"""MAV_SEVERITY_NOTICE: ArduPilot gives reasons as notices ("No Mission. Can't set AUTO.") and graver; what is lighter says what goes well."""
+"""MAV_SEVERITY_NOTICE: ArduPilot gives reasons as notices ("No Mission. Can't set AUTO.") and graver; lighter texts report success."""
 
 _LATE_S = 1.0
 """ArduPilot queues its texts, so that a reason may come after the answer; it empties the queue several times a second."""
@@ -26,23 +26,23 @@ _NOISE = re.compile(
     r"|pbpp:|#",
     re.IGNORECASE,
 )
-"""What ArduPilot says of success and of its way, whatever severity it gives it."""
+"""ArduPilot's texts on success and progress, whatever their severity."""
 
 _OF_THE_VEHICLE = re.compile(
     r"prearm|arm:|arming|battery|ekf|ahrs|dcm|gps|imu|compass|mag|baro|rc\d|radio|crash|logging|chan\d"
     r"|.*\bfailsafe\b|.*\bfences? (in [\d.]+ ?m|breached|cleared)|fence breach|internal error",
     re.IGNORECASE,
 )
-"""What it says of its own state, again and again: no reason to refuse a list."""
+"""Its repeated texts on its own state: no reason to refuse a list."""
 
 
 class Reasons:
-    """The texts that may say why a request was refused, from the request until shortly after its answer.
+    """The texts that may explain why a request was refused, from the request until shortly after its answer.
 
     Parameters
     ----------
     peer : Peer
-        The vehicle; what others say is no reason of its.
+        The vehicle; texts of others are not its reasons.
     is_about_list : bool
         Whether a mission, fence or rally list is asked for: then the vehicle's own state (arming, battery, EKF) is no reason either.
     """
@@ -55,16 +55,16 @@ class Reasons:
 
     @property
     def texts(self) -> tuple[str, ...]:
-        """What was said, each once, in order."""
+        """The texts, each once, in order."""
         return tuple(self._texts)
 
     def ask(self) -> None:
-        """Take notice of a request: what was said before it is not about it."""
+        """Note a request: texts before it are not about it."""
         self._texts.clear()
         self._until_s = math.inf
 
     def answered(self, now_s: float) -> None:
-        """Take notice of its answer: only what is said shortly afterwards is still about it."""
+        """Note its answer: only texts shortly afterwards are still about it."""
         self._until_s = min(self._until_s, now_s + _LATE_S)
 
     def take(self, frame: Frame, now_s: float) -> None:

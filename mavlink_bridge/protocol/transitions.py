@@ -1,11 +1,11 @@
 """Every transition of every protocol machine, in tables.
 
 Two rules: all transitions live here, and this file knows nothing of messages or time. A machine turns what it receives, and the
-passing of time, into an event; the table of its states says where that leads. An event that a state does not list is ignored
+passing of time, into an event; the table of its states holds where that leads. An event that a state does not list is ignored
 there. The machines run by these tables and the state diagrams in the documentation are drawn from them.
 
-How a transfer goes wrong, and the event that says so: the vehicle is silent for longer than our patience (SILENCE), it is busy with
-another ground station (DENIED) for longer than our patience (RIVAL_STAYS), or it says no (REFUSAL).
+How a transfer goes wrong, and its event: the vehicle is silent for longer than our patience (SILENCE), it is busy with
+another ground station (DENIED) for longer than our patience (RIVAL_STAYS), or it refuses (REFUSAL).
 """
 
 from __future__ import annotations
@@ -127,7 +127,7 @@ class UploadState(StrEnum):
     ACCEPTED = auto()
     REFUSED = auto()
     BUSY = auto()
-    UNCONFIRMED = auto()  # over, and only a read-back tells how
+    UNCONFIRMED = auto()  # over, and only a read-back shows how
 
 
 class UploadEvent(StrEnum):
@@ -208,7 +208,7 @@ class VerifiedUploadEvent(StrEnum):
     READ_FOREIGN = auto()  # neither: somebody else's list
     READ_AGAIN = (
         auto()
-    )  # not the wanted list: believed only when a second read says the same; or written by others since
+    )  # not the wanted list: believed only when a second read agrees; or written by others since
     READ_UNSTEADY = auto()  # it was another list at each read
     READ_FAILED = auto()
     OTHERS_WRITE = auto()  # another station keeps writing the list

@@ -1,7 +1,7 @@
 """Reading a list until nobody else was heard to write it meanwhile.
 
 An item that is replaced after it was read is not seen in what was read. So a reading during which somebody else wrote (`WriteWatch`), or in which one
-item came twice and not alike, tells nothing: it is waited until the link has been quiet about the list for a while, then the list is read again, whole.
+item came twice and not alike, proves nothing: it is waited until the link has been quiet about the list for a while, then the list is read again, whole.
 If others go on writing, the reading ends disturbed.
 """
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.protocol.download import DownloadOutcome
     from mavlink_bridge.protocol.peer import Peer
 
-MOST_READS = 4
+MOST_READS = 4  # chosen, not measured: bounds the time where others keep writing
 _QUIET_S = 1.5
 """ArduPilot asks a writer again every second: quiet for longer, it is not being written to. What was sent twice has arrived by then, too."""
 
@@ -81,7 +81,7 @@ class UndisturbedRead(TableMachine[UndisturbedReadState, UndisturbedReadEvent]):
 
     @property
     def outcome(self) -> DownloadOutcome | None:
-        """How the last read ended; None while this runs. Of a disturbed one it tells nothing of what is there."""
+        """How the last read ended; None while this runs. A disturbed one shows nothing of what is there."""
         return self._read if self.is_done else None
 
     @property
@@ -125,7 +125,7 @@ class UndisturbedRead(TableMachine[UndisturbedReadState, UndisturbedReadEvent]):
             self._advance(now_s)
 
     def handle_timer(self, now_s: float) -> None:
-        """Take notice that time has passed."""
+        """Do what is due by now."""
         if self.state is UndisturbedReadState.SETTLING:
             self._settle(now_s)
         elif self._download is not None:

@@ -13,15 +13,15 @@ if TYPE_CHECKING:
     from mavlink_bridge.mavlink.messages import Message
 
 FRESH_S = 3.0
-"""How old telemetry may be to tell what the vehicle does now: a heartbeat comes every second."""
+"""How old telemetry may be to show what the vehicle does now: a heartbeat comes every second."""
 
 MISSION_COMPLETE = 5
-"""MISSION_STATE_COMPLETE in MISSION_CURRENT.mission_state; ArduPilot tells it, 0 is from those that do not."""
+"""MISSION_STATE_COMPLETE in MISSION_CURRENT.mission_state; ArduPilot reports it, 0 is from those that do not."""
 
 
 @dataclass(frozen=True, slots=True)
 class Doing:
-    """What a vehicle does, as far as it has told.
+    """What a vehicle does, as far as it has reported.
 
     Parameters
     ----------
@@ -30,9 +30,9 @@ class Doing:
     is_armed : bool, optional
         Whether it is armed; None before the first heartbeat.
     speed_mps : float, optional
-        Its speed over ground; None if it told none.
+        Its speed over ground; None if it reported none.
     has_completed : bool
-        Whether its mission is driven to its end, by its own word.
+        Whether it reports its mission as complete.
     age_s : float
         How old the newest heartbeat is; infinite before the first.
     speed_age_s : float
@@ -48,7 +48,7 @@ class Doing:
 
     @property
     def is_fresh(self) -> bool:
-        """Whether the heartbeat is young enough to tell what the vehicle does now."""
+        """Whether the heartbeat is young enough to show what the vehicle does now."""
         return self.age_s <= FRESH_S
 
     @property
@@ -58,7 +58,7 @@ class Doing:
 
 
 class VehicleWatch:
-    """Keeps the newest of what a vehicle tells of itself; the caller gives it that vehicle's messages only."""
+    """Keeps the newest of what a vehicle reports about itself; the caller gives it that vehicle's messages only."""
 
     def __init__(self) -> None:
         self._heartbeat: Heartbeat | None = None
@@ -81,11 +81,11 @@ class VehicleWatch:
             self._mission_state, self._mission_s = message.mission_state, now_s
 
     def doing(self, now_s: float) -> Doing:
-        """Return what the vehicle does, as last told."""
+        """Return what the vehicle does, as last reported."""
         heartbeat = self._heartbeat
         if heartbeat is None:
             return Doing()
-        # A mission may be started anew: an old word of its end is none.
+        # A mission may be started anew: an old report of its end does not count.
         has_completed = self._mission_state == MISSION_COMPLETE and now_s - self._mission_s <= FRESH_S
         return Doing(
             heartbeat.custom_mode,
@@ -97,6 +97,6 @@ class VehicleWatch:
         )
 
     def is_active(self, now_s: float) -> bool | None:
-        """Return whether the vehicle drives its mission; None if its last heartbeat is too old to tell."""
+        """Return whether the vehicle drives its mission; None if its last heartbeat is too old."""
         doing = self.doing(now_s)
         return doing.drives_mission if doing.is_fresh else None

@@ -16,7 +16,7 @@ class OutcomeKind(StrEnum):
     """How a safe upload ended."""
 
     VERIFIED = auto()  # the last complete read-back equalled the list, nothing was written since
-    REFUSED = auto()  # the vehicle (or the check of its limits) said no; the old list is there
+    REFUSED = auto()  # the vehicle (or the check of its limits) refused; the old list is there
     BUSY = auto()  # another ground station kept the list busy, or kept writing it; nothing was written
     ACTIVE = auto()  # armed in AUTO; nothing was written
     NO_ANSWER = auto()  # silence before anything was written

@@ -25,7 +25,7 @@ _PLAIN_XY_COMMANDS = frozenset({202, 203})
 def item_to_message(
     item: MissionItem, seq: int, peer: Peer, mission_type: MissionType
 ) -> messages.MissionItemInt:
-    """Give the MISSION_ITEM_INT that sends one item to the peer."""
+    """Return the MISSION_ITEM_INT that sends one item to the peer."""
     return messages.MissionItemInt(
         target_system=peer.system,
         target_component=peer.component,
@@ -46,7 +46,7 @@ def item_to_message(
 
 
 def item_from_message(message: messages.MissionItemInt | messages.MissionItem) -> MissionItem:
-    """Give the item in a MISSION_ITEM_INT or in the old MISSION_ITEM, whose degrees are rounded to degE7.
+    """Return the item in a MISSION_ITEM_INT or in the old MISSION_ITEM, whose degrees are rounded to degE7.
 
     A coordinate of the old form that is not a number or does not fit becomes `INT32_MAX`, MAVLink's "not set".
     """
@@ -69,7 +69,7 @@ def item_from_message(message: messages.MissionItemInt | messages.MissionItem) -
 
 
 def wire_key(message: Message) -> tuple[object, ...]:
-    """Return what tells a message from all others as it goes over the wire: floats as their 32 bits, so that NaN equals itself."""
+    """Return what distinguishes a message from all others as it goes over the wire: floats as their 32 bits, so that NaN equals itself."""
     values = ((field, getattr(message, field.name)) for field in fields(message))
     return (type(message), *(_bits(value) if field.type == "float" else value for field, value in values))
 
@@ -85,7 +85,7 @@ _RESULTS = {int(result): result for result in MissionResult}
 
 
 def mission_result(value: int) -> MissionResult | None:
-    """Give the MAV_MISSION_RESULT of a number off the wire; None for one that is none."""
+    """Return the MAV_MISSION_RESULT of a number off the wire; None for a number that has no such result."""
     return _RESULTS.get(value)
 
 

@@ -5,10 +5,10 @@ vehicle asks the other station for the item and acknowledges it, and the other s
 no writing: stations read lists all the time, so MISSION_REQUEST_LIST, item requests to the vehicle, and the vehicle's counts and items to others
 say nothing.
 
-What is addressed to us, or comes with our ids, may be a late copy of our own upload's. It counts from the moment when the vehicle told the length of
+What is addressed to us, or comes with our ids, may be a late copy of our own upload's. It counts from the moment when the vehicle reported the length of
 the list: a vehicle that does so is taking no items from us. What comes with our ids counts unless we have sent the same.
 
-What no message on this link tells cannot be heard: a write on another port of the vehicle, by MAVFTP, or one of which every message was lost here.
+What no message on this link carries cannot be heard: a write on another port of the vehicle, by MAVFTP, or one of which every message was lost here.
 Where the vehicle fills the ids of MISSION_CURRENT, its total, or the number in the parameters MIS_TOTAL and so on, a change of these counts too.
 """
 
@@ -55,7 +55,7 @@ _IDS = {
     MissionType.RALLY: ("rally_points_id",),
 }
 _STORED_TEXT = "flight plan received"
-"""What ArduPilot says when a mission has been written."""
+"""ArduPilot's text when a mission has been written."""
 
 
 class WriteWatch:
@@ -71,7 +71,7 @@ class WriteWatch:
     Attributes
     ----------
     writer : tuple of int, optional
-        System and component of the other station last heard to write, as far as it was told; our own ids if somebody speaks with these.
+        System and component of the other station last heard to write, as far as that is known; our own ids if somebody speaks with these.
     """
 
     def __init__(self, peer: Peer, mission_type: MissionType) -> None:
@@ -102,7 +102,7 @@ class WriteWatch:
         self._told.clear()
 
     def counted(self) -> None:
-        """Take notice that the vehicle has told the length of the list: it takes no items from us."""
+        """Note that the vehicle has sent the length of the list: it takes no items from us."""
         self._is_counted = True
 
     def note_sent(self, message: Message) -> None:
@@ -165,7 +165,7 @@ class WriteWatch:
             self._disturb(self._own if may_be_ours else target, now_s)
 
     def _compare(self, name: str, value: float, now_s: float) -> None:
-        """Notice that a number changed which the vehicle tells of the list."""
+        """Notice that a number changed which the vehicle reports of the list."""
         if self._is_counted and self._told.setdefault(name, value) != value:
             self._told[name] = value
             self._disturb(None, now_s)

@@ -1,4 +1,4 @@
-"""What a replay is expected to tell, and how what it told differs from that.
+"""The events that a replay is expected to report, and how its own differ from those.
 
 An expectation is a file of JSON lines, one an event. Of each event only the keys that stand there count, so that lines can be shortened by hand
 to what matters.
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 _WORDING: Final = ("log", "severity", "text", "warnings")
 _DETAILS: Final = ("details", "path", "waypoints", "drawn_clearance_m", "duration_s")
-"""What no expectation is recorded of: wording, and details of routes and errors, which may change for the better."""
+"""Left out of recorded expectations: wording, and details of routes and errors, which may change for the better."""
 
-_TOLERANCES: Final = {"time_s": 1e-3, "position": 2e-7, "path": 2e-7}
+_TOLERANCES: Final = {"time_s": 1e-3, "position": 2e-7, "path": 2e-7}  # a millisecond, and two units of degE7
 _TOLERANCE: Final = 0.02
 """How far numbers may lie apart: times in seconds, positions in degrees, all others in metres and seconds. Counts must be equal."""
 
@@ -30,12 +30,12 @@ _SHARES: Final = {"length_m": 0.05}
 
 
 def expectation_path(log: Path) -> Path:
-    """Give where the expectation of a log lies: beside it."""
+    """Return where the expectation of a log lies: beside it."""
     return log.with_suffix(".events.jsonl")
 
 
 def to_expect(events: Sequence[Mapping[str, Any]]) -> str:
-    """Give the text of an expectation file for the events that were told."""
+    """Return the text of an expectation file for a replay's events."""
     left_out = {*_WORDING, *_DETAILS}
     kept = [{key: value for key, value in event.items() if key not in left_out} for event in events]
     return "".join(json.dumps(event) + "\n" for event in kept)
@@ -70,7 +70,7 @@ def read_expectation(path: Path) -> list[dict[str, Any]]:
 
 
 def differences(expected: Sequence[Mapping[str, Any]], told: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Say line by line what was told otherwise than expected; nothing where all is as it should be.
+    """Return line by line where the events differ from the expected ones; nothing where all is as it should be.
 
     ``-`` stands before events that were expected and did not come, ``+`` before others that came, ``~`` before those that came otherwise.
     """

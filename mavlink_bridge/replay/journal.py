@@ -1,4 +1,4 @@
-"""The journal beside a recorded log: what the director was told otherwise than by frames, so that a replay decides the same.
+"""The journal beside a recorded log: what reached the director otherwise than by frames, so that a replay decides the same.
 
 A JSON line each: first the orders, then every call of the director that is no frame, with its time and the number of frames received before
 it, and every event.
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-_FORMAT = 2
+_FORMAT = 2  # of the file; others are not read
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +106,7 @@ class JournalWriter:
 
 
 def journal_path(log: Path) -> Path:
-    """Give where the journal of a log lies."""
+    """Return where the journal of a log lies."""
     return log.with_suffix(".journal.jsonl")
 
 
@@ -116,7 +116,7 @@ def read_journal(path: Path) -> Journal:
     Raises
     ------
     LogError
-        It cannot be read; says at which line.
+        It cannot be read; the message says at which line.
     """
     calls: list[Call] = []
     events: list[dict[str, Any]] = []

@@ -1,7 +1,7 @@
 """The director over a recorded log, in the log's own time.
 
 A log that the bridge recorded comes with a journal: its replay makes the same calls between the same frames and so decides the same. Over any
-other log the director only listens: it learns from what others transferred, and tells what it would have planned.
+other log the director only listens: it learns from what others transferred, and reports what it would have planned.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ SENT_LINK = 3
 """MAVProxy's link number, and ours, for what the recording side sent."""
 
 _NO_BACKUP = {"backup_failed": BackupError, "in_use": VehicleInUseError}
-"""Calls that tell why nothing can be uploaded."""
+"""Calls that report why nothing can be uploaded."""
 _STILL_ADVICE = "fence, mission and targets are in it all the same: `pbpp log FILE`, `pbpp plan --log FILE`"
 
 
 def replay_log(log: Path, orders: Orders, wait: Callable[[float], None] | None = None) -> Iterator[Event]:
-    """Give the director's events over a log; with its journal where there is one.
+    """Return the director's events over a log; with its journal where there is one.
 
     Parameters
     ----------
@@ -59,12 +59,12 @@ def replay_log(log: Path, orders: Orders, wait: Callable[[float], None] | None =
 
 
 def replay_to_json(log: Path, orders: Orders) -> list[dict[str, object]]:
-    """Replay a whole log; give its events as JSON objects, with the log's name. For worker processes."""
+    """Replay a whole log; return its events as JSON objects, with the log's name. For worker processes."""
     return [{"log": log.name, **event.as_json()} for event in replay_log(log, orders)]
 
 
 def replay_recorded(entries: Iterable[LogEntry], journal: Journal) -> Iterator[Event]:
-    """Repeat a bridge's run from its log and journal; give its events."""
+    """Repeat a bridge's run from its log and journal; return its events."""
     director = Director(journal.orders, Situation(parameters=journal.parameters))
     calls = iter(journal.calls)
     following = next(calls, None)
@@ -84,14 +84,14 @@ def replay_recorded(entries: Iterable[LogEntry], journal: Journal) -> Iterator[E
 
 
 def replay_foreign(entries: Iterable[LogEntry], orders: Orders) -> Iterator[Event]:
-    """Let the director listen to a log that somebody else recorded; give its events, at the log's times.
+    """Let the director listen to a log that somebody else recorded; return its events, at the log's times.
 
     The director's own time only goes forward: where the log's clock was set, it goes on from where it was.
 
     Raises
     ------
     LogError
-        The log's clock stands still: the director, who waits for seconds to pass, can tell nothing of it.
+        The log's clock stands still: the director, who waits for seconds to pass, can report nothing of it.
     """
     director = Director(replace(orders, passive=True, upload=False, drive=False, arm=False, once=False))
     clock = SteadyClock()

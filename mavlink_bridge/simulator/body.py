@@ -16,7 +16,7 @@ _OFFSET_FROM_MPS = 0.5
 """From this speed on the offset is whole; a rover that stands knows where it is."""
 
 _STEERING_LOCK_RAD = math.radians(35.0)
-_TURNING_CIRCLE_M = 1.8
+_TURNING_CIRCLE_M = 1.8  # in diameter: twice the 0.9 m of TURN_RADIUS
 _SKID_TURN_RATE_RADPS = math.radians(140.0)
 
 

@@ -27,7 +27,7 @@ _WHOLE: dict[int, tuple[str, ...]] = {
 }
 """The parameters that have to be a number."""
 
-_CHANGE_MODE = 1
+_CHANGE_MODE = 1  # MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
 _LOCAL_FRAMES = (CoordinateFrame.LOCAL_NED, CoordinateFrame.MISSION)
 
 
@@ -39,13 +39,13 @@ class Commands:
     rover : Rover
         Whose commands they are.
     streams_of : callable
-        Gives the timetable of telemetry.
+        Returns the timetable of telemetry.
     report : callable
-        Gives a message by its id, None where it is not known.
+        Returns a message by its id, None where it is not known.
     renew : callable
         Is called after a parameter has changed, with its name.
     is_ready : callable
-        Tells at a moment whether the rover may be armed.
+        Returns whether the rover may be armed at a moment.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class Commands:
         self._is_ready = is_ready
 
     def execute(self, command: CommandLong | CommandInt, now_s: float) -> tuple[MavResult, list[Message]]:
-        """Do a command; give its result and what else is to be sent."""
+        """Do a command; return its result and what else is to be sent."""
         if not all(math.isfinite(getattr(command, name)) for name in _WHOLE.get(command.command, ())):
             return MavResult.DENIED, []  # what a microcontroller makes of NaN as a whole number is its own
         if command.command == Command.DO_REPOSITION:

@@ -27,7 +27,7 @@ class Mode(IntEnum):
 
 
 DEFAULT_HOME = LatLon(40.071374, -105.229930)
-"""Where the rover stands unless told otherwise: the home of the recorded logs."""
+"""Where the rover stands by default: the home of the recorded logs."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,7 +53,7 @@ class SimulatorConfig:
     list_ids : bool
         Whether MISSION_CURRENT carries ids of the lists, as PX4's does and ArduPilot's does not.
     uid : bytes
-        What AUTOPILOT_VERSION tells this board from others by, at most 18 bytes; empty: it tells none.
+        The board's own id in AUTOPILOT_VERSION, at most 18 bytes; empty: none.
     """
 
     system: int = 1

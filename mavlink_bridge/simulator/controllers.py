@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.simulator.body import Body
     from mavlink_bridge.simulator.parameters import ParameterStore
 
-GRAVITY_MPS2 = 9.80665
+GRAVITY_MPS2 = 9.80665  # standard gravity; ArduPilot's GRAVITY_MSS
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +127,7 @@ class Attitude:
         self.steering = self.throttle = 0.0
 
     def limited_speed(self, speed_mps: float, dt_s: float) -> float:
-        """Give the speed the acceleration limits allow next, on the way to the one asked."""
+        """Return the speed that the acceleration limits allow next, on the way to the one asked."""
         limits = self.settings
         gaining = abs(speed_mps) > abs(self.speed_mps) and speed_mps * self.speed_mps >= 0
         step_mps = (limits.accel_mps2 if gaining else limits.decel_mps2) * dt_s
@@ -192,7 +192,7 @@ class Position:
     def update(
         self, accel_mps2: complex, avoid: Callable[[complex], complex] | None, dt_s: float
     ) -> tuple[float, float]:
-        """Give turn rate and speed for the target point, its velocity and its acceleration."""
+        """Return turn rate and speed for the target point, its velocity and its acceleration."""
         limits, body = self.settings, self._body
         most_accel = min(limits.accel_mps2, limits.lateral_accel_mps2)
         velocity_mps = self.target_velocity_mps + sqrt_controlled(self.error_m, limits.position_p, most_accel)
@@ -218,7 +218,7 @@ class Position:
 
 
 def sqrt_controlled(error: complex, p: float, most_accel: float) -> complex:
-    """Give p times the error, but for a large error no more than can be braked (AP's sqrt_controller)."""
+    """Return p times the error, but for a large error no more than can be braked (AP's sqrt_controller)."""
     size = abs(error)
     if size == 0:
         return 0j

@@ -197,7 +197,7 @@ class Drive:
             self._pivot_since_s += dt_s
 
     def _advance(self, dt_s: float) -> complex:
-        """Move the target point on; give its acceleration."""
+        """Move the target point on; return its acceleration."""
         self._scale_time(dt_s)
         step_s = dt_s * self._time_scale
         self._last_leg.advance(step_s)

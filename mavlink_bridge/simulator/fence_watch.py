@@ -19,15 +19,15 @@ if TYPE_CHECKING:
     from missions.geo import LatLon
     from missions.items import MissionItem
 
-_FAR_M = 1e6
-_CIRCLE_SEGMENTS = 64
+_FAR_M = 1e6  # farther than any fence: stands for no edge at all
+_CIRCLE_SEGMENTS = 64  # chords a quarter turn: they leave a 50 m circle by 4 mm
 
 
 class Plane(Protocol):
     """A flat frame."""
 
     def to_flat(self, position: LatLon) -> complex:
-        """Give a position in metres, north + east·j."""
+        """Return a position in metres, north + east·j."""
         ...
 
 
@@ -66,7 +66,7 @@ class FenceArea:
         return bool(self._forbidden.is_empty)
 
     def clearance_m(self, point_m: complex) -> float:
-        """Give the distance to forbidden ground; inside it, the distance to its edge with a minus; infinite without a fence."""
+        """Return the distance to forbidden ground; inside it, minus the distance to its edge; infinite without a fence."""
         if self.is_empty:
             return math.inf
         point = Point(point_m.real, point_m.imag)
@@ -74,7 +74,7 @@ class FenceArea:
         return -distance_m if self._forbidden.contains(point) else distance_m
 
     def ahead_m(self, point_m: complex, direction: complex, reach_m: float) -> float:
-        """Give how far the first edge lies in a direction; infinite if beyond ``reach_m``."""
+        """Return how far the first edge lies in a direction; infinite if beyond ``reach_m``."""
         end_m = point_m + direction * reach_m
         ray = LineString([(point_m.real, point_m.imag), (end_m.real, end_m.imag)])
         if not self._edge.intersects(ray):

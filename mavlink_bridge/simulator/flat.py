@@ -27,13 +27,13 @@ class FlatFrame:
         self.origin = origin
 
     def to_flat(self, position: LatLon) -> complex:
-        """Give a position in metres, north + east·j."""
+        """Return a position in metres, north + east·j."""
         north_m = (position.lat_deg - self.origin.lat_deg) * METRES_PER_DEGREE
         lon_deg = wrap_lon_deg(position.lon_deg - self.origin.lon_deg)
         return complex(north_m, lon_deg * METRES_PER_DEGREE * self._shrink(position.lat_deg))
 
     def to_lat_lon(self, point_m: complex) -> LatLon:
-        """Give the position of a point."""
+        """Return the position of a point."""
         lat_deg = self.origin.lat_deg + point_m.real / METRES_PER_DEGREE
         lon_deg = point_m.imag / (METRES_PER_DEGREE * self._shrink(lat_deg))
         return LatLon(lat_deg, wrap_lon_deg(self.origin.lon_deg + lon_deg))
@@ -61,6 +61,6 @@ class TrueFrame:
         self._east_m = math.radians(6_378_137.0 / w * math.cos(lat_rad))
 
     def to_flat(self, position: LatLon) -> complex:
-        """Give a position in metres, north + east·j."""
+        """Return a position in metres, north + east·j."""
         lon_deg = wrap_lon_deg(position.lon_deg - self.origin.lon_deg)
         return complex((position.lat_deg - self.origin.lat_deg) * self._north_m, lon_deg * self._east_m)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-_V1, _V2 = 0xFE, 0xFD
-_SIGNED = 1
+_V1, _V2 = 0xFE, 0xFD  # the first byte of a frame
+_SIGNED = 1  # MAVLINK_IFLAG_SIGNED
 
 
 class FrameSplitter:
@@ -13,7 +13,7 @@ class FrameSplitter:
         self._rest = b""
 
     def split(self, data: bytes) -> list[bytes]:
-        """Give the complete frames so far."""
+        """Return the complete frames so far."""
         self._rest += data
         frames = []
         while self._rest:
@@ -26,7 +26,7 @@ class FrameSplitter:
 
 
 def _length(data: bytes) -> int | None:
-    """Give the length of the frame or of the junk at the beginning; None while too little has come."""
+    """Return the length of the frame or of the junk at the beginning; None while too little has come."""
     if data[0] not in (_V1, _V2):
         starts = [place for place in (data.find(_V1), data.find(_V2)) if place > 0]
         return min(starts, default=len(data))

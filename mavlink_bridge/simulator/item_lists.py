@@ -23,6 +23,7 @@ FENCE_BYTES = 672
 SD_FENCE_LIMIT = 4096
 """Fence items at most, however large the SD card's storage."""
 
+# How ArduPilot counts storage on an SD card: bytes an item, and a mission's header.
 _BYTES_PER_FENCE_ITEM = 8
 _BYTES_PER_MISSION_ITEM = 15
 _HEADER_BYTES = 4
@@ -39,7 +40,7 @@ class ItemList(ABC):
     items : list of MissionItem
         What is stored now.
     texts : list of str
-        What the vehicle says about the last call, for STATUSTEXT; the caller empties it.
+        The vehicle's texts about the last call, for STATUSTEXT; the caller empties it.
     """
 
     mission_type: MissionType
@@ -54,30 +55,30 @@ class ItemList(ABC):
         return len(self.items)
 
     def read(self, seq: int) -> MissionItem | None:
-        """Give an item as it reads back, None past the end."""
+        """Return an item as it reads back, None past the end."""
         return self.items[seq] if seq < len(self.items) else None
 
     @abstractmethod
     def begin(self, count: int) -> None:
-        """Take notice that ``count`` items will come."""
+        """Note that ``count`` items will come."""
 
     @abstractmethod
     def begin_part(self) -> None:
-        """Take notice that some items will be overwritten."""
+        """Note that some items will be overwritten."""
 
     @abstractmethod
     def write(self, seq: int, item: MissionItem, count: int) -> MissionResult:
         """Take one item of an upload that ends with ``count`` items."""
 
     def finish(self) -> MissionResult:
-        """Take notice that the last item has come."""
+        """Note that the last item has come."""
         return MissionResult.ACCEPTED
 
     def abandon(self) -> None:  # noqa: B027 - only the fence has something to forget
         """Forget what an unfinished upload holds in memory."""
 
     def clear(self) -> bool:
-        """Empty the list; tell whether that was allowed."""
+        """Empty the list; return whether that was allowed."""
         self.items = []
         return True
 
@@ -102,9 +103,9 @@ class MissionList(_InPlaceList):
     Parameters
     ----------
     home : callable
-        Gives the vehicle's home.
+        Returns the vehicle's home.
     is_running : callable
-        Tells whether the vehicle is armed in AUTO.
+        Returns whether the vehicle is armed in AUTO.
     sd_kb : int
         BRD_SD_MISSION: storage on the SD card instead of the default one.
     """
@@ -122,7 +123,7 @@ class MissionList(_InPlaceList):
         self.items.append(_home_item(home()))
 
     def read(self, seq: int) -> MissionItem | None:
-        """Give an item as it reads back: at 0 the vehicle's home."""
+        """Return an item as it reads back: at 0 the vehicle's home."""
         if seq == 0 and self.items:
             return _home_item(self._home())
         return super().read(seq)
@@ -135,7 +136,7 @@ class MissionList(_InPlaceList):
         return self._put(seq, item_rules.kept_mission_item(item))
 
     def finish(self) -> MissionResult:
-        """Say that the plan has come."""
+        """Note with ArduPilot's text that the list is complete; return that it is accepted."""
         self.texts.append("Flight plan received")
         return MissionResult.ACCEPTED
 

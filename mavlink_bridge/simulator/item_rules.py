@@ -40,7 +40,7 @@ _RESULT_OF_PARAM = (
 
 
 def mission_item_result(item: MissionItem, count: int) -> MissionResult:
-    """Tell whether a mission item is taken into a list that will have ``count`` items, home included."""
+    """Return whether a mission item is taken into a list that will have ``count`` items, home included."""
     if item.command not in KEPT:
         return MissionResult.INVALID if item.command in _RESERVED else MissionResult.UNSUPPORTED
     for index, param in enumerate(item.params):
@@ -56,7 +56,7 @@ def mission_item_result(item: MissionItem, count: int) -> MissionResult:
 
 
 def kept_mission_item(item: MissionItem) -> MissionItem:
-    """Give a mission item as it reads back: frame 3, 0 or 10, altitude in whole centimetres, unused parameters 0."""
+    """Return a mission item as it reads back: frame 3, 0 or 10, altitude in whole centimetres, unused parameters 0."""
     params = KEPT[item.command](item.params)
     if item.command not in PLACED:
         return MissionItem(item.command, CoordinateFrame.GLOBAL, params, *kept_beyond_params(item))
@@ -71,7 +71,7 @@ def kept_mission_item(item: MissionItem) -> MissionItem:
 
 
 def fence_item_result(item: MissionItem) -> MissionResult:
-    """Tell whether a fence item is taken as it comes; the fence as a whole is judged after its last item."""
+    """Return whether a fence item is taken as it comes; the fence as a whole is judged after its last item."""
     if item.frame not in _FENCE_FRAMES:
         return MissionResult.UNSUPPORTED_FRAME
     if item.command in _FENCE_VERTICES:
@@ -82,7 +82,7 @@ def fence_item_result(item: MissionItem) -> MissionResult:
 
 
 def kept_fence_item(item: MissionItem) -> MissionItem:
-    """Give a fence item as it reads back: frame 0, z 0, only param1."""
+    """Return a fence item as it reads back: frame 0, z 0, only param1."""
     if item.command in _FENCE_VERTICES:
         param1 = float(uint8(item.params[0]))
     else:
@@ -98,7 +98,7 @@ def kept_fence_item(item: MissionItem) -> MissionItem:
 
 
 def fence_problem(items: list[MissionItem]) -> str | None:
-    """Give what ArduPilot finds wrong with a fence of kept items, in its words; None for a good one."""
+    """Return what ArduPilot finds wrong with a fence of kept items, in its words; None for a good one."""
     expected, of_count, of_command = 0, 0, 0
     return_points = 0
     for item in items:
@@ -128,7 +128,7 @@ def fence_problem(items: list[MissionItem]) -> str | None:
 
 
 def fence_bytes(items: list[MissionItem]) -> int:
-    """Give the storage a good fence needs: 4, 2 + 8 n for a polygon, 13 for a circle, 9 for a return point."""
+    """Return the storage a good fence needs: 4, 2 + 8 n for a polygon, 13 for a circle, 9 for a return point."""
     size = 4
     left = 0
     for item in items:
@@ -144,14 +144,14 @@ def fence_bytes(items: list[MissionItem]) -> int:
 
 
 def rally_item_result(item: MissionItem) -> MissionResult:
-    """Tell whether a rally point is taken."""
+    """Return whether a rally point is taken."""
     if item.command != Command.RALLY_POINT:
         return MissionResult.UNSUPPORTED
     return _place_result(item, 32_767.0, item.frame in _RELATIVE_FRAMES)
 
 
 def kept_rally_item(item: MissionItem) -> MissionItem:
-    """Give a rally point as it reads back: whole metres of altitude."""
+    """Return a rally point as it reads back: whole metres of altitude."""
     return replace(
         item,
         frame=CoordinateFrame.GLOBAL_RELATIVE_ALT,

@@ -40,9 +40,9 @@ REQUEST_AGAIN_S = 1.0
 UPLOAD_TIMEOUT_S = 8.1
 """An upload without a good item for this long is given up."""
 
-WARNING = 4
+WARNING = 4  # MAV_SEVERITY_WARNING
 INFO = 6
-"""MAV_SEVERITY of what is said about transfers."""
+"""MAV_SEVERITY of texts about transfers."""
 
 MissionMessage = (
     MissionCount
@@ -57,7 +57,7 @@ MissionMessage = (
 
 
 @dataclass(slots=True)
-class _Upload:
+class _UploadUnderWay:
     """An upload under way: who sends it, which item is wanted, where it ends."""
 
     client: tuple[int, int]
@@ -79,7 +79,7 @@ class TransferServer:
 
     def __init__(self, stored: ItemList) -> None:
         self.stored = stored
-        self._upload: _Upload | None = None
+        self._upload: _UploadUnderWay | None = None
         self._outbox: list[Message] = []
 
     @property
@@ -90,7 +90,7 @@ class TransferServer:
         return min(self._upload.requested_s + REQUEST_AGAIN_S, self._upload.received_s + UPLOAD_TIMEOUT_S)
 
     def messages_to_send(self) -> list[Message]:
-        """Give and forget what is to be sent."""
+        """Return what is to be sent, and forget it."""
         outbox, self._outbox = self._outbox, []
         return outbox
 
@@ -164,7 +164,7 @@ class TransferServer:
         self._start(client, message.start_index, message.end_index, max(count, message.end_index + 1), now_s)
 
     def _start(self, client: tuple[int, int], first: int, last: int, count: int, now_s: float) -> None:
-        self._upload = _Upload(client, first, last, count, now_s, now_s)
+        self._upload = _UploadUnderWay(client, first, last, count, now_s, now_s)
         self._request(self._upload, now_s)
 
     def _take(self, client: tuple[int, int], seq: int, item: items.MissionItem, now_s: float) -> None:
@@ -178,7 +178,7 @@ class TransferServer:
         else:
             self._write(upload, item, now_s)
 
-    def _write(self, upload: _Upload, item: items.MissionItem, now_s: float) -> None:
+    def _write(self, upload: _UploadUnderWay, item: items.MissionItem, now_s: float) -> None:
         result = self.stored.write(upload.wanted, item, upload.count)
         if result == MissionResult.ACCEPTED:
             upload.received_s = now_s
@@ -212,7 +212,7 @@ class TransferServer:
         self._ack(client, MissionResult.DENIED)
         return True
 
-    def _request(self, upload: _Upload, now_s: float) -> None:
+    def _request(self, upload: _UploadUnderWay, now_s: float) -> None:
         upload.requested_s = now_s
         self._outbox.append(MissionRequest(*upload.client, upload.wanted, self.stored.mission_type))
 
@@ -255,13 +255,13 @@ class MissionServer:
         self._outbox += server.messages_to_send()
 
     def handle_timer(self, now_s: float) -> None:
-        """Take notice that time has passed."""
+        """Do what is due by now."""
         for server in self._servers.values():
             server.handle_timer(now_s)
             self._outbox += server.messages_to_send()
 
     def messages_to_send(self) -> list[Message]:
-        """Give and forget what is to be sent."""
+        """Return what is to be sent, and forget it."""
         outbox, self._outbox = self._outbox, []
         return outbox
 
@@ -275,7 +275,7 @@ class MissionServer:
 def int_message(
     client: tuple[int, int], seq: int, item: items.MissionItem, mission_type: int
 ) -> MissionItemInt:
-    """Give an item as the message that carries it."""
+    """Return the message that carries an item."""
     return MissionItemInt(
         *client,
         seq,

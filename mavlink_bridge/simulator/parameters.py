@@ -47,7 +47,7 @@ DEFAULTS: dict[str, float] = {
 REAL32 = 9
 """MAV_PARAM_TYPE_REAL32."""
 
-_INT8, _INT16 = 2, 4
+_INT8, _INT16 = 2, 4  # MAV_PARAM_TYPE_INT8 and _INT16
 _TYPES = {
     "FENCE_ACTION": _INT8, "FENCE_ENABLE": _INT8, "FENCE_OPTIONS": _INT16, "FENCE_TOTAL": _INT8, "FENCE_TYPE": _INT8,
     "AVOID_BEHAVE": _INT8, "AVOID_ENABLE": _INT8, "OA_TYPE": _INT8, "EK3_ENABLE": _INT8, "EK3_SRC1_POSXY": _INT8,
@@ -58,7 +58,7 @@ _TYPES = {
 
 
 def float32(value: float) -> float:
-    """Give the value as it is after a trip through a float of four bytes."""
+    """Return the value as it is after a trip through a float of four bytes."""
     try:
         return float(struct.unpack("<f", struct.pack("<f", value))[0])
     except OverflowError:
@@ -121,14 +121,14 @@ class ParameterStore:
         self._values[name] = float(int(value)) if kind(name) != REAL32 else float32(value)
 
     def name_at(self, index: int) -> str | None:
-        """Give the name at an index of the list, None past its ends."""
+        """Return the name at an index of the list, None past its ends."""
         return self._names[index] if 0 <= index < len(self._names) else None
 
     def index_of(self, name: str) -> int:
-        """Give a parameter's place in the list."""
+        """Return a parameter's place in the list."""
         return self._names.index(name)
 
 
 def kind(name: str) -> int:
-    """Give a parameter's MAV_PARAM_TYPE."""
+    """Return a parameter's MAV_PARAM_TYPE."""
     return _TYPES.get(name, REAL32)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 _TURNS = (Command.NAV_LOITER_TURNS, Command.NAV_LOITER_TIME)
 _PLACED = (Command.NAV_WAYPOINT, Command.NAV_LOITER_UNLIM, Command.NAV_LAND, Command.NAV_TAKEOFF, *_TURNS)
 _NAVIGATION = (*_PLACED, Command.NAV_RETURN_TO_LAUNCH, Command.NAV_DELAY)
-_MAX_COMMANDS = 64
+_MAX_COMMANDS = 64  # passed at once, so that jumps in a circle end; chosen, not measured
 
 
 class Route:
@@ -24,7 +24,7 @@ class Route:
     Parameters
     ----------
     items : callable
-        Gives the mission as it reads back; item 0 is home.
+        Returns the mission as it reads back; item 0 is home.
     drive : Drive
         The driver.
     frame : FlatFrame
@@ -62,7 +62,7 @@ class Route:
         self._jumps.clear()
 
     def set_current(self, seq: int, *, now_s: float, driving: bool) -> bool:
-        """Go to an item; tell whether there is one."""
+        """Go to an item; return whether there is one."""
         if not 0 <= seq < max(1, len(self._items())):
             return False
         self.seq = max(1, seq)
@@ -133,7 +133,7 @@ class Route:
         return None
 
     def _after(self, seq: int, jumps: dict[int, int]) -> int:
-        """Give what follows an item, counting jumps in ``jumps``."""
+        """Return what follows an item, counting jumps in ``jumps``."""
         item = self._items()[seq]
         if item.command != Command.DO_JUMP:
             return seq + 1
@@ -145,7 +145,7 @@ class Route:
         return target
 
     def _next_place(self, seq: int) -> complex | None:
-        """Give the place after an item at which the rover need not stop; None if it must."""
+        """Return the place after an item at which the rover need not stop; None if it must."""
         items = self._items()
         if items[seq].command != Command.NAV_WAYPOINT or items[seq].params[0] > 0:
             return None

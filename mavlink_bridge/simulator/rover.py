@@ -27,9 +27,9 @@ TICK_S = 0.02
 GIVE_UP_M = 100.0
 """Further outside a fence than this the rover stops instead of driving home."""
 
-_CIRCLE, _POLYGON = 2, 4
-_UNION = 2
-_AVOID_FENCE = 1
+_CIRCLE, _POLYGON = 2, 4  # bits 1 and 2 of FENCE_TYPE
+_UNION = 2  # FENCE_OPTIONS bit 1
+_AVOID_FENCE = 1  # AVOID_ENABLE bit 0
 _DRIVING = (Mode.AUTO, Mode.GUIDED, Mode.RTL)
 
 
@@ -50,7 +50,7 @@ class Rover:
     Attributes
     ----------
     texts : list of tuple of int and str
-        What it says: severity and text; the caller empties it.
+        Its status texts with their severity; the caller empties it.
     reached : list of int
         The numbers of items reached; the caller empties it.
     least_clearance_m : float
@@ -149,7 +149,7 @@ class Rover:
         self._measure_clearance()
 
     def set_mode(self, number: int, now_s: float) -> bool:
-        """Change the mode; tell whether that was possible."""
+        """Change the mode; return whether that was possible."""
         try:
             mode = Mode(number)
         except ValueError:
@@ -174,7 +174,7 @@ class Rover:
         return True
 
     def set_current_item(self, seq: int, *, restart: bool, now_s: float) -> bool:
-        """Go to a mission item; tell whether there is one."""
+        """Go to a mission item; return whether there is one."""
         if restart:
             self.route.restart()
         driving = self.mode == Mode.AUTO

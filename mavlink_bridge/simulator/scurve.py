@@ -74,7 +74,7 @@ class Leg:
         self.elapsed_s = self.duration_s
 
     def at(self, time_s: float) -> tuple[complex, complex, complex]:
-        """Give how far it has gone from its origin, its velocity and its acceleration at a moment."""
+        """Return how far it has gone from its origin, its velocity and its acceleration at a moment."""
         if not self._pieces:
             return 0j, 0j, 0j
         if time_s >= self.duration_s:
@@ -135,7 +135,7 @@ class Leg:
         return (speed_mps + to_mps) / 2 * (2 * jerk_s + level_s)
 
     def _top_speed(self, length_m: float, speed_mps: float) -> float:
-        """Give the limit, or what a short leg allows: the largest speed whose ramps fit, by bisection."""
+        """Return the limit, or what a short leg allows: the largest speed whose ramps fit, by bisection."""
         low_mps, high_mps = speed_mps, self._limits.speed_mps
 
         def ramps_m(top_mps: float) -> float:
@@ -152,7 +152,7 @@ class Leg:
 
 
 def _softened(limits: Limits) -> Limits:
-    """Give limits whose constant jerk takes as long as the real one, which rises and falls by the snap limit."""
+    """Return limits whose constant jerk takes as long as the real one, which rises and falls by the snap limit."""
     rise_s = math.pi * limits.jerk_mps3 / (2 * SNAP_MPS4)
     ramp_s = limits.accel_mps2 / limits.jerk_mps3 + rise_s
     return replace(limits, jerk_mps3=limits.accel_mps2 / ramp_s)

@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 DEFAULT_LISTEN = "tcpin:127.0.0.1:5760"
 """Where ArduPilot's own simulator listens."""
 
-_READ_BYTES = 65_536
+_READ_BYTES = 65_536  # the largest datagram
 _UID_BYTES = 12
-"""As long as the unique id of an STM32, which is what ArduPilot tells."""
-_MAX_BACKLOG_BYTES = 4_000_000
-_LONGEST_WAIT_S = 0.5
-_MOST_AT_ONCE_S, _MOST_REAL_AT_ONCE_S = 1.0, 0.1
+"""As long as the unique id of an STM32, which is what ArduPilot reports."""
+_MAX_BACKLOG_BYTES = 4_000_000  # a client that reads nothing loses what comes after; chosen, bounds memory
+_LONGEST_WAIT_S = 0.5  # chosen, not measured: the shell looks up at least so often
+_MOST_AT_ONCE_S, _MOST_REAL_AT_ONCE_S = 1.0, 0.1  # of the rover's time in one turn, see `_advance`; chosen
 
 Address = tuple[str, int]
 
@@ -49,7 +49,7 @@ class _Client:
         self._relays: dict[tuple[int, int], Codec] = {}
 
     def relay(self, frame: Frame) -> bytes:
-        """Give the bytes of someone else's frame, under the sender's identity."""
+        """Return the bytes of someone else's frame, under the sender's identity."""
         identity = (frame.system, frame.component)
         codec = self._relays.setdefault(identity, Codec(*identity))
         return codec.encode(frame.message)
@@ -222,7 +222,7 @@ class Simulator:
         return max(0.0, min(next_s - self._real_s(), _LONGEST_WAIT_S))
 
     def _advance(self, real_s: float) -> float:
-        """Give the rover's time.
+        """Advance the rover's time.
 
         Where the computer does not keep up, or stood still, the rover's time falls behind: made up for at once, more would pass with
         each turn than in the one before, and the rover would fall silent.
@@ -250,7 +250,7 @@ class Simulator:
             self._selector.register(connection, selectors.EVENT_READ)
             self._peer(connection)
             return
-        with contextlib.suppress(BlockingIOError, ConnectionError):  # a peer that is gone says so here
+        with contextlib.suppress(BlockingIOError, ConnectionError):  # a peer that is gone shows here
             while True:
                 data, address = self._socket.recvfrom(_READ_BYTES)
                 self._take(self._peer(address), data)

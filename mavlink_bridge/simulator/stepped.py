@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from mavlink_bridge.simulator.vehicle import SimulatedVehicle
 
-_CATCH_UP_S = 0.1
+_CATCH_UP_S = 0.1  # what it is behind by more is not caught up; chosen, not measured
 
 
 class SteppedRover:
@@ -47,16 +47,16 @@ class SteppedRover:
         self._vehicle_s = 0.0
 
     def now_s(self) -> float:
-        """Give the time by which the rover and its link run: seconds since 1970."""
+        """Return the time by which the rover and its link run: seconds since 1970."""
         return self._epoch_s + self._vehicle_s
 
     def send(self, data: bytes) -> None:
-        """Give the rover what was sent to it."""
+        """Deliver bytes to the rover."""
         for frame in self._codec.decode(data):
             self.vehicle.receive(frame, self._vehicle_s)
 
     def receive(self, timeout_s: float) -> list[tuple[Hashable, bytes]]:
-        """Let time pass until the rover says something, at most so long."""
+        """Let time pass until the rover sends something, at most so long."""
         until_s = self._vehicle_s + timeout_s
         while True:
             self._pass_until(min(until_s, max(self._vehicle_s, self.vehicle.deadline_s)))

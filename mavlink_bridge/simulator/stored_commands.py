@@ -227,7 +227,7 @@ NOT_DRIVEN = frozenset(KEPT) - {
 }
 """Commands that are stored and given back, and passed over where the rover comes to them."""
 
-_MOUNT_MAVLINK_TARGETING = 2.0
+_MOUNT_MAVLINK_TARGETING = 2.0  # MAV_MOUNT_MODE_MAVLINK_TARGETING
 
 
 def kept_beyond_params(item: MissionItem) -> tuple[int, int, float]:

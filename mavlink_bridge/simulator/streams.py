@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+# Message ids in MAVLink's common.xml and ardupilotmega.xml.
 HEARTBEAT = 0
 SYS_STATUS = 1
 GPS_RAW_INT = 24
@@ -38,7 +39,7 @@ DEFAULT_RATES_HZ: Mapping[int, float] = {
 MAX_RATE_HZ = 40.0
 """0.8 of the loop's rate; faster is refused."""
 
-_ALL = 0
+_ALL = 0  # MAV_DATA_STREAM_ALL
 _GROUPS = {
     2: (
         SYS_STATUS,
@@ -77,7 +78,7 @@ class Streams:
         return min(self._due_s.values())
 
     def due(self, now_s: float) -> list[int]:
-        """Give the ids of what is due and put each off by its interval."""
+        """Return the ids of what is due and put each off by its interval."""
         due = [message_id for message_id, due_s in self._due_s.items() if due_s <= now_s + 1e-9]
         for message_id in due:
             interval_s = self._intervals_s[message_id]

@@ -1,4 +1,4 @@
-"""What the rover tells about itself, message by message."""
+"""What the rover reports about itself, message by message."""
 
 from __future__ import annotations
 
@@ -16,13 +16,14 @@ if TYPE_CHECKING:
 
     from mavlink_bridge.simulator.rover import Rover
 
+# Bits of MAV_SYS_STATUS_SENSOR: enabled and healthy, present, and three single ones.
 _SENSORS = 322_011_183
 _SENSORS_PRESENT = 322_034_735
 _FENCE_SENSOR = 1 << 20
 _GPS_SENSOR = 1 << 5
 _PREARM_OK = 1 << 28
 _EKF_GOOD, _EKF_UNINITIALISED = 831, 1024
-_POSITION_ONLY = 65_016
+_POSITION_ONLY = 65_016  # POSITION_TARGET_TYPEMASK: all ignored but the position
 _CAPABILITIES = (
     m.Capability.MISSION_FLOAT
     | m.Capability.PARAM_FLOAT
@@ -34,17 +35,17 @@ _CAPABILITIES = (
     | m.Capability.MISSION_RALLY
     | m.Capability.PARAM_ENCODE_C_CAST
 )
-_VERSION_4_7_0_DEV = 4 << 24 | 7 << 16
+_VERSION_4_7_0_DEV = 4 << 24 | 7 << 16  # major and minor in the two top bytes; type 0 is development
 _STANDBY, _ACTIVE, _CALIBRATING = 3, 4, 2
 _NO_MISSION, _NOT_STARTED, _ACTIVE_MISSION, _PAUSED, _COMPLETE = 1, 2, 3, 4, 5
-_BOUNDARY = 3
+_BOUNDARY = 3  # FENCE_BREACH_BOUNDARY
 
 
 @dataclass(frozen=True, slots=True)
 class State:
     """What telemetry is about: the rover, the items in its mission (home included), its time since boot, whether it has a position.
 
-    The ids are those of mission, fence and rally points, 0 where none are told; the uid is the board's own.
+    The ids are those of mission, fence and rally points, 0 where none are known; the uid is the board's own.
     """
 
     rover: Rover
@@ -56,7 +57,7 @@ class State:
 
 
 def telemetry(message_id: int, state: State) -> m.Message | None:
-    """Give a message by its id, None where there is nothing to tell."""
+    """Return a message by its id, None where the rover has no such message."""
     build = _BUILDERS.get(message_id)
     return build(state) if build else None
 

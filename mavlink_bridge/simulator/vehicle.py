@@ -38,10 +38,10 @@ PARAMETERS_A_TICK = 10
 BOOT_S = 3.0
 """How long a rebooted vehicle is silent."""
 
-_POSITION_IGNORED = 3
-_GUIDED_ITEM = 2
-_HIGHER_ITEM = 3
-_NO_INDEX = 65_535
+_POSITION_IGNORED = 3  # POSITION_TARGET_TYPEMASK_X_IGNORE and _Y_IGNORE
+_GUIDED_ITEM = 2  # MISSION_ITEM.current: go there now
+_HIGHER_ITEM = 3  # MISSION_ITEM.current: change the altitude, which Rover does not
+_NO_INDEX = 65_535  # UINT16_MAX: PARAM_VALUE.param_index outside a list
 _BOOT_TEXTS = ("ArduRover V4.7.0-dev (simulated)", "ArduPilot Ready")
 
 
@@ -99,7 +99,7 @@ class SimulatedVehicle:
 
     @property
     def deadline_s(self) -> float:
-        """When `handle_timer` wants to be called; never None: a vehicle always has something to tell."""
+        """When `handle_timer` wants to be called; never None: a vehicle always has something to send."""
         return self._time_of(self._wake_tick())
 
     @property
@@ -143,7 +143,7 @@ class SimulatedVehicle:
         return self.rover.breaches
 
     def receive(self, frame: m.Frame, now_s: float) -> None:
-        """Take a frame; the next tick looks at it. A vehicle that boots hears nothing."""
+        """Take a frame; the next tick looks at it. A vehicle that boots receives nothing."""
         self.handle_timer(now_s)
         if now_s < self._boot_s:
             return
@@ -164,7 +164,7 @@ class SimulatedVehicle:
         self._tick = max(self._tick, self._tick_at(now_s) + 1)
 
     def messages_to_send(self) -> list[m.Message]:
-        """Give and forget what is to be sent."""
+        """Return what is to be sent, and forget it."""
         outbox, self._outbox = self._outbox, []
         return outbox
 
@@ -182,7 +182,7 @@ class SimulatedVehicle:
         return math.floor((now_s - self._boot_s) / TICK_S + 1e-6)
 
     def _wake_tick(self) -> int:
-        """Give the next tick in which something happens."""
+        """Return the next tick in which something happens."""
         if self._input or self._parameter_queue or not self.rover.is_idle:
             return self._tick
         deadline_s = self._streams.deadline_s
@@ -251,7 +251,7 @@ class SimulatedVehicle:
                 self._outbox.append(message)
 
     def _tell_changes(self, now_s: float) -> None:
-        """Tell at once of a breach, for which Rover has no text, and of another mode: in ArduPilot's usual order."""
+        """Report at once a breach, for which Rover has no text, and a change of mode: in ArduPilot's usual order."""
         rover = self.rover
         if rover.breaches != self._told_breaches:
             self._outbox += filter(None, [self._report(FENCE_STATUS, now_s)])
@@ -360,7 +360,7 @@ class SimulatedVehicle:
 
 
 def _id_of(items: Sequence[MissionItem]) -> int:
-    """Give a list's id: another one for other items, 0 for none."""
+    """Return a list's id: another one for other items, 0 for none."""
     return zlib.crc32(repr(tuple(items)).encode()) if items else 0
 
 

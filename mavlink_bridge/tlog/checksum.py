@@ -23,7 +23,7 @@ _STEP = np.array([crc_hqx(bytes([byte]), 0) for byte in range(256)], np.uint16)
 
 
 def crc_match(data: bytes, frame_at: int, crc_at: int, message_id: int) -> bool:
-    """Say for one frame whether its checksum is right; the arguments are those of `crc_matches`."""
+    """Return for one frame whether its checksum is right; the arguments are those of `crc_matches`."""
     covered = data[frame_at + 1 : crc_at] + bytes([CRC_SEED[message_id]])
     crc = crc_hqx(covered.translate(_REVERSED), 0xFFFF)
     return crc == int.from_bytes(data[crc_at : crc_at + 2].translate(_REVERSED), "big")
@@ -32,7 +32,7 @@ def crc_match(data: bytes, frame_at: int, crc_at: int, message_id: int) -> bool:
 def crc_matches(
     data: bytes, frame_at: NDArray[np.int64], crc_at: NDArray[np.int64], ids: NDArray[np.uint32]
 ) -> NDArray[np.bool_]:
-    """Say for each frame whether its checksum is right.
+    """Return for each frame whether its checksum is right.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def crc_matches(
     frame_at, crc_at : (n,) array
         Where each frame's magic byte and its checksum stand in the buffer.
     ids : (n,) array
-        Message ids; of an id outside the dialect the answer means nothing.
+        Message ids; for an id outside the dialect the answer is worthless.
 
     Returns
     -------

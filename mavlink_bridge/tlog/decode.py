@@ -34,7 +34,7 @@ def wanted_ids(wanted: Iterable[type[Message]]) -> NDArray[np.bool_]:
 
 
 def select(block: Block, is_wanted: NDArray[np.bool_]) -> tuple[NDArray[np.int64], int]:
-    """Give the places in a block of the wanted frames whose checksum is right, and how many had a wrong one."""
+    """Return the places in a block of the wanted frames whose checksum is right, and how many had a wrong one."""
     ids = block.scan.ids[block.which]
     places = np.flatnonzero(is_wanted[np.minimum(ids, ID_LIMIT)])
     good = block.scan.intact(block.which[places])
@@ -66,7 +66,7 @@ def decode(scan: Scan, which: NDArray[np.int64]) -> list[Message]:
 
 
 def payloads(scan: Scan, which: NDArray[np.int64], layout: Layout) -> NDArray[np.void]:
-    """Give the payloads of frames of one message type as a structured array, what MAVLink 2 left off filled with zeros."""
+    """Return the payloads of frames of one message type as a structured array, what MAVLink 2 left off filled with zeros."""
     width = layout.dtype.itemsize
     rows = scan.words(f"V{width}")[scan.payload_at(which)].view(np.uint8).reshape(len(which), width)
     lengths = scan.payload_bytes[which]
@@ -77,7 +77,7 @@ def payloads(scan: Scan, which: NDArray[np.int64], layout: Layout) -> NDArray[np
 
 
 def texts(column: NDArray[np.bytes_]) -> list[str]:
-    """Give NUL-terminated texts as strings, what is not ASCII replaced, as pymavlink does."""
+    """Return NUL-terminated texts as strings, what is not ASCII replaced, as pymavlink does."""
     return [_text(text) for text in column.tolist()]
 
 

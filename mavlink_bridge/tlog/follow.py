@@ -77,11 +77,11 @@ class Follower:
         return search_at, loose
 
     def chain(self) -> NDArray[np.int64]:
-        """Give the indices of the frames found, among the scan's candidates."""
+        """Return the indices of the frames found, among the scan's candidates."""
         return np.concatenate([np.zeros(0, np.int64), *self._runs])
 
     def times(self) -> NDArray[np.uint64]:
-        """Give the timestamp of each frame of the chain, mended where it is missing or stands alone far off."""
+        """Return the timestamp of each frame of the chain, mended where it is missing or stands alone far off."""
         chain = self.chain()
         times = self._scan.time_us[chain]
         if not self._gap_bytes or (len(self._runs) == 1 and not self._untimed):
@@ -112,7 +112,7 @@ class Follower:
             self._count_skipped(len(data) - loose)
 
     def _open_run(self, index: int, loose: int) -> None:
-        # Count what lies before a frame that does not simply follow, and say whether the 8 bytes before it are its timestamp.
+        # Count what lies before a frame that does not simply follow, and find whether the 8 bytes before it are its timestamp.
         scan = self._scan
         begin = int(scan.at[index]) - self._gap_bytes
         has_time = begin == loose or (

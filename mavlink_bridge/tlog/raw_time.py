@@ -18,7 +18,7 @@ _AUTOPILOT: Final = 1
 
 
 class RawClock:
-    """Gives each frame the ``time_boot_ms`` of the latest autopilot message that carries one; 0 before the first."""
+    """Assigns each frame the ``time_boot_ms`` of the latest autopilot message that carries one; 0 before the first."""
 
     def __init__(self) -> None:
         self._time_us = np.uint64(0)

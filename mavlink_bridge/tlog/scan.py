@@ -70,19 +70,19 @@ class Scan:
         self.step = self._steps()
 
     def intact(self, which: NDArray[Any]) -> NDArray[np.bool_]:
-        """Say for each of these candidates (by index) whether its id is known and its checksum right."""
+        """Return for each of these candidates (by index) whether its id is known and its checksum right."""
         at = self.at[which]
         good = crc_matches(self.data, at, self.crc_at(which), self.ids[which])
         sound: NDArray[np.bool_] = good & self.is_known[which]
         return sound
 
     def words(self, kind: str) -> NDArray[Any]:
-        """Give a view of the window with a value of this dtype beginning at every byte."""
+        """Return a view of the window with a value of this dtype beginning at every byte."""
         dtype = np.dtype(kind)
         return np.ndarray((len(self.view) - dtype.itemsize + 1,), dtype, self.view.data, strides=(1,))
 
     def is_intact(self, index: int) -> bool:
-        """Say whether this candidate's id is known and its checksum right."""
+        """Return whether this candidate's id is known and its checksum right."""
         if not self.is_known[index]:
             return False
         at = int(self.at[index])
@@ -104,7 +104,7 @@ class Scan:
         return linked, place_of, following, ends.tolist()
 
     def run(self, index: int) -> tuple[NDArray[np.int64], bool]:
-        """Give the candidates from this one on that follow one another, and whether the run goes on in the next window."""
+        """Return the candidates from this one on that follow one another, and whether the run goes on in the next window."""
         linked, place_of, following, ends = self._links
         if self.step[index] == NOWHERE:
             return np.array([index]), False
@@ -116,12 +116,12 @@ class Scan:
         return np.concatenate(parts), place == LATER
 
     def crc_at(self, which: NDArray[Any]) -> NDArray[np.int64]:
-        """Give the offset of each of these candidates' checksum."""
+        """Return the offset of each of these candidates' checksum."""
         offsets: NDArray[np.int64] = self.payload_at(which) + self.payload_bytes[which]
         return offsets
 
     def payload_at(self, which: NDArray[Any]) -> NDArray[np.int64]:
-        """Give the offset of each of these candidates' payload."""
+        """Return the offset of each of these candidates' payload."""
         offsets: NDArray[np.int64] = self.at[which] + np.where(self.is_v2[which], 10, 6)
         return offsets
 
@@ -163,14 +163,14 @@ class Scan:
         return step
 
     def _sound(self, step: NDArray[np.int32]) -> NDArray[np.bool_]:
-        # Without timestamps nothing but the checksum tells a frame from noise.
+        # Without timestamps nothing but the checksum distinguishes a frame from noise.
         good = self.intact(np.arange(len(self.at)))
         sound: NDArray[np.bool_] = good | (~self.is_known & (step >= 0) & good[step])
         return sound
 
 
 def near(time_us: NDArray[np.uint64], other_us: NDArray[np.uint64]) -> NDArray[np.bool_]:
-    """Say which timestamps lie less than a day apart."""
+    """Return which timestamps lie less than a day apart."""
     # Unsigned differences wrap round, so this holds for all 64 bits.
     is_near: NDArray[np.bool_] = (time_us - other_us + np.uint64(NEAR_US)) <= 2 * NEAR_US
     return is_near

@@ -13,10 +13,11 @@ if TYPE_CHECKING:
     from contextlib import AbstractContextManager
     from pathlib import Path
 
+# Half a megabyte: many frames at once for numpy, and little memory for any log. Chosen, not measured.
 WINDOW_BYTES: Final = 1 << 19
 _GZIP: Final = 31
 """What zlib calls a stream with gzip's header and checksum."""
-_PACKED_BYTES: Final = 1 << 10
+_PACKED_BYTES: Final = 1 << 10  # of a packed log, read at once
 
 
 class Source(Protocol):
@@ -26,7 +27,7 @@ class Source(Protocol):
     """Whether the log's packing (gzip) broke before its end."""
 
     def window(self, begin: int) -> tuple[bytes, bool]:
-        """Give up to `WINDOW_BYTES` bytes from an offset on, and whether they reach the log's end."""
+        """Return up to `WINDOW_BYTES` bytes from an offset on, and whether they reach the log's end."""
         ...
 
 

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from mavlink_bridge.tlog.source import LogFile, Source
 
+# A frame proves itself by the next ones, which must lie in the same window.
 _OVERLAP_BYTES: Final = 4 * MAX_FRAME_BYTES
 
 
@@ -48,12 +49,12 @@ class Block:
     time_us: NDArray[np.uint64]
 
     def times(self, places: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
-        """Give the times in seconds and the link numbers of the frames at these places in the block."""
+        """Return the times in seconds and the link numbers of the frames at these places in the block."""
         time_us = self.time_us[places]
         return time_us / 1e6, (time_us & np.uint64(3)).astype(np.uint8)
 
     def senders(self, places: NDArray[np.int64]) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-        """Give the system and component ids of the frames at these places in the block."""
+        """Return the system and component ids of the frames at these places in the block."""
         scan, which = self.scan, self.which[places]
         system_at = scan.at[which] + np.where(scan.is_v2[which], 5, 3)
         return scan.view[system_at], scan.view[system_at + 1]

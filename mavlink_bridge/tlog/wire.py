@@ -18,13 +18,14 @@ from mavlink_bridge.mavlink.messages import MESSAGES, Message, wire_name
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+# The first byte of a frame of MAVLink 1 and 2.
 MAGIC_V1: Final = 0xFE
 MAGIC_V2: Final = 0xFD
 SIGNED_FLAG: Final = 1
 """MAVLINK_IFLAG_SIGNED, the only incompatibility flag there is: a frame with another one cannot be read."""
-SIGNATURE_BYTES: Final = 13
-MAX_FRAME_BYTES: Final = 10 + 255 + 2 + SIGNATURE_BYTES
-TIMESTAMP_BYTES: Final = 8
+SIGNATURE_BYTES: Final = 13  # link id, timestamp of 6 bytes, 6 bytes of hash
+MAX_FRAME_BYTES: Final = 10 + 255 + 2 + SIGNATURE_BYTES  # header, payload, checksum, signature of MAVLink 2
+TIMESTAMP_BYTES: Final = 8  # microseconds since 1970, before each frame of a .tlog
 ID_LIMIT: Final = 65535
 """Message ids from here on are outside the dialect; tables are indexed with ``min(id, ID_LIMIT)``."""
 
@@ -127,7 +128,7 @@ NAME_OF_ID: Final[dict[int, str]] = {number: cls.msgname for number, cls in _dia
 
 
 def layout_of(message_class: type[Message]) -> Layout:
-    """Give the layout of one of our messages.
+    """Return the layout of one of our messages.
 
     Raises
     ------

@@ -40,8 +40,9 @@ if TYPE_CHECKING:
     from missions.situation import Mission, Situation
     from missions.vehicle import Vehicle
 
+# A home farther off is not laid out with the mission. Chosen, not measured: it bounds the frame
 _FAR_M = 50_000.0
-_STEP_M = 0.5
+_STEP_M = 0.5  # between the places of the first leg that are asked for their clearance; chosen, not measured
 _ANYTHING = Request()
 
 TOLERANCE_M = 0.01
@@ -61,7 +62,7 @@ class CheckedLeg:
     drawn_clearance_m : float
         The least distance of its straight line to forbidden ground; 0 where it crosses it, infinite without a fence.
     driven_clearance_m : float
-        The least distance foreseen for the driven track, the corner at its end included.
+        The least distance predicted for the driven track, the corner at its end included.
     asked_m : float
         What the driven track has to keep: the clearance, on a first leg no more than the start itself has.
     fence : str or None
@@ -125,7 +126,7 @@ class MissionCheck:
     warnings : tuple of str
         What else a person should know.
     envelope : Envelope
-        The band that the vehicle is foreseen to stay in.
+        The band that the vehicle is predicted to stay in.
     """
 
     mission: Mission
@@ -163,7 +164,7 @@ class MissionCheck:
 
     @property
     def driven_clearance_m(self) -> float:
-        """The least foreseen clearance of all legs."""
+        """The least predicted clearance of all legs."""
         return min(leg.driven_clearance_m for leg in self.legs)
 
     @property
@@ -183,7 +184,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
         Fence, parameters, home and where the vehicle is.
     request : Request
         What every leg has to keep while driving, as for plans: clearance, reserve, the position's error, the vehicle's size. Where the vehicle
-        starts; default: where it is, else home. The rest of it says nothing here: places and speeds are the mission's.
+        starts; default: where it is, else home. The rest of it is not used: places and speeds are the mission's.
 
     Raises
     ------
@@ -243,7 +244,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
 
 
 def plan_of(check: MissionCheck, situation: Situation, *, method: str = "optimal") -> Plan:
-    """Give a mission that was checked as a plan: for pictures, files, uploads and drives."""
+    """Return a checked mission as a plan: for pictures, files, uploads and drives."""
     path = check.path
     home = situation.home.value if situation.home else check.mission.home
     return Plan(
@@ -339,7 +340,7 @@ def _checked_legs(
 
 
 def _asked_of_first_leg_m(ground: Ground, leg: CourseLeg, band_m: float, promised_m: float) -> float:
-    """Give what the leg from the start has to keep: less than the others where the start is near a fence and the leg leads away from it."""
+    """Return the clearance that the leg from the start must keep: less than the others where the start is near a fence and the leg leads away from it."""
     line = drawn_leg(ground, leg.start, leg.end)
     if not isinstance(line, LineString) or not ground.allowed.covers(line):
         return promised_m
@@ -352,12 +353,12 @@ def _asked_of_first_leg_m(ground: Ground, leg: CourseLeg, band_m: float, promise
 
 
 def forecast_band_m(forecast: Envelope) -> float:
-    """Give the widest straight-line band of a drive."""
+    """Return the widest straight-line band of a drive."""
     return max((leg.half_width_m for leg in forecast.legs), default=0.0)
 
 
 def _shape(ground: Ground, leg: CourseLeg, circle_before_m: float) -> BaseGeometry:
-    """Give where a leg's drawn line may run: a circle is left, and come to, anywhere on it."""
+    """Return where a leg's drawn line may run: a circle may be left, and come to, anywhere on it."""
     line: BaseGeometry = drawn_leg(ground, leg.start, leg.end)
     if circle_before_m:
         disc = Point(ground.frame.to_local(leg.start)).buffer(circle_before_m * CIRCLE_PAD)
@@ -396,7 +397,7 @@ class _Drawn:
 
 
 def _first_outside(ground: Ground, shape: BaseGeometry) -> Point:
-    """Give the first place of a shape, in its own direction, that is on forbidden ground."""
+    """Return the first place of a shape, in its own direction, that is on forbidden ground."""
     outside = shape.difference(ground.allowed)
     if not isinstance(shape, LineString) or outside.is_empty:
         return outside.representative_point() if not outside.is_empty else shape.representative_point()
@@ -409,7 +410,7 @@ def _position(ground: Ground, point: Point) -> LatLon:
 
 
 def _driven_m(forecast: Envelope, ground: Ground, count: int) -> NDArray[np.float64]:
-    """Give the least foreseen clearance of each leg, with the corner at its end."""
+    """Return the least predicted clearance of each leg, with the corner at its end."""
     pieces_m = np.maximum(forecast.clearances_m(ground.edge), 0.0)
     pieces_m[~shapely.covers(ground.allowed, forecast.cores)] = 0.0
     legs_m = np.full(count, np.inf)
@@ -426,7 +427,7 @@ def _driven_m(forecast: Envelope, ground: Ground, count: int) -> NDArray[np.floa
 def _start_warnings(
     start: LatLon | None, heading_deg: float | None, first: CheckedLeg, required_m: float
 ) -> list[str]:
-    """Say what is not known of the start, and what its first leg cannot keep."""
+    """Return warnings of what is unknown at the start, and of what its first leg cannot keep."""
     if start is None:
         return [
             f"where the vehicle starts is not known: how it comes to item {first.leg.first_item} was not checked"
@@ -443,7 +444,7 @@ def _start_warnings(
 
 
 def _drive_warnings(vehicle: Vehicle, forecast: Envelope, course: Course) -> list[str]:
-    """Say where the drive model does not hold, and which parameters were not known."""
+    """Return warnings of where the drive model does not hold, and of parameters that were not known."""
     items = [course.legs[0].first_item, *(leg.last_item for leg in course.legs)]
     warnings = [
         f"item {items[corner.waypoint]}: a turn of {abs(corner.turn_deg):.0f}° between short legs; "

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 MOST_LEGS = 2000
 """Missions that repeat themselves longer than this are followed with each jump taken twice: every leg there is occurs in that."""
 
-_FEW_TIMES = 2
+_FEW_TIMES = 2  # a jump taken twice and then passed: every leg that a repeated jump makes occurs
 _SKIPPED = {Command.NAV_TAKEOFF: "TAKEOFF", Command.NAV_LAND: "LAND"}
 _STRAYING = {
     Command.NAV_GUIDED_ENABLE: "hands the vehicle to another computer (NAV_GUIDED_ENABLE)",
@@ -81,7 +81,7 @@ class Course:
     troubles : tuple of str
         What was not understood: where the vehicle goes then is not known.
     notes : tuple of str
-        What else is to be said.
+        Further remarks.
     is_endless : bool
         Whether the mission goes round without end.
     ends_in_loiter : bool
@@ -96,7 +96,7 @@ class Course:
 
 
 def is_navigation(item: MissionItem) -> bool:
-    """Tell whether an item is a navigation command: one that the vehicle is busy with until it is done (AP_Mission::is_nav_cmd)."""
+    """Return whether an item is a navigation command: one that the vehicle is busy with until it is done (AP_Mission::is_nav_cmd)."""
     return 0 < item.command <= Command.NAV_LAST or item.command in _STRAYING
 
 
@@ -125,12 +125,12 @@ def follow_mission(
     return_speed_mps : float, optional
         The speed of RTL (RTL_SPEED); default: the vehicle's own.
     circle_m : float
-        The radius of LOITER_TURNS that tell none (CIRC_RADIUS).
+        The radius of LOITER_TURNS without one of their own (CIRC_RADIUS).
     own_speed_mps : float
         The vehicle's own speed, which holds until the mission changes it.
     """
     for most_repeats in (None, _FEW_TIMES):
-        walk = _Walk(
+        walk = _Execution(
             mission.items, start, home, return_to, return_speed_mps, circle_m, own_speed_mps, most_repeats
         )
         walk.run()
@@ -154,7 +154,7 @@ def follow_mission(
 
 
 @dataclass
-class _Walk:
+class _Execution:
     """The autopilot's state while it executes a mission."""
 
     items: tuple[MissionItem, ...]
@@ -205,7 +205,7 @@ class _Walk:
         self.notes.append(f"item {index + 1} {text}")
 
     def _navigate(self, index: int) -> bool:
-        """Execute a navigation command; tell whether the mission goes on after it."""
+        """Execute a navigation command; return whether the mission goes on after it."""
         item = self.items[index]
         if item.command == Command.NAV_RETURN_TO_LAUNCH:
             self._return(index)
@@ -309,7 +309,7 @@ class _Walk:
         self.speed_mps = speed_mps
 
     def _jump(self, index: int) -> int | None:
-        """Give the index that the mission goes on with; None where it ends here."""
+        """Return the index at which the mission goes on; None where it ends here."""
         item = self.items[index]
         goal = self._jump_goal(item)
         if goal is None:
@@ -336,7 +336,7 @@ class _Walk:
         return goal
 
     def _jump_goal(self, item: MissionItem) -> int | None:
-        """Give the index that a jump leads to; None where there is no such item."""
+        """Return the index that a jump leads to; None where there is no such item."""
         wanted = item.params[0]
         if item.command == _DO_JUMP_TAG:
             tags = (

@@ -57,7 +57,7 @@ class End(StrEnum):
 
 
 def ending(items: Sequence[MissionItem], end: End) -> tuple[MissionItem, ...]:
-    """Give waypoints with the end that is wanted: the last one loitered at, or RTL after it."""
+    """Return waypoints with the end that is wanted: the last one loitered at, or RTL after it."""
     if end is End.RTL:
         return (*items, MissionItem(Command.NAV_RETURN_TO_LAUNCH))
     if end is End.LOITER:
@@ -73,7 +73,7 @@ def ending(items: Sequence[MissionItem], end: End) -> tuple[MissionItem, ...]:
 
 
 def return_place(situation: Situation, here: LatLon, home: LatLon | None) -> LatLon | None:
-    """Tell where RTL leads from a place (AP_Rally::calc_best_rally_or_home_location): the nearest rally point, else home.
+    """Return where RTL leads from a place (AP_Rally::calc_best_rally_or_home_location): the nearest rally point, else home.
 
     Home takes part where RALLY_INCL_HOME is 1, and where the nearest rally point is farther away than RALLY_LIMIT_KM.
     """

@@ -38,20 +38,21 @@ NEGLIGIBLE_M = 0.1
 ASIDE_DEG = 5.0
 """It may look so far to either side of the way that it is meant to go."""
 
+# Steps of the pursuit: chosen, not measured; how well the whole holds against driven tracks stands in docs/drive-model.md, 4.
 _STEP_S = 0.3
-_SETTLE_S = 1.0
-_LEAST_SCALE = 0.1
-_LEAST_MPS = 0.05
-_SAMPLES_A_PIECE = 3
-_SLOWED_SHARE = 0.97
-_NO_LAG_M = 0.1
-_LEAST_TURN_DEG = 8.0
-_ABOUT_CORNER_S = 7.0
+_SETTLE_S = 1.0  # of the target's time scale: acceleration over jerk in AR_WPNav, 1 s with the measured 1 m/s² and 1 m/s³
+_LEAST_SCALE = 0.1  # of the target's time scale, as in AR_WPNav: its time never stands still
+_LEAST_MPS = 0.05  # so that nothing is divided by 0
+_SAMPLES_A_PIECE = 3  # in the convex hull of one piece of ground, 0.9 s
+_SLOWED_SHARE = 0.97  # allowed less than this share of its speed a rover counts as slowed
+_NO_LAG_M = 0.1  # nearer than this it has caught up: no more than a band holds
+_LEAST_TURN_DEG = 8.0  # gentler corners are straight on
+_ABOUT_CORNER_S = 7.0  # before and after a corner; chosen, not measured
 _SIDES = np.exp(1j * np.radians([0.0, ASIDE_DEG, -ASIDE_DEG]))
 
 
 def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry) -> Envelope:
-    """Give an envelope with what corners before a fence need more, where the vehicle's avoidance is on.
+    """Return an envelope with the extra room that corners before a fence need where the vehicle's avoidance is on.
 
     Parameters
     ----------
@@ -69,7 +70,7 @@ def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry) -> Env
     """
     if not vehicle.avoids_fence or fence.is_empty or not band.legs:
         return band
-    target = _Target(band, vehicle)
+    target = _TargetPoint(band, vehicle)
     lags = target.lags(vehicle, FenceAhead(fence, target.places, vehicle))
     pieces = target.pieces(lags)
     if not pieces:
@@ -83,7 +84,7 @@ def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry) -> Env
     )
 
 
-class _Target:
+class _TargetPoint:
     """How the target point moves along all legs: each leg's motion begins while the one before still ends.
 
     Parameters
@@ -114,7 +115,7 @@ class _Target:
             self.places += np.interp(self.times_s - begin_s, *_shares(profile)) * step
 
     def lags(self, vehicle: Vehicle, fence: FenceAhead) -> list[complex]:
-        """Give at each time how far the rover is behind, east and north; an empty list where it never is."""
+        """Return at each time how far the rover is behind, east and north; an empty list where it never is."""
         steps = np.diff(self.places)
         moved_m = np.maximum(np.abs(steps), _LEAST_MPS * _STEP_S)
         is_slowed = np.zeros(len(steps), dtype=np.bool_)
@@ -127,7 +128,7 @@ class _Target:
         return _followed(self.places.tolist(), is_slowed.tolist(), vehicle, fence)
 
     def _near_corners(self) -> NDArray[np.bool_]:
-        """Tell when it is about a corner: falling behind on a straight line does not matter."""
+        """Return which times lie near a corner: falling behind on a straight line does not matter."""
         near = np.zeros(len(self.times_s), dtype=np.bool_)
         for corner, passed_s in zip(self.band.corners, self._passed_s, strict=True):
             if not corner.stops and abs(corner.turn_deg) >= _LEAST_TURN_DEG:
@@ -135,7 +136,7 @@ class _Target:
         return near
 
     def pieces(self, lags: list[complex]) -> list[tuple[BaseGeometry, float, int]]:
-        """Give the ground between target point and rover where that is behind, piece by piece."""
+        """Return the ground between target point and rover where the rover is behind, piece by piece."""
         behind = np.array(lags)
         far = np.flatnonzero(np.abs(behind) >= NEGLIGIBLE_M)
         # A piece holds the first sample of the next one too.
@@ -156,7 +157,7 @@ class _Target:
         )
 
     def _waypoint(self, time_s: float) -> int:
-        """Give the waypoint that a time is nearest to."""
+        """Return the waypoint nearest to a time."""
         if not self._passed_s:
             return self.band.legs[-1].first + 1
         nearest = min(range(len(self._passed_s)), key=lambda number: abs(self._passed_s[number] - time_s))
@@ -168,7 +169,7 @@ def _profile(leg: Leg, vehicle: Vehicle) -> LegProfile:
 
 
 def _shares(profile: LegProfile) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Give times since a leg's start, and what share of it is driven by then."""
+    """Return times since a leg's start, and the share of the leg that is driven by each."""
     leg_s = np.append(np.arange(0.0, profile.duration_s, _STEP_S), profile.duration_s)
     return leg_s, np.array([profile.travelled_m(time_s) / profile.length_m for time_s in leg_s.tolist()])
 
@@ -185,7 +186,7 @@ def _followed(
     velocities.append(velocities[-1])
     top_mps = max(map(abs, velocities))
     behind, scale, at = 0j, 1.0, 0.0
-    rover = _Rover(vehicle)
+    rover = _FollowingRover(vehicle)
     while (sample := int(at)) < len(is_slowed):
         velocity = velocities[sample]
         if not is_slowed[sample] and abs(behind) < _NO_LAG_M:
@@ -205,8 +206,8 @@ def _followed(
     return lags
 
 
-class _Rover:
-    """A rover that turns as its controllers tell it, and takes on the speed wanted at once."""
+class _FollowingRover:
+    """A rover that turns as its controllers demand, and takes on the speed wanted at once."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         self.velocity = 0j
@@ -231,7 +232,9 @@ class _Rover:
 
 
 def _scale(velocity: complex, behind: complex, driven: complex, vehicle: Vehicle) -> float:
-    """Give how fast time runs for the target point: it waits for a rover that cannot keep up (AR_WPNav)."""
+    """Return how fast time runs for the target point: it waits for a rover that cannot keep up (AR_WPNav)."""
     target_mps = max(abs(velocity), _LEAST_MPS)
     along_mps = ((driven - vehicle.position_gain_per_s * behind) * velocity.conjugate()).real / target_mps
-    return min(max(0.05 + along_mps / target_mps, _LEAST_SCALE), 1.0)
+    return min(
+        max(0.05 + along_mps / target_mps, _LEAST_SCALE), 1.0
+    )  # 0.05 as in the simulator's `drive`, after AR_WPNav

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
     from missions.drive_model.legs_and_corners import Route
 
-BLEND_SAMPLES = 6
-NEGLIGIBLE_M = 0.03
+BLEND_SAMPLES = 6  # straight pieces of a blend; chosen, not measured
+NEGLIGIBLE_M = 0.03  # a swing below this is left out; chosen: about a tenth of the band, 0.25 to 0.45 m
 TAIL_TIMES_S = (2.0, 4.5, 8.0, 14.0)
 """Where a leg's band is cut, in seconds since its corner; between them a tail is taken as straight, which is never too narrow."""
 
@@ -45,7 +45,7 @@ class Pieces:
 
 
 def convex(hulls: Sequence[Hull]) -> NDArray[np.object_]:
-    """Give the convex hulls of places."""
+    """Return the convex hulls of places."""
     pairs = [hull if len(hull) > 1 else (*hull, *hull) for hull in hulls]
     owners = np.repeat(np.arange(len(pairs)), [len(hull) for hull in pairs])
     # Lines take far less to make than as many points, and their hulls are the same.
@@ -54,7 +54,7 @@ def convex(hulls: Sequence[Hull]) -> NDArray[np.object_]:
 
 
 def _beside(place: Vector, direction: Vector, stray: Stray) -> list[Vector]:
-    """Give the place, or the two ends of the strip about it."""
+    """Return the place, or the two ends of the strip around it."""
     if stray.widest_m < NEGLIGIBLE_M:
         return [place]
     (east_m, north_m), (ahead_east, ahead_north) = place, direction
@@ -100,7 +100,7 @@ def add_leg(pieces: Pieces, route: Route, number: int) -> None:
 
 
 def waypoint_after(route: Route, leg: int) -> int:
-    """Give the number of the waypoint that a leg leads to."""
+    """Return the number of the waypoint that a leg leads to."""
     return route.corners[leg].waypoint if leg < len(route.corners) else route.legs[leg].first + 1
 
 
@@ -128,7 +128,7 @@ def add_corner(pieces: Pieces, route: Route, number: int) -> None:
 
 
 def _blend_path(route: Route, number: int) -> list[tuple[Vector, Vector]]:
-    """Give places and directions along the blend of two legs; one place where the rover stops."""
+    """Return places and directions along the blend of two legs; one place where the rover stops."""
     corner, before, after = route.corners[number], route.legs[number], route.legs[number + 1]
     duration_s = corner.blend.duration_s
     if duration_s == 0:
@@ -149,7 +149,7 @@ def _blend_path(route: Route, number: int) -> list[tuple[Vector, Vector]]:
 
 
 def _swing_hull(route: Route, number: int) -> list[Vector]:
-    """Give the ground behind the waypoint that a turn needs which the rover cannot follow."""
+    """Return the ground behind the waypoint that a turn needs which the rover cannot follow."""
     corner, after = route.corners[number], route.legs[number + 1]
     hull = [*corner.places]
     for along_m in (-corner.behind_m, 0.0):
@@ -159,7 +159,7 @@ def _swing_hull(route: Route, number: int) -> list[Vector]:
 
 
 def _swing_strip(route: Route, number: int) -> list[Vector]:
-    """Give the strip along the next leg in which a swing has not begun to die away."""
+    """Return the strip along the next leg in which a swing has not begun to die away."""
     corner, after = route.corners[number], route.legs[number + 1]
     ahead_m = after.profile.travelled_m(corner.blend.duration_s)
     if corner.swing_m >= NEGLIGIBLE_M and not corner.pivots:
@@ -174,7 +174,7 @@ def _swing_strip(route: Route, number: int) -> list[Vector]:
 
 
 def _whole_corner(route: Route, number: int) -> list[Vector]:
-    """Give the ground of a corner that is turned within the acceptance radius along a path that was not measured."""
+    """Return the ground of a corner that is turned within the acceptance radius along a path that was not measured."""
     corner, before, after = route.corners[number], route.legs[number], route.legs[number + 1]
     radius_m = route.vehicle.waypoint_radius_m
     return [

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from missions.drive_model.motion import LegProfile
     from missions.vehicle import Vehicle
 
-GRAVITY_MPS2 = 9.80665
+GRAVITY_MPS2 = 9.80665  # standard gravity; ArduPilot's GRAVITY_MSS
 
-BAND_AT_REST_M = 0.20
+BAND_AT_REST_M = 0.20  # the part of the band that does not grow with speed: measured (docs/drive-model.md, 2)
 BAND_HEADING_ERROR = 0.01
 """A heading known wrong by this angle (rad) holds a rover off its line by ``speed * angle / position gain``."""
 
@@ -45,10 +45,12 @@ NEAR_M = 3.0
 STRAIGHT_ON_DEG = 10.0
 """Legs that turn less than this are one leg where short legs are asked for."""
 
+# Fitted to the rows of 5 and 10 m legs in benchmarks/data (docs/drive-model.md, 3).
 SHORT_LEG_M = 5.0
 PIVOT_SWING_M = 0.7
 """How swings grow on short legs: by e^(-leg / 5 m) of 150 %, and of 0.7 m where it pivots."""
 
+# Measured starts, and stops for a delay, less the band (docs/drive-model.md, 3).
 START_SWING_M = ((0.0, 0.0), (90.0, 0.9), (135.0, 1.5), (150.0, 1.75), (165.0, 2.3), (180.0, 2.7))
 START_BEHIND_M = ((0.0, 0.0), (90.0, 0.0), (135.0, 0.3), (170.0, 1.4), (180.0, 3.6))
 """Heading error in degrees at a start or after a stop; how far off the line, and how far behind the point, at a turning radius of 0.9 m."""
@@ -61,8 +63,9 @@ START_HOLD_S = 1.5
 
 END_OVERRUN_M = 0.5
 STOP_LAG_S = 2.0
-"""Past the last waypoint; time to settle at a stop."""
+"""Past the last waypoint, the farthest measured; time to settle at a stop (docs/drive-model.md, 3 and 5)."""
 
+# Measured: all but two of the 83 rows that left the band by more than 0.1 m turn sharper, on shorter legs (docs/drive-model.md).
 UNBOUNDED_TURN_DEG = 115.0
 UNBOUNDED_LEG_M = 15.0
 PIVOT_DOUBT_DEG = 2.0
@@ -89,12 +92,12 @@ STANDSTILL = Blend(0.0, 0.0)
 
 
 def band_m(vehicle: Vehicle, speed_mps: float) -> float:
-    """Give how far a rover strays to either side of the path its autopilot means to drive."""
+    """Return how far a rover strays to either side of the path that its autopilot aims for."""
     return BAND_AT_REST_M + BAND_HEADING_ERROR * speed_mps / vehicle.position_gain_per_s
 
 
 def blend(vehicle: Vehicle, before: LegProfile, after: LegProfile, turn_deg: float) -> Blend:
-    """Give the overlap of two legs' motions at a corner.
+    """Return the overlap of two legs' motions at a corner.
 
     The next leg starts as early as the middle of the turn lies within the waypoint radius and its acceleration within
     ATC_TURN_MAX_G, at the earliest when the present leg begins to brake (SCurve::advance_target_along_track).
@@ -117,7 +120,7 @@ def blend(vehicle: Vehicle, before: LegProfile, after: LegProfile, turn_deg: flo
 
 
 def corner_swing_m(vehicle: Vehicle, turn_deg: float, reach_m: float, shorter_leg_m: float) -> float:
-    """Give how far a rover is carried out beyond its band after a corner that it does not stop at.
+    """Return how far a rover is carried out beyond its band after a corner that it does not stop at.
 
     Steered wheels cannot follow a sharp blend; a blend that starts early gives room back. On short legs a rover is still swinging from
     one corner when the next begins.
@@ -125,6 +128,7 @@ def corner_swing_m(vehicle: Vehicle, turn_deg: float, reach_m: float, shorter_le
     if vehicle.can_pivot:
         return 0.0
     radius_m = max(vehicle.turn_radius_m, MEASURED_TURN_RADIUS_M)
+    # The exponents and their bounds are fitted to benchmarks/data (docs/drive-model.md, 3): 2.5 where the blend or a leg is short, to 6.
     short = math.exp(-shorter_leg_m / SHORT_LEG_M)
     early = np.interp(reach_m, (0.2 * radius_m, 0.6 * radius_m), (0.0, 1.0))
     half_turn = math.sin(math.radians(abs(turn_deg)) / 2) ** 2
@@ -133,22 +137,22 @@ def corner_swing_m(vehicle: Vehicle, turn_deg: float, reach_m: float, shorter_le
 
 
 def swing_length_m(vehicle: Vehicle) -> float:
-    """Give how far along its next leg a rover comes before a swing is at its widest."""
+    """Return how far along its next leg a rover comes before a swing is at its widest."""
     return SWING_LENGTHS * max(vehicle.turn_radius_m, MEASURED_TURN_RADIUS_M)
 
 
 def pivot_swing_m(shorter_leg_m: float) -> float:
-    """Give how far beyond its band a rover strays that pivots between short legs."""
+    """Return how far beyond its band a rover strays that pivots between short legs."""
     return PIVOT_SWING_M * math.exp(-shorter_leg_m / SHORT_LEG_M)
 
 
 def start_swing_m(vehicle: Vehicle, error_deg: float) -> float:
-    """Give how far off its line, beyond its band, a rover swings that starts with its heading wrong."""
+    """Return how far off its line, beyond its band, a rover swings that starts with its heading wrong."""
     return _start(vehicle, error_deg, START_SWING_M)
 
 
 def start_behind_m(vehicle: Vehicle, error_deg: float) -> float:
-    """Give how far behind its start a rover comes that starts with its heading wrong."""
+    """Return how far behind its start a rover comes that starts with its heading wrong."""
     return _start(vehicle, error_deg, START_BEHIND_M)
 
 
@@ -164,7 +168,7 @@ def is_bounded(vehicle: Vehicle, turn_deg: float, shorter_leg_m: float) -> bool:
 
 
 def pivot_time_s(vehicle: Vehicle, turn_deg: float) -> float:
-    """Give how long a turn on the spot takes; a rate of 0 is no limit."""
+    """Return how long a turn on the spot takes; a rate of 0 is no limit."""
     return abs(turn_deg) / vehicle.pivot_rate_dps if vehicle.pivot_rate_dps > 0 else 0.0
 
 
@@ -174,7 +178,8 @@ def may_pivot_or_cut(vehicle: Vehicle, turn_deg: float) -> bool:
 
 
 def swing_time_s(swing_m: float, speed_mps: float) -> float:
-    """Give the time lost on the way out and back, beyond that of the motion."""
+    """Return the time lost on the way out and back, beyond that of the motion."""
+    # No source is recorded for these two; docs/drive-model.md ("How well it holds") has the time errors that they leave.
     return swing_m * (0.7 + 0.4 / max(speed_mps, 0.5))
 
 

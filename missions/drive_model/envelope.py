@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
 
+# Chords in a quarter circle of a buffered band, which is widened so that they lie outside the circle
 QUARTER_SEGMENTS = 8
 _ROUNDING_M = 2e-6
 """What joining many polygons may take from their outline."""
@@ -20,7 +21,7 @@ _ROUNDING_M = 2e-6
 
 @dataclass(frozen=True, slots=True)
 class Corner:
-    """What is foreseen at one waypoint between two legs.
+    """The prediction at one waypoint between two legs.
 
     Parameters
     ----------
@@ -57,7 +58,7 @@ class Corner:
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """What is foreseen on one leg, between two points of the list.
+    """The prediction on one leg, between two points of the list.
 
     Parameters
     ----------
@@ -127,7 +128,7 @@ class Envelope:
         return pieces
 
     def clearances_m(self, obstacle: BaseGeometry) -> NDArray[np.float64]:
-        """Give the distance of each piece from a geometry, negative by its band at most where they meet.
+        """Return the distance of each piece from a geometry, negative by its band at most where they meet.
 
         Parameters
         ----------
@@ -144,5 +145,5 @@ class Envelope:
         return np.asarray(shapely.distance(self.cores, obstacle) - self.bands_m, dtype=np.float64)
 
     def clearance_m(self, obstacle: BaseGeometry) -> float:
-        """Give the least distance of the driven track from a geometry: what `clearances_m` says at its worst."""
+        """Return the least distance of the driven track from a geometry: the least of `clearances_m`."""
         return float(self.clearances_m(obstacle).min(initial=np.inf))

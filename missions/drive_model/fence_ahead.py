@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 _MOVED_M = 5.0
 """So far a place may move until the edges near it are looked for again."""
 
-_SPARE_M = 0.1
-_TOUCHING_M2 = 1e-9
-_FEW = 24
+_SPARE_M = 0.1  # beyond the farthest edge that counts: chosen, so that rounding loses none
+_TOUCHING_M2 = 1e-9  # a ray through the end of an edge meets it, rounding or not
+_FEW = 24  # more edges than this are quicker in numpy than one by one; chosen, it changes no answer
 
 
 class FenceAhead:
@@ -53,17 +53,17 @@ class FenceAhead:
         self._near_edges: list[tuple[complex, complex]] = []
 
     def counts_within_m(self, top_mps: float) -> float:
-        """Give the distance beyond which an edge lets a rover drive at a speed."""
+        """Return the distance beyond which an edge does not slow a rover that drives at a speed."""
         return self._stops_within_m + max(top_mps / self._gain_per_s, top_mps**2 / self._accel_mps2)
 
     def speeds_mps(self, places: NDArray[np.complex128], ways: NDArray[np.complex128]) -> NDArray[np.float64]:
-        """Give the speed that is allowed at each place, its own way (sqrt_controller of what is left to the margin)."""
+        """Return the speed that is allowed at each place in its own direction (sqrt_controller of what is left to the margin)."""
         left_m = np.maximum(self._ahead_m(places, ways) - self._stops_within_m, 0.0)
         far_mps = np.sqrt(2 * self._accel_mps2 * np.maximum(left_m - self._linear_m / 2, 0.0))
         return np.where(left_m <= self._linear_m, self._gain_per_s * left_m, far_mps)
 
     def speed_mps(self, place: complex, way: complex, top_mps: float) -> float:
-        """Give the speed that is allowed at one place, one way; the same for speeds up to ``top_mps``, and above that no less."""
+        """Return the speed that is allowed at one place in one direction; exact up to ``top_mps``, and above that no less."""
         self._look_about(place, self.counts_within_m(top_mps) + _SPARE_M)
         left_m = max(self._one_ahead_m(place, way) - self._stops_within_m, 0.0)
         if left_m <= self._linear_m:
@@ -80,7 +80,7 @@ class FenceAhead:
         self._near_edges = list(zip(*(part.tolist() for part in self._near), strict=True))
 
     def _touch(self, box: tuple[complex, complex], reach_m: float) -> NDArray[np.bool_]:
-        """Tell which edges may come within reach of a box."""
+        """Return which edges may come within reach of a box."""
         near = np.ones(len(self._starts), dtype=np.bool_)
         for part, (low, high) in (
             (np.real, (box[0].real, box[1].real)),
@@ -91,7 +91,7 @@ class FenceAhead:
         return near
 
     def _ahead_m(self, places: NDArray[np.complex128], ways: NDArray[np.complex128]) -> NDArray[np.float64]:
-        """Give how far ahead the first edge lies; infinite where there is none."""
+        """Return how far ahead the first edge lies; infinite without one."""
         back = ways.conj()[:, None]
         off = (self._starts - places[:, None]) * back
         steps = self._steps * back
@@ -102,7 +102,7 @@ class FenceAhead:
         return np.asarray(np.where(met, away_m, np.inf).min(axis=1, initial=np.inf))
 
     def _one_ahead_m(self, place: complex, way: complex) -> float:
-        """Give the same for one place, of the edges near it: this is asked so often that a few edges are best looked at one by one."""
+        """Return the same for one place, from the edges near it: this is asked so often that a few edges are best looked at one by one."""
         back = way.conjugate()
         edges = self._near_edges
         if len(edges) > _FEW:

@@ -29,7 +29,7 @@ def plan_route(
     stops: Mapping[int, float],
     start: Stray,
 ) -> Route:
-    """Give the legs and corners of a list of points; points that lie on one another are one place, and a stop."""
+    """Return the legs and corners of a list of points; points that lie on one another are one place, and a stop."""
     groups = _grouped(points)
     legs = tuple(
         _leg(vehicle, before, after, None if speeds is None else speeds[after[0][0] - 1])
@@ -85,7 +85,7 @@ def _leg(
 
 
 def _runs_m(legs: Sequence[LegPlan], turns_deg: Sequence[float]) -> list[float]:
-    """Give for each leg how far it goes nearly straight on, before and after it together."""
+    """Return for each leg how far the line goes nearly straight on before and after it, together."""
     runs: list[list[LegPlan]] = []
     for number, leg in enumerate(legs):
         if runs and abs(turns_deg[number - 1]) < at_corner.STRAIGHT_ON_DEG:

@@ -38,12 +38,12 @@ class Stray:
         return max(self.left_m, self.right_m)
 
     def after(self, time_s: float, gain_per_s: float) -> Stray:
-        """Give what is left after a time."""
+        """Return what is left of the stray after a time."""
         left = math.exp(-gain_per_s * max(time_s, 0.0))
         return Stray(self.left_m * left, self.right_m * left)
 
     def turned(self, turn_deg: float) -> Stray:
-        """Give it as seen from the next leg."""
+        """Return the stray as seen from the next leg."""
         cosine = math.cos(math.radians(turn_deg))
         same, other = (cosine, 0.0) if cosine > 0 else (0.0, -cosine)
         least_m = KEPT_ACROSS * self.widest_m * abs(math.sin(math.radians(turn_deg)))
@@ -53,15 +53,15 @@ class Stray:
         )
 
     def seen_from(self, turn_deg: float) -> Stray:
-        """Give it as at a right turn: the outside left, the inside right."""
+        """Return the stray as at a right turn: the outside left, the inside right."""
         return self if turn_deg >= 0 else Stray(self.right_m, self.left_m)
 
     def widened(self, more_m: float) -> Stray:
-        """Give it with more to either side."""
+        """Return the stray with more to either side."""
         return Stray(self.left_m + more_m, self.right_m + more_m)
 
     def swung(self, turn_deg: float, swing_m: float) -> Stray:
-        """Give it with a swing to the outside of a turn added."""
+        """Return the stray with a swing to the outside of a turn added."""
         if turn_deg >= 0:
             return Stray(self.left_m + swing_m, self.right_m)
         return Stray(self.left_m, self.right_m + swing_m)
@@ -79,7 +79,7 @@ class LegPlan:
     band_m: float
 
     def at(self, time_s: float) -> Vector:
-        """Give the place the autopilot means to be at, at a time since the leg's own start."""
+        """Return the place that the autopilot aims for, at a time since the leg's own start."""
         along_m = self.profile.travelled_m(time_s)
         return (self.start[0] + self.direction[0] * along_m, self.start[1] + self.direction[1] * along_m)
 
@@ -164,7 +164,7 @@ class Route:
     strays: tuple[Stray, ...]
 
     def span_s(self, leg: int) -> tuple[float, float]:
-        """Give the time (since the leg's own start) when only this leg's motion runs: from one blend to the next."""
+        """Return the time (since the leg's own start) when only this leg's motion runs: from one blend to the next."""
         begin_s = self.corners[leg - 1].blend.duration_s if leg else 0.0
         end_s = self.legs[leg].profile.duration_s
         if leg < len(self.corners):
@@ -172,6 +172,6 @@ class Route:
         return begin_s, max(begin_s, end_s)
 
     def stray_at(self, leg: int, time_s: float) -> Stray:
-        """Give what is left of earlier swings at a time since the leg's own start."""
+        """Return what is left of earlier swings at a time since the leg's own start."""
         middle_s = self.corners[leg - 1].blend.duration_s / 2 if leg else at_corner.START_HOLD_S
         return self.strays[leg].after(time_s - middle_s, self.vehicle.position_gain_per_s)

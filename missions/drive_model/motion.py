@@ -43,7 +43,7 @@ class Ramp:
         return self.speed_mps * self.duration_s / 2
 
     def travelled_m(self, time_s: float) -> float:
-        """Give the distance from the point of rest after a time; beyond the ramp the speed stays."""
+        """Return the distance from the point of rest after a time; beyond the ramp the speed stays."""
         if time_s > self.duration_s / 2:
             # The ramp is symmetric: its second half mirrors the first about the half speed.
             rest_s = max(self.duration_s - time_s, 0.0)
@@ -51,11 +51,11 @@ class Ramp:
         return self._first_half_m(time_s)
 
     def accel_at_mps2(self, time_s: float) -> float:
-        """Give the acceleration in the first half of the ramp."""
+        """Return the acceleration in the first half of the ramp."""
         return self.jerk_mps3 * min(time_s, self.jerk_s)
 
     def time_s(self, distance_m: float) -> float:
-        """Give the time to a distance within the first half of the ramp."""
+        """Return the time to a distance within the first half of the ramp."""
         jerk_m = self.jerk_mps3 * self.jerk_s**3 / 6
         if distance_m <= jerk_m:
             return math.cbrt(6 * distance_m / self.jerk_mps3)
@@ -97,14 +97,14 @@ class LegProfile:
         return self.length_m / self.top_speed_mps + self.ramp.duration_s
 
     def travelled_m(self, time_s: float) -> float:
-        """Give the distance from the leg's start after a time since its start."""
+        """Return the distance from the leg's start after a time since its start."""
         if time_s > self.duration_s / 2:
             return self.length_m - self.ramp.travelled_m(self.duration_s - time_s)
         return self.ramp.travelled_m(time_s)
 
 
 def leg_profile(length_m: float, speed_mps: float, accel_mps2: float, jerk_mps3: float) -> LegProfile:
-    """Give the motion along a leg: to the speed asked for, or as fast as half its length allows."""
+    """Return the motion along a leg: to the speed asked for, or as fast as half its length allows."""
     lag_s = accel_mps2 / jerk_mps3
     # Length of both ramps = leg: v²/a + v·a/j = L where the acceleration is reached, else 2·v·√(v/j) = L.
     reachable_mps = accel_mps2 / 2 * (math.sqrt(lag_s**2 + 4 * length_m / accel_mps2) - lag_s)

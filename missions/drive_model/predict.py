@@ -35,7 +35,7 @@ def envelope(
     speeds: Sequence[float | None] | None = None,
     stops: Mapping[int, float] | None = None,
 ) -> Envelope:
-    """Foresee how a vehicle drives a list of points.
+    """Predict how a vehicle drives a list of points.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def plan_drive(
     speeds: Sequence[float | None] | None = None,
     stops: Mapping[int, float] | None = None,
 ) -> Drive:
-    """Foresee a drive step by step: first its time, and only if need be its band; see `envelope`."""
+    """Predict a drive step by step: first its time, and only if need be its band; see `envelope`."""
     array = _checked(points)
     _check_speeds(speeds, len(array) - 1)
     starts = [_start(array, vehicle, heading_deg)]
@@ -117,11 +117,11 @@ class Drive:
 
     @property
     def envelope(self) -> Envelope:
-        """The band, with what is told of corners and legs."""
+        """The band, with the predictions for corners and legs."""
         return self.with_cores(convex(self.pieces.hulls))
 
     def with_cores(self, cores: NDArray[np.object_]) -> Envelope:
-        """Give the band, the convex hulls of its pieces being known already."""
+        """Return the band from the convex hulls of its pieces, already known."""
         route = self.routes[0]
         return Envelope(
             points=self.points,
@@ -144,7 +144,7 @@ def _add_route(pieces: Pieces, route: Route, points: NDArray[np.float64], behind
 
 
 def _bearing_deg(points: NDArray[np.float64]) -> float:
-    """Give the bearing of the first leg that leads anywhere."""
+    """Return the bearing of the first leg that has a length."""
     away = points[np.hypot(*(points - points[0]).T) > SAME_PLACE_M]
     if not len(away):
         return 0.0
@@ -161,7 +161,7 @@ def corner_forecast(
     speed_mps: float | None = None,
     stop_s: float | None = None,
 ) -> Corner:
-    """Foresee one corner by itself, without the tails of others.
+    """Predict one corner by itself, without the tails of others.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ def _check_speeds(speeds: Sequence[float | None] | None, legs: int) -> None:
 
 
 def _start(array: NDArray[np.float64], vehicle: Vehicle, heading_deg: float | None) -> tuple[Stray, float]:
-    """Give the swing at the start, and how far behind its place it takes the rover."""
+    """Return the swing at the start, and how far behind its place it takes the rover."""
     steps = array - array[0]
     far = np.flatnonzero(np.hypot(steps[:, 0], steps[:, 1]) >= SAME_PLACE_M)
     if not len(far):
@@ -227,3 +227,4 @@ def _start(array: NDArray[np.float64], vehicle: Vehicle, heading_deg: float | No
 
 
 EITHER_SIDE_DEG = 165.0
+"""A start that faces farther back than this may swing to either side. Chosen, not measured: it bounds where little decides on the side."""

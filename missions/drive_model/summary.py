@@ -1,4 +1,4 @@
-"""What is told of a drive: its corners, its legs, and when it comes to each point."""
+"""The summary of a predicted drive: its corners, its legs, and when it comes to each point."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ if TYPE_CHECKING:
     from missions.drive_model.legs_and_corners import LegPlan, Route
 
 START_AND_END_LAG_S = 2.0
+"""For both together, besides the motions of the legs (docs/drive-model.md, 5)."""
 
 
 def told_corner(route: Route, number: int) -> Corner:
-    """Give what is foreseen at a corner."""
+    """Return the prediction for a corner."""
     plan, before, after = route.corners[number], route.legs[number], route.legs[number + 1]
     band_m = max(before.band_m, after.band_m)
     blend_s = before.profile.duration_s - plan.blend.duration_s
@@ -53,7 +54,7 @@ def _cut_m(route: Route, number: int) -> float:
 
 
 def told_leg(route: Route, number: int) -> Leg:
-    """Give what is foreseen on a leg."""
+    """Return the prediction for a leg."""
     leg: LegPlan = route.legs[number]
     begin_s, _ = route.span_s(number)
     stray = route.stray_at(number, begin_s)
@@ -68,7 +69,7 @@ def told_leg(route: Route, number: int) -> Leg:
 
 
 def arrivals_s(route: Route, count: int) -> NDArray[np.float64]:
-    """Give when each point is passed: the motions of the legs one after another, less what they overlap."""
+    """Return when each point is passed: the motions of the legs one after another, less their overlaps."""
     times_s = np.zeros(count)
     clock_s = (
         START_AND_END_LAG_S / 2 + at_corner.swing_time_s(route.strays[0].widest_m, route.vehicle.speed_mps)

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 LegKey = tuple[int, int, int | None]
 """A leg by its items: from seq, to seq, the jump taken in between."""
 
-_CONDITION_DISTANCE = 114
-_JUMP_TAG, _DO_JUMP_TAG = 600, 601
-_FOREVER = -1.0
+_CONDITION_DISTANCE = 114  # MAV_CMD_CONDITION_DISTANCE
+_JUMP_TAG, _DO_JUMP_TAG = 600, 601  # MAV_CMD_JUMP_TAG, MAV_CMD_DO_JUMP_TAG
+_FOREVER = -1.0  # DO_JUMP param2: repeat without end
 
 
 @dataclass(eq=False)
@@ -73,7 +73,7 @@ class ItemList:
 
     @property
     def own_seqs(self) -> frozenset[int]:
-        """Give the seqs of the waypoints and changes of speed that routes have put in before the places of the mission."""
+        """Return the seqs of the waypoints and speed changes that routes have put in before the places of the mission."""
         return frozenset(
             seq
             for seq, entry in enumerate(self._entries, 1)
@@ -83,7 +83,7 @@ class ItemList:
         )
 
     def mission(self) -> Mission:
-        """Give the mission as it is now, its jumps numbered anew."""
+        """Return the mission as it is now, its jumps renumbered."""
         number = {id(entry): seq for seq, entry in enumerate(self._entries, 1)}
         return Mission(
             tuple(
@@ -96,7 +96,7 @@ class ItemList:
         )
 
     def origin(self, leg: CourseLeg) -> LegKey:
-        """Give the leg of the mission as it was that a leg of the present one belongs to."""
+        """Return the leg of the original mission that a leg of the present one belongs to."""
         first = self._entries[leg.first_item - 1] if leg.first_item else None
         last = self._entries[leg.last_item - 1]
         for entry in (last, first):
@@ -141,7 +141,7 @@ class ItemList:
         self._entries[here:here] = [_Entry(item, leg=key, is_after=True) for item in after]
 
     def _place_before(self, key: LegKey) -> int:
-        """Tell where a leg's new places belong: just before the one it leads to.
+        """Return where a leg's new places belong: just before the one it leads to.
 
         But before a condition on the distance to that place, which would else be taken for that to the first new one, and before what
         jumps lead to, which are no part of this leg.

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from missions.request import Request
     from missions.situation import Situation
 
+# Chosen, not measured: routes that break the legs beside them are made anew so often; bounds the time
 _ROUNDS = 8
 _EXTRA_M, _MOST_EXTRA_M = 0.1, 0.5
 """More room for routes where the corners between them and their neighbours need it."""
@@ -68,7 +69,7 @@ class _Detour:
 def repaired_plan(
     situation: Situation, request: Request, *, should_stop: Callable[[], bool] | None = None
 ) -> Plan:
-    """Repair the request's mission, else the situation's, and give it as a plan.
+    """Repair the request's mission, else the situation's, and return it as a plan.
 
     Raises
     ------
@@ -104,12 +105,12 @@ def repair_mission(
     situation : Situation
         Fence, parameters, home and where the vehicle is.
     request : Request
-        Start, clearance, ``snap_m`` for places that are blocked, method; its targets say nothing here.
+        Start, clearance, ``snap_m`` for places that are blocked, method; its targets are not used.
 
     Raises
     ------
     RouteError
-        A leg cannot be replaced (says which and why), or the corners between legs keep breaking the promise.
+        A leg cannot be replaced (the message says which and why), or the corners between legs keep breaking the promise.
     SituationError
         Something in the mission is not understood, so that where it leads is not known.
     FenceMissingError, FenceError, VehicleError, InvalidPositionError
@@ -143,7 +144,7 @@ def repair_mission(
             routed = _routed(asked, keys, situation, replace(request, clearance_m=clearance_m), should_stop)
         except RouteError:
             if clearance_m > asked.clearance_m:
-                break  # there is no more room: what was found before is to be told
+                break  # there is no more room: the error found before is raised
             raise
         repaired = routed
         checked = check_mission(repaired.mission(), situation, request)
@@ -169,7 +170,7 @@ def _routed(
     request: Request,
     should_stop: Callable[[], bool] | None,
 ) -> ItemList:
-    """Give the mission with routes in the place of some legs."""
+    """Return the mission with routes in place of some legs."""
     repaired = ItemList(asked.mission)
     moved: dict[int, LatLon] = {}
 
@@ -203,12 +204,12 @@ def _names(key: LegKey) -> str:
 
 
 def _where_moved(leg: CourseLeg, moved: Mapping[int, LatLon]) -> CourseLeg:
-    """Give a leg between the places where its ends are now."""
+    """Return a leg between the places where its ends are now."""
     return replace(leg, start=moved.get(leg.first_item, leg.start), end=moved.get(leg.last_item, leg.end))
 
 
 def _first_driven(checked: MissionCheck) -> list[tuple[int, CheckedLeg]]:
-    """Give each leg once, where it is driven first, with its number in the course."""
+    """Return each leg once, where it is driven first, with its number in the course."""
     found: dict[LegKey, tuple[int, CheckedLeg]] = {}
     for number, leg in enumerate(checked.legs):
         found.setdefault(_key(leg.leg), (number, leg))
@@ -216,7 +217,7 @@ def _first_driven(checked: MissionCheck) -> list[tuple[int, CheckedLeg]]:
 
 
 def _runs(asked: MissionCheck, keys: set[LegKey]) -> list[list[CourseLeg]]:
-    """Give the legs to be routed, those together that are driven one after another with one speed."""
+    """Return the legs to be routed, grouped where they are driven one after another at one speed."""
     runs: list[list[CourseLeg]] = []
     before = -2
     for number, checked in _first_driven(asked):
@@ -233,7 +234,7 @@ def _runs(asked: MissionCheck, keys: set[LegKey]) -> list[list[CourseLeg]]:
 
 
 def _beside(asked: MissionCheck, keys: set[LegKey]) -> set[LegKey]:
-    """Give the legs driven just before and after some legs."""
+    """Return the legs driven just before and after some legs."""
     order = [_key(leg.leg) for leg in asked.legs]
     places = [number for number, key in enumerate(order) if key in keys]
     return {order[near] for number in places for near in (number - 1, number + 1) if 0 <= near < len(order)}
@@ -251,7 +252,7 @@ def _detours(
     Raises
     ------
     RouteError
-        There is no route; says for which legs.
+        There is no route; the message says for which legs.
     """
     first = run[0]
     local = replace(situation, pose=_pose(first, asked, situation), mission=None)
@@ -272,7 +273,7 @@ def _detours(
 
 
 def _pose(first: CourseLeg, asked: MissionCheck, situation: Situation) -> Known[Pose] | None:
-    """Give where and how the vehicle comes to the first leg of a run."""
+    """Return where and how the vehicle comes to the first leg of a run."""
     number = next(n for n, leg in enumerate(asked.legs) if _key(leg.leg) == _key(first))
     if number == 0:
         return situation.pose
@@ -282,7 +283,7 @@ def _pose(first: CourseLeg, asked: MissionCheck, situation: Situation) -> Known[
 
 
 def _split(planned: Plan, run: Sequence[CourseLeg], mission: Mission) -> list[_Detour]:
-    """Give what of a plan belongs to each leg of a run."""
+    """Return the part of a plan that belongs to each leg of a run."""
     detours = []
     begin = int(run[0].speed_mps is not None)  # the mission sets its speed itself
     point = 0
@@ -319,7 +320,7 @@ def _check_jumps(repaired: ItemList) -> None:
 
 
 def _changes(repaired: ItemList) -> tuple[str, ...]:
-    """Say what was changed."""
+    """Return sentences that list what was changed."""
     texts = []
     for key, count in repaired.added.items():
         texts.append(f"{_names(key)}: replaced by a route with {count} waypoint{'s' * (count != 1)} more")

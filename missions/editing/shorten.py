@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from missions.situation import Mission, Situation
 
 _JUMPS = (Command.DO_JUMP, 601)
-_WORSE_M = 0.01
+_WORSE_M = 0.01  # a leg that breaks the promise already may lose so much more to a shorter mission; chosen, not measured
 
 
 def shortened(
@@ -65,9 +65,9 @@ def shortened(
     Raises
     ------
     MissionTooLongError
-        It cannot be shortened so far; says how far.
+        It cannot be shortened so far; the message says how far.
     """
-    search = _Search(mission, frozenset(own), situation, request, most, may_slow, should_stop)
+    search = _Shortening(mission, frozenset(own), situation, request, most, may_slow, should_stop)
     search.leave_out(search.waypoints)
     search.leave_out(search.corners)
     search.leave_out(search.quick_stretches)
@@ -85,7 +85,7 @@ def shortened(
 
 
 @dataclass(frozen=True, slots=True)
-class _Step:
+class _Removal:
     """Seqs of items that are left out together; where ``put`` is given, it stands in the place of the last of them."""
 
     seqs: tuple[int, ...]
@@ -97,7 +97,7 @@ class _Step:
 
 
 @dataclass
-class _Search:
+class _Shortening:
     """What is left out, by the seqs of the mission as it was."""
 
     mission: Mission
@@ -124,7 +124,7 @@ class _Search:
         """How many items there are now."""
         return len(self.mission.items) - len(self.out)
 
-    def leave_out(self, candidates: Callable[[], list[_Step]]) -> None:
+    def leave_out(self, candidates: Callable[[], list[_Removal]]) -> None:
         """Take the best candidates, as many as are needed, until it fits or there are no more."""
         while self.count > self.most and not (self.should_stop and self.should_stop()):
             steps = self._needed(candidates())
@@ -147,17 +147,17 @@ class _Search:
         items = (put.get(seq, item) for seq, item in enumerate(self.mission.items, 1))
         return replace(self.mission, items=tuple(items))
 
-    def waypoints(self) -> list[_Step]:
-        """Give waypoints that may be left out, those first whose leaving moves the line the least."""
+    def waypoints(self) -> list[_Removal]:
+        """Return waypoints that may be left out, first those whose removal moves the line the least."""
         found = []
         for before, seq, after in runs(self._rest(), 3):
             items = [self._item(one) for one in (before, seq, after)]
             if self._may_go(seq, Command.NAV_WAYPOINT) and all(item.is_placed for item in items):
                 found.append((deviation_m(*items), seq))
-        return [_Step((seq,)) for _, seq in sorted(found)]
+        return [_Removal((seq,)) for _, seq in sorted(found)]
 
-    def corners(self) -> list[_Step]:
-        """Give pairs of corners that may become one, those first that lengthen the way the least."""
+    def corners(self) -> list[_Removal]:
+        """Return pairs of corners that may become one, first those that lengthen the way the least."""
         found = []
         for before, first, last, after in runs(self._rest(), 4):
             a, b, c, d = (self._item(one) for one in (before, first, last, after))
@@ -169,10 +169,12 @@ class _Search:
                 there_m = distance_m(b.position, meeting) + distance_m(meeting, c.position)
                 put = replace(c, lat_e7=lat_e7, lon_e7=lon_e7)
                 found.append((there_m - distance_m(b.position, c.position), first, last, put))
-        return [_Step((first, last), put) for _, first, last, put in sorted(found, key=lambda one: one[:3])]
+        return [
+            _Removal((first, last), put) for _, first, last, put in sorted(found, key=lambda one: one[:3])
+        ]
 
     def _is_corner(self, seq: int) -> bool:
-        """Tell whether it may be moved: only the second of two is left where it may not be left out by itself."""
+        """Return whether an item is a plain waypoint of the route's own that may be moved: beside others that must stay, it may not."""
         item = self.mission.items[seq - 1]
         return (
             seq in self.own
@@ -181,8 +183,8 @@ class _Search:
             and seq not in self._near
         )
 
-    def quick_stretches(self) -> list[_Step]:
-        """Give changes to a higher speed, with the change back where that has nothing left to do; those first that save the least time."""
+    def quick_stretches(self) -> list[_Removal]:
+        """Return changes to a higher speed, with the change back where it has nothing left to do, first those that save the least time."""
         goals = {int(item.params[0]) for item in self.mission.items if item.command in _JUMPS}
         found = []
         before_mps = self.check.vehicle.speed_mps
@@ -200,7 +202,7 @@ class _Search:
                 seqs = (seq, last) if next_mps == before_mps else (seq,)
                 found.append((length_m([self._item(one) for one in between]), seqs))
             before_mps = mps
-        return [_Step(seqs) for _, seqs in sorted(found)]
+        return [_Removal(seqs) for _, seqs in sorted(found)]
 
     def _item(self, seq: int) -> MissionItem:
         return self.put.get(seq, self.mission.items[seq - 1])
@@ -223,9 +225,9 @@ class _Search:
             and not (command == Command.NAV_WAYPOINT and item.params[0] > 0)
         )
 
-    def _needed(self, steps: Sequence[_Step]) -> list[_Step]:
-        """Give so many of the better half as are needed, no two of them beside one another."""
-        taken: list[_Step] = []
+    def _needed(self, steps: Sequence[_Removal]) -> list[_Removal]:
+        """Return as many of the better half as are needed, no two of them neighbours."""
+        taken: list[_Removal] = []
         blocked: set[int] = set()
         place = {seq: number for number, seq in enumerate(self._rest())}
         missing = self.count - self.most
@@ -242,12 +244,14 @@ class _Search:
         return taken
 
     def _is_worse(self, leg: CheckedLeg, seqs: Sequence[int]) -> bool:
-        """Tell whether a broken leg was none before, or less so."""
+        """Return whether a broken leg kept its clearance before, or broke it by less."""
         key = (_seq(seqs, leg.leg.first_item), _seq(seqs, leg.leg.last_item))
         return leg.driven_clearance_m < self._tolerated.get(key, math.inf) - _WORSE_M
 
-    def _guilty(self, steps: Iterable[_Step], worse: Iterable[CheckedLeg], seqs: Sequence[int]) -> set[_Step]:
-        """Give the steps that lie on the legs that broke, or on those beside them."""
+    def _guilty(
+        self, steps: Iterable[_Removal], worse: Iterable[CheckedLeg], seqs: Sequence[int]
+    ) -> set[_Removal]:
+        """Return the steps that lie on the legs that broke, or on legs beside them."""
         guilty = set()
         for leg in worse:
             first, last = sorted((leg.leg.first_item, leg.leg.last_item))
@@ -257,5 +261,5 @@ class _Search:
 
 
 def _seq(seqs: Sequence[int], number: int) -> int:
-    """Give the seq that an item had; 0 is the start."""
+    """Return the seq that an item had; 0 is the start."""
     return seqs[number - 1] if number else 0

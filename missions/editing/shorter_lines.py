@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
     from missions.items import MissionItem
 
-_MOST_TURN_DEG = 120.0
+_MOST_TURN_DEG = 120.0  # of two corners together: beyond, the lines meet far off. Chosen, not measured
 
 
 def without(mission: Mission, out: Collection[int]) -> tuple[Mission, tuple[int, ...]]:
-    """Give a mission without some of its items, its jumps numbered anew, and the seqs that its items had.
+    """Return a mission without some of its items, its jumps renumbered, and the seqs that its items had.
 
     A jump to an item that is left out leads to the next one that is there.
     """
@@ -37,12 +37,12 @@ def without(mission: Mission, out: Collection[int]) -> tuple[Mission, tuple[int,
 
 
 def runs(seqs: Sequence[int], count: int) -> Iterable[tuple[int, ...]]:
-    """Give every so many seqs that follow one another."""
+    """Return every group of so many seqs that follow one another."""
     return (tuple(seqs[begin : begin + count]) for begin in range(len(seqs) - count + 1))
 
 
 def meeting_place(a: LatLon, b: LatLon, c: LatLon, d: LatLon) -> LatLon | None:
-    """Give where the lines from a over b and from d over c meet, if both corners turn the same way and not too far."""
+    """Return where the lines from a over b and from d over c meet, if both corners turn the same way and not too far."""
     if a == b or c == d:
         return None
     along_deg = bearing_deg(b, c)
@@ -61,7 +61,7 @@ def _turn_deg(before_deg: float, after_deg: float) -> float:
 
 
 def deviation_m(before: MissionItem, item: MissionItem, after: MissionItem) -> float:
-    """Give how far an item is from the line between its neighbours, or from the nearer of them."""
+    """Return how far an item is from the line between its neighbours, or from the nearer of them."""
     along_deg = bearing_deg(before.position, after.position)
     turn_rad = math.radians(bearing_deg(before.position, item.position) - along_deg)
     leg_m = distance_m(before.position, item.position)
@@ -70,6 +70,6 @@ def deviation_m(before: MissionItem, item: MissionItem, after: MissionItem) -> f
 
 
 def length_m(items: Iterable[MissionItem]) -> float:
-    """Give the length of the lines through the items that have a place."""
+    """Return the length of the lines through the items that have a place."""
     places = [item.position for item in items if item.is_placed]
     return sum(distance_m(a, b) for a, b in pairwise(places))

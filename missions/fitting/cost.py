@@ -2,6 +2,14 @@
 
 Most lines that a search tries are worse than those it has, and mostly the first look shows it: a line through a fence, a way round. So
 the steps go from the cheapest to the dearest, each can only make lines cost more, and who compares stops as soon as the answer is sure.
+
+**The steps.** The drawn lines against the fence (distances of legs, remembered leg by leg); the time; the band's pieces against the fence,
+taken as convex hulls; pieces that lie inside a fence, the deeper the worse, so that a search is led out of it; and what the vehicle's own
+avoidance adds, only where the rest is nearly enough. After any of them ``cost_s`` is a lower bound of the finished cost.
+
+**The cost** is one number in seconds, so that candidates can be ordered while clearance is still missing: the predicted time, a little for each
+waypoint and for turns that follow at once, and prices for missing clearance and for drawn legs through a fence. The prices only order the
+candidates of a search. What is promised does not rest on them: `is_enough` asks for the clearance itself.
 """
 
 from __future__ import annotations
@@ -17,7 +25,7 @@ import shapely
 
 from missions.drive_model import convex, plan_drive
 from missions.drive_model.avoidance import with_avoidance
-from missions.fitting import moves as corner_means
+from missions.fitting import moves
 from missions.fitting import polyline as drawn
 
 if TYPE_CHECKING:
@@ -34,22 +42,25 @@ ENOUGH_M = 0.002
 """What may be missing: less than rounding to degE7 adds, which is required on top."""
 
 UNBOUNDED_EXTRA_M = 2.0
-"""What corners that left the model when measured (by up to 1.6 m) have to keep on top."""
+"""What unbounded corners have to keep on top: measured ones left the band by up to 1.6 m (docs/drive-model.md, "Where it does not hold")."""
 
 TURN_BACK_DEG, TURN_BACK_EXTRA_M = 165.0, 4.0
-"""A turn so sharp may be driven round either side; the model tells of one."""
+"""A turn so sharp may be driven round either side, and the model predicts one; a steered rover that came back at 1 m/s swung out by 3.6 m (docs/drive-model.md)."""
 
+# Chosen, not measured: prices that order the candidates of a search.
+# A slow stretch costs 8 to 18 s when measured: worth it for some 0.1 m that would else be missing
 _MISSING_COST_S_PER_M = 100.0
-_CROSSING_COST_S = 10_000.0
-_POINT_COST_S = 0.3
-_NEAR_TURNS_COST_S = 3.0
-_TURN_DEG = 5.0
+_CROSSING_COST_S = 10_000.0  # more than any drive takes or misses: a leg through a fence is never worth it
+_POINT_COST_S = 0.3  # between equal lines the one with fewer waypoints
+_NEAR_TURNS_COST_S = 3.0  # two turns within `moves.APART_M`: driven as one, and less surely predicted
+_TURN_DEG = 5.0  # what counts as a turn for that
+# With more than this missing the avoidance is not reckoned: it is the dearest step and can only add
 _FAR_FROM_ENOUGH_M = 0.7
 
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """What the drive model says of lines.
+    """What the drive model predicts for drawn lines.
 
     Parameters
     ----------
@@ -96,7 +107,7 @@ class Gauge:
         self._legs_m: dict[tuple[Vector, Vector], float] = {}
 
     def trial(self, drawing: Drawing, begin: int, end: int) -> Trial:
-        """Give the points from ``begin`` to before ``end`` for measuring; ends of it that are no ends of the lines do not count."""
+        """Return the points from ``begin`` to before ``end``, for measuring; its ends that are not ends of the lines do not count."""
         key = (drawing[begin:end], begin == 0, end == len(drawing))
         trial = self._trials.get(key)
         if trial is None:
@@ -108,14 +119,14 @@ class Gauge:
         return self.trial(drawing, 0, len(drawing)).measured()
 
     def heading_deg(self, part: Drawing, *, is_first: bool) -> float:
-        """Give where the vehicle faces as a part of the lines begins."""
+        """Return the vehicle's heading where a part of the lines begins."""
         if is_first and self._heading_deg is not None:
             return self._heading_deg
         east, north = drawn.direction(part[0], part[1])
         return math.degrees(math.atan2(east, north))
 
     def legs_m(self, part: Drawing) -> list[float]:
-        """Give the distance of each drawn leg from the fence."""
+        """Return the distance of each drawn leg from the fence."""
         legs = [(a.place, b.place) for a, b in pairwise(part)]
         new = [leg for leg in legs if leg not in self._legs_m]
         if new:
@@ -123,7 +134,7 @@ class Gauge:
         return [self._legs_m[leg] for leg in legs]
 
     def distances_m(self, shapes: NDArray[np.object_]) -> NDArray[np.float64]:
-        """Give the distance of shapes from the fence; infinite without one."""
+        """Return the distance of shapes from the fence; infinite without one."""
         edge = self.ground.edge
         return np.full(len(shapes), np.inf) if edge.is_empty else np.asarray(shapely.distance(shapes, edge))
 
@@ -207,7 +218,7 @@ class Trial:
         return self
 
     def measured(self) -> Measured:
-        """Give what was found, all steps taken, and where the band comes too near."""
+        """Return the measured lines once all steps are done: their time, and where the band comes too near."""
         if self._measured is None:
             self.finish()
             self._measured = Measured(tuple(self.missing_m.tolist()), self._worst(), self.cost_s)
@@ -312,7 +323,7 @@ def _near_turns(drawing: Drawing) -> int:
     """Count turns so near to the next that a rover drives them as one."""
     turns = [abs(drawn.turn_deg(drawing, index)) > _TURN_DEG for index in range(1, len(drawing) - 1)]
     return sum(
-        math.dist(drawing[index + 1].place, drawing[index + 2].place) < corner_means.APART_M
+        math.dist(drawing[index + 1].place, drawing[index + 2].place) < moves.APART_M
         for index, (turn, following) in enumerate(pairwise(turns))
         if turn and following
     )

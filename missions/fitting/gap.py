@@ -1,6 +1,12 @@
-"""Narrow places: where the fences on both sides of a leg come nearest to one another, and a straight leg through between them.
+"""Gaps: where the fences on both sides of a leg come nearest to one another, and a straight leg through between them.
 
-A rover keeps its line best where the line is straight: it turns in the open before and behind.
+**How.** From a place on a leg the leg is followed both ways until a fence ends it. The fence on its left and that on its right, within
+reach, are joined by their shortest line: that is the gap. A straight leg is laid across the middle of that line at a right angle, with a few
+lengths before and behind it, and the corners that it replaces go.
+
+**Why.** A rover keeps its line best where the line is straight (no cut, no new swing), so it should turn in the open before and behind. And
+the moves of one corner cannot find this: with a corner on either side of a gate, moving only one of them turns the leg across the gate and
+makes the band worse, so a descent stops there.
 """
 
 from __future__ import annotations
@@ -20,18 +26,21 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
 REACH_M = 8.0
-"""How far about a place the fences on both sides are looked at, and how far beside the new leg old corners give way to it."""
+"""How far around a place the fences on both sides are looked at, and how far beside the new leg old corners give way to it.
+
+Chosen, not measured: it bounds what counts as a gap.
+"""
 
 ENDS_M = (6.0, 12.0, 20.0, 30.0)
-"""How far before and behind the narrowest place the straight leg may begin and end."""
+"""How far before and behind the narrowest place the straight leg may begin and end; swings die away over 25 m at 5 m/s (docs/drive-model.md)."""
 
-_APART_M = 3.0
-_SHY = 0.95
+_APART_M = 3.0  # old corners this near to the new leg's ends go too: nearer turns are one turn to a rover (`moves.APART_M`)
+_SHY = 0.95  # of the way to a fence ahead: stops short of it, so that the fence ahead is on neither side
 
 
 @dataclass(frozen=True, slots=True)
-class Neck:
-    """A narrow place.
+class Gap:
+    """A gap between the fences on both sides of a leg.
 
     Parameters
     ----------
@@ -45,13 +54,13 @@ class Neck:
     through: Vector
 
     def off(self, point: DrawnPoint) -> tuple[float, float]:
-        """Give how far behind the narrowest place a point lies, and how far beside the way through."""
+        """Return how far behind the narrowest place a point lies, and how far beside the way through."""
         east_m, north_m = point.east_m - self.middle[0], point.north_m - self.middle[1]
         along_m = east_m * self.through[0] + north_m * self.through[1]
         return along_m, abs(east_m * self.through[1] - north_m * self.through[0])
 
 
-def find_neck(edge: BaseGeometry, place: Vector, ahead: Vector) -> Neck | None:
+def find_gap(edge: BaseGeometry, place: Vector, ahead: Vector) -> Gap | None:
     """Find the narrow place that a leg leads through.
 
     Parameters
@@ -65,8 +74,8 @@ def find_neck(edge: BaseGeometry, place: Vector, ahead: Vector) -> Neck | None:
 
     Returns
     -------
-    Neck or None
-        None where no fence is near on one of the sides.
+    Gap or None
+        None where one of the sides has no fence near.
     """
     begin, end = (shifted(place, ahead, _free_m(edge, place, ahead, way_m)) for way_m in (-REACH_M, REACH_M))
     sides = []
@@ -83,18 +92,18 @@ def find_neck(edge: BaseGeometry, place: Vector, ahead: Vector) -> Neck | None:
     through = ((north_a - north_b) / width_m, (east_b - east_a) / width_m)
     if through[0] * ahead[0] + through[1] * ahead[1] < 0:
         through = (-through[0], -through[1])
-    return Neck(((east_a + east_b) / 2, (north_a + north_b) / 2), through)
+    return Gap(((east_a + east_b) / 2, (north_a + north_b) / 2), through)
 
 
 def _free_m(edge: BaseGeometry, place: Vector, ahead: Vector, way_m: float) -> float:
-    """Give how far a leg can be followed one way without meeting a fence: what lies behind one is on no side."""
+    """Return how far a leg can be followed in one direction without meeting a fence: what lies behind a fence is on no side."""
     ray = shapely.LineString([place, shifted(place, ahead, way_m)])
     met = shapely.intersection(ray, edge)
     return way_m if met.is_empty else _SHY * math.copysign(shapely.distance(shapely.Point(place), met), way_m)
 
 
-def straight_through(drawing: Drawing, index: int, neck: Neck) -> Iterator[Drawing]:
-    """Give lines with one straight leg through a narrow place, instead of the corners near it.
+def straight_through(drawing: Drawing, index: int, gap: Gap) -> Iterator[Drawing]:
+    """Return lines with one straight leg through a narrow place, instead of the corners near it.
 
     Parameters
     ----------
@@ -102,10 +111,10 @@ def straight_through(drawing: Drawing, index: int, neck: Neck) -> Iterator[Drawi
         The lines.
     index : int
         The point that comes too near to a fence, or the end of the leg that does.
-    neck : Neck
-        The narrow place.
+    gap : Gap
+        The gap.
     """
-    off = [neck.off(point) for point in drawing]
+    off = [gap.off(point) for point in drawing]
 
     def gives_way(number: int, before_m: float, behind_m: float) -> bool:
         along_m, beside_m = off[number]
@@ -121,7 +130,7 @@ def straight_through(drawing: Drawing, index: int, neck: Neck) -> Iterator[Drawi
                 last += 1
             point = replace(drawing[last], is_fixed=False, stop_s=None)
             ends = (
-                point.at(shifted(neck.middle, neck.through, -before_m)),
-                point.at(shifted(neck.middle, neck.through, behind_m)),
+                point.at(shifted(gap.middle, gap.through, -before_m)),
+                point.at(shifted(gap.middle, gap.through, behind_m)),
             )
             yield (*drawing[:first], *ends, *drawing[last:])

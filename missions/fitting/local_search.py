@@ -1,7 +1,23 @@
-"""Fitting drawn lines to a vehicle: until the band it is foreseen to drive in keeps what is required, at the least time.
+"""Fitting drawn lines to a vehicle, until the band it is predicted to drive in keeps what is required, in the least time that is found.
 
-A descent: where the band comes too near, every means is tried at that corner and measured by the drive model; the best is kept. What
-is measured decides, not the means.
+**How.** A greedy descent over whole drawings. Each round takes the point where most clearance is missing, tries every move of `moves` (and
+of `gap`) there, measures the lines that result with the drive model, and keeps those that lower the cost most (`cost`: the predicted time,
+with missing clearance priced as time). Where no move gains at that point, the next worst one is tried. The descent ends when nothing is
+missing, when no move gains anywhere, or when the measurements allowed are used up.
+
+Moves that cost little time come first (`_gentle`); slower stretches and stops (`_all`) only where those do not suffice. What has become
+enough is then made cheaper: points are left out (`_fewer`), and corners taken back towards the straight line (`_eased`). What has not is
+begun again from the first lines, driven slowly around each place where clearance was missing. At the end the points are rounded to degE7, as
+the mission will hold them, and measured and mended once more.
+
+**Why.** The band is no smooth function of the points: a corner pivots or blends, a leg is too short for two ramps, a rounded coordinate
+decides, and what is left of a swing reaches the corners behind it. There is no gradient to follow, and no formula for one corner decides;
+so moves only propose, and the drive model judges. Since nearly all candidates lose, only the part of the lines that changes is measured,
+with some points before and after it, and only as far as needed: the steps of a measurement can only add cost, so the first candidate that
+comes out of the heap fully measured is the best one, as in A*. The winner is then measured as a whole, and what is returned always was.
+
+Every change that is kept lowers the cost by a least gain, so the descent ends. It is a heuristic: lines that fail here do not show that no
+route exists, and `routing.route_search` tries others.
 """
 
 from __future__ import annotations
@@ -15,10 +31,10 @@ from typing import TYPE_CHECKING
 
 import shapely
 
-from missions.fitting import moves as corner_means
+from missions.fitting import moves
 from missions.fitting import polyline as drawn
 from missions.fitting.cost import ENOUGH_M, Gauge
-from missions.fitting.gap import find_neck, straight_through
+from missions.fitting.gap import find_gap, straight_through
 from missions.geo import rounded
 from missions.ground.frame import LocalPoint
 
@@ -32,22 +48,27 @@ if TYPE_CHECKING:
 
 
 FIT_MEASUREMENTS, CRAWL_MEASUREMENTS, MOST_MEASUREMENTS = 500, 350, 1500
-"""Taken for one route, for a slow one, and for all that are tried: a search that is not done by then is given up."""
+"""Taken for one route, for a slow one, and for all that are tried: a search that is not done by then is given up.
 
-_SHORT_LEG_M = 12.0
-_LEAST_GAIN_S = 0.05
+Chosen, not measured: they bound the planning time, which docs/drive-bench.md reports.
+"""
+
+# Chosen, not measured: no experiment is recorded for any of these. They bound the search; whether lines are enough is always measured.
+_SHORT_LEG_M = 12.0  # corners farther apart are not merged to save a point
+_LEAST_GAIN_S = 0.05  # what a change must gain to be kept: it ends the descent
+# Points before and after a change that are measured with it; the whole lines are measured afterwards
 _CONTEXT = 3
-_MORE_TRIES = 12
-_TRIED_WHOLE = 3
-_EASING_STEPS_M = (6.0, 1.6, 0.5)
-_TINY_LEG_M = 2.5
-_JOINED_TURN_DEG = 80.0
-_GRID_TRIES, _GRID_MEASUREMENTS = 4, 150
+_MORE_TRIES = 12  # candidates still looked at after the first that suffices: the gentle ones come first
+_TRIED_WHOLE = 3  # candidates that gained in part and are measured whole
+_EASING_STEPS_M = (6.0, 1.6, 0.5)  # coarse to fine; what is left over is at most the last
+_TINY_LEG_M = 2.5  # shorter legs within gentle turns become one corner before the search
+_JOINED_TURN_DEG = 80.0  # both corners together; sharper ones stay two
+_GRID_TRIES, _GRID_MEASUREMENTS = 4, 150  # to mend what rounding to degE7 (at most 5.6 mm) broke
 
 
 @dataclass(eq=False)
 class Fitting:
-    """Lines, a vehicle and a field; `fit` betters the lines.
+    """The search for one vehicle on one field; `fit` improves drawn lines.
 
     Parameters
     ----------
@@ -72,7 +93,7 @@ class Fitting:
     _until: int = field(default=0, init=False)
 
     def fit(self, drawing: Drawing) -> tuple[Drawing, Measured]:
-        """Better lines until their band keeps what is required, or nothing helps."""
+        """Return lines improved until their band keeps what is required or nothing helps, and how they measure."""
         drawn_first = _joined(drawing)
         self._allow(FIT_MEASUREMENTS)
         drawing, measured = self._fitted(self._fewer(drawn_first))
@@ -85,7 +106,7 @@ class Fitting:
                 )
                 if missing_m > ENOUGH_M
             ]
-            slow = corner_means.crawling(drawn_first, spots, self.vehicle.speed_mps)
+            slow = moves.crawling(drawn_first, spots, self.vehicle.speed_mps)
             self._allow(CRAWL_MEASUREMENTS)
             other, found = self._fitted(slow)
             if sum(found.missing_m) < sum(measured.missing_m):
@@ -115,8 +136,8 @@ class Fitting:
         self._until = min(self.measurements + measurements, self.most_measurements)
 
     def _fitted(self, drawing: Drawing) -> tuple[Drawing, Measured]:
-        for means in (self._gentle, self._all):
-            drawing = self._descend(drawing, means)
+        for propose in (self._gentle, self._all):
+            drawing = self._descend(drawing, propose)
             if self.measure(drawing).is_enough:
                 drawing = self._eased(self._fewer(drawing))
                 break
@@ -132,67 +153,68 @@ class Fitting:
         return Gauge(self.ground, self.vehicle, self.heading_deg)
 
     def _away(self, place: Vector) -> Vector:
-        """Give the unit vector from the nearest fence to a place."""
+        """Return the unit vector from the nearest fence to a place."""
         line = shapely.shortest_line(self.ground.edge, shapely.Point(place))
         (east_a, north_a), (east_b, north_b) = shapely.get_coordinates(line).tolist()
         length_m = math.dist((east_a, north_a), (east_b, north_b)) or 1.0
         return ((east_b - east_a) / length_m, (north_b - north_a) / length_m)
 
     def _gentle(self, drawing: Drawing, index: int, measured: Measured) -> Iterator[Drawing]:
-        """Give the means that cost little time."""
+        """Return the moves that cost little time."""
         missing_m, place = measured.missing_m[index], measured.worst[index]
-        yield from corner_means.moved(drawing, index, missing_m)
+        yield from moves.moved(drawing, index, missing_m)
         if not math.isnan(place[0]):
             ahead = drawn.direction(drawing[max(index - 1, 0)], drawing[max(index, 1)])
-            narrow = find_neck(self.ground.edge, place, ahead)
+            narrow = find_gap(self.ground.edge, place, ahead)
             if narrow is not None:
                 yield from straight_through(drawing, index, narrow)
-            yield from corner_means.bent(drawing, index, place, self._away(place), missing_m)
-        yield from corner_means.together(drawing, index, missing_m)
-        yield from corner_means.without(drawing, index)
-        yield from corner_means.merged(drawing, index)
-        yield from corner_means.merged(drawing, index - 1)
+            yield from moves.bent(drawing, index, place, self._away(place), missing_m)
+        yield from moves.together(drawing, index, missing_m)
+        yield from moves.without(drawing, index)
+        yield from moves.merged(drawing, index)
+        yield from moves.merged(drawing, index - 1)
+        # Chosen, not measured: gentler corners hardly cut, and splitting them only adds waypoints.
         if _is_corner(drawing, index) and abs(drawn.turn_deg(drawing, index)) > 25.0:
-            yield from corner_means.split(drawing, index)
-            yield from corner_means.prolonged(drawing, index)
+            yield from moves.split(drawing, index)
+            yield from moves.prolonged(drawing, index)
         if index <= 1 and self.heading_deg is not None:
-            yield from corner_means.headed(drawing, self.heading_deg)
+            yield from moves.headed(drawing, self.heading_deg)
         if drawing[index].is_fixed:
-            yield from corner_means.approached(drawing, index)
+            yield from moves.approached(drawing, index)
 
     def _all(self, drawing: Drawing, index: int, measured: Measured) -> Iterator[Drawing]:
         place = measured.worst[index]
         if not math.isnan(place[0]):
-            yield from corner_means.slowed(drawing, index, place, self.vehicle.speed_mps)
+            yield from moves.slowed(drawing, index, place, self.vehicle.speed_mps)
         if _is_corner(drawing, index):
-            yield from corner_means.slowed(drawing, index, drawing[index].place, self.vehicle.speed_mps)
+            yield from moves.slowed(drawing, index, drawing[index].place, self.vehicle.speed_mps)
             if self.vehicle.can_pivot:
-                yield from corner_means.stopped(drawing, index)
+                yield from moves.stopped(drawing, index)
         yield from self._gentle(drawing, index, measured)
 
     def _descend(
-        self, drawing: Drawing, means: Callable[[Drawing, int, Measured], Iterable[Drawing]]
+        self, drawing: Drawing, propose: Callable[[Drawing, int, Measured], Iterable[Drawing]]
     ) -> Drawing:
-        """Use means at the worst points until nothing is missing or nothing helps."""
+        """Return the lines after moves at the worst points, until nothing is missing or nothing helps."""
         measured = self.measure(drawing)
         while not measured.is_enough and not self._is_over():
             for index in sorted(range(len(drawing)), key=lambda number: -measured.missing_m[number]):
                 if measured.missing_m[index] <= ENOUGH_M:
                     return drawing
-                better = self._best(drawing, measured, means(drawing, index, measured))
+                better = self._best(drawing, measured, propose(drawing, index, measured))
                 if better is not None:
                     drawing, measured = better
                     break
         return drawing
 
     def _fewer(self, drawing: Drawing) -> Drawing:
-        """Leave out and merge points as long as that loses neither time nor clearance."""
+        """Return the lines with points left out and merged as long as that loses neither time nor clearance."""
         measured = self.measure(drawing)
         index = 1
         while index < len(drawing) - 1 and not self._is_over():
-            candidates = list(corner_means.without(drawing, index))
+            candidates = list(moves.without(drawing, index))
             if math.dist(drawing[index].place, drawing[index + 1].place) < _SHORT_LEG_M:
-                candidates += corner_means.merged(drawing, index)
+                candidates += moves.merged(drawing, index)
             better = self._best(drawing, measured, candidates)
             if better is None:
                 index += 1
@@ -202,12 +224,12 @@ class Fitting:
         return drawing
 
     def _eased(self, drawing: Drawing) -> Drawing:
-        """Take back, step by step, what the route does not need."""
+        """Return the lines with their moves taken back, step by step, as far as clearance and time allow."""
         measured = self.measure(drawing)
         for step_m in _EASING_STEPS_M:
             for index in range(1, len(drawing) - 1):
                 while not self._is_over():
-                    better = self._best(drawing, measured, corner_means.eased(drawing, index, step_m))
+                    better = self._best(drawing, measured, moves.eased(drawing, index, step_m))
                     if better is None:
                         break
                     drawing, measured = better
@@ -216,7 +238,7 @@ class Fitting:
     def _best(
         self, drawing: Drawing, measured: Measured, candidates: Iterable[Drawing]
     ) -> tuple[Drawing, Measured] | None:
-        """Give the lines that gain most, if any do, judged by the part that changes and then on the whole."""
+        """Return the lines that gain most, if any do, judged by the part that changes and then on the whole."""
         trials: list[_Tried] = []
         known_s: dict[tuple[int, int], float] = {}
         solved_at = None
@@ -232,7 +254,7 @@ class Fitting:
             if tried.is_enough() and solved_at is None:
                 solved_at = number
             trials.append(tried)
-            # The means come with the cheapest first: once one has done it, a few more are looked at.
+            # The moves come with the cheapest first: once one suffices, a few more are looked at.
             if self._is_over() or (solved_at is not None and number >= solved_at + _MORE_TRIES):
                 break
         for tried in itertools.islice(_best_first(trials), _TRIED_WHOLE):
@@ -248,7 +270,7 @@ class Fitting:
 
 
 def _joined(drawing: Drawing) -> Drawing:
-    """Give lines without tiny legs: pairs of points become one where the outer legs meet, or half-way."""
+    """Return lines without tiny legs: pairs of points become one where the outer legs meet, or half-way."""
     while True:
         pairs = [
             (math.dist(drawing[index].place, drawing[index + 1].place), index)
@@ -258,7 +280,7 @@ def _joined(drawing: Drawing) -> Drawing:
         for length_m, index in sorted(pairs):
             turn_deg = drawn.turn_deg(drawing, index) + drawn.turn_deg(drawing, index + 1)
             if length_m < _TINY_LEG_M and abs(turn_deg) < _JOINED_TURN_DEG:
-                drawing = next(iter(corner_means.merged(drawing, index)), drawing)
+                drawing = next(iter(moves.merged(drawing, index)), drawing)
                 break
         else:
             return drawing
@@ -291,11 +313,11 @@ class _Tried:
 
     @property
     def gain_s(self) -> float:
-        """What is gained, or less."""
+        """What is gained, at most: steps not yet taken can only lower it."""
         return self.known_s - self.trial.cost_s
 
     def is_enough(self) -> bool:
-        """Measure as far as need be to tell whether the part gains and its band keeps what is required."""
+        """Measure only as far as needed; return whether the part gains and its band keeps what is required."""
         while self.gain_s > _LEAST_GAIN_S and self.trial.may_be_enough:
             if not self.trial.refine():
                 return self.gain_s > _LEAST_GAIN_S and self.trial.may_be_enough
@@ -303,7 +325,7 @@ class _Tried:
 
 
 def _best_first(trials: Iterable[_Tried]) -> Iterator[_Tried]:
-    """Give those that gain, the one that gains most first; the others are measured only as far as it takes to know."""
+    """Return the candidates that gain, best first; a candidate is measured only as far as it takes to decide."""
     waiting = [(-tried.gain_s, tried.number, tried) for tried in trials]
     heapq.heapify(waiting)
     while waiting:
@@ -318,7 +340,7 @@ def _best_first(trials: Iterable[_Tried]) -> Iterator[_Tried]:
 
 
 def _changed(old: Drawing, new: Drawing) -> tuple[int, int]:
-    """Give where the part begins in which lines differ, some points before, and how many points after it are the same."""
+    """Return where the part begins in which two lines differ, some points before, and how many points after it are the same."""
     shorter = min(len(old), len(new))
     same = next((i for i in range(shorter) if old[i] != new[i]), shorter)
     rest = next((i for i in range(shorter - same) if old[-1 - i] != new[-1 - i]), shorter - same)

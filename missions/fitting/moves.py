@@ -1,6 +1,17 @@
-"""What can be done where the band of drawn lines comes too near to a fence: other lines, or a slower stretch.
+"""The moves of the local search: what can be done where the band of drawn lines comes too near to a fence.
 
-Each means takes lines and the number of a point and yields lines that may do better; which of them does is measured elsewhere.
+**How.** Each move takes lines and the number of a point and yields lines that may do better: other points, or the same ones driven
+slower. It judges nothing. A candidate may lead through a fence or turn sharper than before; `cost` measures it, and `local_search` keeps the
+best. Start and targets never move.
+
+**Why these.** A band comes too near to a fence for a few reasons, and each has its moves. A corner is cut or swung out of: move it
+(`moved`, `together`), turn earlier or later (`prolonged`), or make two gentler ones of it (`split`). A leg passes a fence: bend it (`bent`), or lay
+it straight through the gap (`gap.straight_through`). Corners are so near to one another that their swings add up: leave one out or merge them
+(`without`, `merged`). The vehicle starts facing the wrong way (`headed`), or comes to a target from a bad side (`approached`). What is left is
+speed, which costs most: cuts shrink with it (`slowed`, `crawling`, `stopped`).
+
+**Why so coarse.** A move offers a few lengths, each one and a half to two times the last, instead of a fine scale, because each candidate costs a
+measurement. What was moved too far comes back afterwards in fine steps (`eased`).
 """
 
 from __future__ import annotations
@@ -17,28 +28,32 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 MOVES = (0.5, 1.0, 1.5, 2.5)
-"""In lengths of what is missing."""
+"""How far `moved` moves a corner, in multiples of what is missing. Chosen, not measured."""
 
+# How far a turn is put off; chosen, not measured: bounds the candidates to 20 a corner
 PROLONGED_M = (3.0, 6.0, 10.0, 15.0)
-SPACINGS_M = (6.0, 10.0, 15.0, 20.0)
+SPACINGS_M = (6.0, 10.0, 15.0, 20.0)  # between the corners that one is split into; chosen, not measured
 SLOW_MPS = (3.0, 2.0, 1.0)
 SLOW_BEFORE_M = {3.0: 10.0, 2.0: 10.0, 1.0: 5.0}
 SLOW_AFTER_M = (6.0, 15.0)
-"""Measured on corners: 1 m/s from 5 m before to 6 m after takes away the cut (docs/drive-model.md); narrow lanes are longer."""
+"""Measured on corners: 1 m/s from 5 m before to 6 m after takes away the cut (1.8 to 0.3 m), 2 m/s from 10 m before leaves 0.57 m; 5 m before
+is as good as 10 or 15 (rows ``slow`` of benchmarks/data). 3 m/s was not measured there. 15 m after is for narrow lanes, which are longer."""
 
 APART_M = 3.0
-"""Turns nearer to one another are one turn to a rover."""
+"""Turns nearer to one another are one turn to a rover, as for `drive_model.corner.NEAR_M`."""
 
 CHANGE_TURN_DEG, CHANGE_AWAY_M = 8.0, 4.0
-"""The speed changes on a straight line only, so far from a corner: so it was measured."""
+"""The speed changes on a straight line only, 4 m from any turn of more than 8°: at corners it was not measured (docs/drive-model.md)."""
 
-STOP_S = 1.0
-CRAWL_M = 18.0
-HEAD_M = (5.0, 9.0, 15.0)
-SIDE_DEG = (0.0, 35.0, -35.0, 70.0, -70.0)
-APPROACHES = 8
-APPROACH_M = (8.0, 16.0)
-SHARP_DEG = 110.0
+STOP_S = 1.0  # param1 of a waypoint: any delay stops the rover, and one second is what was measured (rows ``delay`` of benchmarks/data)
+
+# Chosen, not measured; the drive model judges what comes of them.
+CRAWL_M = 18.0  # before and after a spot that is crawled past
+HEAD_M = (5.0, 9.0, 15.0)  # lengths of a first leg the way the vehicle faces
+SIDE_DEG = (0.0, 35.0, -35.0, 70.0, -70.0)  # and how far to a side of that it leads
+APPROACHES = 8  # sides from which a fixed point is approached, evenly all round
+APPROACH_M = (8.0, 16.0)  # and from how far
+SHARP_DEG = 110.0  # a sharper corner may be split into three; beyond 115° on short legs the drive model gives no bound
 
 
 def moved(drawing: Drawing, index: int, missing_m: float) -> Iterator[Drawing]:
@@ -52,6 +67,7 @@ def moved(drawing: Drawing, index: int, missing_m: float) -> Iterator[Drawing]:
     along = (-out[1], out[0])
     ways = (out, (-out[0], -out[1]), *(_between(out, side) for side in (along, (-along[0], -along[1]))))
     half_rad = math.radians(abs(drawn.turn_deg(drawing, index))) / 2
+    # Moved out by d, a corner takes its legs d cos(half the turn) away; 5 cm more, so that little missing moves it too.
     unit_m = missing_m / max(math.cos(half_rad), 0.4) + 0.05
     for way in (*ways, along, (-along[0], -along[1])):
         for share in MOVES:
@@ -81,7 +97,7 @@ def bent(drawing: Drawing, index: int, place: Vector, away: Vector, missing_m: f
     along = drawn.distances_m(drawing)
     longer, there = drawn.with_point_at(drawing, _along_m(drawing, along, place, index), APART_M)
     if len(longer) > len(drawing):
-        for share in (1.0, 1.6, 2.5):
+        for share in (1.0, 1.6, 2.5):  # as coarse as `MOVES`, and 5 cm on top
             yield _with(longer, there, shifted(longer[there].place, away, share * missing_m + 0.05))
 
 
@@ -92,7 +108,7 @@ def together(drawing: Drawing, index: int, missing_m: float) -> Iterator[Drawing
             continue
         for number in range(8):
             way = _vector(45.0 * number)
-            for share in (0.7, 1.5, 3.0):
+            for share in (0.7, 1.5, 3.0):  # as coarse as `MOVES`, in eight directions
                 by_m = share * missing_m + 0.02
                 both = _with(drawing, index, shifted(drawing[index].place, way, by_m))
                 yield _with(both, other, shifted(drawing[other].place, way, by_m))
@@ -145,6 +161,7 @@ def split(drawing: Drawing, index: int) -> Iterator[Drawing]:
     )
     middle = _between(before, after) if turn_deg < 175 else (-out[1], out[0])
     here = drawing[index]
+    # The shares of a spacing below are chosen, not measured: shapes to try.
     for spacing_m in SPACINGS_M:
         for out_m in (0.0, 0.35 * spacing_m):
             first = shifted(shifted(here.place, out, out_m), middle, -spacing_m / 2)
@@ -219,6 +236,7 @@ def headed(drawing: Drawing, heading_deg: float) -> Iterator[Drawing]:
             first = replace(first, is_fixed=False)
             yield (start, first, *drawing[1:])
             if side_deg:
+                # Chosen: on round to the same side, to come back to the route behind.
                 second = first.at(shifted(first.place, _vector(heading_deg + 2.5 * side_deg), length_m))
                 yield (start, first, second, *drawing[1:])
 
@@ -250,7 +268,7 @@ def _vector(bearing_deg: float) -> Vector:
 
 
 def _with_change(drawing: Drawing, along_m: float, way: float) -> tuple[Drawing, int]:
-    """Give the lines with a point where the speed may change, and its number: on a straight line, farther on than a corner nearby."""
+    """Return the lines with a point where the speed may change, and its number: on a straight line, beyond any corner nearby."""
     for _ in drawing:
         along = drawn.distances_m(drawing)
         corner_m = next(
@@ -273,7 +291,7 @@ def _slower(point: drawn.DrawnPoint, speed_mps: float) -> drawn.DrawnPoint:
 
 
 def _along_m(drawing: Drawing, along: list[float], place: Vector, index: int) -> float:
-    """Give how far along the leg to a point, or the one after it, a place lies."""
+    """Return how far a place lies along the leg to a point, or along the one after it."""
     best = (math.inf, along[index])
     for leg in (index - 1, index):
         if 0 <= leg < len(drawing) - 1:

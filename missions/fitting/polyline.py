@@ -51,7 +51,7 @@ class DrawnPoint:
         return (self.east_m, self.north_m)
 
     def at(self, place: Vector) -> DrawnPoint:
-        """Give it elsewhere."""
+        """Return the point at another place."""
         return replace(self, east_m=place[0], north_m=place[1])
 
 
@@ -59,33 +59,33 @@ Drawing = tuple[DrawnPoint, ...]
 
 
 def is_end_or_fixed(drawing: Sequence[DrawnPoint], index: int) -> bool:
-    """Tell whether a point has to stay."""
+    """Return whether a point has to stay."""
     return not 0 < index < len(drawing) - 1 or drawing[index].is_fixed
 
 
 def places(drawing: Sequence[DrawnPoint]) -> NDArray[np.float64]:
-    """Give the points' places, (n, 2)."""
+    """Return the points' places, (n, 2)."""
     return np.array([point.place for point in drawing])
 
 
 def speeds(drawing: Sequence[DrawnPoint]) -> list[float | None]:
-    """Give the speed asked for on each leg."""
+    """Return the speed asked for on each leg."""
     return [point.speed_mps for point in drawing[1:]]
 
 
 def stops(drawing: Sequence[DrawnPoint]) -> dict[int, float]:
-    """Give where the vehicle waits, and how long."""
+    """Return where the vehicle waits, and how long."""
     return {number: point.stop_s for number, point in enumerate(drawing) if point.stop_s is not None}
 
 
 def direction(a: DrawnPoint, b: DrawnPoint) -> Vector:
-    """Give the unit vector from one point to another."""
+    """Return the unit vector from one point to another."""
     length_m = math.dist(a.place, b.place) or 1.0
     return ((b.east_m - a.east_m) / length_m, (b.north_m - a.north_m) / length_m)
 
 
 def turn_deg(drawing: Sequence[DrawnPoint], index: int) -> float:
-    """Give how the course changes at an inner point, to the right positive."""
+    """Return how the course changes at an inner point, positive to the right."""
     before, after = (
         direction(drawing[index - 1], drawing[index]),
         direction(drawing[index], drawing[index + 1]),
@@ -95,7 +95,7 @@ def turn_deg(drawing: Sequence[DrawnPoint], index: int) -> float:
 
 
 def outward(drawing: Sequence[DrawnPoint], index: int) -> Vector | None:
-    """Give the unit vector out of a corner along its bisector; None where it hardly turns."""
+    """Return the unit vector out of a corner along its bisector; None where it hardly turns."""
     before, after = (
         direction(drawing[index - 1], drawing[index]),
         direction(drawing[index], drawing[index + 1]),
@@ -106,12 +106,12 @@ def outward(drawing: Sequence[DrawnPoint], index: int) -> Vector | None:
 
 
 def shifted(place: Vector, along: Vector, by_m: float) -> Vector:
-    """Give a place moved along a unit vector."""
+    """Return a place moved along a unit vector."""
     return (place[0] + along[0] * by_m, place[1] + along[1] * by_m)
 
 
 def crossing(a: DrawnPoint, b: DrawnPoint, c: DrawnPoint, d: DrawnPoint) -> Vector | None:
-    """Give where the line from a through b, prolonged, meets the line from d through c, prolonged."""
+    """Return where the line from a through b, prolonged, meets the line from d through c, prolonged."""
     ahead, back = direction(a, b), direction(d, c)
     cross = ahead[0] * back[1] - ahead[1] * back[0]
     if abs(cross) < 1e-3:
@@ -123,7 +123,7 @@ def crossing(a: DrawnPoint, b: DrawnPoint, c: DrawnPoint, d: DrawnPoint) -> Vect
 
 
 def distances_m(drawing: Sequence[DrawnPoint]) -> list[float]:
-    """Give how far along the lines each point lies."""
+    """Return how far along the lines each point lies."""
     found = [0.0]
     for a, b in pairwise(drawing):
         found.append(found[-1] + math.dist(a.place, b.place))
@@ -131,7 +131,7 @@ def distances_m(drawing: Sequence[DrawnPoint]) -> list[float]:
 
 
 def place_at(drawing: Drawing, along_m: float) -> Vector:
-    """Give the place at a distance along the lines."""
+    """Return the place at a distance along the lines."""
     along = distances_m(drawing)
     after = next((number for number, there_m in enumerate(along) if there_m > along_m), len(along) - 1)
     ahead = direction(drawing[after - 1], drawing[after])
@@ -139,7 +139,7 @@ def place_at(drawing: Drawing, along_m: float) -> Vector:
 
 
 def with_point_at(drawing: Drawing, along_m: float, near_m: float) -> tuple[Drawing, int]:
-    """Give the lines with a point at a distance along them, and its number; a point that lies nearer than ``near_m`` does."""
+    """Return the lines with a point at a distance along them, and its number; a point that lies nearer than ``near_m`` is used instead."""
     along = distances_m(drawing)
     nearest = min(range(len(along)), key=lambda number: abs(along[number] - along_m))
     if abs(along[nearest] - along_m) <= near_m:

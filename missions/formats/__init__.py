@@ -84,12 +84,12 @@ FORMATS: dict[str, Format] = {
 
 
 def read_situation(path: Path | str) -> Situation:
-    """Read what a file tells: fence, mission, rally points, home, parameters.
+    """Read what a file holds: fence, mission, rally points, home, parameters.
 
     Raises
     ------
     MissionFormatError
-        The file is missing, its suffix is unknown, or it cannot be read as its format; says where.
+        The file is missing, its suffix is unknown, or it cannot be read as its format; the message says where.
     """
     path = Path(path)
     read = format_of(path).read
@@ -247,7 +247,7 @@ def check_writable_format(path: Path, part: Part = Part.MISSION) -> None:
 
 
 def format_of(path: Path, verb: str = "read", part: Part | None = None) -> Format:
-    """Give the format of a path's suffix, wanted to ``read`` or to ``write`` a part.
+    """Return the format of a path's suffix that can ``read`` or ``write`` a part.
 
     Raises
     ------

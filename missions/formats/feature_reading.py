@@ -1,6 +1,6 @@
 """From the features of a GeoJSON or KML file to a situation.
 
-A polygon of which nothing is said is an inclusion if it is the only zone, and an error otherwise.
+A polygon without a role is an inclusion if it is the only zone, and an error otherwise.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def situation_of(features: Iterable[Feature], source: str) -> Situation:
     Raises
     ------
     MissionFormatError
-        A feature means nothing, or what cannot be; says which and what was expected.
+        A feature without a role, or with an impossible one; the message says which and what was expected.
     """
     found: dict[Role, list[Feature]] = {role: [] for role in Role}
     zones: list[tuple[Feature, Role | None]] = []
@@ -91,7 +91,7 @@ def _fence(zones: Sequence[tuple[Feature, Role | None]], return_point: LatLon | 
 
 
 def _polygons(feature: Feature, kind: ZoneKind) -> list[Zone]:
-    """Give the zone of a polygon, and an exclusion for every hole of an inclusion."""
+    """Return the zone of a polygon, and an exclusion for every hole of an inclusion."""
     outer, *holes = feature.lines
     if holes and kind is ZoneKind.EXCLUSION:
         raise feature.error(
@@ -101,7 +101,7 @@ def _polygons(feature: Feature, kind: ZoneKind) -> list[Zone]:
 
 
 def _items(waypoints: Sequence[Feature], routes: Sequence[Feature]) -> tuple[MissionItem, ...]:
-    """Give the mission's items: those said one by one, else the places along the one line."""
+    """Return the mission's items: those given one by one, else the places along the one line."""
     if waypoints:
         return tuple(map(_item, _in_order(waypoints)))
     if len(routes) > 1:
@@ -146,6 +146,6 @@ def _item(feature: Feature) -> MissionItem:
 
 
 def _param(feature: Feature, key: str) -> float:
-    """Give a parameter; null is MAVLink's "not a number"."""
+    """Return a parameter; null is MAVLink's "not a number"."""
     null = key in feature.properties and feature.properties[key] is None
     return math.nan if null else feature.number(key, 0.0)

@@ -27,7 +27,7 @@ _SURE_KEYS = ("role", "fence")
 _LIKELY_KEYS = ("fence_type", "zone", "kind", "type")
 _TRUE, _FALSE = ("true", "1", "yes"), ("false", "0", "no")
 _WHOLE_NAMES = frozenset({Role.HOME, Role.RETURN_POINT, Role.DRAWING})
-"""A field called "Home meadow" is no home; and what is left out must be said to be, by nothing but that word."""
+"""A field called "Home meadow" is not a home; and a feature is left out only by that one word as its role."""
 
 _ZONES = frozenset({Role.INCLUSION, Role.EXCLUSION})
 _POSSIBLE = {
@@ -39,12 +39,12 @@ _POSSIBLE = {
 
 
 def role_of(feature: Feature) -> Role | None:
-    """Tell what a feature is: what its properties say, else its name, else its folders, innermost first; None where nothing does.
+    """Return what a feature is, by its properties, else its name, else its folders, innermost first; None where none of them names a role.
 
     Raises
     ------
     MissionFormatError
-        Two things are said, a word is not known, or the shape cannot be that.
+        Two roles are named, a word is not known, or the shape does not fit the role.
     """
     possible = _POSSIBLE[feature.shape]
     if feature.shape is Shape.POINT and feature.radius_m() is not None:
@@ -78,7 +78,7 @@ def _said_roles(feature: Feature) -> set[Role]:
 
 
 def _named_role(feature: Feature, possible: Iterable[Role]) -> Role | None:
-    """Find words that tell a role in the names; the innermost name that has one counts."""
+    """Return the roles that words in the names stand for; the innermost name with such a word counts."""
     for name in map(_plain, feature.names):
         roles = {
             role

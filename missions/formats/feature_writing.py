@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def features_of(situation: Situation) -> tuple[list[Feature], list[Feature]]:
-    """Give a situation as features: those of the fence, and all others (mission, home, rally points)."""
+    """Return a situation as features: those of the fence, and all others (mission, home, rally points)."""
     fence = situation.fence.value if situation.fence else Fence()
     zones = [_zone_feature(*pair) for pair in zip(fence.zones, fence.zone_names(), strict=True)]
     if fence.return_point:

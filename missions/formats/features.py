@@ -40,7 +40,7 @@ class Role(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Feature:
-    """A shape with what is said of it.
+    """A shape with its properties.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class Feature:
     where: str = ""
 
     def error(self, problem: str) -> MissionFormatError:
-        """Give an error that says where."""
+        """Return an error that names the place in the file."""
         return MissionFormatError(f"{self.where}: {problem}", where=self.where)
 
     @property
@@ -72,7 +72,7 @@ class Feature:
         return self.lines[0][0]
 
     def radius_m(self) -> float | None:
-        """Give a circle's radius; None where the feature is no point or none is said."""
+        """Return a circle's radius; None where the feature is not a point or has no radius."""
         if self.shape is not Shape.POINT:
             return None
         said = (key for key in self.properties if key.lower() in _RADIUS_KEYS)
@@ -85,7 +85,7 @@ class Feature:
         return radius_m
 
     def number(self, key: str, default: float) -> float:
-        """Give a property that is a number; the default where it is not there or null."""
+        """Return a property that is a number; the default where it is missing or null."""
         value = self.properties.get(key)
         if value is None:
             return default
@@ -95,7 +95,7 @@ class Feature:
             raise self.error(f"{key} {value!r}; expected a number") from None
 
     def whole(self, key: str, default: int) -> int:
-        """Give a property that is a whole number from 0 to 65535."""
+        """Return a property that is a whole number from 0 to 65535."""
         try:
             return whole(self.number(key, default), key, 65535)
         except ValueError as error:

@@ -41,7 +41,7 @@ def read(text: str, source: str) -> Situation:
 
 
 def write(situation: Situation) -> str:
-    """Give the text of a file with the situation's fence.
+    """Return the text of a file with the situation's fence.
 
     Raises
     ------

@@ -26,12 +26,12 @@ _MOST_BYTES = 100_000_000
 
 
 def read_text(path: Path) -> str:
-    """Read a text file: UTF-8, or what its byte order mark says; of a zipped KML (.kmz) the KML in it.
+    """Read a text file: UTF-8, or the encoding of its byte order mark; of a zipped KML (.kmz) the KML in it.
 
     Raises
     ------
     MissionFormatError
-        The file is missing or is no text; says where.
+        The file is missing or is no text; the message says where.
     """
     try:
         data = _unzipped(path) if path.suffix.lower() == ".kmz" else path.read_bytes()
@@ -52,7 +52,7 @@ def read_text(path: Path) -> str:
 
 
 def _unzipped(path: Path) -> bytes:
-    """Give the first KML of a zip file, as KMZ wants it."""
+    """Return the first KML of a zip file, as KMZ wants it."""
     import zipfile  # noqa: PLC0415 - slow to come, only for these
     import zlib  # noqa: PLC0415
 
@@ -98,7 +98,7 @@ def write_file(path: Path, data: bytes, make_way: Callable[[], object] = lambda:
     """
     try:
         mode = mode_of(path)
-        # Beside it, so that nobody ever finds half a mission; by a name that nobody can foresee.
+        # Beside it, so that nobody ever finds half a mission; by a name that nobody can guess.
         unfinished = path.with_name(f".pbpp-{secrets.token_hex(8)}.part")
         descriptor = create_exclusively(unfinished)
         try:
@@ -152,7 +152,7 @@ def keep_aside(path: Path) -> Path:
 
 
 def _put_beside(path: Path, aside: Path) -> None:
-    """Give a file a second name that nothing has yet, by a link or else a copy.
+    """Create a second name for a file, not yet taken, by a link or else a copy.
 
     Raises
     ------

@@ -35,7 +35,7 @@ def read(text: str, source: str) -> Situation:
 
 
 def write(situation: Situation) -> str:
-    """Give the text of a file with the situation's fence, mission, rally points and home."""
+    """Return the text of a file with the situation's fence, mission, rally points and home."""
     zones, others = features_of(situation)
     rows = [json.dumps(_feature_json(feature), allow_nan=False) for feature in (*zones, *others)]
     return '{"type": "FeatureCollection", "features": [\n' + ",\n".join(rows) + "\n]}\n"
@@ -146,7 +146,7 @@ def _geometry_json(feature: Feature) -> dict[str, Any] | None:
 
 
 def _counterclockwise(ring: tuple[LatLon, ...]) -> tuple[LatLon, ...]:
-    """Give a ring as RFC 7946 wants outer rings, beginning with the same vertex."""
+    """Return a ring as RFC 7946 wants outer rings (counter-clockwise), beginning with the same vertex."""
     doubled_area = sum(
         a.lon_deg * b.lat_deg - b.lon_deg * a.lat_deg for a, b in zip(ring, (*ring[1:], ring[0]), strict=True)
     )

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def write(situation: Situation) -> str:
-    """Give the text of a file with the places of the situation's mission; commands without a place are left out.
+    """Return the text of a file with the places of the situation's mission; commands without a place are left out.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""JSON read with care: every value knows where it stands, so that errors can say it."""
+"""JSON read with care: every value knows where it stands, so that errors can name the place."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def parse_json(text: str, source: str) -> JsonNode:
     Raises
     ------
     MissionFormatError
-        It is none; says in which line.
+        The text is not JSON; the message names the line.
     """
     try:
         return JsonNode(json.loads(text), source, "")
@@ -49,7 +49,7 @@ class JsonNode:
         self.value, self.source, self.where = value, source, where
 
     def error(self, problem: str) -> MissionFormatError:
-        """Give an error that names file and path."""
+        """Return an error that names file and path."""
         where = self.where or "top level"
         return MissionFormatError(f"{self.source}: {where}: {problem}", file=self.source, where=where)
 
@@ -65,13 +65,13 @@ class JsonNode:
             raise JsonNode(None, self.source, where).error("missing") from None
 
     def members(self) -> list[JsonNode]:
-        """Give the members of this list."""
+        """Return the members of this list."""
         if not isinstance(self.value, list):
             raise self.error("expected a list")
         return [self[i] for i in range(len(self.value))]
 
     def number(self) -> float:
-        """Give a number; not finite where the file says so."""
+        """Return a number; one that is not finite only where the file has it so."""
         if isinstance(self.value, bool) or not isinstance(self.value, (int, float)):
             raise self.error("expected a number")
         try:
@@ -80,20 +80,20 @@ class JsonNode:
             raise self.error("expected a number of less than 300 digits") from None
 
     def whole(self, name: str, most: int) -> int:
-        """Give a whole number from 0 to ``most``."""
+        """Return a whole number from 0 to ``most``."""
         try:
             return whole(self.number(), name, most)
         except ValueError as error:
             raise self.error(str(error)) from None
 
     def lat_lon(self) -> LatLon:
-        """Give the position of a list that begins with latitude and longitude."""
+        """Return the position of a list that begins with latitude and longitude."""
         if not isinstance(self.value, list) or len(self.value) < 2:
             raise self.error("expected [latitude, longitude]")
         return self._checked(self[0], self[1])
 
     def lon_lat(self) -> LatLon:
-        """Give the position of a list that begins with longitude and latitude."""
+        """Return the position of a list that begins with longitude and latitude."""
         if not isinstance(self.value, list) or len(self.value) < 2:
             raise self.error("expected [longitude, latitude]")
         return self._checked(self[1], self[0])

@@ -1,6 +1,6 @@
 """KML (OGC 2.2): fences, missions, rally points and home as placemarks; positions are longitude first.
 
-Folders and names tell what a placemark is; so do ``Data`` and ``SimpleData`` of its ``ExtendedData``. KML has no circles: they are points
+Folders and names give a placemark its role; so do ``Data`` and ``SimpleData`` of its ``ExtendedData``. KML has no circles: they are points
 with a radius, and for the eye a polygon beside each that reading leaves out.
 """
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 _FOLDERS = ("kml", "Document", "Folder")
 _SHAPES = ("Point", "LineString", "LinearRing", "Polygon", "MultiGeometry")
 _OTHER_SHAPES = ("Model", "Track", "MultiTrack")
-_CIRCLE_CORNERS = 72
+_CIRCLE_CORNERS = 72  # every 5°: to look at; pbpp reads the circle's own data back
 _STYLES = {  # colours of the pictures, as KML writes them: opacity, blue, green, red
     Role.INCLUSION: "<LineStyle><color>ff739e00</color><width>3</width></LineStyle><PolyStyle><fill>0</fill></PolyStyle>",
     Role.EXCLUSION: "<LineStyle><color>ff005ed5</color><width>2</width></LineStyle><PolyStyle><color>66005ed5</color></PolyStyle>",
@@ -50,7 +50,7 @@ def read(text: str, source: str) -> Situation:
 
 
 def write(situation: Situation) -> str:
-    """Give the text of a file with the situation's fence, mission, rally points and home."""
+    """Return the text of a file with the situation's fence, mission, rally points and home."""
     zones, others = features_of(situation)
     drawn = [_drawing(zone) for zone in zones if "radius_m" in zone.properties]
     return "\n".join(
@@ -195,7 +195,7 @@ def _coordinates(positions: Iterable[LatLon]) -> str:
 
 
 def _drawing(zone: Feature) -> Feature:
-    """Give a polygon to see a circle by: around an exclusion, inside an inclusion."""
+    """Return a polygon that draws a circle: around an exclusion, inside an inclusion."""
     from pyproj import Geod  # noqa: PLC0415 - slow to come, only for circles
 
     radius_m = float(str(zone.properties["radius_m"]))

@@ -7,19 +7,19 @@ import math
 from missions.errors import InvalidPositionError
 from missions.geo import LatLon, checked_lat_lon, to_e7
 
-_INT32_MAX = 2**31 - 1
+_INT32_MAX = 2**31 - 1  # degE7 is a 32-bit integer in MAVLink
 _COMMANDS_WITHOUT_PLACES = range(96, 5000)
 
 
 def place_e7(command: int, lat_deg: float, lon_deg: float) -> tuple[int, int]:
-    """Give an item's params 5 and 6 as degE7.
+    """Return an item's params 5 and 6 as degE7.
 
     Conditions and DO_ commands may hold anything there that fits the wire.
 
     Raises
     ------
     InvalidPositionError
-        A place that is none.
+        Not a valid position.
     """
     if command not in _COMMANDS_WITHOUT_PLACES:
         return to_e7(checked_lat_lon(lat_deg, lon_deg))
@@ -38,7 +38,7 @@ def number(text: str) -> float:
     Raises
     ------
     ValueError
-        It is none.
+        It is not such a number.
     """
     if "_" in text:  # 4_0 is 40 to Python, and a slip of the pen to everybody else
         raise ValueError(f"could not convert string to float: {text!r}")
@@ -46,12 +46,12 @@ def number(text: str) -> float:
 
 
 def whole(value: float, name: str, most: int) -> int:
-    """Give a whole number from 0 to ``most``.
+    """Return a whole number from 0 to ``most``.
 
     Raises
     ------
     ValueError
-        It is none.
+        It is not such a number.
     """
     if not (0 <= value <= most and value == int(value)):
         raise ValueError(f"{name} {value:g} is not a whole number from 0 to {most}")

@@ -26,7 +26,7 @@ def read_parameters(path: Path | str) -> dict[str, float]:
     Raises
     ------
     MissionFormatError
-        The file is missing or a line is not a name and a number; says which.
+        The file is missing or a line is not a name and a number; the message says which.
     """
     return dict(read(read_text(Path(path)), str(path)).parameters)
 
@@ -49,7 +49,7 @@ def read(text: str, source: str) -> Situation:
 
 
 def write(situation: Situation) -> str:
-    """Give the text of a file with the situation's parameters by name, as exact as the wire's 32 bits."""
+    """Return the text of a file with the situation's parameters by name, as exact as the 32-bit floats of MAVLink."""
     rows = [f"{name:<16} {value:.9g}\n" for name, value in sorted(situation.parameters.items())]
     return "".join(rows)
 

@@ -20,7 +20,7 @@ class Part(StrEnum):
 
 
 def parts_of(situation: Situation) -> tuple[Part, ...]:
-    """Tell which parts are known."""
+    """Return which parts are known."""
     return tuple(part for part in Part if getattr(situation, part))
 
 

@@ -33,17 +33,17 @@ def read_points(text: str, source: str) -> list[tuple[int, LatLon]]:
 
 
 def format_points(points: Sequence[LatLon]) -> str:
-    """Give the text of points, eight decimals each (1 mm)."""
+    """Return the text of points, eight decimals each (1 mm)."""
     return "".join(f"{point.lat_deg:.8f} {point.lon_deg:.8f}\n" for point in points)
 
 
 def lone_inclusion(fence: Fence, suffix: str) -> PolygonZone:
-    """Give the zone of a fence that is one inclusion polygon.
+    """Return the zone of a fence that is one inclusion polygon.
 
     Raises
     ------
     MissionFormatError
-        The fence is anything else; says what it is.
+        The fence is anything else; the message says what it is.
     """
     zone = fence.zones[0] if len(fence.zones) == 1 else None
     if isinstance(zone, PolygonZone) and zone.kind is ZoneKind.INCLUSION:

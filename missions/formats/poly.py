@@ -27,7 +27,7 @@ def read(text: str, source: str) -> Situation:
 
 
 def write(situation: Situation) -> str:
-    """Give the text of a file with the situation's fence; the return point is left out.
+    """Return the text of a file with the situation's fence; the return point is left out.
 
     Raises
     ------

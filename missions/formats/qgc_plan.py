@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from missions.formats.json_node import JsonNode
 
 _TRANSECTS = "TransectStyleComplexItem"
-_MOST_ITEMS = 65535
-_FIRMWARE_ARDUPILOT = 3
-_VEHICLE_ROVER = 10
+_MOST_ITEMS = 65535  # seq is 16 bits in MAVLink
+_FIRMWARE_ARDUPILOT = 3  # MAV_AUTOPILOT_ARDUPILOTMEGA
+_VEHICLE_ROVER = 10  # MAV_TYPE_GROUND_ROVER
 
 
 def read(text: str, source: str) -> Situation:
@@ -49,7 +49,7 @@ def read(text: str, source: str) -> Situation:
 
 
 def write(situation: Situation) -> str:
-    """Give a plan's text with the situation's mission, fence, rally points and home."""
+    """Return a plan's text with the situation's mission, fence, rally points and home."""
     mission = situation.mission.value if situation.mission else Mission(())
     home = mission.home or (situation.home.value if situation.home else LatLon(0.0, 0.0))
     fence = situation.fence.value if situation.fence else Fence()
@@ -111,7 +111,7 @@ def _mission(node: JsonNode) -> Mission:
 
 
 def _simple_items(node: JsonNode) -> list[JsonNode]:
-    """Give a simple item itself, of a survey or a corridor scan the simple items that it stands for."""
+    """Return a simple item itself, or the simple items that a survey or a corridor scan stands for."""
     if node["type"].value == "SimpleItem":
         return [node]
     if _TRANSECTS in node and "Items" in node[_TRANSECTS]:
@@ -124,7 +124,7 @@ def _simple_items(node: JsonNode) -> list[JsonNode]:
 
 
 def _seq_of_id(nodes: list[JsonNode]) -> dict[int, int | None]:
-    """Give the seq of each item by its doJumpId; None where two items have the same."""
+    """Return the seq of each item by its doJumpId; None where two items have the same."""
     seqs: dict[int, int | None] = {}
     for seq, node in enumerate(nodes, start=1):
         if "doJumpId" in node:

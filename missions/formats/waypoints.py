@@ -45,12 +45,12 @@ def read(text: str, source: str) -> Situation:
 
 
 def is_waypoint_text(text: str) -> bool:
-    """Tell whether a text begins as this format does."""
+    """Return whether a text begins as this format does."""
     return any(line.split() == _HEADER.split() for line in text[:100].splitlines()[:1])
 
 
 def write(situation: Situation) -> str:
-    """Give the text of a file with the situation's mission, home first; without one its fence, else its rally points."""
+    """Return the text of a file with the situation's mission, home first; without one its fence, else its rally points."""
     mission, fence, rally = situation.mission, situation.fence, situation.rally
     if mission is not None:
         home = mission.value.home or (situation.home and situation.home.value) or LatLon(0.0, 0.0)
@@ -62,7 +62,7 @@ def write(situation: Situation) -> str:
 
 
 def format_items(items: Sequence[MissionItem]) -> str:
-    """Give the text of a file with items as they stand (a mission with its home item)."""
+    """Return the text of a file with items as they stand (a mission with its home item)."""
     rows = [
         "\t".join(
             [

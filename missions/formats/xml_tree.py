@@ -10,6 +10,7 @@ from missions.errors import MissionFormatError
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+# Chosen, not measured: bounds what a hostile file can make of the readers that follow its nesting
 _MOST_DEEP = 100
 
 
@@ -32,19 +33,19 @@ class Element:
     text: str = ""
 
     def error(self, problem: str) -> MissionFormatError:
-        """Give an error that names file and line."""
+        """Return an error that names file and line."""
         return MissionFormatError(f"{self.where}: {problem}", where=self.where)
 
     def all(self, *names: str) -> Iterator[Element]:
-        """Give the children of a name."""
+        """Return the children of a name."""
         return (child for child in self.children if child.name in names)
 
     def first(self, name: str) -> Element | None:
-        """Give the first child of a name."""
+        """Return the first child of a name."""
         return next(self.all(name), None)
 
     def text_of(self, name: str) -> str:
-        """Give the text of the first child of a name, empty without one."""
+        """Return the text of the first child of a name, empty without one."""
         child = self.first(name)
         return child.text.strip() if child else ""
 
@@ -55,7 +56,7 @@ def parse_xml(text: str, source: str) -> Element:
     Raises
     ------
     MissionFormatError
-        It is none, or has what is refused; says in which line.
+        The text is not XML, or has what is refused; the message names the line.
     """
     from xml.parsers import expat  # noqa: PLC0415 - quick help; document types are refused below
 

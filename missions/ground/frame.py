@@ -2,7 +2,7 @@
 
 An azimuthal equidistant projection of the WGS 84 ellipsoid. Within 10 km of the origin distances agree with the geodesic to
 1 mm + 1e-6. ArduPilot drives straight in a flat frame of its own (1.113195e5 m a degree, longitude shortened by the cosine of the
-latitude); `autopilot_scale` and `bow_m` tell how far the two differ, so that plans can be padded to the safe side.
+latitude); `autopilot_scale` and `bow_m` are how far the two differ, so that plans can be padded to the safe side.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 MAX_LATITUDE_DEG = 85.0
 """Beyond this the autopilot's flat frame is of no use."""
 
-_WGS84_A_M = 6378137.0
-_WGS84_E2 = 6.69437999014e-3
+_WGS84_A_M = 6378137.0  # semi-major axis, by definition
+_WGS84_E2 = 6.69437999014e-3  # first eccentricity squared, from the flattening 1/298.257223563
 _AUTOPILOT_M_PER_DEG = 1.113195e5  # AP_Math's LATLON_TO_M
 
 
@@ -88,28 +88,28 @@ class LocalFrame:
         return Proj(proj="aeqd", ellps="WGS84", lat_0=self.origin.lat_deg, lon_0=self.origin.lon_deg)
 
     def to_local(self, position: LatLon) -> LocalPoint:
-        """Give the point of a position."""
+        """Return the point of a position."""
         return LocalPoint(*self._proj(position.lon_deg, position.lat_deg))
 
     def to_lat_lon(self, point: LocalPoint) -> LatLon:
-        """Give the position of a point."""
+        """Return the position of a point."""
         lon_deg, lat_deg = self._proj(point.east_m, point.north_m, inverse=True)
         return LatLon(lat_deg, wrap_lon_deg(lon_deg))
 
     def to_local_array(self, positions: Sequence[LatLon]) -> NDArray[np.float64]:
-        """Give positions as an (n, 2) array, east and north in metres."""
+        """Return positions as an (n, 2) array, east and north in metres."""
         # Lists: of an array of one older pyproj and numpy warn that it is taken for a number.
         lons_deg = [lon_deg for _, lon_deg in positions]
         lats_deg = [lat_deg for lat_deg, _ in positions]
         return np.column_stack(self._proj(lons_deg, lats_deg)).reshape(-1, 2)
 
     def to_lat_lons(self, points: NDArray[np.float64]) -> list[LatLon]:
-        """Give the positions of an (n, 2) array, east and north in metres."""
+        """Return the positions of an (n, 2) array, east and north in metres."""
         return [self.to_lat_lon(LocalPoint(east_m, north_m)) for east_m, north_m in points.tolist()]
 
 
 def frame_around(positions: Sequence[LatLon]) -> LocalFrame:
-    """Give the frame at the centre of the positions' bounding box, the short way round across the antimeridian.
+    """Return the frame at the centre of the positions' bounding box, the short way round across the antimeridian.
 
     Raises
     ------
@@ -128,14 +128,14 @@ def frame_around(positions: Sequence[LatLon]) -> LocalFrame:
 
 
 def autopilot_scale(lat_deg: float) -> AutopilotScale:
-    """Tell how many true metres a metre of ArduPilot's flat frame is, at a latitude (0.9933 to 1.0034)."""
+    """Return how many true metres a metre of ArduPilot's flat frame is, at a latitude (0.9933 to 1.0034)."""
     w2 = 1 - _WGS84_E2 * math.sin(math.radians(lat_deg)) ** 2
     equatorial = math.radians(_WGS84_A_M) / _AUTOPILOT_M_PER_DEG
     return AutopilotScale(east=equatorial / math.sqrt(w2), north=equatorial * (1 - _WGS84_E2) / w2**1.5)
 
 
 def bow_m(leg_m: float, lat_deg: float) -> float:
-    """Tell how far the autopilot's straight line bows off the frame's, at most, on a leg of a length.
+    """Return how far at most the autopilot's straight line bows off the frame's, on a leg of a length.
 
     A line straight in latitude and longitude with the heading h curves with sin(h) (1 + cos(h)²) tan(latitude) / Earth's radius, most at
     55° from north, where the factor is 1.089 (1 for a line due east).
@@ -144,7 +144,7 @@ def bow_m(leg_m: float, lat_deg: float) -> float:
 
 
 def autopilot_line(a: LatLon, b: LatLon, pieces: int) -> list[LatLon]:
-    """Give the autopilot's straight line from ``a`` to ``b``, both included, cut into equal pieces."""
+    """Return the autopilot's straight line from ``a`` to ``b``, both included, cut into equal pieces."""
     delta_lon_deg = wrap_lon_deg(b.lon_deg - a.lon_deg)
     return [
         LatLon(

@@ -26,7 +26,7 @@ MAX_FIELD_M = 100_000.0
 
 
 def route_ends(situation: Situation, request: Request) -> tuple[LatLon, tuple[LatLon, ...]]:
-    """Give start and targets: what is asked for, else what the situation tells.
+    """Return start and targets: those of the request, else those of the situation.
 
     Raises
     ------
@@ -54,13 +54,13 @@ def route_ends(situation: Situation, request: Request) -> tuple[LatLon, tuple[La
 
 
 def heading_at(situation: Situation, start: LatLon) -> float | None:
-    """Give the vehicle's heading where the route starts from where it stands, degrees clockwise from north."""
+    """Return the vehicle's heading where the route starts from where it stands, in degrees clockwise from north."""
     pose = situation.pose
     return pose.value.heading_deg if pose is not None and pose.value.position == start else None
 
 
 def ground_for(situation: Situation, vehicle: Vehicle, ends: Sequence[LatLon]) -> Ground:
-    """Lay the situation's fence out in the plane as the vehicle's parameters say.
+    """Lay the situation's fence out in the plane as the vehicle's parameters require.
 
     Raises
     ------

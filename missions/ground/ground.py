@@ -39,9 +39,9 @@ CIRCLE_TOLERANCE_M = 0.05
 EDGE_BOW_M = 1e-3
 """How far a fence's line may stand off the autopilot's."""
 
-_WALL_M = 1e-3
+_WALL_M = 1e-3  # thickness of a line made an area: a millimetre, below degE7's 11 mm
 _CIRCLE_PAD_M = 1e-4  # what the autopilot's flat metres lose on a circle of kilometres
-_OPEN_GROUND_M = 500.0
+_OPEN_GROUND_M = 500.0  # of ground around everything where no inclusion bounds it; chosen, not measured
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +78,7 @@ class Ground:
     warnings: tuple[str, ...]
 
     def areas(self, kind: ZoneKind) -> list[Area]:
-        """Give the areas of one kind; the bounds where there is no inclusion."""
+        """Return the areas of one kind; the bounds where there is no inclusion."""
         found = [barrier.area for barrier in self.barriers if barrier.kind is kind]
         return found or ([self.bounds] if kind is ZoneKind.INCLUSION else [])
 
@@ -100,17 +100,17 @@ class Ground:
 
     @cached_property
     def edge(self) -> BaseGeometry:
-        """The line the vehicle must keep off; the bounds are none of it."""
+        """The line the vehicle must keep off, without the bounds."""
         return self.allowed.boundary.difference(self.bounds.boundary.buffer(_WALL_M))
 
     def clearance_m(self, shape: BaseGeometry) -> float:
-        """Give a shape's least distance to forbidden ground; 0 where it touches it, infinite where there is none."""
+        """Return a shape's least distance to forbidden ground; 0 where it touches it, infinite without any."""
         if not self.allowed.covers(shape):
             return 0.0
         return math.inf if self.edge.is_empty else float(shape.distance(self.edge))
 
     def nearest(self, shape: BaseGeometry) -> tuple[Barrier | None, float]:
-        """Give the barrier nearest to a shape and its distance in metres."""
+        """Return the barrier nearest to a shape and its distance in metres."""
         distances = [(self.distance_m(barrier, shape), i) for i, barrier in enumerate(self.barriers)]
         if not distances:
             return None, math.inf
@@ -118,7 +118,7 @@ class Ground:
         return self.barriers[index], distance_m
 
     def distance_m(self, barrier: Barrier, shape: BaseGeometry) -> float:
-        """Give a shape's distance to a barrier: to an exclusion's area, to an inclusion's edge."""
+        """Return a shape's distance to a barrier: to an exclusion's area, to an inclusion's edge."""
         if barrier.kind is ZoneKind.EXCLUSION:
             return float(barrier.area.distance(shape))
         if self.union:  # an inclusion's edge inside another one is no edge
@@ -127,7 +127,7 @@ class Ground:
         return float(barrier.area.boundary.distance(shape))
 
     def forbidding(self, point: Point) -> list[Barrier]:
-        """Give the barriers that forbid a point: exclusions around it, inclusions it is outside of."""
+        """Return the barriers that forbid a point: exclusions around it, inclusions it is outside of."""
         outside = [b for b in self.barriers if b.kind is ZoneKind.INCLUSION and not b.area.covers(point)]
         inclusions = sum(barrier.kind is ZoneKind.INCLUSION for barrier in self.barriers)
         if self.union and len(outside) < inclusions:
@@ -135,7 +135,7 @@ class Ground:
         return [b for b in self.barriers if b.kind is ZoneKind.EXCLUSION and b.area.covers(point)] + outside
 
     def nearest_point(self, area: BaseGeometry, point: Point) -> Point:
-        """Give the point of an area nearest to a point."""
+        """Return the point of an area nearest to a point."""
         return nearest_points(area, point)[0]
 
 
@@ -161,7 +161,7 @@ def lay_out(
     home : LatLon, optional
         The centre of the home circle.
     home_radius_m : float, optional
-        FENCE_RADIUS where the autopilot enforces it; it holds whatever ``union`` says.
+        FENCE_RADIUS where the autopilot enforces it; it holds whatever ``union`` is.
     around : sequence of LatLon
         Places that must lie within the bounds where the fence has no inclusion.
 
@@ -197,7 +197,7 @@ def check_ground(ground: Ground) -> None:
     Raises
     ------
     FenceError
-        Says which zones leave none.
+        No allowed ground is left; the message names the zones.
     """
     if not ground.allowed.is_empty:
         return
@@ -210,7 +210,7 @@ def check_ground(ground: Ground) -> None:
 
 
 def _within(barriers: list[Barrier], circle: Area, name: str) -> list[Barrier]:
-    """Cut a union's inclusions to the home circle, which limits even the union; those beyond it are none."""
+    """Cut a union's inclusions to the home circle, which limits even the union; inclusions beyond it are left out."""
     found = []
     for barrier in barriers:
         area = _polygons(barrier.area.intersection(circle))
@@ -273,7 +273,7 @@ def _autopilot_ring(vertices: Sequence[LatLon]) -> list[LatLon]:
 
 
 def _even_odd(ring: NDArray[np.float64]) -> Area:
-    """Give the area of a self-crossing ring that a ray from a point crosses an odd number of times to leave."""
+    """Return the area of a self-crossing ring that a ray from a point crosses an odd number of times to leave."""
     lines = shapely.union_all([LinearRing(ring)])
     faces = shapely.get_parts(shapely.polygonize([lines]))
     inside = [face for face in faces if _crossings(ring, face.representative_point()) % 2]
@@ -281,7 +281,7 @@ def _even_odd(ring: NDArray[np.float64]) -> Area:
 
 
 def _walls(ring: NDArray[np.float64]) -> BaseGeometry:
-    """Give a ring's line as a thin wall, edge by edge: buffered whole, a line that doubles back can lose an end."""
+    """Return a ring's line as a thin wall, edge by edge: buffered whole, a line that doubles back can lose an end."""
     edges = shapely.linestrings(np.stack((ring, np.roll(ring, -1, axis=0)), axis=1))
     return shapely.union_all(shapely.buffer(edges, _WALL_M, cap_style="square"))
 
@@ -301,7 +301,7 @@ def _crossings(ring: NDArray[np.float64], point: Point) -> int:
 
 
 def _circle(zone: CircleZone, frame: LocalFrame) -> Polygon:
-    """Give a polygon around an exclusion circle, or inside an inclusion circle."""
+    """Return a polygon around an exclusion circle, or inside an inclusion circle."""
     half_deg = zone.radius_m / 1.1e5
     south_deg, north_deg = zone.centre.lat_deg - half_deg, zone.centre.lat_deg + half_deg
     # The autopilot's metre grows towards the poles: it is least and most at the circle's ends, or on the equator.

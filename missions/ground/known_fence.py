@@ -1,4 +1,4 @@
-"""The fence that is known of a vehicle: which one counts, and what is to be said about it."""
+"""The fence that is known of a vehicle: which one counts, and the remarks about it."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ _ADVICE = (
 
 
 def known_fence(situation: Situation) -> Fence:
-    """Give the fence to plan around.
+    """Return the fence to plan around.
 
     Raises
     ------
     FenceMissingError
-        None is known, or it is empty; says why and what to do.
+        None is known, or it is empty; the message says why and what to do.
     """
     known = situation.fence
     if known is None:
@@ -37,7 +37,7 @@ def known_fence(situation: Situation) -> Fence:
 
 
 def _never_seen(situation: Situation) -> str:
-    """Say that no fence was seen; that the vehicle holds one all the same, where it says so."""
+    """Return why no fence is known: none was seen, though the vehicle may report that it holds one."""
     total = situation.parameters.get(_TOTAL, 0.0)
     if not total > 0:
         return "no fence was transferred"
@@ -48,7 +48,7 @@ def _never_seen(situation: Situation) -> str:
 
 
 def fence_trouble(situation: Situation) -> str | None:
-    """Say why the newest fence that was seen cannot be used; None where there is no such trouble."""
+    """Return why the newest fence that was seen cannot be used; None where it can be."""
     if situation.fence_trouble:
         return f"a fence was transferred but is unusable ({situation.fence_trouble})"
     for to_vehicle in (True, False):

@@ -23,11 +23,12 @@ MAX_LEG_M = 1000.0
 ROUNDING_RESERVE_M = 0.01
 """Rounding to degE7 moves a waypoint by 8 mm at most."""
 
+# Longest straight piece of the autopilot's line, which bows in the frame; chosen, not measured
 _SAMPLE_M = 50.0
 
 
 def reserve_m(ground: Ground) -> float:
-    """Give by how much rounding and the autopilot's own idea of a straight line may bring drawn lines nearer to a fence."""
+    """Return by how much rounding and the autopilot's own idea of a straight line may bring drawn lines nearer to a fence."""
     east_min_m, north_min_m, east_max_m, north_max_m = ground.allowed.bounds
     diagonal_m = math.hypot(east_max_m - east_min_m, north_max_m - north_min_m)
     farthest_lat_deg = min(abs(ground.frame.origin.lat_deg) + diagonal_m / 1.1e5, MAX_LATITUDE_DEG)
@@ -35,12 +36,12 @@ def reserve_m(ground: Ground) -> float:
 
 
 def drawn_leg(ground: Ground, a: LatLon, b: LatLon) -> LineString | Point:
-    """Give the autopilot's straight line between two positions, in the plane."""
+    """Return the autopilot's straight line between two positions, in the plane."""
     pieces = max(1, math.ceil(distance_m(a, b) / _SAMPLE_M))
     line = ground.frame.to_local_array(autopilot_line(a, b, pieces))
     return Point(line[0]) if a == b else LineString(line)
 
 
 def path_length_m(path: Sequence[LatLon]) -> float:
-    """Give how long lines through positions are."""
+    """Return the length of the lines through positions."""
     return sum(distance_m(a, b) for a, b in pairwise(path))

@@ -87,7 +87,7 @@ def with_seams(ground: Ground, vehicle: Vehicle) -> Ground:
 
 
 def first_stop(seams: tuple[Seam, ...], shape: BaseGeometry) -> tuple[str, Point] | None:
-    """Return the first seam before which a vehicle stops that drives along a shape, and where; None where there is none."""
+    """Return the first seam before which a vehicle stops that drives along a shape, and where; None without one."""
     stops = []
     for seam in seams:
         there = shape.intersection(seam.stops_on)

@@ -102,7 +102,7 @@ def draw_plan(
 def sketch_plan(
     plan: Plan, *, track: Sequence[LatLon] = (), columns: int = 80, encoding: str = "utf-8"
 ) -> str:
-    """Give a sketch of a plan for the terminal: plain text, no colours.
+    """Return a sketch of a plan for the terminal: plain text, no colours.
 
     Parameters
     ----------

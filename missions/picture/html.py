@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from missions.picture.scene import Scene
 
-_HOVERS_PER_LEG = 25
+_HOVERS_PER_LEG = 25  # so that any place of a leg answers the pointer
 _HATCH = {
     "shape": "/",
     "fgcolor": style.EXCLUSION,
@@ -42,6 +42,7 @@ _CONFIG = {
 }
 
 
+# The picture's size and place in pixels and shares of it: by eye.
 _NORTH = {
     "text": "<b>N</b><br>↑",
     "showarrow": False,
@@ -172,7 +173,7 @@ def _lines(scene: Scene) -> Iterator[go.Scatter]:
 
 
 def _leg_hovers(scene: Scene) -> go.Scatter:
-    """Give invisible points along the legs that tell of them."""
+    """Return invisible points along the legs that show the legs' figures on hovering."""
     arrivals_s = scene.plan.envelope.arrivals_s
     points, texts = [], []
     for leg, clearance_m in enumerate(scene.leg_clearances_m):
@@ -194,7 +195,7 @@ def _leg_hovers(scene: Scene) -> go.Scatter:
 
 
 def _names(scene: Scene) -> go.Scatter:
-    """Give the exclusions' names in short; hovering tells them in full."""
+    """Return the exclusions' short names; hovering shows the full ones."""
     shown = [
         (zone.area.intersection(scene.frame).representative_point(), short_name(zone.name))
         for zone in scene.plan.ground.barriers
@@ -211,7 +212,7 @@ def _names(scene: Scene) -> go.Scatter:
 
 
 def _scale(scene: Scene) -> go.Scatter:
-    """Give a scale bar that grows with the picture, in its lower left corner."""
+    """Return a scale bar that grows with the picture, in its lower left corner."""
     west, south, east, north = scene.bounds_m
     length_m = scene.scale_m()
     begin_m, height_m = west + (east - west) / 50, south + (north - south) / 50
@@ -270,7 +271,7 @@ def _points(
 
 
 def _east_north(points: NDArray[np.float64]) -> dict[str, list[float | None]]:
-    """Give columns for plotly, millimetres rounded, gaps as null."""
+    """Return columns for plotly, rounded to millimetres, gaps as null."""
     rounded = np.round(points, 3)
     return {
         axis: [None if math.isnan(value) else value for value in column]

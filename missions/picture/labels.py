@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from missions.ground.ground import Barrier
     from missions.picture.scene import Scene
 
-_FONT_SIZE = 8
-_GAP_PX = 3.0
-_MARKER_PX = 16.0
+_FONT_SIZE = 8  # points
+_GAP_PX = 3.0  # around a name
+_MARKER_PX = 16.0  # radius kept free around start and targets
 _BOX = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.0}
 
 
@@ -49,7 +49,7 @@ def place_labels(axes: Any, scene: Scene) -> None:  # noqa: ANN401 - matplotlib 
 
 
 def _spellings(name: str) -> Iterator[str]:
-    """Give a zone's name in ever fewer letters."""
+    """Return a zone's name in ever fewer letters."""
     kind, _, rest = name.partition(" ")
     yield name
     yield f"{kind}\n{rest}"
@@ -60,12 +60,12 @@ def _spellings(name: str) -> Iterator[str]:
 
 
 def short_name(name: str) -> str:
-    """Give a zone's name in the fewest letters."""
+    """Return a zone's name in the fewest letters."""
     return list(_spellings(name))[-1]
 
 
 def _zones_with_room(scene: Scene, m_per_px: float) -> Iterator[tuple[Barrier, BaseGeometry]]:
-    """Give the zones to name, each with the ground that its name may stand on."""
+    """Return the zones to name, each with the ground that its name may stand on."""
     zones = scene.plan.ground.barriers
     gap_m = _GAP_PX * m_per_px
     for zone in zones:
@@ -78,7 +78,7 @@ def _zones_with_room(scene: Scene, m_per_px: float) -> Iterator[tuple[Barrier, B
 
 
 def _lines(scene: Scene, m_per_px: float) -> BaseGeometry:
-    """Give the ground that lines and markers take up."""
+    """Return the ground that lines and markers take up."""
     legs = [LineString(leg) for leg in pairwise(scene.route)]
     track = [LineString(scene.track)] if len(scene.track) > 1 else []
     lines = shapely.union_all([*legs, *track]).buffer(2 * _GAP_PX * m_per_px)

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from missions.geo import LatLon
     from missions.planned import Plan
 
-_BORDER_SHARE = 0.06
-_MOST_BLOCKS = 5000
+_BORDER_SHARE = 0.06  # white around the drawing
+_MOST_BLOCKS = 5000  # more cannot be told apart
 _SCALE_STEPS_M = tuple(step * 10**power for power in range(5) for step in (1, 2, 5))
 
 
@@ -110,17 +110,17 @@ class Scene:
 
     @property
     def envelope(self) -> BaseGeometry:
-        """The band that the vehicle is foreseen to stay in."""
+        """The band that the vehicle is predicted to stay in."""
         return self.plan.envelope.area.intersection(self.frame)
 
     @property
     def leg_clearances_m(self) -> list[float]:
-        """The least distance of each drawn leg to a fence, infinite where there is none."""
+        """The least distance of each drawn leg to a fence, infinite without a fence."""
         legs = zip(self.route[:-1], self.route[1:], strict=True)
         return [self.plan.ground.clearance_m(LineString(leg)) for leg in legs]
 
     def blocks(self) -> list[NDArray[np.float64]]:
-        """Give the corners of the blocks of the free space at the drawn clearance; none where there are too many to see."""
+        """Return the corners of the blocks of the free space at the drawn clearance; none where there are too many to see."""
         ground, plan = self.plan.ground, self.plan
         clearance_m = 0.99 * plan.drawn_clearance_m if math.isfinite(plan.drawn_clearance_m) else 0.0
         areas = ground.areas(ZoneKind.INCLUSION), ground.areas(ZoneKind.EXCLUSION)
@@ -137,7 +137,7 @@ class Scene:
         return [partition.outline(block) + origin_m for block in range(len(partition))]
 
     def title(self) -> str:
-        """Say how long the route is and what it keeps."""
+        """Return the title: how long the route is and what it keeps."""
         plan = self.plan
         drawn = (
             f", clearance {plan.drawn_clearance_m:.2f} m drawn"
@@ -148,12 +148,12 @@ class Scene:
         return f"{plan.length_m:.1f} m, about {plan.duration_s:.0f} s{drawn}{promised}"
 
     def scale_m(self, share: float = 0.2) -> int:
-        """Give a round length of at most a share of the picture's width."""
+        """Return a round length of at most a share of the picture's width."""
         width_m = self.bounds_m[2] - self.bounds_m[0]
         return max((step for step in _SCALE_STEPS_M if step <= share * width_m), default=1)
 
 
 def polygons(area: BaseGeometry) -> list[Polygon]:
-    """Give the polygons of a geometry, outer rings counter-clockwise and holes clockwise."""
+    """Return the polygons of a geometry, outer rings counter-clockwise and holes clockwise."""
     parts = [part for part in shapely.get_parts(area) if isinstance(part, Polygon) and not part.is_empty]
     return list(shapely.orient_polygons(parts)) if parts else []

@@ -15,14 +15,14 @@ if TYPE_CHECKING:
 
     from missions.picture.scene import Scene
 
-_MOST_ROWS = 40
-_FEWEST_COLUMNS = 40
+_MOST_ROWS = 40  # so that a sketch fits a terminal's screen
+_FEWEST_COLUMNS = 40  # narrower terminals wrap
 _CELL_SHAPE = 2.0
 """A terminal's cell is about twice as high as wide."""
 
-_COVERED_SHARE = 0.4
-_THIN_SHARE = 0.05
-_BRAILLE = 0x2800
+_COVERED_SHARE = 0.4  # of a cell
+_THIN_SHARE = 0.05  # of a cell, where the rest of an area shows nowhere
+_BRAILLE = 0x2800  # U+2800, the empty pattern; its eight low bits are the dots
 _DOT_BITS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
 
 
@@ -39,7 +39,7 @@ _PLAIN = _Signs("#", ".", "*", "o", "|-|")
 
 
 def sketch(scene: Scene, *, columns: int = 80, encoding: str = "utf-8") -> str:
-    """Give the sketch of a scene.
+    """Return the sketch of a scene.
 
     Parameters
     ----------
@@ -88,19 +88,19 @@ class _Grid(NamedTuple):
         return cls(west, north, cell_m, min(wide, columns), min(high, _MOST_ROWS))
 
     def cell(self, point: NDArray[np.float64]) -> tuple[int, int]:
-        """Give the row and column of a point."""
+        """Return the row and column of a point."""
         row, column = self._dots(point[None])[0] // (4, 2)
         return int(row), int(column)
 
     def dots(self, line: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Give the braille dots along a line, (n, 2), rows and columns of dots from the upper left."""
+        """Return the braille dots along a line, (n, 2), rows and columns of dots from the upper left."""
         steps = [
             np.linspace(a, b, max(2, math.ceil(4 * math.dist(a, b) / self.cell_m))) for a, b in pairwise(line)
         ]
         return self._dots(np.concatenate([line[:1], *steps]))
 
     def covered(self, area: BaseGeometry) -> NDArray[np.bool_]:
-        """Tell which cells an area covers to a good part; what is too thin for that shows wherever it is."""
+        """Return which cells an area covers to a good part; what is too thin for that shows wherever it is."""
         east_m = self.west_m + self.cell_m * np.arange(self.columns)
         north_m = self.north_m - _CELL_SHAPE * self.cell_m * np.arange(self.rows)
         boxes = shapely.box(
@@ -137,7 +137,7 @@ def _draw(cells: NDArray[np.str_], grid: _Grid, line: NDArray[np.float64], sign:
 
 
 def _legend(scene: Scene, grid: _Grid, signs: _Signs, columns: int) -> list[str]:
-    """Give the scale, the north and what the signs mean, wrapped to the width."""
+    """Return the scale, the north and the meaning of the signs, wrapped to the width."""
     length_m = scene.scale_m()
     left, line, right = tuple(signs.bar)
     bar = f"{left}{line * max(0, round(length_m / grid.cell_m) - 2)}{right} {length_m} m, north up"

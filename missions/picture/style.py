@@ -1,4 +1,4 @@
-"""Colours of all pictures: Okabe and Ito's, told apart by the colour-blind, and by lightness, line or hatching without colour."""
+"""Colours of all pictures: Okabe and Ito's, distinguishable for the colour-blind, and by lightness, line or hatching without colour."""
 
 from __future__ import annotations
 

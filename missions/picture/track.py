@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from missions.ground.frame import LocalFrame
     from missions.ground.ground import Ground
 
-_BORDER_SHARE = 0.06
+_BORDER_SHARE = 0.06  # as in `scene`
 _MODE_COLOURS: Final = ("#0072B2", "#CC79A7", "#000000", "#56B4E9", "#E69F00", "#8A8A8A")
 """Okabe and Ito's, without those that the fence and the targets have."""
 
@@ -105,12 +105,12 @@ class TrackPicture:
         return west - border_m, south - border_m, east + border_m, north + border_m
 
     def zones(self, kind: ZoneKind) -> list[Polygon]:
-        """Give the polygons of one kind of zone."""
+        """Return the polygons of one kind of zone."""
         barriers = self.ground.barriers if self.ground else ()
         return [part for barrier in barriers if barrier.kind is kind for part in polygons(barrier.area)]
 
     def lines(self) -> list[tuple[str, str, str, NDArray[np.float64]]]:
-        """Give the track's stretches: mode, colour, line style and points (n, 2) in metres."""
+        """Return the track's stretches: mode, colour, line style and points (n, 2) in metres."""
         modes = list(dict.fromkeys(mode for mode, _ in self.parts))
         found = []
         for mode, positions in self.parts:

@@ -71,7 +71,7 @@ def finished(ground: Ground, drawing: Drawing, lead_away: int) -> Lines:
 def mission_items(
     lines: Lines, own_speed_mps: float, asked_speed_mps: float | None
 ) -> tuple[tuple[MissionItem, ...], tuple[int, ...]]:
-    """Give the items, and for each point of the path its seq with home at 0 (0 for the start).
+    """Return the items, and for each point of the path its seq with home at 0 (0 for the start).
 
     Speeds stand before the waypoint whose leg they are for: the autopilot takes them when it has reached the one before.
     """
@@ -94,7 +94,7 @@ def mission_items(
 
 
 def check_lines(ground: Ground, lines: Lines, start_clearance_m: float, asked_m: float) -> float:
-    """Measure the finished lines, as the autopilot draws them, and give their least clearance.
+    """Measure the finished lines, as the autopilot draws them, and return their least clearance.
 
     Raises
     ------

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from missions.situation import Situation
     from missions.vehicle import Vehicle
 
-_ROUNDING_M = 1e-6
+_ROUNDING_M = 1e-6  # a micrometre: differences of floating point, nothing that can be driven
 
 
 def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bool] | None = None) -> Plan:
@@ -129,7 +129,7 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
 
 
 def _start_remarks(ground: Ground, start: LocalPoint, vehicle: Vehicle) -> list[str]:
-    """Return what is to be said of the start.
+    """Return remarks on the start.
 
     Raises
     ------
@@ -143,7 +143,7 @@ def _start_remarks(ground: Ground, start: LocalPoint, vehicle: Vehicle) -> list[
 
 
 def _promised_m(asked: Promise, driven_m: float) -> float | None:
-    """Give what is promised: what was asked for, or less where the start leaves less; nothing for drawn lines only."""
+    """Return the promised clearance: what was asked for, or less where the start leaves less; nothing for drawn lines only."""
     if asked.allowance_m is not None:
         return asked.promised_m if asked.allowance_m else None
     kept_m = math.floor(100 * max(driven_m - asked.error_m, 0.0)) / 100
@@ -151,7 +151,7 @@ def _promised_m(asked: Promise, driven_m: float) -> float | None:
 
 
 def _band(ground: Ground, lines: Lines, vehicle: Vehicle, heading_deg: float | None) -> Envelope:
-    """Foresee the drive; a heading that is not known is taken along the first leg."""
+    """Predict the drive; a heading that is not known is taken along the first leg."""
     if heading_deg is None:
         heading_deg = bearing_deg(*lines.path[:2])
     band = envelope(

@@ -1,4 +1,4 @@
-"""What is to be said of a plan beside its figures."""
+"""Remarks on a plan beside its figures."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _DRIVEN_BY = frozenset(
 
 
 def lead_away_remarks(found: DrivenRoute, least_m: float) -> list[str]:
-    """Say how near the start stands to a fence, and what the route does about it."""
+    """Return remarks on how near the start is to a fence, and what the route does about it."""
     if not found.lead_away:
         return []
     if found.start_clearance_m < 0:
@@ -56,7 +56,7 @@ def lead_away_remarks(found: DrivenRoute, least_m: float) -> list[str]:
 
 
 def moved_target_remarks(targets: Sequence[LatLon], reached: Sequence[LatLon]) -> list[str]:
-    """Say which targets were moved, and how far."""
+    """Return remarks on which targets were moved, and how far."""
     return [
         f"the target {asked} is blocked: moved {distance_m(asked, found):.2f} m to {found}"
         for asked, found in zip(targets, reached, strict=True)
@@ -81,6 +81,7 @@ def drive_remarks(
     assumed = [f"{one.parameter} {one.value:g}" for one in vehicle.assumed if one.parameter in _DRIVEN_BY]
     if assumed:
         warnings.append(f"how the vehicle drives is not told in full; taken as {', '.join(assumed)}")
+    # Half a centimetre is not worth a warning; chosen, not measured.
     if asked.allowance_m and driven_m < asked.promised_m - 0.005 and not found.lead_away:
         warnings.append(
             f"the drive model foresees {metres(driven_m)} at the nearest while driving, less than the {metres(asked.promised_m)} promised "

@@ -39,7 +39,7 @@ class NarrowestPlace:
 
     @property
     def where(self) -> str:
-        """Say where, after a comma; nothing where it is not known."""
+        """Return where the narrowest place is, after a comma; empty where that is not known."""
         if self.at is None:
             return ""
         fences = " and ".join(dict.fromkeys(self.between))
@@ -79,12 +79,12 @@ def narrowest_places(
 def widest_clearance_m(
     ground: Ground, points: Sequence[LocalPoint], should_stop: Callable[[], bool] | None = None
 ) -> float:
-    """Give the most clearance a route over all points keeps; 0 where there is no route."""
+    """Return the greatest clearance that a route over all points keeps; 0 where there is no route."""
     return kept_m(narrowest_places(ground, points, should_stop))
 
 
 def kept_m(places: Sequence[NarrowestPlace | None]) -> float:
-    """Give what a route by all these places keeps; 0 where there is no route."""
+    """Return what a route by all these places keeps; 0 where there is no route."""
     return min((place.clearance_m if place else 0.0 for place in places), default=0.0)
 
 

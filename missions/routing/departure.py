@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from missions.ground.ground import Ground
     from missions.vehicle import Vehicle
 
+# Chosen, not measured: a first leg every 15° from the heading on, and its lengths.
 WAYS = 24
 LENGTHS_M = (16.0, 8.0, 4.0)
 ROOM_M = 6.5
@@ -41,7 +42,7 @@ class Departure:
 def departures(
     ground: Ground, vehicle: Vehicle, start: LocalPoint, heading_deg: float | None
 ) -> list[Departure]:
-    """Give first legs all round, the one that keeps most first.
+    """Return first legs in all directions, the one that keeps most first.
 
     Parameters
     ----------

@@ -32,9 +32,9 @@ _INSIDE_M = 0.005
 _ROUNDED_EXCESS_M = 0.005
 """What pbpp's round offsets may keep beyond the clearance, and a little."""
 
-_WIDER = (1, 4, 16, 64)
+_WIDER = (1, 4, 16, 64)  # multiples of the reach within which free ground is looked for, nearest first
 
-_CHORDS = 64
+_CHORDS = 64  # in a quarter circle
 _CHORD_SHARE = 1.0002
 """By so much an arc of that many chords a quarter turn must be wider to keep its distance all along."""
 
@@ -93,7 +93,7 @@ def find_route(  # noqa: PLR0913 - what is sought, and how
     clearance_m : float
         What the drawn lines keep to any fence; where the start is nearer, the route first leads away, never nearer than the start is.
     promised_m : float, optional
-        What of it is promised while driving, for errors to say.
+        What of it is promised while driving, for error messages.
     blocked : sequence of shapely polygon
         Places to keep away from as from exclusions, to find another way round.
     method : str
@@ -138,7 +138,7 @@ def find_route(  # noqa: PLR0913 - what is sought, and how
 
 
 def simplified(ground: Ground, route: Route, clearance_m: float) -> Route:
-    """Give the route with fewer points: those left out whose neighbours a straight line joins at the clearance."""
+    """Return the route with fewer points: those left out whose neighbours a straight line joins at the clearance."""
     fixed = {*range(route.lead_away + 1), *route.target_indices}
     kept = [0]
     while kept[-1] < len(route.points) - 1:
@@ -203,7 +203,7 @@ class _Search:
         return parts
 
     def check_start(self, start: LocalPoint, *, escape: bool) -> float:
-        """Give the start's clearance; on ground that it may escape from, the distance to free ground below 0.
+        """Return the start's clearance; on ground that it may escape from, minus the distance to free ground.
 
         Raises
         ------
@@ -229,7 +229,7 @@ class _Search:
         )
 
     def free_target(self, target: LocalPoint, snap_m: float, start: LocalPoint) -> LocalPoint:
-        """Give the target, or the nearest free point within ``snap_m``, on the start's side of the fences if there is one."""
+        """Return the target, or the nearest free point within ``snap_m``, on the start's side of the fences if there is one."""
         if self.is_free(target):
             return target
         point = Point(target)
@@ -264,7 +264,7 @@ class _Search:
             raise self._no_route(start, goal) from None
 
     def lead_away(self, start: LocalPoint, start_clearance_m: float, goal: LocalPoint) -> list[LocalPoint]:
-        """Give the first points of a route that leaves a fence's neighbourhood without ever coming nearer to one.
+        """Return the first points of a route that leaves a fence's neighbourhood without ever coming nearer to one.
 
         Little further than need be: of the places not much farther than the nearest, the one most on the way.
         """
@@ -281,7 +281,7 @@ class _Search:
         raise self._no_route(start, goal)
 
     def escape(self, start: LocalPoint, goal: LocalPoint) -> list[LocalPoint]:
-        """Give the first points of a route off forbidden ground: straight out, across no other forbidden ground.
+        """Return the first points of a route off forbidden ground: straight out, across no other forbidden ground.
 
         Raises
         ------
@@ -320,7 +320,7 @@ class _Search:
     def _exits(
         self, start: LocalPoint, start_clearance_m: float, free: Polygon, reach_m: float
     ) -> NDArray[np.float64]:
-        """Give the points on a free part's edge that a straight line reaches without coming nearer to a fence, (n, 2)."""
+        """Return the points on a free part's edge that a straight line reaches without coming nearer to a fence, (n, 2)."""
         near = free.boundary.intersection(Point(start).buffer(reach_m))
         nearest = shapely.shortest_line(free, Point(start))
         exits: NDArray[np.float64] = np.vstack(
@@ -335,11 +335,11 @@ class _Search:
         return np.asarray(exits[keeps])
 
     def _component(self, point: LocalPoint) -> Polygon:
-        """Give the part of free ground that a point is on, or nearest to."""
+        """Return the part of free ground that a point is on, or nearest to."""
         return min(self.roomy, key=lambda part: float(part.distance(Point(point))))
 
     def _no_route(self, start: LocalPoint, goal: LocalPoint) -> RouteError:
-        """Say how wide a route there is, or which fences part start and target: those along the edge of the smaller area."""
+        """Return the error for no route: how wide a route there is, or which fences part start and target (those along the edge of the smaller area)."""
         if self.is_other_way:
             return NoRouteError(
                 f"no other way round keeps {self.asked}", clearance_m=round(self.clearance_m, 3)
@@ -369,7 +369,7 @@ class _Search:
         )
 
     def _way(self, point: LocalPoint, to: Point) -> tuple[float, float, LatLon]:
-        """Give distance, bearing and position of another point, on Earth."""
+        """Return distance, bearing and position of another point, on Earth."""
         here = self._position(point)
         there = self.ground.frame.to_lat_lon(LocalPoint(to.x, to.y))
         return distance_m(here, there), bearing_deg(here, there), there

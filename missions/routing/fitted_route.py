@@ -1,4 +1,4 @@
-"""A route whose driven band keeps the promise; where there is none, the widest one, or an error that tells of it."""
+"""A route whose driven band keeps the promise; where there is none, the widest one, or an error that names its clearance."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class FittedRoute:
     _known: dict[float, DrivenRoute | RouteError] = field(default_factory=dict, init=False)
 
     def find(self, asked: Promise) -> tuple[Promise, DrivenRoute]:
-        """Give a route and what is promised for it.
+        """Return a route and what is promised for it.
 
         Raises
         ------
@@ -106,7 +106,7 @@ class FittedRoute:
         raise refusal
 
     def _tried(self, required_m: float) -> DrivenRoute | RouteError:
-        """Give the route that keeps so much, or why there is none; what was tried once is known."""
+        """Return the route that keeps a given clearance, or why there is no such route; each is tried once."""
         if required_m not in self._known:
             try:
                 self._known[required_m] = self._search(required_m, _MEASUREMENTS).find()
@@ -115,7 +115,7 @@ class FittedRoute:
         return self._known[required_m]
 
     def _told(self, error: NoRouteError, asked: Promise) -> NoRouteError:
-        """Give the error with what the widest route keeps while this vehicle drives it."""
+        """Return the error with what the widest route keeps while this vehicle drives it."""
         places = self._places()
         place = min((place for place in places if place), key=lambda place: place.clearance_m)
         try:

@@ -1,4 +1,4 @@
-"""Where a route could not be fitted: said in words, and kept away from by the next one."""
+"""Where a route could not be fitted: the error that names the place, and the block that keeps the next route away from it."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ _START_ADVICE = "the vehicle has no room to turn where it stands: turn it by han
 AT_START = 2
 """Points where most is missing because of how the route begins."""
 
+# Chosen, not measured: half the square's side, and how far along the route it keeps from both ends, so that these stay free.
 _BLOCK_M = 0.5
 _BLOCK_AWAY_M = 8.0
 
@@ -38,7 +39,7 @@ def refusal(
     *,
     held_at_start: bool,
 ) -> NoRouteError:
-    """Say which corner refused, by how much, and at which fence; and whether it is that the vehicle cannot turn where it stands."""
+    """Return the error that names the corner that refused, by how much and at which fence; with advice where the vehicle cannot turn at its start."""
     index = measured.worst_index
     point = drawing[index]
     position = ground.frame.to_lat_lon(LocalPoint(*point.place))
@@ -68,7 +69,7 @@ def refusal(
 
 
 def block(route: Route, drawing: Drawing, measured: Measured) -> Polygon:
-    """Give a small square on a route near where most is missing, to send the next one elsewhere."""
+    """Return a small square on a route near where most is missing, to send the next one elsewhere."""
     index = measured.worst_index
     place = measured.worst[index] if not math.isnan(measured.worst[index][0]) else drawing[index].place
     line = shapely.LineString(route.points)

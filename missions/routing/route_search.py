@@ -1,7 +1,17 @@
 """A route for a vehicle: drawn lines whose driven band keeps the promised clearance.
 
-The shortest way is drawn first and fitted to the vehicle. Where a corner of it refuses every means, the place is blocked and another
-way round is drawn.
+**How.** `pbpp` draws the shortest path for a disc; a vehicle's band is wider at corners, and how wide depends on the corners, which depend on
+the path. So the path is drawn with room for the band of a straight line only, and `fitting.local_search` bends and slows it until the band at
+its corners keeps the promise too. Two paths are drawn, with room for the band at full speed and at `SLOW_MPS`: the second passes narrower
+places, and is fitted only where the first fails or is longer by some per cent. Where neither can be fitted, in this order: first legs that the
+vehicle can drive as it faces, if it is the start that refuses; the whole route at a slow speed; and other ways round, each drawn with a small
+square laid over the place where most was missing so far. Of those found the one of least cost is the answer.
+
+**Why.** A path that is exact for the vehicle would need a search over position, heading and speed. Shortest paths of a disc are exact and
+quick, and fitting them loses little (docs/drive-bench.md: 590 of 600 found, in the median 0.6 to 1.7 % longer than the shortest).
+The square works because shortest paths leave nothing between: what is nearly as short passes the same place, so another try has to be kept off
+it. Each stage has its allowance of measurements, so that a refusal comes in bounded time. It is a heuristic: a refusal names the
+corner that refused; it does not prove that no route exists.
 """
 
 from __future__ import annotations
@@ -35,21 +45,25 @@ if TYPE_CHECKING:
     from missions.vehicle import Vehicle
 
 SLOW_MPS = 1.0
-"""The slowest that a stretch is driven, and the narrowest band."""
+"""The slowest that a stretch is driven, and the narrowest band: steered rovers below 1 m/s swing out farther (docs/drive-model.md)."""
 
 SLOW_ALL_THE_WAY_MPS = (2.0, 1.0)
-"""Where stretches do not do: the whole route at such a speed, so that nothing changes at corners."""
+"""Where slow stretches do not suffice: the whole route at such a speed, so that none changes at corners. Both speeds were measured."""
 
 LATER_MEASUREMENTS = 500
-"""For each kind of route that is tried after the first ones."""
+"""For each kind of route that is tried after the first ones. Chosen, not measured: it bounds the time until a refusal."""
 
-_OTHER_WAYS = 5
+# Chosen, not measured, but the turn at the end of a first leg.
+_OTHER_WAYS = 5  # squares laid over refusing places before the search gives up
+# Missing at the start beyond what a slower, narrower band could win back: nothing else is tried
 _HELD_M = 0.05
-_DEPARTURES_TRIED = 8
+_DEPARTURES_TRIED = 8  # of the first legs, the shortest routes
+# What the first leg may keep less than the best departure, for rounding and bending
 _DEPARTURE_SLACK_M = 0.05
-_TURN_COST_M_PER_DEG = 0.1
+_TURN_COST_M_PER_DEG = 0.1  # orders the departures: a turn of 90° counts as 9 m
 _MOST_TURN_DEG = 100.0
-"""At the end of a first leg: tried with less, rovers that came back the way they went left the band."""
+"""At the end of a first leg: tried with more, rovers that came back the way they went left the band."""
+# The slow speed's path is fitted too where it is shorter than this share of the fast one's
 _SHORTER_SHARE = 0.97
 
 
@@ -159,7 +173,7 @@ class RouteSearch:
         return min(found, key=lambda one: one[0])[1]
 
     def _is_held_at_start(self, refused: Sequence[tuple[Drawing, Measured]], narrower_m: float) -> bool:
-        """Tell whether nothing more is worth trying, as the vehicle cannot turn at its start.
+        """Return whether nothing more is worth trying, as the vehicle cannot turn at its start.
 
         However slowly it drives it swings as far where it starts with its heading wrong; only its band becomes narrower.
         """
@@ -208,7 +222,7 @@ class RouteSearch:
         return fast_m, corner_forecast(0.0, self.vehicle, speed_mps=slow_mps).outside_overshoot_m
 
     def _first_routes(self, fast_m: float, slow_m: float) -> list[tuple[Route, float]]:
-        """Give the shortest route at full speed's band, and that at the slow one's."""
+        """Return the shortest route at full speed's band, and the one at the slow speed's."""
         routes = []
         try:
             routes.append((self._draw(fast_m, ()), fast_m))
@@ -268,7 +282,7 @@ class RouteSearch:
         found.append((measured.cost_s, driven))
 
     def _drawing(self, route: Route) -> Drawing:
-        """Give a route's lines with what each point has to keep: where it leads away, no less than the start does."""
+        """Return a route's lines with what each point has to keep: where the route leads away, no less than the start does."""
         required_m = self.required_m + self.reserve_m
         near_m = self._least_departing_m(route) + self.reserve_m
         line_m = min(required_m, route.start_clearance_m) if route.start_clearance_m >= 0 else -math.inf
@@ -303,7 +317,7 @@ class RouteSearch:
         return departures(self.ground, self.vehicle, self.start, self.heading_deg)
 
     def _departing_routes(self, band_m: float) -> Iterator[Route]:
-        """Give routes by the first legs that the vehicle can drive as it faces, the shortest first."""
+        """Return routes by the first legs that the vehicle can drive as it faces, the shortest first."""
         keeps_m = self.departure_m + self.reserve_m
         routes = []
         for departure in self._departures:
@@ -327,11 +341,11 @@ class RouteSearch:
         yield from (route for _, route in routes[:_DEPARTURES_TRIED])
 
     def _least_departing_m(self, route: Route) -> float:
-        """Give what the band has to keep while the route leads away; nothing while it leaves forbidden ground."""
+        """Return what the band has to keep while the route leads away; nothing while it leaves forbidden ground."""
         return self.departure_m if route.start_clearance_m >= 0 else -math.inf
 
     def _lead_away(self, drawing: Drawing) -> int:
-        """Give how many of the first legs lead away."""
+        """Return how many of the first legs lead away."""
         near = [point.required_m < self.required_m for point in drawing[1:]]
         return near.index(False) if False in near else len(near)
 
@@ -340,14 +354,14 @@ class RouteSearch:
 
 
 def _turn_at_deg(start: LocalPoint, onward: Route) -> float:
-    """Give how far a route turns where a first leg from the start ends."""
+    """Return how far a route turns where a first leg from the start ends."""
     here, after = onward.points[0], onward.points[1]
     turn_rad = math.atan2(*(after - here)) - math.atan2(*(here - np.array(start)))
     return abs(math.degrees((turn_rad + math.pi) % (2 * math.pi) - math.pi))
 
 
 def _turned_deg(route: Route) -> float:
-    """Give how far the lines turn in all."""
+    """Return how far the lines turn in all."""
     east_m, north_m = np.diff(route.points, axis=0).T
     turns_rad = np.diff(np.arctan2(east_m, north_m))
     return float(np.degrees(np.abs((turns_rad + np.pi) % (2 * np.pi) - np.pi)).sum())

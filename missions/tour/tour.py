@@ -37,7 +37,8 @@ if TYPE_CHECKING:
     from missions.request import Request
     from missions.situation import Situation
 
-_WIDEST_SHARE = 0.9
+_WIDEST_SHARE = 0.9  # of the widest, to measure lengths where no route keeps the asked clearance: chosen, so that all places stay connected
+# So that a place moved to free ground is not on its edge; more than degE7's rounding of 5.6 mm
 _INSIDE_M = 0.01
 
 
@@ -83,7 +84,7 @@ def plan_tour(
         said = _order_text(found)
     if request.comes_back:
         targets = (*targets, situation.home.value if situation.home else start)
-    # The targets are given only where they have to be: else the plan says itself where they come from.
+    # The targets are given only where they have to be: else the plan itself notes where they come from.
     asked = replace(request, targets=targets) if len(targets) > 1 or request.targets else request
     planned = plan(situation, asked, should_stop=should_stop)
     planned = with_end(planned, situation, request)
@@ -128,7 +129,7 @@ def route_lengths_m(
     *,
     should_stop: Callable[[], bool] | None = None,
 ) -> NDArray[np.float64]:
-    """Give the lengths of the routes around the fences between all places, in metres.
+    """Return the lengths of the routes around the fences between all places, in metres.
 
     Places too near to a fence are taken where the nearest free ground is.
 
@@ -160,7 +161,7 @@ def route_lengths_m(
 
 
 def _anchor(ground: Ground, planner: pbpp.Planner, place: LocalPoint) -> LocalPoint:
-    """Give the place, or the nearest free one."""
+    """Return the place, or the nearest free one."""
     here = Point(place)
     if planner.free_space.covers(here):
         return place
@@ -183,7 +184,7 @@ def _length_m(
 def with_room(
     planned: Plan, situation: Situation, request: Request, *, should_stop: Callable[[], bool] | None = None
 ) -> Plan:
-    """Give a plan that fits into the vehicle's storage, with what can be left out of its route left out.
+    """Return a plan that fits into the vehicle's storage, without what can be left out of its route.
 
     Raises
     ------
@@ -196,7 +197,7 @@ def with_room(
     wanted = replace(request, clearance_m=planned.clearance_m, start=planned.start)
     is_fitted = (
         request.corner_allowance_m is None
-    )  # else drawn lines were asked for, which a check says nothing of
+    )  # else drawn lines were asked for, which a check does not judge
     own = _own_items(planned, request) if is_fitted else ()
     mission = Mission(planned.items, planned.home)
     checked = shortened(mission, own, situation, wanted, most=most, may_slow=True, should_stop=should_stop)
@@ -215,7 +216,7 @@ def with_room(
 
 
 def _own_items(planned: Plan, request: Request) -> frozenset[int]:
-    """Give the seqs of a plan's items that nobody asked for: all but the targets, and the speed that is set first."""
+    """Return the seqs of a plan's own items: all but the targets, and the speed that is set first."""
     kept = {1} if request.speed_mps is not None else set()
     points = iter(range(1, len(planned.path)))
     for target in planned.targets:
@@ -224,7 +225,7 @@ def _own_items(planned: Plan, request: Request) -> frozenset[int]:
 
 
 def with_end(planned: Plan, situation: Situation, request: Request) -> Plan:
-    """Give a plan with the end that is asked for.
+    """Return a plan with the end that is asked for.
 
     Raises
     ------
@@ -273,7 +274,7 @@ def with_end(planned: Plan, situation: Situation, request: Request) -> Plan:
 
 
 def _order_text(found: TargetOrder) -> list[str]:
-    """Say which order it is, where it is not the one given."""
+    """Return a sentence on the order, where it is not the one given."""
     texts = []
     if found.indices != tuple(range(len(found.indices))):
         numbers = ", ".join(str(index + 1) for index in found.indices)

@@ -3,7 +3,7 @@
 Up to 12 places: Held and Karp, "A dynamic programming approach to sequencing problems", 1962. More: the integer program of Dantzig,
 Fulkerson and Johnson, "Solution of a large-scale traveling-salesman problem", 1954, which HiGHS solves while the cuts that forbid
 subtours are added as they are needed. HiGHS (highspy, MIT licence) is kept by the University of Edinburgh and needs nothing but
-numpy; being exact it also tells how far an answer may be from the best where it is stopped early.
+numpy; being exact it also bounds how far an answer may be from the best where it is stopped early.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ MOST_BY_PROGRAMMING = 12
 """Places that are ordered without HiGHS."""
 
 _OPTIONS = (("output_flag", False), ("threads", 1), ("mip_rel_gap", 0.0), ("time_limit", 30.0))
-_ROUNDS = 60
+_ROUNDS = 60  # of adding cuts; chosen, not measured. When they are used up the answer stands with the bound that was reached
 _FEASIBLE = 2
 """kSolutionStatusFeasible of HiGHS."""
 
@@ -90,12 +90,12 @@ def shortest_order(
 
 
 def length_of(distances_m: NDArray[np.float64], order: Sequence[int]) -> float:
-    """Give the length of an order in metres."""
+    """Return the length of an order in metres."""
     return float(sum(distances_m[a, b] for a, b in pairwise(order)))
 
 
 def _by_programming(distances_m: NDArray[np.float64], *, ends_at_last: bool) -> tuple[int, ...]:
-    """Give the shortest order: for every set of places and every last one of them, the shortest way there."""
+    """Return the shortest order: for every set of places and every last one of them, the shortest way there."""
     count = len(distances_m) - 1 - ends_at_last
     between_m = distances_m[1 : count + 1, 1 : count + 1]
     shortest_m = np.full((1 << count, count), np.inf)
@@ -123,7 +123,7 @@ def _by_programming(distances_m: NDArray[np.float64], *, ends_at_last: bool) -> 
 def _by_cuts(
     distances_m: NDArray[np.float64], *, ends_at_last: bool, should_stop: Callable[[], bool] | None
 ) -> VisitOrder:
-    """Give the shortest round trip in which the start follows the end: directly, or over a place that is near to all."""
+    """Return the shortest round trip in which the start follows the end: directly, or over a place that is near to all."""
     places = len(distances_m)
     round_m = distances_m
     closing = places - 1
@@ -131,7 +131,7 @@ def _by_cuts(
         round_m = np.zeros((places + 1, places + 1))
         round_m[:places, :places] = distances_m
         closing = places
-    trip = _RoundTrip(round_m, closing)
+    trip = _RoundTripProgram(round_m, closing)
     trip.relax(should_stop)
     successors, bound_m = trip.solve(should_stop)
     order = tuple(place for place in successors if place < places)
@@ -140,7 +140,7 @@ def _by_cuts(
     return VisitOrder(order, length_m, min(length_m, bound_m - closing_m))
 
 
-class _RoundTrip:
+class _RoundTripProgram:
     """An integer program: which pairs of places follow one another on the shortest round trip.
 
     Parameters
@@ -184,7 +184,7 @@ class _RoundTrip:
         )
 
     def solve(self, should_stop: Callable[[], bool] | None) -> tuple[list[int], float]:
-        """Give the round trip from 0 to `closing`, and what none is shorter than."""
+        """Return the round trip from 0 to `closing`, and a lower bound on its length."""
         bound_m = 0.0
         for _ in range(_ROUNDS):
             self.solver.run()
@@ -200,7 +200,7 @@ class _RoundTrip:
         return self._completed(self._trip(chosen)), bound_m
 
     def _parts(self, chosen: NDArray[np.bool_]) -> list[set[int]]:
-        """Give the places that chosen pairs join, part by part."""
+        """Return the places that the chosen pairs join, part by part."""
         part_of = {place: {place} for place in range(self.count)}
         for index in np.flatnonzero(chosen):
             a, b = (part_of[place] for place in self.pairs[index])
@@ -216,7 +216,7 @@ class _RoundTrip:
             self._add_row(-math.inf, len(part) - 1.0, inner)
 
     def _trip(self, chosen: NDArray[np.bool_]) -> list[int]:
-        """Give the places from 0 to `closing` along the chosen pairs, which may leave others out."""
+        """Return the places from 0 to `closing` along the chosen pairs, which may leave others out."""
         neighbours: dict[int, list[int]] = {place: [] for place in range(self.count)}
         for index in np.flatnonzero(chosen):
             a, b = self.pairs[index]

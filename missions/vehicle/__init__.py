@@ -1,4 +1,4 @@
-"""The vehicle: what its parameters say of how it drives and guards its fence, and its footprint."""
+"""The vehicle: what its parameters set: how it drives and guards its fence, and its footprint."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def vehicle_from_parameters(
     firmware : tuple of int, optional
         The autopilot's version, major, minor and patch.
     ardupilot : bool, optional
-        Whether its heartbeat said that the autopilot is ArduPilot; default: told by the names.
+        Whether its heartbeat said that the autopilot is ArduPilot; default: judged by the names.
 
     Returns
     -------

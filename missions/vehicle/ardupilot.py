@@ -41,6 +41,7 @@ PARAMETER_NAMES = (
 )
 """The parameters that matter here, for asking a vehicle; steering servos are looked for on the first four outputs."""
 
+# Values of SERVOn_FUNCTION (SRV_Channel.h).
 _GROUND_STEERING, _THROTTLE, _THROTTLE_LEFT, _THROTTLE_RIGHT = 26.0, 70.0, 73.0, 74.0
 
 

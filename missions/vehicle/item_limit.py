@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 MISSION_ITEMS = 655
 """Items that ArduPilot holds with 16 KB of storage, home included, as measured."""
 
-_SD_BYTES_PER_ITEM = 15
-_SD_HEADER_BYTES = 4
+_SD_BYTES_PER_ITEM = 15  # AP_MISSION_EEPROM_COMMAND_SIZE
+_SD_HEADER_BYTES = 4  # storage format's version
 _MOST_SD_KB = 1024
 """ArduPilot's documentation allows 64; more than a megabyte no list of 16-bit numbers can fill."""
 
@@ -26,7 +26,7 @@ def most_items(parameters: Mapping[str, float]) -> int:
 
 
 def sd_card_bytes(parameters: Mapping[str, float], name: str) -> int:
-    """Return the storage on the SD card that BRD_SD_MISSION or BRD_SD_FENCE tell in KB; 0, the least of all, where that is none."""
+    """Return the storage on the SD card that BRD_SD_MISSION or BRD_SD_FENCE set in KB; 0, the least of all, where the value is impossible."""
     try:
         return whole_number(parameters, name, 0, most=_MOST_SD_KB) * 1024
     except VehicleError:
@@ -34,7 +34,7 @@ def sd_card_bytes(parameters: Mapping[str, float], name: str) -> int:
 
 
 def storage_remarks(parameters: Mapping[str, float]) -> list[str]:
-    """Return what is to be said of storage that no vehicle can have."""
+    """Return remarks on storage that no vehicle can have."""
     remarks = []
     for name in ("BRD_SD_MISSION", "BRD_SD_FENCE"):
         try:

@@ -8,8 +8,8 @@ from enum import StrEnum
 
 from missions.errors import VehicleError
 
-MAV_TYPE_GROUND_ROVER = 10
-MAV_TYPE_SURFACE_BOAT = 11
+MAV_TYPE_GROUND_ROVER = 10  # MAV_TYPE of MAVLink's common.xml
+MAV_TYPE_SURFACE_BOAT = 11  # the same
 
 
 class Autopilot(StrEnum):
@@ -114,7 +114,7 @@ class Vehicle:
     mav_type : int or None
         MAV_TYPE of its heartbeat, where one was heard.
     firmware : tuple of int or None
-        The autopilot's version, major, minor and patch, where it told.
+        The autopilot's version, major, minor and patch, where it was reported.
     """
 
     waypoint_radius_m: float = 2.0

@@ -1,4 +1,4 @@
-"""What is said of parameters that cannot be as they came."""
+"""Remarks on parameters with impossible values."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ if TYPE_CHECKING:
 
     from missions.situation import Situation
 
-_MOST_NAMED = 5
+_MOST_NAMED = 5  # chosen: remarks that fit a screen; the rest is counted
 
 
 def parameter_remarks(situation: Situation) -> list[str]:
-    """Return what the vehicle told of its parameters that cannot be."""
+    """Return remarks on parameters that the vehicle reported with impossible values."""
     return [
         *no_number_remarks(situation.no_numbers, situation.parameters),
         *storage_remarks(situation.parameters),

@@ -52,7 +52,7 @@ def px4_vehicle(
 
 
 def _steering(read: ParameterReader) -> Steering:
-    # A rover build of PX4 has the parameters of all its rovers; the airframe tells which one drives.
+    # A rover build of PX4 has the parameters of all its rovers; the airframe decides which one drives.
     airframe = read.known("CA_AIRFRAME")
     if airframe in {6.0, 13.0}:
         return Steering.SKID
@@ -68,7 +68,7 @@ def _steering(read: ParameterReader) -> Steering:
 
 
 def _speed_mps(read: ParameterReader, *, skid: bool) -> float:
-    """Give the first speed that is set: of the mission, of the limit, at full throttle."""
+    """Return the first speed that is set: of the mission, of the limit, at full throttle."""
     mission = "RD_MISS_SPD_DEF" if skid else "RA_MISS_VEL_DEF"
     for name in (mission, "RO_SPEED_LIM", "RO_MAX_THR_SPEED"):
         speed_mps = read.known(name)
@@ -91,7 +91,7 @@ def _turn_radius_m(read: ParameterReader) -> float:
 
 
 def _limit(read: ParameterReader, names: tuple[str, ...]) -> float:
-    """Give the least of some limits, where -1 is none."""
+    """Return the least of some limits, where -1 means no limit."""
     known = [limit for limit in (read.known(name) for name in names) if limit is not None]
     if not known:
         read.assumed.append(Assumed(names[0], UNLIMITED_ACCEL_MPS2))

@@ -15,7 +15,7 @@ UNLIMITED_ACCEL_MPS2 = 20.0
 """What ArduPilot takes where ATC_ACCEL_MAX is 0, "no limit" (AR_WPNav.cpp, AR_WPNAV_ACCEL_MAX)."""
 
 MOST = 10_000.0
-"""More metres, metres a second or degrees than any rover's parameter means: FENCE_RADIUS, the longest of all, ends there (AC_Fence)."""
+"""More metres, metres a second or degrees than any rover's parameter can mean: FENCE_RADIUS, the longest of all, ends there (AC_Fence)."""
 
 _MOST_WHOLE = 32_767
 """ArduPilot keeps enumerations and bit masks in 8 or 16 bits."""
@@ -29,7 +29,7 @@ def real_number(
     Raises
     ------
     VehicleError
-        It is no number, or none that it can be; says what is possible.
+        It is not a number, or out of range; the message says what is possible.
     """
     value = parameters.get(name)
     if value is None:

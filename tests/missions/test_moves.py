@@ -1,4 +1,4 @@
-"""Means at a corner: what they change, and what they leave alone."""
+"""Moves at a corner: what they change, and what they leave alone."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from missions.fitting import moves as corner_means
+from missions.fitting import moves
 from missions.fitting import polyline as drawn
 from missions.fitting.polyline import Drawing, DrawnPoint
 
@@ -48,7 +48,7 @@ def slow_span_m(drawing: Drawing) -> tuple[float, float]:
 def test_a_slow_stretch_holds_the_place_and_begins_and_ends_on_a_straight_line(
     drawing: Drawing, index: int, place: tuple[float, float], at_m: float
 ) -> None:
-    found = list(corner_means.slowed(drawing, index, place, 5.0))
+    found = list(moves.slowed(drawing, index, place, 5.0))
     assert {point.speed_mps for one in found for point in one} == {None, 3.0, 2.0, 1.0}
     for one in found:
         begin_m, end_m = slow_span_m(one)
@@ -59,12 +59,12 @@ def test_a_slow_stretch_holds_the_place_and_begins_and_ends_on_a_straight_line(
 
 
 def test_nothing_is_slower_than_slow() -> None:
-    assert not list(corner_means.slowed(RIGHT_ANGLE, 1, (0.0, 60.0), 1.0))
-    assert corner_means.crawling(RIGHT_ANGLE, [(0.0, 60.0)], 1.0) == RIGHT_ANGLE
+    assert not list(moves.slowed(RIGHT_ANGLE, 1, (0.0, 60.0), 1.0))
+    assert moves.crawling(RIGHT_ANGLE, [(0.0, 60.0)], 1.0) == RIGHT_ANGLE
 
 
 def test_crawling_takes_a_good_way_about_each_spot() -> None:
-    slow = corner_means.crawling(RIGHT_ANGLE, [(0.0, 60.0), (40.0, 60.0)], 5.0)
+    slow = moves.crawling(RIGHT_ANGLE, [(0.0, 60.0), (40.0, 60.0)], 5.0)
     begin_m, end_m = slow_span_m(slow)
     assert begin_m <= 60.0 - 18.0
     assert end_m >= 100.0 + 17.0
@@ -72,16 +72,16 @@ def test_crawling_takes_a_good_way_about_each_spot() -> None:
 
 
 def test_a_slow_stretch_is_shortened_along_its_line() -> None:
-    slow = next(corner_means.slowed(RIGHT_ANGLE, 1, (0.0, 30.0), 5.0))
+    slow = next(moves.slowed(RIGHT_ANGLE, 1, (0.0, 30.0), 5.0))
     number = changes(slow)[0]
-    eased = list(corner_means.eased(slow, number, 2.0))
+    eased = list(moves.eased(slow, number, 2.0))
     norths_m = sorted(one[number].north_m for one in eased)
     assert norths_m == pytest.approx([slow[number].north_m - 2.0, slow[number].north_m + 2.0])
     assert all(one[number].east_m == pytest.approx(0.0) for one in eased)
 
 
 def test_a_corner_is_eased_inwards_and_along() -> None:
-    eased = list(corner_means.eased(RIGHT_ANGLE, 1, 1.0))
+    eased = list(moves.eased(RIGHT_ANGLE, 1, 1.0))
     assert len(eased) == 3
     assert (eased[0][1].east_m, eased[0][1].north_m) == pytest.approx((math.sqrt(0.5), 60 - math.sqrt(0.5)))
 
@@ -90,66 +90,66 @@ FIXED = lines((0, 0), (0, 60), (60, 60), fixed=(1,))
 
 
 @pytest.mark.parametrize(
-    "means",
+    "move",
     [
-        lambda drawing: corner_means.moved(drawing, 1, 1.0),
-        lambda drawing: corner_means.eased(drawing, 1, 1.0),
-        lambda drawing: corner_means.together(drawing, 1, 1.0),
-        lambda drawing: corner_means.prolonged(drawing, 1),
-        lambda drawing: corner_means.without(drawing, 1),
-        lambda drawing: corner_means.merged(drawing, 1),
-        lambda drawing: corner_means.split(drawing, 1),
+        lambda drawing: moves.moved(drawing, 1, 1.0),
+        lambda drawing: moves.eased(drawing, 1, 1.0),
+        lambda drawing: moves.together(drawing, 1, 1.0),
+        lambda drawing: moves.prolonged(drawing, 1),
+        lambda drawing: moves.without(drawing, 1),
+        lambda drawing: moves.merged(drawing, 1),
+        lambda drawing: moves.split(drawing, 1),
     ],
 )
-def test_a_target_stays_where_it_is(means) -> None:
-    assert not list(means(FIXED))
+def test_a_target_stays_where_it_is(move) -> None:
+    assert not list(move(FIXED))
 
 
 @pytest.mark.parametrize("index", [0, 2])
 def test_ends_stay(index: int) -> None:
     for found in (
-        corner_means.moved(RIGHT_ANGLE, index, 1.0),
-        corner_means.stopped(RIGHT_ANGLE, index),
-        corner_means.split(RIGHT_ANGLE, index),
+        moves.moved(RIGHT_ANGLE, index, 1.0),
+        moves.stopped(RIGHT_ANGLE, index),
+        moves.split(RIGHT_ANGLE, index),
     ):
         assert not list(found)
-    for one in corner_means.approached(RIGHT_ANGLE, index):
+    for one in moves.approached(RIGHT_ANGLE, index):
         assert (one[0], one[-1]) == (RIGHT_ANGLE[0], RIGHT_ANGLE[-1])
 
 
 def test_a_corner_is_moved_outwards_first() -> None:
-    first = next(corner_means.moved(RIGHT_ANGLE, 1, 1.0))
+    first = next(moves.moved(RIGHT_ANGLE, 1, 1.0))
     assert first[1].east_m < 0
     assert first[1].north_m > 60
     straight = lines((0, 0), (0, 30), (0, 60))
-    assert next(corner_means.moved(straight, 1, 1.0))[1].east_m != 0
+    assert next(moves.moved(straight, 1, 1.0))[1].east_m != 0
 
 
 def test_two_corners_become_one_where_their_legs_meet() -> None:
-    merged = next(corner_means.merged(TWO_CORNERS, 1))
+    merged = next(moves.merged(TWO_CORNERS, 1))
     assert [point.place for point in merged] == [(0, 0), pytest.approx((0, 46)), (60, 46)]
 
 
 def test_a_hairpin_is_split_into_three_and_round_its_end() -> None:
     hairpin = lines((0, 0), (0, 60), (1, 0))
-    counts = {len(one) for one in corner_means.split(hairpin, 1)}
+    counts = {len(one) for one in moves.split(hairpin, 1)}
     assert counts == {4, 5}
 
 
 def test_a_stop_is_asked_for_at_the_corner_alone() -> None:
-    (stopped,) = corner_means.stopped(RIGHT_ANGLE, 1)
-    assert drawn.stops(stopped) == {1: corner_means.STOP_S}
+    (stopped,) = moves.stopped(RIGHT_ANGLE, 1)
+    assert drawn.stops(stopped) == {1: moves.STOP_S}
 
 
 def test_a_start_is_left_the_way_the_vehicle_faces() -> None:
-    first = next(corner_means.headed(RIGHT_ANGLE, 90.0))
+    first = next(moves.headed(RIGHT_ANGLE, 90.0))
     assert first[1].place == pytest.approx((5.0, 0.0))
     assert first[0] == RIGHT_ANGLE[0]
     assert not first[1].is_fixed
 
 
 def test_a_fixed_point_is_approached_from_other_sides_and_stays() -> None:
-    for one in corner_means.approached(replace_stop(FIXED), 1):
+    for one in moves.approached(replace_stop(FIXED), 1):
         assert any(point.place == (0, 60) and point.stop_s == 2.0 for point in one)
         assert drawn.stops(one) == {[point.place for point in one].index((0, 60)): 2.0}
 
@@ -159,6 +159,6 @@ def replace_stop(drawing: Drawing) -> Drawing:
 
 
 def test_a_leg_is_bent_away_from_a_fence() -> None:
-    bent = list(corner_means.bent(RIGHT_ANGLE, 1, (0.0, 30.0), (-1.0, 0.0), 0.5))
+    bent = list(moves.bent(RIGHT_ANGLE, 1, (0.0, 30.0), (-1.0, 0.0), 0.5))
     assert [one[1].east_m for one in bent] == pytest.approx([-0.55, -0.85, -1.3])
-    assert not list(corner_means.bent(RIGHT_ANGLE, 1, (0.0, 59.0), (-1.0, 0.0), 0.5))
+    assert not list(moves.bent(RIGHT_ANGLE, 1, (0.0, 59.0), (-1.0, 0.0), 0.5))

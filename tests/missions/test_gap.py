@@ -1,4 +1,4 @@
-"""Straight legs through narrow places."""
+"""Straight legs through gaps."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import shapely
 from charts import HOME
 
 from missions import read_fence
-from missions.fitting.gap import find_neck, straight_through
+from missions.fitting.gap import find_gap, straight_through
 from missions.fitting.polyline import DrawnPoint
 from missions.geo import LatLon
 from missions.planning.plan import plan
@@ -30,21 +30,21 @@ def points(*places):
 
 
 @pytest.mark.parametrize("ahead", [(0.0, 1.0), (0.6, 0.8), (0.0, -1.0)])
-def test_the_neck_lies_where_the_fences_are_nearest(ahead):
-    neck = find_neck(NARROW, (2.0, 1.0), ahead)
-    assert neck.middle == pytest.approx((2.5, 0.0))
-    assert neck.through == pytest.approx((0.0, math.copysign(1.0, ahead[1])))
+def test_the_gap_lies_where_the_fences_are_nearest(ahead):
+    gap = find_gap(NARROW, (2.0, 1.0), ahead)
+    assert gap.middle == pytest.approx((2.5, 0.0))
+    assert gap.through == pytest.approx((0.0, math.copysign(1.0, ahead[1])))
 
 
 @pytest.mark.parametrize("edge", [WALL, CORNER, shapely.Polygon(), shapely.LineString([(-9, 0), (9, 0)])])
-def test_a_leg_with_room_on_one_side_or_across_a_fence_has_no_neck(edge):
-    assert find_neck(edge, (2.0, 0.0), (0.0, 1.0)) is None
+def test_a_leg_with_room_on_one_side_or_across_a_fence_has_no_gap(edge):
+    assert find_gap(edge, (2.0, 0.0), (0.0, 1.0)) is None
 
 
 def test_corners_in_the_neck_give_way_to_a_straight_leg_and_others_stay():
     drawing = points((-20, -40), (2, -6), (2.4, 0), (3, 7), (30, 40))
-    neck = find_neck(NARROW, (2.4, 0), (0.0, 1.0))
-    for lines in straight_through(drawing, 2, neck):
+    gap = find_gap(NARROW, (2.4, 0), (0.0, 1.0))
+    for lines in straight_through(drawing, 2, gap):
         assert len(lines) == 4
         assert (lines[0], lines[-1]) == (drawing[0], drawing[-1])
         leg = shapely.LineString([lines[1].place, lines[2].place])
@@ -54,8 +54,8 @@ def test_corners_in_the_neck_give_way_to_a_straight_leg_and_others_stay():
 
 def test_a_target_in_the_neck_stays_the_target():
     drawing = points((-20, -40), (2, -6), (2.4, 0))
-    neck = find_neck(NARROW, (2.4, 0), (0.0, 1.0))
-    assert all(lines[-1] == drawing[-1] for lines in straight_through(drawing, 2, neck))
+    gap = find_gap(NARROW, (2.4, 0), (0.0, 1.0))
+    assert all(lines[-1] == drawing[-1] for lines in straight_through(drawing, 2, gap))
 
 
 @pytest.mark.parametrize("heading_deg", [0.0, 90.0])

@@ -5,9 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.errors import BridgeError, OutcomeError, RefusedError
+from mavlink_bridge.mavlink.messages import MissionType
 from mavlink_bridge.mavlink.rover import AUTO_MODE, HOLD_MODE, MODE_NAMES
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from mavlink_bridge.cli.session import Session
 
 _STATE_PATIENCE_S = 2.0
@@ -38,6 +41,16 @@ def make_ready(session: Session, *, hold: bool, replace_active: bool) -> None:
             "the vehicle is armed and drives its mission in AUTO; nothing was written. "
             "--hold switches it to HOLD first, --replace-active writes all the same"
         )
+
+
+def fence_warnings(session: Session, lists: Iterable[MissionType]) -> list[str]:
+    """Return what an armed vehicle may do once a new fence is on it: if it stands outside, it may drive off."""
+    if MissionType.FENCE not in lists or not session.doing.is_armed:
+        return []
+    return [
+        "the vehicle is armed, and a new fence takes effect at once: if it stands outside and FENCE_ENABLE is 1, it does what "
+        "FENCE_ACTION says (1: RTL, it drives straight home)"
+    ]
 
 
 def start_driving(session: Session) -> None:

@@ -18,7 +18,7 @@ from missions.request import Request
 OURS = (1, 195)
 HEARTBEAT = m.Heartbeat(6, 8)
 HARMLESS = (m.Statustext, m.CommandAck)
-TOLD = "somebody else has our ids (system 1 component 195)"
+TOLD = "another program on the link uses our ids (system 1 component 195)"
 
 
 def spoof(run, message: m.Message = HEARTBEAT, count: int = 1) -> None:
@@ -283,7 +283,7 @@ def test_at_the_start_it_is_refused(orders, once):
     assert run.director.state is State.FAILED
     assert isinstance(run.director.trouble, IdentityTakenError)
     assert str(run.director.trouble) == (
-        "somebody on the link already speaks as system 1 component 195; choose others with --source-system and --source-component"
+        "another program on the link already uses system 1 component 195, perhaps another pbpp command; choose other ids with --source-component (or --source-system)"
     )
     assert run.sent == []
 

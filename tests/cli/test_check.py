@@ -95,7 +95,7 @@ def test_a_leg_that_is_only_near_says_how_near(tmp_path, yard):
     result = run("check", "--mission", made, "--clearance", "3")
     assert result.exit_code == 8
     said = re.search(
-        r"BREAKS: leg . → . comes (\d\.\d\d) m near exclusion polygon \d while driving", result.stdout
+        r"BREAKS: leg . → . comes within (\d\.\d\d) m of exclusion polygon \d while driving", result.stdout
     )
     assert 2 <= float(said[1]) < 3
     worst = min(float(near) for near in re.findall(r"comes (\d\.\d\d) m near", result.stdout))
@@ -149,7 +149,7 @@ def test_a_live_vehicle_is_asked(fields, yard, streams):
         # The fix is good to 0.3 m: kept on top of what is promised, it is more than FENCE_MARGIN and its reserve ask for.
         assert document["clearance_m"] == 2
         assert document["legs"][-1]["asked_m"] == pytest.approx(2.3)
-        assert any("0.3 m are kept on top" in text for text in document["warnings"])
+        assert any("0.3 m added to the clearance" in text for text in document["warnings"])
         assert document["system"] == 1
         assert document["legs"][0]["start"] == pytest.approx(away, abs=1e-5)
         assert not any("did not tell its position" in text for text in document["warnings"])

@@ -71,11 +71,11 @@ def test_a_vehicle_whose_parameters_are_all_known() -> None:
 def test_what_is_not_known_is_told_with_the_default_used() -> None:
     vehicle = vehicle_from_parameters({})
     assert {str(one) for one in vehicle.assumed} >= {
-        "WP_RADIUS is not known; taken as 2",
-        "WP_SPEED is not known; taken as 2",
-        "TURN_RADIUS is not known; taken as 0.9",
-        "SERVO1_FUNCTION is not known; taken as 26",
-        "FENCE_ENABLE is not known; taken as 0",
+        "WP_RADIUS unknown; assuming 2",
+        "WP_SPEED unknown; assuming 2",
+        "TURN_RADIUS unknown; assuming 0.9",
+        "SERVO1_FUNCTION unknown; assuming 26",
+        "FENCE_ENABLE unknown; assuming 0",
     }
     assert vehicle == Vehicle(assumed=vehicle.assumed)
 

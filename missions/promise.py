@@ -154,4 +154,6 @@ def _position_error_m(situation: Situation, request: Request) -> tuple[float, tu
         return 0.0, (
             "the vehicle has no 3D fix: nothing is added to the clearance for its position error (--position-error)",
         )
-    return error_m, (f"{error_m:g} m added to the clearance for the position error of the vehicle's fix (--position-error)",)
+    return error_m, (
+        f"{error_m:g} m added to the clearance for the position error of the vehicle's fix (--position-error)",
+    )

@@ -47,10 +47,11 @@ def fence_warnings(session: Session, lists: Iterable[MissionType]) -> list[str]:
     """Return what an armed vehicle may do once a new fence is on it: if it stands outside, it may drive off."""
     if MissionType.FENCE not in lists or not session.doing.is_armed:
         return []
-    return [
+    text = (
         "the vehicle is armed, and a new fence takes effect at once: if it stands outside and FENCE_ENABLE is 1, it does what "
         "FENCE_ACTION says (1: RTL, it drives straight home)"
-    ]
+    )
+    return [text]
 
 
 def start_driving(session: Session) -> None:

@@ -45,9 +45,7 @@ _MOVED_M = 1.0
 _ARMING_SHOWS_S = 1.5
 """So long after the start a heartbeat from before the arming may still come."""
 
-_START_YOURSELF = (
-    "arm it, then give the target again (or run the command again); or arm it in HOLD and switch it to AUTO yourself"
-)
+_START_YOURSELF = "arm it, then give the target again (or run the command again); or arm it in HOLD and switch it to AUTO yourself"
 _ENDLESS = (Command.NAV_LOITER_UNLIM, Command.NAV_RETURN_TO_LAUNCH)
 
 

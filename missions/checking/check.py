@@ -428,9 +428,7 @@ def _start_warnings(
 ) -> list[str]:
     """Say what is not known of the start, and what its first leg cannot keep."""
     if start is None:
-        return [
-            f"start position unknown; the way to item {first.leg.first_item} was not checked"
-        ]
+        return [f"start position unknown; the way to item {first.leg.first_item} was not checked"]
     warnings = []
     if heading_deg is None:
         warnings.append("heading unknown; assuming the rover faces along the first leg")

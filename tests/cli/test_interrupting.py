@@ -201,7 +201,9 @@ def test_nothing_is_sent_for_a_no_a_second_interrupt_or_a_closed_input(driven, m
     told = interrupt(at_hand, monkeypatch, keyboard=keyboard)
     assert rover.vehicle.mode == AUTO_MODE
     assert {type(message) for message in sent} <= {m.Heartbeat}
-    assert "nothing was sent; the vehicle goes on with the mission that pbpp started: AUTO, armed, " in str(told)
+    assert "nothing was sent; the vehicle goes on with the mission that pbpp started: AUTO, armed, " in str(
+        told
+    )
     assert told.details["drives"] is True
 
 

@@ -440,5 +440,5 @@ def _recorders(
 
     part, recorder, journal = open_recording(stack, log, orders, parameters)
     if part != log:
-        warn((f"{log} is there already: this run is recorded in {part}",))
+        warn((f"{log} exists already; this run is recorded to {part}",))
     return recorder, journal

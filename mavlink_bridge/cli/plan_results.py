@@ -115,7 +115,7 @@ class Told:
         self._written = write_outputs(planned, situation, self._outputs, self._plots, blocks=self._blocks)
         if not self._is_silent:
             if self._plan is not None:
-                echo("The route was made anew:")
+                echo("New route:")
             report_plan(planned, self._written)
             sys.stdout.flush()
         self._plan, self._planning_s = planned, planning_s

@@ -66,13 +66,13 @@ def start_driving(session: Session) -> None:
     """
     if not session.hear_anew():
         raise OutcomeError(
-            "all is verified on the vehicle, but no heartbeat tells whether it is armed: its mode was left alone",
+            "all is verified on the vehicle, but no heartbeat says whether it is armed: its mode was left alone",
             advice=_ADVICE,
         )
     doing = session.doing
     if not doing.is_armed:
         mode = MODE_NAMES.get(doing.mode or 0, f"mode {doing.mode}")
-        drives_off = ": arming it drives off" if doing.mode == AUTO_MODE else ""
+        drives_off = ": arming it makes it drive" if doing.mode == AUTO_MODE else ""
         raise OutcomeError(
             f"all is verified on the vehicle, which is not armed and does not drive: its mode was left alone ({mode}{drives_off})",
             advice=_ADVICE,
@@ -97,5 +97,7 @@ def _put_back(session: Session) -> OutcomeError:
     try:
         session.change_mode(HOLD_MODE)
     except BridgeError as error:
-        return OutcomeError(f"{what}, and it is still there, arming it drives off: {error}", advice=_ADVICE)
+        return OutcomeError(
+            f"{what}, and it is still in AUTO, where arming it makes it drive: {error}", advice=_ADVICE
+        )
     return OutcomeError(f"{what}: it was switched back to HOLD and does not drive", advice=_ADVICE)

@@ -65,7 +65,7 @@ def test_a_flood_while_it_drives_is_one_event_and_one_hold():
     (told,) = clashes(run)
     assert told.severity is Severity.CRITICAL
     assert told.data == {"system": 1, "component": 195, "held": True}
-    assert told.text == f"{TOLD}; HOLD; nothing more is done until a target is typed; clicks are not heeded"
+    assert told.text == f"{TOLD}; HOLD; nothing more is done until a target is typed; clicks are ignored"
     assert [message.param2 for message in asked_of_vehicle(run, since)] == [HOLD_MODE]
     assert run.director.state is State.CLASHED
     assert run.director.drive is None

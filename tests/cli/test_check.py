@@ -98,7 +98,7 @@ def test_a_leg_that_is_only_near_says_how_near(tmp_path, yard):
         r"BREAKS: leg . → . comes within (\d\.\d\d) m of exclusion polygon \d while driving", result.stdout
     )
     assert 2 <= float(said[1]) < 3
-    worst = min(float(near) for near in re.findall(r"comes (\d\.\d\d) m near", result.stdout))
+    worst = min(float(near) for near in re.findall(r"comes within (\d\.\d\d) m of", result.stdout))
     assert worst == pytest.approx(planned["driven_clearance_m"], abs=0.01)
 
 
@@ -363,7 +363,10 @@ def test_a_fence_that_changes_on_the_way_stops_a_repaired_mission(tmp_path, fiel
         orders = Orders(
             identity=(245, 190), request=request, upload=True, drive=True, target_sources=frozenset()
         )
-        with open_link(simulator.connection) as link, pytest.raises(SituationError, match="not begun anew"):
+        with (
+            open_link(simulator.connection) as link,
+            pytest.raises(SituationError, match="not started again"),
+        ):
             conduct(link, orders, quiet=True, on_frames=meddle)
         assert is_changed
         assert simulator.vehicle.mode == HOLD_MODE

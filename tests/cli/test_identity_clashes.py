@@ -29,7 +29,7 @@ from missions.formats.waypoints import format_items
 
 OURS = (245, 190)
 OLD, NEW = plain_mission(25, salt=1), plain_mission(20)
-WARNING = "another program"
+WARNING = "uses our ids"
 
 
 @pytest.fixture(autouse=True)

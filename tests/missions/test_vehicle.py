@@ -137,7 +137,7 @@ def test_no_pivot_angle_no_pivots() -> None:
     ("parameters", "message"),
     [
         ({"WP_RADIUS": -1.0}, "WP_RADIUS is -1; possible are 0 to 1000"),
-        ({"WP_SPEED": math.nan}, "WP_SPEED is nan, which is no number"),
+        ({"WP_SPEED": math.nan}, "WP_SPEED is nan, which is not a number"),
         ({"PSC_POS_P": 0.0}, "PSC_POS_P is 0; possible are 0.01 to 100"),
         ({"WP_SPEED": 0.0, "CRUISE_SPEED": 0.0}, "would not move"),
         ({"RA_MAX_STR_ANG": 1.6}, "RA_MAX_STR_ANG is 1.6 rad"),

@@ -464,6 +464,6 @@ def test_an_autopilot_that_is_not_ardupilot_is_refused_by_every_command(
     code, document, _ = run(rover, *arguments, "--json")
     assert (code, document["error"]) == (5, "VehicleNotFoundError")
     assert document["message"] == (
-        "the autopilot of system 1 is not ArduPilot (PX4): for now only ArduPilot is served"
+        "the autopilot of system 1 is not ArduPilot (PX4): only ArduPilot is supported for now"
     )
     assert document["details"]["autopilot"] == 12

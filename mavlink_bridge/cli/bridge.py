@@ -76,7 +76,7 @@ def bridge(
         ),
     ] = 0.0,
     vehicle: Annotated[
-        Path | None, typer.Option(metavar="FILE.parm", help="Parameters that the vehicle does not tell.")
+        Path | None, typer.Option(metavar="FILE.parm", help="Parameters that the vehicle does not report.")
     ] = None,
     upload: Annotated[bool, typer.Option("--upload", help="Write missions to the vehicle.")] = False,
     drive: Annotated[

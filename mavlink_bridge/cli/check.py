@@ -72,7 +72,7 @@ def check(
         Path | None,
         typer.Option(
             metavar="FILE.parm",
-            help="Parameters that log or link do not tell.",
+            help="Parameters that the log or link does not have.",
             rich_help_panel=VEHICLE_PANEL,
         ),
     ] = None,

@@ -43,7 +43,7 @@ def log(
     json_output: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Tell what telemetry logs hold: who speaks, fences and missions transferred, targets, modes, the drive and its clearance.
+    """Show what telemetry logs hold: who speaks, fences and missions transferred, targets, modes, the drive and its clearance.
 
     Drives of a mission (AUTO) are graded: least clearance, deviation and time against the drive model's prediction.
 

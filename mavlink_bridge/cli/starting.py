@@ -38,8 +38,8 @@ def make_ready(session: Session, *, hold: bool, replace_active: bool) -> None:
         session.change_mode(HOLD_MODE)
     elif not replace_active:
         raise RefusedError(
-            "the vehicle is armed and drives its mission in AUTO; nothing was written. "
-            "--hold switches it to HOLD first, --replace-active writes all the same"
+            "the vehicle is armed and drives its mission in AUTO; nothing was written",
+            advice="--hold switches it to HOLD first; --replace-active writes while it drives",
         )
 
 

@@ -449,7 +449,8 @@ def test_a_start_from_which_rovers_back_into_the_fence_is_a_danger(tmp_path):
     result = run(*asked)
     assert result.exit_code == 8
     assert (
-        "DANGER: the start is 1.11 m from inclusion polygon 1, nearer than FENCE_MARGIN 2 m" in result.output
+        "DANGER: the start is 1.11 m from inclusion polygon 1, nearer than FENCE_MARGIN (2 m) plus 0.05 m"
+        in result.output
     )
     document = document_of(*asked, code=8)
     assert (document["status"], document["broken"], len(document["dangers"])) == ("failed", 0, 1)

@@ -71,7 +71,7 @@ def test_it_leaves_where_its_avoidance_does_not_reach(parameters) -> None:
 
 
 def test_the_flat_margin_counts_where_it_is_the_larger() -> None:
-    with pytest.raises(StartBlockedError, match="nearer than FENCE_MARGIN_XY \(3 m\)"):
+    with pytest.raises(StartBlockedError, match=r"nearer than FENCE_MARGIN_XY \(3 m\)"):
         route(7.5, FENCE_MARGIN_XY=3.0)
 
 

@@ -246,7 +246,7 @@ def test_a_footprint_that_is_none(sizes: tuple[float, float]) -> None:
 @pytest.mark.parametrize("value", [1e38, -1.0, 32_768.0, math.nan, math.inf])
 @pytest.mark.parametrize("name", ["FENCE_TYPE", "FENCE_OPTIONS", "FENCE_ACTION", "AVOID_ENABLE", "OA_TYPE"])
 def test_a_bit_mask_or_enumeration_that_is_none_is_refused(name: str, value: float) -> None:
-    with pytest.raises(VehicleError, match=f"{name} is .*(possible are 0 to 32767|no number)"):
+    with pytest.raises(VehicleError, match=f"{name} is .*(possible are 0 to 32767|not a number)"):
         vehicle_from_parameters({name: value})
 
 
@@ -259,7 +259,7 @@ def test_a_bit_mask_or_enumeration_that_is_none_is_refused(name: str, value: flo
     ],
 )  # fmt: skip
 def test_a_quantity_that_is_none_is_refused(name: str, value: float) -> None:
-    with pytest.raises(VehicleError, match=f"{name} is .*(possible are|no number)"):
+    with pytest.raises(VehicleError, match=f"{name} is .*(possible are|not a number)"):
         vehicle_from_parameters({name: value})
 
 

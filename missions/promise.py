@@ -153,6 +153,8 @@ def _position_error_m(situation: Situation, request: Request) -> tuple[float, tu
         error_m = FIX_ERRORS_M[fix.kind]
     else:
         return 0.0, (
-            "the vehicle has no 3D fix: no room is kept for its position's error (--position-error)",
+            "the vehicle has no 3D fix: nothing is added to the clearance for its position error (--position-error)",
         )
-    return error_m, (f"{error_m:g} m are kept on top for the error of the vehicle's position",)
+    return error_m, (
+        f"{error_m:g} m added to the clearance for the position error of the vehicle's fix (--position-error)",
+    )

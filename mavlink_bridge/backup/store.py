@@ -297,8 +297,10 @@ def read_backup(path: Path) -> Backup:
         raise BackupError(
             f"the backup {path} cannot be read: {error.strerror or error}", path=str(path)
         ) from None
-    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
-        raise BackupError(f"{path} is no backup: {error!r}", path=str(path)) from None
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
+        raise BackupError(
+            f"{path} is not a backup that pbpp wrote; nothing was written to the vehicle", path=str(path)
+        ) from None
     if claimed != _checksum(content):
         raise BackupError(f"the backup {path} is damaged: its checksum does not match", path=str(path))
     return backup

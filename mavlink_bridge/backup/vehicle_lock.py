@@ -103,7 +103,7 @@ class VehicleLock:
         except OSError as error:
             _close(files)
             raise BackupError(
-                f"{self._folder}: no lock can be taken there: {error.strerror or error}; nothing was written to the vehicle",
+                f"{self._folder}: the vehicle cannot be locked there: {error.strerror or error}; nothing was written to the vehicle",
                 path=str(self._folder),
                 advice="make room on the disk, or let XDG_STATE_HOME name a folder that can be written",
             ) from None

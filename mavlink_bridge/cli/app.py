@@ -25,7 +25,7 @@ COMMANDS = {
     "plan": "Plan a mission around fences; write it, draw it, upload it.",
     "check": "Check every leg of a mission against a fence.",
     "bridge": "Run beside the autopilot: targets in, verified missions out.",
-    "log": "Tell what telemetry logs hold.",
+    "log": "Show what telemetry logs hold.",
     "replay": "Run the bridge over recorded logs.",
     "upload": "Upload a file to the vehicle, verified; or put an old list back.",
     "download": "Download a mission, fence, rally points or parameters.",

@@ -77,7 +77,7 @@ def bridge(
         ),
     ] = 0.0,
     vehicle: Annotated[
-        Path | None, typer.Option(metavar="FILE.parm", help="Parameters that the vehicle does not tell.")
+        Path | None, typer.Option(metavar="FILE.parm", help="Parameters that the vehicle does not report.")
     ] = None,
     upload: Annotated[bool, typer.Option("--upload", help="Write missions to the vehicle.")] = False,
     drive: Annotated[
@@ -441,5 +441,5 @@ def _recorders(
 
     part, recorder, journal = open_recording(stack, log, orders, parameters)
     if part != log:
-        warn((f"{log} is there already: this run is recorded in {part}",))
+        warn((f"{log} exists already; this run is recorded to {part}",))
     return recorder, journal

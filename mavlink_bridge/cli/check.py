@@ -72,7 +72,7 @@ def check(
         Path | None,
         typer.Option(
             metavar="FILE.parm",
-            help="Parameters that log or link do not tell.",
+            help="Parameters that the log or link does not have.",
             rich_help_panel=VEHICLE_PANEL,
         ),
     ] = None,
@@ -340,8 +340,8 @@ def _sentence(leg: CheckedLeg) -> str:
     if leg.crosses:
         return f"leg {leg.name} crosses {', '.join(leg.crosses)}, first at {leg.at}"
     return (
-        f"leg {leg.name} comes {leg.driven_clearance_m:.2f} m near {leg.fence} while driving "
-        f"({metres(leg.drawn_clearance_m)} drawn, at {leg.at}); {metres(leg.asked_m)} are to be kept"
+        f"leg {leg.name} comes within {leg.driven_clearance_m:.2f} m of {leg.fence} while driving "
+        f"({metres(leg.drawn_clearance_m)} drawn, at {leg.at}); {metres(leg.asked_m)} is required"
     )
 
 

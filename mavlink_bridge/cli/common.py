@@ -116,7 +116,7 @@ ConfigOption = Annotated[
         metavar="FILE.toml",
         is_eager=True,
         callback=take_options,
-        help="Options from a file; those given here count more. `pbpp config` tells of yours.",
+        help="Options from a file; options given here override it. See `pbpp config`.",
         rich_help_panel=OUTPUT_PANEL,
     ),
 ]
@@ -127,7 +127,7 @@ VerboseOption = Annotated[
     typer.Option(
         "--verbose",
         "-v",
-        help="Tell more: details of errors, progress without a terminal.",
+        help="Show more: details of errors, progress without a terminal.",
         rich_help_panel=OUTPUT_PANEL,
     ),
 ]

@@ -154,7 +154,10 @@ def _read_parameters(session: Session) -> dict[str, float]:
             missing=len(outcome.missing),
         )
     warn(
-        [f"{name} came as {came}, which is no number: left out" for name, came in outcome.no_numbers.items()]
+        [
+            f"{name} came as {came}, which is not a number: ignored"
+            for name, came in outcome.no_numbers.items()
+        ]
     )
     return dict(sorted(outcome.values.items()))
 
@@ -170,7 +173,9 @@ def _write(path: Path, what: str, items: tuple[MissionItem, ...], parameters: Ma
         separator = " " if path.suffix.lower() == ".parm" else ","
         odd = [name for name in parameters if not is_parameter_name(name)]  # it may hold a line break
         if odd:
-            warn([f"{path}: left out, for no parameter has such a name: {', '.join(map(repr, odd))}"])
+            warn(
+                [f"{path}: left out, because no parameter can have such a name: {', '.join(map(repr, odd))}"]
+            )
         named = ((name, value) for name, value in parameters.items() if name not in odd)
         text = "".join(f"{name}{separator}{value:.9g}\n" for name, value in named)
     else:

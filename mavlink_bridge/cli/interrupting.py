@@ -131,13 +131,13 @@ class Ending:
     def _deed(self) -> str:
         now = doing_text(self.doing)
         if self.is_link_lost:
-            now += " when it was last heard (the link is lost)"
+            now += ", when it was last heard (the link is lost)"
         if self.is_held:
             return f"the vehicle was switched to HOLD, confirmed by its heartbeat: {now}"
         if self.is_held is False:
             return f"HOLD was sent, but no heartbeat confirms it: {now}"
         if self.drives:
-            return f"nothing was sent: the vehicle drives on as we set it going: {now}"
+            return f"nothing was sent; the vehicle goes on with the mission that pbpp started: {now}"
         if self.said or self.changed:
             return f"the vehicle now: {now}"
         return f"the vehicle was left as it was: {now}"
@@ -150,7 +150,7 @@ def doing_text(doing: Doing) -> str:
     armed = "armed" if doing.is_armed else "not armed"
     speed = "speed not known" if doing.speed_mps is None else f"{doing.speed_mps:.1f} m/s"
     age_s = max(doing.age_s, 0.0 if doing.speed_mps is None else doing.speed_age_s)
-    old = f" (told {age_s:.0f} s ago)" if age_s > _OLD_S else ""
+    old = f" ({age_s:.0f} s ago)" if age_s > _OLD_S else ""
     complete = ", its mission complete" if doing.has_completed and doing.mode == AUTO_MODE else ""
     return f"{_mode_name(doing.mode)}, {armed}, {speed}{complete}{old}"
 

@@ -119,9 +119,13 @@ def _make_way(path: Path, data: bytes) -> None:
         return
     writer = _writer_of(path)
     if writer is None:
-        warn([f"{path} was not written by pbpp, or was changed since: kept as {keep_aside(path)}"])
+        warn(
+            [
+                f"{path} was not written by pbpp, or was changed since; the old file is kept as {keep_aside(path)}"
+            ]
+        )
     elif lost := _lost_parts(path, data, writer):
-        warn([f"{path} loses its {' and '.join(lost)}: kept as {keep_aside(path)}"])
+        warn([f"{path} loses its {' and '.join(lost)}; the old file is kept as {keep_aside(path)}"])
 
 
 def _writer_of(path: Path) -> str | None:

@@ -63,8 +63,8 @@ _STATE_TEXTS = {
     State.DRIVING: "driving",
     State.ARRIVED: "arrived",
     State.LET_GO: "let go",
-    State.CLASHING: "somebody speaks with our ids; ending the upload",
-    State.CLASHED: "somebody speaks with our ids",
+    State.CLASHING: "another program uses our ids; finishing the upload",
+    State.CLASHED: "another program uses our ids",
     State.LOST: "no heartbeat",
     State.DONE: "done",
     State.FAILED: "failed",
@@ -200,7 +200,7 @@ def _timed_planner(
         if request.repairs and has_driven():
             raise SituationError(
                 "the rest of the mission would no longer keep its clearance, and the vehicle was switched to HOLD: part of the mission "
-                "is driven already, so that it is not begun anew"
+                "is driven already, so it is not started again"
             )
         planned, seconds = timed_plan(situation, request)
         if request.repairs and orders.drive:

@@ -43,9 +43,9 @@ def log(
     json_output: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Tell what telemetry logs hold: who speaks, fences and missions transferred, targets, modes, the drive and its clearance.
+    """Show what telemetry logs hold: who speaks, fences and missions transferred, targets, modes, the drive and its clearance.
 
-    Drives of a mission (AUTO) are graded: least clearance, deviation and time against what the drive model foresees.
+    Drives of a mission (AUTO) are graded: least clearance, deviation and time against the drive model's prediction.
 
     For example:
 
@@ -218,7 +218,7 @@ def _graded(grade: Grade) -> Iterable[str]:
 
     def compared(name: str, found: float | None, told: float | None, unit: str) -> Iterable[str]:
         if found is not None:
-            beside = "" if told is None else f", {told:.2f} {unit} foreseen"
+            beside = "" if told is None else f", {told:.2f} {unit} predicted"
             yield f"  {name}: {found:.2f} {unit}{beside}"
 
     told = (
@@ -231,9 +231,9 @@ def _graded(grade: Grade) -> Iterable[str]:
     yield from compared("time to the last waypoint reached", grade.took_s, told[2], "s")
     if grade.outside_m is not None:
         verdict = (
-            "within the band foreseen"
+            "within the predicted corridor"
             if grade.is_as_foreseen
-            else f"{grade.outside_m:.2f} m outside the band foreseen"
+            else f"{grade.outside_m:.2f} m outside the predicted corridor"
         )
         yield f"  {verdict}"
     yield from (f"  {note}" for note in grade.notes)

@@ -81,7 +81,7 @@ def plan(
         Path | None,
         typer.Option(
             metavar="FILE.parm",
-            help="Parameters that the source does not tell.",
+            help="Parameters that the source does not have.",
             rich_help_panel=VEHICLE_PANEL,
         ),
     ] = None,

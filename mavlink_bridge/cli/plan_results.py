@@ -115,7 +115,7 @@ class Told:
         self._written = write_outputs(planned, situation, self._outputs, self._plots, blocks=self._blocks)
         if not self._is_silent:
             if self._plan is not None:
-                echo("The route was made anew:")
+                echo("New route:")
             report_plan(planned, self._written)
             sys.stdout.flush()
         self._plan, self._planning_s = planned, planning_s
@@ -138,6 +138,8 @@ def arrival_document(arrival: Mapping[str, object] | None) -> dict[str, object]:
 
 def report_plan(planned: Plan, written: list[Path]) -> None:
     """Print a plan for people, and where it was written."""
+    from missions.words import counted  # noqa: PLC0415 - quick help
+
     promise = (
         f"{planned.clearance_m:g} m promised while driving"
         if planned.clearance_m is not None
@@ -147,7 +149,7 @@ def report_plan(planned: Plan, written: list[Path]) -> None:
     turns = max(0, waypoints - len(planned.targets))
     echo(
         f"Route: {planned.length_m:.1f} m ({planned.straight_line_m:.1f} m as the crow flies), "
-        f"about {planned.duration_s:.0f} s, {waypoints} waypoints ({turns} turns)"
+        f"about {planned.duration_s:.0f} s, {counted(waypoints, 'waypoint')} ({counted(turns, 'turn')})"
     )
     echo(f"Clearance: {planned.drawn_clearance_m:.2f} m drawn, {promise}")
     for path in written:

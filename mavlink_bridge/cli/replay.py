@@ -49,7 +49,7 @@ def replay(
         ),
     ] = None,
     record: Annotated[
-        bool, typer.Option("--record", help="Write what is told beside each log, as its .events.jsonl.")
+        bool, typer.Option("--record", help="Write the events beside each log, as its .events.jsonl.")
     ] = False,
     send: Annotated[
         str | None,

@@ -285,8 +285,8 @@ class Session:
         if not self._is_refused:
             system, component = self.link.identity
             text = (
-                f"somebody else on the link has our ids (system {system} component {component}): what the vehicle answers may be meant for "
-                "him; choose others with --source-system and --source-component"
+                f"another program on the link uses our ids (system {system} component {component}): the vehicle's answers may be meant "
+                "for it; if it is another pbpp command, give one of them another --source-component"
             )
             warn([text])
 

@@ -5,9 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.errors import BridgeError, OutcomeError, RefusedError
+from mavlink_bridge.mavlink.messages import MissionType
 from mavlink_bridge.mavlink.rover import AUTO_MODE, HOLD_MODE, MODE_NAMES
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from mavlink_bridge.cli.session import Session
 
 _STATE_PATIENCE_S = 2.0
@@ -37,9 +40,20 @@ def make_ready(session: Session, *, hold: bool, replace_active: bool) -> None:
         session.change_mode(HOLD_MODE)
     elif not replace_active:
         raise RefusedError(
-            "the vehicle is armed and drives its mission in AUTO; nothing was written. "
-            "--hold switches it to HOLD first, --replace-active writes all the same"
+            "the vehicle is armed and drives its mission in AUTO; nothing was written",
+            advice="--hold switches it to HOLD first; --replace-active writes while it drives",
         )
+
+
+def fence_warnings(session: Session, lists: Iterable[MissionType]) -> list[str]:
+    """Return what an armed vehicle may do once a new fence is on it: if it stands outside, it may drive off."""
+    if MissionType.FENCE not in lists or not session.doing.is_armed:
+        return []
+    text = (
+        "the vehicle is armed, and a new fence takes effect at once: if it stands outside and FENCE_ENABLE is 1, it does what "
+        "FENCE_ACTION says (1: RTL, it drives straight home)"
+    )
+    return [text]
 
 
 def start_driving(session: Session) -> None:
@@ -54,13 +68,13 @@ def start_driving(session: Session) -> None:
     """
     if not session.hear_anew():
         raise OutcomeError(
-            "all is verified on the vehicle, but no heartbeat tells whether it is armed: its mode was left alone",
+            "all is verified on the vehicle, but no heartbeat says whether it is armed: its mode was left alone",
             advice=_ADVICE,
         )
     doing = session.doing
     if not doing.is_armed:
         mode = MODE_NAMES.get(doing.mode or 0, f"mode {doing.mode}")
-        drives_off = ": arming it drives off" if doing.mode == AUTO_MODE else ""
+        drives_off = ": arming it makes it drive" if doing.mode == AUTO_MODE else ""
         raise OutcomeError(
             f"all is verified on the vehicle, which is not armed and does not drive: its mode was left alone ({mode}{drives_off})",
             advice=_ADVICE,
@@ -85,5 +99,7 @@ def _put_back(session: Session) -> OutcomeError:
     try:
         session.change_mode(HOLD_MODE)
     except BridgeError as error:
-        return OutcomeError(f"{what}, and it is still there, arming it drives off: {error}", advice=_ADVICE)
+        return OutcomeError(
+            f"{what}, and it is still in AUTO, where arming it makes it drive: {error}", advice=_ADVICE
+        )
     return OutcomeError(f"{what}: it was switched back to HOLD and does not drive", advice=_ADVICE)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.director import Director
     from missions.geo import LatLon
 
-HELP = "LAT,LON gives a target, yes uploads a plan that waits for it"
+HELP = "type LAT,LON for a target, or yes to upload a proposed plan"
 CONFIRM = "type yes to upload the plan, or another target"
 _YES = frozenset({"yes", "y", "go"})
 _MOST_SHOWN = 40  # characters of what was typed, in an answer of one line; chosen
@@ -62,11 +62,11 @@ def understood(line: str, director: Director) -> Typed:
         shown = _shown(line)
         if not any(letter.isdigit() for letter in line):
             return Typed(
-                f"not understood: {shown!r}; {HELP}; stop the vehicle by transmitter or ground station"
+                f"not understood: {shown!r}; {HELP}; to stop the vehicle use the transmitter or ground station"
             )
         return Typed(f"not taken: {_shown(str(error), 3 * _MOST_SHOWN)}; {HELP}")
     later = _LATER.get(director.state)
-    return Typed(f"target {target} taken" + (f": gone into {later}" if later else ""), target=target)
+    return Typed(f"target {target} taken" + (f": planned {later}" if later else ""), target=target)
 
 
 def _why_nothing(director: Director) -> str:
@@ -76,7 +76,7 @@ def _why_nothing(director: Director) -> str:
         return "without --upload plans are only reported"
     if not director.orders.confirm:
         return "plans are uploaded without a yes (--confirm waits for it)"
-    return "no plan waits for it"
+    return "no plan is proposed"
 
 
 def _shown(text: str, most: int = _MOST_SHOWN) -> str:

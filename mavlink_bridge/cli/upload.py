@@ -107,14 +107,14 @@ def upload(
     if not connect and not forget:
         raise UsageError("upload needs --connect CONNECTION")
     if file is None and not restore and not forget:
-        raise UsageError("what is to be uploaded? Give a FILE, or --restore")
+        raise UsageError("give a FILE to upload, or --restore")
     restoration = _restoration(file, for_another=other_vehicle) if restore else None
     lists, parameters = _content(file, only or [], restoration)
 
     from mavlink_bridge.backup.store import BackupStore  # noqa: PLC0415 - usage errors need not wait for it
     from mavlink_bridge.cli.interrupting import interruptible, terminable  # noqa: PLC0415
     from mavlink_bridge.cli.session import Address, open_session  # noqa: PLC0415
-    from mavlink_bridge.cli.starting import make_ready, start_driving  # noqa: PLC0415
+    from mavlink_bridge.cli.starting import fence_warnings, make_ready, start_driving  # noqa: PLC0415
 
     address = Address(connect, (source_system, source_component), system, any_vehicle, timeout, signing_key)
     store = BackupStore()
@@ -135,6 +135,7 @@ def upload(
             if not restoration:
                 warn(interrupted_warnings(store, uploads.vehicle))
             make_ready(session, hold=hold, replace_active=replace_active)
+            warn(fence_warnings(session, [kind for kind, _ in lists] + [one.mission_type for one in backups]))
             for backup in backups:
                 uploads.write_lists([(backup.mission_type, backup.items)], backup.path)
             uploads.write_lists(lists)

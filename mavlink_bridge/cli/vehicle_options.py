@@ -37,7 +37,7 @@ ReserveOption = Annotated[
     typer.Option(
         metavar="M",
         parser=within(0.0, MOST_M, "metres"),
-        help="Kept on top of the clearance, for wind and slip.",
+        help="Added to the clearance, for wind and slip.",
         rich_help_panel=PANEL,
     ),
 ]
@@ -46,7 +46,7 @@ PositionErrorOption = Annotated[
     typer.Option(
         metavar="M",
         parser=within(0.0, MOST_M, "metres"),
-        help="Of the vehicle's position, kept on top too. Default: from its fix.",
+        help="Error of the vehicle's position, added to the clearance. Default: from its fix type.",
         rich_help_panel=PANEL,
     ),
 ]
@@ -54,7 +54,7 @@ HomeOption = Annotated[
     str | None,
     typer.Option(
         metavar="LAT,LON",
-        help="Home, where the source tells none: where it starts and returns to, and the centre of FENCE_RADIUS.",
+        help="Home, if the source has none: start, return and centre of FENCE_RADIUS.",
     ),
 ]
 EscapeOption = Annotated[

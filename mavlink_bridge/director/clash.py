@@ -81,11 +81,11 @@ def is_clash(frame: Frame, identity: tuple[int, int] | None) -> bool:
 
 def account(identity: tuple[int, int], answer: Answer, state: State, *, is_single_job: bool) -> str:
     """Return what is told of a clash: the state is the one that it led to."""
-    parts = [f"somebody else has our ids (system {identity[0]} component {identity[1]})"]
+    parts = [f"another program on the link uses our ids (system {identity[0]} component {identity[1]})"]
     if answer is Answer.HOLD:
         parts.append("HOLD")
     elif state is State.CLASHING:
         parts.append("the upload is finished first")
     if not is_single_job:
-        parts.append("nothing more is done until a target is typed; clicks are not heeded")
+        parts.append("nothing more is done until a target is typed; clicks are ignored")
     return "; ".join(parts)

@@ -45,9 +45,7 @@ _MOVED_M = 1.0
 _ARMING_SHOWS_S = 1.5
 """So long after the start a heartbeat from before the arming may still come."""
 
-_START_YOURSELF = (
-    "arm it and give the target again, or start the mission yourself: arm it in HOLD, then switch to AUTO"
-)
+_START_YOURSELF = "arm it, then give the target again (or run the command again); or arm it in HOLD and switch it to AUTO yourself"
 _ENDLESS = (Command.NAV_LOITER_UNLIM, Command.NAV_RETURN_TO_LAUNCH)
 
 
@@ -248,9 +246,9 @@ class Director(Stopper):
 
     def _was_put_back(self, what: str, machine: PutBack, now_s: float) -> None:
         if machine.is_left_in_auto:
-            text = f"{what}, and it does not go to HOLD: it is in AUTO, arming it drives off"
+            text = f"{what}, and it does not go to HOLD: it is in AUTO, where arming it makes it drive"
         elif machine.was_needed:
-            text = f"{what}; it was switched back from AUTO to HOLD, so that arming it does not drive off"
+            text = f"{what}; it was switched back from AUTO to HOLD, so that arming it does not make it drive"
         else:
             text = what
         trouble = OutcomeError(text, advice=_START_YOURSELF, mode=mode_name(self.situation.mode))
@@ -392,7 +390,7 @@ class Director(Stopper):
     def _refuse_unarmed(self, now_s: float) -> None:
         """Leave the mode of a disarmed vehicle alone: in AUTO, arming it would drive off."""
         mode = mode_name(self.situation.mode)
-        drives_off = ": arming it drives off" if self.situation.mode == AUTO_MODE else ""
+        drives_off = ": arming it makes it drive" if self.situation.mode == AUTO_MODE else ""
         trouble = OutcomeError(
             f"the mission is verified on the vehicle, which is not armed and does not drive: its mode was left alone ({mode}{drives_off})",
             advice=_START_YOURSELF,

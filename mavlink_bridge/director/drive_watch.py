@@ -133,7 +133,7 @@ class DriveWatch:
     def _notice_leaving(self, here: Point, place: LatLon, now_s: float) -> None:
         outside_m = here.distance(self._band)
         if outside_m > OUTSIDE_M and not self._is_outside:
-            text = f"{outside_m:.1f} m outside the band that was foreseen"
+            text = f"{outside_m:.1f} m outside the predicted corridor"
             self._voice.tell(now_s, EventName.LEFT_ENVELOPE, text, round(outside_m, 2), list(place))
         self._is_outside = outside_m > OUTSIDE_M
 

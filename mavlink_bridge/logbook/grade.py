@@ -212,7 +212,9 @@ class DriveGrader:
         self._seqs = np.array(way.seqs)
         self._notes: list[str] = []
         if start.speed_mps > STANDING_MPS:
-            self._notes.append(f"it began at {start.speed_mps:.1f} m/s; foreseen is a start from rest")
+            self._notes.append(
+                f"it began at {start.speed_mps:.1f} m/s; the prediction is for a start from rest"
+            )
         self._forecast = self._foresee(start.heading_deg if start.speed_mps <= STANDING_MPS else None)
         self._windows = np.array(
             [
@@ -278,10 +280,10 @@ class DriveGrader:
 
     def _foresee(self, heading_deg: float | None) -> Envelope | None:
         if self.way.odd is not None:
-            self._notes.append(f"nothing is foreseen: the drive model does not know {self.way.odd}")
+            self._notes.append(f"no prediction: the drive model does not know {self.way.odd}")
             return None
         if self._field.vehicle.autopilot is not Autopilot.ARDUPILOT:
-            self._notes.append("what is foreseen rests on measurements of ArduPilot Rover, which this is not")
+            self._notes.append("the prediction rests on measurements of ArduPilot Rover, which this is not")
         try:
             forecast = envelope(
                 self._points,
@@ -293,7 +295,7 @@ class DriveGrader:
             if self._field.meter is not None:
                 forecast = with_avoidance(forecast, self._field.vehicle, self._field.meter.ground.edge)
         except MissionError as error:
-            self._notes.append(f"nothing is foreseen: {error}")
+            self._notes.append(f"no prediction: {error}")
             return None
         shapely.prepare(forecast.area)
         return forecast

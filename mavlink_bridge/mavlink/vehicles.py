@@ -61,7 +61,7 @@ def choose_vehicle(heard: Sequence[Vehicle], system: int | None, *, any_vehicle:
         raise VehicleNotFoundError("no vehicle's HEARTBEAT was heard")
     if fitting:
         raise VehicleNotFoundError(
-            f"{names} is no rover (MAV_TYPE 10 or 11); --any-vehicle takes it all the same"
+            f"{names} is not a rover or boat (MAV_TYPE 10 or 11); --any-vehicle accepts it"
         )
     raise VehicleNotFoundError(f"system {system} was not heard, only {names}")
 
@@ -83,6 +83,6 @@ def not_ardupilot(system: int | None, autopilot: int | None) -> VehicleNotFoundE
         return None
     name = {m.Autopilot.PX4.value: " (PX4)", None: ""}.get(autopilot, f" (MAV_AUTOPILOT {autopilot})")
     return VehicleNotFoundError(
-        f"the autopilot of system {system} is not ArduPilot{name}: for now only ArduPilot is served",
+        f"the autopilot of system {system} is not ArduPilot{name}: only ArduPilot is supported for now",
         autopilot=autopilot,
     )

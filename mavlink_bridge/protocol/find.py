@@ -150,16 +150,16 @@ class FindVehicle(TableMachine[FindState, FindEvent]):
 def identity_taken(identity: tuple[int, int]) -> IdentityTakenError:
     """Return the error that somebody else on the link speaks with our ids."""
     return IdentityTakenError(
-        f"somebody on the link already speaks as system {identity[0]} component {identity[1]}; "
-        "choose others with --source-system and --source-component"
+        f"another program on the link already uses system {identity[0]} component {identity[1]}, perhaps another pbpp command; "
+        "choose other ids with --source-component (or --source-system)"
     )
 
 
 def identity_shared(identity: tuple[int, int], then: str) -> OutcomeError:
     """Return the error that what was begun is not gone on with, because somebody else speaks with our ids by now."""
     return OutcomeError(
-        f"somebody else has our ids (system {identity[0]} component {identity[1]}): {then}",
+        f"another program on the link uses our ids (system {identity[0]} component {identity[1]}): {then}",
         system=identity[0],
         component=identity[1],
-        advice="find out who it is; choose other ids with --source-system and --source-component, or sign the link",
+        advice="if it is another pbpp command, give one of them another --source-component; else find the program, or sign the link",
     )

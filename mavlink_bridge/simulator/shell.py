@@ -46,13 +46,6 @@ class _Client:
         self.outbound: FaultyLink[bytes] = FaultyLink(faults, seed + 1)
         self.splitter = FrameSplitter()
         self.backlog = b""
-        self._relays: dict[tuple[int, int], Codec] = {}
-
-    def relay(self, frame: Frame) -> bytes:
-        """Return the bytes of someone else's frame, under the sender's identity."""
-        identity = (frame.system, frame.component)
-        codec = self._relays.setdefault(identity, Codec(*identity))
-        return codec.encode(frame.message)
 
 
 class Simulator:
@@ -204,9 +197,10 @@ class Simulator:
         now_s = self._advance(real_s)
         for peer, client in list(self._clients.items()):
             for data in client.inbound.due(real_s):
-                for frame in client.codec.decode(data):
-                    self.vehicle.receive(frame, now_s)
-                    self._relay(frame, peer, real_s)
+                for frame_bytes, frame in client.codec.decode_with_bytes(data):
+                    if frame is not None:
+                        self.vehicle.receive(frame, now_s)
+                        self._relay(frame, frame_bytes, peer, real_s)
         self.vehicle.handle_timer(now_s)
         messages = self.vehicle.messages_to_send()
         for peer, client in list(self._clients.items()):
@@ -274,13 +268,13 @@ class Simulator:
         for frame in client.splitter.split(data):
             client.inbound.push(frame, real_s)
 
-    def _relay(self, frame: Frame, sender: object, real_s: float) -> None:
-        """Pass on what is for everybody or for someone else, as ArduPilot does between its links."""
+    def _relay(self, frame: Frame, frame_bytes: bytes, sender: object, real_s: float) -> None:
+        """Pass on what is for everybody or for someone else, byte for byte, as ArduPilot does between its links."""
         if getattr(frame.message, "target_system", 0) == self.vehicle.config.system:
             return
         for key, client in self._clients.items():
             if key is not sender:
-                client.outbound.push(client.relay(frame), real_s)
+                client.outbound.push(frame_bytes, real_s)
 
     def _send(self, key: object, frames: list[bytes]) -> None:
         if isinstance(key, socket.socket):

@@ -429,12 +429,10 @@ def _start_warnings(
 ) -> list[str]:
     """Return warnings of what is unknown at the start, and of what its first leg cannot keep."""
     if start is None:
-        return [
-            f"where the vehicle starts is not known: how it comes to item {first.leg.first_item} was not checked"
-        ]
+        return [f"start position unknown; the way to item {first.leg.first_item} was not checked"]
     warnings = []
     if heading_deg is None:
-        warnings.append("where the vehicle heads at the start is not known: taken along its first leg")
+        warnings.append("heading unknown; assuming the rover faces along the first leg")
     if first.asked_m < required_m and not first.crosses:
         warnings.append(
             f"the start stands nearer to a fence than {metres(required_m)}: its first leg has to keep {metres(first.asked_m)}, "
@@ -448,7 +446,7 @@ def _drive_warnings(vehicle: Vehicle, forecast: Envelope, course: Course) -> lis
     items = [course.legs[0].first_item, *(leg.last_item for leg in course.legs)]
     warnings = [
         f"item {items[corner.waypoint]}: a turn of {abs(corner.turn_deg):.0f}° between short legs; "
-        "measured rovers swung out farther there than the drive model foresees"
+        "measured rovers swung out farther there than the drive model predicts"
         for corner in forecast.corners
         if not corner.bounded
     ]
@@ -457,7 +455,7 @@ def _drive_warnings(vehicle: Vehicle, forecast: Envelope, course: Course) -> lis
     )
     assumed = [f"{one.parameter} {one.value:g}" for one in vehicle.assumed if one.parameter in _DRIVING]
     if assumed:
-        warnings.append(f"not known of the vehicle, so these defaults count: {', '.join(assumed)}")
+        warnings.append(f"parameters unknown; assuming {', '.join(assumed)}")
     return warnings
 
 

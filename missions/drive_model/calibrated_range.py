@@ -15,7 +15,7 @@ TOP_SPEED_MPS = {Steering.ACKERMANN: 5.0, Steering.SKID: 3.0}
 
 
 SLOW_MPS = 1.0
-"""Slower steered rovers swing out ever farther: the firmware turns lateral acceleration into turn rate with at least 1 m/s."""
+"""Slower steered rovers swing out farther and farther: the firmware turns lateral acceleration into turn rate with at least 1 m/s."""
 
 OLDEST_FIRMWARE = (4, 6, 0)
 """The first with the corners that were measured (upstream commit 56b99d4aa5, March 2025)."""
@@ -58,7 +58,7 @@ def beyond_measured(vehicle: Vehicle, slowest_mps: float | None = None) -> tuple
             and least_mps < SLOW_MPS,
             (
                 f"the promise was not measured for steered rovers below {SLOW_MPS:g} m/s, and this one drives {least_mps:g} m/s: there they swing out "
-                "ever farther (after 90° 0.7 m at 1 m/s, 1.8 m at 0.5, 3.2 m at 0.3) and count waypoints as reached that they passed at a "
+                "farther and farther (after 90° 0.7 m at 1 m/s, 1.8 m at 0.5, 3.2 m at 0.3) and count waypoints as reached that they passed at a "
                 f"distance; drive {SLOW_MPS:g} m/s or more"
             ),
         ),

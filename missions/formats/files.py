@@ -195,7 +195,7 @@ def mode_of(path: Path) -> int | None:
     if stat.S_ISDIR(found):
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     if not (stat.S_ISREG(found) or stat.S_ISLNK(found)):
-        raise OSError(errno.EINVAL, "it is no regular file", str(path))
+        raise OSError(errno.EINVAL, "it is not a regular file", str(path))
     return stat.S_IMODE(found) & 0o777 if stat.S_ISREG(found) else None
 
 

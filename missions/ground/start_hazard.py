@@ -47,7 +47,7 @@ def start_hazard(ground: Ground, start: LocalPoint, vehicle: Vehicle) -> StartBl
     leaves_from_m = vehicle.stops_within_m + _LEAVES_FROM_M
     if away_m >= leaves_from_m:
         return None
-    margin = f"{vehicle.fence.margin_name} {vehicle.stops_within_m:g} m and {_LEAVES_FROM_M:g} m"
+    margin = f"{vehicle.fence.margin_name} ({vehicle.stops_within_m:g} m) plus {_LEAVES_FROM_M:g} m"
     where = (
         f"the start is {away_m:.2f} m from {fence}, nearer than {margin} to a fence that the vehicle avoids"
     )

@@ -125,7 +125,7 @@ def _draw_lines(axes: Any, scene: Scene) -> None:  # noqa: ANN401
         linewidth=0.5,
         alpha=0.45,
         zorder=5,
-        label="driven (foreseen)",
+        label="predicted track",
     )
     axes.plot(*route.T, "-", color=style.ROUTE, linewidth=1.8, zorder=6, label="route")
     axes.plot(*route[1:-1].T, "o", color="white", mec=style.ROUTE, markersize=4.5, zorder=7, label="waypoint")

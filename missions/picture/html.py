@@ -149,7 +149,7 @@ def _ground(scene: Scene, *, blocks: bool) -> Iterator[go.Scatter]:
 def _lines(scene: Scene) -> Iterator[go.Scatter]:
     yield _area(
         scene.envelope,
-        "driven (foreseen)",
+        "predicted track",
         fillcolor=_transparent(style.ENVELOPE, 0.45),
         line={"color": style.ROUTE, "width": 0.5},
     )

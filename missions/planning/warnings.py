@@ -77,14 +77,14 @@ def drive_remarks(
         return []
     warnings = list(beyond_measured(vehicle, slowest_mps))
     if heading_deg is None:
-        warnings.append("the vehicle's heading is not told: it is taken to face along the first leg")
+        warnings.append("heading unknown; assuming the rover faces along the first leg")
     assumed = [f"{one.parameter} {one.value:g}" for one in vehicle.assumed if one.parameter in _DRIVEN_BY]
     if assumed:
-        warnings.append(f"how the vehicle drives is not told in full; taken as {', '.join(assumed)}")
+        warnings.append(f"parameters unknown; assuming {', '.join(assumed)}")
     # Half a centimetre is not worth a warning; chosen, not measured.
     if asked.allowance_m and driven_m < asked.promised_m - 0.005 and not found.lead_away:
         warnings.append(
-            f"the drive model foresees {metres(driven_m)} at the nearest while driving, less than the {metres(asked.promised_m)} promised "
+            f"the drive model predicts {metres(driven_m)} at the nearest while driving, less than the {metres(asked.promised_m)} promised "
             f"with an allowance of {asked.allowance_m:g} m"
         )
     return warnings

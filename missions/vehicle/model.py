@@ -75,7 +75,7 @@ class Assumed:
     value: float
 
     def __str__(self) -> str:
-        return f"{self.parameter} is not known; taken as {self.value:g}"
+        return f"{self.parameter} unknown; assuming {self.value:g}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,8 +25,8 @@ def parameter_remarks(situation: Situation) -> list[str]:
 def no_number_remarks(no_numbers: Mapping[str, str], parameters: Mapping[str, float]) -> list[str]:
     """Return which parameters came as no number, and what counts in their place."""
     remarks = [
-        f"{name} came as {came}, which is no number: "
-        + (f"it stays at {parameters[name]:g}, as it was told before" if name in parameters else "not known")
+        f"{name} came as {came}, which is not a number: "
+        + (f"it stays at {parameters[name]:g}, its last value" if name in parameters else "not known")
         for name, came in no_numbers.items()
     ]
     more = len(remarks) - _MOST_NAMED

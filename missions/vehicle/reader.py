@@ -35,7 +35,7 @@ def real_number(
     if value is None:
         return default
     if not math.isfinite(value):
-        raise VehicleError(f"{name} is {value}, which is no number", parameter=name, value=value)
+        raise VehicleError(f"{name} is {value}, which is not a number", parameter=name, value=value)
     if not least <= value <= most:
         raise VehicleError(
             f"{name} is {value:g}; possible are {least:g} to {most:g}",

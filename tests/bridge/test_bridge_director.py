@@ -566,7 +566,7 @@ def test_a_parameter_that_comes_as_no_number_while_it_drives_is_told_once_and_ch
     matters = name.startswith("FENCE_")
     assert len(told) == matters
     if matters:
-        assert told[0].text.startswith(f"{name} came as {came}, which is no number: it stays at ")
+        assert told[0].text.startswith(f"{name} came as {came}, which is not a number: it stays at ")
     run.run_until(lambda: run.director.state is State.ARRIVED)
 
 

@@ -140,7 +140,7 @@ def test_a_plan_waits_for_the_fix_but_not_for_ever():
     )
     assert late.run() is State.DONE
     assert late.director.situation.fix.value.error_m == 0.3
-    assert any("0.3 m are kept on top" in text for text in late.director.plan.warnings)
+    assert any("0.3 m added to the clearance" in text for text in late.director.plan.warnings)
     never = conductor(rover())
     never.down.push = _without(never.down.push, m.GpsRawInt)
     assert never.run() is State.DONE
@@ -171,7 +171,7 @@ def test_somebody_else_takes_the_vehicle_out_of_auto():
     run.meddle = hold
     assert run.run() is State.FAILED
     assert isinstance(run.director.trouble, OutcomeError)
-    assert "went to HOLD by itself or by somebody unseen" in str(run.director.trouble)
+    assert "went to HOLD by itself or by somebody unheard, such as a transmitter" in str(run.director.trouble)
     assert vehicle.mode == HOLD_MODE
 
 

@@ -58,7 +58,7 @@ def test_a_disarmed_vehicle_that_somebody_left_in_auto_is_told_of():
     run = conductor(request=ONE_JOB, once=True)
     run.vehicles[0].rover.mode = type(run.vehicles[0].mode)(AUTO_MODE)
     assert run.run() is State.FAILED
-    assert "(AUTO: arming it drives off)" in str(run.director.trouble)
+    assert "(AUTO: arming it makes it drive)" in str(run.director.trouble)
     assert modes_sent(run) == []
 
 
@@ -90,7 +90,9 @@ def test_disarmed_between_the_look_and_the_switch_it_is_put_back_to_hold(once, l
     wait(run, 6)
     vehicle = run.vehicles[0]
     assert (vehicle.mode, vehicle.is_armed) == (HOLD_MODE, False)
-    assert "the vehicle was disarmed by itself or by somebody unseen" in str(run.director.trouble)
+    assert "the vehicle was disarmed by itself or by somebody unheard, such as a transmitter" in str(
+        run.director.trouble
+    )
     place = vehicle.position
     unheard(run, ARM)
     wait(run, 5)
@@ -138,7 +140,7 @@ def test_a_vehicle_that_does_not_go_to_hold_is_told_of():
 
     run.up.push = deaf
     assert run.run() is State.FAILED
-    assert "it is in AUTO, arming it drives off" in str(run.director.trouble)
+    assert "it is in AUTO, where arming it makes it drive" in str(run.director.trouble)
 
 
 @pytest.mark.parametrize("once", [True, False])

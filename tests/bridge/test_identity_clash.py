@@ -18,7 +18,7 @@ from missions.request import Request
 OURS = (1, 195)
 HEARTBEAT = m.Heartbeat(6, 8)
 HARMLESS = (m.Statustext, m.CommandAck)
-TOLD = "somebody else has our ids (system 1 component 195)"
+TOLD = "another program on the link uses our ids (system 1 component 195)"
 
 
 def spoof(run, message: m.Message = HEARTBEAT, count: int = 1) -> None:
@@ -65,7 +65,7 @@ def test_a_flood_while_it_drives_is_one_event_and_one_hold():
     (told,) = clashes(run)
     assert told.severity is Severity.CRITICAL
     assert told.data == {"system": 1, "component": 195, "held": True}
-    assert told.text == f"{TOLD}; HOLD; nothing more is done until a target is typed; clicks are not heeded"
+    assert told.text == f"{TOLD}; HOLD; nothing more is done until a target is typed; clicks are ignored"
     assert [message.param2 for message in asked_of_vehicle(run, since)] == [HOLD_MODE]
     assert run.director.state is State.CLASHED
     assert run.director.drive is None
@@ -283,7 +283,7 @@ def test_at_the_start_it_is_refused(orders, once):
     assert run.director.state is State.FAILED
     assert isinstance(run.director.trouble, IdentityTakenError)
     assert str(run.director.trouble) == (
-        "somebody on the link already speaks as system 1 component 195; choose others with --source-system and --source-component"
+        "another program on the link already uses system 1 component 195, perhaps another pbpp command; choose other ids with --source-component (or --source-system)"
     )
     assert run.sent == []
 

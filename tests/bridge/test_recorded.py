@@ -149,7 +149,7 @@ def test_which_vehicle_is_meant(tmp_path: Path) -> None:
     with pytest.raises(LogError, match=r"two\.tlog: system 7 was not heard, only system 1 "):
         situation_from_log(two, 7)
     copter = write_log(tmp_path / "copter.tlog", ((1, 1), heartbeat(2)), ((1, 1), place))
-    with pytest.raises(LogError, match=r"system 1 \(MAV_TYPE 2\) is no rover .*--any-vehicle"):
+    with pytest.raises(LogError, match=r"system 1 \(MAV_TYPE 2\) is not a rover or boat .*--any-vehicle"):
         situation_from_log(copter)
     assert situation_from_log(copter, any_vehicle=True).pose is not None
     beside = write_log(tmp_path / "beside.tlog", ((1, 1), heartbeat(10)), ((2, 1), heartbeat(2)))

@@ -95,10 +95,10 @@ def test_a_leg_that_is_only_near_says_how_near(tmp_path, yard):
     result = run("check", "--mission", made, "--clearance", "3")
     assert result.exit_code == 8
     said = re.search(
-        r"BREAKS: leg . → . comes (\d\.\d\d) m near exclusion polygon \d while driving", result.stdout
+        r"BREAKS: leg . → . comes within (\d\.\d\d) m of exclusion polygon \d while driving", result.stdout
     )
     assert 2 <= float(said[1]) < 3
-    worst = min(float(near) for near in re.findall(r"comes (\d\.\d\d) m near", result.stdout))
+    worst = min(float(near) for near in re.findall(r"comes within (\d\.\d\d) m of", result.stdout))
     assert worst == pytest.approx(planned["driven_clearance_m"], abs=0.01)
 
 
@@ -149,7 +149,7 @@ def test_a_live_vehicle_is_asked(fields, yard, streams):
         # The fix is good to 0.3 m: kept on top of what is promised, it is more than FENCE_MARGIN and its reserve ask for.
         assert document["clearance_m"] == 2
         assert document["legs"][-1]["asked_m"] == pytest.approx(2.3)
-        assert any("0.3 m are kept on top" in text for text in document["warnings"])
+        assert any("0.3 m added to the clearance" in text for text in document["warnings"])
         assert document["system"] == 1
         assert document["legs"][0]["start"] == pytest.approx(away, abs=1e-5)
         assert not any("did not tell its position" in text for text in document["warnings"])
@@ -363,7 +363,10 @@ def test_a_fence_that_changes_on_the_way_stops_a_repaired_mission(tmp_path, fiel
         orders = Orders(
             identity=(245, 190), request=request, upload=True, drive=True, target_sources=frozenset()
         )
-        with open_link(simulator.connection) as link, pytest.raises(SituationError, match="not begun anew"):
+        with (
+            open_link(simulator.connection) as link,
+            pytest.raises(SituationError, match="not started again"),
+        ):
             conduct(link, orders, quiet=True, on_frames=meddle)
         assert is_changed
         assert simulator.vehicle.mode == HOLD_MODE
@@ -446,7 +449,8 @@ def test_a_start_from_which_rovers_back_into_the_fence_is_a_danger(tmp_path):
     result = run(*asked)
     assert result.exit_code == 8
     assert (
-        "DANGER: the start is 1.11 m from inclusion polygon 1, nearer than FENCE_MARGIN 2 m" in result.output
+        "DANGER: the start is 1.11 m from inclusion polygon 1, nearer than FENCE_MARGIN (2 m) plus 0.05 m"
+        in result.output
     )
     document = document_of(*asked, code=8)
     assert (document["status"], document["broken"], len(document["dangers"])) == ("failed", 0, 1)

@@ -29,7 +29,7 @@ from missions.formats.waypoints import format_items
 
 OURS = (245, 190)
 OLD, NEW = plain_mission(25, salt=1), plain_mission(20)
-WARNING = "somebody else"
+WARNING = "uses our ids"
 
 
 @pytest.fixture(autouse=True)
@@ -106,7 +106,7 @@ def test_an_upload_that_has_begun_goes_on_to_its_verified_end_and_says_so_once(r
     assert json.loads(result.stdout)["verified"] is True
     assert is_held(rover, NEW)
     assert result.stderr.count(WARNING) == 1
-    assert "warning: somebody else on the link has our ids (system 245 component 190)" in result.stderr
+    assert "warning: another program on the link uses our ids (system 245 component 190)" in result.stderr
 
 
 def test_an_upload_is_not_driven_then(rover, forge, mission_file):
@@ -116,7 +116,7 @@ def test_an_upload_is_not_driven_then(rover, forge, mission_file):
     document = json.loads(result.stdout)
     assert (result.exit_code, document["error"]) == (7, "OutcomeError")
     assert document["message"] == (
-        "somebody else has our ids (system 245 component 190): the vehicle is not switched to AUTO; what was uploaded is on it"
+        "another program on the link uses our ids (system 245 component 190): the vehicle is not switched to AUTO; what was uploaded is on it"
         "; written and verified before: mission"
     )
     assert is_held(rover, NEW)

@@ -70,7 +70,7 @@ def test_a_mission_drawn_by_hand_is_kept_once(hand_made, tmp_path):
     planning = ("plan", "--fence", hand_made, *WHERE, "-o", hand_made)
     result = run(*planning)
     assert (
-        f"warning: {hand_made} was not written by pbpp, or was changed since: kept as {hand_made}.bak\n"
+        f"warning: {hand_made} was not written by pbpp, or was changed since; the old file is kept as {hand_made}.bak\n"
         in result.stderr
     )
     assert (tmp_path / "mine.plan.bak").read_bytes() == drawn
@@ -177,7 +177,7 @@ class TestDownloads:
         path = tmp_path / "field.plan"
         for what in ("mission", "fence"):
             result = run("download", what, "--connect", rover.connection, "--timeout", 10, "-o", path)
-        assert f"warning: {path} loses its mission: kept as {path}.bak\n" in result.stderr
+        assert f"warning: {path} loses its mission; the old file is kept as {path}.bak\n" in result.stderr
         kept = tmp_path / "mission.plan"
         shutil.copy(tmp_path / "field.plan.bak", kept)
         assert read_situation(kept).mission.value.items == HAND_MADE.mission.value.items
@@ -190,7 +190,7 @@ def test_a_mission_that_was_only_converted_is_kept_from_a_planned_one(tmp_path):
     run(*converting)
     assert "kept as" not in run(*converting).stderr
     planning = ("plan", "--fence", output, *WHERE, "-o", output)
-    assert f"{output} loses its mission: kept as {output}.bak" in run(*planning).stderr
+    assert f"{output} loses its mission; the old file is kept as {output}.bak" in run(*planning).stderr
     assert "kept as" not in run(*planning).stderr
 
 
@@ -205,7 +205,7 @@ def test_rally_points_of_a_plan_of_ours_are_kept_from_one_without(tmp_path, hand
     output = tmp_path / "out.plan"
     run("plan", "--fence", hand_made, *WHERE, "-o", output)
     result = run("plan", "--fence", MAZE, *WHERE, "-o", output)
-    assert f"{output} loses its rally points: kept as {output}.bak" in result.stderr
+    assert f"{output} loses its rally points; the old file is kept as {output}.bak" in result.stderr
 
 
 def test_an_empty_file_is_nobodys(tmp_path):
@@ -286,6 +286,6 @@ def test_a_file_that_grows_follows_no_link(tmp_path):
 @pytest.mark.skipif(os.name != "posix", reason="pipes in folders are POSIX's")
 def test_a_file_that_grows_takes_no_pipe_away(tmp_path):
     os.mkfifo(tmp_path / "demo.tlog")
-    with pytest.raises(MissionFormatError, match="it is no regular file"):
+    with pytest.raises(MissionFormatError, match="it is not a regular file"):
         kept_files.make_room(tmp_path / "demo.tlog")
     assert (tmp_path / "demo.tlog").is_fifo()

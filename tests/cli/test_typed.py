@@ -36,7 +36,7 @@ def test_a_yes_to_a_plan_that_waits_for_it():
     run.director.confirm(run.now_s)
     typed = understood("yes", run.director)
     assert not typed.is_taken
-    assert typed.answer == "nothing to confirm: no plan waits for it"
+    assert typed.answer == "nothing to confirm: no plan is proposed"
 
 
 @pytest.mark.parametrize(
@@ -44,7 +44,7 @@ def test_a_yes_to_a_plan_that_waits_for_it():
     [
         ({}, "without --upload plans are only reported"),
         ({"upload": True}, "plans are uploaded without a yes (--confirm waits for it)"),
-        ({"upload": True, "confirm": True}, "no plan waits for it"),
+        ({"upload": True, "confirm": True}, "no plan is proposed"),
     ],
 )
 def test_a_yes_to_nothing(orders, why):
@@ -54,7 +54,7 @@ def test_a_yes_to_nothing(orders, why):
 def test_targets_are_taken_also_before_a_vehicle_is_heard():
     typed = understood("40.0720926, -105.2286152", Director(Orders()))
     assert typed.target == FAR
-    assert typed.answer == f"target {FAR} taken: gone into as soon as a vehicle is heard"
+    assert typed.answer == f"target {FAR} taken: planned as soon as a vehicle is heard"
     run = ready(conductor(drive=False))
     assert understood(str(FAR), run.director).answer == f"target {FAR} taken"
 
@@ -64,7 +64,7 @@ def test_other_words_are_told_what_can_be_typed(line):
     typed = understood(line, Director(Orders()))
     assert not typed.is_taken
     assert typed.answer.startswith("not understood: ")
-    assert "LAT,LON gives a target, yes uploads a plan" in typed.answer
+    assert "type LAT,LON for a target, or yes to upload" in typed.answer
     assert typed.answer.isprintable()
     assert len(typed.answer) < 250
 
@@ -128,10 +128,10 @@ def test_an_answer_stays_in_the_view():
     run = proposed()
     text = io.StringIO()
     with LiveView(run.director, Console(file=text, force_terminal=True, width=140, height=60)) as view:
-        view.answer("nothing to confirm: no plan waits for it", is_warning=True)
+        view.answer("nothing to confirm: no plan is proposed", is_warning=True)
         text.truncate(0)
         view.show(run.now_s + 1)
-    assert "nothing to confirm: no plan waits for it" in text.getvalue()
+    assert "nothing to confirm: no plan is proposed" in text.getvalue()
 
 
 class Watcher:

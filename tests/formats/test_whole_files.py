@@ -82,7 +82,7 @@ def test_a_link_is_replaced_and_what_it_leads_to_is_left_alone(tmp_path, aim):
 def test_what_is_no_file_is_not_replaced(tmp_path):
     (tmp_path / "folder.plan").mkdir()
     os.mkfifo(tmp_path / "pipe.plan")
-    for name, why in (("folder.plan", "Is a directory"), ("pipe.plan", "it is no regular file")):
+    for name, why in (("folder.plan", "Is a directory"), ("pipe.plan", "it is not a regular file")):
         with pytest.raises(MissionFormatError, match=f"{name} cannot be written: {why}"):
             write_file(tmp_path / name, b"new")
     assert names(tmp_path) == ["folder.plan", "pipe.plan"]

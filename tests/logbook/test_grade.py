@@ -184,7 +184,7 @@ def test_what_the_drive_model_does_not_know_is_said(command, tmp_path):
     (grade,) = read(log, tmp_path).grades
     assert grade.foreseen is None
     assert grade.is_as_foreseen is None
-    assert "nothing is foreseen" in grade.notes[0]
+    assert "no prediction" in grade.notes[0]
 
 
 def test_a_drive_that_began_moving_is_noted(tmp_path):

@@ -266,7 +266,7 @@ class TestStarts:
 
     def test_without_a_heading_the_first_leg_is_taken_and_said(self) -> None:
         result = plan(situation_of(FIELD, WALL), Request(place(-50, 0), (place(50, 0),), 2.0))
-        assert any("heading is not told" in warning for warning in result.warnings)
+        assert any("heading unknown" in warning for warning in result.warnings)
         assert_driven(result, None)
 
 

@@ -317,8 +317,8 @@ def test_margins_come_from_the_parameters() -> None:
         assert result.clearance_m == clearance_m
         assert result.driven_clearance_m >= clearance_m
         assert_keeps(result, clearance_m)
-    assert "FENCE_MARGIN is not known; taken as 2" in result.warnings
-    assert any("taken as" in warning and "WP_RADIUS 2" in warning for warning in result.warnings)
+    assert "FENCE_MARGIN unknown; assuming 2" in result.warnings
+    assert any("assuming" in warning and "WP_RADIUS 2" in warning for warning in result.warnings)
 
 
 def test_a_clearance_within_the_fence_margin_is_warned_of() -> None:

@@ -41,7 +41,7 @@ def test_a_steered_rover_is_not_sent_from_there(away_m) -> None:
     with pytest.raises(StartBlockedError) as caught:
         route(10 - away_m)
     assert str(caught.value) == (
-        f"the start is {away_m:.2f} m from exclusion polygon 1, nearer than FENCE_MARGIN 2 m and 0.05 m to a fence that the vehicle avoids: from there it "
+        f"the start is {away_m:.2f} m from exclusion polygon 1, nearer than FENCE_MARGIN (2 m) plus 0.05 m to a fence that the vehicle avoids: from there it "
         "backs up, and measured rovers backed into the fence (29 of 42 starts, whichever way they headed)"
     )
     assert caught.value.details["advice"] == (
@@ -71,7 +71,7 @@ def test_it_leaves_where_its_avoidance_does_not_reach(parameters) -> None:
 
 
 def test_the_flat_margin_counts_where_it_is_the_larger() -> None:
-    with pytest.raises(StartBlockedError, match="nearer than FENCE_MARGIN_XY 3 m"):
+    with pytest.raises(StartBlockedError, match=r"nearer than FENCE_MARGIN_XY \(3 m\)"):
         route(7.5, FENCE_MARGIN_XY=3.0)
 
 

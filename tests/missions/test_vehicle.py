@@ -71,11 +71,11 @@ def test_a_vehicle_whose_parameters_are_all_known() -> None:
 def test_what_is_not_known_is_told_with_the_default_used() -> None:
     vehicle = vehicle_from_parameters({})
     assert {str(one) for one in vehicle.assumed} >= {
-        "WP_RADIUS is not known; taken as 2",
-        "WP_SPEED is not known; taken as 2",
-        "TURN_RADIUS is not known; taken as 0.9",
-        "SERVO1_FUNCTION is not known; taken as 26",
-        "FENCE_ENABLE is not known; taken as 0",
+        "WP_RADIUS unknown; assuming 2",
+        "WP_SPEED unknown; assuming 2",
+        "TURN_RADIUS unknown; assuming 0.9",
+        "SERVO1_FUNCTION unknown; assuming 26",
+        "FENCE_ENABLE unknown; assuming 0",
     }
     assert vehicle == Vehicle(assumed=vehicle.assumed)
 
@@ -137,7 +137,7 @@ def test_no_pivot_angle_no_pivots() -> None:
     ("parameters", "message"),
     [
         ({"WP_RADIUS": -1.0}, "WP_RADIUS is -1; possible are 0 to 1000"),
-        ({"WP_SPEED": math.nan}, "WP_SPEED is nan, which is no number"),
+        ({"WP_SPEED": math.nan}, "WP_SPEED is nan, which is not a number"),
         ({"PSC_POS_P": 0.0}, "PSC_POS_P is 0; possible are 0.01 to 100"),
         ({"WP_SPEED": 0.0, "CRUISE_SPEED": 0.0}, "would not move"),
         ({"RA_MAX_STR_ANG": 1.6}, "RA_MAX_STR_ANG is 1.6 rad"),
@@ -246,7 +246,7 @@ def test_a_footprint_that_is_none(sizes: tuple[float, float]) -> None:
 @pytest.mark.parametrize("value", [1e38, -1.0, 32_768.0, math.nan, math.inf])
 @pytest.mark.parametrize("name", ["FENCE_TYPE", "FENCE_OPTIONS", "FENCE_ACTION", "AVOID_ENABLE", "OA_TYPE"])
 def test_a_bit_mask_or_enumeration_that_is_none_is_refused(name: str, value: float) -> None:
-    with pytest.raises(VehicleError, match=f"{name} is .*(possible are 0 to 32767|no number)"):
+    with pytest.raises(VehicleError, match=f"{name} is .*(possible are 0 to 32767|not a number)"):
         vehicle_from_parameters({name: value})
 
 
@@ -259,7 +259,7 @@ def test_a_bit_mask_or_enumeration_that_is_none_is_refused(name: str, value: flo
     ],
 )  # fmt: skip
 def test_a_quantity_that_is_none_is_refused(name: str, value: float) -> None:
-    with pytest.raises(VehicleError, match=f"{name} is .*(possible are|no number)"):
+    with pytest.raises(VehicleError, match=f"{name} is .*(possible are|not a number)"):
         vehicle_from_parameters({name: value})
 
 

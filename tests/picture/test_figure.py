@@ -136,7 +136,7 @@ def test_what_the_legend_tells(plans: dict[str, Plan]) -> None:
     (legend,) = figure.legends
     assert {text.get_text() for text in legend.get_texts()} == {
         "outside", "nearer to a fence than the route", "exclusion", "inclusion", "block",
-        "driven (foreseen)", "route", "waypoint", "driven", "start", "target",
+        "predicted track", "route", "waypoint", "driven", "start", "target",
     }  # fmt: skip
     assert problems(figure, Scene(plans["yard"], track)) == []
     plain = {text.get_text() for text in plan_figure(Scene(plans["yard"])).legends[0].get_texts()}

@@ -95,7 +95,7 @@ def test_what_is_drawn_where(plans: dict[str, Plan]) -> None:
     assert named["target"][0].hovertext[1] == f"target 2<br>{scene.plan.targets[1]}"
     assert len(named["waypoint"][0].x) == len(scene.route) - 2
     assert named["waypoint"][0].hovertext[0].startswith(f"waypoint 1<br>{scene.plan.path[1]}<br>after ")
-    assert {"block", "driven", "driven (foreseen)", "start", "outside", "inclusion"} <= set(named)
+    assert {"block", "driven", "predicted track", "start", "outside", "inclusion"} <= set(named)
     single = html_figure(Scene(plans["maze"]))
     assert [trace.marker.symbol for trace in single.data if trace.name == "target"] == ["star"]
     assert not {"block", "driven"} & {trace.name for trace in single.data}

@@ -140,6 +140,16 @@ def test_fences_and_rally_points(rover, tmp_path, fields, kind, name):
         assert document["lists"][0]["pushes"] == 0
 
 
+def test_a_fence_for_an_armed_vehicle_comes_with_a_warning(rover, tmp_path, fields):
+    fence = fields / "yard-fence.waypoints"
+    assert "takes effect at once" not in run(rover, "upload", fence)[2]
+    rover.vehicle.rover.is_armed = True
+    code, _, output = run(rover, "upload", fence)
+    assert code == 0
+    assert "warning: the vehicle is armed, and a new fence takes effect at once" in output
+    assert "takes effect at once" not in run(rover, "upload", mission_file(tmp_path))[2]
+
+
 def test_rally_points_keep_their_altitude(rover, tmp_path):
     points = (RallyPoint(40.0714, -105.2299, 12.0), RallyPoint(40.0715, -105.2298, -3.0))
     file = tmp_path / "rally.waypoints"
@@ -454,6 +464,6 @@ def test_an_autopilot_that_is_not_ardupilot_is_refused_by_every_command(
     code, document, _ = run(rover, *arguments, "--json")
     assert (code, document["error"]) == (5, "VehicleNotFoundError")
     assert document["message"] == (
-        "the autopilot of system 1 is not ArduPilot (PX4): for now only ArduPilot is served"
+        "the autopilot of system 1 is not ArduPilot (PX4): only ArduPilot is supported for now"
     )
     assert document["details"]["autopilot"] == 12

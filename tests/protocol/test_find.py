@@ -95,7 +95,7 @@ def test_whoever_has_our_ids_is_refused_at_once():
     assert script.machine.state is FindState.NOT_FOUND
     assert isinstance(script.machine.trouble, IdentityTakenError)
     assert str(script.machine.trouble) == (
-        "somebody on the link already speaks as system 245 component 190; choose others with --source-system and --source-component"
+        "another program on the link already uses system 245 component 190, perhaps another pbpp command; choose other ids with --source-component (or --source-system)"
     )
     assert script.machine.vehicle is None
 

@@ -95,6 +95,17 @@ def test_clients_hear_each_other_unless_it_is_for_the_vehicle():
         assert first.recv_match(type="MISSION_REQUEST_LIST") is None
 
 
+def test_what_clients_hear_of_each_other_is_byte_for_byte_as_it_was_sent():
+    """With numbers of the link's own, another program with our ids would pass for an echo of ours."""
+    with Simulator(QUIET, LOOPBACK) as simulator, client(simulator) as one, client(simulator, 245) as other:
+        for link in (one, other):
+            heard(link, "HEARTBEAT")
+        other.mav.seq = 77
+        other.mav.heartbeat_send(6, 8, 0, 0, 5)
+        message = heard(one, "HEARTBEAT", system_status=5)
+        assert (message.get_srcSystem(), message.get_seq()) == (245, 77)
+
+
 def test_a_client_that_leaves_is_forgotten_and_another_may_come():
     with Simulator(SimulatorConfig(), LOOPBACK) as simulator:
         for _ in range(2):

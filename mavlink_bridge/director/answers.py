@@ -60,11 +60,3 @@ class Answers:
         if command == Command.DO_REPOSITION:
             self._said[asker] = result
         self._send(m.CommandAck(command, result, target_system=asker[0], target_component=asker[1]))
-
-
-def is_command_to(frame: Frame, identity: tuple[int, int], system: int | None) -> bool:
-    """Tell whether a frame is a command for our own component, not for the vehicle's autopilot or for everyone."""
-    message = frame.message
-    if not isinstance(message, m.CommandInt | m.CommandLong) or message.target_component != identity[1]:
-        return False
-    return message.target_system in (0, identity[0], system) and (frame.system, frame.component) != identity

@@ -9,6 +9,7 @@ import numpy as np
 from shapely import LineString, Point, prepare
 
 from mavlink_bridge.director.events import EventName
+from mavlink_bridge.director.voice import metres
 from mavlink_bridge.mavlink import messages as m
 from missions.geo import from_e7
 
@@ -100,8 +101,32 @@ class DriveWatch:
     def tell_progress(self, now_s: float) -> None:
         """Tell how far the drive is."""
         self.progress_due_s = now_s + PROGRESS_EVERY_S
-        if self._place is not None:
-            self._voice.progress(now_s, self, self._place)
+        if self._place is None:
+            return
+        self._voice.tell(
+            now_s,
+            EventName.PROGRESS,
+            f"{self.distance_left_m:.0f} m left",
+            self.item,
+            round(self.distance_left_m, 1),
+            round(self.time_left_s, 1),
+            metres(self.least_clearance_m),
+            round(self.deviation_m, 2),
+            list(self._place),
+        )
+
+    def tell_arrival(self, now_s: float, *, holds: bool) -> None:
+        """Tell the end of the drive, and whether the vehicle is switched to HOLD."""
+        took_s = now_s - self.begun_s
+        self._voice.tell(
+            now_s,
+            EventName.ARRIVED,
+            f"arrived after {self.driven_m:.0f} m in {took_s:.0f} s{'; HOLD' if holds else ''}",
+            round(self.driven_m, 2),
+            round(took_s, 1),
+            metres(self.least_clearance_m),
+            self.breaches,
+        )
 
     def _take_current(self, message: m.MissionCurrent) -> None:
         if message.seq != self._current_seq:  # told again and again, also just after it was reached

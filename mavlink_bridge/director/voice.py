@@ -10,11 +10,9 @@ from mavlink_bridge.director.events import Event, EventName
 from missions.words import metres as metres_text
 
 if TYPE_CHECKING:
-    from mavlink_bridge.director.drive_watch import DriveWatch
     from mavlink_bridge.mavlink.messages import Statustext
     from missions.checking.recheck import Recheck
     from missions.errors import MissionError
-    from missions.geo import LatLon
     from missions.planned import Plan
     from missions.situation import Situation
 
@@ -42,12 +40,12 @@ class Voice:
         return self._announcer.deadline_s
 
     def take_events(self) -> list[Event]:
-        """Give and forget what was told."""
+        """Return and forget what was told."""
         events, self._events = self._events, []
         return events
 
     def due(self, now_s: float) -> list[Statustext]:
-        """Give the texts that may go now."""
+        """Return the texts that may go now."""
         return self._announcer.due(now_s)
 
     def tell(self, now_s: float, name: EventName, text: str, *values: object) -> None:
@@ -103,34 +101,7 @@ class Voice:
         )
         self.tell(now_s, name, text, metres(found.clearance_m), round(found.asked_m, 3), found.fence)
 
-    def progress(self, now_s: float, drive: DriveWatch, position: LatLon) -> None:
-        """Tell how far a drive is."""
-        self.tell(
-            now_s,
-            EventName.PROGRESS,
-            f"{drive.distance_left_m:.0f} m left",
-            drive.item,
-            round(drive.distance_left_m, 1),
-            round(drive.time_left_s, 1),
-            metres(drive.least_clearance_m),
-            round(drive.deviation_m, 2),
-            list(position),
-        )
-
-    def arrived(self, now_s: float, drive: DriveWatch, *, holds: bool) -> None:
-        """Tell the end of a drive, and whether the vehicle is switched to HOLD."""
-        took_s = now_s - drive.begun_s
-        self.tell(
-            now_s,
-            EventName.ARRIVED,
-            f"arrived after {drive.driven_m:.0f} m in {took_s:.0f} s{'; HOLD' if holds else ''}",
-            round(drive.driven_m, 2),
-            round(took_s, 1),
-            metres(drive.least_clearance_m),
-            drive.breaches,
-        )
-
 
 def metres(value_m: float) -> float | None:
-    """Give a length for JSON, to the millimetre; None for an infinite one."""
+    """Return a length for JSON, to the millimetre; None for an infinite one."""
     return round(value_m, 3) if math.isfinite(value_m) else None

@@ -6,12 +6,12 @@ simulator and in tests.
 
 How it is built
 ---------------
-The director holds parts; each has one concern, and they share a `Core` (state, situation, peer, orders, target, plan, the machine that runs, the
-voice). A frame goes to the parts in one order, `Parts.hearers`, and time in another, `Parts.timed`. A part may use the core and the parts it was made with; it
-never calls one that was made after it. What others must act upon it returns as signals: a `Cue` moves the state where the table in `states` lists it
-and is ignored where it does not; a `Notice` leaves the state alone. Both are looked up in `handlers.HANDLERS`, and what a handler
-returns is heeded before anything else happens. So nothing changes the state but the table, and all that one part leads to in another stands in
-`handlers`.
+The director holds parts; each has one concern, and they share a `Core` (state, situation, peer, orders, target, plan, the machine that runs,
+the voice). A frame goes to the parts in one order, `Parts.hearers`, and time in another, `Parts.timed`. A part may use the core and the parts it
+was made with; it never calls one that was made after it. What others must act upon it returns as signals: a `Cue` moves the state where the table
+in `states` lists it, and is ignored where it does not; a `Notice` leaves the state alone. Both are looked up in `handlers.HANDLERS`, and what a
+handler returns is heeded before anything else happens. So nothing changes the state but the table, and all that one part leads to in another stands
+in `handlers`.
 
 ==================  ===================================================================================================
 `Learner`           finds the vehicle, learns it, notices silence and reboots
@@ -29,19 +29,21 @@ returns is heeded before anything else happens. So nothing changes the state but
 Who may act when
 ----------------
 Three parts make the vehicle do something. `Halter` sends HOLD, in any state in which the orders let it, and its messages go out before all others.
-`Starter` arms and switches to AUTO, in STARTING alone: after a verified upload, a last reading of what somebody may have changed, and a
-heartbeat that shows HOLD by our doing. `MissionWriter` writes, in UPLOADING alone, which it leaves only with the mission verified, the old one put back, or
-the trouble told. (`HandOver` sends HOLD to a vehicle that was disarmed in our AUTO, for arming it would set it going.) No other part sends anything but
-questions. One machine runs at a time (`Steps`); whatever drops what is wanted drops it too, but for an upload that is under way.
+`Starter` arms and switches to AUTO, in STARTING alone: after a verified upload, a last reading of what somebody may have changed, and a heartbeat
+that shows HOLD by our doing. `MissionWriter` begins to write in UPLOADING alone, which ends only with the mission verified, the old one put back, or
+the trouble told. (`HandOver` sends HOLD to a vehicle that was disarmed in our AUTO, for arming it would set it going.) No other part sends
+anything but questions, answers and texts. One machine runs at a time (`Steps`); whatever drops what is wanted drops it too, but for an upload that
+is under way.
 
 Why the operator wins
 ---------------------
-Each switch of ours tells `OperatorWatch` what to expect; anything else that a heartbeat shows, or that a ground station is overheard asking
-for, is somebody's will, whoever it was, and becomes TAKEN_OVER. All states in which something could still be done to the vehicle list that cue. Its
-handler drops the target, the drive, the HOLD under way and the machine that runs, before anything more is sent; an upload is finished or undone first,
-and nothing follows it. From LET_GO only a new target leads on, and `HandOver` hears each frame before `TargetInbox` does and before the machine
-that runs. A link that was lost, or a vehicle switched off and on, ends in watching, never in driving: somebody may have had the vehicle
-meanwhile. When somebody else speaks with our ids, not even targets by message count: only the keyboard does.
+Each switch of ours tells `OperatorWatch` what to expect; anything else that a heartbeat shows, or that a ground station is overheard asking for,
+is somebody's will, whoever it was, and becomes TAKEN_OVER. Every state in which something could still be done to the vehicle lists that cue (in a
+clash `IdentityGuard` sees to it). Its handler drops the target, the drive, the HOLD under way and the machine that runs, before anything more is
+sent; an upload is finished or undone first, and nothing follows it. From LET_GO only a new target leads on. `HandOver` hears each frame before
+`TargetInbox` does, and before the machine that runs: what would go on is dropped before it can. A link that was lost, or a vehicle switched off and
+on, leads to watching, and to driving only by a target given since: somebody may have had the vehicle meanwhile. When somebody else speaks with our ids,
+not even targets by message count: only the keyboard does.
 """
 
 from __future__ import annotations

@@ -63,7 +63,7 @@ class DriveSupervisor(Part):
         return [Cue.REACHED] if self.drive.has_arrived else []
 
     def handle_timer(self, now_s: float) -> Sequence[Signal]:
-        """Tell how far the drive is."""
+        """Report how far the drive is."""
         if self.drive is not None and now_s >= self.drive.progress_due_s:
             self.drive.tell_progress(now_s)
         return []
@@ -108,7 +108,7 @@ class DriveSupervisor(Part):
     # Ends
 
     def arrived(self, now_s: float) -> Sequence[Signal]:
-        """Tell the arrival, and hold the vehicle where we have started it and it is not to go on."""
+        """Report the arrival, and hold the vehicle where we have started it and it is not to go on."""
         assert self.drive is not None
         self.drive.tell_progress(now_s)
         self.holds_after_arrival = self._is_our_start and not self._goes_on_after_arrival

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from shapely import LineString, Point, prepare
@@ -27,6 +27,13 @@ _STANDING_MPS = 0.15
 _STANDING_S = 3.0
 _ACTIVE, _COMPLETE = 3, 5
 """MISSION_STATE_ACTIVE and _COMPLETE."""
+
+
+class _Here(NamedTuple):
+    """Where the vehicle is."""
+
+    place: LatLon
+    point: Point  # in the local frame of the plan's ground
 
 
 class DriveWatch:
@@ -61,8 +68,7 @@ class DriveWatch:
         self._line = LineString(self._points)
         self._band = plan.envelope.area
         prepare(self._band)
-        self._here: Point | None = None
-        self._place: LatLon | None = None
+        self._here: _Here | None = None
         self._is_outside = False
         self._standing_since_s: float | None = None
 
@@ -71,7 +77,7 @@ class DriveWatch:
         """What is left of the drawn lines."""
         rest = self._points[self._point :]
         legs_m = float(np.hypot(*np.diff(rest, axis=0).T).sum()) if len(rest) > 1 else 0.0
-        return legs_m + (self._here.distance(Point(rest[0])) if self._here else 0.0)
+        return legs_m + (self._here.point.distance(Point(rest[0])) if self._here else 0.0)
 
     @property
     def time_left_s(self) -> float:
@@ -99,9 +105,9 @@ class DriveWatch:
             self._count_breaches(message)
 
     def tell_progress(self, now_s: float) -> None:
-        """Tell how far the drive is."""
+        """Report how far the drive is."""
         self.progress_due_s = now_s + PROGRESS_EVERY_S
-        if self._place is None:
+        if self._here is None:
             return
         self._voice.tell(
             now_s,
@@ -112,11 +118,11 @@ class DriveWatch:
             round(self.time_left_s, 1),
             metres(self.least_clearance_m),
             round(self.deviation_m, 2),
-            list(self._place),
+            list(self._here.place),
         )
 
     def tell_arrival(self, now_s: float, *, holds: bool) -> None:
-        """Tell the end of the drive, and whether the vehicle is switched to HOLD."""
+        """Report the end of the drive, and whether the vehicle is switched to HOLD."""
         took_s = now_s - self.begun_s
         self._voice.tell(
             now_s,
@@ -145,14 +151,14 @@ class DriveWatch:
         self.item = self._plan.seqs[self._point]
 
     def _move(self, message: m.GlobalPositionInt, now_s: float) -> None:
-        self._place = from_e7(message.lat, message.lon)
-        here = Point(self._plan.ground.frame.to_local(self._place))
+        place = from_e7(message.lat, message.lon)
+        here = Point(self._plan.ground.frame.to_local(place))
         if self._here is not None:
-            self.driven_m += here.distance(self._here)
-        self._here = here
+            self.driven_m += here.distance(self._here.point)
+        self._here = _Here(place, here)
         self.least_clearance_m = min(self.least_clearance_m, self._plan.ground.clearance_m(here))
         self.deviation_m = here.distance(self._line)
-        self._notice_leaving(here, self._place, now_s)
+        self._notice_leaving(here, place, now_s)
         self._notice_standing(here, math.hypot(message.vx, message.vy) / 100, now_s)
 
     def _notice_leaving(self, here: Point, place: LatLon, now_s: float) -> None:

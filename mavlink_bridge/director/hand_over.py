@@ -90,7 +90,7 @@ class HandOver(Part):
     def account_for(
         self, taken: Takeover, so_far: str, now_s: float, *, was_in_auto: bool
     ) -> Sequence[Signal]:
-        """Tell who took the vehicle; the state has moved, and nothing is wanted any more.
+        """Report who took the vehicle; the state has moved, and nothing is wanted any more.
 
         Parameters
         ----------

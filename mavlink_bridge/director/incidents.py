@@ -174,7 +174,7 @@ class Incidents:
     def _tell_breach(
         self, new: int, breach_type: int | None, situation: Situation, now_s: float, *, is_new: bool = True
     ) -> None:
-        """Tell a breach, with its place and fence."""
+        """Report a breach, with its place and fence."""
         self._breach_told_s = now_s
         self._breaches += new
         mode = None
@@ -226,7 +226,7 @@ class Incidents:
 
 
 def _by(place: FencePlace | None) -> str:
-    """Say by which fence a place is."""
+    """Return in words by which fence a place is."""
     if place is None:
         return ""
     if place.beyond_m > 0:
@@ -238,7 +238,7 @@ def _by(place: FencePlace | None) -> str:
 
 
 def _at(pose: Known[Pose] | None, now_s: float) -> str:
-    """Say where it was, and how old that is where it is not of now."""
+    """Return in words where it was, and how old that is where it is not of now."""
     if pose is None:
         return ""
     age_s = 0.0 if pose.time_s is None else now_s - pose.time_s

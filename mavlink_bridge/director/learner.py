@@ -167,7 +167,7 @@ class Learner(Part):
     # Silence
 
     def fallen_silent(self, now_s: float) -> Sequence[Signal]:
-        """Tell that the vehicle is not heard any more."""
+        """Report that the vehicle is not heard any more."""
         self.core.voice.tell(
             now_s, EventName.LINK_LOST, f"link lost: no heartbeat for {_SILENCE_S:g} s", _SILENCE_S
         )

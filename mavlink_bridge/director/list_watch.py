@@ -109,7 +109,7 @@ class ListWatch(Part):
         return self.core.state in _AT_REST and not self.core.steps and self._may_ask
 
     def _tell_no_numbers(self, before: Situation, now_s: float) -> None:
-        """Tell of a parameter that came as no number, once; of those that matter here."""
+        """Report a parameter that came as no number, once; of those that matter here."""
         after = self.core.situation
         came = {
             name: text

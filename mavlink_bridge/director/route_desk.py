@@ -96,7 +96,7 @@ class RouteDesk(Part):
         self._moves = self.core.moves
 
     def no_plan(self, now_s: float) -> Sequence[Signal]:
-        """Tell why there is no plan."""
+        """Report why there is no plan."""
         assert isinstance(self._made, MissionError)
         self.core.voice.no_plan(now_s, self._made)
         return self.core.give_up(self._made)
@@ -143,6 +143,6 @@ class RouteDesk(Part):
         return [Notice.ROUTE_OUTDATED] if may_mend else []
 
     def broke(self, found: Recheck, now_s: float) -> Sequence[Signal]:
-        """Tell that the route is broken, and have it made anew before it is driven."""
+        """Report that the route is broken, and have it made anew before it is driven."""
         self.core.voice.rechecked(now_s, EventName.ROUTE_BROKEN, "the way from here", found)
         return [Notice.ROUTE_OUTDATED]

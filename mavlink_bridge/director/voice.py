@@ -49,18 +49,18 @@ class Voice:
         return self._announcer.due(now_s)
 
     def tell(self, now_s: float, name: EventName, text: str, *values: object) -> None:
-        """Tell an event; the values are those of its schema, in order."""
+        """Report an event; the values are those of its schema, in order."""
         event = Event.of(now_s, name, text, values)
         self._events.append(event)
         if self._announce and name not in _NOT_ANNOUNCED:
             self._announcer.say(event.severity, text)
 
     def error(self, now_s: float, name: EventName, error: Exception, details: object) -> None:
-        """Tell an error."""
+        """Report an error."""
         self.tell(now_s, name, str(error), type(error).__name__, details)
 
     def learnt(self, now_s: float, situation: Situation) -> None:
-        """Tell what is known of the vehicle."""
+        """Report what is known of the vehicle."""
         fence, mission, pose = situation.fence, situation.mission, situation.pose
         zones = len(fence.value.zones) if fence else 0
         items = len(mission.value.items) if mission else 0
@@ -76,7 +76,7 @@ class Voice:
         )
 
     def planned(self, now_s: float, plan: Plan) -> None:
-        """Tell a plan."""
+        """Report a plan."""
         self.tell(
             now_s,
             EventName.PLANNED,
@@ -91,11 +91,11 @@ class Voice:
         )
 
     def no_plan(self, now_s: float, error: MissionError) -> None:
-        """Tell why there is no plan."""
+        """Report why there is no plan."""
         self.error(now_s, EventName.NO_PLAN, error, dict(error.details))
 
     def rechecked(self, now_s: float, name: EventName, what: str, found: Recheck) -> None:
-        """Tell that lines do not keep what they have to."""
+        """Report that lines do not keep what they have to."""
         text = (
             f"{what} keeps {metres_text(found.clearance_m)} of {metres_text(found.asked_m)} ({found.fence})"
         )

@@ -284,6 +284,5 @@ class Director:
         for signal in signals:
             if isinstance(signal, Cue) and not self._core.move(signal):
                 continue
-            handler = HANDLERS.get(signal)
-            if handler is not None:
-                self._heed(handler(self._parts, now_s), now_s)
+            if (handler := HANDLERS.get(signal)) is not None:
+                self._heed(handler(self._parts, now_s) or (), now_s)

@@ -35,15 +35,15 @@ def _let_loose(parts: Parts) -> None:
 # The vehicle: found, learnt, silent, switched off and on
 
 
-def _learn(parts: Parts, now_s: float) -> Iterable[Signal]:
+def _learn(parts: Parts, now_s: float) -> None:
     parts.learner.learn(now_s)
     is_wanted = parts.learner.is_first_time and bool(parts.core.orders.request.targets)
     parts.inbox.watch_while_waiting(is_wanted=is_wanted)
-    return ()
 
 
-def _learn_again(parts: Parts, now_s: float) -> Iterable[Signal]:
-    return () if parts.core.orders.once else _learn(parts, now_s)
+def _learn_again(parts: Parts, now_s: float) -> None:
+    if not parts.core.orders.once:
+        _learn(parts, now_s)
 
 
 def _on_learnt(parts: Parts, now_s: float) -> Iterable[Signal]:
@@ -83,10 +83,10 @@ def _on_still_there(parts: Parts, now_s: float) -> Iterable[Signal]:
     return parts.desk.fence_changed(now_s) if parts.desk.is_stale else ()
 
 
-def _on_heard_again(parts: Parts, now_s: float) -> Iterable[Signal]:
+def _on_heard_again(parts: Parts, now_s: float) -> None:
     text = "the vehicle is heard again; all is read anew"
     parts.core.voice.tell(now_s, EventName.LINK_BACK, text)
-    return _learn(parts, now_s)
+    _learn(parts, now_s)
 
 
 def _on_silence(parts: Parts, now_s: float) -> Iterable[Signal]:
@@ -96,7 +96,7 @@ def _on_silence(parts: Parts, now_s: float) -> Iterable[Signal]:
     return parts.learner.fallen_silent(now_s)
 
 
-def _on_rebooted(parts: Parts, now_s: float) -> Iterable[Signal]:
+def _on_rebooted(parts: Parts, now_s: float) -> None:
     text = "the vehicle was switched off and on; all is read anew"
     parts.core.voice.tell(now_s, EventName.REBOOTED, text)
     _let_loose(parts)
@@ -104,21 +104,21 @@ def _on_rebooted(parts: Parts, now_s: float) -> Iterable[Signal]:
     parts.core.ours = None
     parts.inbox.waiting = None
     parts.learner.learns_later = parts.core.state is State.WITHDRAWING
-    return () if parts.learner.learns_later else _learn(parts, now_s)
+    if not parts.learner.learns_later:
+        _learn(parts, now_s)
 
 
 # Targets and routes
 
 
-def _on_typed(parts: Parts, now_s: float) -> Iterable[Signal]:
+def _on_typed(parts: Parts, now_s: float) -> None:
     parts.core.operator.stop()
-    return _learn(parts, now_s)
+    _learn(parts, now_s)
 
 
-def _on_target_waits(parts: Parts, now_s: float) -> Iterable[Signal]:
+def _on_target_waits(parts: Parts, now_s: float) -> None:
     parts.halter.stop_at_once(parts.inbox.came, now_s)
     parts.inbox.watch_while_waiting()
-    return ()
 
 
 def _on_route_wanted(parts: Parts, _now_s: float, *, is_own_idea: bool = False) -> Iterable[Signal]:
@@ -130,17 +130,15 @@ def _on_route_outdated(parts: Parts, now_s: float) -> Iterable[Signal]:
     return _on_route_wanted(parts, now_s, is_own_idea=True)
 
 
-def _on_target(parts: Parts, _now_s: float) -> Iterable[Signal]:
+def _on_target(parts: Parts, _now_s: float) -> None:
     parts.writer.is_confirmed = False
     parts.driver.stand_by()
-    return ()
 
 
-def _on_target_while_moving(parts: Parts, now_s: float) -> Iterable[Signal]:
+def _on_target_while_moving(parts: Parts, now_s: float) -> None:
     parts.writer.is_confirmed = False
     parts.driver.drive = None
     parts.halter.hold("a new route is wanted", now_s)
-    return ()
 
 
 def _on_planned(parts: Parts, now_s: float) -> Iterable[Signal]:
@@ -181,21 +179,6 @@ def _after_upload(parts: Parts, now_s: float) -> Iterable[Signal]:
     if not found.holds and parts.desk.is_stale:
         return parts.desk.broke(found, now_s)
     return [Cue.DRIVE] if parts.core.orders.drive else parts.core.end()
-
-
-def _on_drive(parts: Parts, now_s: float) -> Iterable[Signal]:
-    parts.starter.look_once_more(now_s)
-    return ()
-
-
-def _on_started(parts: Parts, now_s: float) -> Iterable[Signal]:
-    parts.driver.begin(now_s)
-    return ()
-
-
-def _on_resumed(parts: Parts, now_s: float) -> Iterable[Signal]:
-    parts.driver.resumed(now_s)
-    return ()
 
 
 def _on_hold_ended(parts: Parts, _now_s: float) -> Iterable[Signal]:
@@ -240,12 +223,7 @@ def _on_clash(parts: Parts, now_s: float) -> Iterable[Signal]:
     return parts.guard.answer(now_s)
 
 
-def _on_given_up(parts: Parts, _now_s: float) -> Iterable[Signal]:
-    parts.core.steps.clear()
-    return ()
-
-
-HANDLERS: dict[Signal, Callable[[Parts, float], Iterable[Signal]]] = {
+HANDLERS: dict[Signal, Callable[[Parts, float], Iterable[Signal] | None]] = {
     # Cues: the state has moved as the table says
     Cue.FOUND: _learn,
     Cue.LEARNT: _on_learnt,
@@ -254,10 +232,10 @@ HANDLERS: dict[Signal, Callable[[Parts, float], Iterable[Signal]]] = {
     Cue.PLANNED: _on_planned,
     Cue.NO_PLAN: _on_no_plan,
     Cue.UPLOAD: lambda parts, now_s: parts.writer.begin(now_s),
-    Cue.DRIVE: _on_drive,
-    Cue.RESUMED: _on_resumed,
+    Cue.DRIVE: lambda parts, now_s: parts.starter.look_once_more(now_s),
+    Cue.RESUMED: lambda parts, now_s: parts.driver.resumed(now_s),
     Cue.STILL_THERE: _on_still_there,
-    Cue.STARTED: _on_started,
+    Cue.STARTED: lambda parts, now_s: parts.driver.begin(now_s),
     Cue.REACHED: lambda parts, now_s: parts.driver.arrived(now_s),
     Cue.TAKEN_OVER: _on_taken_over,
     Cue.CLASH: _on_clash,
@@ -265,7 +243,7 @@ HANDLERS: dict[Signal, Callable[[Parts, float], Iterable[Signal]]] = {
     Cue.SILENCE: _on_silence,
     Cue.HEARD: _on_heard_again,
     Cue.REBOOTED: _on_rebooted,
-    Cue.GIVE_UP: _on_given_up,
+    Cue.GIVE_UP: lambda parts, _now_s: parts.core.steps.clear(),
     # HELD, UPLOAD_VERIFIED, TROUBLE and END move the state, and that is all.
     # Notices: the state is as it was
     Notice.TARGET_CAME: lambda parts, now_s: parts.inbox.go_into(now_s),

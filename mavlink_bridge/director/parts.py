@@ -36,7 +36,7 @@ class Parts:
     """
 
     def __init__(self, core: Core) -> None:
-        self.core = core
+        self.core: Core = core
         self.learner: Learner = Learner(core)
         self.lists: ListWatch = ListWatch(core)
         self.inbox: TargetInbox = TargetInbox(core)

@@ -24,7 +24,7 @@ FRESH_S = 1.5
 """How old a heartbeat may be to tell what the vehicle does now."""
 
 _STILL_MPS = 0.3
-"""An estimate of the speed of a vehicle that stands is off by as much."""
+"""Slower than this counts as standing."""
 
 _STOP_AT_LEAST_S = 0.25
 """Positions come four times a second: one from after the HOLD is waited for."""

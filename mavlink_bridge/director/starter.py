@@ -28,7 +28,7 @@ START_YOURSELF = (
 )
 
 _MOVED_M = 1.0
-"""A vehicle that stands within this of where its route begins has not moved: the fix wanders by less in a minute."""
+"""A vehicle that stands within this of where its route begins counts as not having moved since it was planned."""
 
 
 class Starter(Part):

@@ -29,7 +29,7 @@ class Announcer:
             self._waiting.remove(max(self._waiting, key=lambda entry: entry[0]))
 
     def due(self, now_s: float) -> list[Statustext]:
-        """Give the text that may go now."""
+        """Return the text that may go now."""
         if not self._waiting or now_s < self._free_s:
             return []
         gravest = min(self._waiting, key=lambda entry: entry[0])

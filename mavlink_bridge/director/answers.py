@@ -31,7 +31,7 @@ class Answers:
         self._said: dict[_Asker, m.MavResult] = {}
 
     def begin(self, target: Target) -> None:
-        """Say that a target is being worked on; another asker's is given up for it."""
+        """Answer that a target is being worked on; another asker's is given up for it."""
         asker = target.asker if target.is_to_us else None
         if self._owed is not None and self._owed != asker:
             self.settle(m.MavResult.CANCELLED)
@@ -40,7 +40,7 @@ class Answers:
             self._say(asker, Command.DO_REPOSITION, m.MavResult.IN_PROGRESS)
 
     def settle(self, result: m.MavResult) -> None:
-        """Give the answer that is owed, if one is."""
+        """Send the answer that is owed, if one is."""
         if self._owed is not None:
             self._say(self._owed, Command.DO_REPOSITION, result)
             self._owed = None
@@ -60,11 +60,3 @@ class Answers:
         if command == Command.DO_REPOSITION:
             self._said[asker] = result
         self._send(m.CommandAck(command, result, target_system=asker[0], target_component=asker[1]))
-
-
-def is_command_to(frame: Frame, identity: tuple[int, int], system: int | None) -> bool:
-    """Tell whether a frame is a command for our own component, not for the vehicle's autopilot or for everyone."""
-    message = frame.message
-    if not isinstance(message, m.CommandInt | m.CommandLong) or message.target_component != identity[1]:
-        return False
-    return message.target_system in (0, identity[0], system) and (frame.system, frame.component) != identity

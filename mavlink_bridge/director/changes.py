@@ -73,7 +73,7 @@ class ChangeWatch:
         self._fence_due_s = now_s + FENCE_EVERY_S
 
     def due(self, now_s: float, *, is_driving: bool) -> set[ListKind]:
-        """Give and forget the lists that are to be read again."""
+        """Return and forget the lists that are to be read again."""
         if now_s >= self._poll_due_s:
             self._poll_due_s = now_s + POLL_EVERY_S
             self.suspects |= self._kinds
@@ -132,7 +132,7 @@ class RebootWatch:
         self._boot_ms = 0
 
     def is_reboot(self, message: Message) -> bool:
-        """Tell whether the vehicle's clock has started anew."""
+        """Return whether the vehicle's clock has started anew."""
         if not isinstance(message, m.GlobalPositionInt):
             return False
         before, self._boot_ms = self._boot_ms, message.time_boot_ms

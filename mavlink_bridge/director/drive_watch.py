@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from shapely import LineString, Point, prepare
 
 from mavlink_bridge.director.events import EventName
+from mavlink_bridge.director.voice import metres
 from mavlink_bridge.mavlink import messages as m
 from missions.geo import from_e7
 
@@ -26,6 +27,13 @@ _STANDING_MPS = 0.15
 _STANDING_S = 3.0
 _ACTIVE, _COMPLETE = 3, 5
 """MISSION_STATE_ACTIVE and _COMPLETE."""
+
+
+class _Here(NamedTuple):
+    """Where the vehicle is."""
+
+    place: LatLon
+    point: Point  # in the local frame of the plan's ground
 
 
 class DriveWatch:
@@ -60,8 +68,7 @@ class DriveWatch:
         self._line = LineString(self._points)
         self._band = plan.envelope.area
         prepare(self._band)
-        self._here: Point | None = None
-        self._place: LatLon | None = None
+        self._here: _Here | None = None
         self._is_outside = False
         self._standing_since_s: float | None = None
 
@@ -70,7 +77,7 @@ class DriveWatch:
         """What is left of the drawn lines."""
         rest = self._points[self._point :]
         legs_m = float(np.hypot(*np.diff(rest, axis=0).T).sum()) if len(rest) > 1 else 0.0
-        return legs_m + (self._here.distance(Point(rest[0])) if self._here else 0.0)
+        return legs_m + (self._here.point.distance(Point(rest[0])) if self._here else 0.0)
 
     @property
     def time_left_s(self) -> float:
@@ -98,10 +105,34 @@ class DriveWatch:
             self._count_breaches(message)
 
     def tell_progress(self, now_s: float) -> None:
-        """Tell how far the drive is."""
+        """Report how far the drive is."""
         self.progress_due_s = now_s + PROGRESS_EVERY_S
-        if self._place is not None:
-            self._voice.progress(now_s, self, self._place)
+        if self._here is None:
+            return
+        self._voice.tell(
+            now_s,
+            EventName.PROGRESS,
+            f"{self.distance_left_m:.0f} m left",
+            self.item,
+            round(self.distance_left_m, 1),
+            round(self.time_left_s, 1),
+            metres(self.least_clearance_m),
+            round(self.deviation_m, 2),
+            list(self._here.place),
+        )
+
+    def tell_arrival(self, now_s: float, *, holds: bool) -> None:
+        """Report the end of the drive, and whether the vehicle is switched to HOLD."""
+        took_s = now_s - self.begun_s
+        self._voice.tell(
+            now_s,
+            EventName.ARRIVED,
+            f"arrived after {self.driven_m:.0f} m in {took_s:.0f} s{'; HOLD' if holds else ''}",
+            round(self.driven_m, 2),
+            round(took_s, 1),
+            metres(self.least_clearance_m),
+            self.breaches,
+        )
 
     def _take_current(self, message: m.MissionCurrent) -> None:
         if message.seq != self._current_seq:  # told again and again, also just after it was reached
@@ -120,14 +151,14 @@ class DriveWatch:
         self.item = self._plan.seqs[self._point]
 
     def _move(self, message: m.GlobalPositionInt, now_s: float) -> None:
-        self._place = from_e7(message.lat, message.lon)
-        here = Point(self._plan.ground.frame.to_local(self._place))
+        place = from_e7(message.lat, message.lon)
+        here = Point(self._plan.ground.frame.to_local(place))
         if self._here is not None:
-            self.driven_m += here.distance(self._here)
-        self._here = here
+            self.driven_m += here.distance(self._here.point)
+        self._here = _Here(place, here)
         self.least_clearance_m = min(self.least_clearance_m, self._plan.ground.clearance_m(here))
         self.deviation_m = here.distance(self._line)
-        self._notice_leaving(here, self._place, now_s)
+        self._notice_leaving(here, place, now_s)
         self._notice_standing(here, math.hypot(message.vx, message.vy) / 100, now_s)
 
     def _notice_leaving(self, here: Point, place: LatLon, now_s: float) -> None:

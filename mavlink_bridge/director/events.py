@@ -123,7 +123,7 @@ class Event:
         return SCHEMA[self.name][0]
 
     def as_json(self) -> dict[str, object]:
-        """Give what a JSON line holds."""
+        """Return what a JSON line holds."""
         return {
             "time_s": round(self.time_s, 3),
             "event": str(self.name),

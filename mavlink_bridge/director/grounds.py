@@ -45,7 +45,7 @@ class Grounds:
         return cls(situation.fence, situation.parameters, home)
 
     def changes_since(self, before: Grounds) -> list[str]:
-        """Give what is another one than before, by name; a parameter that was not known before has not changed."""
+        """Return what is another one than before, by name; a parameter that was not known before has not changed."""
         changes = []
         known = before.fence.value if before.fence is not None else None
         if self.fence is not None and self.fence is not before.fence and self.fence.value != known:

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.director.events import EventName
+from mavlink_bridge.director.takeover import DISARMING, Cause
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.rover import HOLD_MODE, LOITER_MODE, RTL_MODE, SMART_RTL_MODE, mode_name
 from missions.checking.fence_place import fence_place
@@ -42,7 +42,6 @@ _OLD_S = 2.0
 _TOLD_LATE_M = 2.0
 """How far before a fence the position told last may lie at a breach: a quarter of a second at 5 m/s, and its own error."""
 
-_DISARMING = -1
 _BREACH = "fence breach"
 _BREACH_TYPES = {1: "minimum altitude", 2: "maximum altitude", 3: "boundary"}
 """FENCE_BREACH; ArduPilot calls circles and polygons alike boundary."""
@@ -53,12 +52,12 @@ _ACTIONS: dict[int, frozenset[int]] = {
     2: frozenset({HOLD_MODE}),
     3: frozenset({SMART_RTL_MODE, RTL_MODE, HOLD_MODE}),
     4: frozenset({SMART_RTL_MODE, HOLD_MODE}),
-    5: frozenset({_DISARMING}),
+    5: frozenset({DISARMING}),
     6: frozenset({LOITER_MODE, HOLD_MODE}),
 }
 """What FENCE_ACTION and FS_ACTION let a Rover do: it goes to HOLD where it cannot do what is asked, or is more than 100 m outside."""
 
-_ANY_ACTION = frozenset({RTL_MODE, SMART_RTL_MODE, HOLD_MODE, LOITER_MODE, _DISARMING})
+_ANY_ACTION = frozenset({RTL_MODE, SMART_RTL_MODE, HOLD_MODE, LOITER_MODE, DISARMING})
 _RADIO, _GCS, _EKF, _BATTERY = "radio failsafe", "ground station failsafe", "EKF failsafe", "battery failsafe"
 _CRASH, _TERMINATION = "crash check", "termination"
 _FAILSAFES: tuple[tuple[re.Pattern[str], str], ...] = (
@@ -74,8 +73,8 @@ _FAILSAFES: tuple[tuple[re.Pattern[str], str], ...] = (
 
 _ACTIONS_OF = {
     _EKF: frozenset({HOLD_MODE}),
-    _CRASH: frozenset({HOLD_MODE, _DISARMING}),
-    _TERMINATION: frozenset({HOLD_MODE, _DISARMING}),
+    _CRASH: frozenset({HOLD_MODE, DISARMING}),
+    _TERMINATION: frozenset({HOLD_MODE, DISARMING}),
 }
 _FS_ACTION = frozenset({_RADIO, _GCS})
 """Failsafes whose answer is FS_ACTION's."""
@@ -85,29 +84,6 @@ _VARIANCE = re.compile(r"ekf variance$", re.IGNORECASE)
 
 _CONTINUING = re.compile(r"failsafe - continuing", re.IGNORECASE)
 _BREACH_TEXT = re.compile(r".*\bfences? breached|fence breach(ed)?$", re.IGNORECASE)
-
-
-@dataclass(frozen=True, slots=True)
-class Cause:
-    """Something that the autopilot may answer by switching its mode or disarming.
-
-    Parameters
-    ----------
-    reason : str
-        What.
-    heard_s : float
-        When it was heard.
-    modes : frozenset of int
-        The modes that it may answer with.
-    """
-
-    reason: str
-    heard_s: float
-    modes: frozenset[int]
-
-    def explains(self, takeover: Takeover) -> bool:
-        """Return whether the autopilot answers it with just that."""
-        return (_DISARMING if takeover.mode is None else takeover.mode) in self.modes
 
 
 class Incidents:
@@ -198,7 +174,7 @@ class Incidents:
     def _tell_breach(
         self, new: int, breach_type: int | None, situation: Situation, now_s: float, *, is_new: bool = True
     ) -> None:
-        """Tell a breach, with its place and fence."""
+        """Report a breach, with its place and fence."""
         self._breach_told_s = now_s
         self._breaches += new
         mode = None
@@ -250,7 +226,7 @@ class Incidents:
 
 
 def _by(place: FencePlace | None) -> str:
-    """Say by which fence a place is."""
+    """Return in words by which fence a place is."""
     if place is None:
         return ""
     if place.beyond_m > 0:
@@ -262,7 +238,7 @@ def _by(place: FencePlace | None) -> str:
 
 
 def _at(pose: Known[Pose] | None, now_s: float) -> str:
-    """Say where it was, and how old that is where it is not of now."""
+    """Return in words where it was, and how old that is where it is not of now."""
     if pose is None:
         return ""
     age_s = 0.0 if pose.time_s is None else now_s - pose.time_s

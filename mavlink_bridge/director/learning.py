@@ -7,7 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.backup.vehicle_mark import uid_of
-from mavlink_bridge.director.steps import Steps
+from mavlink_bridge.director.steps import Steps, step
 from mavlink_bridge.errors import BridgeError, LinkError
 from mavlink_bridge.fold import with_list
 from mavlink_bridge.mavlink import messages as m
@@ -90,9 +90,7 @@ class Learning:
     @property
     def progress(self) -> tuple[int, int]:
         """That of the transfer under way."""
-        current = self._steps.current
-        progress: tuple[int, int] = current.progress if current else (0, 0)
-        return progress
+        return self._steps.progress
 
     @property
     def bound_s(self) -> float:
@@ -120,14 +118,14 @@ class Learning:
         home = m.CommandLong(peer.system, peer.component, Command.GET_HOME_POSITION)
         self._steps.run(
             [
-                (ReadParameters(peer, (*PARAMETER_NAMES, *_MORE_NAMES)), self._take_parameters),
+                step(ReadParameters(peer, (*PARAMETER_NAMES, *_MORE_NAMES)), self._take_parameters),
                 *(
-                    (Download(peer, MISSION_TYPES[kind]), partial(self._take_list, kind))
+                    step(Download(peer, MISSION_TYPES[kind]), partial(self._take_list, kind))
                     for kind in self._kinds
                 ),
                 # Which vehicle it is, and its firmware, which decides what some parameters are by default.
-                (AskVersion(peer), self._take_version),
-                (SendCommand(peer, home), self._take_home),
+                step(AskVersion(peer), self._take_version),
+                step(SendCommand(peer, home), self._take_home),
             ],
             now_s,
         )
@@ -154,12 +152,12 @@ class Learning:
                 )
 
     def messages_to_send(self) -> list[Message]:
-        """Give and forget what is to be sent now."""
+        """Return and forget what is to be sent now."""
         outgoing, self._outgoing = self._outgoing, []
         return outgoing + self._steps.messages_to_send()
 
     def merged(self, situation: Situation, now_s: float) -> Situation:
-        """Give a situation with what was learnt."""
+        """Return a situation with what was learnt."""
         situation = replace(situation, parameters={**situation.parameters, **self._parameters})
         for kind, items in self._lists.items():
             situation = with_read_list(situation, kind, items, now_s)
@@ -209,7 +207,7 @@ def with_read_list(
 
 
 def list_of(machine: Download, kind: ListKind) -> tuple[MissionItem, ...] | BridgeError:
-    """Give what a finished download brought, or the error that it is."""
+    """Return what a finished download brought, or the error that it is."""
     outcome = machine.outcome
     if outcome is not None and outcome.is_complete:
         return outcome.items

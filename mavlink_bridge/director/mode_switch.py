@@ -16,7 +16,7 @@ from mavlink_bridge.protocol.table_machine import TableMachine
 from missions.items import Command
 
 if TYPE_CHECKING:
-    from mavlink_bridge.mavlink.messages import Frame
+    from mavlink_bridge.mavlink.messages import Frame, Message
     from mavlink_bridge.protocol.peer import Peer
 
 _HURRY_S = 0.5
@@ -199,7 +199,7 @@ class AwaitHeartbeat:
 
     def __init__(self, peer: Peer) -> None:
         self._peer = peer
-        self._outgoing: list[CommandLong] = []
+        self._outgoing: list[Message] = []
         self.is_done = False
 
     @property
@@ -212,21 +212,21 @@ class AwaitHeartbeat:
         """Whether it is done, as steps."""
         return int(self.is_done), 1
 
-    def start(self, _now_s: float) -> None:
+    def start(self, now_s: float) -> None:  # noqa: ARG002 - the contract of machines
         """Ask."""
         peer = self._peer
         self._outgoing.append(
             CommandLong(peer.system, peer.component, Command.REQUEST_MESSAGE, param1=_HEARTBEAT_ID)
         )
 
-    def receive(self, frame: Frame, _now_s: float) -> None:
+    def receive(self, frame: Frame, now_s: float) -> None:  # noqa: ARG002 - the contract of machines
         """Take a frame."""
         self.is_done = self.is_done or (isinstance(frame.message, Heartbeat) and self._peer.accepts(frame))
 
     def handle_timer(self, now_s: float) -> None:
         """Take notice that time has passed."""
 
-    def messages_to_send(self) -> list[CommandLong]:
-        """Give and forget what is to be sent now."""
+    def messages_to_send(self) -> list[Message]:
+        """Return and forget what is to be sent now."""
         outgoing, self._outgoing = self._outgoing, []
         return outgoing

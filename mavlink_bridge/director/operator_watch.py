@@ -55,7 +55,7 @@ class OperatorWatch:
         return self._ours is not None
 
     def is_ours(self, mode: int | None) -> bool:
-        """Tell whether a mode is the one that the vehicle is in by our doing."""
+        """Return whether a mode is the one that the vehicle is in by our doing."""
         return mode == self._ours
 
     def expect(self, mode: int | None, fading: set[int | None], *, is_armed: bool) -> None:
@@ -99,7 +99,7 @@ class OperatorWatch:
         return Takeover(mode)
 
     def is_late_click(self, heartbeat: m.Heartbeat, now_s: float) -> bool:
-        """Tell whether a click has set the vehicle going after our HOLD, having come to it by a slower way than to us."""
+        """Return whether a click has set the vehicle going after our HOLD, having come to it by a slower way than to us."""
         is_guided = heartbeat.custom_mode == GUIDED_MODE
         return is_guided and self._ours == HOLD_MODE and now_s - self._clicked_s <= _LATE_CLICK_S
 

@@ -12,7 +12,7 @@ from mavlink_bridge.mavlink.rover import AUTO_MODE, HOLD_MODE
 from missions.items import Command
 
 if TYPE_CHECKING:
-    from mavlink_bridge.mavlink.messages import Frame
+    from mavlink_bridge.mavlink.messages import Frame, Message
     from mavlink_bridge.protocol.peer import Peer
 
 _PATIENCE_S = 4.0
@@ -32,7 +32,7 @@ class PutBack:
 
     def __init__(self, peer: Peer) -> None:
         self._peer = peer
-        self._outgoing: list[CommandLong] = []
+        self._outgoing: list[Message] = []
         self._sends = 0
         self._until_s = 0.0
         self._mode: int | None = None
@@ -79,7 +79,7 @@ class PutBack:
         """Take notice that time has passed."""
         self.is_done = self.is_done or now_s >= self._until_s
 
-    def messages_to_send(self) -> list[CommandLong]:
+    def messages_to_send(self) -> list[Message]:
         """Return and forget what is to be sent now."""
         outgoing, self._outgoing = self._outgoing, []
         return outgoing

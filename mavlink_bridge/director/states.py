@@ -1,8 +1,8 @@
 """Every transition of the director, in one table.
 
-All transitions live here, and this file knows nothing of messages or time. The director turns what it hears, the passing of time and
-the outcomes of its machines into cues; a cue that a state does not list is ignored there. The state diagram in the documentation is
-drawn from this table.
+All transitions live here, and this file knows nothing of messages or time. The director's parts turn what they hear, the passing of time and
+the outcomes of machines into cues; a cue that a state does not list is ignored there. What parts tell each other without a move of the state
+is a notice. The state diagram in the documentation is drawn from this table; what is done on each cue and notice stands in `handlers.HANDLERS`.
 """
 
 from __future__ import annotations
@@ -62,6 +62,29 @@ class Cue(StrEnum):
     END = auto()  # the single job is done
     GIVE_UP = auto()  # the single job cannot be done
 
+
+class Notice(StrEnum):
+    """What one part signals for others to act upon, where the state stays or where the answer decides how it moves."""
+
+    TARGET_CAME = auto()  # the inbox holds it
+    TARGET_WAITS = auto()  # it came at an inconvenient time
+    TARGET_AGAIN = auto()  # it was said once more
+    TARGET_IS_DUE = auto()  # one that has waited may be gone into
+    ROUTE_WANTED = auto()  # by somebody
+    ROUTE_OUTDATED = auto()  # by nobody: what it rests on was changed
+    FENCE_CHANGED = auto()
+    MISSION_READ = auto()  # the vehicle's mission was read again
+    MISSION_TAKEN = auto()  # it is somebody else's now
+    MISSION_HEARD = auto()  # its end may be a target
+    RALLY_HEARD = auto()
+    LEARNING_FAILED = auto()
+    HOLD_ENDED = auto()  # taken, or not
+    UPLOAD_ENDED = auto()  # well or badly; the state has moved already
+    DRIVE_ENDED = auto()
+
+
+Signal = Cue | Notice
+"""What a part hands up to the director."""
 
 _ALWAYS = {
     Cue.SILENCE: State.LOST,

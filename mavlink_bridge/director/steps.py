@@ -3,21 +3,59 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
+    from mavlink_bridge.director.states import Signal
     from mavlink_bridge.mavlink.messages import Frame, Message
+    from mavlink_bridge.protocol.machine import Machine
 
-Step = tuple[Any, "Callable[[Any, float], None]"]
-"""A machine that is not started, and what takes it when it is done."""
+    MachineT = TypeVar("MachineT", bound=Machine)
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """A machine that is not started, and what follows from it.
+
+    Parameters
+    ----------
+    machine : Machine
+        What is to be run.
+    ended : callable
+        Called with the time when the machine is done; returns what the director is to heed, None for nothing.
+    dropped : callable, optional
+        Called instead where the step is dropped before its machine is done.
+    """
+
+    machine: Machine
+    ended: Callable[[float], Iterable[Signal] | None]
+    dropped: Callable[[], None] | None = None
+
+
+def step(
+    machine: MachineT,
+    take: Callable[[MachineT, float], Iterable[Signal] | None],
+    dropped: Callable[[], None] | None = None,
+) -> Step:
+    """Return a step whose machine is handed to ``take`` when it is done."""
+    return Step(machine, partial(take, machine), dropped)
 
 
 class Steps:
-    """A queue of machines; the first one runs."""
+    """A queue of machines; the first one runs.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    heed : callable, optional
+        Takes what the end of a machine signals, at once: before the next machine starts, for it may be dropped.
+    """
+
+    def __init__(self, heed: Callable[[Iterable[Signal], float], None] | None = None) -> None:
+        self._heed = heed
         self._queue: deque[Step] = deque()
         self._last_words: list[Message] = []
 
@@ -25,49 +63,60 @@ class Steps:
         return bool(self._queue)
 
     @property
-    def current(self) -> Any:  # noqa: ANN401 - any machine
+    def current(self) -> Machine | None:
         """The machine that runs, None where there is none."""
-        return self._queue[0][0] if self._queue else None
+        return self._queue[0].machine if self._queue else None
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        """Progress of the machine that runs."""
+        return self._queue[0].machine.progress if self._queue else (0, 0)
 
     @property
     def deadline_s(self) -> float | None:
         """When the running machine wants its timer."""
-        return self._queue[0][0].deadline_s if self._queue else None
+        return self._queue[0].machine.deadline_s if self._queue else None
 
     def run(self, steps: Iterable[Step], now_s: float) -> None:
         """Run these after those that wait already."""
         was_idle = not self._queue
         self._queue.extend(steps)
         if was_idle and self._queue:
-            self._queue[0][0].start(now_s)
+            self._queue[0].machine.start(now_s)
             self._advance(now_s)
 
     def clear(self) -> None:
-        """Forget them all."""
+        """Drop them all."""
+        dropped = list(self._queue)
         self._queue.clear()
+        for one in dropped:
+            if one.dropped is not None:
+                one.dropped()
 
     def receive(self, frame: Frame, now_s: float) -> None:
-        """Give a frame to the machine that runs."""
+        """Hand a frame to the machine that runs."""
         if self._queue:
-            self._queue[0][0].receive(frame, now_s)
+            self._queue[0].machine.receive(frame, now_s)
             self._advance(now_s)
 
     def handle_timer(self, now_s: float) -> None:
-        """Give the time to the machine that runs."""
+        """Hand the time to the machine that runs."""
         if self._queue:
-            self._queue[0][0].handle_timer(now_s)
+            self._queue[0].machine.handle_timer(now_s)
             self._advance(now_s)
 
     def messages_to_send(self) -> list[Message]:
-        """Give and forget what is to be sent."""
+        """Return and forget what is to be sent."""
         messages, self._last_words = self._last_words, []
-        return messages + (self._queue[0][0].messages_to_send() if self._queue else [])
+        return messages + (self._queue[0].machine.messages_to_send() if self._queue else [])
 
     def _advance(self, now_s: float) -> None:
-        while self._queue and self._queue[0][0].is_done:
-            machine, take = self._queue.popleft()
-            self._last_words += machine.messages_to_send()
+        while self._queue and self._queue[0].machine.is_done:
+            done = self._queue.popleft()
+            self._last_words += done.machine.messages_to_send()
             following = self._queue[0] if self._queue else None
-            take(machine, now_s)
+            signals = done.ended(now_s)
+            if signals and self._heed is not None:
+                self._heed(signals, now_s)
             if following is not None and self._queue and self._queue[0] is following:
-                following[0].start(now_s)
+                following.machine.start(now_s)

@@ -8,12 +8,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING
 
 from mavlink_bridge.mavlink.rover import mode_name
 
-if TYPE_CHECKING:
-    from mavlink_bridge.director.incidents import Cause
+DISARMING = -1
+"""Stands among modes for disarming."""
 
 
 class Doer(StrEnum):
@@ -38,6 +37,29 @@ class Takeover:
 
     mode: int | None
     asker: tuple[int, int] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Cause:
+    """Something that the autopilot may answer by switching its mode or disarming.
+
+    Parameters
+    ----------
+    reason : str
+        What.
+    heard_s : float
+        When it was heard.
+    modes : frozenset of int
+        The modes that it may answer with.
+    """
+
+    reason: str
+    heard_s: float
+    modes: frozenset[int]
+
+    def explains(self, takeover: Takeover) -> bool:
+        """Return whether the autopilot answers it with just that."""
+        return (DISARMING if takeover.mode is None else takeover.mode) in self.modes
 
 
 @dataclass(frozen=True, slots=True)

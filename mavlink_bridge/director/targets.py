@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.director.answers import is_command_to
+from mavlink_bridge.director.addressed import is_command_to
 from mavlink_bridge.director.orders import TargetSource
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.rover import GUIDED_MODE
@@ -58,6 +58,11 @@ class Target:
         """Whether it may set the vehicle going, straight, before any plan exists."""
         return self.source in _CLICKS and not self.is_to_us
 
+    def sets_going(self, mode: int | None) -> bool:
+        """Return whether it has made a vehicle in this mode drive straight to it."""
+        is_command = self.source is TargetSource.REPOSITION
+        return self.is_click and (is_command or mode == GUIDED_MODE)
+
 
 class TargetWatch:
     """Finds targets in the stream.
@@ -77,7 +82,7 @@ class TargetWatch:
     def look(
         self, frame: Frame, before: Situation, after: Situation, now_s: float, identity: tuple[int, int]
     ) -> Target | None:
-        """Give the target that a frame brought, None where it brought none that is heeded."""
+        """Return the target that a frame brought, None where it brought none that is heeded."""
         target = self._asked(frame, before, after, identity) or self._echoed(frame, after)
         if target is None or target.source not in self._sources:
             return None

@@ -10,11 +10,9 @@ from mavlink_bridge.director.events import Event, EventName
 from missions.words import metres as metres_text
 
 if TYPE_CHECKING:
-    from mavlink_bridge.director.drive_watch import DriveWatch
     from mavlink_bridge.mavlink.messages import Statustext
     from missions.checking.recheck import Recheck
     from missions.errors import MissionError
-    from missions.geo import LatLon
     from missions.planned import Plan
     from missions.situation import Situation
 
@@ -42,27 +40,27 @@ class Voice:
         return self._announcer.deadline_s
 
     def take_events(self) -> list[Event]:
-        """Give and forget what was told."""
+        """Return and forget what was told."""
         events, self._events = self._events, []
         return events
 
     def due(self, now_s: float) -> list[Statustext]:
-        """Give the texts that may go now."""
+        """Return the texts that may go now."""
         return self._announcer.due(now_s)
 
     def tell(self, now_s: float, name: EventName, text: str, *values: object) -> None:
-        """Tell an event; the values are those of its schema, in order."""
+        """Report an event; the values are those of its schema, in order."""
         event = Event.of(now_s, name, text, values)
         self._events.append(event)
         if self._announce and name not in _NOT_ANNOUNCED:
             self._announcer.say(event.severity, text)
 
     def error(self, now_s: float, name: EventName, error: Exception, details: object) -> None:
-        """Tell an error."""
+        """Report an error."""
         self.tell(now_s, name, str(error), type(error).__name__, details)
 
     def learnt(self, now_s: float, situation: Situation) -> None:
-        """Tell what is known of the vehicle."""
+        """Report what is known of the vehicle."""
         fence, mission, pose = situation.fence, situation.mission, situation.pose
         zones = len(fence.value.zones) if fence else 0
         items = len(mission.value.items) if mission else 0
@@ -78,7 +76,7 @@ class Voice:
         )
 
     def planned(self, now_s: float, plan: Plan) -> None:
-        """Tell a plan."""
+        """Report a plan."""
         self.tell(
             now_s,
             EventName.PLANNED,
@@ -93,44 +91,17 @@ class Voice:
         )
 
     def no_plan(self, now_s: float, error: MissionError) -> None:
-        """Tell why there is no plan."""
+        """Report why there is no plan."""
         self.error(now_s, EventName.NO_PLAN, error, dict(error.details))
 
     def rechecked(self, now_s: float, name: EventName, what: str, found: Recheck) -> None:
-        """Tell that lines do not keep what they have to."""
+        """Report that lines do not keep what they have to."""
         text = (
             f"{what} keeps {metres_text(found.clearance_m)} of {metres_text(found.asked_m)} ({found.fence})"
         )
         self.tell(now_s, name, text, metres(found.clearance_m), round(found.asked_m, 3), found.fence)
 
-    def progress(self, now_s: float, drive: DriveWatch, position: LatLon) -> None:
-        """Tell how far a drive is."""
-        self.tell(
-            now_s,
-            EventName.PROGRESS,
-            f"{drive.distance_left_m:.0f} m left",
-            drive.item,
-            round(drive.distance_left_m, 1),
-            round(drive.time_left_s, 1),
-            metres(drive.least_clearance_m),
-            round(drive.deviation_m, 2),
-            list(position),
-        )
-
-    def arrived(self, now_s: float, drive: DriveWatch, *, holds: bool) -> None:
-        """Tell the end of a drive, and whether the vehicle is switched to HOLD."""
-        took_s = now_s - drive.begun_s
-        self.tell(
-            now_s,
-            EventName.ARRIVED,
-            f"arrived after {drive.driven_m:.0f} m in {took_s:.0f} s{'; HOLD' if holds else ''}",
-            round(drive.driven_m, 2),
-            round(took_s, 1),
-            metres(drive.least_clearance_m),
-            drive.breaches,
-        )
-
 
 def metres(value_m: float) -> float | None:
-    """Give a length for JSON, to the millimetre; None for an infinite one."""
+    """Return a length for JSON, to the millimetre; None for an infinite one."""
     return round(value_m, 3) if math.isfinite(value_m) else None

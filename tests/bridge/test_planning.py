@@ -48,10 +48,10 @@ def test_a_plan_that_takes_long_is_waited_for_and_the_messages_go_on():
     run = planning()
     asked_s = run.now_s
     task = run.director.pending_plan
-    heard_s = run.director._heartbeat_s
+    heard_s = run.director.heard_s
     wait(run, 2.5)
     assert run.director.pending_plan is task
-    assert run.director._heartbeat_s > heard_s
+    assert run.director.heard_s > heard_s
     planned_s = run.run_until(run.happened(EventName.PLANNED), 20)
     assert planned_s - asked_s == pytest.approx(LONG_S - 1.0, abs=0.1)
     run.run_until(lambda: run.director.state is State.DRIVING, 20)
@@ -134,7 +134,7 @@ def test_the_shell_makes_plans_beside_the_link():
 
     run = ready(conductor())
     run.director.take_target(FAR, run.now_s)
-    task = PlanTask(run.director.situation, run.director._route_request())
+    task = PlanTask(run.director.situation, run.director._parts.desk.request())
     waiting = Waiting(task)
     plans = PlanMaker(waiting, slow)
     idle_s = plans.longest_wait_s()

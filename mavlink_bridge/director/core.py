@@ -1,0 +1,163 @@
+"""What all parts of the director need, and what a part is."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from mavlink_bridge.director.operator_watch import OperatorWatch
+from mavlink_bridge.director.states import TRANSITIONS, Cue, Signal, State
+from mavlink_bridge.director.steps import Steps
+from mavlink_bridge.director.voice import Voice
+from mavlink_bridge.mavlink.rover import AUTO_MODE
+from mavlink_bridge.protocol.table_machine import TableMachine
+from mavlink_bridge.protocol.vehicle_watch import VehicleWatch
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+    from mavlink_bridge.director.orders import Orders
+    from mavlink_bridge.director.targets import Target
+    from mavlink_bridge.errors import BridgeError
+    from mavlink_bridge.mavlink.messages import Frame, Message
+    from mavlink_bridge.protocol.peer import Peer
+    from missions.errors import MissionError
+    from missions.items import MissionItem
+    from missions.planned import Plan
+    from missions.situation import Situation
+
+
+class Core(TableMachine[State, Cue]):
+    """The state, what is known of the vehicle, what is wanted of it, and the means to speak.
+
+    Parameters
+    ----------
+    orders : Orders
+        What the director may do.
+    situation : Situation
+        What is known beforehand.
+    heed : callable
+        Takes what the end of a machine signals.
+
+    Attributes
+    ----------
+    situation, before : Situation
+        What is known, and what was before the newest frame.
+    moves : int
+        How often the state has moved; what is counted on only in one stay in a state remembers it.
+    peer : Peer or None
+        The vehicle and our identity, once it was found.
+    watch : VehicleWatch
+        What the vehicle does, as last told.
+    operator : OperatorWatch
+        In which mode the vehicle is by our doing.
+    target : Target or None
+        Where the vehicle is wanted.
+    plan : Plan or None
+        The plan that stands.
+    ours : tuple of MissionItem or None
+        The mission that is on the vehicle by us.
+    """
+
+    def __init__(
+        self, orders: Orders, situation: Situation, heed: Callable[[Iterable[Signal], float], None]
+    ) -> None:
+        super().__init__(TRANSITIONS, State.LISTENING)
+        self.moves = 0
+        self.orders = orders
+        self.situation = self.before = situation
+        self.trouble: BridgeError | MissionError | None = None
+        self.vehicle_uid = ""
+        self.peer: Peer | None = None
+        self.heartbeat_s = -math.inf
+        self.watch = VehicleWatch()
+        self.operator = OperatorWatch()
+        self.steps = Steps(heed)
+        self.voice = Voice(announce=orders.announce)
+        self.target: Target | None = None
+        self.plan: Plan | None = None
+        self.ours: tuple[MissionItem, ...] | None = None
+
+    @property
+    def identity(self) -> tuple[int, int] | None:
+        """The ids we speak with; None until they are known."""
+        if self.peer is not None:
+            return self.peer.own_system, self.peer.own_component
+        orders = self.orders
+        if orders.identity is not None or orders.system is None:
+            return orders.identity
+        return orders.system, orders.own_component
+
+    @property
+    def has_our_mission(self) -> bool:
+        """Whether the vehicle's mission is ours."""
+        mission = self.situation.mission
+        return self.ours is not None and mission is not None and mission.value.items == self.ours[1:]
+
+    @property
+    def is_driving_ours(self) -> bool:
+        """Whether the vehicle drives our mission, whoever started it."""
+        is_auto = bool(self.situation.armed) and self.situation.mode == AUTO_MODE
+        return is_auto and self.has_our_mission
+
+    def is_from_vehicle(self, frame: Frame) -> bool:
+        """Return whether a frame comes from the vehicle's autopilot."""
+        peer = self.peer
+        return peer is not None and (frame.system, frame.component) == (peer.system, peer.component)
+
+    # The state
+
+    def heeds(self, cue: Cue) -> bool:
+        """Return whether a cue leads anywhere from here."""
+        return cue in self._table[self.state]
+
+    def move(self, cue: Cue) -> bool:
+        """Go where the table says; False where the state does not list the cue."""
+        has_moved = self._move(cue)
+        self.moves += has_moved
+        return has_moved
+
+    # Speaking
+
+    def send(self, *messages: Message) -> None:
+        """Send messages, before those of the machine that runs."""
+        self._outgoing += messages
+
+    # What parts signal at the end of something
+
+    def end(self) -> Sequence[Signal]:
+        """Return the end of a single job; the bridge goes on."""
+        return [Cue.END] if self.orders.once else []
+
+    def give_up(self, trouble: BridgeError | MissionError) -> Sequence[Signal]:
+        """Return the end of a single job with its trouble; the bridge goes on."""
+        self.trouble = trouble
+        return [Cue.GIVE_UP] if self.orders.once else []
+
+    def fail_step(self, trouble: BridgeError | MissionError) -> Sequence[Signal]:
+        """Return that what is under way came to a bad end."""
+        return [Cue.TROUBLE, *self.give_up(trouble)]
+
+
+class Part:
+    """A part of the director, which holds it; by itself it does nothing.
+
+    A part may use `core` and the parts it was made with, which know nothing of it. What others must act upon it returns as signals, which the
+    director looks up in its table before anything else happens.
+    """
+
+    def __init__(self, core: Core) -> None:
+        self.core = core
+
+    @property
+    def deadline_s(self) -> float | None:
+        """When `handle_timer` wants to be called; None for never."""
+        return None
+
+    def receive(self, frame: Frame, now_s: float) -> Iterable[Signal]:  # noqa: ARG002 - for those that hear
+        """Take a frame of anybody, which the situation holds already; return what follows, each acted upon before the next is taken."""
+        return ()
+
+    def handle_timer(self, now_s: float) -> Iterable[Signal]:  # noqa: ARG002 - for those that have timers
+        """Take notice that time has passed; return what follows."""
+        return ()

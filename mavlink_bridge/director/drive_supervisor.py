@@ -1,0 +1,142 @@
+"""The part of the director that watches the vehicle drive our mission, until it has arrived."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from mavlink_bridge.director.core import Core, Part
+from mavlink_bridge.director.drive_watch import DriveWatch
+from mavlink_bridge.director.events import EventName
+from mavlink_bridge.director.states import Cue, Notice, Signal, State
+from mavlink_bridge.errors import OutcomeError
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.rover import AUTO_MODE
+from missions.items import Command
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from mavlink_bridge.director.halter import Halter
+    from mavlink_bridge.mavlink.messages import Frame
+
+_ARMING_SHOWS_S = 1.5
+"""So long after the start a heartbeat from before the arming may still come."""
+
+_ENDLESS = (Command.NAV_LOITER_UNLIM, Command.NAV_RETURN_TO_LAUNCH)
+
+
+class DriveSupervisor(Part):
+    """Knows how the drive goes.
+
+    Attributes
+    ----------
+    drive : DriveWatch or None
+        The drive on our mission.
+    holds_after_arrival : bool
+        Whether it has arrived and our HOLD is under way.
+    """
+
+    def __init__(self, core: Core, halter: Halter) -> None:
+        super().__init__(core)
+        self._halter = halter
+        self.drive: DriveWatch | None = None
+        self.holds_after_arrival = False
+        self._item_now = 1
+        self._is_our_start = False  # the drive was begun by us, not by somebody else
+        self._resumed_text = ""
+
+    @property
+    def deadline_s(self) -> float | None:
+        """When progress is to be told."""
+        return self.drive.progress_due_s if self.drive is not None else None
+
+    def receive(self, frame: Frame, now_s: float) -> Sequence[Signal]:
+        """Watch the drive."""
+        message = frame.message
+        if not self.core.is_from_vehicle(frame):
+            return []
+        if isinstance(message, m.MissionCurrent) and message.seq:
+            self._item_now = message.seq
+        if self.core.state is not State.DRIVING or self.drive is None:
+            return []
+        self.drive.receive(frame, now_s)
+        return [Cue.REACHED] if self.drive.has_arrived else []
+
+    def handle_timer(self, now_s: float) -> Sequence[Signal]:
+        """Report how far the drive is."""
+        if self.drive is not None and now_s >= self.drive.progress_due_s:
+            self.drive.tell_progress(now_s)
+        return []
+
+    @property
+    def item(self) -> int:
+        """The mission item that the vehicle is on its way to."""
+        if self.drive is not None:
+            return self.drive.item
+        return self._item_now if self.core.is_driving_ours else 1
+
+    def is_unarmed(self, now_s: float) -> bool:
+        """Return whether our drive runs on a vehicle that never showed itself armed."""
+        is_late = self.drive is not None and now_s > self.drive.begun_s + _ARMING_SHOWS_S
+        return self.core.state is State.DRIVING and is_late and not self.core.situation.armed
+
+    # Beginnings
+
+    def begin(self, now_s: float) -> None:
+        """Watch a drive that we have started."""
+        self._is_our_start = True
+        self._watch("AUTO", now_s)
+
+    def resume(self, text: str) -> Sequence[Signal]:
+        """Return that our mission is being driven, though we did not start it just now, where there is a plan to watch it by."""
+        self._resumed_text = text
+        return [Cue.RESUMED] if self.core.plan is not None else []
+
+    def resumed(self, now_s: float) -> None:
+        """Watch a drive that we did not start just now."""
+        self.core.operator.expect(AUTO_MODE, set(), is_armed=True)
+        self._is_our_start = False
+        self._watch(self._resumed_text, now_s).item = self._item_now
+
+    def _watch(self, text: str, now_s: float) -> DriveWatch:
+        core = self.core
+        assert core.plan is not None
+        self.drive = DriveWatch(core.plan, core.voice, now_s)
+        core.voice.tell(now_s, EventName.DRIVING, text, len(core.plan.items))
+        return self.drive
+
+    # Ends
+
+    def arrived(self, now_s: float) -> Sequence[Signal]:
+        """Report the arrival, and hold the vehicle where we have started it and it is not to go on."""
+        assert self.drive is not None
+        self.drive.tell_progress(now_s)
+        self.holds_after_arrival = self._is_our_start and not self._goes_on_after_arrival
+        self.drive.tell_arrival(now_s, holds=self.holds_after_arrival)
+        self.drive = None
+        if not self.holds_after_arrival:
+            return [Notice.DRIVE_ENDED]
+        self._halter.command_hold(now_s)
+        return []
+
+    def held_after_arrival(self) -> Sequence[Signal]:
+        """Return the end of a drive after its arrival, once HOLD was taken or was not."""
+        if self._halter.is_hold_granted:
+            return [Notice.DRIVE_ENDED]
+        trouble = OutcomeError("it has arrived, but it does not go to HOLD: it is still in AUTO")
+        return [*self.core.give_up(trouble), Notice.DRIVE_ENDED]
+
+    def stand_by(self) -> None:
+        """Watch no drive while a route is made, and remember how the vehicle stands."""
+        core = self.core
+        self.drive = None
+        if core.orders.drive:
+            core.operator.expect(core.situation.mode, set(), is_armed=bool(core.situation.armed))
+
+    @property
+    def _goes_on_after_arrival(self) -> bool:
+        """Whether the mission's end is something to do: to loiter, to return, or what MIS_DONE_BEHAVE says."""
+        core = self.core
+        assert core.plan is not None
+        ends = any(item.command in _ENDLESS for item in core.plan.items)
+        return ends or core.situation.parameters.get("MIS_DONE_BEHAVE", 0) != 0

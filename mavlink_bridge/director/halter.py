@@ -1,0 +1,207 @@
+"""The part of the director that stops the vehicle: HOLD at once, before a new route is made from where it comes to rest."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from mavlink_bridge.director.core import Core, Part
+from mavlink_bridge.director.events import EventName
+from mavlink_bridge.director.mode_switch import ModeSwitch
+from mavlink_bridge.director.orders import TargetSource
+from mavlink_bridge.director.states import Cue, Notice, Signal, State
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.rover import AUTO_MODE, HOLD_MODE
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from mavlink_bridge.director.list_watch import ListWatch
+    from mavlink_bridge.director.targets import Target
+    from mavlink_bridge.mavlink.messages import Frame, Message
+
+FRESH_S = 1.5
+"""How old a heartbeat may be to tell what the vehicle does now."""
+
+_STILL_MPS = 0.3
+"""Slower than this counts as standing."""
+
+_STOP_AT_LEAST_S = 0.25
+"""Positions come four times a second: one from after the HOLD is waited for."""
+
+_STOP_PATIENCE_S = 8.0
+
+
+class Halter(Part):
+    """Brings the vehicle to rest.
+
+    Attributes
+    ----------
+    stopping : ModeSwitch or None
+        Our HOLD, while it is under way.
+    may_be_in_auto : bool
+        Whether our AUTO may be on its way, or no heartbeat may have told of it yet.
+    is_hold_granted : bool
+        Whether the newest HOLD that has ended was taken.
+    """
+
+    def __init__(self, core: Core, lists: ListWatch) -> None:
+        super().__init__(core)
+        self._lists = lists
+        self.stopping: ModeSwitch | None = None
+        self.may_be_in_auto = False
+        self.is_hold_granted = False
+        self._stopped_s = -math.inf  # when the vehicle took it
+        self._speed_mps = 0.0
+        self._held_at_s: float | None = None
+        self._standstill_due_s = math.inf
+
+    @property
+    def deadline_s(self) -> float | None:
+        """When `handle_timer` wants to be called."""
+        times = [self.stopping.deadline_s] if self.stopping is not None else []
+        if self.core.state is State.HOLDING:
+            times.append(-math.inf if self._rereading_due else self._standstill_due_s)
+        return min((time_s for time_s in times if time_s is not None), default=None)
+
+    def messages_to_send(self) -> list[Message]:
+        """Return and forget what is to be sent before anything else."""
+        return self.stopping.messages_to_send() if self.stopping is not None else []
+
+    def receive(self, frame: Frame, now_s: float) -> Sequence[Signal]:  # noqa: ARG002 - a part
+        """Notice how fast the vehicle is."""
+        if self.core.is_from_vehicle(frame) and isinstance(frame.message, m.GlobalPositionInt):
+            self._speed_mps = math.hypot(frame.message.vx, frame.message.vy) / 100
+        return []
+
+    def hear_answer(self, frame: Frame, now_s: float) -> Sequence[Signal]:
+        """Take a frame for the HOLD that is under way."""
+        if self.stopping is None:
+            return []
+        self.stopping.receive(frame, now_s)
+        return self._look_after_hold(self.stopping, now_s)
+
+    def handle_timer(self, now_s: float) -> Sequence[Signal]:
+        """Send HOLD again, or see whether the vehicle stands."""
+        if self.stopping is not None:
+            self.stopping.handle_timer(now_s)
+            if signals := self._look_after_hold(self.stopping, now_s):
+                return signals
+        if self.core.state is not State.HOLDING:
+            return []
+        if self._has_come_to_rest(now_s):
+            return [Cue.HELD]
+        if self._rereading_due:
+            self._lists.reread_suspects(now_s)  # while it comes to rest
+        return []
+
+    @property
+    def _rereading_due(self) -> bool:
+        return self._lists.is_outdated and not self.core.steps
+
+    # What may be stopped
+
+    @property
+    def may_stop_it(self) -> bool:
+        """Whether the vehicle may be on its way and is ours to stop."""
+        core = self.core
+        if core.peer is None:
+            return False
+        if core.orders.hold and core.situation.armed and core.situation.mode == AUTO_MODE:
+            return True
+        if not core.orders.drive:
+            return False
+        if core.state in (State.STARTING, State.DRIVING):
+            return True
+        return not core.orders.once and self._may_move(core.target)
+
+    def _may_move(self, target: Target | None) -> bool:
+        """Return whether the vehicle may be on its way; a click sets it going before any heartbeat says so."""
+        was_clicked = target is not None and target.is_click
+        situation = self.core.situation
+        return was_clicked or (bool(situation.armed) and situation.mode != HOLD_MODE)
+
+    # Stopping
+
+    def stop_again(self, target: Target, now_s: float) -> Sequence[Signal]:
+        """Stop the vehicle once more: a command that is repeated has set it going once more."""
+        core = self.core
+        if target.source is not TargetSource.REPOSITION or not core.operator.is_on or core.orders.once:
+            return []
+        core.operator.take_target(now_s, is_click=True)
+        if core.state in (State.STARTING, State.DRIVING):
+            return [Notice.ROUTE_WANTED]
+        self.command_hold(now_s)
+        return []
+
+    def stop_at_once(self, target: Target, now_s: float) -> None:
+        """Stop a vehicle that a target has set going, though the target itself has to wait."""
+        core = self.core
+        is_heard = core.peer is not None and core.state is not State.LOST
+        if core.orders.drive and is_heard and self._may_move(target) and not core.orders.once:
+            reason = "a target came; it is gone into in a moment"
+            core.voice.tell(now_s, EventName.HOLDING, f"HOLD: {reason}", reason)
+            self.command_hold(now_s)
+
+    def hold(self, reason: str, now_s: float) -> None:
+        """Leave what is under way and stop the vehicle, to plan from where it stands."""
+        self._held_at_s = None
+        self._standstill_due_s = math.inf
+        self.core.voice.tell(now_s, EventName.HOLDING, f"HOLD: {reason}", reason)
+        self.core.steps.clear()
+        self.command_hold(now_s)
+
+    def command_hold(self, now_s: float) -> None:
+        """Switch to HOLD."""
+        assert self.core.peer is not None
+        self.expect_hold()
+        self.stopping = ModeSwitch(self.core.peer, HOLD_MODE, is_urgent=True, until_seen=self.may_be_in_auto)
+        self.stopping.start(now_s)
+
+    def expect_hold(self) -> None:
+        """Expect nothing but what was and what will be once our HOLD is taken."""
+        situation = self.core.situation
+        before = {situation.mode}
+        if self.may_be_in_auto:
+            before.add(AUTO_MODE)
+        self.core.operator.expect(HOLD_MODE, before, is_armed=bool(situation.armed))
+
+    def let_go(self) -> None:
+        """Stop nothing any more."""
+        self.stopping = None
+        self.may_be_in_auto = False
+
+    def _look_after_hold(self, stopping: ModeSwitch, now_s: float) -> Sequence[Signal]:
+        core = self.core
+        if stopping.is_granted and core.state is State.HOLDING and self._held_at_s is None:
+            self._held_at_s = now_s
+            self._standstill_due_s = now_s + _STOP_AT_LEAST_S
+        if not stopping.is_done:
+            return []
+        core.send(*stopping.messages_to_send())
+        self.let_go()
+        self.is_hold_granted = stopping.is_granted
+        self._stopped_s = now_s
+        core.operator.settle(now_s)
+        if not stopping.is_granted:
+            text = "the vehicle does not go to HOLD"
+            core.voice.tell(now_s, EventName.COMMAND_FAILED, text, "DO_SET_MODE", stopping.result_name)
+        return [Notice.HOLD_ENDED]
+
+    def is_mode_known(self, now_s: float) -> bool:
+        """Return whether the newest heartbeat is news of the mode that the vehicle is in."""
+        # A heartbeat from before our HOLD still tells the mode before it.
+        is_news = self.stopping is None and self.core.heartbeat_s > self._stopped_s
+        return is_news and now_s - self.core.heartbeat_s <= FRESH_S
+
+    def _has_come_to_rest(self, now_s: float) -> bool:
+        """Return whether the vehicle stands, or will not; else look again a little later."""
+        if self._held_at_s is None or now_s < self._held_at_s + _STOP_AT_LEAST_S:
+            return False
+        is_patience_over = (
+            now_s >= self._held_at_s + _STOP_PATIENCE_S and self.core.situation.mode == HOLD_MODE
+        )
+        if self._speed_mps <= _STILL_MPS or is_patience_over:
+            return True
+        self._standstill_due_s = now_s + _STOP_AT_LEAST_S
+        return False

@@ -1,0 +1,59 @@
+"""The parts of the director, made in an order in which each knows only those before it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from mavlink_bridge.director.drive_supervisor import DriveSupervisor
+from mavlink_bridge.director.halter import Halter
+from mavlink_bridge.director.hand_over import HandOver
+from mavlink_bridge.director.identity_guard import IdentityGuard
+from mavlink_bridge.director.learner import Learner
+from mavlink_bridge.director.list_watch import ListWatch
+from mavlink_bridge.director.mission_writer import MissionWriter
+from mavlink_bridge.director.route_desk import RouteDesk
+from mavlink_bridge.director.starter import Starter
+from mavlink_bridge.director.target_inbox import TargetInbox
+
+if TYPE_CHECKING:
+    from mavlink_bridge.director.core import Core, Part
+
+
+class Parts:
+    """All parts, and the orders in which they hear.
+
+    Parameters
+    ----------
+    core : Core
+        What they share.
+
+    Attributes
+    ----------
+    hearers : tuple of Part
+        Those that hear frames: what the vehicle does, then who has it, then how the drive goes, then what it rests on, and last what is wanted.
+    timed : tuple of Part
+        Those that have timers. A vehicle that has fallen silent ends what the parts before would go on with, but not what they have done.
+    """
+
+    def __init__(self, core: Core) -> None:
+        self.core: Core = core
+        self.learner: Learner = Learner(core)
+        self.lists: ListWatch = ListWatch(core)
+        self.inbox: TargetInbox = TargetInbox(core)
+        self.halter: Halter = Halter(core, self.lists)
+        self.driver: DriveSupervisor = DriveSupervisor(core, self.halter)
+        self.desk: RouteDesk = RouteDesk(core, self.lists, self.driver)
+        self.writer: MissionWriter = MissionWriter(core, self.lists, self.halter, self.desk)
+        self.starter: Starter = Starter(core, self.lists, self.halter, self.driver, self.desk)
+        self.hand_over: HandOver = HandOver(core, self.halter, self.driver)
+        self.guard: IdentityGuard = IdentityGuard(core, self.learner, self.halter, self.inbox, self.writer)
+        self.hearers: tuple[Part, ...] = (
+            self.halter,
+            self.learner,
+            self.hand_over,
+            self.guard,
+            self.driver,
+            self.lists,
+            self.inbox,
+        )
+        self.timed: tuple[Part, ...] = (self.halter, self.desk, self.driver, self.learner, self.lists)

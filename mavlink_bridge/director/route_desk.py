@@ -1,0 +1,148 @@
+"""The part of the director that has a plan made for each target, and checks whether the one that stands still holds."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from mavlink_bridge.director.core import Core, Part
+from mavlink_bridge.director.events import EventName
+from mavlink_bridge.director.grounds import Grounds
+from mavlink_bridge.director.plan_task import PlanTask
+from mavlink_bridge.director.states import Cue, Notice, Signal, State
+from missions.checking.recheck import recheck
+from missions.errors import MissionError
+from missions.promise import asked_clearance
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from mavlink_bridge.director.drive_supervisor import DriveSupervisor
+    from mavlink_bridge.director.list_watch import ListWatch
+    from missions.checking.recheck import Recheck
+    from missions.planned import Plan
+    from missions.request import Request
+
+_MAKING_A_ROUTE = frozenset({State.HOLDING, State.PLANNING})
+"""States whose plan is yet to come: it is made around the fence as it is then."""
+
+
+class RouteDesk(Part):
+    """Makes routes, with the shell's help.
+
+    Attributes
+    ----------
+    is_own_idea : bool
+        Whether the route is made because the one before broke, not because somebody asked.
+    """
+
+    def __init__(self, core: Core, lists: ListWatch, driver: DriveSupervisor) -> None:
+        super().__init__(core)
+        self._lists = lists
+        self._driver = driver
+        self._task: PlanTask | None = None
+        self._made: Plan | MissionError | None = None
+        self._moves = 0  # a task counts as long as the state has not moved since
+        self._planned_on = Grounds.of(core.situation)
+        self.is_own_idea = False
+
+    @property
+    def deadline_s(self) -> float | None:
+        """At once where there is something to do for the plan but to wait for it."""
+        is_waiting = self.pending is not None and not self._lists.is_outdated
+        is_due = self.core.state is State.PLANNING and not self.core.steps and not is_waiting
+        return -math.inf if is_due else None
+
+    def handle_timer(self, now_s: float) -> Sequence[Signal]:
+        """Go on with the plan."""
+        return self._go_on(now_s) if self.core.state is State.PLANNING else []
+
+    @property
+    def pending(self) -> PlanTask | None:
+        """The plan that is waited for."""
+        is_waiting = self.core.state is State.PLANNING and self._moves == self.core.moves
+        return self._task if is_waiting and self._made is None else None
+
+    def plan_made(self, task: PlanTask, made: Plan | MissionError, now_s: float) -> Sequence[Signal]:
+        """Take a plan, or why there is none; what is not waited for any more is left."""
+        if task is not self.pending:
+            return []
+        self._made = made
+        return self._go_on(now_s)
+
+    def _go_on(self, now_s: float) -> Sequence[Signal]:
+        """Have a plan made around what is known by now, and go on with the one that was."""
+        core = self.core
+        if self._moves != core.moves:
+            self._forget_task()
+        if core.steps:
+            return []
+        if self._lists.is_outdated:
+            self._lists.reread_suspects(now_s)
+        elif self._task is None:
+            self._planned_on = Grounds.of(core.situation)
+            self._task = PlanTask(core.situation, self.request())
+        elif isinstance(self._made, MissionError):
+            core.plan = None
+            return [Cue.NO_PLAN]
+        elif self._made is not None:
+            core.plan = self._made
+            return [Cue.PLANNED]
+        return []
+
+    def _forget_task(self) -> None:
+        self._task = self._made = None
+        self._moves = self.core.moves
+
+    def no_plan(self, now_s: float) -> Sequence[Signal]:
+        """Report why there is no plan."""
+        assert isinstance(self._made, MissionError)
+        self.core.voice.no_plan(now_s, self._made)
+        return self.core.give_up(self._made)
+
+    def request(self) -> Request:
+        """Return what is asked of the next plan: the orders' request, for the newest target, from where the vehicle is."""
+        core, request = self.core, self.core.orders.request
+        if core.target is not None and core.target.position not in request.targets:
+            request = replace(request, targets=(core.target.position,))
+        return request if core.orders.once else replace(request, start=None)
+
+    # Whether the plan still holds
+
+    @property
+    def is_stale(self) -> bool:
+        """Whether the fence is another one than the plan was made around."""
+        return bool(Grounds.of(self.core.situation).changes_since(self._planned_on))
+
+    def recheck(self, item: int) -> Recheck:
+        """Return a check of the rest of the route against the fence and its parameters as they are now."""
+        core = self.core
+        assert core.plan is not None
+        try:
+            vehicle, _ = asked_clearance(core.situation, core.orders.request)
+        except MissionError:
+            vehicle = core.plan.vehicle
+        return recheck(replace(core.plan, vehicle=vehicle), core.situation, item)
+
+    def fence_changed(self, now_s: float) -> Sequence[Signal]:
+        """Look at the route again, whose grounds are others than before."""
+        core = self.core
+        self._forget_task()
+        if core.state is State.READY and core.target is not None:
+            return [Notice.ROUTE_OUTDATED]
+        if core.plan is None or core.state in _MAKING_A_ROUTE or core.state is State.ARRIVED:
+            return []
+        found = self.recheck(self._driver.item)
+        if found.holds:
+            return []
+        is_ours_to_mend = core.state not in (State.READY, State.LET_GO)
+        if is_ours_to_mend or core.is_driving_ours:
+            core.voice.rechecked(now_s, EventName.ROUTE_BROKEN, "the rest of the route", found)
+        may_mend = is_ours_to_mend and (core.state is not State.DRIVING or core.orders.drive)
+        return [Notice.ROUTE_OUTDATED] if may_mend else []
+
+    def broke(self, found: Recheck, now_s: float) -> Sequence[Signal]:
+        """Report that the route is broken, and have it made anew before it is driven."""
+        self.core.voice.rechecked(now_s, EventName.ROUTE_BROKEN, "the way from here", found)
+        return [Notice.ROUTE_OUTDATED]

@@ -1,0 +1,145 @@
+"""The part of the director that sets the vehicle going on its verified mission: nothing else arms or switches to AUTO."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from mavlink_bridge.director.core import Core, Part
+from mavlink_bridge.director.events import EventName
+from mavlink_bridge.director.mode_switch import AwaitHeartbeat, ModeSwitch
+from mavlink_bridge.director.states import Cue, Signal
+from mavlink_bridge.director.steps import Step, step
+from mavlink_bridge.errors import OutcomeError, RefusedError
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.rover import AUTO_MODE, HOLD_MODE, mode_name
+from mavlink_bridge.protocol.command import SendCommand
+from missions.items import Command
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from mavlink_bridge.director.drive_supervisor import DriveSupervisor
+    from mavlink_bridge.director.halter import Halter
+    from mavlink_bridge.director.list_watch import ListWatch
+    from mavlink_bridge.director.route_desk import RouteDesk
+
+START_YOURSELF = "arm it, then give the target again (or run the command again); or arm it in HOLD and switch it to AUTO yourself"
+
+_MOVED_M = 1.0
+"""A vehicle that stands within this of where its route begins counts as not having moved since it was planned."""
+
+
+class Starter(Part):
+    """Looks once more, arms where asked, switches to AUTO and to the first item."""
+
+    def __init__(
+        self, core: Core, lists: ListWatch, halter: Halter, driver: DriveSupervisor, desk: RouteDesk
+    ) -> None:
+        super().__init__(core)
+        self._lists = lists
+        self._halter = halter
+        self._driver = driver
+        self._desk = desk
+
+    def look_once_more(self, now_s: float) -> None:
+        """Read again what somebody may have changed, and wait for a heartbeat: it shows a takeover that was on its way."""
+        assert self.core.peer is not None
+        self._lists.reread_suspects(now_s)
+        self.core.steps.run([step(AwaitHeartbeat(self.core.peer), self._looked)], now_s)
+
+    def _looked(self, _machine: AwaitHeartbeat, now_s: float) -> Sequence[Signal]:
+        core, situation, halter = self.core, self.core.situation, self._halter
+        is_held = halter.stopping is not None
+        if self._lists.has_suspects or is_held or not core.operator.is_ours(situation.mode):
+            self.look_once_more(now_s)
+            return []
+        if not situation.armed and not core.orders.arm:
+            return self._refuse_unarmed(now_s)
+        if (
+            situation.mode != HOLD_MODE
+        ):  # it starts from HOLD: any other mode is then known for somebody else's
+            halter.command_hold(now_s)
+            self.look_once_more(now_s)
+            return []
+        found = self._desk.recheck(1)
+        if not found.holds and (found.moved_m > _MOVED_M or self._desk.is_stale):
+            return self._desk.broke(found, now_s)
+        if core.orders.arm and not situation.armed:
+            core.steps.run([self._command(Command.COMPONENT_ARM_DISARM, self._armed)], now_s)
+        else:
+            self._switch_to_auto(now_s)
+        return []
+
+    def _refuse_unarmed(self, now_s: float) -> Sequence[Signal]:
+        """Leave the mode of a disarmed vehicle alone: in AUTO, arming it would drive off."""
+        situation = self.core.situation
+        mode = mode_name(situation.mode)
+        drives_off = ": arming it makes it drive" if situation.mode == AUTO_MODE else ""
+        trouble = OutcomeError(
+            f"the mission is verified on the vehicle, which is not armed and does not drive: its mode was left alone ({mode}{drives_off})",
+            advice=START_YOURSELF,
+            mode=mode,
+        )
+        self._driver.stand_by()
+        self.core.voice.error(now_s, EventName.TROUBLE, trouble, dict(trouble.details))
+        return self.core.fail_step(trouble)
+
+    def _armed(self, machine: SendCommand, now_s: float) -> Sequence[Signal]:
+        if not _is_accepted(machine):
+            return self._refused(machine, now_s)
+        self._switch_to_auto(now_s)
+        return []
+
+    def _switch_to_auto(self, now_s: float) -> None:
+        core, situation = self.core, self.core.situation
+        assert core.peer is not None
+        self._halter.may_be_in_auto = True
+        core.operator.expect(AUTO_MODE, {situation.mode}, is_armed=bool(situation.armed))
+        core.steps.run([step(ModeSwitch(core.peer, AUTO_MODE), self._in_auto)], now_s)
+
+    def _in_auto(self, machine: ModeSwitch, now_s: float) -> Sequence[Signal]:
+        if not machine.is_granted:
+            self._driver.stand_by()
+            return self._failed("DO_SET_MODE", machine.result_name, "", now_s)
+        self.core.operator.settle(now_s)
+        # Only after the mode change: before it, in HOLD, ArduPilot reports internal errors.
+        first = self._command(Command.DO_SET_MISSION_CURRENT, self._started, param2=1.0)
+        self.core.steps.run([first], now_s)
+        return []
+
+    def _started(self, machine: SendCommand, now_s: float) -> Sequence[Signal]:
+        if _is_accepted(machine):
+            return [Cue.STARTED]
+        signals = self._refused(machine, now_s)
+        self._halter.command_hold(now_s)  # it drives from an item that we do not know
+        return signals
+
+    def _command(
+        self,
+        number: Command,
+        take: Callable[[SendCommand, float], Sequence[Signal]],
+        param2: float = 0.0,
+    ) -> Step:
+        peer = self.core.peer
+        assert peer is not None
+        message = m.CommandLong(peer.system, peer.component, number, param1=1.0, param2=param2)
+        return step(SendCommand(peer, message), take)
+
+    def _refused(self, machine: SendCommand, now_s: float) -> Sequence[Signal]:
+        outcome = machine.outcome
+        assert outcome is not None
+        result = outcome.result.name if outcome.result is not None else "no answer"
+        texts = "".join(f"; {text}" for text in outcome.texts)
+        return self._failed(Command(outcome.command).name, result, texts, now_s)
+
+    def _failed(self, name: str, result: str, texts: str, now_s: float) -> Sequence[Signal]:
+        self.core.steps.clear()
+        self.core.voice.tell(now_s, EventName.COMMAND_FAILED, f"{name}: {result}", name, result)
+        kind = OutcomeError if result == "no answer" else RefusedError
+        return self.core.fail_step(
+            kind(f"the mission is on the vehicle, but it refused {name}: {result}{texts}")
+        )
+
+
+def _is_accepted(machine: SendCommand) -> bool:
+    return machine.outcome is not None and machine.outcome.is_accepted

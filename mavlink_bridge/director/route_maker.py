@@ -18,7 +18,7 @@ from mavlink_bridge.protocol.limits import Limits
 from mavlink_bridge.protocol.outcomes import Writing, end_of_upload, upload_trouble
 from mavlink_bridge.protocol.sendable import check_items
 from mavlink_bridge.protocol.verified_upload import VerifiedUpload, VerifiedUploadOutcome
-from missions.checking.recheck import recheck
+from missions.checking.recheck import Recheck, recheck
 from missions.errors import MissionError
 from missions.items import with_home
 from missions.promise import asked_clearance
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
     from mavlink_bridge.director.orders import Orders
     from mavlink_bridge.mavlink.messages import Frame
-    from missions.checking.recheck import Recheck
     from missions.items import MissionItem
     from missions.planned import Plan
     from missions.request import Request
@@ -212,7 +211,11 @@ class RouteMaker(TargetTaker):
             vehicle, _ = asked_clearance(self.situation, self.orders.request)
         except MissionError:
             vehicle = self.plan.vehicle
-        return recheck(replace(self.plan, vehicle=vehicle), self.situation, item)
+        try:
+            return recheck(replace(self.plan, vehicle=vehicle), self.situation, item)
+        except Exception as error:  # noqa: BLE001 - a defect of ours: what cannot be checked does not hold
+            why = f"not known: checking it broke down ({type(error).__name__}: {error}), a defect"
+            return Recheck(0.0, self.plan.asked_m, why)
 
     def _fence_changed(self, now_s: float) -> None:
         self._forget_task()

@@ -20,6 +20,7 @@ import shapely
 from missions.drive_model.corner import GRAVITY_MPS2, INSIDE_BAND_M
 from missions.drive_model.fence_ahead import FenceAhead
 from missions.drive_model.motion import LegProfile, Ramp
+from missions.errors import VehicleError
 from missions.vehicle import Steering
 
 if TYPE_CHECKING:
@@ -39,6 +40,8 @@ ASIDE_DEG = 5.0
 """It may look so far to either side of the way that it is meant to go."""
 
 _STEP_S = 0.3
+_LONGEST_S = 7 * 86400.0
+"""No rover drives a mission for longer, and a drive is followed step by step."""
 _SETTLE_S = 1.0
 _LEAST_SCALE = 0.1
 _LEAST_MPS = 0.05
@@ -106,6 +109,11 @@ class _Target:
             self._passed_s.append(begins_s[-1] + profiles[number].duration_s - half_s)
             begins_s.append(self._passed_s[-1] - half_s)
         whole_s = begins_s[-1] + profiles[-1].duration_s
+        if not whole_s <= _LONGEST_S:
+            raise VehicleError(
+                f"at its speeds the drive takes {whole_s / 86400:.3g} days, more than the {_LONGEST_S / 86400:g} that can be foreseen",
+                duration_s=whole_s,
+            )
         self.times_s = np.arange(0.0, whole_s + _STEP_S, _STEP_S)
         points = band.points[:, 0] + 1j * band.points[:, 1]
         self.places: NDArray[np.complex128] = np.full(len(self.times_s), points[0])

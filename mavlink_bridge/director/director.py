@@ -70,6 +70,7 @@ class Director(Stopper):
         self._item_now = 1
         self._is_our_start = False  # the drive was begun by us, not by somebody else
         self._holds_after_arrival = False
+        self._was_in_auto_by_us = False  # when it was last heard, before the link was lost
 
     @property
     def progress(self) -> tuple[int, int]:
@@ -166,6 +167,9 @@ class Director(Stopper):
 
     def _take_up_again(self, now_s: float) -> None:
         """Go on where a lost link left us: with watching, never with driving; somebody may have had the vehicle meanwhile."""
+        was_in_auto_by_us, self._was_in_auto_by_us = self._was_in_auto_by_us, False
+        if was_in_auto_by_us and self.situation.mode == AUTO_MODE and not self.situation.armed:
+            self._put_back("the vehicle was disarmed while it was not heard", now_s)
         mission, ours = self.situation.mission, self._ours
         if self.plan is None or ours is None or mission is None or mission.value.items != ours[1:]:
             return
@@ -188,6 +192,8 @@ class Director(Stopper):
             self._voice.tell(now_s, EventName.DRIVING, text, len(self.plan.items))
 
     def _vehicle_gone(self, *, has_forgotten: bool) -> None:
+        is_in_auto_by_us = self._may_be_in_auto or (self.drive is not None and self._is_our_start)
+        self._was_in_auto_by_us = not has_forgotten and (self._was_in_auto_by_us or is_in_auto_by_us)
         self._let_loose()
         if has_forgotten:
             self._incidents.forget()
@@ -294,7 +300,7 @@ class Director(Stopper):
     def _identity_clash(self, now_s: float) -> None:
         """Do what a clash asks for, once until it is settled by a typed target."""
         identity, upload = self.identity, self._steps.current
-        if identity is None or self.is_done:
+        if identity is None or self.is_done or isinstance(upload, PutBack):  # that first: it takes seconds
             return
         answer = clash.Circumstances(
             self.state,

@@ -51,6 +51,11 @@ _START_YOURSELF = (
 _ENDLESS = (Command.NAV_LOITER_UNLIM, Command.NAV_RETURN_TO_LAUNCH)
 
 
+def _is_no_ardupilots(message: m.Message) -> bool:
+    """Return whether a message is a HEARTBEAT of no ArduPilot: its modes mean something else, and it is not the vehicle that was learnt."""
+    return isinstance(message, m.Heartbeat) and message.autopilot != m.Autopilot.ARDUPILOTMEGA
+
+
 class Director(Stopper):
     """Takes targets to verified missions, and missions to arrival.
 
@@ -81,8 +86,10 @@ class Director(Stopper):
         return progress
 
     def receive(self, frame: Frame, now_s: float) -> None:
-        """Take a frame; one with our own ids that we did not send says nothing but that it is there."""
+        """Take a frame; one with our own ids that we did not send says nothing but that it is there, nor does another autopilot's with the vehicle's."""
         is_heeded = self.state is State.LISTENING or self.orders.passive
+        if not is_heeded and self._is_from_vehicle(frame) and _is_no_ardupilots(frame.message):
+            return
         if is_heeded or not clash.is_clash(frame, self.identity):
             super().receive(frame, now_s)
             return

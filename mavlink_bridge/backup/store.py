@@ -228,7 +228,15 @@ class BackupStore:
             backup = self.folder / Path(content["backup"]).name  # it cannot lead out of the folder
             if "vehicle" in content:
                 vehicle = _mark_from_json(int(name[1]), content["vehicle"])
-        except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        except (
+            OSError,
+            ValueError,
+            KeyError,
+            TypeError,
+            AttributeError,
+            OverflowError,
+            RecursionError,
+        ) as error:
             trouble = BackupError(f"{path}: the note of an interrupted upload cannot be read: {error}")
             return Note(path, vehicle, mission_type, trouble=trouble)
         try:
@@ -293,6 +301,7 @@ def read_backup(path: Path) -> Backup:
             MissionType[content["mission_type"].upper()],
             tuple(_item_from_json(item) for item in content["items"]),
         )
+        checksum = _checksum(content)
     except OSError as error:
         raise BackupError(
             f"the backup {path} cannot be read: {error.strerror or error}", path=str(path)
@@ -301,7 +310,7 @@ def read_backup(path: Path) -> Backup:
         raise BackupError(
             f"{path} is not a backup that pbpp wrote; nothing was written to the vehicle", path=str(path)
         ) from None
-    if claimed != _checksum(content):
+    if claimed != checksum:
         raise BackupError(f"the backup {path} is damaged: its checksum does not match", path=str(path))
     return backup
 

@@ -48,6 +48,8 @@ _EXIT_CODES: tuple[tuple[type[Exception], ExitCode], ...] = (
     (bridge_errors.BridgeError, ExitCode.INTERNAL),
 )
 
+_DEFECTS = (bridge_errors.DefectError, mission_errors.PlanCheckError)
+
 _ADVICE: Mapping[type[Exception], str] = {
     mission_errors.InvalidPositionError: "latitude comes first: LAT,LON in decimal degrees, such as 40.0713,-105.2299",
     mission_errors.FenceMissingError: "upload a fence to the vehicle, or give a file that holds one",
@@ -126,7 +128,7 @@ def report_error(command: str, error: Exception, *, wants_json: bool) -> ExitCod
     if "advice" not in details and (advice := _advice(command, error)):
         details["advice"] = advice
     message = str(error)
-    if isinstance(error, bridge_errors.DefectError) and error.__cause__ is not None:
+    if isinstance(error, _DEFECTS) and error.__cause__ is not None:
         message += f"; {_defect_line(error.__cause__)}"
         details["advice"] = "; ".join(filter(None, (details.get("advice"), _REPORT)))
         details |= _trace_of(error.__cause__, wanted=telling().verbose)

@@ -34,7 +34,7 @@ _OLD_S = 2.0  # two heartbeats: older telemetry is shown with its age
 
 
 class Terminated(KeyboardInterrupt):
-    """SIGTERM, or Ctrl-Break on Windows: the end without a person at the keyboard."""
+    """SIGTERM, SIGHUP, or Ctrl-Break on Windows: the end without a person at the keyboard."""
 
 
 class Interrupted(KeyboardInterrupt):
@@ -316,12 +316,13 @@ def _terminate(_number: int, _frame: object) -> None:
 
 @contextlib.contextmanager
 def terminable() -> Iterator[None]:
-    """Let SIGTERM, on Windows Ctrl-Break, end what runs in the context as an interrupt does: with a word of what the vehicle does."""
+    """Let SIGTERM, a terminal that is closed (SIGHUP), on Windows Ctrl-Break, end what runs in the context as an interrupt does: with a word of what the vehicle does."""
     before: dict[int, Any] = {}
-    names = ("SIGINT", "SIGTERM", "SIGBREAK")  # what SIGINT does is put back at the end
+    names = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")  # what SIGINT does is put back at the end
     for number in (getattr(signal, name) for name in names if hasattr(signal, name)):
         before[number] = signal.getsignal(number)
-        if number != signal.SIGINT:
+        is_ignored = before[number] is signal.SIG_IGN  # by nohup
+        if number != signal.SIGINT and not is_ignored:
             with contextlib.suppress(ValueError):  # not the main thread
                 signal.signal(number, _terminate)
     try:

@@ -23,6 +23,9 @@ MOST_VEHICLE_M = 100.0
 MOST_MPS = 100.0
 """No rover is faster."""
 
+LEAST_MPS = 0.05
+"""The least speed between waypoints that ArduPilot goes down to."""
+
 MOST_S = 86_400.0
 """No patience and no link's latency is longer than a day."""
 

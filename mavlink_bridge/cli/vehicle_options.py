@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mavlink_bridge.cli.values import (
+    LEAST_MPS,
     MOST_M,
     MOST_MPS,
     MOST_VEHICLE_M,
@@ -27,7 +28,7 @@ SpeedOption = Annotated[
     float | None,
     typer.Option(
         metavar="M/S",
-        parser=within(0.0, MOST_MPS, "metres a second", above=True),
+        parser=within(LEAST_MPS, MOST_MPS, "metres a second"),
         help="Drive at this speed. Default: the vehicle's own.",
         rich_help_panel=PANEL,
     ),

@@ -57,6 +57,7 @@ from mavlink_bridge.director.handlers import HANDLERS
 from mavlink_bridge.director.parts import Parts
 from mavlink_bridge.director.states import Cue, Signal, State
 from mavlink_bridge.fold import fold
+from mavlink_bridge.mavlink.messages import Autopilot, Heartbeat
 from missions.situation import Situation
 
 if TYPE_CHECKING:
@@ -241,7 +242,7 @@ class Director:
         self._parts.learner.start(now_s)
 
     def receive(self, frame: Frame, now_s: float) -> None:
-        """Take a frame; one with our own ids that we did not send says nothing but that it is there."""
+        """Take a frame; one with our own ids that we did not send says nothing but that it is there, nor does another autopilot's with the vehicle's."""
         core = self._core
         if self._parts.guard.is_clash(frame):
             self._heed(self._parts.guard.take_clash(now_s), now_s)
@@ -251,6 +252,8 @@ class Director:
             return
         if core.state is State.LISTENING:
             self._heed(self._parts.learner.look_for(frame, now_s), now_s)
+            return
+        if not core.orders.passive and core.is_from_vehicle(frame) and _is_no_ardupilots(frame.message):
             return
         self._heed(self._parts.halter.hear_answer(frame, now_s), now_s)
         frame = as_to_vehicle(frame, core.peer)
@@ -286,3 +289,8 @@ class Director:
                 continue
             if (handler := HANDLERS.get(signal)) is not None:
                 self._heed(handler(self._parts, now_s) or (), now_s)
+
+
+def _is_no_ardupilots(message: Message) -> bool:
+    """Return whether a message is a HEARTBEAT of no ArduPilot: its modes mean something else, and it is not the vehicle that was learnt."""
+    return isinstance(message, Heartbeat) and message.autopilot != Autopilot.ARDUPILOTMEGA

@@ -75,6 +75,11 @@ class DriveSupervisor(Part):
             return self.drive.item
         return self._item_now if self.core.is_driving_ours else 1
 
+    @property
+    def is_our_drive(self) -> bool:
+        """Whether the drive was begun by us."""
+        return self.drive is not None and self._is_our_start
+
     def is_unarmed(self, now_s: float) -> bool:
         """Return whether our drive runs on a vehicle that never showed itself armed."""
         is_late = self.drive is not None and now_s > self.drive.begun_s + _ARMING_SHOWS_S

@@ -16,7 +16,7 @@ from mavlink_bridge.director.steps import step
 from mavlink_bridge.director.takeover import Takeover, account_of
 from mavlink_bridge.errors import OutcomeError
 from mavlink_bridge.mavlink import messages as m
-from mavlink_bridge.mavlink.rover import mode_name
+from mavlink_bridge.mavlink.rover import AUTO_MODE, mode_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -35,6 +35,8 @@ class HandOver(Part):
         What the autopilot tells of breaches and failsafes.
     taken : Takeover or None
         What was done that is not told yet; None where the vehicle itself was not taken, but its mission.
+    was_in_auto_by_us : bool
+        Whether it was in AUTO by our doing when it was last heard, before the link was lost.
     """
 
     def __init__(self, core: Core, halter: Halter, driver: DriveSupervisor) -> None:
@@ -43,6 +45,7 @@ class HandOver(Part):
         self._driver = driver
         self.incidents = Incidents(core.voice, core.orders.request)
         self.taken: Takeover | None = None
+        self.was_in_auto_by_us = False
         self._after_withdrawing: OutcomeError | None = None
 
     def receive(self, frame: Frame, now_s: float) -> Iterable[Signal]:
@@ -127,6 +130,18 @@ class HandOver(Part):
         return self.core.give_up(trouble) if trouble is not None else []
 
     # A vehicle that was disarmed in our AUTO
+
+    def note_silence(self) -> None:
+        """Remember of a vehicle that has fallen silent whether it is in AUTO by our doing; what is under way is dropped after that."""
+        is_in_auto_by_us = self._halter.may_be_in_auto or self._driver.is_our_drive
+        self.was_in_auto_by_us = self.was_in_auto_by_us or is_in_auto_by_us
+
+    def put_back_after_silence(self, now_s: float) -> None:
+        """Take a vehicle that is heard again out of our AUTO, where it was disarmed meanwhile."""
+        was_in_auto_by_us, self.was_in_auto_by_us = self.was_in_auto_by_us, False
+        situation = self.core.situation
+        if was_in_auto_by_us and situation.mode == AUTO_MODE and not situation.armed:
+            self._put_back("the vehicle was disarmed while it was not heard", now_s)
 
     def _put_back(self, what: str, now_s: float) -> None:
         """Take the vehicle, disarmed now, out of the AUTO that we switched it to."""

@@ -56,6 +56,7 @@ def _on_learnt(parts: Parts, now_s: float) -> Iterable[Signal]:
         if core.orders.once:
             return core.give_up(OutcomeError("the vehicle was switched off and on meanwhile"))
         inbox.note_lists()
+        parts.hand_over.put_back_after_silence(now_s)
         return [*_take_up_again(parts), Notice.TARGET_IS_DUE]
     if inbox.waiting is not None or targets:
         inbox.note_lists()
@@ -90,6 +91,7 @@ def _on_heard_again(parts: Parts, now_s: float) -> None:
 
 
 def _on_silence(parts: Parts, now_s: float) -> Iterable[Signal]:
+    parts.hand_over.note_silence()
     parts.core.steps.clear()
     _let_loose(parts)
     parts.inbox.watch_while_waiting()
@@ -100,6 +102,7 @@ def _on_rebooted(parts: Parts, now_s: float) -> None:
     text = "the vehicle was switched off and on; all is read anew"
     parts.core.voice.tell(now_s, EventName.REBOOTED, text)
     _let_loose(parts)
+    parts.hand_over.was_in_auto_by_us = False  # it starts in another mode
     parts.hand_over.incidents.forget()
     parts.core.ours = None
     parts.inbox.waiting = None

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from mavlink_bridge.director import clash
 from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
+from mavlink_bridge.director.put_back import PutBack
 from mavlink_bridge.director.states import Cue, Signal, State
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.protocol.find import identity_shared, identity_taken
@@ -42,7 +43,7 @@ class IdentityGuard(Part):
     def take_clash(self, now_s: float) -> Sequence[Signal]:
         """Return what a clash leads to."""
         core, identity = self.core, self.core.identity
-        if identity is None or core.is_done:
+        if identity is None or core.is_done or core.steps.runs(PutBack):  # that first: it takes seconds
             return []
         answer = clash.Circumstances(
             core.state,

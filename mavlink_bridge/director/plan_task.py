@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from missions.errors import MissionError
+from missions.errors import MissionError, PlanCheckError
 from missions.planning.plan import plan as make_plan
 
 if TYPE_CHECKING:
@@ -32,8 +32,12 @@ class PlanTask:
     request: Request
 
     def made(self, planner: Callable[[Situation, Request], Plan] = make_plan) -> Plan | MissionError:
-        """Make it; give it, or why there is none."""
+        """Return the plan, or why there is none; a defect of ours is one reason, and no end of what waits for the plan."""
         try:
             return planner(self.situation, self.request)
         except MissionError as error:
             return error
+        except Exception as error:  # noqa: BLE001 - whatever it is, the vehicle must not lose its bridge by it
+            defect = PlanCheckError(f"planning broke down: {type(error).__name__}: {error}. This is a defect")
+            defect.__cause__ = error
+            return defect

@@ -11,7 +11,7 @@ from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.grounds import Grounds
 from mavlink_bridge.director.plan_task import PlanTask
 from mavlink_bridge.director.states import Cue, Notice, Signal, State
-from missions.checking.recheck import recheck
+from missions.checking.recheck import Recheck, recheck
 from missions.errors import MissionError
 from missions.promise import asked_clearance
 
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
     from mavlink_bridge.director.drive_supervisor import DriveSupervisor
     from mavlink_bridge.director.list_watch import ListWatch
-    from missions.checking.recheck import Recheck
     from missions.planned import Plan
     from missions.request import Request
 
@@ -123,7 +122,11 @@ class RouteDesk(Part):
             vehicle, _ = asked_clearance(core.situation, core.orders.request)
         except MissionError:
             vehicle = core.plan.vehicle
-        return recheck(replace(core.plan, vehicle=vehicle), core.situation, item)
+        try:
+            return recheck(replace(core.plan, vehicle=vehicle), core.situation, item)
+        except Exception as error:  # noqa: BLE001 - a defect of ours: what cannot be checked does not hold
+            why = f"not known: checking it broke down ({type(error).__name__}: {error}), a defect"
+            return Recheck(0.0, core.plan.asked_m, why)
 
     def fence_changed(self, now_s: float) -> Sequence[Signal]:
         """Look at the route again, whose grounds are others than before."""

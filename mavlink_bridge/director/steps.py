@@ -77,6 +77,10 @@ class Steps:
         """When the running machine wants its timer."""
         return self._queue[0].machine.deadline_s if self._queue else None
 
+    def runs(self, kind: type[object]) -> bool:
+        """Return whether the machine that runs is of a kind."""
+        return isinstance(self.current, kind)
+
     def run(self, steps: Iterable[Step], now_s: float) -> None:
         """Run these after those that wait already."""
         was_idle = not self._queue

@@ -175,6 +175,7 @@ def end_of_upload(
         elif verified and not writing.machine.has_written:
             words.append(f"the {writing.name} was not written")
     if verified:
+        words[0] = words[0].replace("nothing was written", "nothing more was written")
         words.append(f"written and verified before: {', '.join(verified)}")
     keeps_kind = is_ours and is_settled and (not verified or isinstance(cause, RefusedError))
     return _ended(cause, "; ".join(words), details, keeps_kind=keeps_kind)

@@ -20,6 +20,7 @@ import shapely
 from missions.drive_model.corner import GRAVITY_MPS2, INSIDE_BAND_M
 from missions.drive_model.fence_ahead import FenceAhead
 from missions.drive_model.motion import LegProfile, Ramp
+from missions.errors import VehicleError
 from missions.vehicle import Steering
 
 if TYPE_CHECKING:
@@ -40,6 +41,8 @@ ASIDE_DEG = 5.0
 
 # Steps of the pursuit: chosen, not measured; how well the whole holds against driven tracks stands in docs/drive-model.md, 4.
 _STEP_S = 0.3
+_LONGEST_S = 7 * 86400.0
+"""No rover drives a mission for longer, and a drive is followed step by step; chosen, not measured."""
 _SETTLE_S = 1.0  # of the target's time scale: acceleration over jerk in AR_WPNav, 1 s with the measured 1 m/s² and 1 m/s³
 _LEAST_SCALE = 0.1  # of the target's time scale, as in AR_WPNav: its time never stands still
 _LEAST_MPS = 0.05  # so that nothing is divided by 0
@@ -107,6 +110,11 @@ class _TargetPoint:
             self._passed_s.append(begins_s[-1] + profiles[number].duration_s - half_s)
             begins_s.append(self._passed_s[-1] - half_s)
         whole_s = begins_s[-1] + profiles[-1].duration_s
+        if not whole_s <= _LONGEST_S:
+            raise VehicleError(
+                f"at its speeds the drive takes {whole_s / 86400:.3g} days, more than the {_LONGEST_S / 86400:g} that can be foreseen",
+                duration_s=whole_s,
+            )
         self.times_s = np.arange(0.0, whole_s + _STEP_S, _STEP_S)
         points = band.points[:, 0] + 1j * band.points[:, 1]
         self.places: NDArray[np.complex128] = np.full(len(self.times_s), points[0])

@@ -16,6 +16,7 @@ from missions.drive_model.from_points import SAME_PLACE_M, plan_route
 from missions.drive_model.legs_and_corners import Stray
 from missions.drive_model.summary import arrivals_s, told_corner, told_leg
 from missions.errors import InvalidPositionError, VehicleError
+from missions.vehicle.reader import LEAST_MPS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -60,7 +61,7 @@ def envelope(
     InvalidPositionError
         No points, or one that is not a pair of numbers.
     VehicleError
-        A speed that is not positive, or not one for each leg.
+        A speed below 0.05 m/s, or not one for each leg.
     """
     return plan_drive(points, vehicle, heading_deg=heading_deg, speeds=speeds, stops=stops).envelope
 
@@ -203,8 +204,11 @@ def _check_speeds(speeds: Sequence[float | None] | None, legs: int) -> None:
     if len(speeds) != legs:
         raise VehicleError(f"a drive of {legs} legs needs as many speeds, not {len(speeds)}", legs=legs)
     for number, speed_mps in enumerate(speeds):
-        if speed_mps is not None and not 0 < speed_mps < math.inf:
-            raise VehicleError(f"a speed of {speed_mps:g} m/s on leg {number} is none", leg=number)
+        if speed_mps is not None and not LEAST_MPS <= speed_mps < math.inf:
+            raise VehicleError(
+                f"a speed of {speed_mps:g} m/s on leg {number} is none that can be foreseen; the least is {LEAST_MPS:g} m/s",
+                leg=number,
+            )
 
 
 def _start(array: NDArray[np.float64], vehicle: Vehicle, heading_deg: float | None) -> tuple[Stray, float]:

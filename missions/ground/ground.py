@@ -42,6 +42,9 @@ EDGE_BOW_M = 1e-3
 _WALL_M = 1e-3  # thickness of a line made an area: a millimetre, below degE7's 11 mm
 _CIRCLE_PAD_M = 1e-4  # what the autopilot's flat metres lose on a circle of kilometres
 _OPEN_GROUND_M = 500.0  # of ground around everything where no inclusion bounds it; chosen, not measured
+_MOST_RADIUS_M = (
+    1_000_000.0  # ten times the farthest that can be planned to; the autopilot's flat metres end before
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +173,7 @@ def lay_out(
     SituationError
         The home circle is enforced and home is not known.
     FenceError
-        An inclusion without area, or a union with none of it within the home circle.
+        An inclusion without area, a circle wider than any field, or a union with none of it within the home circle.
     """
     warnings: list[str] = []
     barriers = [
@@ -235,6 +238,12 @@ def _home_circle(home: LatLon | None, radius_m: float) -> CircleZone:
 
 def _area(zone: Zone, name: str, frame: LocalFrame, warnings: list[str]) -> Area:
     if isinstance(zone, CircleZone):
+        if not zone.radius_m <= _MOST_RADIUS_M:
+            raise FenceError(
+                f"{name} has a radius of {zone.radius_m:g} m; at most {_MOST_RADIUS_M:g} m can be planned with",
+                zone=name,
+                radius_m=zone.radius_m,
+            )
         return _circle(zone, frame)
     return _polygon(zone, name, frame, warnings)
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from missions.errors import VehicleError
 from missions.vehicle.model import Assumed, FenceParameters, Steering, Vehicle
-from missions.vehicle.reader import UNLIMITED_ACCEL_MPS2
+from missions.vehicle.reader import LEAST_ACCEL_MPS2, LEAST_MPS, UNLIMITED_ACCEL_MPS2
 
 if TYPE_CHECKING:
     from missions.vehicle.reader import ParameterReader
@@ -68,7 +68,7 @@ def ardupilot_vehicle(
         turn_radius_m=read.value("TURN_RADIUS", 0.9, most=_MOST_RADIUS_M),
         turn_max_g=read.value("ATC_TURN_MAX_G", 0.6, most=_MOST),
         accel_max_mps2=accel_max_mps2,
-        jerk_mps3=read.value("WP_JERK", 0.0, most=_MOST) or accel_max_mps2,
+        jerk_mps3=read.limit("WP_JERK", 0.0, least=LEAST_ACCEL_MPS2, most=_MOST) or accel_max_mps2,
         position_gain_per_s=read.value("PSC_POS_P", 0.2, least=0.01, most=_MOST),
         pivot_angle_deg=_pivot_angle_deg(read, steering, firmware),
         pivot_rate_dps=read.value("WP_PIVOT_RATE", 60.0, most=_MOST_RADIUS_M),
@@ -112,7 +112,9 @@ def _speed_mps(read: ParameterReader) -> float:
     known = read.known("WP_SPEED")
     if known is None and read.known("CRUISE_SPEED") is None:
         return read.value("WP_SPEED", 2.0, most=_MOST)
-    speed_mps = read.value("WP_SPEED", 0.0, most=_MOST) or read.value("CRUISE_SPEED", 2.0, most=_MOST)
+    speed_mps = read.limit("WP_SPEED", 0.0, least=LEAST_MPS, most=_MOST) or read.limit(
+        "CRUISE_SPEED", 2.0, least=LEAST_MPS, most=_MOST
+    )
     if speed_mps <= 0:
         raise VehicleError(
             "WP_SPEED and CRUISE_SPEED are both 0: the vehicle would not move", parameter="WP_SPEED"
@@ -122,9 +124,11 @@ def _speed_mps(read: ParameterReader) -> float:
 
 def _accel_mps2(read: ParameterReader) -> float:
     limits = [
-        read.value("ATC_ACCEL_MAX", 1.0, most=_MOST),
-        read.known("ATC_DECEL_MAX", least=0.0, most=_MOST) or 0.0,
-        read.value("WP_ACCEL", 0.0, most=_MOST),
+        read.limit("ATC_ACCEL_MAX", 1.0, least=LEAST_ACCEL_MPS2, most=_MOST),
+        read.limit("ATC_DECEL_MAX", 0.0, least=LEAST_ACCEL_MPS2, most=_MOST)
+        if "ATC_DECEL_MAX" in read.parameters
+        else 0.0,
+        read.limit("WP_ACCEL", 0.0, least=LEAST_ACCEL_MPS2, most=_MOST),
     ]
     return min((limit for limit in limits if limit > 0), default=UNLIMITED_ACCEL_MPS2)
 

@@ -17,6 +17,12 @@ UNLIMITED_ACCEL_MPS2 = 20.0
 MOST = 10_000.0
 """More metres, metres a second or degrees than any rover's parameter can mean: FENCE_RADIUS, the longest of all, ends there (AC_Fence)."""
 
+LEAST_MPS = 0.05
+"""The least speed between waypoints that ArduPilot goes down to (AR_WPNav.cpp, AR_WPNAV_SPEED_MIN)."""
+
+LEAST_ACCEL_MPS2 = 0.01
+"""A rover that takes minutes to its speed: at less, no leg is driven within the day. The same number of m/s³ for its jerk."""
+
 _MOST_WHOLE = 32_767
 """ArduPilot keeps enumerations and bit masks in 8 or 16 bits."""
 
@@ -77,6 +83,19 @@ class ParameterReader:
         if name not in self.parameters:
             self.assumed.append(Assumed(name, default))
         return real_number(self.parameters, name, default, least=least, most=most)
+
+    def limit(self, name: str, default: float, *, least: float, most: float) -> float:
+        """Return a parameter whose 0 has a meaning of its own, and which nothing drives with between 0 and ``least``."""
+        value = self.value(name, default, most=most)
+        if 0 < value < least:
+            raise VehicleError(
+                f"{name} is {value:g}; possible are 0 and {least:g} to {most:g}",
+                parameter=name,
+                value=value,
+                least=least,
+                most=most,
+            )
+        return value
 
     def bits(self, name: str, default: int) -> int:
         """Return the parameter as a whole number, or the default and a note of it."""

@@ -112,6 +112,52 @@ def test_over_a_bad_link_too(seed):
     assert "switched back from AUTO to HOLD" in str(run.director.trouble)
 
 
+@pytest.mark.parametrize("clash_s", [0.0, 0.02, 0.5, 1.0])
+@pytest.mark.parametrize("disarmed_s", [0.0, 2.0])
+def test_somebody_with_our_ids_does_not_leave_it_in_auto(disarmed_s, clash_s):
+    run = conductor(once=True, request=ONE_JOB, faults=Faults(latency_s=0.15))
+    arm(run)
+    begun: list[float] = []
+
+    def is_time() -> bool:
+        if not begun and sends_auto(run):
+            begun.append(run.now_s)
+        return bool(begun) and run.now_s >= begun[0] + disarmed_s
+
+    when = disarm_when(run, is_time)
+    run.run_until(lambda: bool(when), 60)
+    wait(run, clash_s)
+    run.director.receive(m.Frame(*run.director.identity, m.Heartbeat(6, 8)), run.now_s)
+    wait(run, 12)
+    assert (run.vehicles[0].mode, run.vehicles[0].is_armed) == (HOLD_MODE, False)
+    assert run.director.state is State.FAILED
+
+
+@pytest.mark.parametrize("unheard_s", [5.5, 40.0])
+def test_disarmed_while_the_link_was_lost_it_is_put_back_too(unheard_s):
+    run = driving(conductor())
+    wait(run, 3)
+    run.is_cut = True
+    unheard(run, DISARM)
+    wait(run, unheard_s)
+    run.is_cut = False
+    wait(run, 15)
+    assert (run.vehicles[0].mode, run.vehicles[0].is_armed) == (HOLD_MODE, False)
+    assert "disarmed while it was not heard; it was switched back from AUTO" in str(run.director.trouble)
+
+
+def test_what_drives_on_while_the_link_was_lost_is_not_touched():
+    run = driving(conductor())
+    wait(run, 3)
+    run.is_cut = True
+    wait(run, 8)
+    run.is_cut = False
+    sent = len(run.sent)
+    wait(run, 15)
+    assert run.vehicles[0].mode == AUTO_MODE
+    assert modes_sent(run, sent) == []
+
+
 def test_who_switches_or_arms_it_first_has_it():
     run = driving(conductor())
     wait(run, 3)

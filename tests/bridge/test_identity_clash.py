@@ -364,3 +364,31 @@ def test_a_director_that_only_listens_has_no_ids_of_its_own():
     wait(run, 2)
     assert clashes(run) == []
     assert run.director.state is State.READY
+
+
+def test_another_autopilot_with_the_vehicles_ids_is_no_news_of_it():
+    run = driving(conductor())
+    wait(run, 3)
+    since = len(run.sent)
+    for mode, flags in ((HOLD_MODE, 0), (GUIDED_MODE, 128), (0, 129)):
+        run.director.receive(m.Frame(1, 1, m.Heartbeat(10, 12, flags, mode)), run.now_s)
+        wait(run, 0.5)
+        assert run.director.situation.mode == AUTO_MODE
+    assert run.director.state is State.DRIVING
+    assert modes_sent(run, since) == []
+
+
+def test_a_vehicle_whose_autopilot_was_swapped_is_driven_no_more():
+    run = driving(conductor())
+    wait(run, 3)
+    since, receive = len(run.sent), run.director.receive
+
+    def swapped(frame, now_s):
+        if isinstance(frame.message, m.Heartbeat) and frame.system == 1 and frame.component == 1:
+            frame = m.Frame(1, 1, m.Heartbeat(10, 12, 129, AUTO_MODE))
+        receive(frame, now_s)
+
+    run.director.receive = swapped
+    run.run_until(lambda: run.director.state is State.LOST, 10)
+    assert run.happened(EventName.LINK_LOST)()
+    assert modes_sent(run, since) == []

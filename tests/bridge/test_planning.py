@@ -20,9 +20,10 @@ from bridge.test_bridge_director import (
 from bridge.test_takeover import modes_sent, unheard, wait
 
 from mavlink_bridge.cli.live import PlanMaker
-from mavlink_bridge.director import EventName, State
+from mavlink_bridge.director import EventName, State, route_maker
 from mavlink_bridge.director.plan_task import PlanTask
 from mavlink_bridge.mavlink import messages as m
+from missions.errors import PlanCheckError
 from missions.fence import fence_to_items
 from missions.geo import distance_m
 from missions.planning.plan import plan
@@ -166,13 +167,10 @@ def test_a_plan_that_nobody_waits_for_any_more_is_left():
     assert made_for == ["first", "second"]
 
 
-def test_what_nobody_expected_of_a_planner_is_raised_where_the_plan_is_taken():
-    def broken(_situation, _request):
-        raise ZeroDivisionError
-
-    plans = PlanMaker(Waiting(PlanTask(None, None)), broken)
-    with pytest.raises(ZeroDivisionError):
-        taken(plans)
+def test_what_nobody_expected_of_a_planner_is_a_reason_for_no_plan():
+    _, made = taken(PlanMaker(Waiting(PlanTask(None, None)), breaking_down))
+    assert isinstance(made, PlanCheckError)
+    assert isinstance(made.__cause__, ZeroDivisionError)
 
 
 def taken(plans: PlanMaker):
@@ -182,3 +180,34 @@ def taken(plans: PlanMaker):
             return made
         time.sleep(0.001)
     raise AssertionError("no plan")
+
+
+def breaking_down(*_arguments):
+    raise ZeroDivisionError("float division by zero")
+
+
+def test_a_defect_while_planning_is_told_and_the_bridge_lives_on():
+    run = conductor()
+    run.planner = breaking_down
+    ready(run)
+    arm(run)
+    run.run_until(lambda: run.director.situation.armed)
+    run.director.take_target(FAR, run.now_s)
+    run.run_until(run.happened(EventName.NO_PLAN), 20)
+    event = run.last(EventName.NO_PLAN)
+    assert "planning broke down: ZeroDivisionError: float division by zero" in event.text
+    wait(run, 2.0)
+    assert not run.director.is_done
+    run.planner = plan
+    run.director.take_target(NEAR, run.now_s)
+    run.run_until(lambda: run.director.state is State.DRIVING, 30)
+
+
+def test_a_defect_while_a_drive_is_checked_holds_the_vehicle(monkeypatch):
+    run = driving(conductor())
+    monkeypatch.setattr(route_maker, "recheck", breaking_down)
+    changed = len(run.events)
+    upload(run, m.MissionType.FENCE, fence_to_items(wall_across_the_route()))
+    run.run_until(run.happened(EventName.HOLDING, changed), 20)
+    assert "a defect" in run.last(EventName.ROUTE_BROKEN).text
+    assert not run.director.is_done

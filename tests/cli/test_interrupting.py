@@ -29,6 +29,7 @@ from mavlink_bridge.cli.interrupting import (
     first_step,
     interruptible,
     step_after,
+    terminable,
 )
 from mavlink_bridge.errors import LinkError
 from mavlink_bridge.link import Link
@@ -346,17 +347,34 @@ def test_an_interrupted_plan_says_what_is_on_the_vehicle(
 
 
 @pytest.mark.skipif(os.name != "posix", reason="SIGTERM")
-@pytest.mark.parametrize(("command", "number"), [("plan", signal.SIGTERM), ("bridge", signal.SIGINT)])
-def test_a_service_that_is_ended_sends_nothing_and_tells_the_state(fields, tmp_path, command, number):
+@pytest.mark.parametrize(
+    ("command", "name"), [("plan", "SIGTERM"), ("bridge", "SIGINT"), ("bridge", "SIGHUP")]
+)
+def test_a_service_that_is_ended_sends_nothing_and_tells_the_state(fields, tmp_path, command, name):
     with Simulator(config(fields), "tcpin:127.0.0.1:0") as simulator:
         simulator.vehicle.rover.is_armed = True
         pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
         process = started(simulator, tmp_path, command, text=True, **pipes)
         assert is_driving(simulator)
-        process.send_signal(number)
+        process.send_signal(getattr(signal, name))
         _, errors = process.communicate(timeout=60)
         assert process.returncode == 130
         assert simulator.vehicle.mode == AUTO_MODE
     assert "nothing was sent; the vehicle goes on with the mission that pbpp started: AUTO, armed, " in errors
     assert "left as it was" not in errors
     assert json.dumps(errors).count("error: ") == 1
+
+
+@pytest.mark.skipif(os.name != "posix", reason="SIGHUP")
+def test_what_nohup_ignores_stays_ignored():
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with terminable():
+            signal.raise_signal(signal.SIGHUP)
+            assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+        signal.signal(signal.SIGHUP, signal.SIG_DFL)
+        with pytest.raises(Terminated), terminable():
+            signal.raise_signal(signal.SIGHUP)
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_DFL
+    finally:
+        signal.signal(signal.SIGHUP, before)

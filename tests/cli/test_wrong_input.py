@@ -171,7 +171,8 @@ WRONG: list[tuple[tuple[str, ...], int, str]] = [
         ((*FROM_TO, "--gps", value), USAGE, "--gps")
         for value in ("inf,0", "0,nan", "1e308,0", "0,101", "0", "0,0,0", "", "east,0", "1_0,0")
     ],
-    ((*FROM_TO, "--speed", "0"), USAGE, "above 0"),
+    ((*FROM_TO, "--speed", "0"), USAGE, "0.05 to 100"),
+    ((*FROM_TO, "--speed", "1e-320"), USAGE, "0.05 to 100"),
     ((*FROM_TO, "--system", "1e308"), USAGE, "--system"),
     ((*FROM_TO, "--system", "9" * 400), USAGE, "--system"),
     ((*CHECK, "--fence", "yard.waypoints", "--clearance", "1e308"), USAGE, "--clearance"),

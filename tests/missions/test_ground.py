@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from itertools import pairwise
 
 import pytest
@@ -357,3 +358,11 @@ def test_an_exclusion_without_area_is_a_wall_to_its_ends(norths_deg: list[float]
     for corner in corners:
         assert wall.distance(Point(frame.to_local(corner))) <= 1e-6
     assert wall.buffer(1e-6).covers(LineString([frame.to_local(one) for one in (min(corners), max(corners))]))
+
+
+@pytest.mark.parametrize("radius_m", [1e15, 1e38, math.inf, math.nan])
+@pytest.mark.parametrize("kind", [IN, OUT])
+def test_a_circle_wider_than_any_field_is_refused(kind: ZoneKind, radius_m: float) -> None:
+    said = re.escape(f"clusion circle 1 has a radius of {radius_m:g} m; at most 1e+06 m")
+    with pytest.raises(FenceError, match=said):
+        ground(CircleZone(kind, HOME, radius_m))

@@ -342,3 +342,15 @@ def test_storage_that_is_none_counts_as_none(parameters: dict[str, float], items
     said = storage_remarks(parameters)
     assert bool(said) is (parameters.get("BRD_SD_MISSION") in (1e38, -1.0))
     assert all("taken as 0" in text for text in said)
+
+
+@pytest.mark.parametrize(
+    "name", ["WP_SPEED", "CRUISE_SPEED", "ATC_ACCEL_MAX", "ATC_DECEL_MAX", "WP_ACCEL", "WP_JERK"]
+)
+@pytest.mark.parametrize("value", [1e-38, 1e-10, 0.001])
+def test_what_nobody_drives_with_is_refused(name: str, value: float) -> None:
+    with pytest.raises(VehicleError, match=f"{name} is {value:g}; possible are 0 and 0.0"):
+        vehicle_from_parameters({name: value})
+    assert (
+        vehicle_from_parameters({name: 0.0, "CRUISE_SPEED": 2.0}).speed_mps == 2.0 or name == "CRUISE_SPEED"
+    )

@@ -216,7 +216,16 @@ def test_two_backups_within_a_tick_of_the_clock_are_both_kept(tmp_path, monkeypa
 
 
 @pytest.mark.parametrize(
-    "note", ["", "[]", '{"time": 1}', '{"backup": 5}', '{"backup": "x", "vehicle": 7}', "[" * 9999]
+    "note",
+    [
+        "",
+        "[]",
+        '{"time": 1}',
+        '{"backup": 5}',
+        '{"backup": "x", "vehicle": 7}',
+        '{"backup": "x", "vehicle": {"autopilot": 1e999}}',
+        "[" * 9999,
+    ],
 )
 def test_an_unreadable_note_is_told_and_can_be_put_aside(tmp_path, note):
     store = BackupStore(tmp_path)
@@ -230,6 +239,14 @@ def test_an_unreadable_note_is_told_and_can_be_put_aside(tmp_path, note):
     assert put_aside.read_text() == note
     assert store.notes() == []
     assert backup.exists()
+
+
+@pytest.mark.parametrize("number", ["NaN", "1e999"])
+def test_a_backup_with_a_number_that_json_has_not_is_none(tmp_path, number):
+    path = BackupStore(tmp_path).keep(ONE, MISSION, [])
+    path.write_text(path.read_text().replace('"items"', f'"more": {number}, "items"'))
+    with pytest.raises(BackupError, match="is no backup"):
+        read_backup(path)
 
 
 def test_a_note_whose_backup_is_gone_is_told(tmp_path):

@@ -20,7 +20,7 @@ from bridge.test_bridge_director import (
 from bridge.test_takeover import modes_sent, unheard, wait
 
 from mavlink_bridge.cli.live import PlanMaker
-from mavlink_bridge.director import EventName, State, route_maker
+from mavlink_bridge.director import EventName, State, route_desk
 from mavlink_bridge.director.plan_task import PlanTask
 from mavlink_bridge.mavlink import messages as m
 from missions.errors import PlanCheckError
@@ -205,7 +205,7 @@ def test_a_defect_while_planning_is_told_and_the_bridge_lives_on():
 
 def test_a_defect_while_a_drive_is_checked_holds_the_vehicle(monkeypatch):
     run = driving(conductor())
-    monkeypatch.setattr(route_maker, "recheck", breaking_down)
+    monkeypatch.setattr(route_desk, "recheck", breaking_down)
     changed = len(run.events)
     upload(run, m.MissionType.FENCE, fence_to_items(wall_across_the_route()))
     run.run_until(run.happened(EventName.HOLDING, changed), 20)

@@ -1,8 +1,8 @@
 """Hunt for lengths that are not the shortest: ends on and beside edges and vertices, at coordinates up to 1e7 m.
 
 ``python tests/pbpp/hunt_edges.py --count 20000 --first 0``: each seed is a field of `random_fields`, scaled and moved, with some pairs of ends; each pair is
-planned forwards and backwards and compared with `exact_reference`, which shares nothing with the planner. Prints what fails and a summary; exits 1 on a
-failure.
+planned forwards and backwards and compared with `exact_reference`, which shares nothing with the planner but free space. Prints what fails and a summary;
+exits 1 on a failure.
 """
 
 import argparse

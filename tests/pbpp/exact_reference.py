@@ -12,6 +12,7 @@ from functools import cmp_to_key
 import numpy as np
 import shapely
 
+AT_CORNER_M = 4e-9
 ON_M = 1e-9
 """An end this near to a vertex or an edge stands on it, as the planner has it."""
 
@@ -141,6 +142,9 @@ class ExactReference:
         share = np.clip(dot(point - self._a, self._edge) / self._edge_m**2, 0, 1)
         foot = self._a + share[:, None] * self._edge
         edges = np.flatnonzero(np.hypot(*(foot - point).T) <= ON_M)
+        if len(edges) > 1 and not len(nodes):
+            # Beside two edges of a corner by as much as counts as on them: at the corner, to either side where obstacles touch.
+            nodes = np.flatnonzero(off <= AT_CORNER_M)
         if len(edges) and not len(nodes):
             point = foot[edges[0]]
         return _End(point, nodes, edges)

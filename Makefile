@@ -12,7 +12,7 @@ COVERAGE_PERCENT := 98
 LOCKED := --quiet --disable-pip-version-check --require-hashes --no-deps
 quoted = '$(subst ','\'',$(1))'
 
-.PHONY: coverage locks package bench bench-bridge bench-drive bench-transfer test-foreign docs soak bench-tlog campaign fuzz demo test lint format types walls check lock clean
+.PHONY: coverage locks package bench bench-bridge bench-drive bench-transfer test-foreign docs soak bench-tlog campaign fuzz hunt demo test lint format types walls check lock clean
 
 demo: .venv/run.stamp
 	$(BIN)/pbpp demo --out $(call quoted,$(OUT))
@@ -104,6 +104,9 @@ campaign: .venv/dev.stamp
 
 fuzz: .venv/dev.stamp
 	$(BIN)/python tests/tlog/fuzz_tlog.py --count 100000
+
+hunt: .venv/dev.stamp
+	$(BIN)/python tests/pbpp/hunt_edges.py --count $(or $(COUNT),20000)
 
 clean:
 	rm -rf .venv demo-out dist build .coverage* .hypothesis .mypy_cache .ruff_cache .pytest_cache

@@ -27,6 +27,7 @@ __all__ = ["BOUNDARY_TOLERANCE_M", "Field"]
 _AREA_SLACK = 1e-9
 _AREA_SLACK_M = 1e-8
 _HEIGHT_SLACK_M = 1e-7
+_UNJOINED_SLACK_M = 1e-8
 
 BOUNDARY_TOLERANCE_M = 1e-7
 """A start or goal this near to free space counts as on its boundary."""
@@ -90,6 +91,8 @@ class Field:
                 f"the blocks do not fill free space: they cover {slabs.area_m2!r} m² of {area_m2!r} m², "
                 f"the least of their heights is {slabs.least_height_m!r} m"
             )
+        if abs(slabs.unjoined_m) > _UNJOINED_SLACK_M * len(slabs):
+            raise InvalidGeometryError(f"the blocks are not joined along {slabs.unjoined_m!r} m")
         return slabs
 
     @cached_property
@@ -106,11 +109,10 @@ class Field:
         try:
             return Blocks(self.free.polygons, self.slabs)
         except (IndexError, ValueError):
-            # Swept from south to north slivers may cross where they did not from west to east.
-            self.free = snapped(self.free)
-            self.slabs = self._checked_slabs()
+            # Swept from south to north slivers may cross where they did not from west to east. Only the horizontal lines come from there.
+            level = snapped(self.free)
         try:
-            return Blocks(self.free.polygons, self.slabs)
+            return Blocks(level.polygons, self.slabs)
         except (IndexError, ValueError) as error:
             raise InvalidGeometryError("the rings of free space do not fit together") from error
 
@@ -145,6 +147,19 @@ class Field:
         nearest, distance_m = self.nearest(local)
         raise error(point, self.free.clearance_m, distance_m, self.scene.from_local(nearest))
 
-    def onto(self, point: Point) -> Point:
-        """Return a point of free space, moved onto a block if rounding put it just beside."""
-        return point if self.slabs.locate(point) else self.nearest(point)[0]
+    def onto(self, point: Point, components: frozenset[int]) -> Point:
+        """Return a point that `require` has let pass as the search needs it: moved into free space by as little as puts it there for certain.
+
+        Parameters
+        ----------
+        point : (east, north)
+            Metres from the scene's origin.
+        components : frozenset of int
+            The components that it may lie in.
+
+        Returns
+        -------
+        (east, north)
+            Metres from the scene's origin.
+        """
+        return self.slabs.places.settle(point, 2.0 * BOUNDARY_TOLERANCE_M, components)

@@ -117,11 +117,14 @@ class FreeSpace:
         The distance in metres that it keeps from the fence.
     grown : (n,) array of shapely geometry
         The area that each exclusion takes away.
+    untidied : shapely geometry
+        The same before tiny edges were taken out, which may turn slivers inside out.
     """
 
     polygons: tuple[Polygon, ...]
     clearance_m: float
     grown: Geometries
+    untidied: BaseGeometry
 
     @cached_property
     def geometry(self) -> MultiPolygon:
@@ -213,8 +216,8 @@ def build_free_space(
     try:
         tidy = shapely.remove_repeated_points(free, _TINY_EDGE_M)
     except shapely.GEOSException:  # a hole no larger than that
-        return snapped(FreeSpace(tuple(polygons_only(free)), clearance_m, grown))
-    return FreeSpace(tuple(_without_flat_rings(polygons_only(tidy))), clearance_m, grown)
+        return snapped(FreeSpace((), clearance_m, grown, free))
+    return FreeSpace(tuple(_without_flat_rings(polygons_only(tidy))), clearance_m, grown, free)
 
 
 def _without_flat_rings(polygons: Sequence[Polygon]) -> list[Polygon]:
@@ -249,9 +252,11 @@ def snapped(free: FreeSpace) -> FreeSpace:
     """
     grid_m = _CLEAR_GRID_M if free.clearance_m > 0.0 else _GRID_M
     try:
-        tidy = shapely.set_precision(MultiPolygon(free.polygons), grid_m)
+        tidy = shapely.set_precision(free.untidied, grid_m)
     except shapely.GEOSException as error:
         raise InvalidGeometryError("the rings of free space do not fit together") from error
+    if not shapely.is_valid(tidy):
+        raise InvalidGeometryError("the rings of free space do not fit together")
     return replace(free, polygons=tuple(polygons_only(tidy)))
 
 

@@ -288,14 +288,14 @@ class Planner:
     def _plan_in(
         self, field: Field, ends: tuple[Point, Point], method: str, should_stop: ShouldStop | None
     ) -> PlannedPath:
-        if not field.require(ends[0], StartBlockedError) & field.require(ends[1], GoalBlockedError):
+        common = field.require(ends[0], StartBlockedError) & field.require(ends[1], GoalBlockedError)
+        if not common:
             raise NoPathError(self._clearance_m)
-        # Blocks may move free space by a rounding, so they come before the ends are placed in it.
-        graph = None if method == "optimal" else field.graph(self._partition or "blocks")
-        start, goal = (field.onto(self._scene.to_local(end)) for end in ends)
-        if graph is None:
+        start, goal = (field.onto(self._scene.to_local(end), common) for end in ends)
+        if method == "optimal":
             found = _optimal(field, start, goal, should_stop, compiled=self._compiled)
         else:
+            graph = field.graph(self._partition or "blocks")
             found = _over_blocks(graph, start, goal, taut=method == "pbpp-taut", should_stop=should_stop)
         if found is None:
             raise NoPathError(self._clearance_m)

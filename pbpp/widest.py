@@ -158,7 +158,9 @@ def _limited_by_end(
 
 def _limited_by_gap(scene: Scene, ends: Sequence[Point], joined: Field, parted: Field) -> WidestWay:
     """Find the gap that is open in one field and closed in the other."""
-    turns = shortest_path(joined.slabs, joined.onto(ends[0]), joined.onto(ends[1])).vertices or ()
+    start_parts, goal_parts = (joined.free.components_at(end, BOUNDARY_TOLERANCE_M) for end in ends)
+    start, goal = (joined.onto(end, start_parts & goal_parts) for end in ends)
+    turns = shortest_path(joined.slabs, start, goal).vertices or ()
     path = LineString([ends[0], *joined.slabs.vertices.points[list(turns)], ends[1]])
     piece = _closed_piece(path, parted)
     near = np.flatnonzero(shapely.dwithin(scene.fence_lines, piece, _REACH * parted.free.clearance_m))

@@ -12,11 +12,13 @@ linked anew, so that each of its free fans is a vertex of its own.
 from __future__ import annotations
 
 from functools import cached_property
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .base import TOLERANCE_M, Portals
+from .places import Places
 from .sweep import Sweep
 from .vertices import Ints, Vertices
 
@@ -29,8 +31,6 @@ if TYPE_CHECKING:
     from pbpp.geometry import Floats, Point
 
 __all__ = ["Slabs"]
-
-_REMEMBERED = 64
 
 
 class Slabs:
@@ -65,7 +65,6 @@ class Slabs:
         self._west = np.array(sweep.west)
         self._east = np.array(sweep.east)
         self._portal_rows = sweep.portals
-        self._located: dict[Point, list[int]] = {}
         self.ways = sweep.ways
         self.beside = (sweep.west_above, sweep.west_below, sweep.east_above, sweep.east_below)
         self.above, self.below = sweep.above, sweep.below
@@ -142,6 +141,20 @@ class Slabs:
         heights = np.concatenate((ceiling_west - floor_west, ceiling_east - floor_east))
         return float(heights.min(initial=0.0))
 
+    @property
+    def unjoined_m(self) -> float:
+        """How much of the blocks' sides is neither portal nor vertical boundary in metres, at least: 0 but for rounding.
+
+        Less than nothing where a portal leads through a boundary.
+        """
+        v = self.vertices
+        floor_west, floor_east, ceiling_west, ceiling_east = self._sides
+        sides_m = float((ceiling_west - floor_west).sum() + (ceiling_east - floor_east).sum())
+        upright_m = float(np.abs(v.y[v.next] - v.y)[v.x[v.next] == v.x].sum())
+        low, high = itemgetter(1), itemgetter(2)
+        portals_m: float = sum(map(high, self._portal_rows)) - sum(map(low, self._portal_rows))
+        return sides_m - upright_m - 2.0 * portals_m
+
     @cached_property
     def portals(self) -> Portals:
         """The portals between blocks."""
@@ -161,33 +174,20 @@ class Slabs:
             corners.append((west, ceiling_west))
         return np.array(corners)
 
+    @cached_property
+    def places(self) -> Places:
+        """Where points lie among the blocks."""
+        floor_west, floor_east, ceiling_west, ceiling_east = self._sides
+        height_m = np.maximum(ceiling_west - floor_west, ceiling_east - floor_east)
+        return Places(self.vertices, (self._floor, self._ceiling), (self._west, self._east), height_m)
+
     def locate(self, point: Point) -> list[int]:
         """Return the blocks that a point lies in or on the edge of, in rising order."""
-        found = self._located.get(point)
-        if found is None:
-            if len(self._located) >= _REMEMBERED:
-                self._located.clear()
-            found = self._located[point] = self._locate(point)
-        return found
-
-    def _locate(self, point: Point) -> list[int]:
-        east, north = point
-        # The sweep opens blocks in the order of their west sides.
-        last = int(np.searchsorted(self._west, east + TOLERANCE_M, side="right"))
-        near = np.flatnonzero(self._east[:last] >= east - TOLERANCE_M)
-        west = self._west[near]
-        width = self._east[near] - west
-        along = np.minimum(np.maximum(east - west, 0.0), width) / width
-        floor_west, floor_east, ceiling_west, ceiling_east = (side[near] for side in self._sides)
-        floor = floor_west + along * (floor_east - floor_west)
-        ceiling = ceiling_west + along * (ceiling_east - ceiling_west)
-        inside = (floor <= north + TOLERANCE_M) & (ceiling >= north - TOLERANCE_M)
-        found: list[int] = near[inside].tolist()
-        return found
+        return self.places.locate(point)
 
     def components(self, blocks: Sequence[int]) -> frozenset[int]:
         """Return the polygons that blocks lie in, by their place among those the slabs were made of."""
-        return frozenset(self.vertices.owner[self._floor[list(blocks)]].tolist())
+        return self.places.components(blocks)
 
     def line_neighbours(self, point: Point, block: int) -> list[tuple[int, bool]]:
         """Return the vertices next to a point on the side line of a block that it stands on.

@@ -120,7 +120,9 @@ class Sweep:
         if leaves == arrives:
             self._bend(x, vertex, before, floor=leaves > 0)
         elif leaves > 0:
-            if self._slope[vertex] > self._slope[before]:
+            rise = self._slope[vertex] - self._slope[before]
+            # Of edges on one line only the vertex tells whether an obstacle lies between them or free space.
+            if rise > 0.0 or (rise == 0.0 and self._end[vertex] >= 0):
                 self._divide(x, vertex, before)
             else:
                 slot = [vertex, before, self._new_block(x, vertex, before)]

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from functools import cached_property
-from typing import TYPE_CHECKING
+from fractions import Fraction
+from functools import cached_property, cmp_to_key
+from math import atan2, dist, tau
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -16,11 +18,55 @@ if TYPE_CHECKING:
 
     from shapely.geometry import Polygon
 
-    from pbpp.geometry import Floats
+    from pbpp.geometry import Floats, Point
 
 __all__ = ["Ints", "Vertices"]
 
 Ints = npt.NDArray[np.intp]
+
+_ONE_WAY_RAD = 1e-6
+
+
+class _Spoke(NamedTuple):
+    """An edge as it leaves a point where obstacles touch, or nearly touch: its own end there, its other end, its direction."""
+
+    end: Point
+    other_end: Point
+    angle_rad: float
+    starts: bool  # whether the edge starts here
+    vertex: int
+    neighbour: int
+
+
+def _in_order(spokes: list[_Spoke]) -> list[_Spoke]:
+    """Return edges counter-clockwise, those of one direction side by side: counted from the widest angle between two of them."""
+    angles_rad = sorted(spoke.angle_rad for spoke in spokes)
+    gaps_rad = [
+        after - before for before, after in zip(angles_rad[-1:] + angles_rad, angles_rad, strict=False)
+    ]
+    gaps_rad[0] += tau
+    first_rad = angles_rad[gaps_rad.index(max(gaps_rad))]
+    turned = [spoke._replace(angle_rad=(spoke.angle_rad - first_rad) % tau) for spoke in spokes]
+    return sorted(turned, key=cmp_to_key(_compare))
+
+
+def _compare(one: _Spoke, other: _Spoke) -> int:
+    """Return which of two edges comes first counter-clockwise; edges do not cross, so of two that lie on one line within rounding any place tells."""
+    if abs(one.angle_rad - other.angle_rad) > _ONE_WAY_RAD:
+        return 1 if one.angle_rad > other.angle_rad else -1
+    if dist(one.end, one.other_end) > dist(other.end, other.other_end):
+        return -_compare(other, one)
+    line = other.end, other.other_end
+    return _left_of(line, one.other_end) or _left_of(line, one.end)
+
+
+def _left_of(line: tuple[Point, Point], point: Point) -> int:
+    """Return 1 if a point lies to the left of a line, -1 to the right, 0 on it: exactly."""
+    (x, y), (end_x, end_y), (point_x, point_y) = (
+        (Fraction(east), Fraction(north)) for east, north in (*line, point)
+    )
+    left = (end_x - x) * (point_y - y) - (end_y - y) * (point_x - x)
+    return (left > 0) - (left < 0)
 
 
 class Vertices:
@@ -62,7 +108,7 @@ class Vertices:
         self.line_x: Floats = east[order][jump]
         self.x = np.empty(count)
         self.x[order] = self.line_x[line]
-        self.y: Floats = np.ascontiguousarray(self.points[:, 1])
+        self.y: Floats = self.points[:, 1].copy()
         self.order: Ints = np.lexsort((self.y, self.x))
         self.line_start: Ints = np.append(np.flatnonzero(jump), count)
         self._split_pinches()
@@ -82,20 +128,34 @@ class Vertices:
         groups: dict[int, list[int]] = {}
         for place in same.tolist():
             groups[place + 1] = [*groups.pop(place, [int(self.order[place])]), int(self.order[place + 1])]
+        after = self.next.copy()
         for members in groups.values():
-            before = [int(self.prev[v]) for v in members]
-            spokes = [(self._angle(v, int(self.next[v])), 0, v) for v in members]
-            spokes += [(self._angle(v, p), 1, p) for v, p in zip(members, before, strict=True)]
-            spokes.sort()
-            for place, (_, kind, vertex) in enumerate(spokes):
-                _, next_kind, neighbour = spokes[(place + 1) % len(spokes)]
-                if kind == 0 and next_kind == 1:
-                    self.prev[vertex] = neighbour
-                    self.next[neighbour] = vertex
+            # One point for all: of two heights the sweep would take the wrong fan's vertex for a portal's end.
+            self.y[members] = self.y[members[0]]
+        for members in groups.values():
+            spokes = [self._spoke(v, int(after[v]), starts=True) for v in members]
+            spokes += [self._spoke(v, int(self.prev[v]), starts=False) for v in members]
+            spokes = _in_order(spokes)
+            for one, other in zip(spokes, [*spokes[1:], spokes[0]], strict=True):
+                if one.starts == other.starts or (other is not spokes[0] and self._crossed(one, other)):
+                    raise ValueError("the edges at a point do not bound free fans")
+                if one.starts:
+                    self.prev[one.vertex] = other.neighbour
+                    self.next[other.neighbour] = one.vertex
 
-    def _angle(self, vertex: int, neighbour: int) -> float:
-        east, north = self.points[neighbour] - self.points[vertex]
-        return float(np.arctan2(north, east))
+    def _spoke(self, vertex: int, neighbour: int, *, starts: bool) -> _Spoke:
+        (x, y), (other_x, other_y) = self.points[[vertex, neighbour]].tolist()
+        return _Spoke((x, y), (other_x, other_y), atan2(other_y - y, other_x - x), starts, vertex, neighbour)
+
+    def _crossed(self, one: _Spoke, other: _Spoke) -> bool:
+        """Return whether two edges one after the other have changed places where their ends were made one point."""
+        if abs(one.angle_rad - other.angle_rad) > _ONE_WAY_RAD:
+            return False
+        here, end, other_end = (
+            (float(self.x[place]), float(self.y[place]))
+            for place in (one.vertex, one.neighbour, other.neighbour)
+        )
+        return _left_of((here, end), other_end) < 0
 
     def _corners(self) -> npt.NDArray[np.bool_]:
         """Mark the vertices that a shortest path may turn around: free space fills half a turn or more.
@@ -108,4 +168,12 @@ class Vertices:
         turn = in_x * out_y - in_y * out_x
         slack = TOLERANCE_M * (np.abs(in_x) + np.abs(in_y) + np.abs(out_x) + np.abs(out_y))
         onwards = in_x * out_x + in_y * out_y >= 0.0
-        return (turn < 0.0) | (onwards & (turn <= slack))
+        if ((in_x == 0.0) & (out_x == 0.0) & ~onwards).any():
+            raise ValueError("a spike of the boundary stands on one line")
+        corner = (turn < 0.0) | (onwards & (turn <= slack))
+        # Edges a rounding apart may have come to lie on each other with their ends on one line: then the points as given decide.
+        for vertex in np.flatnonzero((turn == 0.0) & ~onwards).tolist():
+            before, here, after = self.points[[self.prev[vertex], vertex, self.next[vertex]]]
+            into, out = here - before, after - here
+            corner[vertex] = into[0] * out[1] - into[1] * out[0] < 0.0
+        return corner

@@ -142,7 +142,7 @@ def test_one_block_without_any_line(square):
 def test_rings_that_do_not_fit_together_are_refused(polygon, square):
     scene = parse_scene([square], [], union=False)
     field = Field(scene, 0.0)
-    object.__setattr__(field, "free", FreeSpace((polygon,), 0.0, scene.exclusions))
+    object.__setattr__(field, "free", FreeSpace((polygon,), 0.0, scene.exclusions, polygon))
     with pytest.raises(InvalidGeometryError, match=r"the rings of free space|the blocks do not fill"):
         _ = field.slabs
 

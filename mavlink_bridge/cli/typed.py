@@ -54,7 +54,7 @@ def understood(line: str, director: Director) -> Typed:
     """Return what a line means to the director as it stands."""
     if line.lower() in _YES:
         if director.awaits_confirmation:
-            return Typed("yes: the plan is uploaded", confirms=True)
+            return Typed("yes: uploading the plan", confirms=True)
         return Typed(f"nothing to confirm: {_why_nothing(director)}")
     try:
         target = parse_lat_lon(line)

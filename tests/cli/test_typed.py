@@ -32,7 +32,7 @@ def proposed(**orders):
 def test_a_yes_to_a_plan_that_waits_for_it():
     run = proposed()
     typed = understood("YES", run.director)
-    assert (typed.confirms, typed.is_taken, typed.answer) == (True, True, "yes: the plan is uploaded")
+    assert (typed.confirms, typed.is_taken, typed.answer) == (True, True, "yes: uploading the plan")
     run.director.confirm(run.now_s)
     typed = understood("yes", run.director)
     assert not typed.is_taken

@@ -37,7 +37,9 @@ from mavlink_bridge.backup.store import BackupStore, read_backup
 from mavlink_bridge.backup.vehicle_lock import VehicleLock
 from mavlink_bridge.backup.vehicle_mark import VehicleMark
 from mavlink_bridge.cli.app import app
+from mavlink_bridge.errors import BackupError
 from mavlink_bridge.link import Link
+from mavlink_bridge.protocol.outcomes import end_of_upload
 from missions.formats.waypoints import format_items
 
 OLD, NEW = mission(3, 900), mission(6, 500)
@@ -247,6 +249,14 @@ def test_a_list_that_was_verified_before_is_named(stepped, tmp_path, fields):
     assert "the mission was not written" in document["message"]
     assert "written and verified before: fence" in document["message"]
     assert places(vehicle.held) == places(OLD)
+
+
+def test_after_a_verified_list_nobody_says_that_nothing_was_written():
+    cause = BackupError("the backup cannot be written: no space; nothing was written to the vehicle")
+    assert str(end_of_upload(cause, None, ["fence"])) == (
+        "the backup cannot be written: no space; nothing more was written to the vehicle; written and verified before: fence"
+    )
+    assert end_of_upload(cause, None) is cause
 
 
 @pytest.mark.parametrize("command", ["upload", "plan", "bridge"])

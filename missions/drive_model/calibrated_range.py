@@ -17,6 +17,9 @@ TOP_SPEED_MPS = {Steering.ACKERMANN: 5.0, Steering.SKID: 3.0}
 SLOW_MPS = 1.0
 """Slower steered rovers swing out farther and farther: the firmware turns lateral acceleration into turn rate with at least 1 m/s."""
 
+TURN_RATE_DPS = 120.0
+"""ATC_STR_RAT_MAX as it was measured: ArduPilot's default."""
+
 OLDEST_FIRMWARE = (4, 6, 0)
 """The first with the corners that were measured (upstream commit 56b99d4aa5, March 2025)."""
 
@@ -85,7 +88,12 @@ def beyond_measured(vehicle: Vehicle, slowest_mps: float | None = None) -> tuple
 
 def _beyond_limits(vehicle: Vehicle) -> tuple[tuple[bool, str], ...]:
     """Return which of the vehicle's limits and gains were not measured."""
+    turn_rate_dps = vehicle.turn_rate_max_dps or TURN_RATE_DPS  # 0 is no limit
     return (
+        (
+            vehicle.autopilot is Autopilot.ARDUPILOT and turn_rate_dps < TURN_RATE_DPS,
+            f"turns were measured with ATC_STR_RAT_MAX {TURN_RATE_DPS:g}°/s, not {turn_rate_dps:g}°/s: slower ones swing out farther",
+        ),
         (
             vehicle.steering is Steering.ACKERMANN and vehicle.turn_radius_m > 1.0,
             f"swings were measured at a turning radius of 0.9 m and are scaled to {vehicle.turn_radius_m:g} m",

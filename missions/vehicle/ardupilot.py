@@ -17,6 +17,7 @@ PARAMETER_NAMES = (
     "CRUISE_SPEED",
     "TURN_RADIUS",
     "ATC_TURN_MAX_G",
+    "ATC_STR_RAT_MAX",
     "ATC_ACCEL_MAX",
     "ATC_DECEL_MAX",
     "WP_ACCEL",
@@ -72,6 +73,7 @@ def ardupilot_vehicle(
         position_gain_per_s=read.value("PSC_POS_P", 0.2, least=0.01, most=_MOST),
         pivot_angle_deg=_pivot_angle_deg(read, steering, firmware),
         pivot_rate_dps=read.value("WP_PIVOT_RATE", 60.0, most=_MOST_RADIUS_M),
+        turn_rate_max_dps=read.known("ATC_STR_RAT_MAX", least=0.0, most=_MOST_RADIUS_M),
         steering=steering,
         fence=FenceParameters(
             enabled=bool(read.value("FENCE_ENABLE", 0)),

@@ -101,6 +101,8 @@ class Vehicle:
         WP_PIVOT_ANGLE: on skid steer, corners sharper than this are turned on the spot; 0 never.
     pivot_rate_dps : float
         WP_PIVOT_RATE.
+    turn_rate_max_dps : float or None
+        ATC_STR_RAT_MAX, 0 for no limit; None where it is not known.
     steering : Steering
         From SERVOn_FUNCTION: throttle left and right (73, 74) is skid steer.
     avoid_bits : int
@@ -135,6 +137,7 @@ class Vehicle:
     assumed: tuple[Assumed, ...] = ()
     mav_type: int | None = None
     firmware: tuple[int, int, int] | None = None
+    turn_rate_max_dps: float | None = None
 
     @property
     def is_rover(self) -> bool:

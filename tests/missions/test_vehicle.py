@@ -354,3 +354,10 @@ def test_what_nobody_drives_with_is_refused(name: str, value: float) -> None:
     assert (
         vehicle_from_parameters({name: 0.0, "CRUISE_SPEED": 2.0}).speed_mps == 2.0 or name == "CRUISE_SPEED"
     )
+
+
+@pytest.mark.parametrize(("rate_dps", "is_told"), [(40.0, True), (119.0, True), (120.0, False), (0.0, False), (None, False)])  # fmt: skip
+def test_a_turn_rate_below_the_measured_one_is_told(rate_dps: float | None, is_told: bool) -> None:
+    known = {} if rate_dps is None else {"ATC_STR_RAT_MAX": rate_dps}
+    told = beyond_measured(vehicle_from_parameters({**KNOWN, "TURN_RADIUS": 0.9, **known}))
+    assert any("ATC_STR_RAT_MAX 120°/s" in text for text in told) is is_told

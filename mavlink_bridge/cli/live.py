@@ -15,9 +15,9 @@ from mavlink_bridge.backup.vehicle_mark import Kinship, VehicleMark
 from mavlink_bridge.cli.common import progress_bar, warn
 from mavlink_bridge.cli.interrupting import AtHand, interruptible, terminable
 from mavlink_bridge.cli.link_notes import LinkNotes
-from mavlink_bridge.cli.plan import timed_plan
 from mavlink_bridge.cli.restoring import interrupted_warnings
 from mavlink_bridge.cli.session import signing_of
+from mavlink_bridge.cli.timed_plan import timed_plan
 from mavlink_bridge.director import Director, EventName, Orders, State
 from mavlink_bridge.errors import BackupError, BridgeError, LinkError, VehicleInUseError
 from mavlink_bridge.link import ONE_SHOT_IDENTITY, open_link, parse_connection

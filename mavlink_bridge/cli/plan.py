@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -26,6 +25,7 @@ from mavlink_bridge.cli.common import (
 from mavlink_bridge.cli.permissions import check_permissions
 from mavlink_bridge.cli.plan_request import ENDS, METHODS, ORDERS, request_from_options, with_tour
 from mavlink_bridge.cli.plan_results import Told, arrival_document, report_end
+from mavlink_bridge.cli.timed_plan import timed_plan
 from mavlink_bridge.cli.upload import SigningKeyOption
 from mavlink_bridge.cli.values import MOST_M, within
 from mavlink_bridge.cli.vehicle_options import PANEL as VEHICLE_PANEL
@@ -44,8 +44,6 @@ from mavlink_bridge.cli.vehicle_options import (
 from mavlink_bridge.errors import LogError, UsageError
 
 if TYPE_CHECKING:
-    from missions.planned import Plan
-    from missions.request import Request
     from missions.situation import Situation
 
 _TOURS = "Several targets, and missions to repair"
@@ -251,15 +249,6 @@ def plan(
         print_json(document)
     elif not quiet:
         report_end(arrival, backup, verified=verified)
-
-
-def timed_plan(situation: Situation, request: Request) -> tuple[Plan, float]:
-    """Return a plan, and how long planning took."""
-    from missions.tour.tour import plan_tour  # noqa: PLC0415 - quick help
-
-    begun_s = time.perf_counter()
-    planned = plan_tour(situation, request)
-    return planned, time.perf_counter() - begun_s
 
 
 def with_parameter_file(situation: Situation, vehicle: Path | None) -> Situation:

@@ -1,0 +1,20 @@
+"""A plan, and how long it took."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from missions.planned import Plan
+    from missions.request import Request
+    from missions.situation import Situation
+
+
+def timed_plan(situation: Situation, request: Request) -> tuple[Plan, float]:
+    """Return a plan, and how long planning took."""
+    from missions.tour.tour import plan_tour  # noqa: PLC0415 - quick help
+
+    begun_s = time.perf_counter()
+    planned = plan_tour(situation, request)
+    return planned, time.perf_counter() - begun_s

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 from pathlib import Path
 
 import pytest
@@ -23,6 +24,14 @@ settings.load_profile("default")
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    """Make runs the same wherever they are started."""
+    _keep_examples(config)
+    # A shell starts background jobs with SIGINT ignored, and the programs under test would inherit that.
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def _keep_examples(config: pytest.Config) -> None:
     """Keep the default examples the same: drawn from the constants of loaded modules, each edit would change them."""
     if config.getoption("--hypothesis-profile", None) is None and hasattr(providers, "_get_local_constants"):
         nothing = providers._local_constants

@@ -69,8 +69,11 @@ class Soak:
     def __init__(self, seed: int, pace_s: tuple[float, float] = (3.0, 45.0), **orders: bool) -> None:
         self.random = random.Random(seed)
         self.pace_s = pace_s
+        # With AVOID_BACKUP_SPD 0 it may start inside a fence's margin, where an operator has left it: else nothing is driven any more.
         config = SimulatorConfig(
-            home=HOME, fence=fence_to_items(YARD), parameters={"FENCE_ENABLE": 1.0, "WP_SPEED": 4.0}
+            home=HOME,
+            fence=fence_to_items(YARD),
+            parameters={"FENCE_ENABLE": 1.0, "WP_SPEED": 4.0, "AVOID_BACKUP_SPD": 0.0},
         )
         given = {"upload": True, "drive": True, "arm": True, "announce": True, **orders}
         self.vehicle = SimulatedVehicle(config)

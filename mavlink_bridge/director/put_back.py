@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 _PATIENCE_S = 4.0
 """An AUTO of ours that was on its way shows within this time: heartbeats come every second, some are lost."""
 
+_STALE_S = 1.5
+"""So long after HOLD was sent a heartbeat from before our AUTO may still come, and look like the answer."""
+
 _MOST_SENDS = 16
 
 
@@ -35,6 +38,7 @@ class PutBack:
         self._outgoing: list[Message] = []
         self._sends = 0
         self._until_s = 0.0
+        self._sent_s = 0.0
         self._mode: int | None = None
         self._is_armed: bool | None = None
         self.is_done = False
@@ -72,8 +76,10 @@ class PutBack:
         self._is_armed = bool(heartbeat.base_mode & ModeFlag.SAFETY_ARMED)
         if self.is_left_in_auto:
             self._send_hold(now_s)
-        elif self._mode not in (AUTO_MODE, HOLD_MODE) or self._sends:
-            self.is_done = True
+        elif self._sends:
+            self.is_done = now_s >= self._sent_s + _STALE_S
+        else:
+            self.is_done = self._mode not in (AUTO_MODE, HOLD_MODE)
 
     def handle_timer(self, now_s: float) -> None:
         """Take notice that time has passed."""
@@ -89,6 +95,7 @@ class PutBack:
             self.is_done = True
             return
         self._until_s = now_s + _PATIENCE_S
+        self._sent_s = now_s
         self._outgoing.append(
             CommandLong(
                 self._peer.system,

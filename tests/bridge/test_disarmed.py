@@ -100,16 +100,19 @@ def test_disarmed_between_the_look_and_the_switch_it_is_put_back_to_hold(once, l
     assert armings_sent(run) == 0
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_over_a_bad_link_too(seed):
-    run = conductor(once=True, request=ONE_JOB, faults=Faults(loss=0.25, latency_s=0.1, jitter_s=0.2))
-    run.up, run.down = (type(run.up)(run.faults, 10 * seed + side) for side in (1, 2))
-    unheard(run, ARM)
-    when = disarm_when(run, lambda: run.vehicles[0].mode == AUTO_MODE)
-    assert run.run() is State.FAILED
-    assert when
-    assert run.vehicles[0].mode == HOLD_MODE
-    assert "switched back from AUTO to HOLD" in str(run.director.trouble)
+def test_over_a_bad_link_too():
+    ended = 0
+    for seed in range(24):
+        run = conductor(once=True, request=ONE_JOB, faults=Faults(loss=0.25, latency_s=0.1, jitter_s=0.2))
+        run.up, run.down = (type(run.up)(run.faults, 10 * seed + side) for side in (1, 2))
+        unheard(run, ARM)
+        when = disarm_when(run, lambda run=run: run.vehicles[0].mode == AUTO_MODE)
+        assert run.run() is State.FAILED
+        if when:  # else the link was so bad that it never came to AUTO
+            ended += 1
+            assert run.vehicles[0].mode == HOLD_MODE, seed
+            assert "switched back from AUTO to HOLD" in str(run.director.trouble)
+    assert ended >= 12
 
 
 @pytest.mark.parametrize("clash_s", [0.0, 0.02, 0.5, 1.0])

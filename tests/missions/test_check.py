@@ -195,7 +195,7 @@ def test_a_start_that_is_not_known_is_said():
         mission_of((0.0, 0.0), (10.0, 0.0), home=None), situation_of(FIELD), Request(clearance_m=2.0)
     )
     assert [leg.name for leg in found.legs] == ["1 → 2"]
-    assert any("where the vehicle starts is not known" in warning for warning in found.warnings)
+    assert any("start position unknown" in warning for warning in found.warnings)
 
 
 def test_the_vehicles_own_place_comes_before_home():

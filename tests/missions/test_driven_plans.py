@@ -184,7 +184,7 @@ class TestClearance:
             assert result.clearance_m == 2.0
             assert result.asked_m == pytest.approx(2.0 + error_m)
             assert result.driven_clearance_m >= 2.0 + error_m
-            assert any("error of the vehicle's position" in warning for warning in result.warnings)
+            assert any("position error of the vehicle's fix" in warning for warning in result.warnings)
         none = plan(replace(situation, fix=Known(Fix(1), 0.0, "test")), request)
         assert none.asked_m == 2.0
         assert any("no 3D fix" in warning for warning in none.warnings)

@@ -245,7 +245,7 @@ def test_an_unreadable_note_is_told_and_can_be_put_aside(tmp_path, note):
 def test_a_backup_with_a_number_that_json_has_not_is_none(tmp_path, number):
     path = BackupStore(tmp_path).keep(ONE, MISSION, [])
     path.write_text(path.read_text().replace('"items"', f'"more": {number}, "items"'))
-    with pytest.raises(BackupError, match="is no backup"):
+    with pytest.raises(BackupError, match="is not a backup that pbpp wrote"):
         read_backup(path)
 
 

@@ -17,8 +17,9 @@ quoted = '$(subst ','\'',$(1))'
 demo: .venv/run.stamp
 	$(BIN)/pbpp demo --out $(call quoted,$(OUT))
 
+# Four at a time, also on two cores: half of their time many tests wait for processes and links.
 test: .venv/dev.stamp
-	$(BIN)/pytest -n 2 --dist worksteal
+	$(BIN)/pytest -n 4 --dist worksteal
 
 .venv/pyvenv.cfg:
 	@test -n "$(PYTHON)" || { echo "PBPP Rover needs Python 3.11 or newer with its venv module; set PYTHON=..." >&2; exit 1; }
@@ -39,7 +40,7 @@ COVERING := tests/pbpp tests/missions tests/formats tests/picture tests/protocol
 
 coverage: .venv/dev.stamp
 	rm -f .coverage .coverage.*
-	$(BIN)/pytest -q -n 2 --dist worksteal --cov --cov-report= $(COVERING)
+	$(BIN)/pytest -q -n 4 --dist worksteal --cov --cov-report= $(COVERING)
 	$(BIN)/coverage report --include "$(PROMISING)" --precision 1 --fail-under $(COVERAGE_PERCENT)
 
 lint: .venv/dev.stamp

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from protocol.twin import Vehicle, plain_fence, plain_mission
 
@@ -63,9 +63,10 @@ def test_altitudes_that_are_no_numbers_are_equal_only_to_themselves(a_m, b_m, is
     st.integers(-1800000000, 1800000000),
     st.floats(-1000.0, 8000.0, width=32),
 )
+@example(93, 0, (0.0, 0.0, 0.0, 1536.0), 0, 0, 0.0)
 def test_what_the_vehicle_stores_is_the_same_item(command, frame, params, lat_e7, lon_e7, alt_m):
-    if command not in LOITERS:  # others keep some of these in a byte
-        params = (*params[:2], abs(params[2]) / 12, abs(params[3]) / 12)
+    if command not in LOITERS:  # others keep some of these in a signed byte
+        params = (*params[:2], abs(params[2]) / 24, abs(params[3]) / 24)
     item = MissionItem(command, frame, params, lat_e7, lon_e7, alt_m)
     stored = Vehicle().lists[MISSION]
     stored.begin(1)

@@ -65,8 +65,10 @@ def test_altitudes_that_are_no_numbers_are_equal_only_to_themselves(a_m, b_m, is
 )
 @example(93, 0, (0.0, 0.0, 0.0, 1536.0), 0, 0, 0.0)
 def test_what_the_vehicle_stores_is_the_same_item(command, frame, params, lat_e7, lon_e7, alt_m):
-    if command not in LOITERS:  # others keep some of these in a signed byte
-        params = (*params[:2], abs(params[2]) / 24, abs(params[3]) / 24)
+    if command not in LOITERS:  # others keep some of these in a byte
+        params = (*params[:2], abs(params[2]) / 12, abs(params[3]) / 12)
+    if command == 93:  # NAV_DELAY keeps hour, minute and second in signed ones
+        params = (params[0], *(min(127.0, abs(value)) for value in params[1:]))
     item = MissionItem(command, frame, params, lat_e7, lon_e7, alt_m)
     stored = Vehicle().lists[MISSION]
     stored.begin(1)

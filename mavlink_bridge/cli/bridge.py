@@ -33,7 +33,7 @@ from mavlink_bridge.cli.values import MOST_M, within
 from mavlink_bridge.errors import LinkError, UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Mapping
 
     from mavlink_bridge.cli.bridge_view import LiveView
     from mavlink_bridge.cli.opening import Opening
@@ -244,20 +244,11 @@ class _Shell:
             keyboard=self._keyboard,
         )
 
-    @contextlib.contextmanager
-    def _interrupt_in_words(self) -> Iterator[None]:
-        """Let an interrupt report what an upload under way has left; a link that breaks does not end it."""
-        from mavlink_bridge.protocol.outcomes import end_of_upload  # noqa: PLC0415 - quick help
-
-        try:
-            yield
-        except KeyboardInterrupt as cause:
-            raise end_of_upload(cause, self._backups.writing) from None
-
     def _keep_linked(self, signing: Signing | None, timeout_s: float) -> None:
         from mavlink_bridge.cli.opening import Opening  # noqa: PLC0415 - quick help
         from mavlink_bridge.link import ONE_SHOT_IDENTITY, open_link  # noqa: PLC0415
         from mavlink_bridge.mavlink.echoes import SentFrames  # noqa: PLC0415
+        from mavlink_bridge.protocol.outcomes import ends_in_words  # noqa: PLC0415
 
         sent = SentFrames()
         failures = 0
@@ -277,7 +268,11 @@ class _Shell:
                 )
                 if not self._is_opened(opening):
                     return
-                with opening.link() as link, interruptible(self._at_hand(link)), self._interrupt_in_words():
+                with (
+                    opening.link() as link,
+                    interruptible(self._at_hand(link)),
+                    ends_in_words(lambda: self._backups.writing, causes=KeyboardInterrupt),
+                ):
                     failures = 0
                     if self._view is not None:
                         self._view.link_trouble = None

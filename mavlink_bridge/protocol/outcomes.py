@@ -115,6 +115,7 @@ def ends_in_words(
     writing: Callable[[], Writing | None],
     verified: Sequence[str] = (),
     last_words: Callable[[], None] = lambda: None,
+    causes: type[BaseException] = BaseException,
 ) -> Iterator[None]:
     """Run a block that writes lists to a vehicle; whatever ends it before its time ends as in `end_of_upload`.
 
@@ -126,10 +127,12 @@ def ends_in_words(
         The lists that are on the vehicle by this run, verified; read when the block has ended so.
     last_words : callable, optional
         Called in the end, however that is.
+    causes : type of BaseException
+        Which causes end so; others pass, because they do not end the upload: a link that is opened again.
     """
     try:
         yield
-    except BaseException as cause:
+    except causes as cause:
         ended = end_of_upload(cause, writing(), verified)
         if ended is cause:
             raise

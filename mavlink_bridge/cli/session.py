@@ -15,8 +15,8 @@ from mavlink_bridge.errors import LinkError, OutcomeError, RefusedError
 from mavlink_bridge.link import open_link, parse_connection
 from mavlink_bridge.mavlink.messages import (
     AUTOPILOT_VERSION_ID,
+    Autopilot,
     CommandLong,
-    Heartbeat,
     ModeFlag,
     RequestDataStream,
 )
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from mavlink_bridge.link import Link
-    from mavlink_bridge.mavlink.messages import Frame, Message
+    from mavlink_bridge.mavlink.messages import Frame
     from mavlink_bridge.mavlink.signing import Signing
     from mavlink_bridge.protocol.machine import Machine
     from mavlink_bridge.protocol.vehicle_watch import Doing
@@ -121,7 +121,6 @@ class Session:
             patience_s=address.timeout_s,
             identity=link.identity,
         )
-        self._heartbeat: Heartbeat | None = None
         self.watch = VehicleWatch()
         self.drives_by_us = False
         self._has_changed_mode = False
@@ -133,7 +132,7 @@ class Session:
             raise self._with_signing_hint(finder.trouble)
         self.peer = Peer(finder.vehicle.system, finder.vehicle.component, *link.identity)
         assert finder.heartbeat is not None
-        self._take(finder.heartbeat)
+        self.watch.receive(finder.heartbeat, link.now_s())
         if other := not_ardupilot(finder.vehicle.system, finder.heartbeat.autopilot):
             raise other
 
@@ -174,12 +173,11 @@ class Session:
         """Ask the vehicle which one it is; return by what it is known again."""
         asking = AskVersion(self.vehicle)
         self.run(asking, "asking which vehicle it is")
-        autopilot = self._heartbeat.autopilot if self._heartbeat is not None else None
         return VehicleMark(
             self.vehicle.system,
             uid_of(asking.version),
             str(parse_connection(self._connection)),
-            autopilot,
+            int(Autopilot.ARDUPILOTMEGA),
         )
 
     def run(self, machine: Machine, text: str, on_step: Callable[[], None] | None = None) -> None:
@@ -257,7 +255,7 @@ class Session:
         return is_enough()
 
     def _is_in(self, mode: int) -> bool:
-        return self._heartbeat is not None and self._heartbeat.custom_mode == mode
+        return self.doing.mode == mode
 
     def _listen(self, frames: list[Frame]) -> None:
         others = [frame for frame in frames if not self.link.is_ours(frame)]
@@ -270,12 +268,7 @@ class Session:
                 self.peer.system,
                 self.peer.component,
             ):
-                self._take(frame.message)
-
-    def _take(self, message: Message) -> None:
-        if isinstance(message, Heartbeat):
-            self._heartbeat = message
-        self.watch.receive(message, self.link.now_s())
+                self.watch.receive(frame.message, self.link.now_s())
 
     def _take_clash(self) -> None:
         """End before anything is written; later go on, for what is under way is checked against what the vehicle holds, and report it."""

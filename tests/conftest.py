@@ -49,6 +49,13 @@ def _own_state_folder(tmp_path_factory: pytest.TempPathFactory):
         os.environ["XDG_STATE_HOME"] = before
 
 
+@pytest.fixture
+def state_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A state folder of the test's own."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    return tmp_path / "state"
+
+
 @pytest.fixture(scope="session")
 def logs() -> Path:
     """The recorded telemetry logs."""

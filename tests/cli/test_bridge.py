@@ -27,9 +27,7 @@ def config(fields):
     return SimulatorConfig(home=HOME, fence=fence, parameters={"FENCE_ENABLE": 1.0, "WP_SPEED": 4.0})
 
 
-@pytest.fixture(autouse=True)
-def state_folder(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+pytestmark = pytest.mark.usefixtures("state_folder")
 
 
 def run(*arguments: str):

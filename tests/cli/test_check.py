@@ -31,9 +31,7 @@ HOME = LatLon(40.071374, -105.229930)
 TARGETS = ("40.07209265,-105.22861524", "40.0713,-105.2286", "40.0717,-105.2301")
 
 
-@pytest.fixture(autouse=True)
-def state_folder(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+pytestmark = pytest.mark.usefixtures("state_folder")
 
 
 @pytest.fixture

@@ -32,10 +32,7 @@ OLD, NEW = plain_mission(25, salt=1), plain_mission(20)
 WARNING = "uses our ids"
 
 
-@pytest.fixture(autouse=True)
-def state_folder(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    return tmp_path / "state"
+pytestmark = pytest.mark.usefixtures("state_folder")
 
 
 @pytest.fixture

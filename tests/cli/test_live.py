@@ -33,10 +33,7 @@ def config(fields):
     return SimulatorConfig(home=HOME, fence=fence, mission=mission, parameters={"FENCE_ENABLE": 1.0})
 
 
-@pytest.fixture(autouse=True)
-def state_folder(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    return tmp_path / "state"
+pytestmark = pytest.mark.usefixtures("state_folder")
 
 
 def run(*arguments: str):

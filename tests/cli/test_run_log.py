@@ -28,9 +28,7 @@ FRAME = Codec(1, 1).encode(Heartbeat(10, 3))
 EVENT = Event.of(1.0, EventName.LINK_BACK, "heard again", ())
 
 
-@pytest.fixture(autouse=True)
-def state_folder(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+pytestmark = pytest.mark.usefixtures("state_folder")
 
 
 class FullDisk:

@@ -46,10 +46,7 @@ OLD, NEW = mission(3, 900), mission(6, 500)
 MIXED = "part of the old and part of the new"
 
 
-@pytest.fixture(autouse=True)
-def state_folder(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    return tmp_path / "state"
+pytestmark = pytest.mark.usefixtures("state_folder")
 
 
 @pytest.fixture

@@ -27,10 +27,7 @@ THEIRS = mission(9, 100)
 ONE = VehicleMark(1, uid="0a0b", connection="tcp:127.0.0.1:5760", autopilot=3)
 
 
-@pytest.fixture(autouse=True)
-def state_folder(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    return tmp_path / "state"
+pytestmark = pytest.mark.usefixtures("state_folder")
 
 
 @pytest.fixture

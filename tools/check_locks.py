@@ -47,8 +47,7 @@ def main() -> None:
         pips = [fetch_pip(wanted, place / "pips" / str(number)) for number, wanted in enumerate(PIPS)]
         for python in pythons:
             index = place / f"index-{'.'.join(map(str, python.version))}"
-            for lock in LOCKS:
-                make_index(python, ROOT / "requirements" / f"{lock}.lock", index)
+            make_index(python, ROOT / "requirements" / "dev.lock", index)  # which holds all of run.lock
             for pip in pips:
                 if not starts(python, pip, place / "env"):
                     print(f"{python}: {pip.name} does not run on it")

@@ -15,7 +15,7 @@ from typing import Any
 
 from mavlink_bridge import errors as bridge_errors
 from mavlink_bridge.cli.app import COMMANDS, load
-from mavlink_bridge.cli.common import ExitCode, exit_code_of
+from mavlink_bridge.cli.failing import ExitCode, exit_code_of
 from mavlink_bridge.director import SCHEMA, TRANSITIONS
 from mavlink_bridge.protocol.transitions import TABLES
 from missions import errors as mission_errors

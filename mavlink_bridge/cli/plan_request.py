@@ -4,17 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from mavlink_bridge.cli.options.plan import ENDS, METHODS, ORDERS
 from mavlink_bridge.cli.values import metres_or, position_from
 from mavlink_bridge.errors import UsageError
+from missions.formats import read_mission
+from missions.request import Request
 
-if TYPE_CHECKING:
-    from missions.request import Request
-
-METHODS = ("optimal", "pbpp-taut", "pbpp")
-ORDERS = ("given", "best")
-ENDS = ("hold", "loiter", "rtl")
 _OWN = "own"
 
 
@@ -28,8 +24,6 @@ def request_from_options(
     UsageError
         An option is not what it has to be.
     """
-    from missions.request import Request  # noqa: PLC0415
-
     if method not in METHODS:
         raise UsageError(f"--method {method!r}: expected one of {', '.join(METHODS)}")
     return Request(
@@ -69,6 +63,4 @@ def with_tour(request: Request, order: str, end: str, via: str | None, *, comes_
         )
     if via == _OWN:
         return replace(request, via_own=True)
-    from missions.formats import read_mission  # noqa: PLC0415 - quick help
-
     return replace(request, via=read_mission(Path(via)))

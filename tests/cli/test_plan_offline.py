@@ -14,9 +14,9 @@ from pyproj import Proj
 from shapely import LineString, Point, Polygon
 from typer.testing import CliRunner
 
-from mavlink_bridge.cli import common
 from mavlink_bridge.cli import plan as plan_command
 from mavlink_bridge.cli.app import app
+from mavlink_bridge.cli.failing import exit_code_of
 from missions.errors import FenceError, PlanCheckError
 from missions.fence import CircleZone, Fence, ZoneKind
 from missions.formats import read_fence, read_mission, read_situation
@@ -537,8 +537,8 @@ def test_an_interrupt(fields: Path, monkeypatch) -> None:
 
 
 def test_every_error_has_its_exit_code() -> None:
-    assert common.exit_code_of(PlanCheckError("x")) == 1
-    assert common.exit_code_of(FenceError("x")) == 3
+    assert exit_code_of(PlanCheckError("x")) == 1
+    assert exit_code_of(FenceError("x")) == 3
 
 
 class TestAsAProcess:

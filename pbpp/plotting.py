@@ -6,6 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
+from matplotlib import pyplot as plt
+from matplotlib.collections import PolyCollection
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path
 
 if TYPE_CHECKING:
     from .planned_path import PlannedPath
@@ -33,11 +37,6 @@ def plot_path(path: PlannedPath, ax: Any = None, *, show_blocks: bool = True) ->
     matplotlib.axes.Axes
         The axes.
     """
-    from matplotlib import pyplot as plt  # noqa: PLC0415 - loaded only when a picture is asked for
-    from matplotlib.collections import PolyCollection  # noqa: PLC0415
-    from matplotlib.patches import PathPatch  # noqa: PLC0415
-    from matplotlib.path import Path  # noqa: PLC0415
-
     if ax is None:
         _, ax = plt.subplots(figsize=(6, 6))
     field = path.drawing.field

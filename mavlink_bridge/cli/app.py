@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from difflib import get_close_matches
-from importlib import metadata
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -126,7 +125,9 @@ app = typer.Typer(
 
 def _version(wanted: bool) -> None:  # noqa: FBT001 - typer's way
     if wanted:
-        echo(f"pbpp {metadata.version('pbpp-rover')}")
+        from importlib.metadata import version  # noqa: PLC0415 - 9 ms that help need not wait for
+
+        echo(f"pbpp {version('pbpp-rover')}")
         raise typer.Exit
 
 

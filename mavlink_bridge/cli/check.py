@@ -10,9 +10,10 @@ import typer
 from rich.table import Table
 
 from mavlink_bridge.cli.common import check_one_stdout, warn
+from mavlink_bridge.cli.drawing import cell, console
 from mavlink_bridge.cli.failing import ExitCode
 from mavlink_bridge.cli.plan_results import draw
-from mavlink_bridge.cli.terminal import cell, console, echo, print_json
+from mavlink_bridge.cli.terminal import echo, print_json
 from mavlink_bridge.cli.values import position_from
 from mavlink_bridge.cli.vehicle_options import with_home_option, with_vehicle
 from mavlink_bridge.errors import UsageError

@@ -1,11 +1,9 @@
-"""What every command shares: how it is made from its options, how its errors end, warnings and progress."""
+"""What every command shares: how it is made from its options, how its errors end, and warnings."""
 
 from __future__ import annotations
 
 import dataclasses
 import inspect
-import sys
-from contextlib import AbstractContextManager, contextmanager, nullcontext
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_type_hints
@@ -24,14 +22,11 @@ from mavlink_bridge.cli.failing import (
     report_error,
     telling,
 )
-from mavlink_bridge.cli.terminal import console, say
+from mavlink_bridge.cli.terminal import say
 from missions import errors as mission_errors
-from missions.harmless import harmless
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
-
-    from rich.progress import Progress
+    from collections.abc import Callable, Iterable
 
     from mavlink_bridge.cli.options.shared import CommonOptions
 
@@ -122,59 +117,3 @@ def check_one_stdout(plots: list[Path], *, wants_json: bool) -> None:
         raise bridge_errors.UsageError(
             "--plot - and --json both want the standard output; give a file to --plot"
         )
-
-
-class Shown:
-    """Shows how far a command is: text, steps done, steps in all. This one shows nothing."""
-
-    def __call__(self, text: str, done: int, total: int) -> None:
-        """Show it."""
-
-    def aside(self) -> AbstractContextManager[None]:
-        """Clear the terminal of what moves on it, for as long as the context lasts."""
-        return nullcontext()
-
-
-class _LineProgress(Shown):
-    """Prints progress in lines, one for each new text."""
-
-    def __init__(self) -> None:
-        self._last = ""
-
-    def __call__(self, text: str, _done: int, _total: int) -> None:
-        if text != self._last:
-            self._last = text
-            say(text)
-
-
-class _Bar(Shown):
-    """A progress bar on stderr."""
-
-    def __init__(self, progress: Progress) -> None:
-        self._progress = progress
-        self._task = progress.add_task("", total=None)
-
-    def __call__(self, text: str, done: int, total: int) -> None:
-        self._progress.update(self._task, description=harmless(text), completed=done, total=total or None)
-
-    @contextmanager
-    def aside(self) -> Iterator[None]:
-        self._progress.stop()
-        try:
-            yield
-        finally:
-            self._progress.start()
-
-
-@contextmanager
-def progress_bar(*, quiet: bool) -> Iterator[Shown]:
-    """Show a progress bar on stderr where that is a terminal; yields what moves it."""
-    if not sys.stderr.isatty() or quiet:
-        yield _LineProgress() if telling().verbose and not quiet else Shown()
-        return
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn  # noqa: PLC0415 - quick help
-
-    told = TextColumn("{task.description:<38}", markup=False)
-    columns = (told, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console(err=True), transient=True) as progress:
-        yield _Bar(progress)

@@ -9,7 +9,7 @@ import tempfile
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
-from importlib.metadata import PackageNotFoundError, version
+from importlib import metadata
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -94,16 +94,16 @@ def _python() -> Iterator[_Finding]:
 
 
 def _packages() -> Iterator[_Finding]:
-    yield _Finding(_Verdict.OK, "pbpp-rover", version("pbpp-rover"))
+    yield _Finding(_Verdict.OK, "pbpp-rover", metadata.version("pbpp-rover"))
     for name in _NEEDED:
         try:
-            yield _Finding(_Verdict.OK, name, version(name))
-        except PackageNotFoundError:
+            yield _Finding(_Verdict.OK, name, metadata.version(name))
+        except metadata.PackageNotFoundError:
             yield _Finding(_Verdict.WRONG, name, "not installed", f"python -m pip install {name}")
     for name, use in _WANTED.items():
         try:
-            yield _Finding(_Verdict.OK, name, version(name))
-        except PackageNotFoundError:
+            yield _Finding(_Verdict.OK, name, metadata.version(name))
+        except metadata.PackageNotFoundError:
             advice = "python -m pip install 'pbpp-rover[plot]'"
             yield _Finding(_Verdict.NOTE, name, f"not installed: no {use}", advice)
 

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 from mavlink_bridge.backup.store import BackupStore
 from mavlink_bridge.backup.vehicle_lock import VehicleLock
 from mavlink_bridge.backup.vehicle_mark import Kinship, VehicleMark
-from mavlink_bridge.cli.common import progress_bar, warn
+from mavlink_bridge.cli.common import warn
+from mavlink_bridge.cli.drawing import progress_bar
 from mavlink_bridge.cli.interrupting import AtHand, interruptible, terminable
 from mavlink_bridge.cli.link_notes import LinkNotes
 from mavlink_bridge.cli.restoring import interrupted_warnings

@@ -10,11 +10,11 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from mavlink_bridge.cli.common import progress_bar
+from mavlink_bridge.cli.drawing import cell, console, progress_bar
 from mavlink_bridge.cli.failing import ExitCode
 from mavlink_bridge.cli.kept_files import write_kept
 from mavlink_bridge.cli.log_times import date_text
-from mavlink_bridge.cli.terminal import cell, console, echo, print_json, say
+from mavlink_bridge.cli.terminal import echo, print_json, say
 from mavlink_bridge.errors import LogError, UsageError
 from mavlink_bridge.logbook import read_logbook
 from mavlink_bridge.logbook.document import as_document

@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.cli.common import Shown, progress_bar
+from mavlink_bridge.cli.drawing import Shown, progress_bar
 from mavlink_bridge.cli.session import Address, Session, open_session
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from mavlink_bridge.cli.common import progress_bar
+from mavlink_bridge.cli.drawing import progress_bar
 from mavlink_bridge.cli.failing import ExitCode
 from mavlink_bridge.cli.kept_files import write_kept
 from mavlink_bridge.cli.log_times import log_begin

@@ -239,6 +239,17 @@ class TestFiles:
         quiet = run("--fence", fields / "yard-fence.waypoints", "--start", START, "--target", TARGET, "-q")
         assert (quiet.exit_code, quiet.stdout) == (0, "")
 
+    def test_quiet_leaves_warnings_and_quieter_only_errors(self, fields: Path) -> None:
+        words = ("--fence", fields / "yard-fence.waypoints", "--start", START, "--target")
+        assert "warning: " in run(*words, TARGET, "-q").stderr
+        for quieter in (["-qq"], ["-q", "--quiet"]):
+            result = run(*words, TARGET, *quieter)
+            assert (result.exit_code, result.stdout, result.stderr) == (0, "", "")
+        refused = run(*words, "41,-105", "-qq")
+        assert refused.exit_code != 0
+        assert refused.stderr.startswith("error: ")
+        assert json.loads(run(*words, TARGET, "--json", "-qq").stdout)["warnings"]
+
     def test_a_plan_file_holds_mission_and_fence_and_plans_again(
         self, fields: Path, tmp_path: Path, drawn: tuple
     ) -> None:

@@ -193,16 +193,16 @@ def conduct(
 
 def _timed_planner(
     orders: Orders, has_driven: Callable[[], bool], planning_s: list[float]
-) -> Callable[[Situation, Request], Plan]:
+) -> Callable[..., Plan]:
     """Return what makes a live run's plans, and notes how long each took; a mission that is driven in part is not begun anew."""
 
-    def timed(situation: Situation, request: Request) -> Plan:
+    def timed(situation: Situation, request: Request, *, should_stop: Callable[[], bool]) -> Plan:
         if request.repairs and has_driven():
             raise SituationError(
                 "the rest of the mission would no longer keep its clearance, and the vehicle was switched to HOLD: part of the mission "
                 "is driven already, so it is not started again"
             )
-        planned, seconds = timed_plan(situation, request)
+        planned, seconds = timed_plan(situation, request, should_stop=should_stop)
         if request.repairs and orders.drive:
             _check_drivable(planned)
         planning_s.append(seconds)
@@ -280,7 +280,7 @@ class PlanMaker:
         Makes one; `missions.planning.plan.plan` if not given.
     """
 
-    def __init__(self, director: Director, planner: Callable[[Situation, Request], Plan] = make_plan) -> None:
+    def __init__(self, director: Director, planner: Callable[..., Plan] = make_plan) -> None:
         self._director = director
         self._planner = planner
         self._task: PlanTask | None = None  # in the making, also when nobody waits for it any more

@@ -42,7 +42,7 @@ from mavlink_bridge.errors import LinkError, LogError, UsageError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from mavlink_bridge.cli.session import Address
+    from mavlink_bridge.cli.session import Contact
     from mavlink_bridge.mavlink.messages import Frame
     from missions.checking.check import CheckedLeg, MissionCheck
     from missions.items import MissionItem
@@ -140,10 +140,12 @@ def check(
         if situation.ardupilot is False:  # how another autopilot drives its items was not measured
             raise LogError(f"{log}: {not_ardupilot(situation.system, None)}", file=str(log))
     elif connect is not None:
-        from mavlink_bridge.cli.session import Address as At  # noqa: PLC0415 - only with a link
+        from mavlink_bridge.cli.session import Contact  # noqa: PLC0415 - only with a link
 
-        address = At(connect, (source_system, source_component), system, any_vehicle, timeout, signing_key)
-        situation, unknown = _live_situation(address, quiet=quiet or json_output)
+        contact = Contact(
+            connect, (source_system, source_component), system, any_vehicle, timeout, signing_key
+        )
+        situation, unknown = _live_situation(contact, quiet=quiet or json_output)
     situation = with_home_option(_with_files(situation, mission, fence, vehicle), home)
     if situation.mission is None:
         raise UsageError(f"{log or connect} tells of no mission; give one (--mission FILE)")
@@ -220,7 +222,7 @@ def _with_files(
     return found
 
 
-def _live_situation(address: Address, *, quiet: bool) -> tuple[Situation, list[str]]:
+def _live_situation(contact: Contact, *, quiet: bool) -> tuple[Situation, list[str]]:
     """Read mission, fence, rally points and parameters from the vehicle; nothing is written to it. Return also what it did not report.
 
     Raises
@@ -240,7 +242,7 @@ def _live_situation(address: Address, *, quiet: bool) -> tuple[Situation, list[s
     from missions.situation import Known, Mission, Situation  # noqa: PLC0415
     from missions.vehicle import PARAMETER_NAMES  # noqa: PLC0415
 
-    with progress_bar(quiet=quiet) as show, open_session(address, show) as session:
+    with progress_bar(quiet=quiet) as show, open_session(contact, show) as session:
         peer = session.vehicle
         heard = Situation(system=peer.system, component=peer.component)
 

@@ -66,10 +66,10 @@ def download(
     _check(what, connect, outputs)
 
     from mavlink_bridge.backup.store import BackupStore  # noqa: PLC0415 - usage errors need not wait for it
-    from mavlink_bridge.cli.session import Address, open_session  # noqa: PLC0415
+    from mavlink_bridge.cli.session import Contact, open_session  # noqa: PLC0415
 
-    address = Address(connect, (source_system, source_component), system, any_vehicle, timeout, signing_key)
-    with progress_bar(quiet=quiet or json_output) as show, open_session(address, show) as session:
+    contact = Contact(connect, (source_system, source_component), system, any_vehicle, timeout, signing_key)
+    with progress_bar(quiet=quiet or json_output) as show, open_session(contact, show) as session:
         store = BackupStore()
         if store.notes():  # else nothing needs to be distinguished
             warn(reader_warnings(store, session.which_vehicle()))

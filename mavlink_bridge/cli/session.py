@@ -50,7 +50,7 @@ _STREAM_HZ = 4  # positions often enough to follow a drive; chosen, not measured
 
 
 @dataclass(frozen=True, slots=True)
-class Address:
+class Contact:
     """Where the vehicle is and as whom we speak.
 
     Parameters
@@ -84,7 +84,7 @@ class Session:
     ----------
     link : Link
         The open link.
-    address : Address
+    contact : Contact
         Which vehicle.
     show : callable
         Moves the progress bar: text, steps done, steps in all.
@@ -108,17 +108,17 @@ class Session:
         Somebody else on the link speaks with our ids.
     """
 
-    def __init__(self, link: Link, address: Address, show: Callable[[str, int, int], None]) -> None:
+    def __init__(self, link: Link, contact: Contact, show: Callable[[str, int, int], None]) -> None:
         self.link = link
-        self._connection = address.connection
+        self._connection = contact.connection
         self._show = show
         self._notes = LinkNotes()
         self._machine: Machine | None = None
         self._has_written = self._is_refused = self._has_clashed = False
         finder = FindVehicle(
-            address.system,
-            any_vehicle=address.any_vehicle,
-            patience_s=address.timeout_s,
+            contact.system,
+            any_vehicle=contact.any_vehicle,
+            patience_s=contact.timeout_s,
             identity=link.identity,
         )
         self.watch = VehicleWatch()
@@ -309,7 +309,7 @@ def signing_of(key_file: Path | None) -> Signing | None:
 
 
 @contextmanager
-def open_session(address: Address, show: Callable[[str, int, int], None]) -> Iterator[Session]:
+def open_session(contact: Contact, show: Callable[[str, int, int], None]) -> Iterator[Session]:
     """Open the link, find the vehicle, and close the link at the end.
 
     Raises
@@ -320,12 +320,12 @@ def open_session(address: Address, show: Callable[[str, int, int], None]) -> Ite
         The signing key cannot be used.
     """
     with open_link(
-        address.connection,
-        address.identity,
-        signing=signing_of(address.key_file),
-        timeout_s=address.timeout_s,
+        contact.connection,
+        contact.identity,
+        signing=signing_of(contact.key_file),
+        timeout_s=contact.timeout_s,
     ) as link:
-        yield Session(link, address, show)
+        yield Session(link, contact, show)
 
 
 class _Listen:

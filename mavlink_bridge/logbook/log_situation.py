@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from mavlink_bridge.errors import LogError, VehicleNotFoundError
 from mavlink_bridge.fold import FOLDED, fold
 from mavlink_bridge.mavlink.messages import AutopilotVersion, Heartbeat, Statustext
-from mavlink_bridge.mavlink.vehicles import Vehicle, choose_vehicle, vehicles_heard
+from mavlink_bridge.mavlink.vehicles import HeardVehicle, choose_vehicle, vehicles_heard
 from mavlink_bridge.tlog import TlogReader
 from missions.situation import Situation
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.tlog import Damage
 
 
-def begun(path: Path | str, vehicle: Vehicle) -> Situation:
+def begun(path: Path | str, vehicle: HeardVehicle) -> Situation:
     """Return what is known of a vehicle before a log's first frame: its ids, and what the whole log reports of its autopilot.
 
     How parameters are encoded, and the version, were so before they were reported.

@@ -12,11 +12,11 @@ from mavlink_bridge.fold import FOLDED, fold
 from mavlink_bridge.logbook.clock import NEAR_S, SILENCE_S, Pulse, SteadyClock
 from mavlink_bridge.logbook.facts import Logbook, VehicleLog
 from mavlink_bridge.logbook.log_situation import begun
-from mavlink_bridge.logbook.recorder import RECORDED, Recorder
+from mavlink_bridge.logbook.recorder import RECORDED, VehicleRecorder
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.autopilot_facts import with_parameter
 from mavlink_bridge.mavlink.parameter_values import parameter_value
-from mavlink_bridge.mavlink.vehicles import Vehicle, vehicles_heard
+from mavlink_bridge.mavlink.vehicles import HeardVehicle, vehicles_heard
 from mavlink_bridge.tlog import TlogReader, survey
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def read_logbook(path: Path, system: int | None = None) -> Logbook:
     traffic, damage = survey(path)
     begins_s, duration_s, jumps = _span(path)
     vehicles = _vehicles(path, system)
-    recorders = [Recorder(situation) for situation in _first_situations(path, vehicles)]
+    recorders = [VehicleRecorder(situation) for situation in _first_situations(path, vehicles)]
     clock = SteadyClock()
     clock.advance(begins_s, None)
     reader = TlogReader(path, RECORDED)
@@ -97,7 +97,7 @@ def _without_outliers(times_s: NDArray[np.float64]) -> NDArray[np.float64]:
     return times_s
 
 
-def _vehicles(path: Path, system: int | None) -> list[Vehicle]:
+def _vehicles(path: Path, system: int | None) -> list[HeardVehicle]:
     """Return the vehicles that are heard, one for each system: its autopilot."""
     heard = vehicles_heard(entry.frame for entry in TlogReader(path, {m.Heartbeat}))
     # The last of a system's entries counts: the autopilot's own component where there is one.
@@ -111,7 +111,7 @@ def _vehicles(path: Path, system: int | None) -> list[Vehicle]:
     return [chosen[system]]
 
 
-def _first_situations(path: Path, vehicles: list[Vehicle]) -> list[Situation]:
+def _first_situations(path: Path, vehicles: list[HeardVehicle]) -> list[Situation]:
     """Return the situation of each vehicle when the log begins.
 
     A parameter or home that is reported later held before, and so did a fence that is first seen when it is read from the vehicle.

@@ -21,7 +21,7 @@ from mavlink_bridge.logbook.facts import (
     TrackPart,
     VehicleLog,
 )
-from mavlink_bridge.logbook.track import FenceMeter, Fix, Odometer, pieces
+from mavlink_bridge.logbook.track import FenceMeter, Odometer, TrackFix, pieces
 from mavlink_bridge.logbook.transfers import TRANSFER_TYPES, TransferWatch
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.modes import mode_name
@@ -54,7 +54,7 @@ _MOST_TARGETS, _MOST_INTRUSIONS = 1000, 1000  # the last ones are kept; chosen, 
 _SAME_M, _SAID_AGAIN_S = 0.2, 3.0  # within both a target is the same one repeated; chosen, not measured
 
 
-class Recorder:
+class VehicleRecorder:
     """Folds a vehicle's frames and notes what happens; positions are measured in batches, so memory does not grow with the log.
 
     Parameters
@@ -78,8 +78,8 @@ class Recorder:
         self._fences: list[tuple[float, Fence]] = []
         self._breaches: list[ReportedBreach] = []
         self._breach_count: int | None = None
-        self._batch: list[Fix] = []
-        self._before: Fix | None = None
+        self._batch: list[TrackFix] = []
+        self._before: TrackFix | None = None
         self._positions = self._without_fix = 0
         self._item = 0
         self._frame: LocalFrame | None = None
@@ -238,7 +238,7 @@ class Recorder:
             self._note("positions near a pole were not measured")
             return
         speed_mps = math.hypot(message.vx, message.vy) / 100
-        fix = Fix(
+        fix = TrackFix(
             now_s,
             message.time_boot_ms / 1000,
             pose.value.position,
@@ -311,7 +311,7 @@ class Recorder:
 
     def _note_nearest(
         self,
-        fixes: list[Fix],
+        fixes: list[TrackFix],
         track: NDArray[np.object_],
         points: NDArray[np.float64],
         clearances_m: NDArray[np.float64],
@@ -326,7 +326,7 @@ class Recorder:
 
     def _note_intrusions(
         self,
-        fixes: list[Fix],
+        fixes: list[TrackFix],
         track: NDArray[np.object_],
         points: NDArray[np.float64],
         depths_m: NDArray[np.float64],

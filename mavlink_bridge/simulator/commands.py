@@ -31,7 +31,7 @@ _CHANGE_MODE = 1  # MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
 _LOCAL_FRAMES = (CoordinateFrame.LOCAL_NED, CoordinateFrame.MISSION)
 
 
-class Commands:
+class CommandServer:
     """Does what commands ask for.
 
     Parameters

@@ -21,14 +21,14 @@ from mavlink_bridge.cli import interrupting
 from mavlink_bridge.cli.app import app
 from mavlink_bridge.cli.interrupting import (
     AtHand,
-    Ending,
     Interrupted,
-    Step,
+    InterruptReport,
+    Reaction,
     Terminated,
     doing_text,
-    first_step,
+    first_reaction,
     interruptible,
-    step_after,
+    reaction_to,
     terminable,
 )
 from mavlink_bridge.errors import LinkError
@@ -53,20 +53,20 @@ DRIVING = Doing(AUTO_MODE, True, 5.0, age_s=0.3, speed_age_s=0.1)
 @pytest.mark.parametrize("can_ask", [True, False])
 @pytest.mark.parametrize("is_terminated", [True, False])
 def test_only_a_person_at_a_terminal_is_asked_and_only_while_it_drives_by_us(drives, can_ask, is_terminated):
-    wanted = Step.ASK if drives and can_ask and not is_terminated else Step.REPORT
-    assert first_step(drives=drives, can_ask=can_ask, is_terminated=is_terminated) is wanted
+    wanted = Reaction.ASK if drives and can_ask and not is_terminated else Reaction.REPORT
+    assert first_reaction(drives=drives, can_ask=can_ask, is_terminated=is_terminated) is wanted
 
 
 @pytest.mark.parametrize(
     ("answer", "step"),
     [
-        *[(answer, Step.HOLD) for answer in ("", "y", "Y", "yes", " Yes ", "hold", "HOLD")],
-        *[(answer, Step.REPORT) for answer in ("n", "N", "no", None)],
-        *[(answer, Step.ASK) for answer in ("perhaps", "40.07,-105.2", "nn")],
+        *[(answer, Reaction.HOLD) for answer in ("", "y", "Y", "yes", " Yes ", "hold", "HOLD")],
+        *[(answer, Reaction.REPORT) for answer in ("n", "N", "no", None)],
+        *[(answer, Reaction.ASK) for answer in ("perhaps", "40.07,-105.2", "nn")],
     ],
 )
 def test_answers(answer, step):
-    assert step_after(answer) is step
+    assert reaction_to(answer) is step
 
 
 @pytest.mark.parametrize(
@@ -87,16 +87,16 @@ def test_what_a_vehicle_does_in_words(doing, text):
 @pytest.mark.parametrize(
     ("ending", "message"),
     [
-        (Ending("", Doing(HOLD_MODE, False, 0.0, age_s=0, speed_age_s=0), ""),
+        (InterruptReport("", Doing(HOLD_MODE, False, 0.0, age_s=0, speed_age_s=0), ""),
          "interrupted; the vehicle was left as it was: HOLD, not armed, 0.0 m/s; nothing was written to it"),
-        (Ending("", DRIVING, "the mission on it is ours", drives=True),
+        (InterruptReport("", DRIVING, "the mission on it is ours", drives=True),
          "interrupted; nothing was sent; the vehicle goes on with the mission that pbpp started: AUTO, armed, 5.0 m/s; the mission on it is ours"),
-        (Ending("", Doing(HOLD_MODE, True, 0.1, age_s=0, speed_age_s=0), "x", drives=True, was_asked=True, is_held=True),
+        (InterruptReport("", Doing(HOLD_MODE, True, 0.1, age_s=0, speed_age_s=0), "x", drives=True, was_asked=True, is_held=True),
          "interrupted; the vehicle was switched to HOLD, confirmed by its heartbeat: HOLD, armed, 0.1 m/s; x"),
-        (Ending("", DRIVING, "x", drives=True, is_held=False),
+        (InterruptReport("", DRIVING, "x", drives=True, is_held=False),
          "interrupted; HOLD was sent, but no heartbeat confirms it: AUTO, armed, 5.0 m/s; x"),
-        (Ending("part old, part new", DRIVING, ""), "part old, part new; the vehicle now: AUTO, armed, 5.0 m/s"),
-        (Ending("", DRIVING, "x", drives=True, is_link_lost=True),
+        (InterruptReport("part old, part new", DRIVING, ""), "part old, part new; the vehicle now: AUTO, armed, 5.0 m/s"),
+        (InterruptReport("", DRIVING, "x", drives=True, is_link_lost=True),
          "interrupted; nothing was sent; the vehicle goes on with the mission that pbpp started: AUTO, armed, 5.0 m/s, when it was last heard (the link is lost); x"),
     ],
 )  # fmt: skip
@@ -105,10 +105,12 @@ def test_what_is_said_at_the_end(ending, message):
 
 
 def test_what_scripts_are_told():
-    assert Ending("", DRIVING, "", drives=True).details() == {
+    assert InterruptReport("", DRIVING, "", drives=True).details() == {
         "mode": "AUTO", "armed": True, "speed_mps": 5.0, "age_s": 0.3, "drives": True, "hold": "not sent",
     }  # fmt: skip
-    held = Ending("", Doing(HOLD_MODE, True, None, age_s=0.5), "", drives=True, is_held=True).details()
+    held = InterruptReport(
+        "", Doing(HOLD_MODE, True, None, age_s=0.5), "", drives=True, is_held=True
+    ).details()
     assert (held["drives"], held["hold"], held["speed_mps"]) == (False, "confirmed", None)
 
 

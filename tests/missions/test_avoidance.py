@@ -81,11 +81,11 @@ def driven(
     now_s = 1.0
     rover.set_mode(Mode.AUTO, now_s)
     track = []
-    while rover.mode == Mode.AUTO and not rover.route.is_complete and now_s < 120.0:
+    while rover.mode == Mode.AUTO and not rover.mission_run.is_complete and now_s < 120.0:
         now_s += TICK_S
         rover.step(now_s)
         track.append(rover.position)
-    assert rover.route.is_complete
+    assert rover.mission_run.is_complete
     return shapely.MultiPoint(Chart(HOME).points(track[::5]))
 
 

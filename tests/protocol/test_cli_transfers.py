@@ -253,12 +253,12 @@ def test_disarmed_between_the_look_and_the_switch_it_is_put_back(rover, tmp_path
 
 def test_a_mission_that_is_complete_is_replaced_and_begun_anew(rover, tmp_path):
     put(rover, AUTO_MODE)
-    rover.vehicle.rover.route.is_complete = True
+    rover.vehicle.rover.mission_run.is_complete = True
     path = mission_file(tmp_path)
     assert run(rover, "upload", path)[0] == 0
-    assert (rover.vehicle.mode, rover.vehicle.rover.route.is_complete) == (AUTO_MODE, True)
+    assert (rover.vehicle.mode, rover.vehicle.rover.mission_run.is_complete) == (AUTO_MODE, True)
     assert run(rover, "upload", path, "--drive")[0] == 0
-    assert (rover.vehicle.mode, rover.vehicle.rover.route.is_complete) == (AUTO_MODE, False)
+    assert (rover.vehicle.mode, rover.vehicle.rover.mission_run.is_complete) == (AUTO_MODE, False)
 
 
 def test_nobody_there(tmp_path):

@@ -99,7 +99,7 @@ def test_commands_of_mowers_and_sprayers_are_stored_and_passed_over(command):
     bench.start_auto()
     bench.run_until(lambda: distance_m(bench.vehicle.position, at(24, 0)) < 3.5, 60.0)
     assert bench.vehicle.mode == Mode.AUTO
-    assert bench.vehicle.rover.route.seq == 3
+    assert bench.vehicle.rover.mission_run.seq == 3
 
 
 @pytest.mark.parametrize(

@@ -26,7 +26,8 @@ from typing import TYPE_CHECKING
 from drive_fields import Field, make_field
 from drive_more_fields import make_more
 
-from mavlink_bridge.simulator.config import Mode, SimulatorConfig
+from mavlink_bridge.mavlink.rover import Mode
+from mavlink_bridge.simulator.config import SimulatorConfig
 from mavlink_bridge.simulator.rover import TICK_S
 from mavlink_bridge.simulator.vehicle import SimulatedVehicle
 from missions.errors import MissionError

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from mavlink_bridge.cli.keyboard import Keyboard
 from mavlink_bridge.cli.terminal import say
 from mavlink_bridge.errors import LinkError
-from mavlink_bridge.mavlink.rover import AUTO_MODE, HOLD_MODE, MODE_NAMES
+from mavlink_bridge.mavlink.rover import Mode, plain_mode_name
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -120,7 +120,7 @@ class InterruptReport:
         """Return the details for scripts."""
         doing = self.doing
         return {
-            "mode": _mode_name(doing.mode),
+            "mode": None if doing.mode is None else plain_mode_name(doing.mode),
             "armed": doing.is_armed,
             "speed_mps": None if doing.speed_mps is None else round(doing.speed_mps, 2),
             "age_s": round(doing.age_s, 1),
@@ -151,12 +151,8 @@ def doing_text(doing: Doing) -> str:
     speed = "speed not known" if doing.speed_mps is None else f"{doing.speed_mps:.1f} m/s"
     age_s = max(doing.age_s, 0.0 if doing.speed_mps is None else doing.speed_age_s)
     old = f" ({age_s:.0f} s ago)" if age_s > _OLD_S else ""
-    complete = ", its mission complete" if doing.has_completed and doing.mode == AUTO_MODE else ""
-    return f"{_mode_name(doing.mode)}, {armed}, {speed}{complete}{old}"
-
-
-def _mode_name(mode: int | None) -> str | None:
-    return None if mode is None else MODE_NAMES.get(mode, f"mode {mode}")
+    complete = ", its mission complete" if doing.has_completed and doing.mode == Mode.AUTO else ""
+    return f"{plain_mode_name(doing.mode)}, {armed}, {speed}{complete}{old}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -272,7 +268,7 @@ def _hold(at_hand: AtHand) -> bool:
     link, peer = at_hand.link, at_hand.peer()
     assert link is not None
     assert peer is not None
-    switch = ModeSwitch(peer, HOLD_MODE, is_urgent=True, until_seen=True)
+    switch = ModeSwitch(peer, Mode.HOLD, is_urgent=True, until_seen=True)
     link.run(switch, on_frames=lambda frames: _take(at_hand, frames))
     return switch.is_granted
 

@@ -20,7 +20,7 @@ from mavlink_bridge.mavlink.messages import (
     ModeFlag,
     RequestDataStream,
 )
-from mavlink_bridge.mavlink.rover import AUTO_MODE, MODE_NAMES
+from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.mavlink.vehicles import not_ardupilot
 from mavlink_bridge.protocol.ask_version import AskVersion
 from mavlink_bridge.protocol.command import SendCommand
@@ -201,7 +201,7 @@ class Session:
             raise identity_taken(self.link.identity)
         self._has_written = self._has_written or getattr(machine, "has_written", False)
 
-    def change_mode(self, mode: int) -> None:
+    def change_mode(self, mode: Mode) -> None:
         """Switch the vehicle's mode and wait until its heartbeat reports it.
 
         Raises
@@ -211,8 +211,8 @@ class Session:
         OutcomeError
             It accepted but does not show the mode, or did not answer; or it is to drive, and somebody else has our ids.
         """
-        name = MODE_NAMES[mode]
-        if mode == AUTO_MODE and self._has_clashed:
+        name = mode.name
+        if mode == Mode.AUTO and self._has_clashed:
             raise identity_shared(
                 self.link.identity, "the vehicle is not switched to AUTO; what was uploaded is on it"
             )

@@ -9,7 +9,7 @@ from mavlink_bridge.director.operator_watch import OperatorWatch
 from mavlink_bridge.director.states import TRANSITIONS, Cue, Signal, State
 from mavlink_bridge.director.steps import Steps
 from mavlink_bridge.director.voice import Voice
-from mavlink_bridge.mavlink.rover import AUTO_MODE
+from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.protocol.table_machine import TableMachine
 from mavlink_bridge.protocol.vehicle_watch import VehicleWatch
 
@@ -98,7 +98,7 @@ class Core(TableMachine[State, Cue]):
     @property
     def is_driving_ours(self) -> bool:
         """Whether the vehicle drives our mission, whoever started it."""
-        is_auto = bool(self.situation.armed) and self.situation.mode == AUTO_MODE
+        is_auto = bool(self.situation.armed) and self.situation.mode == Mode.AUTO
         return is_auto and self.has_our_mission
 
     def is_from_vehicle(self, frame: Frame) -> bool:

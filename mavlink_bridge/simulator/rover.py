@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.simulator.body import Body
-from mavlink_bridge.simulator.config import Mode
 from mavlink_bridge.simulator.controllers import Settings, sqrt_controlled
 from mavlink_bridge.simulator.drive import Driver
 from mavlink_bridge.simulator.fence_watch import FenceArea
@@ -31,6 +31,8 @@ _CIRCLE, _POLYGON = 2, 4  # bits 1 and 2 of FENCE_TYPE
 _UNION = 2  # FENCE_OPTIONS bit 1
 _AVOID_FENCE = 1  # AVOID_ENABLE bit 0
 _DRIVING = (Mode.AUTO, Mode.GUIDED, Mode.RTL)
+_MODES = frozenset({*_DRIVING, Mode.MANUAL, Mode.HOLD, Mode.LOITER})
+"""The modes that the simulated rover can be switched to."""
 
 
 class Rover:
@@ -150,12 +152,9 @@ class Rover:
 
     def set_mode(self, number: int, now_s: float) -> bool:
         """Change the mode; return whether that was possible."""
-        try:
-            mode = Mode(number)
-        except ValueError:
+        if number not in _MODES:
             return False
-        if mode == Mode.INITIALISING:
-            return False
+        mode = Mode(number)
         if mode == self.mode:
             return True
         if mode == Mode.AUTO and self.mission_run.is_empty:

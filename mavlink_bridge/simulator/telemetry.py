@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.simulator import streams
-from mavlink_bridge.simulator.config import Mode
 from missions.geo import to_e7
 
 if TYPE_CHECKING:

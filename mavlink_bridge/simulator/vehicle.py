@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.errors import RefusedError
 from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.simulator.commands import CommandServer
-from mavlink_bridge.simulator.config import Mode, SimulatorConfig
+from mavlink_bridge.simulator.config import SimulatorConfig
 from mavlink_bridge.simulator.item_lists import FenceList, MissionList, RallyList, StoredList
 from mavlink_bridge.simulator.mission_server import MissionServer
 from mavlink_bridge.simulator.parameters import ParameterStore, kind

@@ -11,7 +11,8 @@ import pytest
 import shapely
 from charts import HOME, OUT, Chart, box, place
 
-from mavlink_bridge.simulator.config import Mode, SimulatorConfig
+from mavlink_bridge.mavlink.rover import Mode
+from mavlink_bridge.simulator.config import SimulatorConfig
 from mavlink_bridge.simulator.rover import TICK_S
 from mavlink_bridge.simulator.vehicle import SimulatedVehicle
 from missions.drive_model import envelope

@@ -10,8 +10,8 @@ from simulator.station import HOME, Bench, at, kept, line, placed, square, verte
 
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.messages import MavResult, MissionType
+from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.simulator import SimulatorConfig
-from mavlink_bridge.simulator.config import Mode
 from mavlink_bridge.simulator.fence_watch import FenceArea
 from mavlink_bridge.simulator.flat import FlatFrame, TrueFrame
 from missions.geo import LatLon, distance_m

@@ -13,9 +13,9 @@ from simulator.station import Bench, at, kept
 
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.messages import MissionResult, MissionType
+from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.mavlink.stored_form import is_same_item
 from mavlink_bridge.simulator import SimulatorConfig
-from mavlink_bridge.simulator.config import Mode
 from mavlink_bridge.simulator.item_rules import kept_mission_item, mission_item_result
 from mavlink_bridge.simulator.stored_commands import KEPT, NOT_DRIVEN, PLACED
 from missions.geo import distance_m, to_e7

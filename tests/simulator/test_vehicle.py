@@ -12,8 +12,8 @@ from simulator.station import HOME, TICK_S, Bench, at, line, placed, square
 from mavlink_bridge.errors import BridgeError
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.messages import Capability, MavResult, ModeFlag
+from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig
-from mavlink_bridge.simulator.config import Mode
 from mavlink_bridge.simulator.parameters import DEFAULTS
 from missions.items import Command, MissionItem
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.director.addressed import is_command_to
 from mavlink_bridge.director.orders import TargetSource
+from mavlink_bridge.fold import TargetMessage
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.rover import Mode
 from missions.geo import distance_m, from_e7
@@ -16,10 +17,10 @@ if TYPE_CHECKING:
     from missions.geo import LatLon
     from missions.situation import Situation
 
-_SOURCES = {
-    "DO_REPOSITION": TargetSource.REPOSITION,
-    "SET_POSITION_TARGET_GLOBAL_INT": TargetSource.POSITION_TARGET,
-    "MISSION_ITEM with current 2": TargetSource.GUIDED_ITEM,
+_SOURCES: dict[str, TargetSource] = {
+    TargetMessage.REPOSITION: TargetSource.REPOSITION,
+    TargetMessage.POSITION_TARGET: TargetSource.POSITION_TARGET,
+    TargetMessage.GUIDED_ITEM: TargetSource.GUIDED_ITEM,
 }
 _CLICKS = frozenset(
     {TargetSource.REPOSITION, TargetSource.POSITION_TARGET, TargetSource.GUIDED_ITEM, TargetSource.ECHO}

@@ -235,12 +235,11 @@ def _live_situation(contact: Contact, *, quiet: bool) -> tuple[Situation, list[s
     from mavlink_bridge.fold import fold  # noqa: PLC0415
     from mavlink_bridge.link import now_s  # noqa: PLC0415
     from mavlink_bridge.protocol.parameters import ReadParameters  # noqa: PLC0415
-    from missions.checking.mission_end import PARAMETER_NAMES as END_NAMES  # noqa: PLC0415
     from missions.fence import fence_from_items  # noqa: PLC0415
     from missions.items import without_home  # noqa: PLC0415
     from missions.rally import rally_from_items  # noqa: PLC0415
     from missions.situation import Known, Mission, Situation  # noqa: PLC0415
-    from missions.vehicle import PARAMETER_NAMES  # noqa: PLC0415
+    from missions.vehicle.asked_parameters import ASKED_NAMES  # noqa: PLC0415
 
     with progress_bar(quiet=quiet) as show, open_session(contact, show) as session:
         peer = session.vehicle
@@ -254,7 +253,7 @@ def _live_situation(contact: Contact, *, quiet: bool) -> tuple[Situation, list[s
         session.listeners.append(listen)
         session.ask_telemetry()
         items, fence, rally = (read_list(session, what) for what in ("mission", "fence", "rally"))
-        machine = ReadParameters(session.vehicle, (*PARAMETER_NAMES, *END_NAMES, "BRD_SD_MISSION"))
+        machine = ReadParameters(session.vehicle, ASKED_NAMES)
         session.run(machine, "reading parameters")
         # What is promised rests on the fix: whether it is known must not be a matter of luck.
         session.listen_until(lambda: heard.pose is not None and heard.fix is not None, _TELEMETRY_PATIENCE_S)

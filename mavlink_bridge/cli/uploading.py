@@ -16,6 +16,7 @@ from mavlink_bridge.protocol.limits import Limits
 from mavlink_bridge.protocol.outcomes import Writing, end_of_parameters, ends_in_words, upload_trouble
 from mavlink_bridge.protocol.parameters import ReadParameters, SetParameter
 from mavlink_bridge.protocol.verified_upload import Held, VerifiedUpload
+from missions.vehicle.asked_parameters import STORAGE_NAMES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -233,6 +234,6 @@ def _limits(session: Session, lists: Sequence[tuple[MissionType, tuple[MissionIt
     if not any(limits.problem(items, mission_type) for mission_type, items in lists):
         return limits
     # ARMING_CHECK is on every vehicle: an answer to it distinguishes a missing parameter from a lossy link.
-    reading = ReadParameters(session.vehicle, ("ARMING_CHECK", "BRD_SD_MISSION", "BRD_SD_FENCE"))
+    reading = ReadParameters(session.vehicle, ("ARMING_CHECK", *STORAGE_NAMES))
     session.run(reading, "reading the vehicle's limits")
     return Limits.from_parameters(reading.outcome.values) if reading.outcome else limits

@@ -20,7 +20,7 @@ from mavlink_bridge.protocol.parameters import ReadParameters
 from mavlink_bridge.protocol.transitions import DownloadState
 from missions.items import Command
 from missions.situation import ListKind
-from missions.vehicle import PARAMETER_NAMES
+from missions.vehicle.asked_parameters import ASKED_NAMES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -42,8 +42,6 @@ _ASK_STREAMS_EVERY_S = 3.0
 _HOME_S = 60.0  # the longest that a command may take
 _FIX_PATIENCE_S = 3.0
 """What is promised rests on the fix, so that whether it is known must not be a matter of luck; not every vehicle tells it."""
-_MORE_NAMES = ("BRD_SD_MISSION", "BRD_SD_FENCE", "MIS_DONE_BEHAVE")
-"""How much it stores, and what it does at the end of a mission."""
 
 
 class Learning:
@@ -118,7 +116,7 @@ class Learning:
         home = m.CommandLong(peer.system, peer.component, Command.GET_HOME_POSITION)
         self._steps.run(
             [
-                step(ReadParameters(peer, (*PARAMETER_NAMES, *_MORE_NAMES)), self._take_parameters),
+                step(ReadParameters(peer, ASKED_NAMES), self._take_parameters),
                 *(
                     step(Download(peer, MISSION_TYPES[kind]), partial(self._take_list, kind))
                     for kind in self._kinds

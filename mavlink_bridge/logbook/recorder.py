@@ -29,7 +29,7 @@ from missions.errors import MissionError
 from missions.geo import distance_m
 from missions.ground.frame import MAX_LATITUDE_DEG, frame_around
 from missions.ground.from_situation import ground_for
-from missions.vehicle import PARAMETER_NAMES, Vehicle, vehicle_from_parameters
+from missions.vehicle import PARAMETER_NAMES, PX4_PREFIXES, Vehicle, vehicle_from_parameters
 from missions.vehicle.parameter_remarks import no_number_remarks
 
 if TYPE_CHECKING:
@@ -48,7 +48,6 @@ T = TypeVar("T")
 RECORDED = FOLDED | TRANSFER_TYPES | {m.MissionCurrent, m.MissionItemReached, m.FenceStatus}
 """The message types that a recorder looks at."""
 
-_PX4_PREFIXES = ("NAV_ACC_RAD", "RA_", "RD_", "RO_", "GF_")
 _BATCH: Final = 4096  # positions measured against the fence at once; chosen, it changes no answer
 _MOST_TARGETS, _MOST_INTRUSIONS = 1000, 1000  # the last ones are kept; chosen, bounds memory
 _SAME_M, _SAID_AGAIN_S = 0.2, 3.0  # within both a target is the same one repeated; chosen, not measured
@@ -364,4 +363,4 @@ def _is_other_ground(before: Situation, after: Situation) -> bool:
 
 
 def _matters(name: str) -> bool:
-    return name in PARAMETER_NAMES or name.startswith(_PX4_PREFIXES)
+    return name in PARAMETER_NAMES or name.startswith(PX4_PREFIXES)

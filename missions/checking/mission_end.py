@@ -35,16 +35,6 @@ _RTL_ACTIONS = {
 }
 """Values that end in RTL, at once or where SmartRTL cannot be had."""
 
-PARAMETER_NAMES = (
-    *_RTL_ACTIONS,
-    "MIS_DONE_BEHAVE",
-    "RTL_SPEED",
-    "RALLY_INCL_HOME",
-    "RALLY_LIMIT_KM",
-    "CIRC_RADIUS",
-)
-"""The parameters that matter here, for asking a vehicle."""
-
 _DONE_MODES = {1: "Loiter", 2: "Acro", 3: "Manual"}
 
 

@@ -263,7 +263,7 @@ def _doing_text_now(at_hand: AtHand) -> str:
 
 def _hold(at_hand: AtHand) -> bool:
     """Switch the vehicle to HOLD, and return whether its heartbeat has confirmed it."""
-    from mavlink_bridge.director.mode_switch import ModeSwitch  # noqa: PLC0415 - quick help
+    from mavlink_bridge.protocol.mode_switch import ModeSwitch  # noqa: PLC0415 - quick help
 
     link, peer = at_hand.link, at_hand.peer()
     assert link is not None

@@ -17,14 +17,13 @@ from mavlink_bridge.mavlink.messages import (
     AUTOPILOT_VERSION_ID,
     Autopilot,
     CommandLong,
-    ModeFlag,
     RequestDataStream,
 )
 from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.mavlink.vehicles import not_ardupilot
 from mavlink_bridge.protocol.ask_version import AskVersion
-from mavlink_bridge.protocol.command import SendCommand
 from mavlink_bridge.protocol.find import FindVehicle, identity_shared, identity_taken
+from mavlink_bridge.protocol.mode_switch import ModeSwitch
 from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.protocol.vehicle_watch import VehicleWatch
 from missions.items import Command
@@ -216,21 +215,12 @@ class Session:
             raise identity_shared(
                 self.link.identity, "the vehicle is not switched to AUTO; what was uploaded is on it"
             )
-        peer = self.vehicle
-        flags = float(ModeFlag.CUSTOM_MODE_ENABLED)
-        message = CommandLong(
-            peer.system, peer.component, Command.DO_SET_MODE, param1=flags, param2=float(mode)
-        )
-        command = SendCommand(peer, message)
+        switch = ModeSwitch(self.vehicle, mode)
         self._has_changed_mode = True
-        self.run(command, f"switching to {name}")
-        outcome = command.outcome
-        assert outcome is not None
-        if outcome.result is not None and not outcome.is_accepted:
-            texts = "".join(f"; {text}" for text in outcome.texts)
-            raise RefusedError(
-                f"the vehicle refused mode {name}: {outcome.result.name}{texts}", result=outcome.result.name
-            )
+        self.run(switch, f"switching to {name}")
+        if switch.is_refused:
+            result, texts = switch.result_name, "".join(f"; {text}" for text in switch.texts)
+            raise RefusedError(f"the vehicle refused mode {name}: {result}{texts}", result=result)
         if not self.listen_until(lambda: self._is_in(mode), _MODE_PATIENCE_S):
             raise OutcomeError(f"the vehicle does not show mode {name}", mode=name)
 

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
-from mavlink_bridge.director.mode_switch import ModeSwitch
 from mavlink_bridge.director.orders import TargetSource
 from mavlink_bridge.director.states import Cue, Notice, Signal, State
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.rover import Mode
+from mavlink_bridge.protocol.mode_switch import ModeSwitch
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.mavlink.messages import CommandLong, Heartbeat, ModeFlag
+from mavlink_bridge.mavlink.messages import Heartbeat, ModeFlag
 from mavlink_bridge.mavlink.rover import Mode
-from missions.items import Command
+from mavlink_bridge.protocol.mode_switch import set_mode
 
 if TYPE_CHECKING:
     from mavlink_bridge.mavlink.messages import Frame, Message
@@ -96,14 +96,5 @@ class PutBack:
             return
         self._until_s = now_s + _PATIENCE_S
         self._sent_s = now_s
-        self._outgoing.append(
-            CommandLong(
-                self._peer.system,
-                self._peer.component,
-                Command.DO_SET_MODE,
-                self._sends,
-                param1=ModeFlag.CUSTOM_MODE_ENABLED,
-                param2=Mode.HOLD,
-            )
-        )
+        self._outgoing.append(set_mode(self._peer, Mode.HOLD, self._sends))
         self._sends += 1

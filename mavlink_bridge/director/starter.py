@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
-from mavlink_bridge.director.mode_switch import AwaitHeartbeat, ModeSwitch
 from mavlink_bridge.director.states import Cue, Signal
 from mavlink_bridge.director.steps import Step, step
 from mavlink_bridge.errors import OutcomeError, RefusedError
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.rover import Mode, mode_name
 from mavlink_bridge.protocol.command import SendCommand
+from mavlink_bridge.protocol.mode_switch import AwaitHeartbeat, ModeSwitch
 from missions.items import Command
 
 if TYPE_CHECKING:

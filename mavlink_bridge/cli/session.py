@@ -14,10 +14,7 @@ from mavlink_bridge.cli.link_notes import LinkNotes
 from mavlink_bridge.errors import LinkError, OutcomeError, RefusedError
 from mavlink_bridge.link import open_link, parse_connection
 from mavlink_bridge.mavlink.messages import (
-    AUTOPILOT_VERSION_ID,
     Autopilot,
-    CommandLong,
-    RequestDataStream,
 )
 from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.mavlink.vehicles import not_ardupilot
@@ -25,8 +22,8 @@ from mavlink_bridge.protocol.ask_version import AskVersion
 from mavlink_bridge.protocol.find import FindVehicle, identity_shared, identity_taken
 from mavlink_bridge.protocol.mode_switch import ModeSwitch
 from mavlink_bridge.protocol.peer import Peer
+from mavlink_bridge.protocol.telemetry import stream_requests
 from mavlink_bridge.protocol.vehicle_watch import VehicleWatch
-from missions.items import Command
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -42,10 +39,6 @@ if TYPE_CHECKING:
 _MODE_PATIENCE_S = 5.0
 _HEARTBEAT_PATIENCE_S = 5.0
 """A heartbeat comes every second; over a bad link some are lost."""
-
-_STREAMS = (6, 2)
-"""MAV_DATA_STREAM_POSITION and _EXTENDED_STATUS, which holds GPS_RAW_INT."""
-_STREAM_HZ = 4  # positions often enough to follow a drive; chosen, not measured
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,19 +218,8 @@ class Session:
             raise OutcomeError(f"the vehicle does not show mode {name}", mode=name)
 
     def ask_telemetry(self) -> None:
-        """Ask for the position, its quality and the firmware's version, which not every link gets unasked."""
-        peer = self.vehicle
-        self.link.send_all(
-            [
-                *(
-                    RequestDataStream(peer.system, peer.component, stream, _STREAM_HZ, 1)
-                    for stream in _STREAMS
-                ),
-                CommandLong(
-                    peer.system, peer.component, Command.REQUEST_MESSAGE, param1=AUTOPILOT_VERSION_ID
-                ),
-            ]
-        )
+        """Ask for the position, its quality and the mission's state, which not every link gets unasked."""
+        self.link.send_all(stream_requests(self.vehicle))
 
     def listen_until(self, is_enough: Callable[[], bool], for_s: float) -> bool:
         """Listen until a condition holds, no longer than a time; return whether it does."""

@@ -162,7 +162,7 @@ def test_what_a_live_vehicle_does_not_tell_is_said(fields, yard, monkeypatch):
         parameters={"FENCE_ENABLE": 1.0},
         streams=False,
     )
-    monkeypatch.setattr("mavlink_bridge.cli.session.Session.ask_telemetry", lambda _session: None)
+    monkeypatch.setattr("mavlink_bridge.director.learning.stream_requests", lambda _peer: [])
     with Simulator(config, "tcpin:127.0.0.1:0") as simulator:
         document = document_of("check", "--connect", simulator.connection, "--clearance", "2", code=8)
         assert (

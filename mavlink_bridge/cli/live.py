@@ -10,8 +10,9 @@ from threading import Thread
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.backup.store import BackupStore
+from mavlink_bridge.backup.upload_note import UploadNote
 from mavlink_bridge.backup.vehicle_lock import VehicleLock
-from mavlink_bridge.backup.vehicle_mark import Kinship, VehicleMark
+from mavlink_bridge.backup.vehicle_mark import VehicleMark
 from mavlink_bridge.cli.common import progress_bar, warn
 from mavlink_bridge.cli.interrupting import AtHand, interruptible, terminable
 from mavlink_bridge.cli.link_notes import LinkNotes
@@ -340,7 +341,6 @@ class BackupKeeper:
         store: BackupStore | None = None,
         journal: Callable[[str, float, str], None] = lambda _name, _now_s, _text: None,
     ) -> None:
-        self.path: Path | None = None
         self._director = director
         self._connection = connection
         self._store = store or BackupStore()
@@ -349,9 +349,13 @@ class BackupKeeper:
         self._guarded: VerifiedUpload | None = None
         self._lock: VehicleLock | None = None
         self._hindrance: BridgeError | None = None
-        self._was_interrupted = False
-        self._noted: VehicleMark | None = None
+        self._note: UploadNote | None = None
         self._settled: object = None
+
+    @property
+    def path(self) -> Path | None:
+        """The backup that the newest upload has made; None where it has made none."""
+        return self._note.backup if self._note is not None else None
 
     @property
     def writing(self) -> Writing | None:
@@ -367,13 +371,12 @@ class BackupKeeper:
         if director.is_uploading and director.upload is not self._guarded:
             self._guard(vehicle)
         if (old := director.pending_backup) is not None:
-            self._keep(vehicle, old, now_s)
+            self._keep(old, now_s)
         outcome = director.upload_outcome
         if outcome is not None and outcome is not self._settled:
             self._settled = outcome
-            is_settled = outcome.held in (Held.OLD, Held.FOREIGN) and not self._was_interrupted
-            if outcome.held is Held.WANTED or is_settled:
-                self._store.end(vehicle, MissionType.MISSION)
+            if self._note is not None:
+                self._note.settle(outcome.held)
         if not director.is_uploading:
             self.release()
         if self._has_warned or director.state in _NOT_KNOWN_YET:
@@ -385,15 +388,8 @@ class BackupKeeper:
         """Let other processes write to the vehicle; a note of an upload that has written nothing goes with it."""
         if self._lock is None:
             return
-        upload = self._guarded
-        if (
-            self._noted is not None
-            and upload is not None
-            and not upload.has_written
-            and not self._was_interrupted
-        ):
-            self._store.end(self._noted, MissionType.MISSION)
-        self._noted = None
+        if self._note is not None and self._guarded is not None and not self._guarded.has_written:
+            self._note.settle(Held.OLD)
         self._lock.free()
         self._lock = None
 
@@ -408,22 +404,22 @@ class BackupKeeper:
     def _guard(self, vehicle: VehicleMark) -> None:
         """Lock the vehicle before its old mission is read: a mission that somebody else was writing meanwhile is no backup."""
         self.release()
-        self._guarded, self._hindrance, self.path = self._director.upload, None, None
+        self._guarded, self._hindrance, self._note = self._director.upload, None, None
         self._lock = VehicleLock(vehicle)
         try:
             if holder := self._lock.take():
                 self._hindrance = holder.error(vehicle)
+            else:
+                self._note = UploadNote(self._store, vehicle, MissionType.MISSION)
         except BackupError as error:
             self._hindrance = error
 
-    def _keep(self, vehicle: VehicleMark, old: tuple[MissionItem, ...], now_s: float) -> None:
+    def _keep(self, old: tuple[MissionItem, ...], now_s: float) -> None:
         try:
             if self._hindrance is not None:
                 raise self._hindrance
-            earlier = self._store.interrupted(vehicle, MissionType.MISSION)
-            self._was_interrupted = any(vehicle.kinship(note.vehicle) is Kinship.SAME for note in earlier)
-            self._noted = vehicle
-            self.path = self._store.begin(vehicle, MissionType.MISSION, old)
+            assert self._note is not None
+            self._note.begin(old)
         except BridgeError as error:
             name = "in_use" if isinstance(error, VehicleInUseError) else "backup_failed"
             self._journal(name, now_s, str(error))

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from mavlink_bridge.backup.store import BackupStore
+from mavlink_bridge.backup.upload_note import UploadNote
 from mavlink_bridge.backup.vehicle_lock import VehicleLock
-from mavlink_bridge.backup.vehicle_mark import Kinship
 from mavlink_bridge.errors import LinkError, OutcomeError, RefusedError
 from mavlink_bridge.link import now_s
 from mavlink_bridge.mavlink.messages import MissionType
@@ -139,10 +139,8 @@ class Uploads:
     def _write_list(
         self, mission_type: MissionType, items: tuple[MissionItem, ...], limits: Limits, restored: Path | None
     ) -> None:
-        session, store, vehicle = self._session, self._store, self.vehicle
-        name = mission_type.name.lower()
-        earlier = store.interrupted(vehicle, mission_type)
-        was_interrupted = any(vehicle.kinship(note.vehicle) is Kinship.SAME for note in earlier)
+        session, name = self._session, mission_type.name.lower()
+        note = UploadNote(self._store, self.vehicle, mission_type)
         machine = VerifiedUpload(
             session.vehicle,
             mission_type,
@@ -155,24 +153,22 @@ class Uploads:
 
         def step() -> None:
             if (old := machine.pending_backup) is not None:
-                self._writing = Writing(name, machine, store.begin(vehicle, mission_type, old))
+                self._writing = Writing(name, machine, note.begin(old))
                 machine.backup_stored(now_s())
 
         begun_s = time.monotonic()
         try:
             session.run(machine, f"{name}: {len(items)} items", step)
         except BaseException:
-            if not machine.has_written and not was_interrupted:
-                store.end(vehicle, mission_type)
+            if not machine.has_written:
+                note.settle(Held.OLD)
             raise
         outcome = machine.outcome
         assert outcome is not None
+        note.settle(outcome.held, restored)
         if trouble := upload_trouble(outcome):
-            if outcome.held in (Held.OLD, Held.FOREIGN) and not was_interrupted:
-                store.end(vehicle, mission_type)
             raise trouble
-        store.end(vehicle, mission_type, restored)
-        self.done.append(Done(mission_type, outcome, self._writing.backup, time.monotonic() - begun_s))
+        self.done.append(Done(mission_type, outcome, note.backup, time.monotonic() - begun_s))
         self._writing = None
         if outcome.pushes:
             self._verified.append(name)

@@ -70,23 +70,27 @@ class Rover:
         fence: Callable[[], Sequence[MissionItem]],
     ) -> None:
         self.parameters = parameters
+        self._fence = fence
+        self._mission = mission
+        self.least_clearance_m = math.inf
+        self.breaches = 0
+        self._boot(home, heading_deg)
+
+    def _boot(self, home: LatLon, heading_deg: float) -> None:
+        """Begin at a place, which is home now."""
         self.home = from_e7(*to_e7(home))
         self.frame = FlatFrame(self.home)
         self._true_frame = TrueFrame(self.home)
-        self._fence = fence
-        self._mission = mission
         self.mode = Mode.INITIALISING
         self.is_armed = False
         self.texts: list[tuple[int, str]] = []
         self.reached: list[int] = []
-        self.least_clearance_m = math.inf
-        self.breaches = 0
         self.breached = False
         self.breach_time_s = 0.0
-        settings = Settings.from_parameters(parameters)
+        settings = Settings.from_parameters(self.parameters)
         self.body = Body(0j, math.radians(heading_deg), settings.is_skid)
         self.drive = Driver(settings, self.body)
-        self.mission_run = MissionRun(mission, self.drive, self.frame)
+        self.mission_run = MissionRun(self._mission, self.drive, self.frame)
         self._current_before_auto = False
         self.renew_fence()
 
@@ -125,11 +129,7 @@ class Rover:
 
     def reboot(self) -> None:
         """Begin anew where it stands; home is there now."""
-        position, heading_deg = self.position, self.heading_deg
-        least_clearance_m, breaches = self.least_clearance_m, self.breaches
-        self.__init__(self.parameters, position, heading_deg, self._mission, self._fence)  # type: ignore[misc]
-        self.least_clearance_m = min(least_clearance_m, self.least_clearance_m)
-        self.breaches = breaches
+        self._boot(self.position, self.heading_deg)
 
     def renew_settings(self) -> None:
         """Take changed parameters."""

@@ -67,7 +67,7 @@ def return_place(situation: Situation, here: LatLon, home: LatLon | None) -> Lat
 
     Home takes part where RALLY_INCL_HOME is 1, and where the nearest rally point is farther away than RALLY_LIMIT_KM.
     """
-    rally = situation.rally.value if situation.rally else ()
+    rally = [point.position for point in situation.rally.value] if situation.rally else []
     if not rally:
         return home
     nearest = min(rally, key=lambda place: distance_m(here, place))

@@ -428,7 +428,7 @@ class TestMission:
         for told in (upload(items, 2), read_back(items, 2)):
             found = after(NEW, *told)
             assert found.rally is not None
-            assert found.rally.value == (THERE,)
+            assert [point.position for point in found.rally.value] == [THERE]
 
 
 class TestTarget:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from functools import partial
 from threading import Thread
 from typing import TYPE_CHECKING
 
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
+    from mavlink_bridge.cli.common import Shown
     from mavlink_bridge.director.plan_task import PlanTask
     from mavlink_bridge.link import Link
     from mavlink_bridge.mavlink.messages import Frame
@@ -145,71 +147,78 @@ def conduct(
     BridgeError, MissionError
         The director's trouble; or what ended the run, with what may be on the vehicle.
     """
-    planning_s: list[float] = []
-    has_driven = False
-    director = Director(replace(orders, once=True), situation)
-    plans = PlanMaker(director, _timed_planner(orders, lambda: has_driven, planning_s))
-    backups = BackupKeeper(director, connection)
-    notes = LinkNotes()
-    taken: Plan | None = None
-    arrival: Mapping[str, object] | None = None
+    run = _Run(Director(replace(orders, once=True), situation), link, connection, on_plan)
+    director, backups = run.director, run.backups
     with progress_bar(quiet=quiet) as show:
-
-        def step() -> None:
-            nonlocal has_driven, taken, arrival
-            has_driven = has_driven or director.state is State.DRIVING
-            show(_STATE_TEXTS[director.state], *director.progress)
-            warn(backups.step(link.now_s()))
-            if (made := plans.take()) is not None:
-                director.plan_made(*made, link.now_s())
-            if director.plan is not None and director.plan is not taken:
-                taken = director.plan
-                with show.aside():  # before anything of it is sent
-                    on_plan(taken, planning_s[-1], director.situation)
-            for event in director.take_events():
-                arrival = event.data if event.name is EventName.ARRIVED else arrival
-                if event.name is EventName.IDENTITY_CLASH:
-                    warn([event.text])
-            notes.tell(link)
-
         at_hand = replace(director_at_hand(director, link), aside=show.aside)
         with (
             interruptible(at_hand) if is_real else nullcontext(),
             ends_in_words(lambda: backups.writing, last_words=backups.release),
         ):
-            link.run(director, on_frames=on_frames, on_step=step, longest_wait_s=plans.longest_wait_s)
+            link.run(
+                director,
+                on_frames=on_frames,
+                on_step=partial(run.step, show),
+                longest_wait_s=run.plans.longest_wait_s,
+            )
     if director.trouble is not None or director.plan is None:
         raise _with_hint(director.trouble or LinkError("the director ended without a plan"))
     outcome = director.upload_outcome
     return LiveResult(
         director.plan,
-        planning_s[-1],
+        run.planning_s,
         director.situation,
         verified=outcome is not None and outcome.is_verified,
         backup=backups.path,
-        arrival=arrival,
+        arrival=run.arrival,
         doing=director.watch.doing(link.now_s()),
     )
 
 
-def _timed_planner(
-    orders: Orders, has_driven: Callable[[], bool], planning_s: list[float]
-) -> Callable[..., Plan]:
-    """Return what makes a live run's plans, and notes how long each took; a mission that is driven in part is not begun anew."""
+class _Run:
+    """What the shell does around the director of a single job."""
 
-    def timed(situation: Situation, request: Request, *, should_stop: Callable[[], bool]) -> Plan:
-        if request.repairs and has_driven():
+    def __init__(self, director: Director, link: Link, connection: str, on_plan: PlanTaker) -> None:
+        self.director = director
+        self.plans = PlanMaker(director, self._plan)
+        self.backups = BackupKeeper(director, connection)
+        self.planning_s = 0.0
+        self.arrival: Mapping[str, object] | None = None
+        self._link = link
+        self._notes = LinkNotes()
+        self._on_plan = on_plan
+        self._taken: Plan | None = None
+        self._has_driven = False
+
+    def step(self, show: Shown) -> None:
+        """Do what the director waits for, and report what it did."""
+        director, link = self.director, self._link
+        self._has_driven = self._has_driven or director.state is State.DRIVING
+        show(_STATE_TEXTS[director.state], *director.progress)
+        warn(self.backups.step(link.now_s()))
+        if (made := self.plans.take()) is not None:
+            director.plan_made(*made, link.now_s())
+        if director.plan is not None and director.plan is not self._taken:
+            self._taken = director.plan
+            with show.aside():  # before anything of it is sent
+                self._on_plan(self._taken, self.planning_s, director.situation)
+        for event in director.take_events():
+            self.arrival = event.data if event.name is EventName.ARRIVED else self.arrival
+            if event.name is EventName.IDENTITY_CLASH:
+                warn([event.text])
+        self._notes.tell(link)
+
+    def _plan(self, situation: Situation, request: Request, *, should_stop: Callable[[], bool]) -> Plan:
+        """Make a plan, and note how long it took; a mission that is driven in part is not begun anew."""
+        if request.repairs and self._has_driven:
             raise SituationError(
                 "the rest of the mission would no longer keep its clearance, and the vehicle was switched to HOLD: part of the mission "
                 "is driven already, so it is not started again"
             )
-        planned, seconds = timed_plan(situation, request, should_stop=should_stop)
-        if request.repairs and orders.drive:
+        planned, self.planning_s = timed_plan(situation, request, should_stop=should_stop)
+        if request.repairs and self.director.orders.drive:
             _check_drivable(planned)
-        planning_s.append(seconds)
         return planned
-
-    return timed
 
 
 def _with_hint(trouble: BridgeError | MissionError) -> BridgeError | MissionError:

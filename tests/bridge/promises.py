@@ -35,6 +35,7 @@ class Promises:
         self._is_armed = False
         self._heartbeats = 0
         self._has_clashed = False
+        self._was_clashing = False  # when it last sent: an upload that has ended since leaves its last words
         self._took: tuple[float, int | None] | None = None  # when, and to which mode
         self._knows = False
         self._asked_s = -1e9
@@ -50,6 +51,7 @@ class Promises:
             messages = messages_to_send()
             for message in messages:
                 self._check(message)
+            self._was_clashing = run.director.state is State.CLASHING
             return messages
 
         run.director.receive = listen
@@ -122,7 +124,8 @@ class Promises:
             Command.DO_SET_MODE,
             Mode.HOLD,
         )
-        if isinstance(message, m.MissionAck) or self._run.director.state is State.CLASHING or is_hold:
+        is_uploads_end = isinstance(message, m.MissionAck | m.MissionRequestInt) and self._was_clashing
+        if is_uploads_end or self._run.director.state is State.CLASHING or is_hold:
             return
         self._break(f"{type(message).__name__} after somebody spoke with our ids")
 

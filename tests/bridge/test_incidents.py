@@ -96,7 +96,7 @@ def test_a_breach_of_ours_is_told_with_place_and_fence_and_who_switched():
     ],
 )
 def test_a_mode_that_the_autopilot_chose_itself_is_told_so(heard, mode, reason):
-    run = on_its_way()
+    run = on_its_way(FS_ACTION=1.0)  # RTL, or HOLD where that cannot be had
     told(run, heard)
     unheard(run, m.SetMode(1, 1, mode))
     found = taken_over(run)
@@ -112,7 +112,7 @@ def test_a_mode_that_the_autopilot_chose_itself_is_told_so(heard, mode, reason):
     ],
 )
 def test_where_the_mode_is_seen_first_nothing_is_claimed_until_the_cause_is_heard(heard, mode, event):
-    run = on_its_way()
+    run = on_its_way(FS_ACTION=1.0)  # RTL, or HOLD where that cannot be had
     unheard(run, m.SetMode(1, 1, mode))
     found = taken_over(run)
     assert (found["by"], found["reason"]) == ("unknown", None)

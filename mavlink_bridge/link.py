@@ -263,6 +263,7 @@ class Link:
         timeout_s: float | None = None,
         on_frames: Callable[[list[Frame]], None] | None = None,
         on_step: Callable[[], None] | None = None,
+        on_sent: Callable[[], None] | None = None,
         until: Callable[[], bool] = lambda: False,
         longest_wait_s: Callable[[], float] = lambda: 0.5,
     ) -> None:
@@ -278,6 +279,8 @@ class Link:
             Sees every batch of frames before the machine does.
         on_step : callable, optional
             Called before each step's messages are sent, for progress bars and for what the machine hands out.
+        on_sent : callable, optional
+            Called after they are sent, for what takes time.
         until : callable, optional
             Ends the run early when it gives True; nothing more is sent then.
         longest_wait_s : callable, optional
@@ -294,6 +297,8 @@ class Link:
             if on_step:
                 on_step()
             self.send_all(machine.messages_to_send())
+            if on_sent:
+                on_sent()
             if machine.is_done:
                 return
             if timeout_s is not None and self.now_s() - begun_s > timeout_s:

@@ -12,11 +12,10 @@ from mavlink_bridge.cli.options.download import KINDS
 from mavlink_bridge.cli.options_session import session_for
 from mavlink_bridge.cli.restoring import reader_warnings
 from mavlink_bridge.cli.terminal import echo, print_json
-from mavlink_bridge.errors import LinkError, RefusedError, UsageError
+from mavlink_bridge.errors import BridgeError, LinkError, UsageError
 from mavlink_bridge.mavlink.messages import MissionType
-from mavlink_bridge.protocol.outcomes import download_refusal
+from mavlink_bridge.protocol.outcomes import list_read
 from mavlink_bridge.protocol.parameters import ReadParameters
-from mavlink_bridge.protocol.transitions import DownloadState
 from mavlink_bridge.protocol.undisturbed_read import UndisturbedRead
 from missions.fence import fence_from_items
 from missions.formats import write_mission
@@ -93,19 +92,12 @@ def read_list(session: Session, what: str) -> tuple[MissionItem, ...]:
     """
     machine = UndisturbedRead(session.vehicle, MissionType[what.upper()])
     session.run(machine, f"reading the {what}")
-    outcome = machine.outcome
-    assert outcome is not None
-    if machine.is_disturbed:
-        raise RefusedError(f"another station keeps writing the {what}: it was another one while it was read")
-    if outcome.is_complete:
-        if outcome.is_coarse:
-            warn([f"the vehicle gives positions as 32-bit floats: the {what} is known to about 1 m only"])
-        return outcome.items
-    if outcome.state is DownloadState.BUSY:
-        raise RefusedError(f"another ground station keeps the {what} busy (DENIED)", result="DENIED")
-    if outcome.result is not None:
-        raise download_refusal(what, outcome.result)
-    raise LinkError(f"the {what} could not be read: {outcome.shortfall}")
+    items = list_read(machine, what)
+    if isinstance(items, BridgeError):
+        raise items
+    if machine.outcome is not None and machine.outcome.is_coarse:
+        warn([f"the vehicle gives positions as 32-bit floats: the {what} is known to about 1 m only"])
+    return items
 
 
 def _read_parameters(session: Session) -> dict[str, float]:

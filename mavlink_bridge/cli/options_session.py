@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.cli.drawing import Shown, progress_bar
-from mavlink_bridge.cli.session import Address, Session, open_session
+from mavlink_bridge.cli.session import Contact, Session, open_session
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -25,7 +25,7 @@ def session_for(options: LinkOptions, connection: str) -> Iterator[tuple[Session
     UsageError
         The signing key cannot be used.
     """
-    address = Address(
+    contact = Contact(
         connection,
         options.identity,
         options.system,
@@ -33,5 +33,5 @@ def session_for(options: LinkOptions, connection: str) -> Iterator[tuple[Session
         options.timeout,
         options.signing_key,
     )
-    with progress_bar(quiet=options.is_silent) as show, open_session(address, show) as session:
+    with progress_bar(quiet=options.is_silent) as show, open_session(contact, show) as session:
         yield session, show

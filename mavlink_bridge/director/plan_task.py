@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from missions.errors import MissionError, PlanCheckError
+from missions.errors import MissionError, PlanCheckError, SituationError
 from missions.planning.plan import plan as make_plan
 
 if TYPE_CHECKING:
@@ -16,9 +16,15 @@ if TYPE_CHECKING:
     from missions.situation import Situation
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+class PlanDropped(Exception):  # noqa: N818 - nothing went wrong
+    """Nobody waits for the plan any more; raised inside the search, which has nothing to tidy up."""
+
+
+@dataclass(eq=False, slots=True)
 class PlanTask:
     """A plan to be made; each is itself alone.
+
+    It is made in a thread of the shell's. A plain flag is all that passes between that and the director: one sets it, once, and the other reads it.
 
     Parameters
     ----------
@@ -26,18 +32,29 @@ class PlanTask:
         What was known when it was asked for.
     request : Request
         What is asked of it.
+    is_dropped : bool
+        Whether nobody waits for it any more.
     """
 
     situation: Situation
     request: Request
+    is_dropped: bool = False
 
-    def made(self, planner: Callable[[Situation, Request], Plan] = make_plan) -> Plan | MissionError:
+    def made(self, planner: Callable[..., Plan] = make_plan) -> Plan | MissionError:
         """Return the plan, or why there is none; a defect of ours is one reason, and no end of what waits for the plan."""
         try:
-            return planner(self.situation, self.request)
+            return planner(self.situation, self.request, should_stop=self._should_stop)
+        except PlanDropped:
+            return SituationError("nobody waits for the plan any more")
         except MissionError as error:
             return error
         except Exception as error:  # noqa: BLE001 - whatever it is, the vehicle must not lose its bridge by it
             defect = PlanCheckError(f"planning broke down: {type(error).__name__}: {error}. This is a defect")
             defect.__cause__ = error
             return defect
+
+    def _should_stop(self) -> bool:
+        """Break off a plan that nobody waits for: the best one so far, which a search gives that is merely stopped, would still be finished and measured."""
+        if self.is_dropped:
+            raise PlanDropped
+        return False

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.mavlink.messages import CommandLong, Heartbeat, ModeFlag
-from mavlink_bridge.mavlink.rover import AUTO_MODE, HOLD_MODE
-from missions.items import Command
+from mavlink_bridge.mavlink.messages import Heartbeat, ModeFlag
+from mavlink_bridge.mavlink.rover import Mode
+from mavlink_bridge.protocol.mode_switch import set_mode
 
 if TYPE_CHECKING:
     from mavlink_bridge.mavlink.messages import Frame, Message
@@ -56,7 +56,7 @@ class PutBack:
     @property
     def is_left_in_auto(self) -> bool:
         """Whether the vehicle was last shown disarmed and in AUTO all the same."""
-        return self._mode == AUTO_MODE and self._is_armed is False
+        return self._mode == Mode.AUTO and self._is_armed is False
 
     @property
     def was_needed(self) -> bool:
@@ -79,7 +79,7 @@ class PutBack:
         elif self._sends:
             self.is_done = now_s >= self._sent_s + _STALE_S
         else:
-            self.is_done = self._mode not in (AUTO_MODE, HOLD_MODE)
+            self.is_done = self._mode not in (Mode.AUTO, Mode.HOLD)
 
     def handle_timer(self, now_s: float) -> None:
         """Take notice that time has passed."""
@@ -96,14 +96,5 @@ class PutBack:
             return
         self._until_s = now_s + _PATIENCE_S
         self._sent_s = now_s
-        self._outgoing.append(
-            CommandLong(
-                self._peer.system,
-                self._peer.component,
-                Command.DO_SET_MODE,
-                self._sends,
-                param1=ModeFlag.CUSTOM_MODE_ENABLED,
-                param2=HOLD_MODE,
-            )
-        )
+        self._outgoing.append(set_mode(self._peer, Mode.HOLD, self._sends))
         self._sends += 1

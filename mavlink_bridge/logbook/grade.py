@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from mavlink_bridge.logbook.track import FenceMeter, Fix
+    from mavlink_bridge.logbook.track import FenceMeter, TrackFix
     from missions.drive_model import Envelope
     from missions.geo import LatLon
     from missions.ground.frame import LocalFrame
@@ -170,7 +170,7 @@ def way_of(items: Sequence[MissionItem], first_item: int, *, home_first: bool) -
 
 
 @dataclass(frozen=True, slots=True)
-class Field:
+class GradedField:
     """What a drive is measured in: the plane, the fence where one is known, the vehicle by its parameters."""
 
     frame: LocalFrame
@@ -197,12 +197,12 @@ class DriveGrader:
     ----------
     way : MissionWay
         With at least one waypoint.
-    start : Fix
+    start : TrackFix
         Where the drive began.
-    field : Field
+    field : GradedField
     """
 
-    def __init__(self, way: MissionWay, start: Fix, field: Field) -> None:
+    def __init__(self, way: MissionWay, start: TrackFix, field: GradedField) -> None:
         self.way = way
         self._start = start
         self._field = field
@@ -223,7 +223,7 @@ class DriveGrader:
             ]
         )
 
-    def drive(self, fixes: Sequence[Fix], clearances_m: NDArray[np.float64] | None) -> None:
+    def drive(self, fixes: Sequence[TrackFix], clearances_m: NDArray[np.float64] | None) -> None:
         """Take positions, and what the track to each keeps to the fence."""
         tally = self._tally
         track = self._field.frame.to_local_array([fix.position for fix in (self._last, *fixes)])

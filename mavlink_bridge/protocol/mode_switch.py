@@ -8,11 +8,12 @@ heartbeat has to show it.
 
 from __future__ import annotations
 
-from enum import StrEnum, auto
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.mavlink.messages import CommandAck, CommandLong, Heartbeat, MavResult, ModeFlag
 from mavlink_bridge.protocol.table_machine import TableMachine
+from mavlink_bridge.protocol.texts import Reasons
+from mavlink_bridge.protocol.transitions import MODE_SWITCH, MODE_SWITCH_UNTIL_SEEN, SwitchEvent, SwitchState
 from missions.items import Command
 
 if TYPE_CHECKING:
@@ -27,54 +28,6 @@ _SETTLE_S = 0.5
 _MOST_SENDS = 16
 _MOST_S = 60.0  # 16 sends at a heartbeat a second take 16 s; where heartbeats are lost it takes longer
 _HEARTBEAT_ID = 0.0
-
-
-class SwitchState(StrEnum):
-    """Where a mode switch is."""
-
-    IDLE = auto()
-    SENT = auto()
-    ACCEPTED = auto()
-    SEEN = auto()
-    REFUSED = auto()
-    UNANSWERED = auto()
-
-
-class SwitchEvent(StrEnum):
-    """What moves it."""
-
-    START = auto()
-    ACCEPTED = auto()
-    REFUSED = auto()
-    SEEN = auto()
-    SILENCE = auto()
-
-
-_ASKING: dict[SwitchState, dict[SwitchEvent, SwitchState]] = {
-    SwitchState.IDLE: {SwitchEvent.START: SwitchState.SENT},
-    SwitchState.SENT: {
-        SwitchEvent.ACCEPTED: SwitchState.ACCEPTED,
-        SwitchEvent.REFUSED: SwitchState.REFUSED,
-        SwitchEvent.SEEN: SwitchState.SEEN,
-        SwitchEvent.SILENCE: SwitchState.UNANSWERED,
-    },
-    SwitchState.ACCEPTED: {},
-    SwitchState.SEEN: {},
-    SwitchState.REFUSED: {},
-    SwitchState.UNANSWERED: {},
-}
-_UNTIL_SEEN: dict[SwitchState, dict[SwitchEvent, SwitchState]] = {
-    **_ASKING,
-    SwitchState.SENT: {
-        SwitchEvent.ACCEPTED: SwitchState.ACCEPTED,
-        SwitchEvent.SEEN: SwitchState.SEEN,
-        SwitchEvent.SILENCE: SwitchState.UNANSWERED,
-    },
-    SwitchState.ACCEPTED: {
-        SwitchEvent.SEEN: SwitchState.SEEN,
-        SwitchEvent.SILENCE: SwitchState.UNANSWERED,
-    },
-}
 
 
 class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
@@ -93,7 +46,7 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
     """
 
     def __init__(self, peer: Peer, mode: int, *, is_urgent: bool = False, until_seen: bool = False) -> None:
-        super().__init__(_UNTIL_SEEN if until_seen else _ASKING, SwitchState.IDLE)
+        super().__init__(MODE_SWITCH_UNTIL_SEEN if until_seen else MODE_SWITCH, SwitchState.IDLE)
         self._peer = peer
         self._mode = mode
         self._is_urgent = is_urgent
@@ -101,11 +54,22 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
         self._sent_s = 0.0
         self._give_up_s = 0.0
         self._result: MavResult | None = None
+        self._reasons = Reasons(peer)
 
     @property
     def is_granted(self) -> bool:
         """Whether the vehicle said yes, by its answer or by its heartbeat."""
         return self.state in (SwitchState.ACCEPTED, SwitchState.SEEN)
+
+    @property
+    def is_refused(self) -> bool:
+        """Whether the vehicle said no."""
+        return self.state is SwitchState.REFUSED
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """STATUSTEXTs that came meanwhile and may be the reason of a refusal."""
+        return self._reasons.texts
 
     @property
     def result_name(self) -> str:
@@ -133,6 +97,7 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
         """Send the command."""
         if self._move(SwitchEvent.START):
             self._give_up_s = now_s + _MOST_S
+            self._reasons.ask()
             self._send_once(now_s)
 
     def receive(self, frame: Frame, now_s: float) -> None:
@@ -140,6 +105,7 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
         if self.is_done or not self._peer.accepts(frame):
             return
         message = frame.message
+        self._reasons.take(frame, now_s)
         if isinstance(message, Heartbeat):
             if message.custom_mode == self._mode:
                 self._move(SwitchEvent.SEEN)
@@ -176,19 +142,21 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
             self._move(SwitchEvent.SILENCE)
 
     def _send_once(self, now_s: float) -> None:
-        peer = self._peer
-        self._send(
-            CommandLong(
-                peer.system,
-                peer.component,
-                Command.DO_SET_MODE,
-                min(self._sends, 255),
-                param1=ModeFlag.CUSTOM_MODE_ENABLED,
-                param2=self._mode,
-            )
-        )
+        self._send(set_mode(self._peer, self._mode, self._sends))
         self._sends += 1
         self._sent_s = now_s
+
+
+def set_mode(peer: Peer, mode: int, confirmation: int) -> CommandLong:
+    """Return the command that switches to a mode, for the first time (0) or once more."""
+    return CommandLong(
+        peer.system,
+        peer.component,
+        Command.DO_SET_MODE,
+        confirmation,
+        param1=ModeFlag.CUSTOM_MODE_ENABLED,
+        param2=mode,
+    )
 
 
 class AwaitHeartbeat:

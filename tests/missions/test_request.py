@@ -94,7 +94,7 @@ def test_a_place_works_or_fails_at_once(field, made):
         ):
             made(senseless)
     for beyond in ((91.0, 0.0), (40.0, 181.0), (math.nan, 0.0), (0.0, math.inf)):
-        with pytest.raises(InvalidPositionError, match="beyond ±|is not a pair of numbers"):
+        with pytest.raises(InvalidPositionError, match=r"beyond ±|is not a pair of numbers"):
             made(beyond)
 
 
@@ -219,5 +219,5 @@ def test_a_mission_to_repair_is_repaired_or_said_to_be_missing():
 
 def test_what_makes_no_sense_is_an_error_of_missions_whatever_it_is():
     for words in ({"method": "x"}, {"clearance_m": math.nan}, {"targets": ((1e3, 0.0),)}, {"start": "here"}):
-        with pytest.raises(MissionError, match="expected|beyond"):
+        with pytest.raises(MissionError, match=r"expected|beyond"):
             Request(**words)

@@ -21,6 +21,11 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
 
 class MissionError(Exception):
     """Root of the package's errors; ``details`` holds the numbers a person or a script needs."""
@@ -56,6 +61,26 @@ class RequestError(MissionError):
 
 class PlanStoppedError(MissionError):
     """Planning was stopped from outside (``should_stop``): nobody waits for the plan any more."""
+
+    @classmethod
+    def when(cls, should_stop: Callable[[], bool] | None) -> Callable[[], bool] | None:
+        """Return what ends planning wherever it is asked whether to stop, and at once if so: half an answer is of no use to anybody.
+
+        Raises
+        ------
+        PlanStoppedError
+            It is to stop already.
+        """
+        if should_stop is None:
+            return None
+
+        def asked() -> bool:
+            if should_stop():
+                raise cls("planning was stopped: nobody waits for this plan any more")
+            return False
+
+        asked()
+        return asked
 
 
 class SituationError(MissionError):

@@ -281,9 +281,9 @@ def request_of(*, via: Mission | None = None, via_own: bool = False, **words: An
         return GoTo(**conditions(tour), target=next(iter(tour.targets), None))
     if via is not None and via_own:
         raise _senseless("via_own", via_own, "none beside another mission to repair")
+    tour = Tour(**{name: words.pop(name) for name in _TOUR_WORDS if name in words})
     for name in _TOUR_WORDS:
-        value = words.pop(name, _DEFAULTS[name])
-        if value != _DEFAULTS[name]:
+        if (value := getattr(tour, name)) != _DEFAULTS[name]:
             raise _senseless(name, value, "none: a repair keeps the mission's own places, order and end")
     return RepairMission(mission=via, **words)
 
@@ -324,4 +324,5 @@ def _check_number(name: str, value: Any, *, is_zero_allowed: bool) -> None:  # n
 
 
 def _senseless(name: str, value: object, expected: str) -> RequestError:
-    return RequestError(f"{name} {value!r}: expected {expected}", field=name, value=value)
+    plain = value.value if isinstance(value, StrEnum) else value
+    return RequestError(f"{name} {plain!r}: expected {expected}", field=name, value=plain)

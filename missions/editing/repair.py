@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 from missions.checking.check import MissionCheck, check_mission, plan_of
 from missions.editing.edited_mission import ItemList
 from missions.editing.shorten import shortened
-from missions.errors import NoRouteError, RouteError, SituationError, StartBlockedError
+from missions.errors import NoRouteError, PlanStoppedError, RouteError, SituationError, StartBlockedError
 from missions.finishing.route_plan import plan_route
 from missions.geo import bearing_deg, distance_m, to_e7
 from missions.ground.legs import ROUNDING_RESERVE_M
 from missions.items import change_speed
-from missions.request import Tour, conditions
+from missions.request import Tour, conditions, request_of
 from missions.situation import Known, Mission, Pose
 from missions.vehicle.item_limit import most_items
 from missions.words import metres
@@ -106,10 +106,16 @@ def repair_mission(
     situation : Situation
         Fence, parameters, home and where the vehicle is.
     request : Request
-        Start, clearance, ``snap_m`` for places that are blocked, method; its targets are not used.
+        Start, clearance, ``snap_m`` for places that are blocked, method: what a `RepairMission` may ask for.
+    should_stop : callable, optional
+        Asked now and then; once it returns True, nobody waits for the repair any more.
 
     Raises
     ------
+    PlanStoppedError
+        It was stopped.
+    RequestError
+        More is asked for than a repair keeps: targets, an end, a speed.
     RouteError
         A leg cannot be replaced (the message says which and why), or the corners between legs keep breaking the promise.
     SituationError
@@ -117,6 +123,8 @@ def repair_mission(
     FenceMissingError, FenceError, VehicleError, InvalidPositionError
         As `missions.checking.check.check_mission`.
     """
+    should_stop = PlanStoppedError.when(should_stop)
+    request = request_of(**{**request.words(), "via": mission, "via_own": False})
     asked = _checked(mission, situation, request)
     repaired, checked = ItemList(mission), asked
     keys = {_key(leg.leg) for leg in asked.broken}

@@ -53,32 +53,14 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
     PlanCheckError
         The finished route failed its check: a defect of this program, never to be driven.
     """
-    stop = None if should_stop is None else _ending(should_stop)
+    should_stop = PlanStoppedError.when(should_stop)
     if isinstance(request, RepairMission):
-        return repaired_plan(situation, request, should_stop=stop)
+        return repaired_plan(situation, request, should_stop=should_stop)
     if isinstance(request, Tour):
-        planned = plan_tour(situation, request, should_stop=stop)
+        planned = plan_tour(situation, request, should_stop=should_stop)
     else:
-        planned = plan_route(situation, request, should_stop=stop)
-    return _with_room(planned, situation, request, stop)
-
-
-def _ending(should_stop: Callable[[], bool]) -> Callable[[], bool]:
-    """Return what ends planning wherever it is asked whether to stop: half an answer is of no use to anybody.
-
-    Raises
-    ------
-    PlanStoppedError
-        At once where it is to stop already.
-    """
-
-    def asked() -> bool:
-        if should_stop():
-            raise PlanStoppedError("planning was stopped: nobody waits for this plan any more")
-        return False
-
-    asked()
-    return asked
+        planned = plan_route(situation, request, should_stop=should_stop)
+    return _with_room(planned, situation, request, should_stop)
 
 
 def _with_room(

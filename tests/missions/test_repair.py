@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -13,12 +14,12 @@ from shapely import LineString, Polygon
 from missions.checking.check import check_mission
 from missions.checking.execution import follow_mission
 from missions.editing.repair import MOST_TRACKED_JUMPS, Repair, repair_mission, repaired_plan
-from missions.errors import NoRouteError, RouteError, SituationError, TargetBlockedError
+from missions.errors import NoRouteError, PlanStoppedError, RouteError, SituationError, TargetBlockedError
 from missions.fence import Fence, Zone
 from missions.formats import read_fence, read_mission
 from missions.items import CoordinateFrame, MissionItem, change_speed, waypoint
 from missions.planning.plan import plan
-from missions.request import Request
+from missions.request import RepairMission, Request
 from missions.situation import Known, Mission, Pose, Situation
 
 if TYPE_CHECKING:
@@ -331,3 +332,16 @@ def test_random_missions_in_random_fields():
         assert after.is_endless == before.is_endless
         assert len(after.legs) >= len(before.legs)
     assert len(refused) <= 2
+
+
+def test_a_repair_that_is_stopped_ends_with_one_error():
+    asked = itertools.count(1)
+    through = Mission((WEST, EAST), HOME)
+    with pytest.raises(PlanStoppedError, match="nobody waits"):
+        repair_mission(
+            through,
+            situation_of(FIELD, BARN),
+            RepairMission(clearance_m=2.0),
+            should_stop=lambda: next(asked) >= 3,
+        )
+    assert next(asked) == 4

@@ -11,7 +11,7 @@ from charts import FIELD, HOME, OUT, WALL, box, place, situation_of
 from hypothesis import given
 from hypothesis import strategies as st
 
-from missions import plan
+from missions import plan, repair_mission
 from missions.errors import InvalidPositionError, MissionError, RequestError, SituationError
 from missions.geo import LatLon, rounded
 from missions.items import Command, waypoint
@@ -144,6 +144,8 @@ def test_what_a_repair_cannot_keep_is_refused(dropped):
     for repaired in ({"via": MISSION}, {"via_own": True}):
         with pytest.raises(RequestError, match=f"^{next(iter(dropped))} .*a repair keeps the mission's own"):
             Request(**repaired, **dropped)
+    with pytest.raises(RequestError, match=f"^{next(iter(dropped))} .*a repair keeps the mission's own"):
+        repair_mission(MISSION, situation_of(FIELD), Request(**dropped))
     with pytest.raises(RequestError, match="via_own True: expected none beside another mission"):
         Request(via=MISSION, via_own=True)
 

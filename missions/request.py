@@ -22,20 +22,6 @@ POINT = Footprint()
 """A vehicle of no size: its clearance counts from where its position is known."""
 
 _LENGTHS = ("clearance_m", "corner_allowance_m", "snap_m", "position_error_m", "reserve_m")
-_WORDS = (
-    *(
-        "start",
-        "targets",
-        "clearance_m",
-        "widest",
-        "corner_allowance_m",
-        "snap_m",
-        "method",
-        "position_error_m",
-    ),
-    *("reserve_m", "speed_mps", "footprint", "escape", "order", "comes_back", "end", "via", "via_own"),
-)
-"""What `request_of` knows, in the order in which `Request` takes it."""
 
 
 class Method(StrEnum):
@@ -67,9 +53,9 @@ class _Kinds(type):
     def __call__(cls, *words: Any, **named: Any) -> Any:  # noqa: ANN401 - an instance of the class, or of one below it
         if cls is not Request:
             return super().__call__(*words, **named)
-        if len(words) > len(_WORDS) or (twice := set(_WORDS[: len(words)]) & set(named)):
-            raise TypeError(f"Request() takes {', '.join(_WORDS)}, each once; {twice or len(words)} given")
-        return request_of(**dict(zip(_WORDS, words, strict=False)), **named)
+        if len(words) > len(_DEFAULTS):
+            raise TypeError(f"Request() takes {', '.join(_DEFAULTS)}; {len(words)} were given")
+        return request_of(**dict(zip(_DEFAULTS, words, strict=False)), **named)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,7 +71,7 @@ class Request(metaclass=_Kinds):
     clearance_m : float, optional
         Promised for the rover as it drives. Default: from FENCE_MARGIN.
     widest : bool
-        Take the widest route there is; `clearance_m` is then not used.
+        Take the widest route there is, whose clearance then comes of itself.
     corner_allowance_m : float, optional
         Room for cut corners and tracking error everywhere on top of the clearance; 0 plans the drawn lines only. Default: the route is
         fitted to the drive model, with no more room than each corner needs.
@@ -130,6 +116,8 @@ class Request(metaclass=_Kinds):
         for name in _LENGTHS:
             _check_number(name, getattr(self, name), is_zero_allowed=True)
         _check_number("speed_mps", self.speed_mps, is_zero_allowed=False)
+        if self.widest and self.clearance_m is not None:
+            raise _senseless("clearance_m", self.clearance_m, "none beside the widest route")
         self._set("method", _word("method", self.method, Method))
         if not isinstance(self.footprint, Footprint):
             raise _senseless("footprint", self.footprint, "a Footprint")
@@ -251,10 +239,13 @@ class RepairMission(Request):
 
 _TOUR_WORDS = ("targets", "order", "comes_back", "end")
 _DEFAULTS: dict[str, Any] = {
-    **dict.fromkeys(_WORDS),
-    **{one.name: one.default for kind in (Request, Tour) for one in fields(kind)},
+    "start": None,
+    "targets": (),
+    **{one.name: one.default for one in fields(Tour)},
+    "via": None,
     "via_own": False,
 }
+"""What `request_of` knows, in the order in which `Request` takes it, as it is where it is left out."""
 
 
 def request_of(*, via: Mission | None = None, via_own: bool = False, **words: Any) -> Request:  # noqa: ANN401 - the fields of all kinds

@@ -76,7 +76,7 @@ def _with_room(
     most = most_items(situation.parameters) - 1
     if len(planned.items) <= most:
         return planned
-    wanted = replace(request, clearance_m=planned.clearance_m, start=planned.start)
+    wanted = replace(request, widest=False, clearance_m=planned.clearance_m, start=planned.start)
     # Drawn lines that were asked for are not judged by a check: nothing of them is left out.
     own = _own_items(planned, request) if request.corner_allowance_m is None else ()
     mission = Mission(planned.items, planned.home)

@@ -192,7 +192,7 @@ def with_end(planned: Plan, situation: Situation, request: Tour) -> Plan:
         raise SituationError(
             "RTL leads home, and home is not known; give it (--home LAT,LON), or end with hold or loiter"
         )
-    wanted = replace(request, clearance_m=planned.clearance_m, start=planned.start)
+    wanted = replace(request, widest=False, clearance_m=planned.clearance_m, start=planned.start)
     checked = check_mission(Mission(items, planned.home), situation, wanted)
     last = checked.legs[-1]
     is_broken = last.breaks if planned.clearance_m is not None else last.drawn_clearance_m < planned.asked_m

@@ -39,6 +39,11 @@ def test_what_has_a_default_of_its_own_cannot_be_none(name):
         GoTo(**{name: None})
 
 
+def test_the_widest_route_has_no_clearance_that_is_asked_for():
+    with pytest.raises(RequestError, match=r"clearance_m 2\.0: expected none beside the widest route"):
+        Tour(widest=True, clearance_m=2.0)
+
+
 def test_no_speed_is_no_speed_and_no_room_is_room():
     with pytest.raises(RequestError, match="speed_mps 0: expected a finite number above 0"):
         GoTo(speed_mps=0)
@@ -111,7 +116,10 @@ def test_one_place_for_several_and_other_things_are_refused():
 
 def test_the_common_constructor_makes_the_kind_that_its_words_ask_for():
     assert Request() == GoTo()
-    assert Request(HOME, (FAR,), 2.0, True) == GoTo(start=HOME, target=FAR, clearance_m=2.0, widest=True)
+    assert Request(HOME, (FAR,), 2.0, False, 0.5) == GoTo(
+        start=HOME, target=FAR, clearance_m=2.0, corner_allowance_m=0.5
+    )
+    assert Request(HOME, (FAR,), None, True) == GoTo(start=HOME, target=FAR, widest=True)
     assert Request(targets=(FAR, HOME)) == Tour(targets=(FAR, HOME))
     assert Request(targets=(FAR,), end="loiter") == Tour(targets=(FAR,), end=End.LOITER)
     assert Request(comes_back=True) == Tour(comes_back=True)
@@ -122,6 +130,8 @@ def test_the_common_constructor_makes_the_kind_that_its_words_ask_for():
         Request(HOME, (), 2.0, clearance_m=1.0)
     with pytest.raises(TypeError, match="no_such_word"):
         Request(no_such_word=1)
+    with pytest.raises(TypeError, match="18 were given"):
+        Request(*[None] * 18)
 
 
 FAR = place(100, 60)
@@ -170,7 +180,6 @@ SHARED = {
 }
 ON_A_ROUTE = {
     **SHARED,
-    "widest": st.booleans(),
     "speed_mps": st.none() | st.floats(0.1, 9.0),
     "escape": st.booleans(),
 }
@@ -188,7 +197,7 @@ REQUESTS = st.one_of(
 )
 
 
-@given(REQUESTS)
+@given(REQUESTS | st.builds(GoTo, start=PLACES, widest=st.just(True)))
 def test_the_words_of_a_request_make_the_same_one(asked):
     assert request_of(**asked.words()) == asked == Request(*asked.words().values())
 

@@ -16,7 +16,7 @@ from missions.errors import NoRouteError, SituationError, TargetBlockedError
 from missions.fence import Fence, Zone
 from missions.items import Command
 from missions.planning.plan import plan
-from missions.request import Request
+from missions.request import Request, Tour
 from missions.situation import Known, Situation
 from missions.tour.tour import route_lengths_m, target_order
 
@@ -188,7 +188,7 @@ def test_a_blocked_target_is_told_by_the_plan():
 
 
 def test_the_widest_routes_can_be_ordered_too():
-    made = plan(WALLED, request(NEAR_BUT_BEHIND, FAR_BUT_HERE, order="best", widest=True))
+    made = plan(WALLED, Tour(start=HOME, targets=(NEAR_BUT_BEHIND, FAR_BUT_HERE), order="best", widest=True))
     assert made.targets[0] == FAR_BUT_HERE
 
 

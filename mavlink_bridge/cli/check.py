@@ -21,7 +21,7 @@ from missions.checking.check import check_mission, plan_of
 from missions.errors import FenceMissingError
 from missions.formats import read_mission, read_parameters, read_situation
 from missions.picture import check_picture_format
-from missions.request import Request
+from missions.request import GoTo
 from missions.situation import Known, Situation
 from missions.vehicle.item_limit import most_items
 from missions.words import metres
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 def check(options: CheckOptions) -> None:
     """Check each leg, and report, draw or print as JSON what was found."""
     _check_options(options)
-    request = with_vehicle(Request(clearance_m=options.clearance), options)
+    request = with_vehicle(GoTo(clearance_m=options.clearance), options)
     begin = position_from("--start", options.start) if options.start is not None else None
     situation, unknown = _situation(options)
     if situation.mission is None:

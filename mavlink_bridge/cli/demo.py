@@ -27,7 +27,7 @@ from missions.fence import fence_to_items
 from missions.formats import read_fence
 from missions.geo import LatLon, from_e7
 from missions.picture import draw_plan
-from missions.request import Request
+from missions.request import GoTo
 
 if TYPE_CHECKING:
     from mavlink_bridge.cli.options.demo import DemoOptions
@@ -61,7 +61,7 @@ def demo(options: DemoOptions) -> None:
         recorder = stack.enter_context(TlogWriter(out / "demo.tlog"))
         rover = _rover(options.speedup)
         link = stack.enter_context(Link(rover, _IDENTITY, recorder, clock=rover.now_s))
-        request = Request(targets=(LatLon(*_TARGET),), clearance_m=_CLEARANCE_M)
+        request = GoTo(target=LatLon(*_TARGET), clearance_m=_CLEARANCE_M)
         orders = Orders(identity=_IDENTITY, request=request, upload=True, drive=True, arm=True)
         result = conduct(
             link,

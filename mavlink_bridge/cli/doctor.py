@@ -25,7 +25,7 @@ from mavlink_bridge.errors import UsageError
 from mavlink_bridge.mavlink.signing import SigningKey
 from missions.formats import read_situation
 from missions.geo import LatLon
-from missions.request import Request
+from missions.request import GoTo
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -180,7 +180,9 @@ def _backups() -> Iterator[_Finding]:
 
 def _test_plan() -> Iterator[_Finding]:
     """Plan through the demo's maze; the answer is known, and its clearance is measured again."""
-    request = Request(LatLon(*_START), (LatLon(*_TARGET),), clearance_m=_CLEARANCE_M, corner_allowance_m=0.0)
+    request = GoTo(
+        start=LatLon(*_START), target=LatLon(*_TARGET), clearance_m=_CLEARANCE_M, corner_allowance_m=0.0
+    )
     try:
         from shapely import LineString  # noqa: PLC0415 - a library that does not load is a finding too
 

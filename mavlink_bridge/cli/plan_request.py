@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 from mavlink_bridge.cli.options.plan import ENDS, METHODS, ORDERS
 from mavlink_bridge.cli.values import metres_or, position_from
 from mavlink_bridge.errors import UsageError
 from missions.formats import read_mission
-from missions.request import Request
+from missions.request import RepairMission, Request, conditions, request_of
 
 _OWN = "own"
 
@@ -26,7 +25,7 @@ def request_from_options(
     """
     if method not in METHODS:
         raise UsageError(f"--method {method!r}: expected one of {', '.join(METHODS)}")
-    return Request(
+    return request_of(
         start=position_from("--start", start) if start is not None else None,
         targets=tuple(position_from("--target", target) for target in targets),
         clearance_m=metres_or("--clearance", clearance, "max"),
@@ -49,7 +48,7 @@ def with_tour(request: Request, order: str, end: str, via: str | None, *, comes_
         if value not in known:
             raise UsageError(f"{option} {value!r}: expected one of {', '.join(known)}")
     if via is None:
-        return replace(request, order=order, comes_back=comes_back, end=end)
+        return request_of(**{**request.words(), "order": order, "comes_back": comes_back, "end": end})
     if request.targets or comes_back or (order, end) != ("given", "hold"):
         raise UsageError(
             "--via-mission keeps the mission's own places, order and end; it does not go with --target, --order, --return, --end"
@@ -61,6 +60,4 @@ def with_tour(request: Request, order: str, end: str, via: str | None, *, comes_
             "--via-mission keeps the mission's own speeds and goes by the drive model; it does not go with --speed, "
             "--corner-allowance, --escape"
         )
-    if via == _OWN:
-        return replace(request, via_own=True)
-    return replace(request, via=read_mission(Path(via)))
+    return RepairMission(**conditions(request), mission=None if via == _OWN else read_mission(Path(via)))

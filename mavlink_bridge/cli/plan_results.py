@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,9 +11,7 @@ from mavlink_bridge.cli.common import warn
 from mavlink_bridge.cli.kept_files import write_kept
 from mavlink_bridge.cli.terminal import echo, echo_lines
 from missions.fence import CircleZone, PolygonZone, ZoneKind
-from missions.formats import write_mission
 from missions.picture import TERMINAL, draw_plan, sketch_plan
-from missions.situation import Known, Mission
 from missions.words import counted
 
 if TYPE_CHECKING:
@@ -28,12 +25,8 @@ def write_outputs(
     planned: Plan, situation: Situation, outputs: list[Path], plots: list[Path], *, blocks: bool = False
 ) -> list[Path]:
     """Write the mission and draw the plan; return the files."""
-    mission = Mission(planned.items, planned.home or planned.start)
-    to_write = replace(
-        situation, mission=Known(mission, None, "pbpp plan"), fence=Known(planned.fence, None, "pbpp plan")
-    )
     for path in outputs:
-        write_mission(to_write, path, write=write_kept)
+        planned.write(path, situation, write=write_kept)
     return [*outputs, *draw(planned, plots, blocks=blocks)]
 
 

@@ -21,10 +21,9 @@ from mavlink_bridge.cli.options.shared import (
     WidthOption,
 )
 from mavlink_bridge.cli.values import LEAST_MPS, MOST_M, MOST_MPS, within
+from missions.request import End, Method, Order
 
-METHODS = ("optimal", "pbpp-taut", "pbpp")
-ORDERS = ("given", "best")
-ENDS = ("hold", "loiter", "rtl")
+METHODS, ORDERS, ENDS = tuple(Method), tuple(Order), tuple(End)
 _TOURS = "Several targets, and missions to repair"
 
 

@@ -36,7 +36,8 @@ test: .venv/dev.stamp
 
 # The parts that promises rest on: the planner, missions, and all that decides or speaks a protocol without sockets.
 PROMISING := pbpp/*,missions/*,mavlink_bridge/mavlink/*,mavlink_bridge/protocol/*,mavlink_bridge/director/*,mavlink_bridge/backup/*,mavlink_bridge/tlog/*,mavlink_bridge/logbook/*,mavlink_bridge/replay/*,mavlink_bridge/fold.py
-COVERING := tests/pbpp tests/missions tests/formats tests/picture tests/protocol tests/bridge tests/tlog tests/logbook
+COVERING := tests/pbpp tests/missions $(filter-out %/__pycache__ %/cli %/simulator,$(wildcard tests/mavlink_bridge/*)) \
+	tests/mavlink_bridge/cli/test_cli_transfers.py tests/mavlink_bridge/cli/test_ends_after_writes.py
 
 coverage: .venv/dev.stamp
 	rm -f .coverage .coverage.*
@@ -95,16 +96,16 @@ test-foreign: .venv/dev.stamp
 	$(BIN)/python tests/foreign/run.py
 
 soak: .venv/dev.stamp
-	$(BIN)/python tests/bridge/soak.py --hours 100 --minutes $(or $(MINUTES),30)
+	$(BIN)/python tests/mavlink_bridge/director/soak.py --hours 100 --minutes $(or $(MINUTES),30)
 
 bench-tlog: .venv/dev.stamp
 	$(BIN)/python benchmarks/tlog.py
 
 campaign: .venv/dev.stamp
-	$(BIN)/python tests/protocol/campaign.py --count $(or $(COUNT),10000)
+	$(BIN)/python tests/mavlink_bridge/protocol/campaign.py --count $(or $(COUNT),10000)
 
 fuzz: .venv/dev.stamp
-	$(BIN)/python tests/tlog/fuzz_tlog.py --count 100000
+	$(BIN)/python tests/mavlink_bridge/tlog/fuzz_tlog.py --count 100000
 
 hunt: .venv/dev.stamp
 	$(BIN)/python tests/pbpp/hunt_edges.py --count $(or $(COUNT),20000)

@@ -27,7 +27,11 @@ NEEDED = {
     "mavlink_bridge/py.typed",
     "mavlink_bridge/cli/data/maze-fence.waypoints",
 }
-QUICK_TESTS = ("pbpp", "missions", "formats", "picture", "protocol", "tlog", "logbook")
+QUICK_TESTS = (
+    "pbpp",
+    "missions",
+    *(f"mavlink_bridge/{room}" for room in ("mavlink", "protocol", "backup", "tlog", "logbook")),
+)
 START, TARGET = "40.071374,-105.229930", "40.0720926,-105.2286152"
 
 

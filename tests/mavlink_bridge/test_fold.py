@@ -74,7 +74,7 @@ def fence_of(situation: Situation) -> Fence | None:
 
 
 def why_no_plan(situation: Situation) -> str:
-    with pytest.raises(FenceMissingError) as caught:
+    with pytest.raises(FenceMissingError, match="fence") as caught:
         plan(situation, Request(HOME, (THERE,)))
     return str(caught.value)
 

@@ -191,7 +191,7 @@ def test_the_picture_shows_each_mode_once_and_the_track_in_place():
     assert (east - west, north - south) == pytest.approx((112.0, 112.0), abs=1.0)
     with pytest.raises(MissionFormatError, match="nothing to draw"):
         TrackPicture(fence=None, parts=())
-    with pytest.raises(MissionFormatError):
+    with pytest.raises(MissionFormatError, match=r"drive\.bmp: no picture format"):
         draw_track(picture, places_path())
 
 

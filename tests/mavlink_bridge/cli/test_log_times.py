@@ -69,7 +69,7 @@ def test_when_a_log_begins(short, tmp_path):
     assert str(log_begin(raw)) == "raw: without times of its own"
     empty = tmp_path / "empty.tlog"
     empty.touch()
-    with pytest.raises(LogError):
+    with pytest.raises(LogError, match=r"empty\.tlog: the file is empty"):
         log_begin(empty)
 
 

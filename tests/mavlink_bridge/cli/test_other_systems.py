@@ -73,7 +73,7 @@ def test_serial_ports_by_their_names(text, device, baud):
 
 @pytest.mark.parametrize("text", ["COM", "COM7,fast", "COM7,0", "COMA"])
 def test_names_that_are_no_port(text):
-    with pytest.raises(LinkError):
+    with pytest.raises(LinkError, match=f"connection '{text}': expected udpin:"):
         parse_connection(text)
 
 
@@ -83,7 +83,7 @@ def test_a_signal_that_windows_has_not_is_not_asked_for(monkeypatch):
     monkeypatch.delattr(signal, "SIGTERM")
     monkeypatch.delattr(signal, "SIGBREAK", raising=False)
     monkeypatch.setattr(signal, "signal", lambda number, _handler: handled.append(number))
-    with pytest.raises(LinkError):
+    with pytest.raises(LinkError, match="connection 'nonsense': expected udpin:"):
         bridge_command.bridge(connect="nonsense")
     assert handled == []
 

@@ -172,11 +172,11 @@ def test_the_key_shows_itself_nowhere(tmp_path, caplog):
     codec = Codec(245, 190, Signing(key, time.time))
     codec.decode(Codec(1, 1, signing(bytes(32))).encode(Heartbeat(10, 3)))
     shown += [caplog.text, repr(vars(codec))]
-    with pytest.raises(TypeError) as pickling:
+    with pytest.raises(TypeError, match="a signing key is not written anywhere") as pickling:
         pickle.dumps(key)
     shown.append(str(pickling.value))
     for content in (b"\xff" + SECRET, SECRET * 200):
-        with pytest.raises(UsageError) as error:
+        with pytest.raises(UsageError, match="signing key") as error:
             SigningKey.read(key_file(tmp_path, content))
         shown += [str(error.value), repr(error.value.details)]
     for text in shown:

@@ -133,7 +133,7 @@ def test_what_is_no_journal_is_one_clear_error(tmp_path, text):
     path.write_text(text)
     with pytest.raises(LogError, match=r"run\.journal\.jsonl"):
         read_journal(path)
-    with pytest.raises(LogError):
+    with pytest.raises(LogError, match=r"missing\.jsonl cannot be read: No such file"):
         read_journal(tmp_path / "missing.jsonl")
 
 

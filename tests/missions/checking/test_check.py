@@ -331,7 +331,7 @@ def test_the_home_circle_counts():
 def test_a_mission_that_drives_nowhere_and_a_missing_fence():
     with pytest.raises(SituationError, match="no leg to check"):
         checked(do(178, 1, 2))
-    with pytest.raises(FenceMissingError):
+    with pytest.raises(FenceMissingError, match="no fence was transferred"):
         check_mission(mission_of((10.0, 0.0)), Situation())
 
 

@@ -83,11 +83,10 @@ def test_waypoints_round_an_obstacle_stay():
     assert len(found.mission.items) <= 10
     kept = sum(item in found.mission.items for item in items[39:44])
     assert kept >= 3
-    with pytest.raises(MissionTooLongError) as caught:
+    with pytest.raises(MissionTooLongError, match="the vehicle holds 4:") as caught:
         shortened(Mission(tuple(items), HOME), own, situation, request, most=3)
     assert caught.value.details["limit"] == 4
     assert caught.value.details["items"] > 4
-    assert "holds 4" in str(caught.value)
 
 
 def test_quick_stretches_become_slow_ones():
@@ -124,7 +123,9 @@ def test_a_speed_that_the_mission_sets_itself_stays():
         change_speed(1.0),
         go(60.0, 0.0),
     )
-    with pytest.raises(MissionTooLongError):
+    with pytest.raises(
+        MissionTooLongError, match="needs 7 items with home, and the vehicle holds 5: 0 of 0 items"
+    ):
         shortened(Mission(items, HOME), (), situation_of(WIDE), Request(clearance_m=2.0), most=4)
 
 

@@ -347,7 +347,9 @@ def test_where_no_clearance_helps_the_advice_is_another(monkeypatch: pytest.Monk
     monkeypatch.setattr(FittedRoute, "_search", counted)
     lane = box(IN, -1.6, -60, 1.6, 60)
     situation = facing(situation_of(lane, **VEHICLES[0]), 0, 40, 0.0)
-    with pytest.raises(NoRouteError) as caught:
+    with pytest.raises(
+        NoRouteError, match=r"at the start this vehicle would come as near as 0\.00 m"
+    ) as caught:
         plan(situation, Request(targets=(place(0, -50),), widest=True))
     assert str(caught.value.details["advice"]).startswith(
         "less clearance does not help this vehicle: turn it"
@@ -371,6 +373,6 @@ def test_a_gap_that_no_clearance_lets_this_vehicle_through_is_told(monkeypatch: 
 
 def test_a_target_that_no_clearance_frees_has_its_own_advice() -> None:
     situation = facing(situation_of(FIELD, WALL), -50, 0, 90.0)
-    with pytest.raises(TargetBlockedError) as caught:
+    with pytest.raises(TargetBlockedError, match=r"the target .*: exclusion polygon 1;") as caught:
         plan(situation, Request(targets=(place(0, 0),), widest=True))
     assert "advice" not in caught.value.details

@@ -12,7 +12,7 @@ COVERAGE_PERCENT := 97
 LOCKED := --quiet --disable-pip-version-check --require-hashes --no-deps
 quoted = '$(subst ','\'',$(1))'
 
-.PHONY: coverage locks package bench bench-bridge bench-drive bench-transfer test-foreign docs soak bench-tlog campaign fuzz hunt demo test lint format types walls check lock clean
+.PHONY: coverage locks package release bench bench-bridge bench-drive bench-transfer test-foreign docs soak bench-tlog campaign fuzz hunt demo test lint format types walls check lock clean
 
 demo: .venv/run.stamp
 	$(BIN)/pbpp demo --out $(call quoted,$(OUT))
@@ -70,6 +70,10 @@ locks: .venv/dev.stamp
 package: .venv/dev.stamp
 	$(BIN)/python tools/package.py $(if $(LOWEST),--lowest)
 
+# Version, changelog, build, commit and tag; nothing leaves this computer (docs/releasing.md).
+release: .venv/dev.stamp
+	$(BIN)/python tools/release.py $(VERSION)
+
 lock: .venv/run.stamp
 	$(BIN)/python -m pip install --quiet uv
 	$(BIN)/uv pip compile pyproject.toml requirements/build.in --extra plot --universal --python-version 3.11 \
@@ -78,6 +82,8 @@ lock: .venv/run.stamp
 		--python-version 3.11 --generate-hashes --no-header --quiet -c requirements/run.lock -o requirements/dev.lock
 	$(BIN)/uv pip compile pyproject.toml requirements/build.in --extra plot --extra test --python-version 3.11 \
 		--resolution lowest-direct --generate-hashes --no-header --quiet -o requirements/lowest.lock
+	echo keyring | $(BIN)/uv pip compile requirements/release.in --universal --python-version 3.11 --excludes /dev/stdin \
+		--generate-hashes --no-header --quiet -c requirements/dev.lock -o requirements/release.lock
 
 bench: .venv/dev.stamp
 	$(BIN)/python benchmarks/planner/run.py

@@ -1,4 +1,4 @@
-"""Release this checkout: ``make release VERSION=0.2.0`` writes version and changelog, builds and checks the files, commits, tags.
+"""Release this checkout: ``make release VERSION=X.Y.Z`` writes version and changelog, builds and checks the files, commits, tags.
 
 Nothing is pushed and nothing is uploaded; docs/releasing.md says what comes before and after.
 """
@@ -29,10 +29,14 @@ def main() -> None:
         changelog: with_release(before[changelog], version, datetime.now(UTC).date().isoformat()),
     }
     write(after)
-    if subprocess.run([sys.executable, ROOT / "tools" / "package.py"], cwd=ROOT, check=False).returncode:
+    try:
+        package = [sys.executable, str(ROOT / "tools" / "package.py")]
+        if subprocess.run(package, cwd=ROOT, check=False).returncode:
+            sys.exit("not released: version and changelog are as before")
+        git("commit", "--message", f"Version {version}", "--", project.name, changelog.name)
+    except BaseException:
         write(before)
-        sys.exit("not released: version and changelog are as before")
-    git("commit", "--all", "--message", f"Version {version}")
+        raise
     git("tag", "--annotate", f"v{version}", "--message", f"PBPP Rover {version}")
     print(f"v{version} is tagged, its files are in dist/. Next: docs/releasing.md, from step 4")
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
+import yaml
 
 from mavlink_bridge.director import TRANSITIONS
 
@@ -76,3 +77,28 @@ def test_the_workflow_runs_the_same_and_trusts_no_moving_tag():
     actions = re.findall(r"uses: (\S+)", text)
     assert actions
     assert all(re.fullmatch(r"[\w/-]+@[0-9a-f]{40}", action) for action in actions)
+
+
+TEMPLATES = DOCS.parent / ".github" / "ISSUE_TEMPLATE"
+
+
+@pytest.mark.parametrize("name", ["bug", "feature"])
+def test_issue_forms_are_forms(name):
+    form = yaml.safe_load((TEMPLATES / f"{name}.yml").read_text(encoding="utf-8"))
+    fields = [part for part in form["body"] if part["type"] != "markdown"]
+    assert {"name", "description", "labels", "body"} == set(form)
+    assert (
+        len({field["id"] for field in fields})
+        == len({field["attributes"]["label"] for field in fields})
+        == len(fields)
+    )
+    assert {field["type"] for field in fields} <= {"textarea", "input", "dropdown"}
+    assert any(field.get("validations", {}).get("required") for field in fields)
+
+
+def test_a_bug_may_be_in_any_command():
+    form = yaml.safe_load((TEMPLATES / "bug.yml").read_text(encoding="utf-8"))
+    (command,) = (part for part in form["body"] if part.get("id") == "command")
+    told = re.findall(r"^## (pbpp \w+)$", (DOCS / "commands.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert len(told) > 5
+    assert sorted(command["attributes"]["options"][:-1]) == told

@@ -87,7 +87,7 @@ def line(name: tuple[str, ...], found: list[tuple[Row, Corner, float]]) -> str:
 
 
 def missions() -> Iterator[list[Row]]:
-    """Give the rows mission by mission: those whose track goes on where the row before left off."""
+    """Return the rows mission by mission: those whose track goes on where the row before left off."""
     for name in ("corners.csv", "corners_extra.csv"):
         mission: list[Row] = []
         with (HERE / "data" / name).open(newline="") as file:

@@ -65,7 +65,7 @@ def run(*command: str, cwd: Path, **options: str) -> str:
 
 
 def look_into_wheel(wheel: Path) -> set[str]:
-    """Check the metadata, and that what is needed is there; give the names of all files."""
+    """Check the metadata, and that what is needed is there; return the names of all files."""
     with zipfile.ZipFile(wheel) as archive:
         names = set(archive.namelist())
         (info,) = {name.split("/")[0] for name in names if ".dist-info/" in name}

@@ -59,7 +59,7 @@ def started(link, *arguments):
 
 
 def interrupted_on(vehicle, mission_file):
-    """Break an upload off half-way; give the backup."""
+    """Break an upload off half-way; return the backup."""
     with TcpVehicle(vehicle) as link:
         assert run(link, "upload", mission_file)[0] == 7
     [note] = BackupStore().notes()

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def advice_of(*arguments: str) -> str:
-    """Run a command that fails; give its advice, as JSON and as a line the same."""
+    """Run a command that fails; return its advice, as JSON and as a line the same."""
     told = CliRunner().invoke(app, [arguments[0], "--json", *arguments[1:]])
     assert told.exit_code not in (0, 1), told.output
     document = json.loads(told.stdout)

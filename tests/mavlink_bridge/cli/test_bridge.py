@@ -56,7 +56,7 @@ def start_bridge(connection: str, *arguments: str) -> subprocess.Popen:
 
 
 def wait_for(process: subprocess.Popen, name: str, within_s: float = 120.0) -> dict:
-    """Give the first event of a name from the bridge's JSON lines."""
+    """Return the first event of a name from the bridge's JSON lines."""
     until_s = time.monotonic() + within_s
     while time.monotonic() < until_s:
         line = process.stdout.readline()

@@ -59,7 +59,7 @@ def hasty_rover():
 
 
 def run(rover, *arguments, timeout_s=10):
-    """Run a command against the rover; give exit code, JSON document (None without --json) and stderr."""
+    """Run a command against the rover; return exit code, JSON document (None without --json) and stderr."""
     command = [
         *map(str, arguments),
         "--connect",

@@ -151,7 +151,7 @@ def json_line(document):
 
 
 def printing(tree):
-    """Give what puts something on the terminal, or over a file, on a way of its own."""
+    """Return what puts something on the terminal, or over a file, on a way of its own."""
     for node in ast.walk(tree):
         if not isinstance(node, ast.Call):
             continue
@@ -302,5 +302,5 @@ def test_what_the_bridge_says_to_ground_stations():
 
 
 def is_plain(text):
-    """Tell whether a text has our line breaks and otherwise only what is seen."""
+    """Return whether a text has our line breaks and otherwise only what is seen."""
     return all(harmless(line) == line for line in text.split("\n"))

@@ -14,7 +14,7 @@ START, TARGET = "40.071374,-105.229930", "40.0720926,-105.2286152"
 
 
 def loaded_after(*arguments: object) -> set[str]:
-    """Run the command line in a fresh interpreter; give the modules it loaded."""
+    """Run the command line in a fresh interpreter; return the modules it loaded."""
     code = (
         "import sys; sys.argv[0] = 'pbpp'; from mavlink_bridge.cli import main\n"
         "try: main()\n"

@@ -456,7 +456,7 @@ def run(*arguments: str):
 
 
 def check_lines(stderr: str) -> str:
-    """Give the error's message, once its form is right: warnings, one error, at most one piece of advice."""
+    """Return the error's message, once its form is right: warnings, one error, at most one piece of advice."""
     lines = stderr.splitlines()
     assert "Traceback" not in stderr
     assert [line.split(":")[0] for line in lines if not line.startswith(("warning: ", "link: "))] in (
@@ -588,7 +588,7 @@ class TestColour:
 
     @staticmethod
     def on_a_terminal(**more: str) -> str:
-        """Run with a pseudo-terminal for stderr; give what came there."""
+        """Run with a pseudo-terminal for stderr; return what came there."""
         pty = pytest.importorskip("pty")
         ours, theirs = pty.openpty()
         environment = {name: value for name, value in os.environ.items() if name not in ("NO_COLOR", "TERM")}

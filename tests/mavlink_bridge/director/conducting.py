@@ -104,9 +104,9 @@ class Conductor:
         self.down.push(frame, self.now_s)
 
     def happened(self, name: EventName, after: int = 0) -> Callable[[], bool]:
-        """Give a condition: an event came, after the first so many events."""
+        """Return a condition: an event came, after the first so many events."""
         return lambda: any(event.name is name for event in self.events[after:])
 
     def last(self, name: EventName) -> Event:
-        """Give the newest event of a name."""
+        """Return the newest event of a name."""
         return next(event for event in reversed(self.events) if event.name is name)

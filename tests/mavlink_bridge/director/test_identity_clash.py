@@ -31,12 +31,12 @@ def clashes(run) -> list:
 
 
 def asked_of_vehicle(run, since: int) -> list[m.Message]:
-    """Give what was sent that asks the vehicle for something or changes it."""
+    """Return what was sent that asks the vehicle for something or changes it."""
     return [message for message in run.sent[since:] if not isinstance(message, HARMLESS)]
 
 
 def is_left_alone(run, seconds: float = 30.0) -> bool:
-    """Tell whether nothing is sent, whatever is clicked, typed as a yes, or forged."""
+    """Return whether nothing is sent, whatever is clicked, typed as a yes, or forged."""
     since = len(run.sent)
     for number in range(10):
         wait(run, seconds / 10)

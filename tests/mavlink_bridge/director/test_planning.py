@@ -33,7 +33,7 @@ LONG_S = 5.0
 
 
 def planning(planning_s: float = LONG_S):
-    """Give a bridge in the middle of a plan that takes long."""
+    """Return a bridge in the middle of a plan that takes long."""
     run = conductor()
     run.planning_s = planning_s
     ready(run)

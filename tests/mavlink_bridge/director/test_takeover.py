@@ -82,7 +82,7 @@ def hearing_all(run: Conductor) -> None:
 
 
 def left_alone(run: Conductor, mode: int, seconds: float = 20.0) -> bool:
-    """Tell whether the vehicle stays as the operator has it, and nothing is sent to change that."""
+    """Return whether the vehicle stays as the operator has it, and nothing is sent to change that."""
     wait(run, 1.5)  # a heartbeat tells
     sent = len(run.sent)
     wait(run, seconds)

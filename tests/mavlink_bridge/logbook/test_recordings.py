@@ -35,7 +35,7 @@ def recording(request):
 
 
 def local(places_deg):
-    """Give places in a flat frame of our own, good to centimetres on such fields."""
+    """Return places in a flat frame of our own, good to centimetres on such fields."""
     array = np.asarray(places_deg, dtype=float).reshape(-1, 2) - (HOME["lat_deg"], HOME["lon_deg"])
     return np.column_stack((array[:, 1] * np.cos(np.radians(HOME["lat_deg"])), array[:, 0])) * M_PER_DEG
 

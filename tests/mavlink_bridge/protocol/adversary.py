@@ -40,7 +40,7 @@ HOLD, AUTO = 4, 10
 
 
 def mission(count, step_e7=500):
-    """Give a mission of so many items, home at 0, whose places depend on the step."""
+    """Return a mission of so many items, home at 0, whose places depend on the step."""
     lat_e7, lon_e7 = to_e7(HOME)
     places = [
         LatLon((lat_e7 + seq * step_e7) / 1e7, (lon_e7 + seq * step_e7) / 1e7) for seq in range(1, count)
@@ -49,7 +49,7 @@ def mission(count, step_e7=500):
 
 
 def places(items):
-    """Give what of a mission must be equal: home is the vehicle's own."""
+    """Return what of a mission must be equal: home is the vehicle's own."""
     return [(int(item.command), item.lat_e7, item.lon_e7) for item in items[1:]]
 
 
@@ -273,7 +273,7 @@ class DrivesMidway(Adversary):
 
 
 class CancelsAtThree(Adversary):
-    """Gives up whenever item 3 has come."""
+    """Return up whenever item 3 has come."""
 
     def store(self, message, kind):
         super().store(message, kind)
@@ -373,7 +373,7 @@ class SteppedLink:
 
 
 def encoded(codecs, frame):
-    """Give a frame's bytes, counted by its sender."""
+    """Return a frame's bytes, counted by its sender."""
     codec = codecs.setdefault((frame.system, frame.component), Codec(frame.system, frame.component))
     return codec.encode(frame.message)
 

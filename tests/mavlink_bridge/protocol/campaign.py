@@ -349,7 +349,7 @@ def _await_moment(twin, client, rivals, scenario):
 
 
 def _odd(scenario):
-    """Give the item that the vehicle keeps otherwise."""
+    """Return the item that the vehicle keeps otherwise."""
     if not scenario.odd_items:
         return {}
     seq = random.Random(scenario.seed).randrange(1, max(scenario.count, 2))

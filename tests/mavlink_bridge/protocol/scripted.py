@@ -24,7 +24,7 @@ class Script:
         self._collect()
 
     def hear(self, *messages, after_s=0.0, system=PEER.system, component=PEER.component):
-        """Let frames of the vehicle arrive; give what is sent in return."""
+        """Let frames of the vehicle arrive; return what is sent in return."""
         before = len(self.sent)
         self.pass_time(after_s)
         for message in messages:
@@ -33,7 +33,7 @@ class Script:
         return self.sent[before:]
 
     def pass_time(self, for_s):
-        """Let time pass, with every deadline kept; give what is sent meanwhile."""
+        """Let time pass, with every deadline kept; return what is sent meanwhile."""
         before = len(self.sent)
         until_s = self.now_s + for_s
         while (deadline_s := self.machine.deadline_s) is not None and deadline_s <= until_s:
@@ -48,5 +48,5 @@ class Script:
 
 
 def seqs(messages):
-    """Give the seq of each message that has one."""
+    """Return the seq of each message that has one."""
     return [message.seq for message in messages if hasattr(message, "seq")]

@@ -62,7 +62,7 @@ class Peer:
         self._numbers = itertools.count(1)
 
     def hear(self, message):
-        """Give what is answered, and after how long; some answers come from others."""
+        """Return what is answered, and after how long; some answers come from others."""
         answer, wait_s = next(self._answers)
         return [(wait_s, frame) for frame in self._answer(answer, message)]
 
@@ -144,7 +144,7 @@ def test_every_machine_ends_when_one_answer_comes_again_and_again(name, answer):
 
 
 def run(machine, peer, limit_s, noise_every_s=None, backup_after_s=100.0):
-    """Run a machine in stepped time; give how long that took, and how long it waited for its backup to be stored."""
+    """Run a machine in stepped time; return how long that took, and how long it waited for its backup to be stored."""
     now_s = waited_s = 0.0
     order = itertools.count()
     coming = []  # (when, order, frame)

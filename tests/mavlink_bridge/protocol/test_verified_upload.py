@@ -38,7 +38,7 @@ def upload(items, old=(), kind=MISSION, faults=None, seed=0, vehicle=None, **opt
 
 
 def at_backup(**options):
-    """Give a script whose machine has read an empty list and waits for the backup to be stored."""
+    """Return a script whose machine has read an empty list and waits for the backup to be stored."""
     script = Script(VerifiedUpload(PEER, MISSION, plain_mission(3), **options))
     script.hear(MissionCount(PEER.own_system, PEER.own_component, 0))
     assert script.machine.state is VerifiedUploadState.STORING_BACKUP

@@ -18,7 +18,7 @@ STEP_S = 0.01
 
 
 def run(faults, seed, signing=False, reboot_s=None):
-    """Run one upload in stepped time; give the outcome and the vehicle."""
+    """Run one upload in stepped time; return the outcome and the vehicle."""
     vehicle = SimulatedVehicle(SimulatorConfig(mission=tuple(OLD[1:])))
     machine = VerifiedUpload(PEER, MISSION, NEW)
     ours, theirs = (

@@ -85,7 +85,7 @@ class Vehicle:
         stored.texts.clear()
 
     def held(self, mission_type: MissionType) -> tuple[Item, ...]:
-        """Give what it holds, as it reads back."""
+        """Return what it holds, as it reads back."""
         stored = self.lists[mission_type]
         return tuple(stored.read(seq) for seq in range(len(stored)))
 
@@ -153,7 +153,7 @@ class Twin:
         self._reboots = sorted(begin_s for begin_s, _ in vehicle.off)
 
     def run(self, limit_s=4000.0):
-        """Run until every client has ended or the limit is reached; give the time that took."""
+        """Run until every client has ended or the limit is reached; return the time that took."""
         self._schedule()
         while any(client.ended_s is None for client in self.clients):
             if not self._step(limit_s):
@@ -289,7 +289,7 @@ class Twin:
                 self._from_client(client)
 
     def _breaks(self, client):
-        """Break the link at the message that is the last; give whether it is broken."""
+        """Break the link at the message that is the last; return whether it is broken."""
         if client.breaks_after is not None and len(client.sent) + len(client.heard) >= client.breaks_after:
             client.is_broken = True
         return client.is_broken
@@ -311,7 +311,7 @@ class Twin:
             self._at(arrival_s, deliver, frame)
 
     def _leaves_at_s(self, way, frame):
-        """Put a frame into the queue of a narrow link; give when it has left, None if there is no room."""
+        """Put a frame into the queue of a narrow link; return when it has left, None if there is no room."""
         faults = self.faults
         if faults.bytes_per_s is None:
             return self.now_s
@@ -393,7 +393,7 @@ class PartialWriter:
 
 
 def plain_mission(length, salt=0):
-    """Give a mission of so many items with home at 0, every item another place."""
+    """Return a mission of so many items with home at 0, every item another place."""
     home = Item(Command.NAV_WAYPOINT, CoordinateFrame.GLOBAL, lat_e7=400713740, lon_e7=-1052299300)
     return [
         home,
@@ -411,7 +411,7 @@ def plain_mission(length, salt=0):
 
 
 def plain_fence(polygons, salt=0, vertices=4):
-    """Give a fence of so many exclusion polygons."""
+    """Return a fence of so many exclusion polygons."""
     return [
         Item(
             Command.FENCE_POLYGON_VERTEX_EXCLUSION,

@@ -19,32 +19,32 @@ TICK_S = 0.02
 
 
 def at(north_m: float, east_m: float) -> LatLon:
-    """Give a place so many of ArduPilot's metres from home."""
+    """Return a place so many of ArduPilot's metres from home."""
     lat_deg = HOME.lat_deg + north_m / 1.113195e5
     shrink = math.cos(math.radians((lat_deg + HOME.lat_deg) / 2))
     return LatLon(lat_deg, HOME.lon_deg + east_m / (1.113195e5 * shrink))
 
 
 def line(count: int) -> tuple[MissionItem, ...]:
-    """Give so many waypoints in a line to the north, 10 m apart, as they read back."""
+    """Return so many waypoints in a line to the north, 10 m apart, as they read back."""
     return tuple(kept(waypoint(at(10.0 * (index + 1), 0.0))) for index in range(count))
 
 
 def kept(item: MissionItem) -> MissionItem:
-    """Give a waypoint of ours as the vehicle reads it back."""
+    """Return a waypoint of ours as the vehicle reads it back."""
     return MissionItem(
         item.command, CoordinateFrame.GLOBAL_RELATIVE_ALT, item.params, item.lat_e7, item.lon_e7
     )
 
 
 def vertex(position: LatLon, count: float, *, inclusion: bool = False) -> MissionItem:
-    """Give a fence vertex."""
+    """Return a fence vertex."""
     command = Command.FENCE_POLYGON_VERTEX_INCLUSION if inclusion else Command.FENCE_POLYGON_VERTEX_EXCLUSION
     return placed(command, position, count)
 
 
 def placed(command: int, position: LatLon, param1: float = 0.0) -> MissionItem:
-    """Give an item in frame 0 at a place."""
+    """Return an item in frame 0 at a place."""
     item = waypoint(position)
     return MissionItem(command, CoordinateFrame.GLOBAL, (param1, 0.0, 0.0, 0.0), item.lat_e7, item.lon_e7)
 
@@ -52,7 +52,7 @@ def placed(command: int, position: LatLon, param1: float = 0.0) -> MissionItem:
 def square(
     north_m: float, east_m: float, half_m: float = 5.0, *, inclusion: bool = False
 ) -> list[MissionItem]:
-    """Give a square of fence vertices round a point."""
+    """Return a square of fence vertices round a point."""
     corners = ((-1, -1), (-1, 1), (1, 1), (1, -1))
     return [vertex(at(north_m + half_m * n, east_m + half_m * e), 4, inclusion=inclusion) for n, e in corners]
 
@@ -86,7 +86,7 @@ class Bench:
         self.now_s = max(end_s, self.now_s)
 
     def run_until(self, done, limit_s: float) -> float:
-        """Let time pass until something is so; give how long it took."""
+        """Let time pass until something is so; return how long it took."""
         begin_s = self.now_s
         while not done():
             assert self.now_s - begin_s < limit_s, f"not so after {limit_s} s"
@@ -101,11 +101,11 @@ class Bench:
         return [message for _, message in self.heard[begin:] if not isinstance(message, m.Heartbeat)]
 
     def texts(self) -> list[str]:
-        """Give all STATUSTEXTs heard so far."""
+        """Return all STATUSTEXTs heard so far."""
         return [message.text for _, message in self.heard if isinstance(message, m.Statustext)]
 
     def of(self, kind: type[Message]) -> list[Message]:
-        """Give all messages of a kind heard so far."""
+        """Return all messages of a kind heard so far."""
         return [message for _, message in self.heard if isinstance(message, kind)]
 
     def count(
@@ -117,13 +117,13 @@ class Bench:
     def item(
         self, seq: int, item: MissionItem, mission_type: int = MissionType.MISSION, *, current: int = 0
     ) -> m.MissionItemInt:
-        """Give an item as the message a client sends."""
+        """Return an item as the message a client sends."""
         message = int_message((1, 1), seq, item, mission_type)
         fields = {name: getattr(message, name) for name in message.__slots__}
         return m.MissionItemInt(**{**fields, "current": current})
 
     def upload(self, items, mission_type: int = MissionType.MISSION) -> tuple[MissionResult, list[str]]:
-        """Upload a list, one item at a time; give the result and what the vehicle said about it."""
+        """Upload a list, one item at a time; return the result and what the vehicle said about it."""
         before = len(self.texts())
         answers = self.count(len(items), mission_type)
         for seq, item in enumerate(items):
@@ -154,7 +154,7 @@ class Bench:
         return items
 
     def command(self, command: int, *params: float, as_int: bool = False, **places) -> int:
-        """Send a command; give its MAV_RESULT."""
+        """Send a command; return its MAV_RESULT."""
         kind = m.CommandInt if as_int else m.CommandLong
         numbered = {f"param{index}": value for index, value in enumerate(params, start=1)}
         extra = {"frame": CoordinateFrame.GLOBAL, **places} if as_int else places

@@ -13,7 +13,7 @@ from mavlink_bridge.simulator.framing import FrameSplitter
 
 
 def through(faults, payloads, seed=0, step_s=0.01):
-    """Push one payload a step; give all that comes out with the time it does."""
+    """Push one payload a step; return all that comes out with the time it does."""
     link = FaultyLink(faults, seed)
     came = []
     now_s = 0.0

@@ -101,7 +101,7 @@ def test_corners_between_short_legs(cell):
 
 
 def shape(fence, frame):
-    """Give the fence's edges as one shape, without the code under test."""
+    """Return the fence's edges as one shape, without the code under test."""
     edges = []
     for zone in fence.zones:
         if isinstance(zone, PolygonZone):

@@ -19,7 +19,7 @@ def rover(speedup=1000.0, **options):
 
 
 def listen(link, for_s):
-    """Listen so long; give the times at which heartbeats came."""
+    """Listen so long; return the times at which heartbeats came."""
     until_s = link.now_s() + for_s
     times_s = []
     while link.now_s() < until_s:

@@ -54,7 +54,7 @@ class Track:
 
 
 def chain(turns_deg: list[float], legs_m: list[float]) -> list[complex]:
-    """Give the points of a chain of legs with turns between them; it begins to the north."""
+    """Return the points of a chain of legs with turns between them; it begins to the north."""
     heading = 0.0
     points = [0j]
     for leg_m, turn_deg in zip(legs_m, [*turns_deg, 0.0], strict=True):
@@ -64,12 +64,12 @@ def chain(turns_deg: list[float], legs_m: list[float]) -> list[complex]:
 
 
 def settings(vehicle: str, **parameters: float) -> Settings:
-    """Give the settings of a vehicle, ``ackermann`` or ``skid``."""
+    """Return the settings of a vehicle, ``ackermann`` or ``skid``."""
     return Settings.from_parameters(ParameterStore({**(SKID if vehicle == "skid" else {}), **parameters}))
 
 
 def drive(points_m: list[complex], limits: Settings, *, heading_rad: float | None = None) -> Track:
-    """Drive along points without stops; give the track."""
+    """Drive along points without stops; return the track."""
     first_rad = cmath.phase(points_m[1] - points_m[0]) if heading_rad is None else heading_rad
     body = Body(points_m[0], first_rad, limits.is_skid)
     driver = Drive(limits, body)

@@ -183,7 +183,7 @@ class Score:
     slowest_s: float = 0.0
 
     def add(self, seed: int, folder: Path) -> str:
-        """Read one variant; give its kind of trouble, if any."""
+        """Read one variant; return its kind of trouble, if any."""
         rng = random.Random(seed)
         source = original(rng.randrange(28))
         variant = make_variant(rng, source.data)

@@ -54,7 +54,7 @@ def vehicle_of(parameters: dict[str, float]) -> Vehicle:
 def bands(
     points: list[tuple[float, float]], zone: PolygonZone, parameters: dict[str, float]
 ) -> tuple[Envelope, Envelope, BaseGeometry]:
-    """Give the band without avoidance, the band with it, and the fence's line."""
+    """Return the band without avoidance, the band with it, and the fence's line."""
     line = Chart(HOME).zone_line(zone)
     vehicle = vehicle_of(parameters)
     heading_deg = math.degrees(math.atan2(points[1][0] - points[0][0], points[1][1] - points[0][1]))
@@ -65,7 +65,7 @@ def bands(
 def driven(
     points: list[tuple[float, float]], zone: PolygonZone, parameters: dict[str, float]
 ) -> BaseGeometry:
-    """Give the simulated rover's true track."""
+    """Return the simulated rover's true track."""
     simulated = SimulatedVehicle(
         SimulatorConfig(
             home=place(*points[0]),

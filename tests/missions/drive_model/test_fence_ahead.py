@@ -23,7 +23,7 @@ def vehicle_at(speed_mps: float) -> Vehicle:
 
 
 def expected_mps(fence: shapely.Geometry, place: complex, way: complex, vehicle: Vehicle) -> float:
-    """Give the speed by ArduPilot's sqrt_controller of the distance that shapely measures."""
+    """Return the speed by ArduPilot's sqrt_controller of the distance that shapely measures."""
     end = place + RAY_M * way
     met = shapely.LineString([(place.real, place.imag), (end.real, end.imag)]).intersection(fence)
     if met.is_empty:

@@ -24,13 +24,13 @@ TWO_CORNERS = lines((0, 0), (0, 40), (6, 46), (60, 46))
 
 
 def changes(drawing: Drawing) -> list[int]:
-    """Give the points at which another speed is asked for."""
+    """Return the points at which another speed is asked for."""
     speeds = drawn.speeds(drawing)
     return [number for number in range(1, len(speeds)) if speeds[number] != speeds[number - 1]]
 
 
 def slow_span_m(drawing: Drawing) -> tuple[float, float]:
-    """Give from where to where along the lines they are slow."""
+    """Return from where to where along the lines they are slow."""
     along = drawn.distances_m(drawing)
     slow = [number for number, point in enumerate(drawing) if point.speed_mps is not None]
     return along[slow[0] - 1], along[slow[-1]]

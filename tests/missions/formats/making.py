@@ -61,7 +61,7 @@ def known(value):
 
 
 def contents(situation: Situation) -> tuple[object, ...]:
-    """Give what is known without its sources, rings turned so that they begin and run alike."""
+    """Return what is known without its sources, rings turned so that they begin and run alike."""
     fence = situation.fence and situation.fence.value
     return (
         fence and Fence(tuple(map(_alike, fence.zones)), fence.return_point),
@@ -72,7 +72,7 @@ def contents(situation: Situation) -> tuple[object, ...]:
 
 
 def on_the_wire(value: float) -> float:
-    """Give a number as MAVLink's 32 bits hold it."""
+    """Return a number as MAVLink's 32 bits hold it."""
     return struct.unpack("<f", struct.pack("<f", value))[0]
 
 

@@ -83,7 +83,7 @@ def read(document: Any) -> Situation:
 
 
 def changed(path: str, value: Any) -> dict[str, Any]:
-    """Give the plan with the value at a path like ``mission.items.0.params`` changed."""
+    """Return the plan with the value at a path like ``mission.items.0.params`` changed."""
     document = copy.deepcopy(PLAN)
     *steps, last = [int(step) if step.isdigit() else step for step in path.split(".")]
     node: Any = document

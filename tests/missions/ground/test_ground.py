@@ -89,7 +89,7 @@ crossing_rings = st.lists(st.tuples(st.floats(-100, 100), st.floats(-100, 100)),
 
 
 def brute_even_odd(ring: tuple[LatLon, ...], place: LatLon) -> bool:
-    """Tell whether a ray to the east crosses the ring an odd number of times, in latitude and longitude as the autopilot tests."""
+    """Return whether a ray to the east crosses the ring an odd number of times, in latitude and longitude as the autopilot tests."""
     inside = False
     for a, b in pairwise([*ring, ring[0]]):
         if (a.lat_deg > place.lat_deg) != (b.lat_deg > place.lat_deg):

@@ -35,7 +35,7 @@ def box_of(bbox: Bbox) -> Polygon:
 
 
 def problems(figure: Figure, scene: Scene) -> list[str]:
-    """Say what is out of the frame or covered, in pixels."""
+    """Return what is out of the frame or covered, in pixels."""
     figure.canvas.draw()
     (axes,) = figure.axes
     to_px = axes.transData.transform

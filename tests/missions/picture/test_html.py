@@ -40,7 +40,7 @@ def test_a_page_needs_no_network(plans: dict[str, Plan], tmp_path: Path) -> None
 
 
 def _library(page: str) -> str:
-    """Give the text of the longest script, plotly itself."""
+    """Return the text of the longest script, plotly itself."""
     return max(re.findall(r"<script[^>]*>(.*?)</script>", page, flags=re.DOTALL), key=len)
 
 

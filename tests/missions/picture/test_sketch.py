@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def cells_of(text: str) -> list[str]:
-    """Give the picture's rows without the legend."""
+    """Return the picture's rows without the legend."""
     lines = text.splitlines()
     legend = next(i for i, line in enumerate(lines) if "north up" in line)
     return lines[:legend]

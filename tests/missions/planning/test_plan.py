@@ -76,7 +76,7 @@ def assert_consistent(result: Plan) -> None:
 
 
 def _meridian(*lats_deg: float) -> PolygonZone:
-    """Give an exclusion of corners on one meridian: a wall without area."""
+    """Return an exclusion of corners on one meridian: a wall without area."""
     return PolygonZone(OUT, tuple(LatLon(lat_deg, -105.23) for lat_deg in lats_deg))
 
 
@@ -121,7 +121,7 @@ def _check_refusal(field: RandomField, error: Exception) -> None:
 
 
 def _visibility_length_m(fence: Fence, a: LatLon, b: LatLon, clearance_m: float) -> float:
-    """Give the length of the shortest path along corners of mitred offsets, by brute force."""
+    """Return the length of the shortest path along corners of mitred offsets, by brute force."""
     chart = Chart(a)
     areas = {
         kind: [Polygon(chart.points(zone.vertices)) for zone in fence.zones if zone.kind is kind]

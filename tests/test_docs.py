@@ -102,3 +102,12 @@ def test_a_bug_may_be_in_any_command():
     told = re.findall(r"^## (pbpp \w+)$", (DOCS / "commands.md").read_text(encoding="utf-8"), re.MULTILINE)
     assert len(told) > 5
     assert sorted(command["attributes"]["options"][:-1]) == told
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: f"{page.parent.name}-{page.stem}")
+def test_every_test_that_a_page_names_is_there(page):
+    if page.name == "CHANGELOG.md":
+        return
+    for name in re.findall(r"\btests/[\w./*-]+\w|\btest_\w+\.py", page.read_text(encoding="utf-8")):
+        pattern = name.removeprefix("tests/") if name.startswith("tests/") else f"**/{name}"
+        assert any((DOCS.parent / "tests").glob(pattern)), name

@@ -61,10 +61,14 @@ def test_this_project_could_be_released(release):
     version = f"{major}.{int(minor) + 1}.0"
     project = release.with_version((ROOT / "pyproject.toml").read_text(encoding="utf-8"), version)
     assert f'\nversion = "{version}"\n' in project
-    changelog = release.with_release(
-        (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), version, "2030-01-02"
+    # Just after a release nothing is unreleased.
+    changelog = (
+        (ROOT / "CHANGELOG.md")
+        .read_text(encoding="utf-8")
+        .replace("## Unreleased\n", "## Unreleased\n\n- One.\n", 1)
     )
-    assert f"## Unreleased\n\n## {version} - 2030-01-02\n\n###" in changelog
+    released = release.with_release(changelog, version, "2030-01-02")
+    assert f"## Unreleased\n\n## {version} - 2030-01-02\n\n- One.\n" in released
 
 
 def test_a_release_is_committed_and_tagged(release, checkout):

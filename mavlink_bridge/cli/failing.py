@@ -80,11 +80,11 @@ class Telling:
     command: str = ""
     verbose: bool = False
     quiet: int = 0
-    """How often ``-q`` was given: once leaves warnings and errors, twice (`ERRORS_ONLY`) errors."""
+    """How often ``-q`` was given: once leaves warnings and errors, `ERRORS_ONLY` times only errors."""
     warned: set[str] = field(default_factory=set)
 
 
-ERRORS_ONLY = 2
+ERRORS_ONLY = 2  # -qq
 
 
 _telling: ContextVar[Telling | None] = ContextVar("telling", default=None)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from mavlink_bridge.backup.vehicle_mark import uid_of
 from mavlink_bridge.director.steps import Steps, step
 from mavlink_bridge.errors import BridgeError, LinkError
-from mavlink_bridge.fold import with_list
+from mavlink_bridge.fold import KINDS, with_list
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.protocol.ask_version import VERSION_PATIENCE_S, AskVersion
 from mavlink_bridge.protocol.command import SendCommand
@@ -17,6 +17,7 @@ from mavlink_bridge.protocol.download import Download
 from mavlink_bridge.protocol.outcomes import list_read
 from mavlink_bridge.protocol.pace import MOST_S
 from mavlink_bridge.protocol.parameters import ReadParameters
+from mavlink_bridge.protocol.table_machine import Outbox
 from mavlink_bridge.protocol.telemetry import stream_requests
 from missions.items import Command
 from missions.situation import ListKind
@@ -31,19 +32,15 @@ if TYPE_CHECKING:
     from missions.items import MissionItem
     from missions.situation import Situation
 
-MISSION_TYPES = {
-    ListKind.MISSION: m.MissionType.MISSION,
-    ListKind.FENCE: m.MissionType.FENCE,
-    ListKind.RALLY: m.MissionType.RALLY,
-}
+MISSION_TYPES = {kind: m.MissionType(number) for number, kind in KINDS.items()}
 
-_ASK_STREAMS_EVERY_S = 3.0
+_ASK_STREAMS_EVERY_S = 3.0  # until they come: a request may be lost; chosen, not measured
 _HOME_S = 60.0  # the longest that a command may take
 _FIX_PATIENCE_S = 3.0
 """What is promised rests on the fix, so that whether it is known must not be a matter of luck; not every vehicle tells it."""
 
 
-class Learning:
+class Learning(Outbox):
     """Learns a vehicle; a machine as all others, its outcome in `trouble` and `merged`.
 
     Parameters
@@ -78,6 +75,7 @@ class Learning:
         *,
         needs_position: bool = True,
     ) -> None:
+        super().__init__()
         self.trouble: BridgeError | None = None
         self.uid = ""
         self._peer = peer
@@ -87,7 +85,6 @@ class Learning:
         self._needs_position = needs_position
         self.coarse: list[ListKind] = []
         self._steps = Steps()
-        self._outgoing: list[Message] = []
         self._parameters: dict[str, float] = {}
         self._lists: dict[ListKind, tuple[MissionItem, ...]] = {}
         self._awaits_position = True
@@ -168,8 +165,7 @@ class Learning:
 
     def messages_to_send(self) -> list[Message]:
         """Return and forget what is to be sent now."""
-        outgoing, self._outgoing = self._outgoing, []
-        return outgoing + self._steps.messages_to_send()
+        return super().messages_to_send() + self._steps.messages_to_send()
 
     def merged(self, situation: Situation, now_s: float) -> Situation:
         """Return a situation with what was learnt."""

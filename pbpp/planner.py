@@ -19,7 +19,8 @@ from .field import Field
 from .free_space import Scene, grow_exclusions, parse_scene
 from .funnel import taut_path
 from .geometry import Point, Ring, parse_point
-from .planned_path import Drawing, PlannedPath, length_of, straightened
+from .planned_path import PlannedPath, length_of, straightened
+from .plotting import Drawing
 from .three_cases import crossing_point
 from .widest import WidestWay, widest_in
 

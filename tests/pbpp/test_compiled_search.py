@@ -26,7 +26,7 @@ def test_it_gives_the_same_on_random_fields(kind):
     for seed in range(7_000_000, 7_000_250):
         field = random_field(seed, kind)
         try:
-            slabs = field.planner()._mitred.slabs
+            slabs = field.planner()._space.mitred.slabs
         except pbpp.InvalidGeometryError:
             continue
         reached += assert_same(slabs, field.start, field.goal).vertices is not None
@@ -38,7 +38,7 @@ def test_it_gives_the_same_on_random_fields(kind):
 @pytest.mark.parametrize("name", ["rand100", "rand1000", "rb_lattice", "rb_corner_touch", "paper_3"])
 def test_it_gives_the_same_on_the_cases(load_case, name):
     case = load_case(name)
-    slabs = pbpp.Planner([case["inclusion"]], case["exclusions"])._mitred.slabs
+    slabs = pbpp.Planner([case["inclusion"]], case["exclusions"])._space.mitred.slabs
     for query in case["queries"]:
         assert_same(slabs, tuple(query[:2]), tuple(query[2:]))
 
@@ -49,7 +49,7 @@ def test_a_queue_that_does_not_fit_is_made_larger(load_case, monkeypatch):
 
     monkeypatch.setattr(compiled_search, "_CAPACITY", 64)
     case = load_case("rand100")
-    slabs = pbpp.Planner([case["inclusion"]], case["exclusions"])._mitred.slabs
+    slabs = pbpp.Planner([case["inclusion"]], case["exclusions"])._space.mitred.slabs
     assert assert_same(slabs, tuple(case["queries"][0][:2]), tuple(case["queries"][0][2:])).expanded > 10
 
 
@@ -73,7 +73,7 @@ def test_a_planner_searches_compiled_if_asked(square, monkeypatch):
 @needs_numba
 def test_it_finds_no_path_where_there_is_none(square):
     walls = [[(0, 40), (100, 40), (100, 50), (0, 50)]]
-    slabs = pbpp.Planner([square], walls)._mitred.slabs
+    slabs = pbpp.Planner([square], walls)._space.mitred.slabs
     assert assert_same(slabs, (10.0, 10.0), (10.0, 90.0)).vertices is None
 
 

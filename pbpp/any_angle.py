@@ -106,7 +106,7 @@ def shortest_path(
 
 
 def _compiled_search(slabs: Slabs, start: Point, goal: Point) -> SearchResult:
-    from .compiled_search import search  # noqa: PLC0415 - numba is an extra, and takes a while to load
+    from .compiled.search import search  # noqa: PLC0415 - numba is an extra, and takes a while to load
 
     blocks = slabs.locate(start)
     neighbours = [vertex for block in blocks for vertex, _ in slabs.line_neighbours(start, block)]

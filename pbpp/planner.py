@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
-from importlib.util import find_spec
 from math import dist, isfinite
 from typing import TYPE_CHECKING
 
@@ -15,6 +14,7 @@ import numpy.typing as npt
 
 from .any_angle import shortest_path
 from .block_search import BlockGraph, block_sequence
+from .compiled import require_numba
 from .errors import GoalBlockedError, InvalidGeometryError, NoPathError, StartBlockedError
 from .field import Field
 from .free_space import Scene, grow_exclusions, parse_scene
@@ -122,8 +122,8 @@ class Planner:
             raise InvalidGeometryError(f"the clearance must be a length of at least 0 m, not {clearance_m!r}")
         if partition not in {None, "slabs", "blocks"}:
             raise ValueError(f'partition must be "slabs", "blocks" or None, not {partition!r}')
-        if compiled and find_spec("numba") is None:
-            raise ImportError('the compiled search needs numba: pip install "pbpp-rover[fast]"')
+        if compiled:
+            require_numba()
         self._partition, self._compiled = partition, compiled
         self._space = _Space.swept(
             Field(parse_scene(inclusions, exclusions, union=union), float(clearance_m))

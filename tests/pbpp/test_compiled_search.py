@@ -7,7 +7,7 @@ import pytest
 from random_fields import KINDS, random_field
 
 import pbpp
-from pbpp import any_angle, planner
+from pbpp import any_angle
 from pbpp.any_angle import shortest_path
 
 needs_numba = pytest.mark.skipif(find_spec("numba") is None, reason="the extra fast is not installed")
@@ -44,13 +44,15 @@ def test_it_gives_the_same_on_the_cases(load_case, name):
 
 
 @needs_numba
-def test_a_queue_that_does_not_fit_is_made_larger(load_case, monkeypatch):
-    from pbpp import compiled_search
+@pytest.mark.parametrize("name", ["rand100", "rb_lattice"])
+def test_a_queue_that_does_not_fit_grows_in_the_midst_of_a_search(load_case, monkeypatch, name):
+    from pbpp.compiled import search
 
-    monkeypatch.setattr(compiled_search, "_CAPACITY", 64)
-    case = load_case("rand100")
+    monkeypatch.setattr(search, "_CAPACITY", 64)
+    case = load_case(name)
     slabs = pbpp.Planner([case["inclusion"]], case["exclusions"])._space.mitred.slabs
-    assert assert_same(slabs, tuple(case["queries"][0][:2]), tuple(case["queries"][0][2:])).expanded > 10
+    for query in case["queries"]:
+        assert_same(slabs, tuple(query[:2]), tuple(query[2:]))
 
 
 @needs_numba
@@ -78,7 +80,7 @@ def test_it_finds_no_path_where_there_is_none(square):
 
 
 def test_without_numba_it_is_refused_with_advice(square, monkeypatch):
-    monkeypatch.setattr(planner, "find_spec", lambda _: None)
+    monkeypatch.setattr("pbpp.compiled.find_spec", lambda _: None)
     assert pbpp.Planner([square], []).plan((1, 1), (2, 2)).length_m > 1.0
     with pytest.raises(ImportError, match=r"pip install \"pbpp-rover\[fast\]\""):
         pbpp.Planner([square], [], compiled=True)

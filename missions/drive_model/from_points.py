@@ -7,7 +7,7 @@ import math
 from typing import TYPE_CHECKING
 
 from missions.drive_model import corner as at_corner
-from missions.drive_model.legs_and_corners import Bend, CornerPlan, LegPlan, Route, Stray, Vector
+from missions.drive_model.legs_and_corners import Bend, CornerPlan, DrivePlan, LegPlan, Stray, Vector
 from missions.drive_model.motion import leg_profile
 
 if TYPE_CHECKING:
@@ -22,13 +22,13 @@ SAME_PLACE_M = 0.3
 """Points nearer to one another are one place for a rover: it can make nothing of a leg between them but a stop."""
 
 
-def plan_route(
+def drive_plan(
     points: NDArray[np.float64],
     vehicle: Vehicle,
     speeds: Sequence[float | None] | None,
     stops: Mapping[int, float],
     start: Stray,
-) -> Route:
+) -> DrivePlan:
     """Return the legs and corners of a list of points; points that lie on one another are one place, and a stop."""
     groups = _grouped(points)
     legs = tuple(
@@ -56,7 +56,7 @@ def plan_route(
         left = strays[-1].after(passed_s, vehicle.position_gain_per_s)
         stray = left.turned(corner.turn_deg).swung(corner.turn_deg, corner.swing_m)
         strays.append(stray.widened(corner.stray_m))
-    return Route(vehicle, legs, tuple(corners), tuple(strays))
+    return DrivePlan(vehicle, legs, tuple(corners), tuple(strays))
 
 
 def _grouped(points: NDArray[np.float64]) -> list[list[tuple[int, Vector]]]:

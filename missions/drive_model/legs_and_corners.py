@@ -155,7 +155,7 @@ class Bend:
 
 
 @dataclass(frozen=True, slots=True)
-class Route:
+class DrivePlan:
     """A drive: n legs, the n - 1 corners between them, and the errors that each leg begins with."""
 
     vehicle: Vehicle

@@ -279,7 +279,7 @@ class Trial:
         least_m = np.full(len(required_m), np.inf)
         np.minimum.at(least_m, self._waypoints, self._clearances_m)
         missing_m = np.maximum(required_m - least_m, self._asked_lines_m)
-        for corner in self._drive.routes[0].corners:
+        for corner in self._drive.plans[0].corners:
             turns_back = abs(corner.turn_deg) > TURN_BACK_DEG and not corner.pivots
             if not corner.bounded or turns_back:
                 here = slice(corner.waypoint, corner.waypoint + 2)

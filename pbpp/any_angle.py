@@ -102,7 +102,7 @@ def shortest_path(
     """
     if compiled and should_stop is None:
         return _compiled_search(slabs, start, goal)
-    return _Search(slabs, start, goal).run(should_stop)
+    return _Query(slabs, start, goal).run(should_stop)
 
 
 def _compiled_search(slabs: Slabs, start: Point, goal: Point) -> SearchResult:
@@ -114,7 +114,7 @@ def _compiled_search(slabs: Slabs, start: Point, goal: Point) -> SearchResult:
     return SearchResult(None if turns is None else tuple(turns), length_m, expanded, stopped=False)
 
 
-class _Search:
+class _Query:
     """One query."""
 
     def __init__(self, slabs: Slabs, start: Point, goal: Point) -> None:

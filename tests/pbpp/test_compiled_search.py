@@ -60,7 +60,7 @@ def test_a_planner_searches_compiled_if_asked(square, monkeypatch):
     fence = [square], [[(30, 30), (70, 30), (70, 70), (30, 70)]]
     plain = pbpp.Planner(*fence, clearance_m=1.0)
     compiled = pbpp.Planner(*fence, clearance_m=1.0, compiled=True)
-    monkeypatch.setattr(any_angle, "_Search", None)
+    monkeypatch.setattr(any_angle, "_Query", None)
     path = compiled.plan((10, 50), (90, 50))
     more = compiled.with_exclusion([(1, 1), (2, 1), (2, 2)]).plan((10, 50), (90, 50))
     monkeypatch.undo()

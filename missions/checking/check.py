@@ -16,8 +16,7 @@ from missions.checking.mission_end import crossed_zones, end_warnings, return_pl
 from missions.drive_model import Envelope, beyond_measured, envelope
 from missions.drive_model.avoidance import with_avoidance
 from missions.errors import SituationError, StartBlockedError
-from missions.geo import LatLon, bearing_deg, distance_m
-from missions.ground.frame import LocalPoint
+from missions.geo import LatLon, LocalPoint, bearing_deg, distance_m
 from missions.ground.from_situation import ground_for, heading_at
 from missions.ground.ground import EDGE_BOW_M, Ground
 from missions.ground.known_fence import fence_warnings, known_fence

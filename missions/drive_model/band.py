@@ -10,7 +10,8 @@ import numpy as np
 import shapely
 
 from missions.drive_model import corner as at_corner
-from missions.drive_model.legs_and_corners import Stray, Vector
+from missions.drive_model.legs_and_corners import Stray
+from missions.geo import Vector
 from missions.vehicle import Autopilot
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ import math
 from typing import TYPE_CHECKING
 
 from missions.drive_model import corner as at_corner
-from missions.drive_model.legs_and_corners import Bend, CornerPlan, DrivePlan, LegPlan, Stray, Vector
+from missions.drive_model.legs_and_corners import Bend, CornerPlan, DrivePlan, LegPlan, Stray
 from missions.drive_model.motion import leg_profile
 
 if TYPE_CHECKING:
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from missions.geo import Vector
     from missions.vehicle import Vehicle
 
 SAME_PLACE_M = 0.3

@@ -23,6 +23,7 @@ from .geometry import Point, Ring, parse_point
 from .planned_path import PlannedPath, length_of, straightened
 from .plotting import Drawing
 from .three_cases import crossing_point
+from .uncollected import uncollected
 from .widest import WidestWay, widest_in
 
 if TYPE_CHECKING:
@@ -125,9 +126,7 @@ class Planner:
         if compiled:
             require_numba()
         self._partition, self._compiled = partition, compiled
-        self._space = _Space.swept(
-            Field(parse_scene(inclusions, exclusions, union=union), float(clearance_m))
-        )
+        self._space = _Space.swept(parse_scene(inclusions, exclusions, union=union), float(clearance_m))
 
     def with_exclusion(self, ring: Ring) -> Planner:
         """Return a planner for the same fence with one exclusion more, faster than from scratch.
@@ -174,7 +173,7 @@ class Planner:
 
     def _changed(self, scene: Scene, grown: Geometries) -> Planner:
         changed = copy(self)
-        changed._space = _Space.swept(Field(scene, self.clearance_m, grown=grown))  # noqa: SLF001 - one of our own
+        changed._space = _Space.swept(scene, self.clearance_m, grown)  # noqa: SLF001 - one of our own
         return changed
 
     @property
@@ -299,9 +298,11 @@ class _Space:
     mitred: Field
 
     @classmethod
-    def swept(cls, field: Field) -> _Space:
+    def swept(cls, scene: Scene, clearance_m: float, grown: Geometries | None = None) -> _Space:
         """Return the space with its slabs made: searches need them, and better now than in the first query."""
-        _ = field.slabs
+        with uncollected():
+            field = Field(scene, clearance_m, grown=grown)
+            _ = field.slabs
         return cls(field)
 
     def holding(self, ends: tuple[Point, Point]) -> _Space:

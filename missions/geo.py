@@ -102,6 +102,12 @@ def heading_vector(heading_deg: float) -> Vector:
     return (math.sin(math.radians(heading_deg)), math.cos(math.radians(heading_deg)))
 
 
+def change_deg(before: Vector, after: Vector) -> float:
+    """Return how the course changes from one direction in the plane to another, positive to the right."""
+    cross = before[0] * after[1] - before[1] * after[0]
+    return -math.degrees(math.atan2(cross, before[0] * after[0] + before[1] * after[1]))
+
+
 def wrap_lon_deg(lon_deg: float) -> float:
     """Bring a longitude into -180 (inclusive) to 180 (exclusive)."""
     return (lon_deg + 180.0) % 360.0 - 180.0

@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
     from shapely.geometry.base import BaseGeometry
 
     from missions.geo import Vector
@@ -44,15 +44,11 @@ class FenceAhead:
         self._gain_per_s, self._accel_mps2 = vehicle.position_gain_per_s, vehicle.accel_max_mps2
         self._linear_m = self._accel_mps2 / self._gain_per_s**2
         points, lines = shapely.get_coordinates(shapely.get_parts(fence), return_index=True)
-        joined = lines[1:] == lines[:-1]
-        corners = _complex(points)
-        self._starts, self._ends = corners[:-1][joined], corners[1:][joined]
-        near = self._touch(
-            (complex(*places.min(axis=0)), complex(*places.max(axis=0))),
-            self.counts_within_m(vehicle.speed_mps),
-        )
-        self._starts, self._ends = self._starts[near], self._ends[near]
-        self._steps = self._ends - self._starts
+        self._edges = np.stack((points[:-1], points[1:]), axis=1)[lines[1:] == lines[:-1]]
+        within_m = self.counts_within_m(vehicle.speed_mps)
+        self._edges = self._edges[self._touch(places.min(axis=0), places.max(axis=0), within_m)]
+        self._starts = _complex(self._edges[:, 0])
+        self._steps = _complex(self._edges[:, 1]) - self._starts
         self._centre, self._reach_m = 0j, -math.inf
         self._near = self._starts, self._steps
         self._near_edges: list[tuple[complex, complex]] = []
@@ -81,20 +77,17 @@ class FenceAhead:
         if abs(place - self._centre) <= _MOVED_M and reach_m <= self._reach_m:
             return
         self._centre, self._reach_m = place, reach_m
-        near = self._touch((place, place), reach_m + _MOVED_M)
+        here = (place.real, place.imag)
+        near = self._touch(here, here, reach_m + _MOVED_M)
         self._near = self._starts[near], self._steps[near]
         self._near_edges = list(zip(*(part.tolist() for part in self._near), strict=True))
 
-    def _touch(self, box: tuple[complex, complex], reach_m: float) -> NDArray[np.bool_]:
+    def _touch(self, low: ArrayLike, high: ArrayLike, reach_m: float) -> NDArray[np.bool_]:
         """Return which edges may come within reach of a box."""
-        near = np.ones(len(self._starts), dtype=np.bool_)
-        for part, (low, high) in (
-            (np.real, (box[0].real, box[1].real)),
-            (np.imag, (box[0].imag, box[1].imag)),
-        ):
-            starts, ends = part(self._starts), part(self._ends)
-            near &= (np.maximum(starts, ends) >= low - reach_m) & (np.minimum(starts, ends) <= high + reach_m)
-        return near
+        starts, ends = self._edges[:, 0], self._edges[:, 1]
+        near = np.maximum(starts, ends) >= np.subtract(low, reach_m)
+        near &= np.minimum(starts, ends) <= np.add(high, reach_m)
+        return np.asarray(near.all(axis=1))
 
     def _ahead_m(self, places: NDArray[np.complex128], ways: NDArray[np.complex128]) -> NDArray[np.float64]:
         """Return how far ahead the first edge lies; infinite without one."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from missions.drive_model import corner as at_corner
 from missions.drive_model.legs_and_corners import Bend, CornerPlan, DrivePlan, LegPlan, Stray
 from missions.drive_model.motion import leg_profile
+from missions.geo import change_deg
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -36,7 +37,7 @@ def drive_plan(
         _leg(vehicle, before, after, None if speeds is None else speeds[after[0][0] - 1])
         for before, after in itertools.pairwise(groups)
     )
-    turns_deg = [_turn_deg(before.direction, after.direction) for before, after in itertools.pairwise(legs)]
+    turns_deg = [change_deg(before.direction, after.direction) for before, after in itertools.pairwise(legs)]
     runs_m = _runs_m(legs, turns_deg)
     asked = [None if speeds is None else speeds[leg.first] for leg in legs]
     corners = []
@@ -149,9 +150,3 @@ def _stray_m(places: int, delay_s: float) -> float:
     if places > 1:
         return at_corner.SAME_PLACE_STRAY_M
     return at_corner.DELAY_STRAY_M if delay_s > 0 else 0.0
-
-
-def _turn_deg(before: Vector, after: Vector) -> float:
-    cross = before[0] * after[1] - before[1] * after[0]
-    dot = before[0] * after[0] + before[1] * after[1]
-    return -math.degrees(math.atan2(cross, dot))

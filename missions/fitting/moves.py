@@ -122,8 +122,7 @@ def prolonged(drawing: Drawing, index: int) -> Iterator[Drawing]:
     if drawn.is_end_or_fixed(drawing, index):
         return
     here = drawing[index]
-    before = drawn.direction(drawing[index - 1], here)
-    after = drawn.direction(here, drawing[index + 1])
+    before, after = drawn.directions(drawing, index)
     for length_m in PROLONGED_M:
         later = here.at(shifted(here.place, before, length_m))
         earlier = here.at(shifted(here.place, after, -length_m))
@@ -159,10 +158,7 @@ def split(drawing: Drawing, index: int) -> Iterator[Drawing]:
     if out is None:
         return
     turn_deg = abs(drawn.turn_deg(drawing, index))
-    before, after = (
-        drawn.direction(drawing[index - 1], drawing[index]),
-        drawn.direction(drawing[index], drawing[index + 1]),
-    )
+    before, after = drawn.directions(drawing, index)
     middle = _between(before, after) if turn_deg < 175 else (-out[1], out[0])
     here = drawing[index]
     # The shares of a spacing below are chosen, not measured: shapes to try.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from missions.geo import LocalPoint
+from missions.geo import LocalPoint, change_deg
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -80,22 +80,20 @@ def direction(a: DrawnPoint, b: DrawnPoint) -> Vector:
     return ((b.place[0] - a.place[0]) / length_m, (b.place[1] - a.place[1]) / length_m)
 
 
+def directions(drawing: Sequence[DrawnPoint], index: int) -> tuple[Vector, Vector]:
+    """Return the directions of the legs before and after an inner point."""
+    here = drawing[index]
+    return direction(drawing[index - 1], here), direction(here, drawing[index + 1])
+
+
 def turn_deg(drawing: Sequence[DrawnPoint], index: int) -> float:
     """Return how the course changes at an inner point, positive to the right."""
-    before, after = (
-        direction(drawing[index - 1], drawing[index]),
-        direction(drawing[index], drawing[index + 1]),
-    )
-    cross = before[0] * after[1] - before[1] * after[0]
-    return -math.degrees(math.atan2(cross, before[0] * after[0] + before[1] * after[1]))
+    return change_deg(*directions(drawing, index))
 
 
 def outward(drawing: Sequence[DrawnPoint], index: int) -> Vector | None:
     """Return the unit vector out of a corner along its bisector; None where it hardly turns."""
-    before, after = (
-        direction(drawing[index - 1], drawing[index]),
-        direction(drawing[index], drawing[index + 1]),
-    )
+    before, after = directions(drawing, index)
     east, north = before[0] - after[0], before[1] - after[1]
     length = math.hypot(east, north)
     return (east / length, north / length) if length > 0.02 else None
@@ -141,7 +139,5 @@ def with_point_at(drawing: Drawing, along_m: float, near_m: float) -> tuple[Draw
     if abs(along[nearest] - along_m) <= near_m:
         return drawing, nearest
     after = next(number for number, there_m in enumerate(along) if there_m > along_m)
-    ahead = direction(drawing[after - 1], drawing[after])
-    place = shifted(drawing[after - 1].place, ahead, along_m - along[after - 1])
-    new = replace(drawing[after].at(place), stop_s=None, is_fixed=False)
+    new = replace(drawing[after].at(place_at(drawing, along_m)), stop_s=None, is_fixed=False)
     return (*drawing[:after], new, *drawing[after:]), after

@@ -121,10 +121,10 @@ def check(
     if json_output and Path("-") in plots:
         raise UsageError("--plot - and --json both want the standard output; give a file to --plot")
     from missions.checking.check import check_mission  # noqa: PLC0415
-    from missions.request import Request  # noqa: PLC0415
+    from missions.request import GoTo  # noqa: PLC0415
 
     request = with_vehicle(
-        Request(clearance_m=clearance),
+        GoTo(clearance_m=clearance),
         reserve=reserve,
         position_error=position_error,
         size=(length, width, gps),

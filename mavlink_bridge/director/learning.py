@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from mavlink_bridge.backup.vehicle_mark import uid_of
 from mavlink_bridge.director.steps import Steps, step
 from mavlink_bridge.errors import BridgeError, LinkError
-from mavlink_bridge.fold import with_list
+from mavlink_bridge.fold import KINDS, with_list
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.protocol.ask_version import VERSION_PATIENCE_S, AskVersion
 from mavlink_bridge.protocol.command import SendCommand
@@ -31,11 +31,7 @@ if TYPE_CHECKING:
     from missions.items import MissionItem
     from missions.situation import Situation
 
-MISSION_TYPES = {
-    ListKind.MISSION: m.MissionType.MISSION,
-    ListKind.FENCE: m.MissionType.FENCE,
-    ListKind.RALLY: m.MissionType.RALLY,
-}
+MISSION_TYPES = {kind: m.MissionType(number) for number, kind in KINDS.items()}
 
 _ASK_STREAMS_EVERY_S = 3.0
 _HOME_S = 60.0  # the longest that a command may take

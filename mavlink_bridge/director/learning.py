@@ -17,6 +17,7 @@ from mavlink_bridge.protocol.download import Download
 from mavlink_bridge.protocol.outcomes import list_read
 from mavlink_bridge.protocol.pace import MOST_S
 from mavlink_bridge.protocol.parameters import ReadParameters
+from mavlink_bridge.protocol.table_machine import Outbox
 from mavlink_bridge.protocol.telemetry import stream_requests
 from missions.items import Command
 from missions.situation import ListKind
@@ -39,7 +40,7 @@ _FIX_PATIENCE_S = 3.0
 """What is promised rests on the fix, so that whether it is known must not be a matter of luck; not every vehicle tells it."""
 
 
-class Learning:
+class Learning(Outbox):
     """Learns a vehicle; a machine as all others, its outcome in `trouble` and `merged`.
 
     Parameters
@@ -74,6 +75,7 @@ class Learning:
         *,
         needs_position: bool = True,
     ) -> None:
+        super().__init__()
         self.trouble: BridgeError | None = None
         self.uid = ""
         self._peer = peer
@@ -83,7 +85,6 @@ class Learning:
         self._needs_position = needs_position
         self.coarse: list[ListKind] = []
         self._steps = Steps()
-        self._outgoing: list[Message] = []
         self._parameters: dict[str, float] = {}
         self._lists: dict[ListKind, tuple[MissionItem, ...]] = {}
         self._awaits_position = True
@@ -164,8 +165,7 @@ class Learning:
 
     def messages_to_send(self) -> list[Message]:
         """Return and forget what is to be sent now."""
-        outgoing, self._outgoing = self._outgoing, []
-        return outgoing + self._steps.messages_to_send()
+        return super().messages_to_send() + self._steps.messages_to_send()
 
     def merged(self, situation: Situation, now_s: float) -> Situation:
         """Return a situation with what was learnt."""

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 MISSION_TYPES = {kind: m.MissionType(number) for number, kind in KINDS.items()}
 
-_ASK_STREAMS_EVERY_S = 3.0
+_ASK_STREAMS_EVERY_S = 3.0  # until they come: a request may be lost; chosen, not measured
 _HOME_S = 60.0  # the longest that a command may take
 _FIX_PATIENCE_S = 3.0
 """What is promised rests on the fix, so that whether it is known must not be a matter of luck; not every vehicle tells it."""

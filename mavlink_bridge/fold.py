@@ -164,8 +164,7 @@ def _acknowledged(situation: Situation, frame: Frame, time_s: float) -> Situatio
     """Close an upload: taken over if the vehicle accepted it and every item was seen."""
     message = frame.message
     assert isinstance(message, m.MissionAck)
-    kinds = _kinds(message)
-    for kind in kinds:
+    for kind in kinds_of(message.mission_type):
         transfer = situation.transfers.get((kind, True))
         if transfer is None or message.type == m.MissionResult.INVALID_SEQUENCE:
             continue
@@ -215,8 +214,7 @@ def _upload_item(situation: Situation, message: Message, time_s: float) -> Situa
 
 def _clear(situation: Situation, message: Message, _time_s: float) -> Situation:
     assert isinstance(message, m.MissionClearAll)
-    kinds = _kinds(message)
-    for kind in kinds:
+    for kind in kinds_of(message.mission_type):
         situation = _with_transfer(situation, kind, ListTransfer(to_vehicle=True, count=0, items={}))
     return situation
 
@@ -416,8 +414,9 @@ def _kind(message: Any) -> ListKind | None:  # noqa: ANN401 - any message of the
     return KINDS.get(message.mission_type)
 
 
-def _kinds(message: m.MissionAck | m.MissionClearAll) -> list[ListKind]:
-    if message.mission_type == m.MissionType.ALL:
-        return list(ListKind)
-    kind = _kind(message)
-    return [kind] if kind else []
+def kinds_of(mission_type: int) -> tuple[ListKind, ...]:
+    """Return the lists that a mission_type stands for: one, all, or none that is known here."""
+    if mission_type == m.MissionType.ALL:
+        return tuple(ListKind)
+    kind = KINDS.get(mission_type)
+    return (kind,) if kind else ()

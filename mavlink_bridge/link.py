@@ -314,6 +314,39 @@ class Link:
                 machine.receive(frame, came_s)
             machine.handle_timer(came_s)  # not a later time: what came while we were busy is still unread
 
+    def listen(
+        self,
+        for_s: float,
+        *,
+        on_frames: Callable[[list[Frame]], None],
+        until: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """Listen for a while, or until it is enough."""
+        self.run(_Listen(for_s), on_frames=on_frames, until=until)
+
+
+class _Listen:
+    """A machine that sends nothing and ends after a while."""
+
+    progress = (0, 0)
+
+    def __init__(self, for_s: float) -> None:
+        self.bound_s = for_s
+        self.deadline_s: float | None = None
+        self.is_done = False
+
+    def start(self, now_s: float) -> None:
+        self.deadline_s = now_s + self.bound_s
+
+    def receive(self, frame: Frame, now_s: float) -> None:
+        pass
+
+    def handle_timer(self, now_s: float) -> None:
+        self.is_done = self.deadline_s is not None and now_s >= self.deadline_s
+
+    def messages_to_send(self) -> list[Message]:
+        return []
+
 
 _NETWORK_ADVICE = "are address and port right, does the other side run (tcp), and does nobody else listen on this port (udpin, tcpin)?"
 

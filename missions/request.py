@@ -48,7 +48,7 @@ class End(StrEnum):
 
 
 class _Kinds(type):
-    """Lets ``Request(...)`` make whichever kind its words ask for."""
+    """Lets ``Request(...)`` make a `Tour` or a `RepairMission`, as it did both when there was one kind."""
 
     def __call__(cls, *words: Any, **named: Any) -> Any:  # noqa: ANN401 - an instance of the class, or of one below it
         if cls is not Request:
@@ -62,7 +62,7 @@ class _Kinds(type):
 class Request(metaclass=_Kinds):
     """What is asked of every plan; None leaves it to the situation and the vehicle.
 
-    ``Request(...)`` itself makes a `GoTo`, `Tour` or `RepairMission`, whichever its words ask for.
+    ``Request(...)`` itself makes a `Tour` of any number of targets, or a `RepairMission` where there is ``via`` or ``via_own``.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ class Request(metaclass=_Kinds):
         return self
 
     def words(self) -> dict[str, Any]:
-        """Return the words from which `request_of` makes the same request."""
+        """Return the words from which `request_of` makes a request for the same."""
         return {name: getattr(self, name, default) for name, default in _DEFAULTS.items()}
 
     def _set(self, name: str, value: object) -> None:
@@ -233,7 +233,7 @@ class RepairMission(Request):
         return True
 
     def words(self) -> dict[str, Any]:
-        """Return the words from which `request_of` makes the same request."""
+        """Return the words from which `request_of` makes a request for the same."""
         return {**super().words(), "via": self.mission, "via_own": self.mission is None}
 
 
@@ -249,7 +249,7 @@ _DEFAULTS: dict[str, Any] = {
 
 
 def request_of(*, via: Mission | None = None, via_own: bool = False, **words: Any) -> Request:  # noqa: ANN401 - the fields of all kinds
-    """Return the kind of request that words ask for.
+    """Return a `Tour`, or a `RepairMission` where there is a mission to repair.
 
     Parameters
     ----------
@@ -258,7 +258,7 @@ def request_of(*, via: Mission | None = None, via_own: bool = False, **words: An
     via_own : bool
         Repair the mission that the situation holds.
     **words
-        The fields of `GoTo`, `Tour` or `RepairMission`, with ``targets`` for any number of targets.
+        The fields of `Tour` or `RepairMission`.
 
     Raises
     ------
@@ -266,10 +266,7 @@ def request_of(*, via: Mission | None = None, via_own: bool = False, **words: An
         They do not go together, or one makes no sense.
     """
     if via is None and not via_own:
-        tour = Tour(**words)
-        if len(tour.targets) > 1 or any(getattr(tour, name) != _DEFAULTS[name] for name in _TOUR_WORDS[1:]):
-            return tour
-        return GoTo(**conditions(tour), target=next(iter(tour.targets), None))
+        return Tour(**words)
     if via is not None and via_own:
         raise _senseless("via_own", via_own, "none beside another mission to repair")
     tour = Tour(**{name: words.pop(name) for name in _TOUR_WORDS if name in words})

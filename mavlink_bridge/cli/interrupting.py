@@ -11,6 +11,7 @@ import signal
 import sys
 from dataclasses import dataclass
 from enum import StrEnum, auto
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from mavlink_bridge.cli.keyboard import Keyboard
@@ -269,7 +270,7 @@ def _hold(at_hand: AtHand) -> bool:
     assert link is not None
     assert peer is not None
     switch = ModeSwitch(peer, Mode.HOLD, is_urgent=True, until_seen=True)
-    link.run(switch, on_frames=lambda frames: _take(at_hand, frames))
+    link.run(switch, on_frames=partial(_take, at_hand))
     return switch.is_granted
 
 
@@ -277,13 +278,12 @@ def _listen(at_hand: AtHand) -> None:
     """Listen for a heartbeat, so that what is reported of the vehicle is true now."""
     assert at_hand.link is not None
     begun_s = at_hand.link.now_s()
-    while at_hand.watch().heartbeat_s < begun_s and at_hand.link.now_s() < begun_s + _LISTEN_S:
-        _hear(at_hand, _LOOK_S)
+    _hear(at_hand, _LISTEN_S, until=lambda: at_hand.watch().heartbeat_s >= begun_s)
 
 
-def _hear(at_hand: AtHand, timeout_s: float) -> None:
+def _hear(at_hand: AtHand, for_s: float, until: Callable[[], bool] = lambda: False) -> None:
     assert at_hand.link is not None
-    _take(at_hand, at_hand.link.receive(timeout_s))
+    at_hand.link.listen(for_s, on_frames=partial(_take, at_hand), until=until)
 
 
 def _take(at_hand: AtHand, frames: list[Any]) -> None:

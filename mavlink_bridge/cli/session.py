@@ -223,7 +223,7 @@ class Session:
 
     def listen_until(self, is_enough: Callable[[], bool], for_s: float) -> bool:
         """Listen until a condition holds, no longer than a time; return whether it does."""
-        self.link.run(_Listen(for_s), on_frames=self._listen, until=is_enough)
+        self.link.listen(for_s, on_frames=self._listen, until=is_enough)
         return is_enough()
 
     def _is_in(self, mode: int) -> bool:
@@ -298,26 +298,3 @@ def open_session(contact: Contact, show: Callable[[str, int, int], None]) -> Ite
         timeout_s=contact.timeout_s,
     ) as link:
         yield Session(link, contact, show)
-
-
-class _Listen:
-    """A machine that sends nothing and ends after a while."""
-
-    progress = (0, 0)
-
-    def __init__(self, for_s: float) -> None:
-        self.bound_s = for_s
-        self.deadline_s: float | None = None
-        self.is_done = False
-
-    def start(self, now_s: float) -> None:
-        self.deadline_s = now_s + self.bound_s
-
-    def receive(self, frame: Frame, now_s: float) -> None:
-        pass
-
-    def handle_timer(self, now_s: float) -> None:
-        self.is_done = self.deadline_s is not None and now_s >= self.deadline_s
-
-    def messages_to_send(self) -> list[Any]:
-        return []

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from missions.errors import MissionError, PlanCheckError, SituationError
+from missions.errors import MissionError, PlanCheckError
 from missions.planning.plan import plan as make_plan
 
 if TYPE_CHECKING:
@@ -14,10 +14,6 @@ if TYPE_CHECKING:
     from missions.planned import Plan
     from missions.request import Request
     from missions.situation import Situation
-
-
-class PlanDropped(Exception):  # noqa: N818 - nothing went wrong
-    """Nobody waits for the plan any more; raised inside the search, which has nothing to tidy up."""
 
 
 @dataclass(eq=False, slots=True)
@@ -41,20 +37,12 @@ class PlanTask:
     is_dropped: bool = False
 
     def made(self, planner: Callable[..., Plan] = make_plan) -> Plan | MissionError:
-        """Return the plan, or why there is none; a defect of ours is one reason, and no end of what waits for the plan."""
+        """Return the plan, or why there is none: dropped, for one; a defect of ours is a reason too, and no end of what waits for the plan."""
         try:
-            return planner(self.situation, self.request, should_stop=self._should_stop)
-        except PlanDropped:
-            return SituationError("nobody waits for the plan any more")
+            return planner(self.situation, self.request, should_stop=lambda: self.is_dropped)
         except MissionError as error:
             return error
         except Exception as error:  # noqa: BLE001 - whatever it is, the vehicle must not lose its bridge by it
             defect = PlanCheckError(f"planning broke down: {type(error).__name__}: {error}. This is a defect")
             defect.__cause__ = error
             return defect
-
-    def _should_stop(self) -> bool:
-        """Break off a plan that nobody waits for: the best one so far, which a search gives that is merely stopped, would still be finished and measured."""
-        if self.is_dropped:
-            raise PlanDropped
-        return False

@@ -37,6 +37,23 @@ def begun(entries: Iterable[LogEntry], vehicle: HeardVehicle) -> Situation:
     return situation
 
 
+def vehicle_of(
+    path: Path | str, entries: Iterable[LogEntry], system: int | None, *, any_vehicle: bool
+) -> HeardVehicle:
+    """Return the vehicle of a log that is meant, by its heartbeats.
+
+    Raises
+    ------
+    LogError
+        The log holds no such vehicle, or several and none was chosen.
+    """
+    try:
+        heard = vehicles_heard(entry.frame for entry in entries)
+        return choose_vehicle(heard, system, any_vehicle=any_vehicle)
+    except VehicleNotFoundError as error:
+        raise LogError(f"{path}: {error}", file=str(path)) from None
+
+
 def situation_from_log(
     path: Path | str,
     system: int | None = None,
@@ -63,12 +80,7 @@ def situation_from_log(
         The log is missing, empty or not one; or it holds no such vehicle, or several and none was chosen.
     """
     about = list(TlogReader(path, ABOUT_THE_AUTOPILOT))
-    vehicles = vehicles_heard(entry.frame for entry in about)
-    try:
-        vehicle = choose_vehicle(vehicles, system, any_vehicle=any_vehicle)
-    except VehicleNotFoundError as error:
-        raise LogError(f"{path}: {error}", file=str(path)) from None
-    situation = begun(about, vehicle)
+    situation = begun(about, vehicle_of(path, about, system, any_vehicle=any_vehicle))
     reader = TlogReader(path, FOLDED)
     for entry in reader:
         situation = fold(situation, entry.frame, entry.time_s)

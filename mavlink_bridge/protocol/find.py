@@ -73,11 +73,6 @@ class FindVehicle(TableMachine[FindState, FindEvent]):
         return self.vehicle or self.trouble
 
     @property
-    def progress(self) -> tuple[int, int]:
-        """Whether it is done, as steps."""
-        return int(self.is_done), 1
-
-    @property
     def bound_s(self) -> float:
         """Longest time from the start to the end."""
         return self._patience_s + LISTEN_S

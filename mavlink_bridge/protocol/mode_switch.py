@@ -11,13 +11,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.mavlink.messages import CommandAck, CommandLong, Heartbeat, MavResult, ModeFlag
-from mavlink_bridge.protocol.table_machine import TableMachine
+from mavlink_bridge.protocol.table_machine import Outbox, TableMachine
 from mavlink_bridge.protocol.texts import Reasons
 from mavlink_bridge.protocol.transitions import MODE_SWITCH, MODE_SWITCH_UNTIL_SEEN, SwitchEvent, SwitchState
 from missions.items import Command
 
 if TYPE_CHECKING:
-    from mavlink_bridge.mavlink.messages import Frame, Message
+    from mavlink_bridge.mavlink.messages import Frame
     from mavlink_bridge.protocol.peer import Peer
 
 _HURRY_S = 0.5  # HOLD is sent again without waiting for heartbeats; chosen, not measured
@@ -75,11 +75,6 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
     def result_name(self) -> str:
         """How it was answered, by name."""
         return self._result.name if self._result is not None else "no answer"
-
-    @property
-    def progress(self) -> tuple[int, int]:
-        """Whether it is done, as steps."""
-        return int(self.is_done), 1
 
     @property
     def deadline_s(self) -> float | None:
@@ -159,15 +154,15 @@ def set_mode(peer: Peer, mode: int, confirmation: int) -> CommandLong:
     )
 
 
-class AwaitHeartbeat:
+class AwaitHeartbeat(Outbox):
     """Asks for a heartbeat and waits for the vehicle's next: what it tells is no older than our wish to act on it.
 
     One comes every second also unasked, so nothing is asked twice.
     """
 
     def __init__(self, peer: Peer) -> None:
+        super().__init__()
         self._peer = peer
-        self._outgoing: list[Message] = []
         self.is_done = False
 
     @property
@@ -183,9 +178,7 @@ class AwaitHeartbeat:
     def start(self, now_s: float) -> None:  # noqa: ARG002 - the contract of machines
         """Ask."""
         peer = self._peer
-        self._outgoing.append(
-            CommandLong(peer.system, peer.component, Command.REQUEST_MESSAGE, param1=_HEARTBEAT_ID)
-        )
+        self._send(CommandLong(peer.system, peer.component, Command.REQUEST_MESSAGE, param1=_HEARTBEAT_ID))
 
     def receive(self, frame: Frame, now_s: float) -> None:  # noqa: ARG002 - the contract of machines
         """Take a frame."""
@@ -193,8 +186,3 @@ class AwaitHeartbeat:
 
     def handle_timer(self, now_s: float) -> None:
         """Take notice that time has passed."""
-
-    def messages_to_send(self) -> list[Message]:
-        """Return and forget what is to be sent now."""
-        outgoing, self._outgoing = self._outgoing, []
-        return outgoing

@@ -73,7 +73,7 @@ def plan_route(
     lines, drawn_m, band = _finished(ground, found, asked, vehicle, heading_deg)
     driven_m = max(0.0, band.clearance_m(ground.edge))
     items, seqs = mission_items(lines, vehicle.speed_mps, request.speed_mps)
-    reached = tuple(map(rounded, ground.frame.to_lat_lons(np.array(found.targets))))
+    reached = tuple(rounded(ground.frame.to_lat_lon(target)) for target in found.targets)
     slowest_mps = min(filter(None, lines.speeds), default=None)
     warnings += lead_away_remarks(found, asked.drawn_m)
     warnings += moved_target_remarks(targets, reached)

@@ -27,7 +27,6 @@ from shapely import Point
 from missions.drive_model import corner_forecast
 from missions.fitting.local_search import MOST_MEASUREMENTS, Fitting
 from missions.fitting.polyline import Drawing, DrawnPoint
-from missions.ground.frame import LocalPoint
 from missions.ground.legs import reserve_m
 from missions.routing.departure import ROOM_M, departures
 from missions.routing.drawn_route import DrawnRoutes, Route
@@ -38,6 +37,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from missions.fitting.cost import Measured
+    from missions.geo import LocalPoint
     from missions.routing.departure import Departure
     from missions.routing.drawn_route import Sought
     from missions.vehicle import Vehicle
@@ -77,7 +77,7 @@ class DrivenRoute:
         How many of the first legs lead away from a fence that the start stands nearer to than is required.
     start_clearance_m : float
         The start's distance to the nearest fence.
-    targets : tuple of (float, float)
+    targets : tuple of LocalPoint
         The targets as reached, in order.
     blocks : int
         Blocks of the partition that was searched.
@@ -239,12 +239,11 @@ class RouteSearch:
         )
         if not measured.is_enough:
             return _Attempt(drawing, measured, None)
-        targets = tuple(LocalPoint(*route.points[index].tolist()) for index in route.target_indices)
         driven = DrivenRoute(
             drawing,
             self._lead_away(drawing),
             route.start_clearance_m,
-            targets,
+            route.targets,
             route.blocks,
             self._least_departing_m(route),
         )
@@ -259,13 +258,12 @@ class RouteSearch:
         leading = {*range(max(route.lead_away, 1) + 1)} - {*route.target_indices}
         return tuple(
             DrawnPoint(
-                east_m,
-                north_m,
+                place,
                 near_m if number in leading else required_m,
                 line_m if number in leading else required_m,
                 is_fixed=number in fixed,
             )
-            for number, (east_m, north_m) in enumerate(route.points.tolist())
+            for number, place in enumerate(route.places)
         )
 
     @cached_property

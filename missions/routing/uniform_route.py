@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from missions.fitting.polyline import DrawnPoint
-from missions.ground.frame import LocalPoint
 from missions.ground.legs import reserve_m
 from missions.routing.bottleneck import kept_m
 from missions.routing.drawn_route import DrawnRoutes, Route, simplified
@@ -48,11 +47,8 @@ def widest_uniform_route(sought: Sought, asked: Promise) -> tuple[Promise, Drive
 
 
 def _driven(route: Route, drawn_m: float) -> DrivenRoute:
-    drawing = tuple(
-        DrawnPoint(east_m, north_m, drawn_m, drawn_m) for east_m, north_m in route.points.tolist()
-    )
-    reached = tuple(LocalPoint(*route.points[index].tolist()) for index in route.target_indices)
-    return DrivenRoute(drawing, route.lead_away, route.start_clearance_m, reached, route.blocks)
+    drawing = tuple(DrawnPoint(place, drawn_m, drawn_m) for place in route.places)
+    return DrivenRoute(drawing, route.lead_away, route.start_clearance_m, route.targets, route.blocks)
 
 
 def _sparse_route(sought: Sought, clearance_m: float) -> Route | NoRoute:

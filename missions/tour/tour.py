@@ -16,7 +16,7 @@ from missions.drive_model import corner_forecast
 from missions.errors import NoRouteError, SituationError
 from missions.fence import ZoneKind
 from missions.finishing.route_plan import plan_route
-from missions.ground.frame import LocalPoint
+from missions.geo import LocalPoint
 from missions.ground.from_situation import route_ends, route_ground
 from missions.promise import known_vehicle, promise
 from missions.request import End, Order

@@ -239,7 +239,7 @@ def test_a_link_that_breaks_meanwhile(driven, monkeypatch):
     def broken(_timeout_s):
         raise LinkError("the other end closed the link")
 
-    monkeypatch.setattr(at_hand.link, "receive", broken)
+    monkeypatch.setattr(at_hand.link, "receive_at", broken)
     told = interrupt(at_hand, monkeypatch, terminal=False)
     assert "(the link is lost)" in str(told)
 

@@ -28,7 +28,7 @@ from mavlink_bridge.director.plan_task import PlanTask
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.messages import Frame
 from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig
-from missions.errors import PlanCheckError, SituationError
+from missions.errors import PlanCheckError, PlanStoppedError
 from missions.fence import CircleZone, Fence, ZoneKind, fence_to_items
 from missions.geo import LatLon, distance_m
 from missions.items import Command
@@ -260,7 +260,7 @@ def test_a_plan_is_dropped_as_soon_as_nobody_waits_for_it(happens):
     happens(run)
     run.run_until(lambda: run.director.pending_plan is not task, 10)
     assert task.is_dropped
-    assert isinstance(task.made(), SituationError)  # and at once, for the search is left at its first look
+    assert isinstance(task.made(), PlanStoppedError)  # and at once, for the search is left at its first look
 
 
 def test_an_outdated_plan_stops_and_the_next_begins_at_once():

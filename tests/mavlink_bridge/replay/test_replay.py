@@ -130,7 +130,7 @@ def test_a_journal_keeps_what_a_tour_asks_for_and_refuses_what_makes_no_sense(tm
     for asked in (tour, GoTo(), RepairMission(footprint=Footprint(1.0, 0.5))):
         with path.open("w") as file:
             JournalWriter(file, replace(ORDERS, request=asked), {})
-        assert read_journal(path).orders.request == asked
+        assert read_journal(path).orders.request.words() == asked.words()
     path.write_text(path.read_text().replace('"snap_m": 0.0', '"snap_m": -1.0'))
     with pytest.raises(LogError, match=r"snap_m -1\.0: expected a finite number of at least 0"):
         read_journal(path)

@@ -11,7 +11,7 @@ import shapely
 from shapely import LineString, Point, Polygon
 
 from missions.fence import CircleZone, Fence, PolygonZone, ZoneKind
-from missions.geo import LatLon
+from missions.geo import LatLon, LocalPoint
 from missions.ground.ground import lay_out
 from missions.picture import draw_plan, style
 from missions.picture import scene as scenes
@@ -102,8 +102,10 @@ def test_the_check_finds_what_is_wrong(plans: dict[str, Plan]) -> None:
 def test_long_fields(plans: dict[str, Plan], east_m: float, north_m: float) -> None:
     frame = plans["maze"].ground.frame
     corners = np.array([(-east_m, -north_m), (east_m, -north_m), (east_m, north_m), (-east_m, north_m)])
-    fence = Fence((PolygonZone(ZoneKind.INCLUSION, tuple(frame.to_lat_lons(corners))),))
-    path = tuple(frame.to_lat_lons(0.9 * corners[[0, 2]]))
+    fence = Fence(
+        (PolygonZone(ZoneKind.INCLUSION, tuple(frame.to_lat_lon(LocalPoint(*corner)) for corner in corners)),)
+    )
+    path = tuple(frame.to_lat_lon(LocalPoint(*corner)) for corner in 0.9 * corners[[0, 2]])
     ground = lay_out(fence, frame)
     scene = Scene(replace(plans["maze"], fence=fence, ground=ground, path=path, targets=path[1:]))
     assert problems(plan_figure(scene), scene) == []

@@ -436,7 +436,7 @@ def test_other_ways_and_first_legs_are_drawn_in_the_free_space_that_is_there(
     counts = counted(monkeypatch)
     lane = box(IN, -2.9, -60, 2.9, 60)
     facing_away = facing(situation_of(lane, **VEHICLES[1]), 0, 40, 0.0)
-    with pytest.raises(NoRouteError):
+    with pytest.raises(NoRouteError, match="at the start this vehicle would come as near as"):
         plan(facing_away, Request(targets=(place(0, -50),), clearance_m=1.0))
     assert counts["whole"] <= 2
     assert counts["widest"] == 0

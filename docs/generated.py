@@ -15,7 +15,7 @@ from typing import Any
 
 from mavlink_bridge import errors as bridge_errors
 from mavlink_bridge.cli.app import COMMANDS, load
-from mavlink_bridge.cli.common import ExitCode, exit_code_of
+from mavlink_bridge.cli.failing import ExitCode, exit_code_of
 from mavlink_bridge.director import SCHEMA, TRANSITIONS
 from mavlink_bridge.protocol.transitions import TABLES
 from missions import errors as mission_errors
@@ -67,11 +67,12 @@ def _option_row(parameter: Any) -> str:  # noqa: ANN401 - the command line's own
     is_option = parameter.param_type_name == "option"
     word = parameter.metavar or parameter.name.upper()
     names = parameter.opts if is_option else [word]
-    metavar = f" {word}" if is_option and not getattr(parameter, "is_flag", False) else ""
+    is_switch = getattr(parameter, "is_flag", False) or getattr(parameter, "count", False)
+    metavar = f" {word}" if is_option and not is_switch else ""
     shown = ", ".join(f"`{name}{metavar}`" for name in names)
     meaning = getattr(parameter, "help", None) or ""
     default = parameter.default
-    is_shown = default != "" and isinstance(default, (str, int, float)) and not isinstance(default, bool)
+    is_shown = not is_switch and default != "" and isinstance(default, (str, int, float))
     cells = (shown, meaning, f"`{default}`" if is_shown else "")
     return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"
 

@@ -5,20 +5,18 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import platformdirs
+
 _NAME = "pbpp-rover"
 
 
 def config_folder() -> Path:
     """Return the folder of the user's options: below ``XDG_CONFIG_HOME`` if that is set, else where the system keeps such files."""
-    import platformdirs  # noqa: PLC0415 - quick help
-
     return _below("XDG_CONFIG_HOME") or platformdirs.user_config_path(_NAME, appauthor=False)
 
 
 def state_folder() -> Path:
     """Return the folder of what is kept between runs: below ``XDG_STATE_HOME`` if that is set, else where the system keeps such files."""
-    import platformdirs  # noqa: PLC0415 - only where something is stored
-
     return _below("XDG_STATE_HOME") or platformdirs.user_state_path(_NAME, appauthor=False)
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sys
-from importlib import import_module
+from difflib import get_close_matches
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from mavlink_bridge.cli.common import command_of
 from mavlink_bridge.cli.failing import (
     ExitCode,
     drop_stdout,
@@ -57,8 +58,6 @@ class Commands(TyperGroup):
         if args[0] in COMMANDS:
             self.commands[args[0]] = load(args[0])
         elif not args[0].startswith("-"):
-            from difflib import get_close_matches  # noqa: PLC0415 - only for a mistake
-
             similar = get_close_matches(args[0], COMMANDS)
             hint = f"did you mean {' or '.join(similar)}?" if similar else f"there are {', '.join(COMMANDS)}"
             ctx.fail(f"no command {args[0]!r}; {hint}")
@@ -79,11 +78,8 @@ class Commands(TyperGroup):
 
 def load(name: str) -> Any:  # noqa: ANN401 - a command of the parser library that typer uses
     """Return a command, with its options."""
-    from mavlink_bridge.cli.common import guarded  # noqa: PLC0415 - quick help
-
-    function = getattr(import_module(f"mavlink_bridge.cli.{name}"), name)
     single = typer.Typer(add_completion=False, rich_markup_mode="markdown", pretty_exceptions_enable=False)
-    single.command(name)(guarded(function))
+    single.command(name)(command_of(name))
     return typer.main.get_command(single)
 
 
@@ -129,7 +125,7 @@ app = typer.Typer(
 
 def _version(wanted: bool) -> None:  # noqa: FBT001 - typer's way
     if wanted:
-        from importlib.metadata import version  # noqa: PLC0415 - quick help
+        from importlib.metadata import version  # noqa: PLC0415 - 9 ms that help need not wait for
 
         echo(f"pbpp {version('pbpp-rover')}")
         raise typer.Exit

@@ -8,37 +8,41 @@ import time
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
-from mavlink_bridge.cli.common import (
-    AnyVehicleOption,
-    ConfigOption,
-    JsonOption,
-    QuietOption,
-    SystemOption,
-    TimeoutOption,
-    exit_code_of,
-    print_json,
-    warn,
-)
+from mavlink_bridge.cli.bridge_view import LiveView
+from mavlink_bridge.cli.common import warn
+from mavlink_bridge.cli.failing import ERRORS_ONLY, exit_code_of, telling
 from mavlink_bridge.cli.interrupting import AtHand, interruptible, terminable
 from mavlink_bridge.cli.keyboard import Keyboard
+from mavlink_bridge.cli.link_notes import LinkNotes
+from mavlink_bridge.cli.live import BackupKeeper, PlanMaker, director_at_hand
+from mavlink_bridge.cli.opening import Opening
 from mavlink_bridge.cli.permissions import check_permissions
 from mavlink_bridge.cli.plan_request import request_from_options
-from mavlink_bridge.cli.terminal import echo, say
-from mavlink_bridge.cli.upload import RequiredConnectOption, SigningKeyOption
-from mavlink_bridge.cli.values import MOST_M, within
+from mavlink_bridge.cli.recording import open_recording
+from mavlink_bridge.cli.run_log import RunLog, SafeTeller
+from mavlink_bridge.cli.session import signing_of
+from mavlink_bridge.cli.terminal import echo, print_json, say
+from mavlink_bridge.cli.typed import CONFIRM, understood
+from mavlink_bridge.director import AT_WORK, Director, Orders, Severity
+from mavlink_bridge.director.orders import DEFAULT_SOURCES, TargetSource
 from mavlink_bridge.errors import LinkError, UsageError
+from mavlink_bridge.link import ONE_SHOT_IDENTITY, now_s, open_link, parse_connection
+from mavlink_bridge.mavlink.echoes import SentFrames
+from mavlink_bridge.protocol.outcomes import ends_in_words
+from mavlink_bridge.replay.journal import Call
+from missions.formats import read_parameters
+from missions.geo import LatLon
+from missions.situation import Situation
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from mavlink_bridge.cli.bridge_view import LiveView
-    from mavlink_bridge.cli.opening import Opening
-    from mavlink_bridge.cli.run_log import RunLog
-    from mavlink_bridge.director import Director, Event, Orders
+    from mavlink_bridge.cli.options.bridge import BridgeOptions
+    from mavlink_bridge.director import Event
     from mavlink_bridge.link import Link
     from mavlink_bridge.mavlink.messages import Frame, Message
     from mavlink_bridge.mavlink.signing import Signing
@@ -52,121 +56,50 @@ _LINK_LOOK_S = 0.25  # how soon an interrupt is seen while waiting for that
 _OPENING_LOOK_S = 0.05  # and while a link is being opened
 
 
-def bridge(
-    connect: RequiredConnectOption,
-    target: Annotated[
-        list[str] | None,
-        typer.Option(metavar="LAT,LON", help="The first target; more can be typed or clicked."),
-    ] = None,
-    target_from: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="SOURCE",
-            help="typed, reposition, position-target, guided-item, mission, rally or echo; repeatable.",
-        ),
-    ] = None,
-    clearance: Annotated[
-        str | None, typer.Option(metavar="M|max", help="Promised while driving. Default: from FENCE_MARGIN.")
-    ] = None,
-    corner_allowance: Annotated[
-        str, typer.Option(metavar="M|auto", help="Room for cut corners on top.")
-    ] = "auto",
-    snap: Annotated[
-        float,
-        typer.Option(
-            metavar="M", parser=within(0.0, MOST_M, "metres"), help="Move blocked targets to free ground."
-        ),
-    ] = 0.0,
-    vehicle: Annotated[
-        Path | None, typer.Option(metavar="FILE.parm", help="Parameters that the vehicle does not report.")
-    ] = None,
-    upload: Annotated[bool, typer.Option("--upload", help="Write missions to the vehicle.")] = False,
-    drive: Annotated[
-        bool,
-        typer.Option(
-            "--drive",
-            help="With --upload: switch modes, HOLD before a new route and after arrival, AUTO for a verified one.",
-        ),
-    ] = False,
-    arm: Annotated[bool, typer.Option("--arm", help="With --drive: arm before AUTO.")] = False,
-    confirm: Annotated[bool, typer.Option("--confirm", help="Upload a plan only after a typed yes.")] = False,
-    once: Annotated[bool, typer.Option("--once", help="End after one job.")] = False,
-    log: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.tlog",
-            help="Record both directions, and a journal beside it; a restart goes on in run.2.tlog, run.3.tlog …",
-        ),
-    ] = None,
-    config: ConfigOption = None,
-    system: SystemOption = None,
-    any_vehicle: AnyVehicleOption = False,
-    source_system: Annotated[
-        int | None,
-        typer.Option(metavar="N", min=1, max=255, help="Our system id. Default: the vehicle's own."),
-    ] = None,
-    source_component: Annotated[
-        int, typer.Option(metavar="N", min=1, max=255, help="Our component id.")
-    ] = 195,
-    signing_key: SigningKeyOption = None,
-    timeout: TimeoutOption = 30.0,
-    json_output: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
-    """Run beside the autopilot: read fences, state and targets from the stream, keep a plan, upload it verified, watch the drive.
-
-    Type targets as `LAT,LON`; `yes` confirms a plan. Without `--upload` it only reports.
-
-    For example:
-
-    `pbpp bridge --connect udpin:0.0.0.0:14550`
-
-    `pbpp bridge --connect /dev/ttyAMA0,921600 --upload --drive --log run.tlog --json`
-    """
-    del config  # its callback has taken it
-    check_permissions(upload=upload, drive=drive, arm=arm)
-    from mavlink_bridge.cli.run_log import RunLog, SafeTeller  # noqa: PLC0415
-    from mavlink_bridge.cli.session import signing_of  # noqa: PLC0415
-    from mavlink_bridge.director import AT_WORK, Director, Orders  # noqa: PLC0415 - quick help
-    from mavlink_bridge.director.orders import DEFAULT_SOURCES, TargetSource  # noqa: PLC0415
-    from missions.formats import read_parameters  # noqa: PLC0415
-    from missions.situation import Situation  # noqa: PLC0415
-
-    try:
-        sources = frozenset(TargetSource(name) for name in target_from) if target_from else DEFAULT_SOURCES
-    except ValueError as error:
-        raise UsageError(f"--target-from: {error}; known are {', '.join(TargetSource)}") from None
-    orders = Orders(
-        identity=(source_system, source_component) if source_system else None,
-        own_component=source_component,
-        system=system,
-        any_vehicle=any_vehicle,
-        request=request_from_options(None, target or [], clearance, corner_allowance, snap, "optimal"),
-        upload=upload,
-        drive=drive,
-        arm=arm,
-        confirm=confirm,
-        once=once,
-        announce=True,
-        target_sources=sources,
-        patience_s=timeout,
-    )
-    parameters = read_parameters(vehicle) if vehicle else {}
+def bridge(options: BridgeOptions) -> None:
+    """Run the director on a link until its single job is done, or for ever."""
+    check_permissions(upload=options.upload, drive=options.drive, arm=options.arm)
+    orders = _orders(options)
+    parameters = read_parameters(options.vehicle) if options.vehicle else {}
     with contextlib.ExitStack() as stack:
-        recorder, journal = _recorders(stack, log, orders, parameters)
+        recorder, journal = _recorders(stack, options.log, orders, parameters)
         director = Director(orders, Situation(parameters=parameters))
-        view = _view(stack, director, is_wanted=not (json_output or quiet))
-        tell = view.tell if view else _teller(wants_json=json_output, quiet=quiet)
+        view = _view(stack, director, is_wanted=not options.is_silent)
+        tell = view.tell if view else _teller(options)
         log_of_run = RunLog(recorder, journal) if recorder is not None and journal is not None else None
         tell = SafeTeller(tell, lambda: director.state not in AT_WORK)
-        shell = _Shell(director, connect, tell, view, log_of_run, quiet=quiet)
+        shell = _Shell(director, options.connect, tell, view, log_of_run)
         with terminable():
-            shell.run(signing_of(signing_key), timeout)
+            shell.run(signing_of(options.signing_key), options.timeout)
     trouble = shell.director.trouble
     if trouble is not None and shell.director.is_done:
-        if json_output:
+        if options.json_output:
             raise typer.Exit(exit_code_of(trouble))
         raise trouble
+
+
+def _orders(options: BridgeOptions) -> Orders:
+    try:
+        sources = frozenset(map(TargetSource, options.target_from)) or DEFAULT_SOURCES
+    except ValueError as error:
+        raise UsageError(f"--target-from: {error}; known are {', '.join(TargetSource)}") from None
+    return Orders(
+        identity=(options.source_system, options.source_component) if options.source_system else None,
+        own_component=options.source_component,
+        system=options.system,
+        any_vehicle=options.any_vehicle,
+        request=request_from_options(
+            None, options.target, options.clearance, options.corner_allowance, options.snap, "optimal"
+        ),
+        upload=options.upload,
+        drive=options.drive,
+        arm=options.arm,
+        confirm=options.confirm,
+        once=options.once,
+        announce=True,
+        target_sources=sources,
+        patience_s=options.timeout,
+    )
 
 
 @dataclass(eq=False)
@@ -178,9 +111,6 @@ class _Journaled:
     frames: int = 0
 
     def call(self, name: str, now_s: float, target: object = None, text: str = "") -> None:
-        from mavlink_bridge.replay.journal import Call  # noqa: PLC0415 - quick help
-        from missions.geo import LatLon  # noqa: PLC0415
-
         if self.writer is not None:
             place = target if isinstance(target, LatLon) else None
             self.writer.call(Call(self.frames, now_s, name, place, text))
@@ -224,13 +154,7 @@ class _Shell:
         tell: Callable[[Event], None],
         view: LiveView | None,
         log: RunLog | None,
-        *,
-        quiet: bool = False,
     ) -> None:
-        from mavlink_bridge.cli.link_notes import LinkNotes  # noqa: PLC0415 - quick help
-        from mavlink_bridge.cli.live import BackupKeeper, PlanMaker  # noqa: PLC0415
-        from mavlink_bridge.link import parse_connection  # noqa: PLC0415
-
         self._connection = connection
         self.director = director
         self._view = view
@@ -245,14 +169,10 @@ class _Shell:
         )
         self._plans = PlanMaker(self.director)
         self._keyboard = Keyboard()
-        self._quiet = quiet
         self._asked_for: Plan | None = None  # the plan that waits for a yes, as was printed
 
     def run(self, signing: Signing | None, timeout_s: float) -> None:
         """Run until the single job is done, or for ever; a link that breaks is opened again."""
-        from mavlink_bridge.link import now_s  # noqa: PLC0415 - quick help
-        from mavlink_bridge.protocol.outcomes import ends_in_words  # noqa: PLC0415
-
         begun_s = now_s()
         self._written.call("start", begun_s)
         self.director.start(begun_s)
@@ -264,8 +184,6 @@ class _Shell:
 
     def _at_hand(self, link: Link | None) -> AtHand:
         """Return the vehicle as an interrupt finds it."""
-        from mavlink_bridge.cli.live import director_at_hand  # noqa: PLC0415 - quick help
-
         at_hand = director_at_hand(self.director, link)
         return replace(
             at_hand,
@@ -274,11 +192,6 @@ class _Shell:
         )
 
     def _keep_linked(self, signing: Signing | None, timeout_s: float) -> None:
-        from mavlink_bridge.cli.opening import Opening  # noqa: PLC0415 - quick help
-        from mavlink_bridge.link import ONE_SHOT_IDENTITY, open_link  # noqa: PLC0415
-        from mavlink_bridge.mavlink.echoes import SentFrames  # noqa: PLC0415
-        from mavlink_bridge.protocol.outcomes import ends_in_words  # noqa: PLC0415
-
         sent = SentFrames()
         failures = 0
         while not self.director.is_done:
@@ -345,8 +258,6 @@ class _Shell:
 
     def _idle(self, wait_s: float) -> None:
         """Let time pass without a link, so that the director notices."""
-        from mavlink_bridge.link import now_s  # noqa: PLC0415 - quick help
-
         until_s = now_s() + wait_s
         while now_s() < until_s and not self.director.is_done:
             self._listen_to_keyboard(now_s())
@@ -365,8 +276,6 @@ class _Shell:
             self.director.plan_made(*made, now)
 
     def _listen_to_keyboard(self, now: float) -> None:
-        from mavlink_bridge.cli.typed import understood  # noqa: PLC0415 - quick help
-
         line = self._keyboard.line()
         if not line:
             return
@@ -386,13 +295,11 @@ class _Shell:
         """Print a note that is not an event, where it does not disturb: above the view, else on stderr."""
         if self._view is not None:
             self._view.note(text, is_warning=is_warning)
-        elif is_warning or not self._quiet:
+        elif telling().quiet < (ERRORS_ONLY if is_warning else 1):
             say(text, typer.colors.YELLOW if is_warning else None)
 
     def _ask_for_yes(self) -> None:
         """Print once for each plan that it waits for a yes."""
-        from mavlink_bridge.cli.typed import CONFIRM  # noqa: PLC0415 - quick help
-
         plan = self.director.plan if self.director.awaits_confirmation else None
         if plan is not None and plan is not self._asked_for:
             self._note(CONFIRM, is_warning=False)
@@ -410,16 +317,14 @@ def _view(stack: contextlib.ExitStack, director: Director, *, is_wanted: bool) -
     """Open the live view where somebody watches a terminal."""
     if not is_wanted or not sys.stdout.isatty():
         return None
-    from mavlink_bridge.cli.bridge_view import LiveView  # noqa: PLC0415 - only in a terminal
-
     return stack.enter_context(LiveView(director))
 
 
-def _teller(*, wants_json: bool, quiet: bool) -> Callable[[Event], None]:
+def _teller(options: BridgeOptions) -> Callable[[Event], None]:
     """Return what prints events: JSON lines, or lines for people."""
-    if wants_json:
+    if options.json_output:
         return lambda event: _flushed_json(event.as_json())
-    if quiet:
+    if options.quiet:
         return lambda _event: None
     return _tell_people
 
@@ -430,8 +335,6 @@ def _flushed_json(document: Mapping[str, object]) -> None:
 
 
 def _tell_people(event: Event) -> None:
-    from mavlink_bridge.director import Severity  # noqa: PLC0415 - quick help
-
     colour = {
         Severity.CRITICAL: typer.colors.RED,
         Severity.ERROR: typer.colors.RED,
@@ -446,8 +349,6 @@ def _recorders(
 ) -> tuple[TlogWriter | None, JournalWriter | None]:
     if log is None:
         return None, None
-    from mavlink_bridge.cli.recording import open_recording  # noqa: PLC0415 - quick help
-
     part, recorder, journal = open_recording(stack, log, orders, parameters)
     if part != log:
         warn((f"{log} exists already; this run is recorded to {part}",))

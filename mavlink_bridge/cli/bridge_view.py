@@ -7,15 +7,15 @@ import time
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from rich.console import Console, Group  # the type: `terminal.console` makes one
+from rich.console import Console, Group  # the type: `drawing.console` makes one
 from rich.control import Control
 from rich.live import Live
 from rich.segment import ControlType
 from rich.table import Table
 from rich.text import Text
 
-from mavlink_bridge.cli.terminal import cell
-from mavlink_bridge.cli.terminal import console as terminal_console
+from mavlink_bridge.cli.drawing import cell
+from mavlink_bridge.cli.drawing import console as terminal_console
 from mavlink_bridge.cli.typed import CONFIRM
 from mavlink_bridge.director import Severity, State
 from mavlink_bridge.mavlink.rover import mode_name

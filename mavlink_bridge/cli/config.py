@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import os
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
-from mavlink_bridge.cli.common import ConfigOption, JsonOption, QuietOption, print_json
+from mavlink_bridge.backup.store import BackupStore
+from mavlink_bridge.cli.app import COMMANDS, load
 from mavlink_bridge.cli.options_file import DARING, FOR_ALL, is_there, options_for, read_tables, user_file
-from mavlink_bridge.cli.terminal import echo, echo_lines
+from mavlink_bridge.cli.terminal import echo, echo_lines, print_json
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from mavlink_bridge.cli.options.config import ConfigOptions
 
 _VARIABLES = {
     "NO_COLOR": "no colour",
@@ -33,40 +36,20 @@ class Setting:
     source: str
 
 
-def config(
-    template: Annotated[
-        bool, typer.Option("--template", help="Print an example file, to be saved where yours belongs.")
-    ] = False,
-    config: ConfigOption = None,
-    json_output: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
-    """Show where the file of your options lies, what it sets, and which environment variables count.
-
-    The command line counts most, then `--config FILE`, then your own file, then the defaults in `--help`.
-
-    For example:
-
-    `pbpp config`
-
-    `pbpp config --config bridge.toml --json`
-
-    `pbpp config --template`
-    """
-    if template:
+def config(options: ConfigOptions) -> None:
+    """Print where options come from and which are set, or an example file."""
+    if options.template:
         echo_lines(_TEMPLATE.splitlines())
         return
-    from mavlink_bridge.backup.store import BackupStore  # noqa: PLC0415 - quick help
-
     own = user_file()
     settings = settings_of(own, is_asked_for=False) if is_there(own) else []
-    if config is not None:
-        given = settings_of(config, is_asked_for=True)
+    if options.config is not None:
+        given = settings_of(options.config, is_asked_for=True)
         covered = {(setting.command, setting.option) for setting in given}
         settings = [one for one in settings if (one.command, one.option) not in covered] + given
     variables = {name: os.environ[name] for name in _VARIABLES if os.environ.get(name)}
     backups = BackupStore().folder
-    if json_output:
+    if options.json_output:
         print_json(
             {
                 "status": "ok",
@@ -79,7 +62,7 @@ def config(
             }
         )
         return
-    if quiet:
+    if options.quiet:
         return
     echo(f"Your options: {own}{'' if is_there(own) else ' (not there; `pbpp config --template` shows one)'}")
     echo(f"Backups of what was on vehicles: {backups}")
@@ -97,8 +80,6 @@ def settings_of(path: Path, *, is_asked_for: bool) -> list[Setting]:
     typer.BadParameter
         The file is not an options file, or sets an option that does not exist.
     """
-    from mavlink_bridge.cli.app import COMMANDS, load  # noqa: PLC0415 - which loads this module
-
     tables = read_tables(path)
     if unknown := sorted(set(tables) - {FOR_ALL, *COMMANDS}):
         raise typer.BadParameter(f"{path}: [{unknown[0]}] is no command; there are {', '.join(COMMANDS)}")

@@ -4,79 +4,46 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
-
-from mavlink_bridge.cli.common import JsonOption, QuietOption, is_same_file, print_json, warn
-from mavlink_bridge.cli.terminal import echo
+from mavlink_bridge.cli.common import is_same_file, warn
+from mavlink_bridge.cli.kept_files import write_kept
+from mavlink_bridge.cli.terminal import echo, print_json
 from mavlink_bridge.cli.values import position_from
 from mavlink_bridge.errors import UsageError
+from missions.formats import Part, format_of, parts_of, read_situation, write_situation
 
 if TYPE_CHECKING:
-    from missions.formats import Part
+    from mavlink_bridge.cli.options.convert import ConvertOptions
     from missions.situation import Situation
 
 
-def convert(
-    source: Annotated[
-        Path, typer.Argument(metavar="IN", help="What to read: .plan, .waypoints, .fen, .poly, .geojson, …")
-    ],
-    output: Annotated[
-        Path, typer.Argument(metavar="OUT", help="What to write: .plan, .waypoints, .geojson, .kml, .gpx, …")
-    ],
-    only: Annotated[
-        str | None,
-        typer.Option(
-            metavar="mission|fence|rally", help="Write this part only, where IN holds more than OUT can."
-        ),
-    ] = None,
-    return_point: Annotated[
-        str | None,
-        typer.Option(metavar="LAT,LON", help="The fence's return point, which .fen files must have."),
-    ] = None,
-    json_output: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
-    """Convert a file with a fence, a mission, rally points or parameters; the suffixes choose the formats.
-
-    For example:
-
-    `pbpp convert field.kml field.plan`
-
-    `pbpp convert field.plan fence.waypoints --only fence`
-
-    `pbpp convert mission.waypoints route.gpx`
-    """
-    from mavlink_bridge.cli.kept_files import write_kept  # noqa: PLC0415 - quick help
-    from missions.formats import parts_of, read_situation, write_situation  # noqa: PLC0415
-
-    if is_same_file(source, output):
-        raise UsageError(f"{output} would be written over what it is made of; give another OUT")
-    part = _part(only)
-    situation = _with_return_point(read_situation(source), return_point)
-    _check_choice(situation, source, output, part)
-    written = write_situation(situation, output, part, write=write_kept)
-    warnings = _left_out(situation, written, output) if part is None else []
+def convert(options: ConvertOptions) -> None:
+    """Write OUT, with a word of what it could not hold."""
+    if is_same_file(options.source, options.output):
+        raise UsageError(f"{options.output} would be written over what it is made of; give another OUT")
+    part = _part(options.only)
+    situation = _with_return_point(read_situation(options.source), options.return_point)
+    _check_choice(situation, options.source, options.output, part)
+    written = write_situation(situation, options.output, part, write=write_kept)
+    warnings = _left_out(situation, written, options.output) if part is None else []
     warn(warnings)
     document = {
         "status": "ok",
         "command": "convert",
-        "source": str(source),
-        "outputs": [str(output)],
+        "source": str(options.source),
+        "outputs": [str(options.output)],
         "parts": [str(one) for one in written],
         "left_out": [str(one) for one in parts_of(situation) if one not in written],
         "warnings": warnings,
     }
-    if json_output:
+    if options.json_output:
         print_json(document)
-    elif not quiet:
-        echo(f"Wrote {output}: {', '.join(_count(situation, one) for one in written)}")
+    elif not options.quiet:
+        echo(f"Wrote {options.output}: {', '.join(_count(situation, one) for one in written)}")
 
 
 def _part(only: str | None) -> Part | None:
-    from missions.formats import Part  # noqa: PLC0415 - quick help
-
     if only is None:
         return None
     if only not in list(Part):
@@ -96,8 +63,6 @@ def _with_return_point(situation: Situation, return_point: str | None) -> Situat
 
 def _check_choice(situation: Situation, source: Path, output: Path, part: Part | None) -> None:
     """Ask for a choice where OUT holds one list and IN has several."""
-    from missions.formats import format_of, parts_of  # noqa: PLC0415 - quick help
-
     format_ = format_of(output, "write")
     there = [one for one in parts_of(situation) if one in format_.holds]
     if part is None and len(there) > 1 and not format_.together:
@@ -108,8 +73,6 @@ def _check_choice(situation: Situation, source: Path, output: Path, part: Part |
 
 
 def _left_out(situation: Situation, written: tuple[Part, ...], output: Path) -> list[str]:
-    from missions.formats import parts_of  # noqa: PLC0415 - quick help
-
     texts = [
         f"{_count(situation, one)} left out: a {output.suffix} file holds no {one}"
         for one in parts_of(situation)

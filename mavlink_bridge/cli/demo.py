@@ -2,24 +2,37 @@
 
 from __future__ import annotations
 
+import secrets
 import time
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from importlib.resources import as_file, files
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
+from shapely import LineString
 
-from mavlink_bridge.cli.common import JsonOption, QuietOption, print_json, warn
-from mavlink_bridge.cli.terminal import echo
-from mavlink_bridge.cli.values import within
+from mavlink_bridge.cli.common import warn
+from mavlink_bridge.cli.failing import ExitCode
+from mavlink_bridge.cli.kept_files import make_room, remember, write_kept
+from mavlink_bridge.cli.live import conduct
+from mavlink_bridge.cli.plan_results import write_outputs
+from mavlink_bridge.cli.terminal import echo, print_json
+from mavlink_bridge.director import Orders
+from mavlink_bridge.link import Link
+from mavlink_bridge.mavlink.messages import FenceStatus, GlobalPositionInt
+from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig, SteppedRover
+from mavlink_bridge.tlog import TlogWriter
+from missions.fence import fence_to_items
+from missions.formats import read_fence
+from missions.geo import LatLon, from_e7
+from missions.picture import draw_plan
+from missions.request import GoTo
 
 if TYPE_CHECKING:
+    from mavlink_bridge.cli.options.demo import DemoOptions
     from mavlink_bridge.mavlink.messages import Frame
-    from mavlink_bridge.simulator import SteppedRover
     from missions.fence import Fence
-    from missions.geo import LatLon
     from missions.planned import Plan
 
 # The maze of the recorded logs: its start, a target in it and a clearance that leaves a route.
@@ -37,46 +50,23 @@ class _Heard:
     breaches: int = 0
 
 
-def demo(
-    out: Annotated[
-        Path, typer.Option(metavar="DIR", help="Where the picture, the mission and the log go.")
-    ] = Path("demo-out"),
-    speedup: Annotated[
-        float,
-        typer.Option(
-            metavar="X",
-            parser=within(1.0, 20.0),
-            help="Simulated time runs so much faster, where the computer keeps up.",
-        ),
-    ] = 4.0,
-    json_output: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
-    """Show the whole loop: simulated rover, fence, target, plan, upload, verify, drive, picture, report."""
-    from mavlink_bridge.cli.kept_files import make_room, remember, write_kept  # noqa: PLC0415 - quick help
-    from mavlink_bridge.cli.live import LiveResult, conduct  # noqa: PLC0415
-    from mavlink_bridge.cli.plan_results import write_outputs  # noqa: PLC0415
-    from mavlink_bridge.director import Orders  # noqa: PLC0415
-    from mavlink_bridge.link import Link  # noqa: PLC0415
-    from mavlink_bridge.tlog import TlogWriter  # noqa: PLC0415
-    from missions.geo import LatLon  # noqa: PLC0415
-    from missions.picture import draw_plan  # noqa: PLC0415
-    from missions.request import GoTo  # noqa: PLC0415
-
+def demo(options: DemoOptions) -> None:
+    """Drive the demo's mission; write its picture, files and report."""
+    out = options.out
     out.mkdir(parents=True, exist_ok=True)
     make_room(out / "demo.tlog")
     drive = _Heard()
     begun_s = time.monotonic()
     with ExitStack() as stack:
         recorder = stack.enter_context(TlogWriter(out / "demo.tlog"))
-        rover = _rover(speedup)
+        rover = _rover(options.speedup)
         link = stack.enter_context(Link(rover, _IDENTITY, recorder, clock=rover.now_s))
         request = GoTo(target=LatLon(*_TARGET), clearance_m=_CLEARANCE_M)
         orders = Orders(identity=_IDENTITY, request=request, upload=True, drive=True, arm=True)
-        result: LiveResult = conduct(
+        result = conduct(
             link,
             orders,
-            quiet=quiet or json_output,
+            quiet=options.is_silent,
             on_frames=lambda frames: _observe(drive, frames),
             is_real=False,
         )
@@ -100,22 +90,16 @@ def demo(
         "time_s": round(time.monotonic() - begun_s, 1),
         "outputs": [str(path) for path in (out / "plan.png", *written, out / "demo.tlog")],
     }
-    if json_output:
+    if options.json_output:
         print_json(document)
-    elif not quiet:
+    elif not options.quiet:
         _report(document, result.plan)
     if drive.breaches:
-        raise typer.Exit(8)
+        raise typer.Exit(ExitCode.CHECK)
 
 
 def _rover(speedup: float) -> SteppedRover:
     """Return a rover in the maze, on a link that no slow computer breaks."""
-    import secrets  # noqa: PLC0415 - quick help
-
-    from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig, SteppedRover  # noqa: PLC0415 - quick help
-    from missions.fence import fence_to_items  # noqa: PLC0415
-    from missions.geo import LatLon  # noqa: PLC0415
-
     config = SimulatorConfig(
         home=LatLon(*_HOME),
         fence=fence_to_items(_maze()),
@@ -126,17 +110,12 @@ def _rover(speedup: float) -> SteppedRover:
 
 
 def _maze() -> Fence:
-    from missions.formats import read_fence  # noqa: PLC0415 - quick help
-
     with as_file(files("mavlink_bridge.cli") / "data" / "maze-fence.waypoints") as path:
         return read_fence(path)
 
 
 def _observe(drive: _Heard, frames: list[Frame]) -> None:
     """Keep the track and the breaches that the vehicle reports."""
-    from mavlink_bridge.mavlink.messages import FenceStatus, GlobalPositionInt  # noqa: PLC0415 - quick help
-    from missions.geo import from_e7  # noqa: PLC0415
-
     for frame in frames:
         if isinstance(frame.message, GlobalPositionInt):
             drive.track.append(from_e7(frame.message.lat, frame.message.lon))
@@ -146,8 +125,6 @@ def _observe(drive: _Heard, frames: list[Frame]) -> None:
 
 def _driven(plan: Plan, track: list[LatLon]) -> tuple[float, float]:
     """Return the driven track's least clearance and its length, in metres."""
-    from shapely import LineString  # noqa: PLC0415 - quick help
-
     line = LineString(plan.ground.frame.to_local_array(track))
     return plan.ground.clearance_m(line), float(line.length)
 

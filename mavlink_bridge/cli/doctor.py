@@ -7,18 +7,30 @@ import platform
 import sys
 import tempfile
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
+from importlib import metadata
+from importlib.resources import as_file, files
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
-from mavlink_bridge.cli.common import ExitCode, JsonOption, QuietOption, print_json
-from mavlink_bridge.cli.terminal import echo, echo_labelled
+from mavlink_bridge.backup.store import BackupStore
+from mavlink_bridge.cli.config import settings_of
+from mavlink_bridge.cli.failing import ExitCode
+from mavlink_bridge.cli.options_file import is_there, user_file
+from mavlink_bridge.cli.terminal import echo, echo_labelled, print_json
+from mavlink_bridge.errors import UsageError
+from mavlink_bridge.mavlink.signing import SigningKey
+from missions.formats import read_situation
+from missions.geo import LatLon
+from missions.request import GoTo
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+
+    from mavlink_bridge.cli.options.doctor import DoctorOptions
 
 _NEEDED = ("numpy", "shapely", "pyproj", "pymavlink", "pyserial", "typer", "rich", "platformdirs")
 _WANTED = {"matplotlib": "pictures (.png, .svg, .pdf)", "plotly": "interactive pages (.html)"}
@@ -46,34 +58,19 @@ class _Finding:
     advice: str | None = None
 
 
-def doctor(
-    signing_key: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Look at this signing key and who may read it.")
-    ] = None,
-    json_output: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
-    """Look at this installation: versions, serial ports, options file, signing key, backups, and a plan with a known answer.
-
-    Nothing is opened and nothing is sent. Exit 8 if something is wrong.
-
-    For example:
-
-    `pbpp doctor`
-
-    `pbpp doctor --signing-key rover.key --json`
-    """
+def doctor(options: DoctorOptions) -> None:
+    """Look at everything, and report each finding."""
     looks: list[Callable[[], Iterator[_Finding]]] = [
-        _python, _packages, _ports, _options, lambda: _key(signing_key), _backups, _test_plan,
+        _python, _packages, _ports, _options, lambda: _key(options.signing_key), _backups, _test_plan,
     ]  # fmt: skip
     findings = [finding for look in looks for finding in look()]
     is_well = all(finding.verdict is not _Verdict.WRONG for finding in findings)
-    if json_output:
+    if options.json_output:
         status = {"status": "ok"} if is_well else {"status": "error", "exit_code": int(ExitCode.CHECK)}
         print_json({**status, "command": "doctor", "findings": [asdict(finding) for finding in findings]})
     else:
         for finding in findings:
-            if not quiet or finding.verdict is _Verdict.WRONG:
+            if not options.quiet or finding.verdict is _Verdict.WRONG:
                 _tell(finding)
     if not is_well:
         raise typer.Exit(ExitCode.CHECK)
@@ -97,24 +94,22 @@ def _python() -> Iterator[_Finding]:
 
 
 def _packages() -> Iterator[_Finding]:
-    from importlib.metadata import PackageNotFoundError, version  # noqa: PLC0415 - quick help
-
-    yield _Finding(_Verdict.OK, "pbpp-rover", version("pbpp-rover"))
+    yield _Finding(_Verdict.OK, "pbpp-rover", metadata.version("pbpp-rover"))
     for name in _NEEDED:
         try:
-            yield _Finding(_Verdict.OK, name, version(name))
-        except PackageNotFoundError:
+            yield _Finding(_Verdict.OK, name, metadata.version(name))
+        except metadata.PackageNotFoundError:
             yield _Finding(_Verdict.WRONG, name, "not installed", f"python -m pip install {name}")
     for name, use in _WANTED.items():
         try:
-            yield _Finding(_Verdict.OK, name, version(name))
-        except PackageNotFoundError:
+            yield _Finding(_Verdict.OK, name, metadata.version(name))
+        except metadata.PackageNotFoundError:
             advice = "python -m pip install 'pbpp-rover[plot]'"
             yield _Finding(_Verdict.NOTE, name, f"not installed: no {use}", advice)
 
 
 def _ports() -> Iterator[_Finding]:
-    from serial.tools.list_ports import comports  # noqa: PLC0415 - quick help
+    from serial.tools.list_ports import comports  # noqa: PLC0415 - a library that does not load is no reason not to look on
 
     ports = sorted(comports(), key=lambda port: port.device)
     if not ports:
@@ -140,9 +135,6 @@ def _permission_advice(device: Path) -> str:
 
 
 def _options() -> Iterator[_Finding]:
-    from mavlink_bridge.cli.config import settings_of  # noqa: PLC0415 - quick help
-    from mavlink_bridge.cli.options_file import is_there, user_file  # noqa: PLC0415
-
     path = user_file()
     if not is_there(path):
         yield _Finding(_Verdict.OK, "options file", f"none ({path})")
@@ -160,9 +152,6 @@ def _options() -> Iterator[_Finding]:
 def _key(path: Path | None) -> Iterator[_Finding]:
     if path is None:
         return
-    from mavlink_bridge.errors import UsageError  # noqa: PLC0415 - quick help
-    from mavlink_bridge.mavlink.signing import SigningKey  # noqa: PLC0415
-
     try:
         SigningKey.read(path)
     except UsageError as error:
@@ -176,8 +165,6 @@ def _key(path: Path | None) -> Iterator[_Finding]:
 
 
 def _backups() -> Iterator[_Finding]:
-    from mavlink_bridge.backup.store import BackupStore  # noqa: PLC0415 - quick help
-
     folder = BackupStore().folder
     above = next(path for path in (folder, *folder.parents) if path.exists())
     try:
@@ -193,23 +180,16 @@ def _backups() -> Iterator[_Finding]:
 
 def _test_plan() -> Iterator[_Finding]:
     """Plan through the demo's maze; the answer is known, and its clearance is measured again."""
-    from dataclasses import replace  # noqa: PLC0415 - quick help
-    from importlib.resources import as_file, files  # noqa: PLC0415
-
-    from shapely import LineString  # noqa: PLC0415
-
-    from missions.formats import read_situation  # noqa: PLC0415
-    from missions.geo import LatLon  # noqa: PLC0415
-    from missions.planning.plan import plan  # noqa: PLC0415
-    from missions.request import GoTo  # noqa: PLC0415
-    from missions.situation import Situation  # noqa: PLC0415
-
     request = GoTo(
         start=LatLon(*_START), target=LatLon(*_TARGET), clearance_m=_CLEARANCE_M, corner_allowance_m=0.0
     )
     try:
+        from shapely import LineString  # noqa: PLC0415 - a library that does not load is a finding too
+
+        from missions.planning.plan import plan  # noqa: PLC0415 - as above
+
         with as_file(files("mavlink_bridge.cli") / "data" / "maze-fence.waypoints") as path:
-            situation: Situation = replace(read_situation(path), home=None)
+            situation = replace(read_situation(path), home=None)
         planned = plan(situation, request)
         line = LineString(planned.ground.frame.to_local_array(planned.path))
         clearance_m = planned.ground.clearance_m(line)

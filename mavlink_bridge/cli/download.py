@@ -3,101 +3,73 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
-
-from mavlink_bridge.cli.common import (
-    AnyVehicleOption,
-    JsonOption,
-    QuietOption,
-    SourceComponentOption,
-    SourceSystemOption,
-    SystemOption,
-    TimeoutOption,
-    print_json,
-    progress_bar,
-    warn,
-)
+from mavlink_bridge.backup.store import BackupStore
+from mavlink_bridge.cli.common import warn
+from mavlink_bridge.cli.kept_files import write_kept
+from mavlink_bridge.cli.options.download import KINDS
+from mavlink_bridge.cli.options_session import session_for
 from mavlink_bridge.cli.restoring import reader_warnings
-from mavlink_bridge.cli.terminal import echo
-from mavlink_bridge.cli.upload import RequiredConnectOption, SigningKeyOption
+from mavlink_bridge.cli.terminal import echo, print_json
 from mavlink_bridge.errors import BridgeError, LinkError, UsageError
+from mavlink_bridge.mavlink.messages import MissionType
+from mavlink_bridge.protocol.outcomes import list_read
+from mavlink_bridge.protocol.parameters import ReadParameters
+from mavlink_bridge.protocol.undisturbed_read import UndisturbedRead
+from missions.fence import fence_from_items
+from missions.formats import write_mission
+from missions.formats.parameters import is_parameter_name
+from missions.formats.waypoints import format_items
+from missions.items import without_home
+from missions.rally import rally_from_items
+from missions.situation import Known, Mission, Situation
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+    from pathlib import Path
 
+    from mavlink_bridge.cli.options.download import DownloadOptions
     from mavlink_bridge.cli.session import Session
     from missions.items import MissionItem
 
-_KINDS = ("mission", "fence", "rally", "parameters")
 _ITEM_SUFFIXES = (".waypoints", ".txt")
 _PARAMETER_SUFFIXES = (".parm", ".param", ".params")
 
 
-def download(
-    what: Annotated[str, typer.Argument(metavar="|".join(_KINDS), help="What to read.")],
-    connect: RequiredConnectOption = "",
-    output: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "-o", "--output", metavar="FILE", help="Where to: .waypoints, .plan; parameters .parm, .param."
-        ),
-    ] = None,
-    signing_key: SigningKeyOption = None,
-    system: SystemOption = None,
-    any_vehicle: AnyVehicleOption = False,
-    source_system: SourceSystemOption = 245,
-    source_component: SourceComponentOption = 190,
-    timeout: TimeoutOption = 30.0,
-    json_output: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
-    """Download a mission, fence, rally points or all parameters; nothing is written to the vehicle.
-
-    For example:
-
-    `pbpp download fence --connect udpin:0.0.0.0:14550 -o field.waypoints`
-
-    `pbpp download parameters --connect /dev/ttyACM0 -o rover.parm`
-    """
-    outputs = output or []
-    _check(what, connect, outputs)
-
-    from mavlink_bridge.backup.store import BackupStore  # noqa: PLC0415 - usage errors need not wait for it
-    from mavlink_bridge.cli.session import Contact, open_session  # noqa: PLC0415
-
-    contact = Contact(connect, (source_system, source_component), system, any_vehicle, timeout, signing_key)
-    with progress_bar(quiet=quiet or json_output) as show, open_session(contact, show) as session:
+def download(options: DownloadOptions) -> None:
+    """Read what is asked for, write it to files, and report it."""
+    what = options.what
+    _check(what, options.connect, options.output)
+    items: tuple[MissionItem, ...] = ()
+    parameters: dict[str, float] = {}
+    with session_for(options, options.connect) as (session, _show):
         store = BackupStore()
         if store.notes():  # else nothing needs to be distinguished
             warn(reader_warnings(store, session.which_vehicle()))
         if what == "parameters":
             parameters = _read_parameters(session)
-            items: tuple[MissionItem, ...] = ()
         else:
-            parameters = {}
             items = read_list(session, what)
-    for path in outputs:
+    for path in options.output:
         _write(path, what, items, parameters)
     document: dict[str, Any] = {
         "status": "ok",
         "command": "download",
         "system": session.vehicle.system,
         "what": what,
-        "outputs": [str(path) for path in outputs],
+        "outputs": [str(path) for path in options.output],
     }
-    if json_output:
+    if options.json_output:
         print_json({**document, **_details(what, items, parameters)})
-    elif not quiet:
+    elif not options.quiet:
         number = f"{len(parameters)} parameters" if what == "parameters" else f"{what}: {len(items)} items"
-        echo(number + "".join(f"; written to {path}" for path in outputs))
+        echo(number + "".join(f"; written to {path}" for path in options.output))
 
 
 def _check(what: str, connect: str, outputs: list[Path]) -> None:
-    if what not in _KINDS:
-        raise UsageError(f"download {what!r}: expected one of {', '.join(_KINDS)}")
+    if what not in KINDS:
+        raise UsageError(f"download {what!r}: expected one of {', '.join(KINDS)}")
     if not connect:
         raise UsageError("download needs --connect CONNECTION")
     suffixes = _PARAMETER_SUFFIXES if what == "parameters" else (*_ITEM_SUFFIXES, ".plan")
@@ -118,10 +90,6 @@ def read_list(session: Session, what: str) -> tuple[MissionItem, ...]:
     LinkError
         It fell silent.
     """
-    from mavlink_bridge.mavlink.messages import MissionType  # noqa: PLC0415
-    from mavlink_bridge.protocol.outcomes import list_read  # noqa: PLC0415
-    from mavlink_bridge.protocol.undisturbed_read import UndisturbedRead  # noqa: PLC0415
-
     machine = UndisturbedRead(session.vehicle, MissionType[what.upper()])
     session.run(machine, f"reading the {what}")
     items = list_read(machine, what)
@@ -133,8 +101,6 @@ def read_list(session: Session, what: str) -> tuple[MissionItem, ...]:
 
 
 def _read_parameters(session: Session) -> dict[str, float]:
-    from mavlink_bridge.protocol.parameters import ReadParameters  # noqa: PLC0415
-
     machine = ReadParameters(session.vehicle)
     session.run(machine, "reading parameters")
     outcome = machine.outcome
@@ -155,9 +121,6 @@ def _read_parameters(session: Session) -> dict[str, float]:
 
 
 def _write(path: Path, what: str, items: tuple[MissionItem, ...], parameters: Mapping[str, float]) -> None:
-    from mavlink_bridge.cli.kept_files import write_kept  # noqa: PLC0415 - quick help
-    from missions.formats.parameters import is_parameter_name  # noqa: PLC0415
-
     if path.suffix.lower() == ".plan":
         _write_plan(path, what, items)
         return
@@ -171,20 +134,11 @@ def _write(path: Path, what: str, items: tuple[MissionItem, ...], parameters: Ma
         named = ((name, value) for name, value in parameters.items() if name not in odd)
         text = "".join(f"{name}{separator}{value:.9g}\n" for name, value in named)
     else:
-        from missions.formats.waypoints import format_items  # noqa: PLC0415
-
         text = format_items(items)
     write_kept(path, text.encode())
 
 
 def _write_plan(path: Path, what: str, items: tuple[MissionItem, ...]) -> None:
-    from mavlink_bridge.cli.kept_files import write_kept  # noqa: PLC0415
-    from missions.fence import fence_from_items  # noqa: PLC0415
-    from missions.formats import write_mission  # noqa: PLC0415
-    from missions.items import without_home  # noqa: PLC0415
-    from missions.rally import rally_from_items  # noqa: PLC0415
-    from missions.situation import Known, Mission, Situation  # noqa: PLC0415
-
     source = "read from the vehicle"
     if what == "mission":
         home = items[0].position if items else None

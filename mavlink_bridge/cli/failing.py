@@ -6,6 +6,7 @@ import errno
 import os
 import re
 import sys
+import traceback
 from collections.abc import Mapping
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -78,8 +79,12 @@ class Telling:
 
     command: str = ""
     verbose: bool = False
+    quiet: int = 0
+    """How often ``-q`` was given: once leaves warnings and errors, `ERRORS_ONLY` times only errors."""
     warned: set[str] = field(default_factory=set)
-    quiet: bool = False
+
+
+ERRORS_ONLY = 2  # -qq
 
 
 _telling: ContextVar[Telling | None] = ContextVar("telling", default=None)
@@ -87,12 +92,12 @@ _telling: ContextVar[Telling | None] = ContextVar("telling", default=None)
 
 def telling() -> Telling:
     """Return how much the running command prints."""
-    return _telling.get() or begin_telling("", verbose=False)
+    return _telling.get() or begin_telling("")
 
 
-def begin_telling(command: str, *, verbose: bool) -> Telling:
+def begin_telling(command: str, *, verbose: bool = False, quiet: int = 0) -> Telling:
     """Begin a command."""
-    now = Telling(command, verbose)
+    now = Telling(command, verbose, quiet)
     _telling.set(now)
     return now
 
@@ -137,8 +142,6 @@ def report_error(command: str, error: Exception, *, wants_json: bool) -> ExitCod
 
 
 def _defect_line(error: BaseException) -> str:
-    import traceback  # noqa: PLC0415 - only then
-
     place = traceback.extract_tb(error.__traceback__)[-1]
     what = " ".join(f"{type(error).__name__}: {error}".split())
     return f"internal error, a bug in pbpp: {what} (at {Path(place.filename).name}:{place.lineno})"
@@ -146,8 +149,6 @@ def _defect_line(error: BaseException) -> str:
 
 def _trace_of(error: BaseException, *, wanted: bool) -> dict[str, str]:
     """Put a defect's traceback on stderr where it is wanted; return it for the document."""
-    import traceback  # noqa: PLC0415 - only then
-
     if not wanted and os.environ.get("PBPP_TRACEBACK", "") in ("", "0"):
         return {}
     trace = "".join(traceback.format_exception(error))

@@ -17,6 +17,7 @@ from mavlink_bridge.cli.common import warn
 from mavlink_bridge.cli.failing import telling
 from mavlink_bridge.user_folders import state_folder
 from missions.errors import MissionError
+from missions.formats import FORMATS, Part, parts_of
 from missions.formats.files import create_exclusively, keep_aside, mode_of, unwritable, write_file
 
 if TYPE_CHECKING:
@@ -153,8 +154,6 @@ def _lost_parts(path: Path, data: bytes, writer: str) -> list[str]:
     A part that is there again, but other, is lost too where another kind of command wrote the file: a planned mission takes the place
     of a planned one, and not of one that was converted or downloaded.
     """
-    from missions.formats import FORMATS, Part, parts_of  # noqa: PLC0415 - quick help
-
     format_ = FORMATS.get(path.suffix.lower())
     if format_ is None or format_.read is None or not format_.together or len(format_.holds) == 1:
         return []

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import os
+import queue
 import select
 import sys
+import threading
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -61,9 +63,6 @@ def keyboard_thread(descriptor: int) -> Callable[[], bytes | None]:
 
     The thread reads the descriptor itself: one that waits in ``sys.stdin`` would hold its lock when the program ends.
     """
-    import queue  # noqa: PLC0415 - only on Windows
-    import threading  # noqa: PLC0415
-
     typed: queue.SimpleQueue[bytes] = queue.SimpleQueue()
 
     def read() -> None:

@@ -17,7 +17,7 @@ class LinkNotes:
     """Reports a link's echoes, once, also where the link is opened again; silent with ``-q``."""
 
     def __init__(self) -> None:
-        self._was_told = telling().quiet
+        self._was_told = telling().quiet > 0
 
     def tell(self, link: Link) -> None:
         """Report what there is to note about a link and was not reported yet."""

@@ -14,7 +14,8 @@ from mavlink_bridge.backup.store import BackupStore
 from mavlink_bridge.backup.upload_note import UploadNote
 from mavlink_bridge.backup.vehicle_lock import VehicleLock
 from mavlink_bridge.backup.vehicle_mark import VehicleMark
-from mavlink_bridge.cli.common import progress_bar, warn
+from mavlink_bridge.cli.common import warn
+from mavlink_bridge.cli.drawing import progress_bar
 from mavlink_bridge.cli.interrupting import AtHand, interruptible, terminable
 from mavlink_bridge.cli.link_notes import LinkNotes
 from mavlink_bridge.cli.restoring import interrupted_warnings
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-    from mavlink_bridge.cli.common import Shown
+    from mavlink_bridge.cli.drawing import Shown
     from mavlink_bridge.director.plan_task import PlanTask
     from mavlink_bridge.link import Link
     from mavlink_bridge.mavlink.messages import Frame

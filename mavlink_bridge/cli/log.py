@@ -4,26 +4,29 @@ from __future__ import annotations
 
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import typer
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
 
-from mavlink_bridge.cli.common import (
-    ExitCode,
-    JsonOption,
-    QuietOption,
-    SystemOption,
-    print_json,
-    progress_bar,
-)
-from mavlink_bridge.cli.terminal import cell, console, echo, say
+from mavlink_bridge.cli.drawing import cell, console, progress_bar
+from mavlink_bridge.cli.failing import ExitCode
+from mavlink_bridge.cli.kept_files import write_kept
+from mavlink_bridge.cli.log_times import date_text
+from mavlink_bridge.cli.terminal import echo, print_json, say
 from mavlink_bridge.errors import LogError, UsageError
+from mavlink_bridge.logbook import read_logbook
+from mavlink_bridge.logbook.document import as_document
+from missions.errors import VehicleError
+from missions.picture import check_picture_format
+from missions.picture.track import TrackPicture, draw_track
+from missions.vehicle import bits
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from rich.table import Table
-
+    from mavlink_bridge.cli.options.log import LogOptions
     from mavlink_bridge.logbook import Logbook, VehicleLog
     from mavlink_bridge.logbook.grade import Grade
 
@@ -33,62 +36,38 @@ _UNION_BIT = 2
 """FENCE_OPTIONS: inside one inclusion is enough."""
 
 
-def log(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Telemetry logs: .tlog, .raw, .gz.")],
-    plot: Annotated[
-        list[Path] | None,
-        typer.Option(metavar="FILE", help="Draw fence, track, mission and targets: .png, .svg, .pdf, .html."),
-    ] = None,
-    system: SystemOption = None,
-    json_output: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
-    """Show what telemetry logs hold: who speaks, fences and missions transferred, targets, modes, the drive and its clearance.
-
-    Drives of a mission (AUTO) are graded: least clearance, deviation and time against the drive model's prediction.
-
-    For example:
-
-    `pbpp log flight.tlog --plot flight.png`
-
-    `pbpp log *.tlog --json`
-    """
-    plots = plot or []
-    if plots and len(files) > 1:
+def log(options: LogOptions) -> None:
+    """Print what each log holds, or draw one."""
+    plots = options.plot
+    if plots and len(options.files) > 1:
         raise UsageError("--plot draws one log: give one FILE")
-    if plots:
-        from missions.picture import check_picture_format  # noqa: PLC0415 - quick help
-
-        for path in plots:
-            check_picture_format(path)
-    from mavlink_bridge.logbook import read_logbook  # noqa: PLC0415 - quick help
-    from mavlink_bridge.logbook.document import as_document  # noqa: PLC0415
-
+    for path in plots:
+        check_picture_format(path)
     documents: list[dict[str, object]] = []
     is_unusable = False
-    with progress_bar(quiet=quiet or json_output or len(files) == 1) as show:
-        for number, path in enumerate(files):
-            show(path.name, number, len(files))
+    with progress_bar(quiet=options.is_silent or len(options.files) == 1) as show:
+        for number, path in enumerate(options.files):
+            show(path.name, number, len(options.files))
             try:
-                book = read_logbook(path, system)
+                book = read_logbook(path, options.system)
             except LogError as error:
-                if len(files) == 1:
+                if len(options.files) == 1:
                     raise
                 is_unusable = True
                 documents.append({"log": path.name, "error": "LogError", "message": str(error)})
                 say(f"error: {error}", typer.colors.RED)
                 continue
-            if json_output:
+            if options.json_output:
                 documents.append(as_document(book))
-            elif not quiet:
+            elif not options.quiet:
                 _print(book)
             for picture in plots:
                 _draw(book, picture)
-    if json_output:
+    if options.json_output:
         status = "error" if is_unusable else "ok"
         code = {"exit_code": int(ExitCode.INPUT)} if is_unusable else {}
         print_json({"status": status, "command": "log", **code, "logs": documents})
-    elif not quiet:
+    elif not options.quiet:
         for picture in plots:
             echo(f"Wrote {picture}")
     if is_unusable:
@@ -96,9 +75,6 @@ def log(
 
 
 def _draw(book: Logbook, path: Path) -> None:
-    from mavlink_bridge.cli.kept_files import write_kept  # noqa: PLC0415 - quick help
-    from missions.picture.track import TrackPicture, draw_track  # noqa: PLC0415 - slow to come
-
     if not book.vehicles:
         raise LogError(f"{book.name}: no vehicle was heard: there is nothing to draw")
     vehicle = book.vehicles[0]
@@ -120,9 +96,6 @@ def _draw(book: Logbook, path: Path) -> None:
 
 def _is_union(vehicle: VehicleLog) -> bool:
     """Return whether one inclusion is enough; the notes name an impossible FENCE_OPTIONS."""
-    from missions.errors import VehicleError  # noqa: PLC0415 - quick help
-    from missions.vehicle import bits  # noqa: PLC0415
-
     try:
         return bool(bits(vehicle.parameters, "FENCE_OPTIONS", 0) & _UNION_BIT)
     except VehicleError:
@@ -157,8 +130,6 @@ def _print(book: Logbook) -> None:
 
 
 def _length(book: Logbook) -> str:
-    from mavlink_bridge.cli.log_times import date_text  # noqa: PLC0415 - quick help
-
     begin = f" from {date_text(book.begins_s)}" if book.has_timestamps else ", raw: without times of its own"
     return f"{_duration(book.duration_s)}{begin}, {book.damage.frames} messages"
 
@@ -298,9 +269,6 @@ def _add(table: Table, *values: str) -> None:
 
 
 def _table(title: str, *columns: str) -> Table:
-    from rich.box import SIMPLE_HEAD  # noqa: PLC0415 - quick help
-    from rich.table import Table  # noqa: PLC0415
-
     table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
     for column in columns:
         is_number = column.endswith(")") or column in ("count", "types", "messages", "system", "component")

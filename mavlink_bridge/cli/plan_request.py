@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from mavlink_bridge.cli.options.plan import ENDS, METHODS, ORDERS
 from mavlink_bridge.cli.values import metres_or, position_from
 from mavlink_bridge.errors import UsageError
-from missions.request import End, Method, Order, RepairMission, Request, conditions, request_of
+from missions.formats import read_mission
+from missions.request import RepairMission, Request, conditions, request_of
 
-METHODS, ORDERS, ENDS = tuple(Method), tuple(Order), tuple(End)
 _OWN = "own"
 
 
@@ -59,6 +60,4 @@ def with_tour(request: Request, order: str, end: str, via: str | None, *, comes_
             "--via-mission keeps the mission's own speeds and goes by the drive model; it does not go with --speed, "
             "--corner-allowance, --escape"
         )
-    from missions.formats import read_mission  # noqa: PLC0415 - quick help
-
     return RepairMission(**conditions(request), mission=None if via == _OWN else read_mission(Path(via)))

@@ -8,7 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.cli.common import warn
+from mavlink_bridge.cli.kept_files import write_kept
 from mavlink_bridge.cli.terminal import echo, echo_lines
+from missions.fence import CircleZone, PolygonZone, ZoneKind
+from missions.picture import TERMINAL, draw_plan, sketch_plan
+from missions.words import counted
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -21,8 +25,6 @@ def write_outputs(
     planned: Plan, situation: Situation, outputs: list[Path], plots: list[Path], *, blocks: bool = False
 ) -> list[Path]:
     """Write the mission and draw the plan; return the files."""
-    from mavlink_bridge.cli.kept_files import write_kept  # noqa: PLC0415 - quick help
-
     for path in outputs:
         planned.write(path, situation, write=write_kept)
     return [*outputs, *draw(planned, plots, blocks=blocks)]
@@ -32,9 +34,6 @@ def draw(planned: Plan, plots: list[Path], *, title: str | None = None, blocks: 
     """Draw the plan to files, and to the terminal where ``-`` is among them; return the files."""
     if not plots:
         return []
-    from mavlink_bridge.cli.kept_files import write_kept  # noqa: PLC0415 - quick help
-    from missions.picture import TERMINAL, draw_plan, sketch_plan  # noqa: PLC0415
-
     for path in plots:
         if str(path) == TERMINAL:
             columns = min(80, shutil.get_terminal_size().columns)
@@ -46,8 +45,6 @@ def draw(planned: Plan, plots: list[Path], *, title: str | None = None, blocks: 
 
 def plan_document(planned: Plan) -> dict[str, object]:
     """Return the JSON document of a plan."""
-    from missions.fence import CircleZone, PolygonZone, ZoneKind  # noqa: PLC0415 - quick help
-
     fence = planned.fence
     return {
         "status": "ok",
@@ -131,8 +128,6 @@ def arrival_document(arrival: Mapping[str, object] | None) -> dict[str, object]:
 
 def report_plan(planned: Plan, written: list[Path]) -> None:
     """Print a plan for people, and where it was written."""
-    from missions.words import counted  # noqa: PLC0415 - quick help
-
     promise = (
         f"{planned.clearance_m:g} m promised while driving"
         if planned.clearance_m is not None

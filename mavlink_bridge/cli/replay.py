@@ -8,107 +8,51 @@ import time
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from mavlink_bridge.cli.common import (
-    AnyVehicleOption,
-    ExitCode,
-    JsonOption,
-    QuietOption,
-    SystemOption,
-    print_json,
-    progress_bar,
-)
+from mavlink_bridge.cli.drawing import progress_bar
+from mavlink_bridge.cli.failing import ExitCode
+from mavlink_bridge.cli.kept_files import write_kept
+from mavlink_bridge.cli.log_times import log_begin
 from mavlink_bridge.cli.plan_request import request_from_options
-from mavlink_bridge.cli.terminal import echo, say
-from mavlink_bridge.cli.values import within
+from mavlink_bridge.cli.terminal import echo, print_json, say
+from mavlink_bridge.director import Orders, TargetSource
 from mavlink_bridge.errors import LogError, UsageError
+from mavlink_bridge.link import open_transport, parse_connection
+from mavlink_bridge.logbook import SteadyClock
+from mavlink_bridge.logbook.playback import vehicle_frames
+from mavlink_bridge.mavlink.codec import Codec
+from mavlink_bridge.replay.expectations import differences, expectation_path, read_expectation, to_expect
+from mavlink_bridge.replay.replay import replay_log, replay_to_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
-    from mavlink_bridge.director import Orders
+    from mavlink_bridge.cli.options.replay import ReplayOptions
 
 _Told = dict[str, Any]
 
-MOST_SPEED = 1e6
-"""A day of a log in a tenth of a second: faster than any computer."""
 
-MOST_JOBS = 1024  # chosen: more processes than any computer has cores are a mistake in typing
-
-
-def replay(
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Recorded telemetry logs (.tlog).")],
-    expect: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="JSON lines of the events that are expected, or a folder with each log's .events.jsonl; exit 8 if others come.",
-        ),
-    ] = None,
-    record: Annotated[
-        bool, typer.Option("--record", help="Write the events beside each log, as its .events.jsonl.")
-    ] = False,
-    send: Annotated[
-        str | None,
-        typer.Option(metavar="CONNECTION", help="Play the vehicle's side of one log to a live client."),
-    ] = None,
-    speed: Annotated[
-        float | None,
-        typer.Option(
-            metavar="X",
-            parser=within(0.0, MOST_SPEED, above=True),
-            help="Times the log's own speed. Default: as fast as it goes; 1 with --send.",
-        ),
-    ] = None,
-    jobs: Annotated[
-        int | None,
-        typer.Option(
-            metavar="N",
-            min=1,
-            max=MOST_JOBS,
-            help="Logs replayed side by side. Default: as many as there are processors.",
-        ),
-    ] = None,
-    clearance: Annotated[str | None, typer.Option(metavar="M|max", help="As for plan.")] = None,
-    corner_allowance: Annotated[str, typer.Option(metavar="M|auto", help="As for plan.")] = "auto",
-    system: SystemOption = None,
-    any_vehicle: AnyVehicleOption = False,
-    json_output: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
-    """Run the bridge's director over recorded logs, in their own time: what it saw, what it would have planned.
-
-    A log that `pbpp bridge --log` recorded is replayed with its journal: the same decisions come again. Over other logs the director only listens.
-
-    For example:
-
-    `pbpp replay sitl_logs/guided-maze.tlog`
-
-    `pbpp replay field.tlog --record; pbpp replay field.tlog --expect field.events.jsonl`
-
-    `pbpp replay field.tlog --send udpout:127.0.0.1:14550`
-    """
-    from mavlink_bridge.director import Orders, TargetSource  # noqa: PLC0415 - quick help
-
-    if send is not None:
-        if len(logs) > 1 or record or expect is not None:
+def replay(options: ReplayOptions) -> None:
+    """Replay, record or compare logs; or play one to a client."""
+    if options.send is not None:
+        if len(options.logs) > 1 or options.record or options.expect is not None:
             raise UsageError("--send plays one LOG and compares nothing")
-        _send(logs[0], send, speed or 1.0, system, any_vehicle=any_vehicle, quiet=quiet or json_output)
+        _send(options, options.send)
         return
     orders = Orders(
-        system=system,
-        any_vehicle=any_vehicle,
-        request=request_from_options(None, [], clearance, corner_allowance, 0.0, "optimal"),
+        system=options.system,
+        any_vehicle=options.any_vehicle,
+        request=request_from_options(None, [], options.clearance, options.corner_allowance, 0.0, "optimal"),
         target_sources=frozenset(TargetSource) - {TargetSource.ECHO, TargetSource.RALLY},
     )
-    expected = _expected(logs, expect)
-    teller = _Teller(wants_json=json_output, quiet=quiet, names_logs=len(logs) > 1)
-    results = _replayed(logs, orders, speed, jobs, teller)
-    if record:
-        _record(results, quiet=quiet or json_output)
+    expected = _expected(options.logs, options.expect)
+    teller = _Teller(options)
+    results = _replayed(options.logs, orders, options.speed, options.jobs, teller)
+    if options.record:
+        _record(results, quiet=options.is_silent)
     if not _is_as_expected(expected, results):
         raise typer.Exit(ExitCode.CHECK)
     if any(isinstance(result, LogError) for result in results.values()):
@@ -118,19 +62,17 @@ def replay(
 class _Teller:
     """Puts events on stdout, as they come: JSON with the log's own times, lines for people with seconds since its begin."""
 
-    def __init__(self, *, wants_json: bool, quiet: bool, names_logs: bool) -> None:
-        self.is_quiet = quiet or wants_json
-        self._wants_json = wants_json
-        self._is_silent = quiet and not wants_json
-        self._names_logs = names_logs
+    def __init__(self, options: ReplayOptions) -> None:
+        self.is_quiet = options.is_silent
+        self._wants_json = options.json_output
+        self._is_silent = options.is_silent and not options.json_output
+        self._names_logs = len(options.logs) > 1
         self._begin_s = 0.0
 
     def begin(self, log: Path) -> None:
         """Note that a log begins; events that follow belong to it."""
         if self._wants_json or self._is_silent:
             return
-        from mavlink_bridge.cli.log_times import log_begin  # noqa: PLC0415 - quick help
-
         begin = log_begin(log)
         self._begin_s = begin.time_s
         echo(f"{log.name}: {begin}")
@@ -173,8 +115,6 @@ def _pool(workers: int) -> ProcessPoolExecutor | None:
 
 
 def _one_after_the_other(logs: list[Path], orders: Orders, speed: float | None, teller: _Teller) -> _Results:
-    from mavlink_bridge.replay.replay import replay_log  # noqa: PLC0415 - quick help
-
     results: _Results = {}
     for log in logs:
         wait = None if speed is None else _PlaySpeed(speed).wait
@@ -195,8 +135,6 @@ def _one_after_the_other(logs: list[Path], orders: Orders, speed: float | None, 
 
 
 def _side_by_side(logs: list[Path], orders: Orders, pool: ProcessPoolExecutor, teller: _Teller) -> _Results:
-    from mavlink_bridge.replay.replay import replay_to_json  # noqa: PLC0415 - quick help
-
     results: _Results = {}
     try:
         futures = {log: pool.submit(replay_to_json, log, orders) for log in logs}
@@ -219,8 +157,6 @@ def _side_by_side(logs: list[Path], orders: Orders, pool: ProcessPoolExecutor, t
 
 def _expected(logs: list[Path], expect: Path | None) -> dict[Path | None, list[_Told]]:
     """Read what is expected: of each log by itself, or (under None) of all together."""
-    from mavlink_bridge.replay.expectations import expectation_path, read_expectation  # noqa: PLC0415 - quick help
-
     if expect is None:
         return {}
     if expect.is_dir():
@@ -229,8 +165,6 @@ def _expected(logs: list[Path], expect: Path | None) -> dict[Path | None, list[_
 
 
 def _is_as_expected(expected: dict[Path | None, list[_Told]], results: _Results) -> bool:
-    from mavlink_bridge.replay.expectations import differences  # noqa: PLC0415 - quick help
-
     found = []
     for log, events in expected.items():
         chosen = results.values() if log is None else [results[log]]
@@ -244,9 +178,6 @@ def _is_as_expected(expected: dict[Path | None, list[_Told]], results: _Results)
 
 
 def _record(results: _Results, *, quiet: bool) -> None:
-    from mavlink_bridge.cli.kept_files import write_kept  # noqa: PLC0415 - quick help
-    from mavlink_bridge.replay.expectations import expectation_path, to_expect  # noqa: PLC0415
-
     for log, told in results.items():
         if isinstance(told, LogError):
             continue
@@ -272,18 +203,12 @@ class _PlaySpeed:
         return self._begun_s + elapsed_s / self._speed - time.monotonic()
 
 
-def _send(
-    log: Path, connection: str, speed: float, system: int | None, *, any_vehicle: bool, quiet: bool
-) -> None:
+def _send(options: ReplayOptions, connection: str) -> None:
     """Play the vehicle's side of a log; what the client sends shows only that it is there."""
-    from mavlink_bridge.link import open_transport, parse_connection  # noqa: PLC0415
-    from mavlink_bridge.logbook.playback import vehicle_frames  # noqa: PLC0415
-    from mavlink_bridge.mavlink.codec import Codec  # noqa: PLC0415 - quick help
-
     is_called = parse_connection(connection).kind == "udpin"
-    frames = vehicle_frames(log, system, any_vehicle=any_vehicle)
+    frames = vehicle_frames(options.logs[0], options.system, any_vehicle=options.any_vehicle)
     codec = Codec(1, 1)  # it only listens: the frames go out as they are in the log
-    with closing(open_transport(connection)) as transport, progress_bar(quiet=quiet) as show:
+    with closing(open_transport(connection)) as transport, progress_bar(quiet=options.is_silent) as show:
 
         def listen(timeout_s: float) -> bool:
             heard = [
@@ -299,8 +224,8 @@ def _send(
             show(f"waiting for a client on {connection}", 0, 0)
             while not listen(0.5):
                 pass
-        count = _play(frames, speed, transport.send, listen, show)
-    if not quiet:
+        count = _play(frames, options.speed or 1.0, transport.send, listen, show)
+    if not options.is_silent:
         echo(f"Sent {count} messages")
 
 
@@ -325,8 +250,6 @@ def _play(
 
 def _elapsed(frames: Iterable[tuple[float, bytes]]) -> Iterator[tuple[float, bytes]]:
     """Return the seconds since the first frame, by a clock that only goes forward."""
-    from mavlink_bridge.logbook import SteadyClock  # noqa: PLC0415 - quick help
-
     clock = SteadyClock()
     begin_s: float | None = None
     for time_s, data in frames:

@@ -2,100 +2,44 @@
 
 from __future__ import annotations
 
+import signal
 import sys
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+import threading
+from typing import TYPE_CHECKING
 
 import typer
 
-from mavlink_bridge.cli.common import JsonOption, QuietOption, print_json
-from mavlink_bridge.cli.terminal import echo
-from mavlink_bridge.cli.values import MOST_FLOAT32, MOST_S, checked_number, position_from, within
-from mavlink_bridge.errors import UsageError
+from mavlink_bridge.cli.terminal import echo, print_json
+from mavlink_bridge.cli.values import MOST_FLOAT32, checked_number, position_from
+from mavlink_bridge.errors import LinkError, UsageError
+from mavlink_bridge.simulator.config import SimulatorConfig
+from mavlink_bridge.simulator.faults import Faults
+from mavlink_bridge.simulator.parameters import DEFAULTS
+from mavlink_bridge.simulator.shell import Simulator
+from missions.fence import fence_to_items
+from missions.formats import read_fence, read_mission
 
 if TYPE_CHECKING:
-    from mavlink_bridge.simulator.config import SimulatorConfig
+    from mavlink_bridge.cli.options.sim import SimOptions
     from missions.geo import LatLon
 
-MOST_SEED = 2**63 - 1
-"""What fits everywhere a seed is kept."""
 
-
-def sim(
-    listen: Annotated[
-        str,
-        typer.Option(
-            metavar="CONNECTION", help="tcpin:, udpin: or udpout:HOST:PORT; port 0 is any free one."
-        ),
-    ] = "tcpin:127.0.0.1:5760",
-    home: Annotated[
-        str, typer.Option(metavar="LAT,LON[,HEADING]", help="Where the rover stands and looks at first.")
-    ] = "40.071374,-105.229930,0",
-    fence: Annotated[Path | None, typer.Option(help="Fence file stored in the rover.")] = None,
-    mission: Annotated[
-        Path | None,
-        typer.Option(help="Mission file stored in the rover; its home, if it has one, is not used."),
-    ] = None,
-    param: Annotated[
-        list[str] | None, typer.Option(metavar="NAME=VALUE", help="A parameter that differs; repeatable.")
-    ] = None,
-    speedup: Annotated[
-        float, typer.Option(metavar="X", parser=within(0.01, 1000.0), help="How many times faster than real.")
-    ] = 1.0,
-    loss: Annotated[
-        float, typer.Option(metavar="P", parser=within(0.0, 1.0), help="Share of frames lost, each way.")
-    ] = 0.0,
-    duplicate: Annotated[
-        float, typer.Option(metavar="P", parser=within(0.0, 1.0), help="Share of frames that come twice.")
-    ] = 0.0,
-    latency: Annotated[
-        float,
-        typer.Option(
-            metavar="S", parser=within(0.0, MOST_S, "seconds"), help="Seconds each frame is late, each way."
-        ),
-    ] = 0.0,
-    jitter: Annotated[
-        float,
-        typer.Option(
-            metavar="S", parser=within(0.0, MOST_S, "seconds"), help="Up to so many seconds more, at random."
-        ),
-    ] = 0.0,
-    seed: Annotated[int, typer.Option(min=-MOST_SEED, max=MOST_SEED, help="Seed of the link's faults.")] = 0,
-    system: Annotated[int, typer.Option(min=1, max=255, help="MAVLink system id.")] = 1,
-    json_output: JsonOption = False,
-    quiet: QuietOption = False,
-) -> None:
-    """Run a simulated rover until Ctrl-C.
-
-    It answers MAVLink 2 as ArduPilot Rover does: missions, fences, rally points, parameters, modes, arming; it drives AUTO and GUIDED.
-    Prints the connection string to open as soon as it listens.
-
-    For example:
-
-    `pbpp sim --fence field.plan --home 40.0713,-105.2299`
-
-    `pbpp sim --listen udpout:127.0.0.1:14550 --loss 0.1 --latency 0.2`
-    """
-    del quiet  # one line is all there is to print
-    import signal  # noqa: PLC0415 - with the other imports below: a usage error need not wait for them
-    import threading  # noqa: PLC0415
-
-    from mavlink_bridge.errors import LinkError  # noqa: PLC0415
-    from mavlink_bridge.simulator.faults import Faults  # noqa: PLC0415
-    from mavlink_bridge.simulator.shell import Simulator  # noqa: PLC0415
-
-    config = _config(home, fence, mission, param or [], system)
-    faults = Faults(loss=loss, duplicate=duplicate, latency_s=latency, jitter_s=jitter)
+def sim(options: SimOptions) -> None:
+    """Run the rover until a signal; the one line that is printed, its connection, stands with ``-q`` too."""
+    config = _config(options)
+    faults = Faults(
+        loss=options.loss, duplicate=options.duplicate, latency_s=options.latency, jitter_s=options.jitter
+    )
     stop = threading.Event()
     try:
-        simulator = Simulator(config, listen, faults, speedup, seed)
+        simulator = Simulator(config, options.listen, faults, options.speedup, options.seed)
     except LinkError as error:
         raise typer.BadParameter(str(error), param_hint="--listen") from None
     with simulator:
         for name in ("SIGINT", "SIGTERM", "SIGBREAK"):  # the last is Ctrl-Break on Windows
             if hasattr(signal, name):
                 signal.signal(getattr(signal, name), lambda *_: stop.set())
-        if json_output:
+        if options.json_output:
             print_json({"status": "ok", "command": "sim", "connection": simulator.connection})
         else:
             echo(simulator.connection)
@@ -104,21 +48,15 @@ def sim(
             pass
 
 
-def _config(
-    home: str, fence: Path | None, mission: Path | None, params: list[str], system: int
-) -> SimulatorConfig:
-    from mavlink_bridge.simulator.config import SimulatorConfig  # noqa: PLC0415
-    from missions.fence import fence_to_items  # noqa: PLC0415
-    from missions.formats import read_fence, read_mission  # noqa: PLC0415
-
-    position, heading_deg = _parse_home(home)
+def _config(options: SimOptions) -> SimulatorConfig:
+    position, heading_deg = _parse_home(options.home)
     return SimulatorConfig(
-        system=system,
+        system=options.system,
         home=position,
         heading_deg=heading_deg,
-        fence=fence_to_items(read_fence(fence)) if fence else (),
-        mission=tuple(read_mission(mission).items) if mission else (),
-        parameters=dict(_parse_parameter(text) for text in params),
+        fence=fence_to_items(read_fence(options.fence)) if options.fence else (),
+        mission=tuple(read_mission(options.mission).items) if options.mission else (),
+        parameters=dict(_parse_parameter(text) for text in options.param),
     )
 
 
@@ -133,8 +71,6 @@ def _parse_home(text: str) -> tuple[LatLon, float]:
 
 
 def _parse_parameter(text: str) -> tuple[str, float]:
-    from mavlink_bridge.simulator.parameters import DEFAULTS  # noqa: PLC0415
-
     name, equals, value = text.partition("=")
     if not equals:
         raise typer.BadParameter(f"{text!r} is not NAME=VALUE", param_hint="--param")

@@ -21,9 +21,6 @@ from missions.harmless import harmless
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from rich.console import Console
-    from rich.text import Text
-
 
 def says_no_colour() -> bool:
     """Return whether the user wants no colour (https://no-color.org), or the terminal has none."""
@@ -61,20 +58,6 @@ def print_json(document: Mapping[str, object]) -> None:
     """Put a JSON document on stdout, in ASCII; numbers that JSON has not become null."""
     text = json.dumps(_plain(document), allow_nan=False)  # which lets one control character through: DEL
     sys.stdout.write(text.replace("\x7f", "\\u007f") + "\n")
-
-
-def console(*, err: bool = False) -> Console:
-    """Return a console for what rich draws; every text from outside goes into it as a `cell`."""
-    from rich.console import Console  # noqa: PLC0415 - quick help
-
-    return Console(stderr=err, highlight=False, markup=False)
-
-
-def cell(text: object, style: str = "") -> Text:
-    """Return what rich shows of a text: as it stands, without markup and without control characters; a cell as it is."""
-    from rich.text import Text  # noqa: PLC0415 - quick help
-
-    return text if isinstance(text, Text) else Text(harmless(str(text)), style=style)
 
 
 def _put(line: str, colour: str | None, *, is_error: bool, nl: bool = True) -> None:

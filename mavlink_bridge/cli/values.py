@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import typer
 
 from mavlink_bridge.errors import UsageError
+from missions.errors import InvalidPositionError
+from missions.geo import parse_lat_lon
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -118,9 +120,6 @@ def position_from(option: str, text: str) -> LatLon:
     UsageError
         Not such a value.
     """
-    from missions.errors import InvalidPositionError  # noqa: PLC0415 - quick help
-    from missions.geo import parse_lat_lon  # noqa: PLC0415
-
     try:
         return parse_lat_lon(text)
     except InvalidPositionError as error:

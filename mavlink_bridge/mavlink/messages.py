@@ -104,6 +104,14 @@ class Message:
 
 
 @dataclass(frozen=True, slots=True)
+class Addressed(Message):
+    """A message that begins with whom it is for."""
+
+    target_system: int
+    target_component: int
+
+
+@dataclass(frozen=True, slots=True)
 class Heartbeat(Message):
     """HEARTBEAT (0)."""
 
@@ -134,21 +142,16 @@ class SetMode(Message):
 
 
 @dataclass(frozen=True, slots=True)
-class ParamRequestRead(Message):
+class ParamRequestRead(Addressed):
     """PARAM_REQUEST_READ (20); ``param_index`` -1 asks by name."""
 
-    target_system: int
-    target_component: int
     param_id: str
     param_index: int = -1
 
 
 @dataclass(frozen=True, slots=True)
-class ParamRequestList(Message):
+class ParamRequestList(Addressed):
     """PARAM_REQUEST_LIST (21)."""
-
-    target_system: int
-    target_component: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,11 +166,9 @@ class ParamValue(Message):
 
 
 @dataclass(frozen=True, slots=True)
-class ParamSet(Message):
+class ParamSet(Addressed):
     """PARAM_SET (23)."""
 
-    target_system: int
-    target_component: int
     param_id: str
     param_value: float
     param_type: int
@@ -203,22 +204,18 @@ class GlobalPositionInt(Message):
 
 
 @dataclass(frozen=True, slots=True)
-class MissionWritePartialList(Message):
+class MissionWritePartialList(Addressed):
     """MISSION_WRITE_PARTIAL_LIST (38)."""
 
-    target_system: int
-    target_component: int
     start_index: int
     end_index: int
     mission_type: int = 0
 
 
 @dataclass(frozen=True, slots=True)
-class MissionItem(Message):
+class MissionItem(Addressed):
     """MISSION_ITEM (39), the old form with float degrees in ``x`` and ``y``."""
 
-    target_system: int
-    target_component: int
     seq: int
     frame: int
     command: int
@@ -235,21 +232,17 @@ class MissionItem(Message):
 
 
 @dataclass(frozen=True, slots=True)
-class MissionRequest(Message):
+class MissionRequest(Addressed):
     """MISSION_REQUEST (40)."""
 
-    target_system: int
-    target_component: int
     seq: int
     mission_type: int = 0
 
 
 @dataclass(frozen=True, slots=True)
-class MissionSetCurrent(Message):
+class MissionSetCurrent(Addressed):
     """MISSION_SET_CURRENT (41)."""
 
-    target_system: int
-    target_component: int
     seq: int
 
 
@@ -267,30 +260,24 @@ class MissionCurrent(Message):
 
 
 @dataclass(frozen=True, slots=True)
-class MissionRequestList(Message):
+class MissionRequestList(Addressed):
     """MISSION_REQUEST_LIST (43)."""
 
-    target_system: int
-    target_component: int
     mission_type: int = 0
 
 
 @dataclass(frozen=True, slots=True)
-class MissionCount(Message):
+class MissionCount(Addressed):
     """MISSION_COUNT (44)."""
 
-    target_system: int
-    target_component: int
     count: int
     mission_type: int = 0
 
 
 @dataclass(frozen=True, slots=True)
-class MissionClearAll(Message):
+class MissionClearAll(Addressed):
     """MISSION_CLEAR_ALL (45)."""
 
-    target_system: int
-    target_component: int
     mission_type: int = 0
 
 
@@ -302,21 +289,17 @@ class MissionItemReached(Message):
 
 
 @dataclass(frozen=True, slots=True)
-class MissionAck(Message):
+class MissionAck(Addressed):
     """MISSION_ACK (47)."""
 
-    target_system: int
-    target_component: int
     type: int
     mission_type: int = 0
 
 
 @dataclass(frozen=True, slots=True)
-class MissionRequestInt(Message):
+class MissionRequestInt(Addressed):
     """MISSION_REQUEST_INT (51)."""
 
-    target_system: int
-    target_component: int
     seq: int
     mission_type: int = 0
 
@@ -332,22 +315,18 @@ class NavControllerOutput(Message):
 
 
 @dataclass(frozen=True, slots=True)
-class RequestDataStream(Message):
+class RequestDataStream(Addressed):
     """REQUEST_DATA_STREAM (66)."""
 
-    target_system: int
-    target_component: int
     req_stream_id: int
     req_message_rate: int
     start_stop: int
 
 
 @dataclass(frozen=True, slots=True)
-class MissionItemInt(Message):
+class MissionItemInt(Addressed):
     """MISSION_ITEM_INT (73)."""
 
-    target_system: int
-    target_component: int
     seq: int
     frame: int
     command: int
@@ -374,11 +353,9 @@ class VfrHud(Message):
 
 
 @dataclass(frozen=True, slots=True)
-class CommandInt(Message):
+class CommandInt(Addressed):
     """COMMAND_INT (75)."""
 
-    target_system: int
-    target_component: int
     frame: int
     command: int
     param1: float = 0.0
@@ -393,11 +370,9 @@ class CommandInt(Message):
 
 
 @dataclass(frozen=True, slots=True)
-class CommandLong(Message):
+class CommandLong(Addressed):
     """COMMAND_LONG (76)."""
 
-    target_system: int
-    target_component: int
     command: int
     confirmation: int = 0
     param1: float = 0.0
@@ -538,6 +513,6 @@ def wire_name(message_class: type[Message]) -> str:
 MESSAGES: dict[str, type[Message]] = {
     wire_name(cls): cls
     for cls in list(vars().values())
-    if isinstance(cls, type) and issubclass(cls, Message) and cls is not Message
+    if isinstance(cls, type) and issubclass(cls, Message) and cls not in (Message, Addressed)
 }
 """Every message this project speaks, by its MAVLink name."""

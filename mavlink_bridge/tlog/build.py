@@ -7,13 +7,16 @@ log. Here the fields are set column by column through the slots' own descriptors
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import fields
 from itertools import repeat
 from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-_T = TypeVar("_T")
+    from _typeshed import DataclassInstance
+
+_T = TypeVar("_T", bound="DataclassInstance")
 
 
 def build(cls: type[_T], columns: Sequence[Sequence[Any]]) -> list[_T]:
@@ -31,7 +34,6 @@ def build(cls: type[_T], columns: Sequence[Sequence[Any]]) -> list[_T]:
     list of objects of the class
     """
     objects = list(map(object.__new__, repeat(cls, len(columns[0]))))
-    names = cls.__dict__["__slots__"]
-    for name, column in zip(names, columns, strict=True):
-        deque(map(cls.__dict__[name].__set__, objects, column), maxlen=0)
+    for field, column in zip(fields(cls), columns, strict=True):
+        deque(map(getattr(cls, field.name).__set__, objects, column), maxlen=0)
     return objects

@@ -9,6 +9,8 @@ import os
 import secrets
 import shutil
 import stat
+import zipfile
+import zlib
 from contextlib import suppress
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -53,9 +55,6 @@ def read_text(path: Path) -> str:
 
 def _unzipped(path: Path) -> bytes:
     """Return the first KML of a zip file, as KMZ wants it."""
-    import zipfile  # noqa: PLC0415 - slow to come, only for these
-    import zlib  # noqa: PLC0415
-
     try:
         with zipfile.ZipFile(path) as archive:
             found = next((one for one in archive.infolist() if one.filename.lower().endswith(".kml")), None)

@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from pyproj import Proj
 
 from missions.errors import InvalidPositionError
 from missions.geo import LatLon, LocalPoint, rounded, wrap_lon_deg
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
-    from pyproj import Proj
 
 MAX_LATITUDE_DEG = 85.0
 """Beyond this the autopilot's flat frame is of no use."""
@@ -76,8 +76,6 @@ class LocalFrame:
 
     @cached_property
     def _proj(self) -> Proj:
-        from pyproj import Proj  # noqa: PLC0415 - 100 ms that a usage error need not wait for
-
         return Proj(proj="aeqd", ellps="WGS84", lat_0=self.origin.lat_deg, lon_0=self.origin.lon_deg)
 
     def to_local(self, position: LatLon) -> LocalPoint:

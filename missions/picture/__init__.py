@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from missions.errors import MissionFormatError
 from missions.formats.files import write_file
 from missions.picture.scene import Scene
+from missions.picture.sketch import sketch
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -120,6 +121,4 @@ def sketch_plan(
     str
         Lines of at most that width.
     """
-    from missions.picture.sketch import sketch  # noqa: PLC0415 - only for terminals
-
     return sketch(Scene(plan, track), columns=columns, encoding=encoding)

@@ -154,7 +154,7 @@ def test_a_live_vehicle_is_asked(fields, yard, streams):
 
 
 def test_what_a_live_vehicle_does_not_tell_is_said(fields, yard, monkeypatch):
-    monkeypatch.setattr("mavlink_bridge.cli.check._TELEMETRY_PATIENCE_S", 0.5)
+    monkeypatch.setattr("mavlink_bridge.cli.check_on_link._TELEMETRY_PATIENCE_S", 0.5)
     config = SimulatorConfig(
         home=HOME,
         fence=fence_to_items(read_fence(fields / "yard-fence.waypoints")),

@@ -26,10 +26,20 @@ def loaded_after(*arguments: object) -> set[str]:
     return set(done.stderr.splitlines()[-1].split())
 
 
+LIBRARIES = {"numpy", "shapely", "pyproj", "pymavlink", "serial", "missions.formats"}
+RUNNERS = {f"mavlink_bridge.cli.{name}" for name in COMMANDS}
+
+
 def test_help_loads_no_command_and_no_library():
     loaded = loaded_after("--help")
-    assert not {"numpy", "shapely", "pyproj", "pymavlink", "serial", "platformdirs", "tomllib"} & loaded
-    assert not {f"mavlink_bridge.cli.{name}" for name in COMMANDS} & loaded
+    assert not (LIBRARIES | RUNNERS | {"platformdirs", "tomllib"}) & loaded
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_of_a_command_loads_its_options_alone(name):
+    loaded = loaded_after(name, "--help")
+    assert f"mavlink_bridge.cli.options.{name}" in loaded
+    assert not (LIBRARIES | RUNNERS) & loaded
 
 
 def test_a_plan_of_a_file_loads_no_link_and_no_picture(fields):

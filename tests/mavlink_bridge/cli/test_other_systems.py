@@ -21,6 +21,7 @@ from mavlink_bridge.cli import failing
 from mavlink_bridge.cli import keyboard as keyboard_module
 from mavlink_bridge.cli.app import app
 from mavlink_bridge.cli.keyboard import Keyboard
+from mavlink_bridge.cli.options.bridge import BridgeOptions
 from mavlink_bridge.cli.options_file import user_file
 from mavlink_bridge.errors import LinkError
 from mavlink_bridge.link import parse_connection
@@ -84,7 +85,7 @@ def test_a_signal_that_windows_has_not_is_not_asked_for(monkeypatch):
     monkeypatch.delattr(signal, "SIGBREAK", raising=False)
     monkeypatch.setattr(signal, "signal", lambda number, _handler: handled.append(number))
     with pytest.raises(LinkError, match="connection 'nonsense': expected udpin:"):
-        bridge_command.bridge(connect="nonsense")
+        bridge_command.bridge(BridgeOptions(connect="nonsense"))
     assert handled == []
 
 

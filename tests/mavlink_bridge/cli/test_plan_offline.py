@@ -14,9 +14,9 @@ from pyproj import Proj
 from shapely import LineString, Point, Polygon
 from typer.testing import CliRunner
 
-from mavlink_bridge.cli import common
 from mavlink_bridge.cli import plan as plan_command
 from mavlink_bridge.cli.app import app
+from mavlink_bridge.cli.failing import exit_code_of
 from missions.errors import FenceError, PlanCheckError
 from missions.fence import CircleZone, Fence, ZoneKind
 from missions.formats import read_fence, read_mission, read_situation
@@ -238,6 +238,17 @@ class TestFiles:
         assert all(line.startswith("warning: ") for line in result.stderr.splitlines())
         quiet = run("--fence", fields / "yard-fence.waypoints", "--start", START, "--target", TARGET, "-q")
         assert (quiet.exit_code, quiet.stdout) == (0, "")
+
+    def test_quiet_leaves_warnings_and_quieter_only_errors(self, fields: Path) -> None:
+        words = ("--fence", fields / "yard-fence.waypoints", "--start", START, "--target")
+        assert "warning: " in run(*words, TARGET, "-q").stderr
+        for quieter in (["-qq"], ["-q", "--quiet"]):
+            result = run(*words, TARGET, *quieter)
+            assert (result.exit_code, result.stdout, result.stderr) == (0, "", "")
+        refused = run(*words, "41,-105", "-qq")
+        assert refused.exit_code != 0
+        assert refused.stderr.startswith("error: ")
+        assert json.loads(run(*words, TARGET, "--json", "-qq").stdout)["warnings"]
 
     def test_a_plan_file_holds_mission_and_fence_and_plans_again(
         self, fields: Path, tmp_path: Path, drawn: tuple
@@ -537,8 +548,8 @@ def test_an_interrupt(fields: Path, monkeypatch) -> None:
 
 
 def test_every_error_has_its_exit_code() -> None:
-    assert common.exit_code_of(PlanCheckError("x")) == 1
-    assert common.exit_code_of(FenceError("x")) == 3
+    assert exit_code_of(PlanCheckError("x")) == 1
+    assert exit_code_of(FenceError("x")) == 3
 
 
 class TestAsAProcess:

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 from mavlink_bridge.cli.bridge_view import LiveView
+from mavlink_bridge.cli.failing import begin_telling
 from mavlink_bridge.cli.opening import Opening
 from mavlink_bridge.cli.typed import CONFIRM, understood
 from mavlink_bridge.director import Director, Orders, State
@@ -162,6 +163,15 @@ def test_the_view_goes_on_while_the_link_is_opened_again():
         shell.run(None, 30.0)
     assert "tcp:127.0.0.1:1 cannot be opened" in watcher.link_trouble
     assert watcher.notes[-1] == f"link: {watcher.link_trouble}"
+
+
+@pytest.mark.parametrize(("quiet", "shown"), [(0, "nw"), (1, "w"), (2, "")])
+def test_notes_beside_the_events_heed_quiet(quiet, shown, capsys):
+    begin_telling("bridge", quiet=quiet)
+    shell = bridge._Shell(Director(Orders()), "tcp:127.0.0.1:1", lambda _event: None, None, None)
+    shell._note("n", is_warning=False)
+    shell._note("w", is_warning=True)
+    assert capsys.readouterr().err.replace("\n", "") == shown
 
 
 def test_time_goes_on_while_opening_takes_long():

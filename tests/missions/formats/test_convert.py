@@ -9,8 +9,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from mavlink_bridge.cli.common import guarded
-from mavlink_bridge.cli.convert import convert
+from mavlink_bridge.cli.common import command_of
 from missions.formats import read_fence, read_mission, read_parameters, read_situation
 
 if TYPE_CHECKING:
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
     from click.testing import Result
 
 app = typer.Typer(pretty_exceptions_enable=False)
-app.command()(guarded(convert))
+app.command()(command_of("convert"))
 
 
 def run(*arguments: object) -> Result:

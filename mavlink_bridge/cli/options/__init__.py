@@ -1,0 +1,1 @@
+"""What each command can be asked for: one module a command, which help needs and nothing more."""

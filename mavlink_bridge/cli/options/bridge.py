@@ -1,0 +1,90 @@
+"""The options of ``pbpp bridge``, and its help."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mavlink_bridge.cli.options.shared import (
+    AnyVehicleOption,
+    CommonOptions,
+    RequiredConnectOption,
+    SigningKeyOption,
+    SystemOption,
+    TimeoutOption,
+)
+from mavlink_bridge.cli.values import MOST_M, within
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BridgeOptions(CommonOptions):
+    """Run beside the autopilot: read fences, state and targets from the stream, keep a plan, upload it verified, watch the drive.
+
+    Type targets as `LAT,LON`; `yes` confirms a plan. Without `--upload` it only reports.
+
+    For example:
+
+    `pbpp bridge --connect udpin:0.0.0.0:14550`
+
+    `pbpp bridge --connect /dev/ttyAMA0,921600 --upload --drive --log run.tlog --json`
+    """
+
+    connect: RequiredConnectOption
+    target: Annotated[
+        list[str],
+        typer.Option(metavar="LAT,LON", help="The first target; more can be typed or clicked."),
+    ] = field(default_factory=list)
+    target_from: Annotated[
+        list[str],
+        typer.Option(
+            metavar="SOURCE",
+            help="typed, reposition, position-target, guided-item, mission, rally or echo; repeatable.",
+        ),
+    ] = field(default_factory=list)
+    clearance: Annotated[
+        str | None, typer.Option(metavar="M|max", help="Promised while driving. Default: from FENCE_MARGIN.")
+    ] = None
+    corner_allowance: Annotated[str, typer.Option(metavar="M|auto", help="Room for cut corners on top.")] = (
+        "auto"
+    )
+    snap: Annotated[
+        float,
+        typer.Option(
+            metavar="M", parser=within(0.0, MOST_M, "metres"), help="Move blocked targets to free ground."
+        ),
+    ] = 0.0
+    vehicle: Annotated[
+        Path | None, typer.Option(metavar="FILE.parm", help="Parameters that the vehicle does not report.")
+    ] = None
+    upload: Annotated[bool, typer.Option("--upload", help="Write missions to the vehicle.")] = False
+    drive: Annotated[
+        bool,
+        typer.Option(
+            "--drive",
+            help="With --upload: switch modes, HOLD before a new route and after arrival, AUTO for a verified one.",
+        ),
+    ] = False
+    arm: Annotated[bool, typer.Option("--arm", help="With --drive: arm before AUTO.")] = False
+    confirm: Annotated[bool, typer.Option("--confirm", help="Upload a plan only after a typed yes.")] = False
+    once: Annotated[bool, typer.Option("--once", help="End after one job.")] = False
+    log: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.tlog",
+            help="Record both directions, and a journal beside it; a restart goes on in run.2.tlog, run.3.tlog …",
+        ),
+    ] = None
+    system: SystemOption = None
+    any_vehicle: AnyVehicleOption = False
+    source_system: Annotated[
+        int | None,
+        typer.Option(metavar="N", min=1, max=255, help="Our system id. Default: the vehicle's own."),
+    ] = None
+    source_component: Annotated[int, typer.Option(metavar="N", min=1, max=255, help="Our component id.")] = (
+        195
+    )
+    signing_key: SigningKeyOption = None
+    timeout: TimeoutOption = 30.0

@@ -1,0 +1,82 @@
+"""The options of ``pbpp check``, and its help."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mavlink_bridge.cli.options.shared import (
+    OUTPUT_PANEL,
+    VEHICLE_PANEL,
+    ConnectOption,
+    GpsOption,
+    HomeOption,
+    LengthOption,
+    LinkOptions,
+    PositionErrorOption,
+    ReserveOption,
+    WidthOption,
+)
+from mavlink_bridge.cli.values import MOST_M, within
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CheckOptions(LinkOptions):
+    """Check every leg of a mission, whoever wrote it: what it keeps to the fence drawn and driven. Exit 8 if one breaks the promise.
+
+    For example:
+
+    `pbpp check --mission mission.waypoints --fence fence.waypoints --clearance 2`
+
+    `pbpp check --mission field.plan --vehicle rover.parm --plot check.png`
+
+    `pbpp check --log field.tlog`
+    """
+
+    mission: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Mission file: .plan, .waypoints, …")
+    ] = None
+    fence: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Fence file; not needed where --mission holds one.")
+    ] = None
+    log: Annotated[
+        Path | None, typer.Option(metavar="FILE.tlog", help="Recorded log, for what no file is given for.")
+    ] = None
+    connect: ConnectOption = None
+    start: Annotated[
+        str | None,
+        typer.Option(metavar="LAT,LON", help="Default: the vehicle's position; of files and logs home."),
+    ] = None
+    home: HomeOption = None
+    vehicle: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.parm",
+            help="Parameters that the log or link does not have.",
+            rich_help_panel=VEHICLE_PANEL,
+        ),
+    ] = None
+    clearance: Annotated[
+        float | None,
+        typer.Option(
+            metavar="M",
+            parser=within(0.0, MOST_M, "metres"),
+            help="To be kept by each leg while driving. Default: from FENCE_MARGIN.",
+        ),
+    ] = None
+    plot: Annotated[
+        list[Path],
+        typer.Option(
+            metavar="FILE",
+            help="Draw it: .png, .svg, .pdf, .html; - in the terminal.",
+            rich_help_panel=OUTPUT_PANEL,
+        ),
+    ] = field(default_factory=list)
+    reserve: ReserveOption = 0.0
+    position_error: PositionErrorOption = None
+    length: LengthOption = 0.0
+    width: WidthOption = 0.0
+    gps: GpsOption = "0,0"

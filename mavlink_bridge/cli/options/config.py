@@ -1,0 +1,30 @@
+"""The options of ``pbpp config``, and its help."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import typer
+
+from mavlink_bridge.cli.options.shared import CommonOptions
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConfigOptions(CommonOptions):
+    """Show where the file of your options lies, what it sets, and which environment variables count.
+
+    The command line counts most, then `--config FILE`, then your own file, then the defaults in `--help`.
+
+    For example:
+
+    `pbpp config`
+
+    `pbpp config --config bridge.toml --json`
+
+    `pbpp config --template`
+    """
+
+    template: Annotated[
+        bool, typer.Option("--template", help="Print an example file, to be saved where yours belongs.")
+    ] = False

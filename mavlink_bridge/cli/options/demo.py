@@ -1,0 +1,29 @@
+"""The options of ``pbpp demo``, and its help."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mavlink_bridge.cli.options.shared import CommonOptions
+from mavlink_bridge.cli.values import within
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DemoOptions(CommonOptions):
+    """Show the whole loop: simulated rover, fence, target, plan, upload, verify, drive, picture, report."""
+
+    out: Annotated[
+        Path, typer.Option(metavar="DIR", help="Where the picture, the mission and the log go.")
+    ] = Path("demo-out")
+    speedup: Annotated[
+        float,
+        typer.Option(
+            metavar="X",
+            parser=within(1.0, 20.0),
+            help="Simulated time runs so much faster, where the computer keeps up.",
+        ),
+    ] = 4.0

@@ -1,0 +1,29 @@
+"""The options of ``pbpp doctor``, and its help."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mavlink_bridge.cli.options.shared import CommonOptions
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DoctorOptions(CommonOptions):
+    """Look at this installation: versions, serial ports, options file, signing key, backups, and a plan with a known answer.
+
+    Nothing is opened and nothing is sent. Exit 8 if something is wrong.
+
+    For example:
+
+    `pbpp doctor`
+
+    `pbpp doctor --signing-key rover.key --json`
+    """
+
+    signing_key: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Look at this signing key and who may read it.")
+    ] = None

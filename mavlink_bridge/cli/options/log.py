@@ -1,0 +1,32 @@
+"""The options of ``pbpp log``, and its help."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mavlink_bridge.cli.options.shared import CommonOptions, SystemOption
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LogOptions(CommonOptions):
+    """Show what telemetry logs hold: who speaks, fences and missions transferred, targets, modes, the drive and its clearance.
+
+    Drives of a mission (AUTO) are graded: least clearance, deviation and time against the drive model's prediction.
+
+    For example:
+
+    `pbpp log flight.tlog --plot flight.png`
+
+    `pbpp log *.tlog --json`
+    """
+
+    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Telemetry logs: .tlog, .raw, .gz.")]
+    plot: Annotated[
+        list[Path],
+        typer.Option(metavar="FILE", help="Draw fence, track, mission and targets: .png, .svg, .pdf, .html."),
+    ] = field(default_factory=list)
+    system: SystemOption = None

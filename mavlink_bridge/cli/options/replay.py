@@ -1,0 +1,70 @@
+"""The options of ``pbpp replay``, and its help."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mavlink_bridge.cli.options.shared import AnyVehicleOption, CommonOptions, SystemOption
+from mavlink_bridge.cli.values import within
+
+MOST_SPEED = 1e6
+"""A day of a log in a tenth of a second: faster than any computer."""
+
+MOST_JOBS = 1024  # chosen: more processes than any computer has cores are a mistake in typing
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReplayOptions(CommonOptions):
+    """Run the bridge's director over recorded logs, in their own time: what it saw, what it would have planned.
+
+    A log that `pbpp bridge --log` recorded is replayed with its journal: the same decisions come again. Over other logs the director only listens.
+
+    For example:
+
+    `pbpp replay sitl_logs/guided-maze.tlog`
+
+    `pbpp replay field.tlog --record; pbpp replay field.tlog --expect field.events.jsonl`
+
+    `pbpp replay field.tlog --send udpout:127.0.0.1:14550`
+    """
+
+    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Recorded telemetry logs (.tlog).")]
+    expect: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="JSON lines of the events that are expected, or a folder with each log's .events.jsonl; exit 8 if others come.",
+        ),
+    ] = None
+    record: Annotated[
+        bool, typer.Option("--record", help="Write the events beside each log, as its .events.jsonl.")
+    ] = False
+    send: Annotated[
+        str | None,
+        typer.Option(metavar="CONNECTION", help="Play the vehicle's side of one log to a live client."),
+    ] = None
+    speed: Annotated[
+        float | None,
+        typer.Option(
+            metavar="X",
+            parser=within(0.0, MOST_SPEED, above=True),
+            help="Times the log's own speed. Default: as fast as it goes; 1 with --send.",
+        ),
+    ] = None
+    jobs: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N",
+            min=1,
+            max=MOST_JOBS,
+            help="Logs replayed side by side. Default: as many as there are processors.",
+        ),
+    ] = None
+    clearance: Annotated[str | None, typer.Option(metavar="M|max", help="As for plan.")] = None
+    corner_allowance: Annotated[str, typer.Option(metavar="M|auto", help="As for plan.")] = "auto"
+    system: SystemOption = None
+    any_vehicle: AnyVehicleOption = False

@@ -1,0 +1,186 @@
+"""Options that several commands have, each written once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mavlink_bridge.cli.options_file import take_options
+from mavlink_bridge.cli.values import MOST_M, MOST_S, MOST_VEHICLE_M, within
+
+LINK_PANEL, OUTPUT_PANEL, VEHICLE_PANEL = "Link", "Output", "Vehicle"
+"""How help groups what many commands have."""
+
+ConnectOption = Annotated[
+    str | None,
+    typer.Option(
+        "--connect",
+        metavar="CONNECTION",
+        help="A live link: udpin:0.0.0.0:14550, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:…, /dev/ttyACM0[,BAUD], COM7[,BAUD].",
+    ),
+]
+SystemOption = Annotated[
+    int | None,
+    typer.Option(
+        "--system",
+        metavar="N",
+        min=1,
+        max=255,
+        help="Which vehicle, when several are heard.",
+        rich_help_panel=LINK_PANEL,
+    ),
+]
+TimeoutOption = Annotated[
+    float,
+    typer.Option(
+        metavar="S",
+        parser=within(0.1, MOST_S, "seconds"),
+        help="How long to wait for the vehicle.",
+        rich_help_panel=LINK_PANEL,
+    ),
+]
+AnyVehicleOption = Annotated[
+    bool,
+    typer.Option(
+        "--any-vehicle", help="Take vehicles that are neither rover nor boat too.", rich_help_panel=LINK_PANEL
+    ),
+]
+RequiredConnectOption = Annotated[
+    str,
+    typer.Option(
+        "--connect",
+        metavar="CONNECTION",
+        help="udpin:0.0.0.0:14550, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:…, /dev/ttyACM0[,BAUD], COM7[,BAUD].",
+    ),
+]
+SigningKeyOption = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="Sign with this key: 32 bytes, hex, base64, or a passphrase."),
+]
+ReserveOption = Annotated[
+    float,
+    typer.Option(
+        metavar="M",
+        parser=within(0.0, MOST_M, "metres"),
+        help="Added to the clearance, for wind and slip.",
+        rich_help_panel=VEHICLE_PANEL,
+    ),
+]
+PositionErrorOption = Annotated[
+    float | None,
+    typer.Option(
+        metavar="M",
+        parser=within(0.0, MOST_M, "metres"),
+        help="Error of the vehicle's position, added to the clearance. Default: from its fix type.",
+        rich_help_panel=VEHICLE_PANEL,
+    ),
+]
+HomeOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="LAT,LON",
+        help="Home, if the source has none: start, return and centre of FENCE_RADIUS.",
+    ),
+]
+LengthOption = Annotated[
+    float,
+    typer.Option(
+        metavar="M",
+        parser=within(0.0, MOST_VEHICLE_M, "metres"),
+        help="The vehicle's length, tools included.",
+        rich_help_panel=VEHICLE_PANEL,
+    ),
+]
+WidthOption = Annotated[
+    float,
+    typer.Option(
+        metavar="M",
+        parser=within(0.0, MOST_VEHICLE_M, "metres"),
+        help="The vehicle's width, tools included.",
+        rich_help_panel=VEHICLE_PANEL,
+    ),
+]
+GpsOption = Annotated[
+    str,
+    typer.Option(
+        metavar="FORWARD,RIGHT",
+        help="The GPS antenna from the middle of the vehicle, metres.",
+        rich_help_panel=VEHICLE_PANEL,
+    ),
+]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CommonOptions:
+    """What every command has."""
+
+    json_output: Annotated[
+        bool, typer.Option("--json", help="One JSON document on stdout.", rich_help_panel=OUTPUT_PANEL)
+    ] = False
+    quiet: Annotated[
+        int,
+        typer.Option(
+            "--quiet",
+            "-q",
+            count=True,
+            metavar="",
+            show_default=False,
+            help="No progress and no report; -qq: no warnings either, only errors.",
+            rich_help_panel=OUTPUT_PANEL,
+        ),
+    ] = 0
+    config: Annotated[
+        Path | None,
+        typer.Option(
+            "--config",
+            metavar="FILE.toml",
+            is_eager=True,
+            callback=take_options,
+            help="Options from a file; options given here override it. See `pbpp config`.",
+            rich_help_panel=OUTPUT_PANEL,
+        ),
+    ] = None
+    verbose: Annotated[
+        bool,
+        typer.Option(
+            "--verbose",
+            "-v",
+            help="Show more: details of errors, progress without a terminal.",
+            rich_help_panel=OUTPUT_PANEL,
+        ),
+    ] = False
+
+    @property
+    def is_silent(self) -> bool:
+        """Whether neither progress nor a report is printed."""
+        return self.json_output or self.quiet > 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinkOptions(CommonOptions):
+    """What commands have that speak to one vehicle, once."""
+
+    system: SystemOption = None
+    any_vehicle: AnyVehicleOption = False
+    source_system: Annotated[
+        int,
+        typer.Option(
+            metavar="N", min=1, max=255, help="The system id we speak as.", rich_help_panel=LINK_PANEL
+        ),
+    ] = 245
+    source_component: Annotated[
+        int,
+        typer.Option(
+            metavar="N", min=1, max=255, help="The component id we speak as.", rich_help_panel=LINK_PANEL
+        ),
+    ] = 190
+    signing_key: SigningKeyOption = None
+    timeout: TimeoutOption = 30.0
+
+    @property
+    def identity(self) -> tuple[int, int]:
+        """The system and component id that we speak as."""
+        return self.source_system, self.source_component

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from itertools import pairwise
+from typing import TYPE_CHECKING, Final
+
+from missions.geo import bearing_deg
 
 if TYPE_CHECKING:
     from missions.drive_model import Envelope
@@ -12,6 +15,8 @@ if TYPE_CHECKING:
     from missions.ground.ground import Ground
     from missions.items import MissionItem
     from missions.vehicle import Vehicle
+
+_TURN_DEG: Final = 1.0  # a smaller change of direction is a long line in pieces; chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +52,8 @@ class Plan:
         The band that the vehicle is predicted to stay in, and its times.
     home : LatLon or None
         For the mission's home item.
+    asked_targets : tuple of LatLon
+        The targets as they were asked for, before blocked ones were moved; empty where nobody asked for targets.
     """
 
     items: tuple[MissionItem, ...]
@@ -70,6 +77,16 @@ class Plan:
     envelope: Envelope
     home: LatLon | None
     warnings: tuple[str, ...]
+    asked_targets: tuple[LatLon, ...] = ()
+
+    @property
+    def turn_count(self) -> int:
+        """How often the drawn lines change their direction, at targets too."""
+        places = [
+            place for place, before in zip(self.path, (None, *self.path), strict=False) if place != before
+        ]
+        courses_deg = [bearing_deg(a, b) for a, b in pairwise(places)]
+        return sum(abs((b - a + 180) % 360 - 180) > _TURN_DEG for a, b in pairwise(courses_deg))
 
     def path_index(self, seq: int, after: int = 0) -> int:
         """Return which point of the path a mission item drives to; for a change of speed, the one that it is for.

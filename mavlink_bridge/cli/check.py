@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -23,6 +24,7 @@ from mavlink_bridge.cli.common import (
     progress_bar,
     warn,
 )
+from mavlink_bridge.cli.pictures import check_plots, draw
 from mavlink_bridge.cli.terminal import cell, console, echo
 from mavlink_bridge.cli.upload import SigningKeyOption
 from mavlink_bridge.cli.values import MOST_M, position_from, within
@@ -46,6 +48,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.mavlink.messages import Frame
     from missions.checking.check import CheckedLeg, MissionCheck
     from missions.items import MissionItem
+    from missions.picture.scene import PictureScene
     from missions.situation import Situation
 
 _TELEMETRY_PATIENCE_S = 5.0
@@ -117,9 +120,8 @@ def check(
     `pbpp check --log field.tlog`
     """
     plots = plot or []
-    _check_options(mission, log, connect, home, plots)
-    if json_output and Path("-") in plots:
-        raise UsageError("--plot - and --json both want the standard output; give a file to --plot")
+    _check_options(mission, log, connect, home)
+    check_plots(plots, json_output=json_output)
     from missions.checking.check import check_mission  # noqa: PLC0415
     from missions.request import Request  # noqa: PLC0415
 
@@ -152,7 +154,7 @@ def check(
     checked = check_mission(situation.mission.value, situation, replace(request, start=begin))
     warnings = [*unknown, *checked.warnings, *_storage_warnings(checked.mission.items, situation)]
     warn(warnings)
-    _draw(checked, situation, plots)
+    draw(partial(_scene, checked, situation), plots)
     if json_output:
         print_json(_document(checked, warnings, situation.system, plots))
     elif not quiet:
@@ -161,9 +163,7 @@ def check(
         raise typer.Exit(ExitCode.CHECK)
 
 
-def _check_options(
-    mission: Path | None, log: Path | None, connect: str | None, home: str | None, plots: list[Path]
-) -> None:
+def _check_options(mission: Path | None, log: Path | None, connect: str | None, home: str | None) -> None:
     """Find what cannot work before any work is done."""
     if mission is None and log is None and connect is None:
         raise UsageError("give a mission: --mission FILE, --log FILE.tlog or --connect CONNECTION")
@@ -171,11 +171,6 @@ def _check_options(
         raise UsageError("give one of --log and --connect")
     if home is not None and connect is not None:
         raise UsageError("--home goes with files and logs: a live vehicle tells its own home")
-    if plots:
-        from missions.picture import check_picture_format  # noqa: PLC0415 - quick help
-
-        for path in plots:
-            check_picture_format(path)
 
 
 def _storage_warnings(items: Sequence[MissionItem], situation: Situation) -> list[str]:
@@ -274,19 +269,19 @@ def _live_situation(address: Address, *, quiet: bool) -> tuple[Situation, list[s
     return found, unknown
 
 
-def _draw(checked: MissionCheck, situation: Situation, plots: list[Path]) -> None:
-    if not plots:
-        return
-    from mavlink_bridge.cli.plan_results import draw  # noqa: PLC0415 - quick help
-    from missions.checking.check import plan_of  # noqa: PLC0415
+def _scene(checked: MissionCheck, situation: Situation) -> PictureScene:
+    from missions.checking.check import plan_of  # noqa: PLC0415 - quick help
+    from missions.picture.plans import plan_scene  # noqa: PLC0415
 
-    broken = len(checked.broken)
-    title = (
-        f"{checked.length_m:.1f} m, about {checked.duration_s:.0f} s: "
-        + (f"{broken} of {len(checked.legs)} legs break" if broken else f"{len(checked.legs)} legs keep")
-        + f" {checked.clearance_m:g} m"
+    count, broken = len(checked.legs), len(checked.broken)
+    verdict = (
+        f"FAIL: {broken} of {count} legs {'does' if broken == 1 else 'do'} not keep"
+        if broken
+        else f"all {count} legs keep"
     )
-    draw(plan_of(checked, situation), plots, title=title)
+    title = f"{checked.length_m:.1f} m, about {checked.duration_s:.0f} s\n{verdict} {checked.clearance_m:g} m while driving"
+    unsafe = {number: leg.at for number, leg in enumerate(checked.legs) if leg.breaks}
+    return plan_scene(plan_of(checked, situation), title=title, unsafe=unsafe)
 
 
 def _report(checked: MissionCheck, plots: list[Path]) -> None:

@@ -23,6 +23,7 @@ from mavlink_bridge.cli.common import (
     warn,
 )
 from mavlink_bridge.cli.permissions import check_permissions
+from mavlink_bridge.cli.pictures import check_plots
 from mavlink_bridge.cli.plan_request import ENDS, METHODS, ORDERS, request_from_options, with_tour
 from mavlink_bridge.cli.plan_results import Told, arrival_document, report_end
 from mavlink_bridge.cli.timed_plan import timed_plan
@@ -198,8 +199,7 @@ def plan(
     _check_options(fence, log, connect, upload=upload, outputs=outputs, plots=plots)
     if home is not None and connect is not None:
         raise UsageError("--home goes with --fence and --log: a live vehicle tells its own home")
-    if json_output and Path("-") in plots:
-        raise UsageError("--plot - and --json both want the standard output; give a file to --plot")
+    check_plots(plots, json_output=json_output)
     told = Told(outputs, plots, blocks=blocks, is_silent=json_output or quiet)
     if connect is not None:
         from mavlink_bridge.cli.live import plan_live  # noqa: PLC0415 - only with a link
@@ -287,11 +287,6 @@ def _check_options(
                 f"{path} cannot be written: there is no folder {path.parent}",
                 advice=f"make {path.parent} first, or choose another place",
             )
-    if plots:
-        from missions.picture import check_picture_format  # noqa: PLC0415 - quick help
-
-        for path in plots:
-            check_picture_format(path)
 
 
 def _offline_situation(

@@ -109,7 +109,7 @@ def replay(
     results = _replayed(logs, orders, speed, jobs, teller)
     if record:
         _record(results, quiet=quiet or json_output)
-    if not _is_as_expected(expected, results):
+    if not _is_as_expected(expected, results, quiet=quiet or json_output):
         raise typer.Exit(ExitCode.CHECK)
     if any(isinstance(result, LogError) for result in results.values()):
         raise typer.Exit(ExitCode.INPUT)
@@ -228,7 +228,7 @@ def _expected(logs: list[Path], expect: Path | None) -> dict[Path | None, list[_
     return {None: read_expectation(expect)}
 
 
-def _is_as_expected(expected: dict[Path | None, list[_Told]], results: _Results) -> bool:
+def _is_as_expected(expected: dict[Path | None, list[_Told]], results: _Results, *, quiet: bool) -> bool:
     from mavlink_bridge.replay.expectations import differences  # noqa: PLC0415 - quick help
 
     found = []
@@ -240,6 +240,9 @@ def _is_as_expected(expected: dict[Path | None, list[_Told]], results: _Results)
         say(line)
     if found:
         say("- expected, did not come; + came, not expected; ~ came otherwise")
+    elif expected and not quiet:
+        count = sum(map(len, expected.values()))
+        echo(f"As expected: all {count} events came" if count != 1 else "As expected: the one event came")
     return not found
 
 

@@ -94,6 +94,7 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
         speeds=lines.speeds,
         start=start,
         targets=reached,
+        asked_targets=targets,
         method=request.method,
         length_m=path_length_m(lines.path),
         straight_line_m=path_length_m((start, *targets)),

@@ -221,7 +221,8 @@ class _Search:
         names = _names([barrier.name for barrier in forbidding])
         raise StartBlockedError(
             f"the start is on forbidden ground ({self._position(start)}): {names}; "
-            f"free ground is {distance:.2f} m away, bearing {round(bearing) % 360}°, at {position}",
+            f"free ground is {distance:.2f} m away, bearing {round(bearing) % 360}°, at {position}"
+            f"{self.ground.common_ground_advice(point)}",
             fences=[barrier.name for barrier in forbidding],
             distance_m=round(distance, 3),
             bearing_deg=round(bearing, 1),
@@ -248,7 +249,8 @@ class _Search:
             names = [nearest.name] if nearest else []
             problem = f"the target is {metres(gap_m)} from {_names(names)}, nearer than {self.asked}"
         raise TargetBlockedError(
-            f"{problem}; the nearest free point is {distance:.2f} m away, bearing {round(bearing) % 360}°, at {position}",
+            f"{problem}; the nearest free point is {distance:.2f} m away, bearing {round(bearing) % 360}°, at {position}"
+            f"{self.ground.common_ground_advice(point)}",
             fences=names,
             clearance_m=round(self.clearance_m, 3),
             distance_m=round(distance, 3),

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from missions.picture.scene import PictureScene
 
 _WIDTH_IN = 8.0  # of a page's text
-_NARROWEST, _TALLEST = 0.45, 1.5
+_NARROWEST, _TALLEST = 0.45, 1.5  # height to width; what is narrower gets room beside it
 _DPI = 150  # 1,200 pixels across
 _TITLE_COLUMNS = 82  # of its font across the page
 _LINE_IN = 0.2  # of the title

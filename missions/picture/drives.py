@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from missions.geo import LatLon
+    from missions.ground.frame import LocalFrame
 
 _OTHERS = "other drives"
 
@@ -67,9 +68,6 @@ def drive_scene(
         raise MissionFormatError("there is nothing to draw: no fence, no track, no mission and no target")
     frame = frame_around(places)
     ground = lay_out(fence, frame, union=union, around=places)
-    names = list(dict.fromkeys(name for name, _ in parts))
-    own = names if len(names) <= MOST_LOOKS else names[: MOST_LOOKS - 1]
-    tracks = (Track(name if name in own else _OTHERS, frame.to_local_array(at)) for name, at in parts)
     items = [f"item {number}\n{at}" for number, at in mission]
     route = frame.to_local_array([at for _, at in mission])
     return PictureScene(
@@ -87,5 +85,12 @@ def drive_scene(
         targets=frame.to_local_array(targets),
         asked=np.full((len(targets), 2), np.nan) if targets else no_points(),
         target_texts=tuple(map(str, targets)),
-        tracks=tuple(tracks),
+        tracks=_tracks(parts, frame),
     )
+
+
+def _tracks(parts: Sequence[tuple[str, Sequence[LatLon]]], frame: LocalFrame) -> tuple[Track, ...]:
+    """Return the driven lines; those beyond what can be told apart under one name."""
+    names = list(dict.fromkeys(name for name, _ in parts))
+    own = names if len(names) <= MOST_LOOKS else names[: MOST_LOOKS - 1]
+    return tuple(Track(name if name in own else _OTHERS, frame.to_local_array(at)) for name, at in parts)

@@ -44,6 +44,7 @@ _ARROW = Outline([(-0.5, -0.5), (0.0, 0.6), (0.5, -0.5), (0.0, -0.2), (-0.5, -0.
 _ARROW_PT = 10.0
 _LEGEND_PT = 9.0  # of a marker in the legend, at most
 _SHORT_PX = 40.0  # a leg that is shorter has no arrow
+_MOST_ARROWS = 100  # chosen: more cannot be told apart
 
 
 def scene_image(scene: PictureScene, suffix: str) -> bytes:
@@ -135,9 +136,10 @@ def _draw_route(axes: Any, scene: PictureScene) -> None:  # noqa: ANN401
         look = {"color": style.UNSAFE, "linewidth": 2.8, "path_effects": _HALO, "zorder": 6.5}
         axes.plot(*route[leg : leg + 2].T, "-", label=None if count else "unsafe leg", **look)
     px_per_m = _WIDTH_IN * _DPI / (scene.bounds_m[2] - scene.bounds_m[0])
-    for leg, (a, b) in enumerate(pairwise(route)):
-        if math.dist(a, b) * px_per_m >= _SHORT_PX:
-            _draw_arrow(axes, a, b, style.UNSAFE if leg in scene.unsafe_legs else style.ROUTE)
+    long = [leg for leg, ends in enumerate(pairwise(route)) if math.dist(*ends) * px_per_m >= _SHORT_PX]
+    for leg in long[:: 1 + len(long) // _MOST_ARROWS]:
+        color = style.UNSAFE if leg in scene.unsafe_legs else style.ROUTE
+        _draw_arrow(axes, route[leg], route[leg + 1], color)
     points = np.array([point for _, point, _ in scene.waypoints])
     axes.plot(*points.T, "o", color="white", mec=style.ROUTE, markersize=4.5, zorder=7, label="waypoint")
     if scene.narrowest is not None:
@@ -163,9 +165,10 @@ def _draw_tracks(axes: Any, scene: PictureScene) -> None:  # noqa: ANN401
         width = max(1.4, 3.2 - 0.6 * names.index(track.name))
         axes.plot(*track.points.T, dashes, color=color, linewidth=width, zorder=8, label=label)
         drawn.add(track.name)
-    for count, mark in enumerate(scene.marks):
+    if scene.marks:
+        points = np.array([mark.point for mark in scene.marks])
         look = {"color": style.UNSAFE, "markersize": 8, "mew": 2.2, "path_effects": _HALO, "zorder": 8.5}
-        axes.plot(*mark.point, "x", label=None if count else scene.marks_name, **look)
+        axes.plot(*points.T, "x", label=scene.marks_name, **look)
 
 
 def _draw_ends(axes: Any, scene: PictureScene) -> None:  # noqa: ANN401

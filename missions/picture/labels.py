@@ -23,6 +23,7 @@ _FONT_SIZE = 8  # points
 _GAP_PX = 3.0  # around a name
 _MARKER_PX = 18.0  # radius kept free around start, targets and marks
 _WAYPOINT_PX = 6.0  # around a waypoint
+_MOST_NAMES = 100  # of one kind; chosen: more cannot be read
 _BOX = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.0}
 _SIDES = tuple((math.sin(turn), math.cos(turn)) for turn in np.array((2, 6, 4, 0, 1, 3, 5, 7)) * math.pi / 4)
 """Directions from a place to its name: straight beside it before over a corner."""
@@ -35,16 +36,17 @@ def place_labels(axes: Any, scene: PictureScene) -> None:  # noqa: ANN401 - matp
     if scene.narrowest is not None:
         middle = Point(scene.narrowest.ends.mean(axis=0))
         room.beside(middle, f"{scene.narrowest.width_m:.1f} m", "width", (10.0, 25.0, 45.0, 80.0))
-    for mark in scene.marks:
+    for mark in scene.marks[:_MOST_NAMES]:
         if mark.name:
             room.beside(Point(mark.point), harmless(mark.name), "mark", (10.0, 25.0))
-    named: set[tuple[float, float]] = set()
-    for number, point, _ in scene.waypoints:
-        if tuple(point) not in named:
-            named.add(tuple(point))
-            room.beside(Point(point), str(number), "number", (_WAYPOINT_PX, _MARKER_PX))
+    waypoints = list(
+        {tuple(point): (number, point) for number, point, _ in reversed(scene.waypoints)}.values()
+    )
+    for number, point in reversed(waypoints[:: 1 + len(waypoints) // _MOST_NAMES]):
+        room.beside(Point(point), str(number), "number", (_WAYPOINT_PX, _MARKER_PX))
     fences = shapely.union_all([scene.exclusions, scene.ground.edge, scene.inner_edges])
-    for zone, seen in scene.named_zones:
+    zones = sorted(scene.named_zones, key=lambda named: -named[1].area)
+    for zone, seen in zones[:_MOST_NAMES]:
         in_two_lines = zone.name.replace(" ", "\n", 1)
         is_inside = any(room.inside(seen, words) for words in (in_two_lines, zone.name))
         if not is_inside and zone.area.within(scene.frame):
@@ -66,8 +68,8 @@ class _Room:
         self._axes = axes
         self._m_per_px = 1 / abs(axes.transData.transform((1, 0))[0] - axes.transData.transform((0, 0))[0])
         self._frame = scene.frame
-        self._taken = [*self._lines(scene), scene.band]
-        shapely.prepare(self._taken)
+        self._lines = shapely.STRtree([*self._lines_of(scene), scene.band])
+        self._names: list[Polygon] = []
 
     def beside(
         self,
@@ -96,8 +98,8 @@ class _Room:
     def inside(self, area: BaseGeometry, words: str) -> bool:
         """Put a name into an area, if there is room."""
         text, size_m = self._text(words, "zone")
-        near = [shape for shape in self._taken if shape.intersects(area)]
-        free = area.buffer(-_GAP_PX * self._m_per_px).difference(shapely.union_all(near))
+        near = self._lines.geometries.take(self._lines.query(area))
+        free = area.buffer(-_GAP_PX * self._m_per_px).difference(shapely.union_all([*near, *self._names]))
         middle = _place(free, *size_m)
         if middle is None:
             text.remove()
@@ -114,13 +116,14 @@ class _Room:
         return text, (width_px * self._m_per_px, height_px * self._m_per_px)
 
     def _is_free(self, box: Polygon) -> bool:
-        return bool(self._frame.covers(box)) and not shapely.intersects(self._taken, box).any()
+        is_covered = len(self._lines.query(box, "intersects")) or any(map(box.intersects, self._names))
+        return bool(self._frame.covers(box)) and not is_covered
 
     def _put(self, text: Any, middle: Point, box: Polygon) -> None:  # noqa: ANN401
         text.set_position((middle.x, middle.y))
-        self._taken.append(box)
+        self._names.append(box)
 
-    def _lines(self, scene: PictureScene) -> Iterator[BaseGeometry]:
+    def _lines_of(self, scene: PictureScene) -> Iterator[BaseGeometry]:
         """Return the ground that lines and markers take up."""
         metres = self._m_per_px
         tracks = [LineString(track.points) for track in scene.tracks if len(track.points) > 1]

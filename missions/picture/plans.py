@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from missions.planned import Plan
 
 _MOST_BLOCKS = 5000  # more cannot be told apart
+_MOST_NAMED = 3  # legs in a title; chosen
 
 
 def plan_scene(
@@ -95,6 +96,8 @@ def plan_title(plan: Plan, crossing: tuple[int, ...]) -> tuple[str, ...]:
     length = f"{plan.length_m:.1f} m, about {plan.duration_s:.0f} s"
     drawn_m = plan.drawn_clearance_m
     if crossing:
+        if len(crossing) > _MOST_NAMED:
+            return length, f"{len(crossing)} legs are unsafe: they cross the fence"
         names = ", ".join(str(leg + 1) for leg in crossing)
         others_m = [m for leg, m in enumerate(leg_clearances_m(plan)) if leg > max(crossing)]
         kept = f"; the others keep {min(others_m):.2f} m" if others_m else ""

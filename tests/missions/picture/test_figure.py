@@ -267,6 +267,28 @@ def test_unsafe_legs_and_where_they_cross_the_fence(plans: dict[str, Plan]) -> N
     assert problems(scene_figure(near), near) == []
 
 
+def test_what_is_too_much_to_read_is_left_out(plans: dict[str, Plan]) -> None:
+    plan = plans["yard"]
+    ring = np.linspace(0, 40 * np.pi, 401)
+    points = np.column_stack((np.cos(ring), np.sin(ring))) * np.linspace(20, 60, 401)[:, None]
+    path = tuple(plan.ground.frame.to_lat_lons(points))
+    long = replace(
+        plan,
+        path=path,
+        seqs=tuple(range(401)),
+        targets=path[-1:],
+        asked_targets=(),
+        envelope=replace(plan.envelope, arrivals_s=np.arange(401.0)),
+    )
+    scene = plan_scene(long)
+    assert len(scene.unsafe_legs) > 3
+    assert scene.title[1] == f"{len(scene.unsafe_legs)} legs are unsafe: they cross the fence"
+    figure = scene_figure(scene)
+    assert sum(line.get_gid() == "direction" for line in figure.axes[0].get_lines()) <= 100
+    assert len(texts_of(figure, "number")) <= 100
+    assert problems(figure, scene) == []
+
+
 def test_a_moved_target_is_shown_with_what_was_asked(plans: dict[str, Plan]) -> None:
     plan = plans["yard"]
     asked = LatLon(plan.targets[1].lat_deg + 1e-4, plan.targets[1].lon_deg)

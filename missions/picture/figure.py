@@ -130,7 +130,7 @@ def _draw_route(axes: Any, scene: PictureScene) -> None:  # noqa: ANN401
     route = scene.route
     if not len(route):
         return
-    width = 1.0 if scene.tracks else 1.8
+    width = 1.0 if scene.band.is_empty else 1.8  # a mission that was recorded stands behind what was driven
     axes.plot(*route.T, "-", color=style.ROUTE, linewidth=width, zorder=6, label=scene.route_name)
     for count, leg in enumerate(scene.unsafe_legs):
         look = {"color": style.UNSAFE, "linewidth": 2.8, "path_effects": _HALO, "zorder": 6.5}
@@ -156,13 +156,14 @@ def _draw_arrow(axes: Any, a: NDArray[np.float64], b: NDArray[np.float64], color
 
 
 def _draw_tracks(axes: Any, scene: PictureScene) -> None:  # noqa: ANN401
-    names = list(dict.fromkeys(track.name for track in scene.tracks))
+    looks = style.track_looks(track.name for track in scene.tracks)
+    order = list(looks)
     drawn: set[str] = set()
     for track in scene.tracks:
-        color, dashes = style.track_look(names.index(track.name))
+        color, dashes = looks[track.name]
         label = None if track.name in drawn else harmless(track.name)
         # One drive over another: the first is seen on both sides of the next.
-        width = max(1.4, 3.2 - 0.6 * names.index(track.name))
+        width = 1.4 + 0.6 * min(3, len(order) - 1 - order.index(track.name))
         axes.plot(*track.points.T, dashes, color=color, linewidth=width, zorder=8, label=label)
         drawn.add(track.name)
     if scene.marks:

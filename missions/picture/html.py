@@ -222,10 +222,10 @@ def _legs(scene: PictureScene) -> Iterator[go.Scatter]:
 
 
 def _tracks(scene: PictureScene) -> Iterator[go.Scatter]:
-    names = list(dict.fromkeys(track.name for track in scene.tracks))
+    looks = style.track_looks(track.name for track in scene.tracks)
     drawn: set[str] = set()
     for track in scene.tracks:
-        color, dashes = style.track_look(names.index(track.name))
+        color, dashes = looks[track.name]
         line = {"color": color, "width": 2, "dash": _DASHES[dashes]}
         name = plain_text(track.name)
         look = {"legendgroup": name, "showlegend": track.name not in drawn}

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 INCLUSION: Final = "#009E73"
 EXCLUSION: Final = "#D55E00"
@@ -25,7 +28,13 @@ MOST_LOOKS: Final = len(TRACKS) * len(TRACK_DASHES)
 """So many driven lines can be told apart."""
 
 
-def track_look(number: int) -> tuple[str, str]:
-    """Return the colour and the dashes of a driven line, counted from 0."""
-    rounds, place = divmod(number, len(TRACKS))
-    return TRACKS[place], TRACK_DASHES[rounds % len(TRACK_DASHES)]
+def track_looks(names: Iterable[str]) -> dict[str, tuple[str, str]]:
+    """Return the colour and the dashes of driven lines by their names; one alone is dashed, so that the route is seen under it."""
+    different = list(dict.fromkeys(names))
+    if len(different) == 1:
+        return {different[0]: (TRACKS[0], "--")}
+    places = (divmod(number, len(TRACKS)) for number in range(len(different)))
+    return {
+        name: (TRACKS[place], TRACK_DASHES[rounds % len(TRACK_DASHES)])
+        for name, (rounds, place) in zip(different, places, strict=True)
+    }

@@ -414,8 +414,10 @@ def test_lines_stand_out_from_grounds_without_colour(ground: str, line: str) -> 
 
 
 def test_driven_lines_are_told_apart() -> None:
-    looks = [style.track_look(number) for number in range(style.MOST_LOOKS)]
-    assert len(set(looks)) == style.MOST_LOOKS == 24
+    looks = style.track_looks(f"drive {number}" for number in range(style.MOST_LOOKS))
+    assert len(set(looks.values())) == style.MOST_LOOKS == 24
+    assert style.track_looks(["driven", "driven"]) == {"driven": ("#000000", "--")}
+    assert style.track_looks(["HOLD", "AUTO", "HOLD"])["AUTO"] == (style.TRACKS[1], "-")
 
 
 def test_a_zone_far_from_all_others_is_inside_the_frame(plans: dict[str, Plan]) -> None:

@@ -11,8 +11,8 @@ import shapely
 from shapely import LineString, Point, Polygon, affinity
 
 from missions.fence import CircleZone, Fence, PolygonZone, ZoneKind
-from missions.geo import LatLon, rounded
-from missions.ground.frame import LocalFrame, LocalPoint, frame_around
+from missions.geo import LatLon, LocalPoint, rounded
+from missions.ground.frame import LocalFrame, frame_around
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
 import shapely
 from shapely import Polygon
 
 from missions.errors import FenceError
 from missions.fence import Fence, PolygonZone, ZoneKind
-from missions.geo import rounded
+from missions.geo import LocalPoint, rounded
 from missions.ground.frame import frame_around
 from missions.ground.ground import lay_out
 
@@ -59,8 +58,9 @@ def merged_fence(fence: Fence) -> Fence:
 
 
 def _zone(kind: ZoneKind, ring: LinearRing, frame: LocalFrame) -> PolygonZone:
-    corners = np.asarray(ring.coords)[:-1]
-    return PolygonZone(kind, tuple(map(rounded, frame.to_lat_lons(corners))))
+    return PolygonZone(
+        kind, tuple(rounded(frame.to_lat_lon(LocalPoint(*corner))) for corner in ring.coords[:-1])
+    )
 
 
 def _apart(inside: BaseGeometry, inclusions: list[Barrier]) -> FenceError:

@@ -12,7 +12,6 @@ import shapely
 import pbpp
 from missions.fence import ZoneKind
 from missions.geo import distance_m
-from missions.ground.frame import LocalPoint
 from missions.ground.legs import ROUNDING_RESERVE_M
 from missions.picture.scene import Mark, PictureScene, Track, crossings
 
@@ -141,7 +140,7 @@ def _blocks(plan: Plan) -> list[NDArray[np.float64]]:
     ground = plan.ground
     clearance_m = 0.99 * plan.drawn_clearance_m if math.isfinite(plan.drawn_clearance_m) else 0.0
     areas = ground.areas(ZoneKind.INCLUSION), ground.areas(ZoneKind.EXCLUSION)
-    target = LocalPoint(*ground.frame.to_local(plan.targets[-1]))
+    target = ground.frame.to_local(plan.targets[-1])
     try:
         planner = pbpp.Planner(*areas, clearance_m=clearance_m, union=ground.union)
         drawing = planner.plan(target, target, method=plan.method).drawing

@@ -1,3 +1,4 @@
+import gc
 import subprocess
 import sys
 
@@ -198,3 +199,18 @@ def test_free_space_helps_to_find_free_points(square):
     free = pbpp.Planner([square], [BOX], clearance_m=2.0).free_space
     assert isinstance(free, shapely.MultiPolygon)
     assert free.distance(Point(50, 50)) == pytest.approx(22.0, abs=1e-6)
+
+
+def test_building_leaves_garbage_collection_as_it_was(square, monkeypatch):
+    seen = []
+    monkeypatch.setattr("pbpp.planner.Field", lambda *_, **__: seen.append(gc.isenabled()) or 1 / 0)
+    try:
+        for switch in (gc.enable, gc.disable):
+            switch()
+            before = gc.isenabled()
+            with pytest.raises(ZeroDivisionError):
+                pbpp.Planner([square], [])
+            assert gc.isenabled() == before
+    finally:
+        gc.enable()
+    assert seen == [False, False]

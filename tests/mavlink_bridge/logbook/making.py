@@ -14,8 +14,8 @@ from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.protocol.wire import item_to_message
 from mavlink_bridge.tlog import SENT_LINK, TlogWriter
 from missions.fence import Fence, PolygonZone, ZoneKind, fence_to_items
-from missions.geo import LatLon
-from missions.ground.frame import LocalFrame, LocalPoint
+from missions.geo import LatLon, LocalPoint
+from missions.ground.frame import LocalFrame
 from missions.items import MissionItem, waypoint, with_home
 
 if TYPE_CHECKING:

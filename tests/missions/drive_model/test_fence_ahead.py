@@ -54,22 +54,24 @@ def test_the_speed_is_that_of_the_first_edge_ahead(
     vehicle = vehicle_at(speed_mps)
     fence = shapely.union_all([ring(corners, 20.3, 0.0, 0.0), ring(corners, 4.1, 5.0, 30.0)])
     place = complex(east_m, north_m)
-    ahead = FenceAhead(fence, np.array([-20 - 20j, 20 + 20j]), vehicle)
+    ahead = FenceAhead(fence, np.array([(-20.0, -20.0), (20.0, 20.0)]), vehicle)
     units = [cmath.rect(1.0, way) for way in ways]
-    many_mps = ahead.speeds_mps(np.full(len(units), place), np.array(units))
+    many_mps = ahead.speeds_mps(
+        np.full((len(units), 2), (east_m, north_m)), np.array([(unit.real, unit.imag) for unit in units])
+    )
     for unit, one_of_many_mps in zip(units, many_mps, strict=True):
         wanted_mps = min(expected_mps(fence, place, unit, vehicle), speed_mps)
         assert min(float(one_of_many_mps), speed_mps) == pytest.approx(wanted_mps, abs=1e-6)
-        one_mps = ahead.speed_mps(place, unit, speed_mps)
+        one_mps = ahead.speed_mps((east_m, north_m), (unit.real, unit.imag), speed_mps)
         assert min(one_mps, speed_mps) == pytest.approx(wanted_mps, abs=1e-6)
 
 
 def test_places_far_apart_look_at_their_own_edges() -> None:
     vehicle = vehicle_at(2.0)
     walls = shapely.MultiLineString([[(10.0, -5.0), (10.0, 5.0)], [(210.0, -5.0), (210.0, 5.0)]])
-    ahead = FenceAhead(walls, np.array([0j, 200 + 0j]), vehicle)
+    ahead = FenceAhead(walls, np.array([(0.0, 0.0), (200.0, 0.0)]), vehicle)
     for east_m in (0.0, 200.0, 1.0):
-        assert ahead.speed_mps(complex(east_m), 1 + 0j, 2.0) == pytest.approx(
+        assert ahead.speed_mps((east_m, 0.0), (1.0, 0.0), 2.0) == pytest.approx(
             expected_mps(walls, complex(east_m), 1 + 0j, vehicle)
         )
 
@@ -77,6 +79,6 @@ def test_places_far_apart_look_at_their_own_edges() -> None:
 def test_an_edge_along_the_way_is_met_at_its_neighbour() -> None:
     vehicle = vehicle_at(2.0)
     corner = shapely.LineString([(4.0, 0.0), (8.0, 0.0), (8.0, 3.0)])
-    ahead = FenceAhead(corner, np.array([0j]), vehicle)
+    ahead = FenceAhead(corner, np.array([(0.0, 0.0)]), vehicle)
     left_m = 8.0 - vehicle.fence.margin_m
-    assert ahead.speed_mps(0j, 1 + 0j, 2.0) == pytest.approx(vehicle.position_gain_per_s * left_m)
+    assert ahead.speed_mps((0.0, 0.0), (1.0, 0.0), 2.0) == pytest.approx(vehicle.position_gain_per_s * left_m)

@@ -11,7 +11,7 @@ from charts import HOME
 from missions import read_fence
 from missions.fitting.gap import find_gap, straight_through
 from missions.fitting.polyline import DrawnPoint
-from missions.geo import LatLon
+from missions.geo import LatLon, LocalPoint
 from missions.planning.plan import plan
 from missions.request import Request
 from missions.situation import Known, Pose, Situation
@@ -26,7 +26,9 @@ DIJKSTRA_MAZE_S = 58.4
 
 def points(*places):
     ends = (0, len(places) - 1)
-    return tuple(DrawnPoint(*place, 2.0, 2.0, is_fixed=i in ends) for i, place in enumerate(places))
+    return tuple(
+        DrawnPoint(LocalPoint(*place), 2.0, 2.0, is_fixed=i in ends) for i, place in enumerate(places)
+    )
 
 
 @pytest.mark.parametrize("ahead", [(0.0, 1.0), (0.6, 0.8), (0.0, -1.0)])

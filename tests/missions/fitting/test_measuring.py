@@ -18,6 +18,7 @@ from missions.fence import Fence
 from missions.fitting import local_search as fitting
 from missions.fitting.cost import ENOUGH_M, Gauge
 from missions.fitting.polyline import Drawing, DrawnPoint
+from missions.geo import LocalPoint
 from missions.ground.frame import frame_around
 from missions.ground.from_situation import ground_for
 from missions.ground.ground import lay_out
@@ -35,7 +36,7 @@ def gauge_of(*zones, heading_deg: float | None = 0.0, **parameters: float) -> Ga
 
 
 def lines(*places: tuple[float, float], required_m: float = 2.0) -> Drawing:
-    points = [DrawnPoint(east_m, north_m, required_m, required_m) for east_m, north_m in places]
+    points = [DrawnPoint(LocalPoint(*place), required_m, required_m) for place in places]
     return tuple(replace(point, is_fixed=at in (0, len(points) - 1)) for at, point in enumerate(points))
 
 

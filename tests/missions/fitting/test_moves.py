@@ -10,13 +10,17 @@ import pytest
 from missions.fitting import moves
 from missions.fitting import polyline as drawn
 from missions.fitting.polyline import Drawing, DrawnPoint
+from missions.geo import LocalPoint
 
 MOST_TURN_AT_A_CHANGE_DEG = 8.0
 
 
 def lines(*places: tuple[float, float], fixed: tuple[int, ...] = ()) -> Drawing:
     ends = {0, len(places) - 1, *fixed}
-    return tuple(DrawnPoint(*place, 2.0, 2.0, is_fixed=number in ends) for number, place in enumerate(places))
+    return tuple(
+        DrawnPoint(LocalPoint(*place), 2.0, 2.0, is_fixed=number in ends)
+        for number, place in enumerate(places)
+    )
 
 
 RIGHT_ANGLE = lines((0, 0), (0, 60), (60, 60))
@@ -75,15 +79,15 @@ def test_a_slow_stretch_is_shortened_along_its_line() -> None:
     slow = next(moves.slowed(RIGHT_ANGLE, 1, (0.0, 30.0), 5.0))
     number = changes(slow)[0]
     eased = list(moves.eased(slow, number, 2.0))
-    norths_m = sorted(one[number].north_m for one in eased)
-    assert norths_m == pytest.approx([slow[number].north_m - 2.0, slow[number].north_m + 2.0])
-    assert all(one[number].east_m == pytest.approx(0.0) for one in eased)
+    norths_m = sorted(one[number].place.north_m for one in eased)
+    assert norths_m == pytest.approx([slow[number].place.north_m - 2.0, slow[number].place.north_m + 2.0])
+    assert all(one[number].place.east_m == pytest.approx(0.0) for one in eased)
 
 
 def test_a_corner_is_eased_inwards_and_along() -> None:
     eased = list(moves.eased(RIGHT_ANGLE, 1, 1.0))
     assert len(eased) == 3
-    assert (eased[0][1].east_m, eased[0][1].north_m) == pytest.approx((math.sqrt(0.5), 60 - math.sqrt(0.5)))
+    assert eased[0][1].place == pytest.approx((math.sqrt(0.5), 60 - math.sqrt(0.5)))
 
 
 FIXED = lines((0, 0), (0, 60), (60, 60), fixed=(1,))
@@ -119,10 +123,10 @@ def test_ends_stay(index: int) -> None:
 
 def test_a_corner_is_moved_outwards_first() -> None:
     first = next(moves.moved(RIGHT_ANGLE, 1, 1.0))
-    assert first[1].east_m < 0
-    assert first[1].north_m > 60
+    assert first[1].place.east_m < 0
+    assert first[1].place.north_m > 60
     straight = lines((0, 0), (0, 30), (0, 60))
-    assert next(moves.moved(straight, 1, 1.0))[1].east_m != 0
+    assert next(moves.moved(straight, 1, 1.0))[1].place.east_m != 0
 
 
 def test_two_corners_become_one_where_their_legs_meet() -> None:
@@ -160,5 +164,5 @@ def replace_stop(drawing: Drawing) -> Drawing:
 
 def test_a_leg_is_bent_away_from_a_fence() -> None:
     bent = list(moves.bent(RIGHT_ANGLE, 1, (0.0, 30.0), (-1.0, 0.0), 0.5))
-    assert [one[1].east_m for one in bent] == pytest.approx([-0.55, -0.85, -1.3])
+    assert [one[1].place.east_m for one in bent] == pytest.approx([-0.55, -0.85, -1.3])
     assert not list(moves.bent(RIGHT_ANGLE, 1, (0.0, 59.0), (-1.0, 0.0), 0.5))

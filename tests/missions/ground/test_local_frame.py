@@ -11,10 +11,9 @@ from shapely import LineString, Point
 from strategies import GEOD, away, lat_lons
 
 from missions.errors import InvalidPositionError
-from missions.geo import LatLon
+from missions.geo import LatLon, LocalPoint
 from missions.ground.frame import (
     LocalFrame,
-    LocalPoint,
     autopilot_line,
     autopilot_scale,
     bow_m,
@@ -53,8 +52,8 @@ def test_there_and_back(origin: LatLon, east_m: float, north_m: float) -> None:
     assert -180 <= position.lon_deg < 180
     # PROJ 9.2 puts what is nearer than 0.64 mm (1e-10 rad) at the origin itself.
     assert frame.to_local(position) == pytest.approx((east_m, north_m), abs=1e-3)
-    array = np.array([[east_m, north_m], [0, 0]])
-    np.testing.assert_allclose(frame.to_local_array(frame.to_lat_lons(array)), array, atol=1e-3)
+    points = [LocalPoint(east_m, north_m), LocalPoint(0, 0)]
+    np.testing.assert_allclose(frame.to_local_array(list(map(frame.to_lat_lon, points))), points, atol=1e-3)
 
 
 def test_no_positions_give_an_empty_array() -> None:

@@ -11,7 +11,7 @@ import shapely
 from shapely import LineString, Point, Polygon
 
 from missions.fence import CircleZone, Fence, PolygonZone, ZoneKind
-from missions.geo import LatLon
+from missions.geo import LatLon, LocalPoint
 from missions.ground.ground import lay_out
 from missions.picture import draw_plan, style
 from missions.picture.figure import scene_figure
@@ -23,11 +23,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.transforms import Bbox
 
+    from missions.ground.frame import LocalFrame
     from missions.picture.scene import PictureScene
     from missions.planned import Plan
 
 TOUCH_PX = 0.5
 NAMES = ("zone", "number", "width", "mark")
+
+
+def positions(frame: LocalFrame, points: np.ndarray) -> list[LatLon]:
+    return [frame.to_lat_lon(LocalPoint(*point)) for point in points.tolist()]
 
 
 def box_of(bbox: Bbox) -> Polygon:
@@ -124,8 +129,8 @@ def test_long_fields(plans: dict[str, Plan], east_m: float, north_m: float) -> N
     plan = plans["maze"]
     frame = plan.ground.frame
     corners = np.array([(-east_m, -north_m), (east_m, -north_m), (east_m, north_m), (-east_m, north_m)])
-    fence = Fence((PolygonZone(ZoneKind.INCLUSION, tuple(frame.to_lat_lons(corners))),))
-    path = tuple(frame.to_lat_lons(0.9 * corners[[0, 2]]))
+    fence = Fence((PolygonZone(ZoneKind.INCLUSION, tuple(positions(frame, corners))),))
+    path = tuple(positions(frame, 0.9 * corners[[0, 2]]))
     long = replace(
         plan,
         fence=fence,
@@ -244,7 +249,7 @@ def test_unsafe_legs_and_where_they_cross_the_fence(plans: dict[str, Plan]) -> N
     frame, zone = plan.ground.frame, plan.ground.barriers[1].area  # a rectangle
     west, south, east, north = zone.bounds
     middle_m = (south + north) / 2
-    ends = frame.to_lat_lons(np.array([(west - 10, middle_m), (east + 3, middle_m), (east + 3, north + 12)]))
+    ends = positions(frame, np.array([(west - 10, middle_m), (east + 3, middle_m), (east + 3, north + 12)]))
     path = tuple(ends)
     through = replace(
         plan,
@@ -271,7 +276,7 @@ def test_what_is_too_much_to_read_is_left_out(plans: dict[str, Plan]) -> None:
     plan = plans["yard"]
     ring = np.linspace(0, 40 * np.pi, 401)
     points = np.column_stack((np.cos(ring), np.sin(ring))) * np.linspace(20, 60, 401)[:, None]
-    path = tuple(plan.ground.frame.to_lat_lons(points))
+    path = tuple(positions(plan.ground.frame, points))
     long = replace(
         plan,
         path=path,
@@ -306,7 +311,7 @@ def test_the_narrowest_place_is_where_the_fences_face_each_other(plans: dict[str
 
     def block(west: float, south: float, east: float, north: float, kind: ZoneKind) -> PolygonZone:
         ring = np.array([(west, south), (east, south), (east, north), (west, north)], dtype=float)
-        return PolygonZone(kind, tuple(frame.to_lat_lons(ring)))
+        return PolygonZone(kind, tuple(positions(frame, ring)))
 
     fence = Fence(
         (
@@ -316,7 +321,7 @@ def test_the_narrowest_place_is_where_the_fences_face_each_other(plans: dict[str
         )
     )
     for north_m in (0.5, -1.0, 2.0):
-        path = tuple(frame.to_lat_lons(np.array([(-30.0, north_m), (30.0, north_m)])))
+        path = tuple(positions(frame, np.array([(-30.0, north_m), (30.0, north_m)])))
         through = replace(
             plan,
             fence=fence,

@@ -10,6 +10,7 @@ import pytest
 from shapely import LineString, Point, box
 
 from missions.fence import Fence, PolygonZone, ZoneKind
+from missions.geo import LocalPoint
 from missions.ground.ground import lay_out
 from missions.picture import sketch_plan
 from missions.picture.plans import plan_scene
@@ -101,7 +102,9 @@ def test_a_thin_wall_is_seen(plans: dict[str, Plan]) -> None:
         [(-70, 50), (70, 50), (70, 50.3), (-70, 50.3)],
         [(-10, -60), (-9.7, -60), (-9.7, 60), (-10, 60)],
     ):
-        wall = PolygonZone(ZoneKind.EXCLUSION, tuple(frame.to_lat_lons(np.array(corners, dtype=float))))
+        wall = PolygonZone(
+            ZoneKind.EXCLUSION, tuple(frame.to_lat_lon(LocalPoint(*corner)) for corner in corners)
+        )
         fence = Fence((plan.fence.zones[0], wall))
         scene = plan_scene(replace(plan, fence=fence, ground=lay_out(fence, frame)))
         rows = cells_of(sketch(scene))

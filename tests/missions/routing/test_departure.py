@@ -8,7 +8,7 @@ import pytest
 from charts import FIELD, OUT, WALL, box, place, situation_of
 
 from missions.drive_model import envelope
-from missions.ground.frame import LocalPoint
+from missions.geo import LocalPoint
 from missions.ground.from_situation import ground_for
 from missions.routing.departure import LENGTHS_M, WAYS, departures
 from missions.vehicle import Steering, Vehicle

@@ -14,7 +14,7 @@ import statistics
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -34,7 +34,7 @@ from missions.fence import fence_to_items
 from missions.geo import distance_m
 from missions.ground.from_situation import ground_for
 from missions.planning.plan import plan
-from missions.request import Request
+from missions.request import GoTo
 from missions.routing.bottleneck import widest_clearance_m
 from missions.situation import Known, Pose, Situation
 from missions.vehicle import vehicle_from_parameters
@@ -158,7 +158,7 @@ def _run(field: Field, name: str) -> Run:
     widest_m = widest_clearance_m(
         ground, [ground.frame.to_local(field.start), ground.frame.to_local(field.target)]
     )
-    request = Request(targets=(field.target,), clearance_m=field.clearance_m)
+    request = GoTo(target=field.target, clearance_m=field.clearance_m)
     known = {
         "seed": field.seed,
         "kind": field.kind,
@@ -172,9 +172,7 @@ def _run(field: Field, name: str) -> Run:
     except MissionError as error:
         return Run(**known, refusal=str(error), planning_s=time.process_time() - begun_s)  # type: ignore[arg-type]
     planning_s = time.process_time() - begun_s
-    shortest = plan(
-        situation, Request(targets=(field.target,), clearance_m=field.clearance_m, corner_allowance_m=0.0)
-    )
+    shortest = plan(situation, replace(request, corner_allowance_m=0.0))
     driven_s, rover, arrived = _drive(field, planned, parameters)
     return Run(
         **known,  # type: ignore[arg-type]

@@ -123,10 +123,10 @@ def check(
     _check_options(mission, log, connect, home)
     check_plots(plots, json_output=json_output)
     from missions.checking.check import check_mission  # noqa: PLC0415
-    from missions.request import Request  # noqa: PLC0415
+    from missions.request import GoTo  # noqa: PLC0415
 
     request = with_vehicle(
-        Request(clearance_m=clearance),
+        GoTo(clearance_m=clearance),
         reserve=reserve,
         position_error=position_error,
         size=(length, width, gps),

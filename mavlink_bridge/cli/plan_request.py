@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from mavlink_bridge.cli.values import metres_or, position_from
 from mavlink_bridge.errors import UsageError
+from missions.request import End, Method, Order, RepairMission, Request, conditions, request_of
 
-if TYPE_CHECKING:
-    from missions.request import Request
-
-METHODS = ("optimal", "pbpp-taut", "pbpp")
-ORDERS = ("given", "best")
-ENDS = ("hold", "loiter", "rtl")
+METHODS, ORDERS, ENDS = tuple(Method), tuple(Order), tuple(End)
 _OWN = "own"
 
 
@@ -28,11 +22,9 @@ def request_from_options(
     UsageError
         An option is not what it has to be.
     """
-    from missions.request import Request  # noqa: PLC0415
-
     if method not in METHODS:
         raise UsageError(f"--method {method!r}: expected one of {', '.join(METHODS)}")
-    return Request(
+    return request_of(
         start=position_from("--start", start) if start is not None else None,
         targets=tuple(position_from("--target", target) for target in targets),
         clearance_m=metres_or("--clearance", clearance, "max"),
@@ -55,7 +47,7 @@ def with_tour(request: Request, order: str, end: str, via: str | None, *, comes_
         if value not in known:
             raise UsageError(f"{option} {value!r}: expected one of {', '.join(known)}")
     if via is None:
-        return replace(request, order=order, comes_back=comes_back, end=end)
+        return request_of(**{**request.words(), "order": order, "comes_back": comes_back, "end": end})
     if request.targets or comes_back or (order, end) != ("given", "hold"):
         raise UsageError(
             "--via-mission keeps the mission's own places, order and end; it does not go with --target, --order, --return, --end"
@@ -67,8 +59,6 @@ def with_tour(request: Request, order: str, end: str, via: str | None, *, comes_
             "--via-mission keeps the mission's own speeds and goes by the drive model; it does not go with --speed, "
             "--corner-allowance, --escape"
         )
-    if via == _OWN:
-        return replace(request, via_own=True)
     from missions.formats import read_mission  # noqa: PLC0415 - quick help
 
-    return replace(request, via=read_mission(Path(via)))
+    return RepairMission(**conditions(request), mission=None if via == _OWN else read_mission(Path(via)))

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 
 def timed_plan(situation: Situation, request: Request) -> tuple[Plan, float]:
     """Return a plan, and how long planning took."""
-    from missions.tour.tour import plan_tour  # noqa: PLC0415 - quick help
+    from missions.planning.plan import plan  # noqa: PLC0415 - quick help
 
     begun_s = time.perf_counter()
-    planned = plan_tour(situation, request)
+    planned = plan(situation, request)
     return planned, time.perf_counter() - begun_s

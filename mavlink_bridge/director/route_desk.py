@@ -104,7 +104,7 @@ class RouteDesk(Part):
         """Return what is asked of the next plan: the orders' request, for the newest target, from where the vehicle is."""
         core, request = self.core, self.core.orders.request
         if core.target is not None and core.target.position not in request.targets:
-            request = replace(request, targets=(core.target.position,))
+            request = request.to(core.target.position)
         return request if core.orders.once else replace(request, start=None)
 
     # Whether the plan still holds

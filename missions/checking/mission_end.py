@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from enum import StrEnum
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -12,6 +11,7 @@ from shapely import MultiPoint
 from missions.fence import ZoneKind
 from missions.geo import LatLon, distance_m
 from missions.items import Command, MissionItem, waypoint
+from missions.request import End
 from missions.vehicle import Autopilot, real_number, whole_number
 
 if TYPE_CHECKING:
@@ -46,14 +46,6 @@ PARAMETER_NAMES = (
 """The parameters that matter here, for asking a vehicle."""
 
 _DONE_MODES = {1: "Loiter", 2: "Acro", 3: "Manual"}
-
-
-class End(StrEnum):
-    """What the vehicle does at the end of a mission."""
-
-    HOLD = "hold"
-    LOITER = "loiter"
-    RTL = "rtl"
 
 
 def ending(items: Sequence[MissionItem], end: End) -> tuple[MissionItem, ...]:

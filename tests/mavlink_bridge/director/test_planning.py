@@ -8,6 +8,8 @@ import time
 import pytest
 from director.test_bridge_director import (
     FAR,
+    FENCE,
+    HOME,
     IN_BARN,
     NEAR,
     arm,
@@ -23,10 +25,13 @@ from mavlink_bridge.cli.live import PlanMaker
 from mavlink_bridge.director import EventName, State, route_desk
 from mavlink_bridge.director.plan_task import PlanTask
 from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig
 from missions.errors import PlanCheckError
-from missions.fence import fence_to_items
-from missions.geo import distance_m
+from missions.fence import CircleZone, Fence, ZoneKind, fence_to_items
+from missions.geo import LatLon, distance_m
+from missions.items import Command
 from missions.planning.plan import plan
+from missions.request import End, GoTo, RepairMission, Tour
 
 MANUAL = 0
 LONG_S = 5.0
@@ -117,6 +122,60 @@ def test_what_changed_is_read_while_the_vehicle_comes_to_rest():
     upload(run, m.MissionType.FENCE, fence_to_items(wall_across_the_route()))
     run.run_until(lambda: run.director.situation.fence.value == wall_across_the_route(), 3)
     assert run.director.state is State.HOLDING
+
+
+def test_a_mission_longer_than_the_vehicle_holds_is_shortened_or_refused(monkeypatch):
+    posts = (
+        CircleZone(
+            ZoneKind.EXCLUSION, LatLon(40.0714 + 0.00012 * i + 0.00005 * j, -105.2297 + 0.00025 * j), 2.0
+        )
+        for i in range(6)
+        for j in range(5)
+    )
+    parameters = {"FENCE_ENABLE": 1.0, "WP_SPEED": 3.0, "WP_RADIUS": 3.0}
+    config = SimulatorConfig(
+        home=HOME, fence=fence_to_items(Fence((*FENCE.zones, *posts))), parameters=parameters
+    )
+
+    def verified_or_refused(most: int):
+        monkeypatch.setattr("missions.planning.plan.most_items", lambda _parameters: most)
+        vehicle = SimulatedVehicle(config)
+        run = ready(conductor(vehicle=vehicle, drive=False, request=GoTo(clearance_m=1.5)))
+        run.director.take_target(FAR, run.now_s)
+        ends = (run.happened(EventName.VERIFIED), run.happened(EventName.NO_PLAN))
+        run.run_until(lambda: any(end() for end in ends), 20)
+        return run
+
+    whole = verified_or_refused(655).director.plan
+    most = len(whole.items)  # one less, with home
+    run = verified_or_refused(most)
+    assert len(run.vehicles[0].mission) <= most
+    assert any(f"so that the vehicle can hold it ({most})" in text for text in run.director.plan.warnings)
+    assert run.director.plan.targets == whole.targets
+    assert run.director.plan.driven_clearance_m >= 1.5 - 0.01
+    run = verified_or_refused(2)
+    assert run.last(EventName.NO_PLAN).data["error"] == "MissionTooLongError"
+    assert not run.happened(EventName.UPLOADING)()
+
+
+def test_home_again_and_an_end_are_asked_of_the_bridge_too():
+    asked = Tour(clearance_m=2.5, comes_back=True, end=End.LOITER)
+    run = ready(conductor(drive=False, request=asked))
+    home = run.director.situation.home.value
+    run.director.take_target(FAR, run.now_s)
+    run.run_until(run.happened(EventName.VERIFIED), 20)
+    assert [distance_m(*pair) < 0.1 for pair in zip(run.director.plan.targets, (FAR, home), strict=True)] == [
+        True,
+        True,
+    ]
+    assert run.vehicles[0].mission[-1].command == Command.NAV_LOITER_UNLIM
+
+
+def test_a_target_that_is_heard_leaves_a_repair_what_it_is():
+    run = ready(conductor(drive=False, request=RepairMission(clearance_m=2.5)))
+    run.director.take_target(FAR, run.now_s)
+    run.run_until(run.happened(EventName.NO_PLAN), 10)
+    assert "no mission to repair" in run.last(EventName.NO_PLAN).text
 
 
 class Waiting:

@@ -13,8 +13,8 @@ from missions.fence import fence_to_items
 from missions.formats import read_fence, read_mission
 from missions.geo import LatLon, distance_m
 from missions.items import Command, CoordinateFrame, MissionItem
+from missions.planning.plan import plan
 from missions.request import Request
-from missions.tour.tour import plan_tour
 
 FIELDS = Path(__file__).parents[2] / "fields"
 HOME = LatLon(40.071374, -105.229930)
@@ -39,7 +39,7 @@ def conductor(*items: MissionItem) -> tuple[Conductor, SimulatedVehicle]:
         once=True,
         target_sources=frozenset(),
     )
-    return Conductor(Director(orders), [vehicle], planner=plan_tour), vehicle
+    return Conductor(Director(orders), [vehicle], planner=plan), vehicle
 
 
 def test_the_vehicles_own_mission_with_a_jump_a_delay_and_a_condition():

@@ -26,7 +26,8 @@ from typing import TYPE_CHECKING
 from drive_fields import Field, make_field
 from drive_more_fields import make_more
 
-from mavlink_bridge.simulator.config import Mode, SimulatorConfig
+from mavlink_bridge.mavlink.rover import Mode
+from mavlink_bridge.simulator.config import SimulatorConfig
 from mavlink_bridge.simulator.rover import TICK_S
 from mavlink_bridge.simulator.vehicle import SimulatedVehicle
 from missions.errors import MissionError
@@ -208,11 +209,11 @@ def _drive(field: Field, planned: Plan, parameters: dict[str, float]) -> tuple[f
     now_s = 1.0
     rover.set_mode(Mode.AUTO, now_s)
     limit_s = 3 * planned.duration_s + 60.0
-    while rover.mode == Mode.AUTO and not rover.route.is_complete and now_s < limit_s:
+    while rover.mode == Mode.AUTO and not rover.mission_run.is_complete and now_s < limit_s:
         now_s += TICK_S
         rover.step(now_s)
     near = distance_m(vehicle.position, planned.targets[-1]) < max(parameters["WP_RADIUS"], 1.5) + 1.0
-    return now_s - 1.0, vehicle, rover.route.is_complete and near
+    return now_s - 1.0, vehicle, rover.mission_run.is_complete and near
 
 
 def _made() -> str:

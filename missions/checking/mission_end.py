@@ -35,16 +35,6 @@ _RTL_ACTIONS = {
 }
 """Values that end in RTL, at once or where SmartRTL cannot be had."""
 
-PARAMETER_NAMES = (
-    *_RTL_ACTIONS,
-    "MIS_DONE_BEHAVE",
-    "RTL_SPEED",
-    "RALLY_INCL_HOME",
-    "RALLY_LIMIT_KM",
-    "CIRC_RADIUS",
-)
-"""The parameters that matter here, for asking a vehicle."""
-
 _DONE_MODES = {1: "Loiter", 2: "Acro", 3: "Manual"}
 
 
@@ -69,7 +59,7 @@ def return_place(situation: Situation, here: LatLon, home: LatLon | None) -> Lat
 
     Home takes part where RALLY_INCL_HOME is 1, and where the nearest rally point is farther away than RALLY_LIMIT_KM.
     """
-    rally = situation.rally.value if situation.rally else ()
+    rally = [point.position for point in situation.rally.value] if situation.rally else []
     if not rally:
         return home
     nearest = min(rally, key=lambda place: distance_m(here, place))

@@ -10,7 +10,7 @@ from missions.errors import MissionFormatError
 from missions.fence import Fence, PolygonZone
 from missions.ground.frame import frame_around
 from missions.ground.ground import lay_out
-from missions.picture.scene import Mark, PictureScene, Track, no_points
+from missions.picture.scene import Mark, PictureScene, TrackLine, no_points
 from missions.picture.style import MOST_LOOKS
 
 if TYPE_CHECKING:
@@ -89,8 +89,8 @@ def drive_scene(
     )
 
 
-def _tracks(parts: Sequence[tuple[str, Sequence[LatLon]]], frame: LocalFrame) -> tuple[Track, ...]:
+def _tracks(parts: Sequence[tuple[str, Sequence[LatLon]]], frame: LocalFrame) -> tuple[TrackLine, ...]:
     """Return the driven lines; those beyond what can be told apart under one name."""
     names = list(dict.fromkeys(name for name, _ in parts))
     own = names if len(names) <= MOST_LOOKS else names[: MOST_LOOKS - 1]
-    return tuple(Track(name if name in own else _OTHERS, frame.to_local_array(at)) for name, at in parts)
+    return tuple(TrackLine(name if name in own else _OTHERS, frame.to_local_array(at)) for name, at in parts)

@@ -13,7 +13,7 @@ import pbpp
 from missions.fence import ZoneKind
 from missions.geo import distance_m
 from missions.ground.legs import ROUNDING_RESERVE_M
-from missions.picture.scene import Mark, PictureScene, Track, crossings
+from missions.picture.scene import Mark, PictureScene, TrackLine, crossings
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -84,7 +84,7 @@ def plan_scene(
             -1, 2
         ),
         target_texts=tuple(map(str, plan.targets)),
-        tracks=(Track("driven", local(track)),) if len(track) else (),
+        tracks=(TrackLine("driven", local(track)),) if len(track) else (),
         blocks=tuple(_blocks(plan)) if blocks else (),
         marks_narrowest=True,
     )

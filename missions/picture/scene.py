@@ -34,7 +34,7 @@ def no_points() -> NDArray[np.float64]:
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
+class TrackLine:
     """A driven line: its name in the legend, and its points (n, 2)."""
 
     name: str
@@ -50,7 +50,7 @@ class Mark:
 
 
 @dataclass(frozen=True, eq=False)
-class NarrowestPlace:
+class NarrowSection:
     """Where the fences on both sides of a route are nearest to each other: two points on them, and how wide it is."""
 
     ends: NDArray[np.float64]
@@ -95,7 +95,7 @@ class PictureScene:
         Where the route leads to, and what was asked for where that is somewhere else: as many rows, NaN where it is the same.
     target_texts : tuple of str
         What is known of each target.
-    tracks : tuple of Track
+    tracks : tuple of TrackLine
         What was driven.
     blocks : tuple of ndarray
         Corners of the blocks of the free space.
@@ -120,7 +120,7 @@ class PictureScene:
     targets: NDArray[np.float64] = field(default_factory=no_points)
     asked: NDArray[np.float64] = field(default_factory=no_points)
     target_texts: tuple[str, ...] = ()
-    tracks: tuple[Track, ...] = ()
+    tracks: tuple[TrackLine, ...] = ()
     blocks: tuple[NDArray[np.float64], ...] = ()
     marks_narrowest: bool = False
 
@@ -202,7 +202,7 @@ class PictureScene:
         return [LineString(leg) for leg in zip(self.route[:-1], self.route[1:], strict=True)]
 
     @cached_property
-    def narrowest(self) -> NarrowestPlace | None:
+    def narrowest(self) -> NarrowSection | None:
         """The narrowest place of the route; None without a fence on both sides, or where it is wide.
 
         Sections are laid across the route through the fence that is nearest, up to the fence on the other side.
@@ -215,7 +215,7 @@ class PictureScene:
         steps = shapely.line_interpolate_point(line, np.linspace(0, line.length, count))
         along = shapely.points(np.concatenate((shapely.get_coordinates(steps), self.route)))
         near = shapely.get_coordinates(shapely.shortest_line(along, edge)).reshape(-1, 2, 2)
-        found: NarrowestPlace | None = None
+        found: NarrowSection | None = None
         for place, fence in near:
             distance_m = math.dist(place, fence)
             if not _AWAY_M < distance_m < (found.width_m if found else reach_m):
@@ -229,7 +229,7 @@ class PictureScene:
                 continue
             width_m = float(Point(fence).distance(hit))
             if width_m > distance_m:  # the fence on the other side of the route
-                found = NarrowestPlace(np.array((fence, fence + across * width_m)), width_m)
+                found = NarrowSection(np.array((fence, fence + across * width_m)), width_m)
         return found
 
     def scale_m(self, share: float = 0.2) -> int:

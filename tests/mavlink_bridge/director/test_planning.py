@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 
@@ -25,8 +26,9 @@ from mavlink_bridge.cli.live import PlanMaker
 from mavlink_bridge.director import EventName, State, route_desk
 from mavlink_bridge.director.plan_task import PlanTask
 from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.messages import Frame
 from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig
-from missions.errors import PlanCheckError
+from missions.errors import PlanCheckError, PlanStoppedError
 from missions.fence import CircleZone, Fence, ZoneKind, fence_to_items
 from missions.geo import LatLon, distance_m
 from missions.items import Command
@@ -188,7 +190,7 @@ class Waiting:
 def test_the_shell_makes_plans_beside_the_link():
     may_end = threading.Event()
 
-    def slow(situation, request):
+    def slow(situation, request, **_options):
         may_end.wait(30)
         return plan(situation, request)
 
@@ -213,7 +215,7 @@ def test_the_shell_makes_plans_beside_the_link():
 def test_a_plan_that_nobody_waits_for_any_more_is_left():
     made_for = []
 
-    def note(_situation, request):
+    def note(_situation, request, **_options):
         made_for.append(request)
         return request
 
@@ -224,6 +226,67 @@ def test_a_plan_that_nobody_waits_for_any_more_is_left():
     waiting.pending_plan = second
     assert taken(plans) == (second, "second")
     assert made_for == ["first", "second"]
+
+
+def take_over(run):
+    unheard(run, m.SetMode(1, 1, MANUAL))
+
+
+def change_the_fence(run):
+    upload(run, m.MissionType.FENCE, fence_to_items(wall_across_the_route()))
+
+
+def go_elsewhere(run):
+    run.director.take_target(NEAR, run.now_s)
+
+
+def fall_silent(run):
+    run.is_cut = True
+
+
+def speak_with_our_ids(run):
+    for _ in range(2):
+        run.director.receive(Frame(*run.director.identity, m.Statustext(6, "another program")), run.now_s)
+
+
+@pytest.mark.parametrize(
+    "happens", [take_over, change_the_fence, go_elsewhere, fall_silent, speak_with_our_ids]
+)
+def test_a_plan_is_dropped_as_soon_as_nobody_waits_for_it(happens):
+    run = planning(1000.0)
+    task = run.director.pending_plan
+    wait(run, 3.0)
+    assert not task.is_dropped
+    happens(run)
+    run.run_until(lambda: run.director.pending_plan is not task, 10)
+    assert task.is_dropped
+    assert isinstance(task.made(), PlanStoppedError)  # and at once, for the search is left at its first look
+
+
+def test_an_outdated_plan_stops_and_the_next_begins_at_once():
+    """On the shell's own thread: what nobody waits for takes no time from what somebody does."""
+    begun = []
+
+    def again_and_again(situation, request, *, should_stop):
+        begun.append((request.targets, time.monotonic()))
+        until_s = time.monotonic() + (60 if request.targets == (FAR,) else 0)
+        while True:
+            planned = plan(situation, request, should_stop=should_stop)
+            if time.monotonic() >= until_s:
+                return planned
+
+    run = planning(math.inf)
+    plans = PlanMaker(run.director, again_and_again)
+    assert plans.take() is None
+    time.sleep(0.5)
+    assert plans.take() is None  # it takes a minute
+    run.director.take_target(NEAR, run.now_s)
+    changed_s = time.monotonic()
+    run.run_until(lambda: run.director.pending_plan is not None, 10)
+    _, made = taken(plans)
+    assert made.targets == (NEAR,)
+    assert [targets for targets, _ in begun] == [(FAR,), (NEAR,)]
+    assert begun[1][1] - changed_s < 5.0
 
 
 def test_what_nobody_expected_of_a_planner_is_a_reason_for_no_plan():
@@ -241,7 +304,7 @@ def taken(plans: PlanMaker):
     raise AssertionError("no plan")
 
 
-def breaking_down(*_arguments):
+def breaking_down(*_arguments, **_options):
     raise ZeroDivisionError("float division by zero")
 
 

@@ -98,7 +98,7 @@ def log(
 
 
 def _scene(book: Logbook) -> PictureScene:
-    from mavlink_bridge.cli.log_verdict import drive_name, verdict  # noqa: PLC0415 - quick help
+    from mavlink_bridge.cli.log_verdict import names_of_stretches, verdict  # noqa: PLC0415 - quick help
     from missions.picture.drives import drive_scene  # noqa: PLC0415 - slow to come
 
     if not book.vehicles:
@@ -113,7 +113,7 @@ def _scene(book: Logbook) -> PictureScene:
     return drive_scene(
         (f"{book.name}: {vehicle.driven_m:.1f} m driven", verdict(vehicle)[0]),
         vehicle.fences[-1][1] if vehicle.fences else None,
-        [(drive_name(vehicle, part.mode, part.begun_s), part.positions) for part in vehicle.track],
+        list(zip(names_of_stretches(vehicle), (part.positions for part in vehicle.track), strict=True)),
         union=_is_union(vehicle),
         mission=[(number, item.position) for number, item in items if item.is_placed],
         targets=[target.position for target in vehicle.targets],

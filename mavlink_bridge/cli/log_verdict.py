@@ -67,12 +67,18 @@ def verdict(vehicle: VehicleLog) -> tuple[str, bool]:
     return "; ".join(parts), not (intrusions or reported or strayed)
 
 
-def drive_name(vehicle: VehicleLog, mode: str, begun_s: float) -> str:
-    """Return the name of a stretch of a track: the drive that it is, else its mode."""
+def names_of_stretches(vehicle: VehicleLog) -> list[str]:
+    """Return the name of each stretch of a track: the drive of a mission that it is, else its mode."""
+    names = [part.mode for part in vehicle.track]
     for number, grade in enumerate(vehicle.grades, start=1):
-        if 0 <= begun_s - grade.begun_s <= _HEARTBEATS_S:
-            return f"drive {number} ({mode})"
-    return mode
+        begun = [
+            place
+            for place, part in enumerate(vehicle.track)
+            if part.begun_s <= grade.begun_s + _HEARTBEATS_S and part.mode.startswith("AUTO")
+        ]
+        if begun:
+            names[begun[-1]] = f"drive {number} ({vehicle.track[begun[-1]].mode})"
+    return names
 
 
 _HEARTBEATS_S = 2.0

@@ -182,7 +182,7 @@ def test_pictures(tmp_path, yard):
     picture = tmp_path / "check.svg"
     document = check_yard(yard, "--plot", str(picture))
     assert document["outputs"] == [str(picture)]
-    assert "1 of 2 legs break" in picture.read_text()
+    assert "1 of 2 legs does not keep" in picture.read_text()
     sketch = run("check", "--mission", yard["mission"], "--fence", yard["fence"], "--plot", "-")
     assert len(sketch.stdout.splitlines()) > 20
 

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from missions.geo import LatLon
 
 _M_PER_DEG = 111_320.0
-_REACH_M = 1_000.0  # chosen: no vehicle comes that far out of its field
+REACH_M = 1_000.0
+"""How far from its inclusions a vehicle may ever come; chosen."""
 
 
 def within_reach(fence: Fence) -> tuple[Fence, int]:
@@ -22,7 +23,7 @@ def within_reach(fence: Fence) -> tuple[Fence, int]:
 
     A vehicle that stays inside the inclusions never comes there; maps of whole countries hold thousands.
     """
-    fields = [_bounds(zone, _REACH_M) for zone in fence.zones if zone.kind is ZoneKind.INCLUSION]
+    fields = [_bounds(zone, REACH_M) for zone in fence.zones if zone.kind is ZoneKind.INCLUSION]
     if not fields:
         return fence, 0
     near = tuple(

@@ -24,7 +24,7 @@ COMMANDS_WITH_PLACE = frozenset({{
 USED_PARAMS = {{
 {used}
 }}
-"""Which of params 1 to 4 each command uses; the others are empty or reserved."""
+"""Which of params 1 to 6 each command uses; the others are empty or reserved."""
 '''
 
 
@@ -45,7 +45,7 @@ def _has_location(entry: object) -> bool:
 
 
 def _used(entry: dialect.EnumEntry) -> str:
-    return "".join(str(i) for i in range(1, 5) if not UNUSED.match(entry.param.get(i, "")))
+    return "".join(str(i) for i in range(1, 7) if not UNUSED.match(entry.param.get(i, "")))
 
 
 def _lines(text: str) -> str:

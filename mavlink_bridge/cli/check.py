@@ -23,6 +23,16 @@ from mavlink_bridge.cli.common import (
     progress_bar,
     warn,
 )
+from mavlink_bridge.cli.field_files import (
+    IgnorePointsOption,
+    MapOptions,
+    OutermostOption,
+    RoleOption,
+    read_fence_file,
+    read_file,
+    read_vehicle_file,
+    with_mission_home,
+)
 from mavlink_bridge.cli.terminal import cell, console, echo
 from mavlink_bridge.cli.upload import SigningKeyOption
 from mavlink_bridge.cli.values import MOST_M, position_from, within
@@ -92,6 +102,9 @@ def check(
             rich_help_panel=OUTPUT_PANEL,
         ),
     ] = None,
+    role: RoleOption = None,
+    outermost: OutermostOption = None,
+    ignore_points: IgnorePointsOption = False,
     reserve: ReserveOption = 0.0,
     position_error: PositionErrorOption = None,
     length: LengthOption = 0.0,
@@ -144,7 +157,8 @@ def check(
 
         address = At(connect, (source_system, source_component), system, any_vehicle, timeout, signing_key)
         situation, unknown = _live_situation(address, quiet=quiet or json_output)
-    situation = with_home_option(_with_files(situation, mission, fence, vehicle), home)
+    maps = MapOptions(role, outermost, ignore_points)
+    situation = with_home_option(_with_files(situation, mission, fence, vehicle, maps), home)
     if situation.mission is None:
         raise UsageError(f"{log or connect} tells of no mission; give one (--mission FILE)")
     if begin is None and log is not None and situation.home is not None:
@@ -188,35 +202,35 @@ def _storage_warnings(items: Sequence[MissionItem], situation: Situation) -> lis
 
 
 def _with_files(
-    source: Situation | None, mission: Path | None, fence: Path | None, vehicle: Path | None
+    source: Situation | None,
+    mission: Path | None,
+    fence: Path | None,
+    vehicle: Path | None,
+    maps: MapOptions,
 ) -> Situation:
     """Put what files hold in the place of what the log or the link reported; of parameters the vehicle's own count more."""
-    from missions.errors import FenceMissingError  # noqa: PLC0415 - quick help
-    from missions.formats import read_mission, read_parameters, read_situation  # noqa: PLC0415
-    from missions.situation import Known, Situation  # noqa: PLC0415
+    from missions.formats import mission_of  # noqa: PLC0415 - quick help
+    from missions.situation import Situation  # noqa: PLC0415
 
     found = source or Situation()
     if fence is not None:
-        told = read_situation(fence)
-        if told.fence is None:
-            raise FenceMissingError(f"{fence} holds no fence", file=str(fence))
+        told = read_fence_file(fence, maps)
         found = replace(
             found, fence=told.fence, fence_trouble=None, transfers={}, home=found.home or told.home
         )
     if mission is not None:
-        read_mission(mission)  # which names what is wrong where no fence can be used
-        told = read_situation(mission)
-        assert told.mission is not None
-        home = told.mission.value.home
+        told = read_file(mission, maps if fence is None else maps.of_another_file())
+        drawn = mission_of(told, mission)
         found = replace(
             found,
             mission=told.mission,
             fence=told.fence if fence is None and told.fence else found.fence,
             rally=found.rally or told.rally,
-            home=found.home if source or not home else Known(home, None, str(mission)),
         )
+        if source is None:
+            found = with_mission_home(found, drawn, str(mission))
     if vehicle is not None:
-        found = replace(found, parameters={**read_parameters(vehicle), **found.parameters})
+        found = replace(found, parameters={**read_vehicle_file(vehicle), **found.parameters})
     return found
 
 

@@ -9,6 +9,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mavlink_bridge.cli.common import JsonOption, QuietOption, is_same_file, print_json, warn
+from mavlink_bridge.cli.field_files import (
+    IgnorePointsOption,
+    MapOptions,
+    OutermostOption,
+    RoleOption,
+    read_file,
+)
 from mavlink_bridge.cli.terminal import echo
 from mavlink_bridge.cli.values import position_from
 from mavlink_bridge.errors import UsageError
@@ -35,6 +42,9 @@ def convert(
         str | None,
         typer.Option(metavar="LAT,LON", help="The fence's return point, which .fen files must have."),
     ] = None,
+    role: RoleOption = None,
+    outermost: OutermostOption = None,
+    ignore_points: IgnorePointsOption = False,
     json_output: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
@@ -47,18 +57,22 @@ def convert(
     `pbpp convert field.plan fence.waypoints --only fence`
 
     `pbpp convert mission.waypoints route.gpx`
+
+    `pbpp convert farm.kml field.plan --outermost inclusion --ignore-points`
     """
     from mavlink_bridge.cli.kept_files import write_kept  # noqa: PLC0415 - quick help
-    from missions.formats import parts_of, read_situation, write_situation  # noqa: PLC0415
+    from missions.formats import parts_of, write_situation  # noqa: PLC0415
 
     if is_same_file(source, output):
         raise UsageError(f"{output} would be written over what it is made of; give another OUT")
     part = _part(only)
-    situation = _with_return_point(read_situation(source), return_point)
+    situation = read_file(source, MapOptions(role, outermost, ignore_points))
+    situation = _with_return_point(situation, return_point)
     _check_choice(situation, source, output, part)
     written = write_situation(situation, output, part, write=write_kept)
-    warnings = _left_out(situation, written, output) if part is None else []
-    warn(warnings)
+    left_out = _left_out(situation, written, output) if part is None else []
+    warn(left_out)
+    warnings = [*situation.remarks, *left_out]
     document = {
         "status": "ok",
         "command": "convert",
@@ -116,11 +130,11 @@ def _left_out(situation: Situation, written: tuple[Part, ...], output: Path) -> 
         if one not in written
     ]
     mission = situation.mission
-    if mission is not None and output.suffix.lower() == ".gpx":
+    if mission is not None and output.suffix.lower() in (".gpx", ".csv"):
         placeless = sum(not item.is_placed for item in mission.value.items)
         if placeless:
             texts.append(
-                f"{placeless} mission items without a place left out: a .gpx file holds the route only"
+                f"{placeless} mission items without a place left out: a {output.suffix} file holds the route only"
             )
     fence = situation.fence
     if fence is not None and fence.value.return_point and output.suffix.lower() == ".poly":

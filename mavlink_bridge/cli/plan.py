@@ -22,6 +22,15 @@ from mavlink_bridge.cli.common import (
     print_json,
     warn,
 )
+from mavlink_bridge.cli.field_files import (
+    IgnorePointsOption,
+    MapOptions,
+    OutermostOption,
+    RoleOption,
+    read_fence_file,
+    read_vehicle_file,
+    with_mission_home,
+)
 from mavlink_bridge.cli.permissions import check_permissions
 from mavlink_bridge.cli.plan_request import ENDS, METHODS, ORDERS, request_from_options, with_tour
 from mavlink_bridge.cli.plan_results import Told, arrival_document, report_end
@@ -128,6 +137,9 @@ def plan(
             rich_help_panel=_TOURS,
         ),
     ] = None,
+    role: RoleOption = None,
+    outermost: OutermostOption = None,
+    ignore_points: IgnorePointsOption = False,
     method: Annotated[str, typer.Option(metavar="|".join(METHODS), help="How to search.")] = "optimal",
     output: Annotated[
         list[Path] | None,
@@ -194,7 +206,8 @@ def plan(
         size=(length, width, gps),
         escape=escape,
     )
-    request = with_tour(request, order, end, via_mission, comes_back=come_back)
+    maps = MapOptions(role, outermost, ignore_points)
+    request = with_tour(request, order, end, via_mission, maps, comes_back=come_back)
     _check_options(fence, log, connect, upload=upload, outputs=outputs, plots=plots)
     if home is not None and connect is not None:
         raise UsageError("--home goes with --fence and --log: a live vehicle tells its own home")
@@ -230,7 +243,9 @@ def plan(
     else:
         from mavlink_bridge.mavlink.vehicles import not_ardupilot  # noqa: PLC0415 - only where needed
 
-        situation = _offline_situation(fence, log, system, any_vehicle=any_vehicle)
+        situation = _offline_situation(fence, log, system, maps, any_vehicle=any_vehicle)
+        if request.via is not None and log is None:
+            situation = with_mission_home(situation, request.via, str(via_mission))
         situation = with_home_option(with_parameter_file(situation, vehicle), home)
         if request.repairs and situation.ardupilot is False:
             raise LogError(f"{log}: {not_ardupilot(situation.system, None)}", file=str(log))
@@ -255,9 +270,7 @@ def with_parameter_file(situation: Situation, vehicle: Path | None) -> Situation
     """Add the parameters of a file to those that the vehicle itself reported."""
     if vehicle is None:
         return situation
-    from missions.formats import read_parameters  # noqa: PLC0415 - quick help
-
-    return replace(situation, parameters={**read_parameters(vehicle), **situation.parameters})
+    return replace(situation, parameters={**read_vehicle_file(vehicle), **situation.parameters})
 
 
 def _check_options(
@@ -295,7 +308,7 @@ def _check_options(
 
 
 def _offline_situation(
-    fence: Path | None, log: Path | None, system: int | None, *, any_vehicle: bool
+    fence: Path | None, log: Path | None, system: int | None, maps: MapOptions, *, any_vehicle: bool
 ) -> Situation:
     if log is not None:
         from mavlink_bridge.logbook.log_situation import situation_from_log  # noqa: PLC0415 - pymavlink only where needed
@@ -303,11 +316,5 @@ def _offline_situation(
         return situation_from_log(
             log, system, any_vehicle=any_vehicle, on_damage=lambda damage: warn([f"{log}: {damage}"])
         )
-    from missions.errors import FenceMissingError  # noqa: PLC0415 - quick help
-    from missions.formats import read_situation  # noqa: PLC0415
-
     assert fence is not None
-    situation = read_situation(fence)
-    if situation.fence is None:
-        raise FenceMissingError(f"{fence} holds no fence", file=str(fence))
-    return situation
+    return read_fence_file(fence, maps)

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mavlink_bridge.cli.field_files import NO_OPTIONS, MapOptions, read_mission_file
 from mavlink_bridge.cli.values import metres_or, position_from
 from mavlink_bridge.errors import UsageError
 
@@ -43,7 +44,15 @@ def request_from_options(
     )
 
 
-def with_tour(request: Request, order: str, end: str, via: str | None, *, comes_back: bool) -> Request:
+def with_tour(
+    request: Request,
+    order: str,
+    end: str,
+    via: str | None,
+    maps: MapOptions = NO_OPTIONS,
+    *,
+    comes_back: bool,
+) -> Request:
     """Add order, way home, end or a mission to repair.
 
     Raises
@@ -69,6 +78,4 @@ def with_tour(request: Request, order: str, end: str, via: str | None, *, comes_
         )
     if via == _OWN:
         return replace(request, via_own=True)
-    from missions.formats import read_mission  # noqa: PLC0415 - quick help
-
-    return replace(request, via=read_mission(Path(via)))
+    return replace(request, via=read_mission_file(Path(via), maps.of_another_file()))

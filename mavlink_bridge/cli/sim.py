@@ -9,6 +9,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mavlink_bridge.cli.common import JsonOption, QuietOption, print_json
+from mavlink_bridge.cli.field_files import (
+    IgnorePointsOption,
+    MapOptions,
+    OutermostOption,
+    RoleOption,
+    read_file,
+    read_mission_file,
+)
 from mavlink_bridge.cli.terminal import echo
 from mavlink_bridge.cli.values import MOST_FLOAT32, MOST_S, checked_number, position_from, within
 from mavlink_bridge.errors import UsageError
@@ -62,6 +70,9 @@ def sim(
     ] = 0.0,
     seed: Annotated[int, typer.Option(min=-MOST_SEED, max=MOST_SEED, help="Seed of the link's faults.")] = 0,
     system: Annotated[int, typer.Option(min=1, max=255, help="MAVLink system id.")] = 1,
+    role: RoleOption = None,
+    outermost: OutermostOption = None,
+    ignore_points: IgnorePointsOption = False,
     json_output: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
@@ -84,7 +95,8 @@ def sim(
     from mavlink_bridge.simulator.faults import Faults  # noqa: PLC0415
     from mavlink_bridge.simulator.shell import Simulator  # noqa: PLC0415
 
-    config = _config(home, fence, mission, param or [], system)
+    maps = MapOptions(role, outermost, ignore_points)
+    config = _config(home, fence, mission, param or [], system, maps)
     faults = Faults(loss=loss, duplicate=duplicate, latency_s=latency, jitter_s=jitter)
     stop = threading.Event()
     try:
@@ -105,19 +117,24 @@ def sim(
 
 
 def _config(
-    home: str, fence: Path | None, mission: Path | None, params: list[str], system: int
+    home: str,
+    fence: Path | None,
+    mission: Path | None,
+    params: list[str],
+    system: int,
+    maps: MapOptions,
 ) -> SimulatorConfig:
     from mavlink_bridge.simulator.config import SimulatorConfig  # noqa: PLC0415
     from missions.fence import fence_to_items  # noqa: PLC0415
-    from missions.formats import read_fence, read_mission  # noqa: PLC0415
+    from missions.formats import fence_of  # noqa: PLC0415
 
     position, heading_deg = _parse_home(home)
     return SimulatorConfig(
         system=system,
         home=position,
         heading_deg=heading_deg,
-        fence=fence_to_items(read_fence(fence)) if fence else (),
-        mission=tuple(read_mission(mission).items) if mission else (),
+        fence=fence_to_items(fence_of(read_file(fence, maps), fence)) if fence else (),
+        mission=read_mission_file(mission, maps.of_another_file()).items if mission else (),
         parameters=dict(_parse_parameter(text) for text in params),
     )
 

@@ -19,6 +19,14 @@ from mavlink_bridge.cli.common import (
     progress_bar,
     warn,
 )
+from mavlink_bridge.cli.field_files import (
+    IgnorePointsOption,
+    MapOptions,
+    OutermostOption,
+    RoleOption,
+    read_file,
+    read_vehicle_file,
+)
 from mavlink_bridge.cli.restoring import Restoration, backups_to_restore, interrupted_warnings
 from mavlink_bridge.cli.terminal import echo
 from mavlink_bridge.errors import UsageError
@@ -81,6 +89,9 @@ def upload(
         bool,
         typer.Option("--forget", help="Put the notes of interrupted uploads aside; the backups stay."),
     ] = False,
+    role: RoleOption = None,
+    outermost: OutermostOption = None,
+    ignore_points: IgnorePointsOption = False,
     signing_key: SigningKeyOption = None,
     system: SystemOption = None,
     any_vehicle: AnyVehicleOption = False,
@@ -109,7 +120,8 @@ def upload(
     if file is None and not restore and not forget:
         raise UsageError("give a FILE to upload, or --restore")
     restoration = _restoration(file, for_another=other_vehicle) if restore else None
-    lists, parameters = _content(file, only or [], restoration)
+    maps = MapOptions(role, outermost, ignore_points)
+    lists, parameters = _content(file, only or [], restoration, maps)
 
     from mavlink_bridge.backup.store import BackupStore  # noqa: PLC0415 - usage errors need not wait for it
     from mavlink_bridge.cli.interrupting import interruptible, terminable  # noqa: PLC0415
@@ -184,7 +196,7 @@ def _forget(store: BackupStore, address: Address, *, json_output: bool, quiet: b
 
 
 def _content(
-    file: Path | None, only: Sequence[str], restoration: Restoration | None
+    file: Path | None, only: Sequence[str], restoration: Restoration | None, maps: MapOptions
 ) -> tuple[Lists, Mapping[str, float]]:
     """Read the file, lists as they go over the wire or parameters; all that it holds can be sent."""
     from mavlink_bridge.mavlink.messages import MissionType  # noqa: PLC0415 - usage errors need not wait for it
@@ -197,12 +209,10 @@ def _content(
     if file is None or restoration is not None:
         return [], {}
     if file.suffix.lower() in _PARAMETER_SUFFIXES:
-        from missions.formats import read_parameters  # noqa: PLC0415
-
-        parameters = read_parameters(file)
+        parameters = read_vehicle_file(file)
         check_parameters(parameters)
         return [], parameters
-    found = _lists_of(file)
+    found = _lists_of(file, maps)
     chosen = [name for name in _LISTS if name in found and (not only or name in only)]
     if not chosen:
         raise UsageError(f"{file} holds no {' or '.join(only or _LISTS)}")
@@ -212,14 +222,13 @@ def _content(
     return lists, {}
 
 
-def _lists_of(file: Path) -> dict[str, tuple[MissionItem, ...]]:
+def _lists_of(file: Path, maps: MapOptions) -> dict[str, tuple[MissionItem, ...]]:
     from missions.fence import fence_to_items  # noqa: PLC0415
-    from missions.formats import read_situation  # noqa: PLC0415
     from missions.geo import LatLon  # noqa: PLC0415
     from missions.items import with_home  # noqa: PLC0415
     from missions.rally import rally_to_items  # noqa: PLC0415
 
-    situation = read_situation(file)
+    situation = read_file(file, maps)
     found: dict[str, tuple[MissionItem, ...]] = {}
     if situation.fence and situation.fence.value.zones:
         found["fence"] = fence_to_items(situation.fence.value)

@@ -181,6 +181,18 @@ _WITH_PLACE = frozenset(
 )
 """Commands stored with a place and a frame (``AP_Mission::stored_in_location``); others read back with frame 0 and mostly without a place."""
 
+_NAN_TAKEN = frozenset(
+    {
+        (int(Command.NAV_WAYPOINT), 3),
+        (int(Command.NAV_LAND), 3),
+        (int(Command.NAV_TAKEOFF), 3),
+        (84, 3),
+        (85, 2),
+        (85, 3),
+    }
+)
+"""Commands and the parameters of theirs, counted from 0, in which ArduPilot takes NaN."""
+
 _POLYGON_VERTICES = frozenset(
     {Command.FENCE_POLYGON_VERTEX_INCLUSION, Command.FENCE_POLYGON_VERTEX_EXCLUSION}
 )
@@ -213,6 +225,21 @@ class Difference:
 def _brief(item: MissionItem) -> str:
     params = ", ".join(f"{value:g}" for value in item.params)
     return f"command {int(item.command)} ({params}) at {item.position}, {item.alt_m:g} m in frame {int(item.frame)}"
+
+
+def sendable_params(item: MissionItem) -> tuple[float, float, float, float]:
+    """Return an item's parameters, with 0 for a NaN that ArduPilot would refuse and of which it keeps nothing.
+
+    QGroundControl leaves headings unset (null), and ArduPilot refuses that of NAV_LOITER_UNLIM (ArduPilot #27482).
+    """
+    keepers = _KEPT_PARAMS.get(int(item.command), _KEEPS_ALL)
+    a, b, c, d = (
+        0.0
+        if math.isnan(value) and keep in (_dropped, _flag) and (int(item.command), i) not in _NAN_TAKEN
+        else value
+        for i, (value, keep) in enumerate(zip(item.params, keepers, strict=True))
+    )
+    return a, b, c, d
 
 
 def is_same_item(a: MissionItem, b: MissionItem, mission_type: MissionType, *, coarse: bool = False) -> bool:

@@ -45,7 +45,9 @@ __all__ = [
     "Format",
     "Part",
     "check_writable_format",
+    "fence_of",
     "format_of",
+    "mission_of",
     "parts_of",
     "read_fence",
     "read_mission",
@@ -151,7 +153,18 @@ def read_fence(path: Path | str) -> Fence:
     FenceMissingError
         The file holds no fence.
     """
-    fence = read_situation(path).fence
+    return fence_of(read_situation(path), path)
+
+
+def fence_of(situation: Situation, path: Path | str) -> Fence:
+    """Return the fence of a situation that was read from a file.
+
+    Raises
+    ------
+    FenceMissingError
+        It has none.
+    """
+    fence = situation.fence
     if fence is None or not fence.value.zones:
         raise FenceMissingError(
             f"{path} holds no fence",
@@ -172,14 +185,24 @@ def read_mission(path: Path | str) -> Mission:
     MissionFormatError
         As `read_situation`, or the file holds no mission.
     """
-    mission = read_situation(path).mission
-    if mission is None:
+    return mission_of(read_situation(path), path)
+
+
+def mission_of(situation: Situation, path: Path | str) -> Mission:
+    """Return the mission of a situation that was read from a file.
+
+    Raises
+    ------
+    MissionFormatError
+        It has none.
+    """
+    if situation.mission is None:
         raise MissionFormatError(
             f"{path} holds no mission",
             file=str(path),
             advice="give a file that holds one, such as a .plan or .waypoints",
         )
-    return mission.value
+    return situation.mission.value
 
 
 def write_situation(

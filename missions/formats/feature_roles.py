@@ -99,6 +99,9 @@ _NEUTRAL = re.compile(
 )
 """Names that programs give, and words that say nothing of what to do there."""
 
+_ESCAPED = re.compile(r"\\x([0-9a-fA-F]{2})")
+"""A letter beyond ASCII as programs write it that cannot hold it: M\\xfchle."""
+
 _THING = re.compile(
     r"(?<![^\W\d_])((no|not|never|kein|keine) [^\W\d_]{3,}|danger|dangerous|hazard|warning|trees?|bush(es)?|hedges?|woods?|forests?|ponds?|lakes?|rivers?"
     r"|streams?|water|ditch(es)?|buildings?|house|barn|sheds?|walls?|rocks?|stones?|holes?|poles?|pylons?|roads?|pool|bed|protected|private"
@@ -153,7 +156,7 @@ def _misfit(feature: Feature, role: Role, possible: Iterable[Role]) -> MissionFo
 
 
 def _either(feature: Feature, roles: Iterable[Role]) -> str:
-    return "say which it is: " + " or ".join(feature.role_option(role) for role in sorted(roles))
+    return "say which it is: " + " or ".join(feature.role_option(role) for role in sorted(roles, reverse=True))
 
 
 def _said_roles(feature: Feature) -> set[Role]:
@@ -208,7 +211,7 @@ def may_be_inclusion(feature: Feature) -> bool:
     Its name says nothing (it has no word of three letters or more, or only such as programs give), or it is one of a field; and nothing that
     is said of it is a thing that rovers keep away from.
     """
-    own = feature.names[0] if feature.names else ""
+    own = _ESCAPED.sub(lambda found: chr(int(found[1], 16)), feature.names[0] if feature.names else "")
     texts = [*feature.names, *(f"{key} {value}" for key, value in feature.properties.items())]
     if any(_THING.search(_plain(text)) for text in texts if isinstance(text, str)):
         return False

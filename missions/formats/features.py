@@ -83,7 +83,8 @@ class Feature:
 
     def role_option(self, role: str) -> str:
         """Return the command line's option that gives it a role."""
-        return f"--role {quote(f'{self.handle}={role}')}"
+        word = "ignore" if role == Role.DRAWING else role
+        return f"--role {quote(f'{self.handle}={word}')}"
 
     def __str__(self) -> str:
         return f"{self.shape} {self.names[0]!r}" if self.names and self.names[0] else self.label or self.shape

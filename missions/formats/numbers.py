@@ -22,7 +22,8 @@ _DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+")
 def xy_from_file(command: int, frame: int, param5: float, param6: float) -> tuple[int, int]:
     """Return an item's params 5 and 6 as MISSION_ITEM_INT carries them.
 
-    A place goes as degE7, anything else as the whole number that it is: ArduPilot, QGroundControl and MAVSDK do not scale it.
+    A place goes as degE7, anything else as the whole number that it is: ArduPilot, QGroundControl and MAVSDK do not scale it. Where
+    the command uses neither, what is no whole number is dropped.
 
     Raises
     ------
@@ -31,12 +32,19 @@ def xy_from_file(command: int, frame: int, param5: float, param6: float) -> tupl
     """
     if has_place(command, frame):
         return to_e7(checked_lat_lon(param5, param6))
-    for name, value in (("param5", param5), ("param6", param6)):
-        if not (math.isfinite(value) and value == round(value) and abs(value) <= _INT32_MAX):
-            raise InvalidPositionError(
-                f"{name} is {value:.10g}; command {command} has no place, and a mission item carries whole numbers there"
-            )
-    return round(param5), round(param6)
+    return _whole_param(command, 5, param5), _whole_param(command, 6, param6)
+
+
+def _whole_param(command: int, number: int, value: float) -> int:
+    if math.isfinite(value) and value == round(value) and abs(value) <= _INT32_MAX:
+        return round(value)
+    if str(number) not in USED_PARAMS.get(
+        command, "56"
+    ):  # what a ground station left there, such as an old place
+        return 0
+    raise InvalidPositionError(
+        f"param{number} is {value:.10g}; command {command} has no place, and a mission item carries whole numbers there"
+    )
 
 
 def xy_for_file(item: MissionItem) -> tuple[float, float]:

@@ -31,7 +31,18 @@ def read_parameters(path: Path | str) -> dict[str, float]:
     MissionFormatError
         The file is missing or a line is not a name and a number; the message says which.
     """
-    return dict(read(read_text(Path(path)).text, str(path)).parameters)
+    return dict(read_path(Path(path)).parameters)
+
+
+def read_path(path: Path) -> Situation:
+    """Read a parameter file of any suffix; the situation's remarks tell what was passed over.
+
+    Raises
+    ------
+    MissionFormatError
+        As `read_parameters`.
+    """
+    return read(read_text(path).text, str(path))
 
 
 def read(text: str, source: str) -> Situation:

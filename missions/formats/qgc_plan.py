@@ -101,7 +101,7 @@ def _is_of_version_2(plan: JsonNode, key: str, remarks: list[str]) -> bool:
         )
         remarks.append(f"{node.source}: {key} {what}: passed over")
         return False
-    if node["version"].value != 2:
+    if (key == "geoFence" or "version" in node) and node["version"].value != 2:
         raise node["version"].error(f"{key} version {node['version'].value!r}; expected 2")
     return True
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from missions.errors import FenceMissingError, MissionFormatError
+from missions.foreign_files import kind_of_suffix
 from missions.formats import (
     fen,
     geojson,
@@ -25,7 +26,6 @@ from missions.formats import (
 )
 from missions.formats.choices import NO_CHOICES, Choices
 from missions.formats.files import write_file
-from missions.formats.foreign import kind_of_suffix
 from missions.formats.parameters import read_parameters
 from missions.formats.parts import Part, only, parts_of
 from missions.formats.texts import read_text

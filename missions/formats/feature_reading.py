@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import TYPE_CHECKING
 
 from missions.errors import InvalidPositionError, MissionFormatError
 from missions.fence import Fence
+from missions.formats.bounds import MOST_FEATURES, check_bound
 from missions.formats.choices import NO_CHOICES
 from missions.formats.feature_roles import role_of
 from missions.formats.feature_zones import roles_of_zones, zones_of
@@ -36,7 +38,9 @@ def situation_of(features: Iterable[Feature], source: str, choices: Choices = NO
     found: dict[Role, list[Feature]] = {role: [] for role in Role}
     zones: list[tuple[Feature, Role | None]] = []
     unknown_points = []
-    all_features = numbered(features)
+    drawn = list(itertools.islice(features, MOST_FEATURES + 1))
+    check_bound(len(drawn), MOST_FEATURES, "features", source)
+    all_features = numbered(drawn)
     if not all_features:
         raise MissionFormatError(f"{source}: there is nothing in it", file=source)
     choices.check_names(all_features, source)

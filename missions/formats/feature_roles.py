@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from missions.formats.choices import NO_CHOICES
@@ -78,6 +79,17 @@ _LIKELY_KEYS = ("fence_type", "zone", "kind", "type")
 _TRUE, _FALSE = ("true", "1", "yes"), ("false", "0", "no")
 _WHOLE_NAMES = frozenset({Role.HOME, Role.RETURN_POINT, Role.DRAWING})
 """A field called "Home meadow" is not a home; and a feature is left out only by that one word as its role."""
+
+_LONE_WORDS = {
+    name: role for word, role in _ROLES.items() if role in _WHOLE_NAMES for name in (word, f"{word}s")
+}
+_WORDS = {
+    role: re.compile(
+        rf"(?<![^\W\d_])({'|'.join(word for word in _ROLES if _ROLES[word] is role)})s?(?![^\W\d_])"
+    )
+    for role in Role
+    if role not in _WHOLE_NAMES
+}
 
 _ZONES = frozenset({Role.INCLUSION, Role.EXCLUSION})
 _POSSIBLE = {
@@ -156,7 +168,9 @@ def _misfit(feature: Feature, role: Role, possible: Iterable[Role]) -> MissionFo
 
 
 def _either(feature: Feature, roles: Iterable[Role]) -> str:
-    return "say which it is: " + " or ".join(feature.role_option(role) for role in sorted(roles, reverse=True))
+    return "say which it is: " + " or ".join(
+        feature.role_option(role) for role in sorted(roles, reverse=True)
+    )
 
 
 def _said_roles(feature: Feature) -> set[Role]:
@@ -185,24 +199,23 @@ def _said_roles(feature: Feature) -> set[Role]:
 def _named_role(names: Iterable[str], feature: Feature, possible: Iterable[Role]) -> Role | None:
     """Return the role that words in the names stand for; the innermost name with such a word counts."""
     for name in map(_plain, names):
-        roles = {
-            role
-            for word, role in _ROLES.items()
-            if role in possible
-            if (
-                name in (word, f"{word}s")
-                if role in _WHOLE_NAMES
-                else re.search(rf"(?<![^\W\d_]){word}s?(?![^\W\d_])", name)
-            )
-        }
+        roles = _roles_in(name) & frozenset(possible)
         if len(roles) > 1:
             raise feature.error(
                 f"the name {name!r} tells of {' and '.join(sorted(roles))}; expected one of them",
                 advice=_either(feature, roles),
             )
         if roles:
-            return roles.pop()
+            return next(iter(roles))
     return None
+
+
+@lru_cache(maxsize=1024)
+def _roles_in(name: str) -> frozenset[Role]:
+    """Return the roles that words in a name stand for."""
+    if name in _LONE_WORDS:
+        return frozenset({_LONE_WORDS[name]})
+    return frozenset(role for role, words in _WORDS.items() if words.search(name))
 
 
 def may_be_inclusion(feature: Feature) -> bool:

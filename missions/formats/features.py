@@ -13,7 +13,7 @@ from missions.errors import MissionFormatError
 from missions.formats.numbers import number, whole
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Mapping, Sequence
 
     from missions.geo import LatLon
 
@@ -125,13 +125,12 @@ class Feature:
             raise self.error(str(error)) from None
 
 
-def numbered(features: Iterable[Feature]) -> list[Feature]:
+def numbered(features: Sequence[Feature]) -> list[Feature]:
     """Return features with what they are called."""
-    found = list(features)
-    names = Counter(name_key(feature.names[0]) for feature in found if feature.names)
+    names = Counter(name_key(feature.names[0]) for feature in features if feature.names)
     counts: Counter[Shape] = Counter()
     result = []
-    for feature in found:
+    for feature in features:
         counts[feature.shape] += 1
         label = f"{'feature' if feature.shape is Shape.NOWHERE else feature.shape} {counts[feature.shape]}"
         own = feature.names[0] if feature.names else ""

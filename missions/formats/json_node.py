@@ -30,7 +30,11 @@ def parse_json(text: str, source: str) -> JsonNode:
             f"{source}: line {error.lineno}: not JSON: {error.msg}", file=source
         ) from None
     except (RecursionError, ValueError) as error:
-        reason = "nested too deeply (some 1,000 deep)" if isinstance(error, RecursionError) else error
+        reason = (
+            "nested too deeply (some 1,000 deep)"
+            if isinstance(error, RecursionError)
+            else str(error).partition(" for integer")[0]
+        )
         raise MissionFormatError(f"{source}: not JSON: {reason}", file=source) from None
 
 

@@ -7,7 +7,6 @@ with a radius, and for the eye a polygon beside each that reading leaves out.
 from __future__ import annotations
 
 import math
-import re
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -31,7 +30,6 @@ if TYPE_CHECKING:
 _FOLDERS = ("kml", "Document", "Folder")
 _SHAPES = ("Point", "LineString", "LinearRing", "Polygon", "MultiGeometry")
 _TRACKS = ("Track", "MultiTrack")
-_AROUND_COMMAS = re.compile(r"\s*,\s*")
 _CIRCLE_CORNERS = 72  # every 5°: to look at; pbpp reads the circle's own data back
 _STYLES = {  # colours of the pictures, as KML writes them: opacity, blue, green, red
     Role.INCLUSION: "<LineStyle><color>ff739e00</color><width>3</width></LineStyle><PolyStyle><fill>0</fill></PolyStyle>",
@@ -151,7 +149,7 @@ def _positions(element: Element, least: int) -> tuple[LatLon, ...]:
     if coordinates is None:
         raise element.error(f"a {element.name} without <coordinates>")
     # Written by hand there may be blanks around the commas
-    words = _AROUND_COMMAS.sub(",", coordinates.text).split()
+    words = ",".join(part.strip() for part in coordinates.text.split(",")).split()
     positions = tuple(_position(word, coordinates) for word in words)
     if len(positions) < least:
         raise coordinates.error(f"{len(positions)} positions; expected at least {least}")

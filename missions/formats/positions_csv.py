@@ -7,7 +7,7 @@ import io
 from typing import TYPE_CHECKING
 
 from missions.errors import InvalidPositionError, MissionFormatError
-from missions.formats.bounds import MOST_LINES, check_bound
+from missions.formats.bounds import MOST_COLUMNS, MOST_FEATURES, check_bound
 from missions.formats.choices import NO_CHOICES
 from missions.formats.feature_reading import situation_of
 from missions.formats.features import Feature, Role, Shape
@@ -31,9 +31,10 @@ def read(text: str, source: str, choices: Choices = NO_CHOICES) -> Situation:
     MissionFormatError
         With the line and what was expected there.
     """
-    check_bound(text.count("\n"), MOST_LINES, "lines", source)
+    check_bound(text.count("\n"), MOST_FEATURES, "rows", source)
     first = text.partition("\n")[0]
     delimiter = max(";\t,", key=first.count)
+    check_bound(first.count(delimiter), MOST_COLUMNS, "columns", source)
     rows = csv.reader(io.StringIO(text), delimiter=delimiter)
     try:
         numbered = [(rows.line_num, row) for row in rows if any(cell.strip() for cell in row)]

@@ -8,8 +8,8 @@ import re
 from typing import TYPE_CHECKING, NamedTuple
 
 from missions.errors import MissionFormatError
+from missions.foreign_files import check_head
 from missions.formats.bounds import MOST_BYTES, check_bound
-from missions.formats.foreign import check_head
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -90,7 +90,6 @@ def _bounded(file: IO[bytes], source: str) -> bytes:
 
 def _unzipped(data: bytes, path: Path) -> tuple[bytes, tuple[str, ...]]:
     """Return the KML of a zip file, as KMZ wants it: doc.kml, else the first."""
-    import lzma  # noqa: PLC0415
     import zipfile  # noqa: PLC0415 - slow to come, only for these
     import zlib  # noqa: PLC0415
 
@@ -98,30 +97,28 @@ def _unzipped(data: bytes, path: Path) -> tuple[bytes, tuple[str, ...]]:
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             found, remarks = _kml_in(archive, path)
+            if found.compress_type not in (
+                zipfile.ZIP_STORED,
+                zipfile.ZIP_DEFLATED,
+            ):  # Python unpacks others without a bound
+                raise NotImplementedError(f"{found.filename} is packed by another method than deflate")
             with archive.open(found) as file:
                 return _bounded(file, f"{path}: {found.filename}"), remarks
     except (
         zipfile.BadZipFile,
-        RuntimeError,  # encrypted
-        NotImplementedError,  # packed in a way that Python does not know
+        RuntimeError,  # encrypted, and ways of packing that Python does not know
         zlib.error,
-        lzma.LZMAError,
         EOFError,
+        OSError,
         ValueError,
     ) as error:
         reason = str(error) or type(error).__name__
         raise MissionFormatError(
             f"{path} is no zip file that can be read: {reason}", file=str(path), advice=_ZIP_ADVICE
         ) from None
-    except OSError as error:
-        if error.errno is not None:
-            raise
-        raise MissionFormatError(  # bz2 says so
-            f"{path} is no zip file that can be read: {error}", file=str(path), advice=_ZIP_ADVICE
-        ) from None
 
 
-_ZIP_ADVICE = "save the .kmz again, or save a .kml"
+_ZIP_ADVICE = "save the .kmz again as an ordinary zip file, or save a .kml"
 
 
 def _kml_in(archive: ZipFile, path: Path) -> tuple[ZipInfo, tuple[str, ...]]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from missions.errors import FenceError, InvalidPositionError, MissionFormatError
 from missions.fence import fence_from_items, fence_to_items
-from missions.formats.bounds import lines_of
+from missions.formats.bounds import MOST_ITEMS, check_bound, lines_of
 from missions.formats.numbers import number, whole, without_nan, xy_for_file, xy_from_file
 from missions.geo import LatLon
 from missions.items import Command, MissionItem, file_frame, with_home
@@ -69,6 +69,7 @@ def read(text: str, source: str) -> Situation:
             line=1,
             advice="save the file from the ground station again, as QGC WPL 110 or as .plan",
         )
+    check_bound(sum(map(bool, lines)) - 1, MOST_ITEMS, "items", source)
     rows = [
         _row(line.split(), version, f"{source}: line {count}", count)
         for count, line in enumerate(lines[1:], start=2)

@@ -117,15 +117,25 @@ def read_fence_file(path: Path, options: MapOptions = NO_OPTIONS) -> Situation:
     FenceMissingError
         It holds no fence.
     """
-    from missions.errors import FenceMissingError  # noqa: PLC0415 - quick help
-    from missions.fence_reach import REACH_M, within_reach  # noqa: PLC0415
+    from missions.errors import FenceError, FenceMissingError  # noqa: PLC0415 - quick help
+    from missions.fence import ZoneKind  # noqa: PLC0415
+    from missions.fence_reach import REACH_M, is_wide, within_reach  # noqa: PLC0415
 
     situation = read_file(path, options)
     if situation.fence is None:
         raise FenceMissingError(f"{path} holds no fence", file=str(path))
-    fence, count = within_reach(situation.fence.value)
-    if count:
-        warn([f"{path}: left out {count} exclusions more than {REACH_M / 1000:g} km from every inclusion"])
+    fence, left_out, cut = within_reach(situation.fence.value)
+    if fence.zones and is_wide(*fence.zones) and all(zone.kind is ZoneKind.EXCLUSION for zone in fence.zones):
+        raise FenceError(
+            f"{path}: its exclusions reach over more than can be planned, and no inclusion tells which of them matter",
+            file=str(path),
+            advice="draw an inclusion around the field; exclusions far from it are left out then",
+        )
+    far = f"more than {REACH_M / 1000:g} km from every inclusion"
+    if left_out:
+        warn([f"{path}: exclusions {far} left out: {left_out}"])
+    if cut:
+        warn([f"{path}: exclusions whose parts {far} are left out: {cut}"])
     return replace(situation, fence=replace(situation.fence, value=fence))
 
 

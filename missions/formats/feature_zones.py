@@ -123,7 +123,8 @@ def _outline(zone: Feature, origin: LatLon) -> BaseGeometry:
 
 
 def _about(position: LatLon, origin: LatLon) -> tuple[float, float]:
-    return wrap_lon_deg(position.lon_deg - origin.lon_deg), position.lat_deg
+    # Rounded, for numbers like 1e-316 make GEOS lose whole triangles
+    return round(wrap_lon_deg(position.lon_deg - origin.lon_deg), 12), round(position.lat_deg, 12)
 
 
 def zones_of(feature: Feature, role: Role) -> list[Zone]:

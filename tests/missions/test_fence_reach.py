@@ -5,10 +5,11 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 from pyproj import Geod
+from shapely import Polygon
 from strategies import away
 
 from missions.fence import CircleZone, Fence, PolygonZone, ZoneKind
-from missions.fence_reach import REACH_M, within_reach
+from missions.fence_reach import REACH_M, is_wide, within_reach
 from missions.geo import LatLon
 
 GEOD = Geod(ellps="WGS84")
@@ -30,8 +31,8 @@ def test_what_is_near_stays_and_what_is_far_goes(centre, bearing, distance_m, si
         if is_circle
         else square(ZoneKind.EXCLUSION, there, size_m)
     )
-    kept, left_out = within_reach(Fence((field, zone)))
-    assert len(kept.zones) + left_out == 2
+    kept, left_out, cut = within_reach(Fence((field, zone)))
+    assert (len(kept.zones) + left_out, cut) == (2, 0)
     gap_m = GEOD.inv(centre.lon_deg, centre.lat_deg, there.lon_deg, there.lat_deg)[2] - 200.0 - size_m
     if gap_m < REACH_M:
         assert left_out == 0
@@ -41,4 +42,29 @@ def test_what_is_near_stays_and_what_is_far_goes(centre, bearing, distance_m, si
 
 def test_without_an_inclusion_everything_stays():
     zones = tuple(square(ZoneKind.EXCLUSION, LatLon(48.1 + i, 11.5), 50.0) for i in range(4))
-    assert within_reach(Fence(zones)) == (Fence(zones), 0)
+    assert within_reach(Fence(zones)) == (Fence(zones), 0, 0)
+
+
+@given(CENTRES.filter(lambda centre: centre.lat_deg < 70), st.floats(0, 360), st.floats(0, 300.0))
+def test_of_a_wide_exclusion_the_part_within_reach_is_left_as_it_was(centre, bearing, distance_m):
+    field = square(ZoneKind.INCLUSION, centre, 200.0)
+    corner = away(centre, bearing, distance_m)
+    wide = tuple(
+        LatLon(corner.lat_deg + up, (corner.lon_deg + right + 180) % 360 - 180)
+        for up, right in ((0, 0), (0, 3), (4, 3), (4, 0))
+    )
+    kept, left_out, cut = within_reach(Fence((field, PolygonZone(ZoneKind.EXCLUSION, wide))))
+    assert (left_out, cut) == (0, 1)
+
+    def plane(vertices):
+        return Polygon(
+            [((p.lon_deg - corner.lon_deg + 180) % 360 - 180, p.lat_deg - corner.lat_deg) for p in vertices]
+        )
+
+    [part] = kept.zones[1:]
+    reach_deg = 0.9 * REACH_M / 111_320
+    near = plane(field.vertices).buffer(reach_deg)
+    missing = plane(wide).intersection(near).difference(plane(part.vertices))
+    assert missing.area < 1e-12
+    assert plane(part.vertices).difference(plane(wide)).area < 1e-12
+    assert not is_wide(*kept.zones)

@@ -164,7 +164,12 @@ def check(
     if begin is None and log is not None and situation.home is not None:
         begin = situation.home.value  # at a log's end the vehicle may stand anywhere on its way
     checked = check_mission(situation.mission.value, situation, replace(request, start=begin))
-    warnings = [*unknown, *checked.warnings, *_storage_warnings(checked.mission.items, situation)]
+    warnings = [
+        *situation.remarks,
+        *unknown,
+        *checked.warnings,
+        *_storage_warnings(checked.mission.items, situation),
+    ]
     warn(warnings)
     _draw(checked, situation, plots)
     if json_output:
@@ -216,7 +221,12 @@ def _with_files(
     if fence is not None:
         told = read_fence_file(fence, maps)
         found = replace(
-            found, fence=told.fence, fence_trouble=None, transfers={}, home=found.home or told.home
+            found,
+            fence=told.fence,
+            fence_trouble=None,
+            transfers={},
+            home=found.home or told.home,
+            remarks=told.remarks,
         )
     if mission is not None:
         told = read_file(mission, maps if fence is None else maps.of_another_file())
@@ -226,6 +236,7 @@ def _with_files(
             mission=told.mission,
             fence=told.fence if fence is None and told.fence else found.fence,
             rally=found.rally or told.rally,
+            remarks=(*found.remarks, *told.remarks),
         )
         if source is None:
             found = with_mission_home(found, drawn, str(mission))

@@ -132,11 +132,11 @@ def read_fence_file(path: Path, options: MapOptions = NO_OPTIONS) -> Situation:
             advice="draw an inclusion around the field; exclusions far from it are left out then",
         )
     far = f"more than {REACH_M / 1000:g} km from every inclusion"
-    if left_out:
-        warn([f"{path}: exclusions {far} left out: {left_out}"])
-    if cut:
-        warn([f"{path}: exclusions whose parts {far} are left out: {cut}"])
-    return replace(situation, fence=replace(situation.fence, value=fence))
+    counts = {f"exclusions {far} left out": left_out, f"exclusions whose parts {far} are left out": cut}
+    more = [f"{path}: {what}: {count}" for what, count in counts.items() if count]
+    warn(more)
+    known = replace(situation.fence, value=fence)
+    return replace(situation, fence=known, remarks=(*situation.remarks, *more))
 
 
 def read_mission_file(path: Path, options: MapOptions = NO_OPTIONS) -> Mission:

@@ -249,10 +249,11 @@ def is_same_item(a: MissionItem, b: MissionItem, mission_type: MissionType, *, c
     stored_a, stored_b = _stored(a, mission_type), _stored(b, mission_type)
     if stored_a.fixed != stored_b.fixed:
         return False
-    if stored_a.may_lose_place and (_has_none(stored_a) or _has_none(stored_b)):
-        return True
-    if not _is_near(stored_a.alt_m, stored_b.alt_m):
+    may_lose = stored_a.may_lose_place
+    if not (_is_near(stored_a.alt_m, stored_b.alt_m) or (may_lose and 0 in (stored_a.alt_m, stored_b.alt_m))):
         return False
+    if may_lose and (0, 0) in (stored_a.place, stored_b.place):
+        return True
     if not coarse:
         return stored_a.place == stored_b.place
     return all(
@@ -327,10 +328,6 @@ def _stored(item: MissionItem, mission_type: MissionType) -> _StoredItem:
         return _StoredItem((command, params), place, item.alt_m, may_lose_place=True)
     frame = _FRAMES.get(int(item.frame), int(item.frame))
     return _StoredItem((command, frame, params), place, item.alt_m)
-
-
-def _has_none(stored: _StoredItem) -> bool:
-    return stored.place == (0, 0) and stored.alt_m == 0
 
 
 def _is_near(a_m: float, b_m: float) -> bool:

@@ -12,9 +12,10 @@ from typer.testing import CliRunner
 
 from mavlink_bridge.cli.app import app, load
 from mavlink_bridge.mavlink.messages import MissionResult, MissionType
+from mavlink_bridge.mavlink.stored_form import is_same_item
 from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.protocol.wire import item_from_message, item_to_message
-from mavlink_bridge.simulator.item_rules import mission_item_result
+from mavlink_bridge.simulator.item_rules import kept_mission_item, mission_item_result
 from missions.errors import MissionFormatError
 from missions.fence import ZoneKind
 from missions.formats import read_fence, read_mission, read_parameters, read_situation
@@ -156,6 +157,16 @@ def test_params_5_and_6_without_a_place_are_sent_as_they_are(tmp_path, name, com
 def test_what_mowers_do_is_read_and_taken(path):
     items = read_mission(path).items
     assert [mission_item_result(item, 4) for item in items] == [MissionResult.ACCEPTED] * 3
+
+
+@pytest.mark.parametrize(
+    "path",
+    [*sorted((CASES / "73-sim-mower-commands").iterdir()), *sorted((CASES / "81-digicam-param5").iterdir())],
+    ids=lambda path: path.name,
+)
+def test_what_the_vehicle_keeps_of_it_reads_back_as_the_same(path):
+    for item in read_mission(path).items:
+        assert is_same_item(item, kept_mission_item(item), MissionType.MISSION)
 
 
 # Maps

@@ -12,7 +12,7 @@ COVERAGE_PERCENT := 97
 LOCKED := --quiet --disable-pip-version-check --require-hashes --no-deps
 quoted = '$(subst ','\'',$(1))'
 
-.PHONY: coverage locks package bench bench-bridge bench-drive bench-transfer test-foreign docs soak bench-tlog campaign fuzz hunt demo test lint format types walls check lock clean
+.PHONY: coverage locks package release bench bench-bridge bench-drive bench-transfer test-foreign docs soak bench-tlog campaign fuzz hunt demo test lint format types walls check lock clean
 
 demo: .venv/run.stamp
 	$(BIN)/pbpp demo --out $(call quoted,$(OUT))
@@ -36,7 +36,8 @@ test: .venv/dev.stamp
 
 # The parts that promises rest on: the planner, missions, and all that decides or speaks a protocol without sockets.
 PROMISING := pbpp/*,missions/*,mavlink_bridge/mavlink/*,mavlink_bridge/protocol/*,mavlink_bridge/director/*,mavlink_bridge/backup/*,mavlink_bridge/tlog/*,mavlink_bridge/logbook/*,mavlink_bridge/replay/*,mavlink_bridge/fold.py
-COVERING := tests/pbpp tests/missions tests/formats tests/picture tests/protocol tests/bridge tests/tlog tests/logbook
+COVERING := tests/pbpp tests/missions $(filter-out %/__pycache__ %/cli %/simulator,$(wildcard tests/mavlink_bridge/*)) \
+	tests/mavlink_bridge/cli/test_cli_transfers.py tests/mavlink_bridge/cli/test_ends_after_writes.py
 
 coverage: .venv/dev.stamp
 	rm -f .coverage .coverage.*
@@ -69,6 +70,10 @@ locks: .venv/dev.stamp
 package: .venv/dev.stamp
 	$(BIN)/python tools/package.py $(if $(LOWEST),--lowest)
 
+# Version, changelog, build, commit and tag; nothing leaves this computer (docs/releasing.md).
+release: .venv/dev.stamp
+	$(BIN)/python tools/release.py $(VERSION)
+
 lock: .venv/run.stamp
 	$(BIN)/python -m pip install --quiet uv
 	$(BIN)/uv pip compile pyproject.toml requirements/build.in --extra plot --universal --python-version 3.11 \
@@ -77,6 +82,8 @@ lock: .venv/run.stamp
 		--python-version 3.11 --generate-hashes --no-header --quiet -c requirements/run.lock -o requirements/dev.lock
 	$(BIN)/uv pip compile pyproject.toml requirements/build.in --extra plot --extra test --python-version 3.11 \
 		--resolution lowest-direct --generate-hashes --no-header --quiet -o requirements/lowest.lock
+	echo keyring | $(BIN)/uv pip compile requirements/release.in --universal --python-version 3.11 --excludes /dev/stdin \
+		--generate-hashes --no-header --quiet -c requirements/dev.lock -o requirements/release.lock
 
 bench: .venv/dev.stamp
 	$(BIN)/python benchmarks/planner/run.py
@@ -95,16 +102,16 @@ test-foreign: .venv/dev.stamp
 	$(BIN)/python tests/foreign/run.py
 
 soak: .venv/dev.stamp
-	$(BIN)/python tests/bridge/soak.py --hours 100 --minutes $(or $(MINUTES),30)
+	$(BIN)/python tests/mavlink_bridge/director/soak.py --hours 100 --minutes $(or $(MINUTES),30)
 
 bench-tlog: .venv/dev.stamp
 	$(BIN)/python benchmarks/tlog.py
 
 campaign: .venv/dev.stamp
-	$(BIN)/python tests/protocol/campaign.py --count $(or $(COUNT),10000)
+	$(BIN)/python tests/mavlink_bridge/protocol/campaign.py --count $(or $(COUNT),10000)
 
 fuzz: .venv/dev.stamp
-	$(BIN)/python tests/tlog/fuzz_tlog.py --count 100000
+	$(BIN)/python tests/mavlink_bridge/tlog/fuzz_tlog.py --count 100000
 
 hunt: .venv/dev.stamp
 	$(BIN)/python tests/pbpp/hunt_edges.py --count $(or $(COUNT),20000)

@@ -112,12 +112,12 @@ class Bridge:
         self._process.stdin.flush()
 
     def await_event(self, name: str, within_s: float = 60.0, after: int = 0) -> dict[str, Any]:
-        """Give the first event of a name after so many."""
+        """Return the first event of a name after so many."""
         wait_for(lambda: any(event["event"] == name for event in self.events[after:]), within_s, name)
         return next(event for event in self.events[after:] if event["event"] == name)
 
     def cpu_s(self) -> float:
-        """Give the CPU time of the process so far."""
+        """Return the CPU time of the process so far."""
         fields = Path(f"/proc/{self._process.pid}/stat").read_text().rpartition(")")[2].split()
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
@@ -133,7 +133,7 @@ def wait_for(condition: Callable[[], bool], within_s: float, what: str) -> float
 
 
 def cpu_at_rest(seconds: float) -> float:
-    """Give the share of one core that the bridge takes with every message at 4 Hz."""
+    """Return the share of one core that the bridge takes with every message at 4 Hz."""
     with Simulator(config("maze")) as simulator, Bridge(simulator.connection) as bridge:
         bridge.await_event("learnt")
         with open_link(simulator.connection, _GROUND_STATION) as station:
@@ -213,7 +213,7 @@ class Flood:
 
 
 def full_stream(seconds: float) -> tuple[float, float, list[float]]:
-    """Give messages a second, the share of one core and the lags in s under fifteen types at 50 Hz."""
+    """Return messages a second, the share of one core and the lags in s under fifteen types at 50 Hz."""
     with (
         Simulator(config("maze")) as simulator,
         Flood(simulator) as flood,
@@ -259,7 +259,7 @@ def serve(station: Link, seconds: float) -> None:
 
 
 def target_to_verified() -> tuple[float, int]:
-    """Give the time from a typed target to its verified mission in the maze, and the mission's items."""
+    """Return the time from a typed target to its verified mission in the maze, and the mission's items."""
     with Simulator(config("maze")) as simulator, Bridge(simulator.connection, "--upload") as bridge:
         bridge.await_event("learnt")
         time.sleep(1.0)
@@ -269,7 +269,7 @@ def target_to_verified() -> tuple[float, int]:
 
 
 def fence_across_the_route(faults: Faults) -> dict[str, float]:
-    """Give how a drive goes on whose route is cut by a new fence: times in s, and breaches."""
+    """Return how a drive goes on whose route is cut by a new fence: times in s, and breaches."""
     options = ("--upload", "--drive", "--arm", "--clearance", "2.5")
     with (
         Simulator(config("yard"), faults=faults) as simulator,
@@ -303,7 +303,7 @@ def fence_across_the_route(faults: Faults) -> dict[str, float]:
 
 
 def config(field: str) -> SimulatorConfig:
-    """Give a simulated rover in a field."""
+    """Return a simulated rover in a field."""
     fence = fence_to_items(read_fence(FIELDS / f"{field}-fence.waypoints"))
     return SimulatorConfig(home=HOME, fence=fence, parameters={"FENCE_ENABLE": 1.0, "WP_SPEED": 3.0})
 

@@ -224,13 +224,13 @@ def _made() -> str:
 
 
 def report(runs: list[Run], took_s: float) -> str:
-    """Give the tables."""
+    """Return the tables."""
     lines = [
         f"{len({run.seed for run in runs})} fields x {len(VEHICLES)} vehicles, {took_s:.0f} s.",
         "",
         (
             "| | routes | refused, widest ≥ promised + 0.5 m | least driven − promised | short by > 0.10 m | breaches | not arrived "
-            "| longer than the shortest, median / p90 | time foreseen / driven, p10 … p90 | planning (CPU), median / max |"
+            "| longer than the shortest, median / p90 | predicted / driven time, p10 … p90 | planning (CPU), median / max |"
         ),
         "|---|---|---|---|---|---|---|---|---|---|",
     ]

@@ -11,8 +11,8 @@ import shapely
 from shapely import LineString, Point, Polygon, affinity
 
 from missions.fence import CircleZone, Fence, PolygonZone, ZoneKind
-from missions.geo import LatLon, rounded
-from missions.ground.frame import LocalFrame, LocalPoint, frame_around
+from missions.geo import LatLon, LocalPoint, rounded
+from missions.ground.frame import LocalFrame, frame_around
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
@@ -39,7 +39,7 @@ class Field:
 
 
 def make_field(seed: int) -> Field:
-    """Give the field of a seed."""
+    """Return the field of a seed."""
     rng = random.Random(seed)
     kind = ("yard", "circles", "gates", "hairpins")[seed % 4]
     size_m = rng.uniform(80.0, 220.0)
@@ -92,7 +92,7 @@ def _outline(rng: random.Random, size_m: float) -> Polygon:
 
 
 def _yard(rng: random.Random, _outline: Polygon, size_m: float, _: float) -> tuple[list[Polygon], Circles]:
-    """Give buildings, some of them with a court, turned any way."""
+    """Return buildings, some of them with a court, turned any way."""
     found: list[Polygon] = []
     for _try in range(rng.randint(3, 9)):
         x, y = (rng.uniform(-size_m, size_m) * 0.4 for _ in range(2))
@@ -109,7 +109,7 @@ def _yard(rng: random.Random, _outline: Polygon, size_m: float, _: float) -> tup
 def _circles(
     rng: random.Random, _outline: Polygon, size_m: float, __: float
 ) -> tuple[list[Polygon], Circles]:
-    """Give trees and ponds."""
+    """Return trees and ponds."""
     return [], [
         (rng.uniform(-0.4, 0.4) * size_m, rng.uniform(-0.4, 0.4) * size_m, rng.uniform(1.0, size_m / 9))
         for _ in range(rng.randint(4, 14))
@@ -119,7 +119,7 @@ def _circles(
 def _gates(
     rng: random.Random, outline: Polygon, size_m: float, clearance_m: float
 ) -> tuple[list[Polygon], Circles]:
-    """Give walls right across the field, each with a gate that is a little wider than need be."""
+    """Return walls right across the field, each with a gate that is a little wider than need be."""
     walls: list[Polygon] = []
     reach_m = size_m
     turn_deg = rng.uniform(0, 180)
@@ -139,7 +139,7 @@ def _gates(
 def _hairpins(
     rng: random.Random, outline: Polygon, size_m: float, clearance_m: float
 ) -> tuple[list[Polygon], Circles]:
-    """Give walls from alternate sides, to be driven round in sharp turns."""
+    """Return walls from alternate sides, to be driven round in sharp turns."""
     walls: list[Polygon] = []
     count = rng.randint(2, 4)
     turn_deg = rng.uniform(0, 180)
@@ -164,7 +164,7 @@ def _round(circles: Circles) -> list[Polygon]:
 def _ends(
     rng: random.Random, outline: Polygon, obstacles: list[Polygon], size_m: float, clearance_m: float
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Give two places far from one another with some room about them, on one piece of ground."""
+    """Return two places far from one another with some room about them, on one piece of ground."""
     free = outline.difference(shapely.union_all(obstacles))
     roomy = free.buffer(-(clearance_m + START_ROOM_M))
     joined = shapely.get_parts(free.buffer(-clearance_m))
@@ -191,11 +191,11 @@ def _crosses(obstacles: list[Polygon], a: tuple[float, float], b: tuple[float, f
 
 
 def place_of(frame: LocalFrame, east_m: float, north_m: float) -> LatLon:
-    """Give a place as a mission would hold it."""
+    """Return a place as a mission would hold it."""
     return rounded(frame.to_lat_lon(LocalPoint(east_m, north_m)))
 
 
 def polygon_zone(frame: LocalFrame, kind: ZoneKind, area: BaseGeometry) -> PolygonZone:
-    """Give an area as a fence's zone."""
+    """Return an area as a fence's zone."""
     ring = shapely.get_coordinates(area.exterior if isinstance(area, Polygon) else area)[:-1]
     return PolygonZone(kind, tuple(place_of(frame, float(x), float(y)) for x, y in ring))

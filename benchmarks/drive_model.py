@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 HERE = Path(__file__).parent
-DRIVES = HERE.parent / "tests" / "missions" / "data" / "drives"
+DRIVES = HERE.parent / "tests" / "missions" / "drive_model" / "data" / "drives"
 Row = dict[str, str]
 SLOW = {"slow1at5": (1.0, 5.0), "slow1at10": (1.0, 10.0), "slow1at15": (1.0, 15.0), "slow2at10": (2.0, 10.0)}
 """Speed of the slow stretch, and how far before the corner it begins; it ends 6 m after it."""
@@ -87,7 +87,7 @@ def line(name: tuple[str, ...], found: list[tuple[Row, Corner, float]]) -> str:
 
 
 def missions() -> Iterator[list[Row]]:
-    """Give the rows mission by mission: those whose track goes on where the row before left off."""
+    """Return the rows mission by mission: those whose track goes on where the row before left off."""
     for name in ("corners.csv", "corners_extra.csv"):
         mission: list[Row] = []
         with (HERE / "data" / name).open(newline="") as file:

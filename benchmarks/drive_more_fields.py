@@ -24,7 +24,7 @@ Layout = tuple[Polygon, list[Polygon], Place, Place]
 
 
 def make_more(seed: int) -> Field:
-    """Give the field of a seed."""
+    """Return the field of a seed."""
     rng = random.Random(1_000_000 + seed)
     kind = KINDS[seed % len(KINDS)]
     clearance_m = rng.choice(CLEARANCES_M)

@@ -37,14 +37,14 @@ START, TARGET = "40.071374,-105.229930", "40.0720926,-105.2286152"
 
 
 def seconds(command: list[str], environment: dict[str, str]) -> float:
-    """Give the wall time of a command, which must succeed."""
+    """Return the wall time of a command, which must succeed."""
     begun_s = time.perf_counter()
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment)
     return time.perf_counter() - begun_s
 
 
 def medians(commands: dict[str, list[str]], rounds: int, cache: Path) -> dict[str, float]:
-    """Run the commands by turns, with byte code as an installation has it; give the median wall time of each, in seconds."""
+    """Run the commands by turns, with byte code as an installation has it; return the median wall time of each, in seconds."""
     environment = {**os.environ, "PYTHONPYCACHEPREFIX": str(cache)}
     environment.pop("PYTHONDONTWRITEBYTECODE", None)
     times: dict[str, list[float]] = {name: [] for name in commands}

@@ -99,7 +99,7 @@ def by_filter(path: Path) -> list[Any]:
 
 
 def timed(work: Callable[[Path], Any], path: Path) -> tuple[float, Any]:
-    """Give the CPU seconds of one call, and how many messages it found and their hash."""
+    """Return the CPU seconds of one call, and how many messages it found and their hash."""
     begin_s = time.process_time()
     result = work(path)
     spent_s = time.process_time() - begin_s
@@ -107,14 +107,14 @@ def timed(work: Callable[[Path], Any], path: Path) -> tuple[float, Any]:
 
 
 def comparable(found: Any) -> tuple[int, str]:  # noqa: ANN401 - pymavlink ships no types
-    """Give a log entry's time and frame, and those of a message of pymavlink."""
+    """Return a log entry's time and frame, and those of a message of pymavlink."""
     if isinstance(found, LogEntry):
         return round(found.time_s * 1e6), repr(found.frame)
     return round(found._timestamp * 1e6), repr(to_frame(found))  # noqa: SLF001 - pymavlink's way
 
 
 def peak_mb(path: Path) -> int:
-    """Give the peak memory in MB of a process that reads the log."""
+    """Return the peak memory in MB of a process that reads the log."""
     root = Path(__file__).parent.parent
     answer = subprocess.run(
         [sys.executable, "-c", MEMORY, str(path)], cwd=root, check=True, capture_output=True, text=True

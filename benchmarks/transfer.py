@@ -19,7 +19,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
+sys.path.insert(0, str(Path(__file__).parent.parent / "tests" / "mavlink_bridge"))
 
 from protocol.campaign import Judged, Scenario, scenario_of, transfer
 from protocol.twin import PEER, Client, Faults, Twin, Vehicle, plain_mission

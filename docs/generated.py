@@ -32,7 +32,7 @@ _PART = re.compile(r"(<!-- made: ([a-z0-9-]+) -->\n).*?(<!-- end -->)", re.DOTAL
 
 
 def event_table() -> str:
-    """Give the table of the bridge's events."""
+    """Return the table of the bridge's events."""
     rows = [
         f"| `{name}` | {severity.name.lower()} | {', '.join(f'`{key}`' for key in keys) or '—'} |"
         for name, (severity, keys) in SCHEMA.items()
@@ -41,7 +41,7 @@ def event_table() -> str:
 
 
 def director_table() -> str:
-    """Give the director's transitions as a table, in the order of the picture."""
+    """Return the director's transitions as a table, in the order of the picture."""
     few, many = lanes(TRANSITIONS)
     rows = [
         f"| `{lane.cue}` | {', '.join(f'`{state}`' for state in lane.begins)} | `{lane.end}` |"
@@ -51,7 +51,7 @@ def director_table() -> str:
 
 
 def commands() -> str:
-    """Give every command's options, from the command line itself."""
+    """Return every command's options, from the command line itself."""
     parts = []
     for name, command in sorted((name, load(name)) for name in COMMANDS):
         rows = [
@@ -77,7 +77,7 @@ def _option_row(parameter: Any) -> str:  # noqa: ANN401 - the command line's own
 
 
 def exit_codes() -> str:
-    """Give the table of exit codes and the errors that end with each."""
+    """Return the table of exit codes and the errors that end with each."""
     kinds = defaultdict(list)
     for module in (mission_errors, bridge_errors):
         for name, kind in vars(module).items():
@@ -120,7 +120,7 @@ class _Reading(ParameterReader):
 
 
 def parameters() -> str:
-    """Give the vehicle's parameters that count, with what is taken where they are not told."""
+    """Return the vehicle's parameters that count, with what is taken where they are not told."""
     rows = []
     vehicles = (
         ("ArduPilot", ardupilot_vehicle, ({},)),
@@ -140,16 +140,16 @@ def parameters() -> str:
             for name, default in asked.items()
             if name not in servos[1:]
         ]
-    return "\n".join(["| parameter | autopilot | taken where it is not told |", "|---|---|---|", *rows])
+    return "\n".join(["| parameter | autopilot | default if it is not known |", "|---|---|---|", *rows])
 
 
 def _span(names: list[str]) -> str:
-    """Give the first and the last of a row of names."""
+    """Return the first and the last of a row of names."""
     return f"`{names[0]}` … `{names[-1]}`"
 
 
 def _planners(case: str) -> str:
-    """Give a map's table out of the benchmark's results."""
+    """Return a map's table out of the benchmark's results."""
     text = (DOCS.parent / "benchmarks" / "results" / "planner.md").read_text(encoding="utf-8")
     found = re.search(rf"^## {case}\n\n(.*?)\n\n", text, re.DOTALL | re.MULTILINE)
     assert found is not None
@@ -181,7 +181,7 @@ PICTURES = {
 
 
 def renewed(text: str) -> str:
-    """Give a page's text with its made parts as the code says."""
+    """Return a page's text with its made parts as the code says."""
     return _PART.sub(lambda found: f"{found[1]}{PARTS[found[2]]()}\n{found[3]}", text)
 
 

@@ -31,7 +31,7 @@ class Lane:
 
 
 def lanes(table: Table) -> tuple[list[Lane], list[Lane]]:
-    """Give the lanes of cues that may come in few states, and of those that may come in many."""
+    """Return the lanes of cues that may come in few states, and of those that may come in many."""
     begins: dict[tuple[str, str], list[str]] = {}
     for state, row in table.items():
         for cue, after in row.items():
@@ -43,7 +43,7 @@ def lanes(table: Table) -> tuple[list[Lane], list[Lane]]:
 
 
 def draw(table: Table, title: str) -> str:
-    """Give the SVG of a table, states from top to bottom in its order."""
+    """Return the SVG of a table, states from top to bottom in its order."""
     few, many = lanes(table)
     row_y = {state: _EDGE + _HEAD + _ROW * (number + 0.5) for number, state in enumerate(table)}
     left = _EDGE + _BOX + _LANE

@@ -10,7 +10,7 @@ from missions.geo import parse_lat_lon
 
 
 def plan_to(connection: str, target: str) -> Plan:
-    """Give the plan; what goes wrong is raised as a BridgeError or MissionError."""
+    """Return the plan; what goes wrong is raised as a BridgeError or MissionError."""
     orders = Orders(identity=(245, 190), request=Request(targets=(parse_lat_lon(target),)), once=True)
     director = Director(orders)
 

@@ -1,4 +1,8 @@
-"""Positions on Earth."""
+"""Positions on Earth, and points in the plane.
+
+On Earth a place is a `LatLon`; in the plane it is a `LocalPoint`, and many of them are an array of shape (n, 2), always east before north.
+`missions.ground.frame.LocalFrame` leads from one to the other. Headings are degrees clockwise from north in both.
+"""
 
 from __future__ import annotations
 
@@ -20,6 +24,17 @@ class LatLon(NamedTuple):
 
     def __str__(self) -> str:
         return f"{self.lat_deg:.7f},{self.lon_deg:.7f}"
+
+
+class LocalPoint(NamedTuple):
+    """A point in the plane of a `missions.ground.frame.LocalFrame`, metres."""
+
+    east_m: float
+    north_m: float
+
+
+Vector = tuple[float, float]
+"""East and north in the plane: a `LocalPoint`, the way from one to another in metres, or a direction of length 1."""
 
 
 def checked_lat_lon(lat_deg: float, lon_deg: float) -> LatLon:
@@ -80,6 +95,17 @@ def distance_m(a: LatLon, b: LatLon) -> float:
 def bearing_deg(a: LatLon, b: LatLon) -> float:
     """Return the geodesic's bearing at ``a``, in degrees clockwise from north, 0 to 360."""
     return float(_geod().inv(a.lon_deg, a.lat_deg, b.lon_deg, b.lat_deg)[0]) % 360.0
+
+
+def heading_vector(heading_deg: float) -> Vector:
+    """Return the direction of length 1 in the plane that a heading clockwise from north leads in."""
+    return (math.sin(math.radians(heading_deg)), math.cos(math.radians(heading_deg)))
+
+
+def change_deg(before: Vector, after: Vector) -> float:
+    """Return how the course changes from one direction in the plane to another, positive to the right."""
+    cross = before[0] * after[1] - before[1] * after[0]
+    return -math.degrees(math.atan2(cross, before[0] * after[0] + before[1] * after[1]))
 
 
 def wrap_lon_deg(lon_deg: float) -> float:

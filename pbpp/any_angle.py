@@ -102,11 +102,11 @@ def shortest_path(
     """
     if compiled and should_stop is None:
         return _compiled_search(slabs, start, goal)
-    return _Search(slabs, start, goal).run(should_stop)
+    return _Query(slabs, start, goal).run(should_stop)
 
 
 def _compiled_search(slabs: Slabs, start: Point, goal: Point) -> SearchResult:
-    from .compiled_search import search  # noqa: PLC0415 - numba is an extra, and takes a while to load
+    from .compiled.search import search  # noqa: PLC0415 - numba is an extra, and takes a while to load
 
     blocks = slabs.locate(start)
     neighbours = [vertex for block in blocks for vertex, _ in slabs.line_neighbours(start, block)]
@@ -114,7 +114,7 @@ def _compiled_search(slabs: Slabs, start: Point, goal: Point) -> SearchResult:
     return SearchResult(None if turns is None else tuple(turns), length_m, expanded, stopped=False)
 
 
-class _Search:
+class _Query:
     """One query."""
 
     def __init__(self, slabs: Slabs, start: Point, goal: Point) -> None:

@@ -26,10 +26,11 @@ __all__ = ["FreeSpace", "Scene", "build_free_space", "parse_scene", "snapped"]
 
 GeometryT = TypeVar("GeometryT", bound=BaseGeometry)
 
-_OPEN_MARGIN_M = 100.0
-_TINY_EDGE_M = 2e-9
+_OPEN_MARGIN_M = 100.0  # where no inclusion bounds the plane, so much room lies around all that is drawn; chosen, not measured: any would do
+_TINY_EDGE_M = 2e-9  # twice the partition's tolerance: a shorter edge has no direction
 _LEAST_RING = 4  # the coordinates of a triangle: the first one is repeated
-_INSIDE_M = 1e-6
+_INSIDE_M = 1e-6  # an inclusion's edge lies inside the union from here on: far more than rounding; chosen, not measured
+# Half a diagonal of the grids is what a vertex moves: 1.1e-8 and 1.4e-9 m. Powers of two, so that no coordinate is rounded again.
 _GRID_M = 2.0**-26
 _CLEAR_GRID_M = 2.0**-29
 

@@ -8,31 +8,12 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .field import Field
     from .geometry import Floats
+    from .plotting import Drawing
 
-__all__ = ["Drawing", "PlannedPath", "length_of", "straightened"]
+__all__ = ["PlannedPath", "length_of", "straightened"]
 
 _STRAIGHT_M = 1e-9  # rounding: a point that lies no farther beside the straight line is on it
-
-
-@dataclass(frozen=True)
-class Drawing:
-    """What `PlannedPath.plot` draws besides the path.
-
-    Parameters
-    ----------
-    field : Field
-        Free space with its partitions.
-    partition : str
-        ``"slabs"`` or ``"blocks"``.
-    crossings_m : (n, 2) array
-        The points at which the path was fixed, before points on a straight line were left out; east and north in metres.
-    """
-
-    field: Field
-    partition: str
-    crossings_m: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,9 +62,12 @@ class PlannedPath:
         matplotlib.axes.Axes
             The axes.
         """
-        from .plotting import plot_path  # noqa: PLC0415 - matplotlib is loaded only when asked for
-
-        return plot_path(self, ax, show_blocks=show_blocks)
+        ax = self.drawing.draw(self.points, self.sequence, ax, show_blocks=show_blocks)
+        ax.set_title(
+            f"{self.method}: {self.length_m:.2f} m, {self.blocks} blocks, {self.expanded} expanded",
+            fontsize=10,
+        )
+        return ax
 
 
 def length_of(points: Floats) -> float:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
-from importlib.util import find_spec
 from math import dist, isfinite
 from typing import TYPE_CHECKING
 
@@ -14,13 +14,16 @@ import numpy.typing as npt
 
 from .any_angle import shortest_path
 from .block_search import BlockGraph, block_sequence
+from .compiled import require_numba
 from .errors import GoalBlockedError, InvalidGeometryError, NoPathError, StartBlockedError
 from .field import Field
 from .free_space import Scene, grow_exclusions, parse_scene
 from .funnel import taut_path
 from .geometry import Point, Ring, parse_point
-from .planned_path import Drawing, PlannedPath, length_of, straightened
+from .planned_path import PlannedPath, length_of, straightened
+from .plotting import Drawing
 from .three_cases import crossing_point
+from .uncollected import uncollected
 from .widest import WidestWay, widest_in
 
 if TYPE_CHECKING:
@@ -120,19 +123,10 @@ class Planner:
             raise InvalidGeometryError(f"the clearance must be a length of at least 0 m, not {clearance_m!r}")
         if partition not in {None, "slabs", "blocks"}:
             raise ValueError(f'partition must be "slabs", "blocks" or None, not {partition!r}')
-        if compiled and find_spec("numba") is None:
-            raise ImportError('the compiled search needs numba: pip install "pbpp-rover[fast]"')
-        self._compiled = compiled
-        scene = parse_scene(inclusions, exclusions, union=union)
-        self._setup(scene, float(clearance_m), partition, Field(scene, float(clearance_m)))
-
-    def _setup(self, scene: Scene, clearance_m: float, partition: str | None, field: Field) -> None:
-        self._scene = scene
-        self._clearance_m = clearance_m
-        self._partition = partition
-        self._mitred = field
-        # Searches need slabs: better here than in the first query.
-        _ = field.slabs
+        if compiled:
+            require_numba()
+        self._partition, self._compiled = partition, compiled
+        self._space = _Space.swept(parse_scene(inclusions, exclusions, union=union), float(clearance_m))
 
     def with_exclusion(self, ring: Ring) -> Planner:
         """Return a planner for the same fence with one exclusion more, faster than from scratch.
@@ -152,9 +146,9 @@ class Planner:
         InvalidGeometryError
             If the ring cannot be used.
         """
-        scene = self._scene.with_exclusion(ring)
-        added = grow_exclusions(replace(scene, exclusions=scene.exclusions[-1:]), self._clearance_m)
-        return self._changed(scene, np.concatenate((self._mitred.free.grown, added)))
+        scene, grown = self._space.scene.with_exclusion(ring), self._space.mitred.free.grown
+        added = grow_exclusions(replace(scene, exclusions=scene.exclusions[-1:]), self.clearance_m)
+        return self._changed(scene, np.concatenate((grown, added)))
 
     def without_exclusion(self, index: int) -> Planner:
         """Return a planner for the same fence without one of its exclusions, faster than from scratch.
@@ -174,31 +168,23 @@ class Planner:
         IndexError
             If there is no such exclusion.
         """
-        return self._changed(self._scene.without_exclusion(index), np.delete(self._mitred.free.grown, index))
+        grown = np.delete(self._space.mitred.free.grown, index)
+        return self._changed(self._space.scene.without_exclusion(index), grown)
 
     def _changed(self, scene: Scene, grown: Geometries) -> Planner:
-        changed = Planner.__new__(Planner)
-        changed._compiled = self._compiled  # noqa: SLF001 - one of our own
-        field = Field(scene, self._clearance_m, grown=grown)
-        changed._setup(  # noqa: SLF001 - one of our own
-            scene, self._clearance_m, self._partition, field
-        )
+        changed = copy(self)
+        changed._space = _Space.swept(scene, self.clearance_m, grown)  # noqa: SLF001 - one of our own
         return changed
 
     @property
     def clearance_m(self) -> float:
         """Distance in metres that paths keep from the fence."""
-        return self._clearance_m
+        return self._space.mitred.free.clearance_m
 
-    @cached_property
+    @property
     def free_space(self) -> MultiPolygon:
         """Where the robot's centre may be: one polygon for each connected component, east and north in metres."""
-        return self._scene.to_map(self._mitred.free.geometry)
-
-    @cached_property
-    def _rounded(self) -> Field:
-        """The same with round corners: asked before anyone is told that there is no way."""
-        return Field(self._scene, self._clearance_m, rounded=True)
+        return self._space.on_map
 
     def plan(
         self,
@@ -234,16 +220,15 @@ class Planner:
             If no path joins them.
         """
         ends = parse_point(start, "start"), parse_point(goal, "goal")
-        if not len(self._scene.inclusions):
-            self._widen(ends)
+        self._space = self._space.holding(ends)
         if method not in {"optimal", "pbpp-taut", "pbpp"}:
             raise ValueError(f'method must be "optimal", "pbpp-taut" or "pbpp", not {method!r}')
         try:
-            return self._plan_in(self._mitred, ends, method, should_stop)
+            return self._plan_in(self._space.mitred, ends, method, should_stop)
         except (NoPathError, StartBlockedError, GoalBlockedError):
-            if self._clearance_m == 0.0:
+            if self.clearance_m == 0.0:
                 raise
-        return self._plan_in(self._rounded, ends, method, should_stop)
+        return self._plan_in(self._space.rounded, ends, method, should_stop)
 
     def widest(
         self,
@@ -275,31 +260,23 @@ class Planner:
             As `widest` does.
         """
         ends = parse_point(start, "start"), parse_point(goal, "goal")
-        return widest_in(self._scene, ends, tolerance_m, should_stop)
-
-    def _widen(self, ends: tuple[Point, Point]) -> None:
-        """Without inclusions, let the bounded part of the plane hold both ends."""
-        local = [self._scene.to_local(end) for end in ends]
-        if not all(self._mitred.holds(end) for end in local):
-            self.__dict__.pop("free_space", None)
-            self.__dict__.pop("_rounded", None)
-            self._mitred = Field(self._scene, self._clearance_m, reach=local)
+        return widest_in(self._space.scene, ends, tolerance_m, should_stop)
 
     def _plan_in(
         self, field: Field, ends: tuple[Point, Point], method: str, should_stop: ShouldStop | None
     ) -> PlannedPath:
         common = field.require(ends[0], StartBlockedError) & field.require(ends[1], GoalBlockedError)
         if not common:
-            raise NoPathError(self._clearance_m)
-        start, goal = (field.onto(self._scene.to_local(end), common) for end in ends)
+            raise NoPathError(self.clearance_m)
+        start, goal = (field.onto(field.scene.to_local(end), common) for end in ends)
         if method == "optimal":
             found = _optimal(field, start, goal, should_stop, compiled=self._compiled)
         else:
             graph = field.graph(self._partition or "blocks")
             found = _over_blocks(graph, start, goal, taut=method == "pbpp-taut", should_stop=should_stop)
         if found is None:
-            raise NoPathError(self._clearance_m)
-        inner = np.array(found.turns, dtype=np.float64).reshape(-1, 2) + self._scene.origin_m
+            raise NoPathError(self.clearance_m)
+        inner = np.array(found.turns, dtype=np.float64).reshape(-1, 2) + field.scene.origin_m
         points = straightened(np.array([ends[0], *inner, ends[1]]))
         length_m = length_of(points)
         return PlannedPath(
@@ -312,6 +289,43 @@ class Planner:
             sequence=tuple(found.sequence),
             drawing=Drawing(field, self._partition or ("slabs" if method == "optimal" else "blocks"), inner),
         )
+
+
+@dataclass(frozen=True, eq=False)
+class _Space:
+    """Free space with mitred corners, and what follows from it once it is asked for."""
+
+    mitred: Field
+
+    @classmethod
+    def swept(cls, scene: Scene, clearance_m: float, grown: Geometries | None = None) -> _Space:
+        """Return the space with its slabs made: searches need them, and better now than in the first query."""
+        with uncollected():
+            field = Field(scene, clearance_m, grown=grown)
+            _ = field.slabs
+        return cls(field)
+
+    def holding(self, ends: tuple[Point, Point]) -> _Space:
+        """Return the same space; without inclusions one whose bounded part of the plane holds both ends."""
+        local = [self.scene.to_local(end) for end in ends]
+        if len(self.scene.inclusions) or all(map(self.mitred.holds, local)):
+            return self
+        return _Space(Field(self.scene, self.mitred.free.clearance_m, reach=local))
+
+    @property
+    def scene(self) -> Scene:
+        """The fence."""
+        return self.mitred.scene
+
+    @cached_property
+    def on_map(self) -> MultiPolygon:
+        """The polygons on the map."""
+        return self.scene.to_map(self.mitred.free.geometry)
+
+    @cached_property
+    def rounded(self) -> Field:
+        """The same with round corners: asked before anyone is told that there is no way."""
+        return Field(self.scene, self.mitred.free.clearance_m, rounded=True)
 
 
 @dataclass(frozen=True)

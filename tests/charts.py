@@ -51,7 +51,7 @@ class Chart:
         return self.line([*zone.vertices, zone.vertices[0]])
 
     def clearance_m(self, zone: Zone, path: Sequence[LatLon]) -> float:
-        """Give a path's distance to where it must not be, negative (or 0) where it is there."""
+        """Return a path's distance to where it must not be, negative (or 0) where it is there."""
         line = self.line(path)
         if isinstance(zone, CircleZone):
             centre = Point(self.points([zone.centre])[0])

@@ -25,13 +25,13 @@ kinds = st.sampled_from(ZoneKind)
 
 
 def away(origin: LatLon, bearing_deg: float, distance_m: float) -> LatLon:
-    """Give the place at a bearing and a geodesic distance, by Geod alone."""
+    """Return the place at a bearing and a geodesic distance, by Geod alone."""
     lon_deg, lat_deg, _ = GEOD.fwd(origin.lon_deg, origin.lat_deg, bearing_deg, distance_m)
     return LatLon(lat_deg, lon_deg)
 
 
 def offset(origin: LatLon, east_m: float, north_m: float) -> LatLon:
-    """Give the place so far east and north (as bearing and distance) of another."""
+    """Return the place so far east and north (as bearing and distance) of another."""
     return away(origin, math.degrees(math.atan2(east_m, north_m)), math.hypot(east_m, north_m))
 
 

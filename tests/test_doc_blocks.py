@@ -118,7 +118,7 @@ class Reader:
                 _compare(shown, self.run(line))
 
     def run(self, line: str) -> str:
-        """Run a command; give what it told on stdout and stderr."""
+        """Run a command; return what it told on stdout and stderr."""
         expected = int(found[1]) if (found := _EXIT.search(line)) else 0
         words = shlex.split(line, comments=True)
         if words[:2] == ["pbpp", "sim"]:
@@ -178,7 +178,7 @@ class Reader:
 
 
 def _interrupted(process: subprocess.Popen) -> str:
-    """Press Ctrl-C; give what it told last. Whatever happens, nothing goes on running beside the next page."""
+    """Press Ctrl-C; return what it told last. Whatever happens, nothing goes on running beside the next page."""
     process.send_signal(signal.SIGINT)
     try:
         return process.communicate(timeout=60)[1]

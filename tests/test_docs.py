@@ -9,6 +9,7 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
+import yaml
 
 from mavlink_bridge.director import TRANSITIONS
 
@@ -76,3 +77,71 @@ def test_the_workflow_runs_the_same_and_trusts_no_moving_tag():
     actions = re.findall(r"uses: (\S+)", text)
     assert actions
     assert all(re.fullmatch(r"[\w/-]+@[0-9a-f]{40}", action) for action in actions)
+
+
+TEMPLATES = DOCS.parent / ".github" / "ISSUE_TEMPLATE"
+
+
+@pytest.mark.parametrize("name", ["bug", "feature"])
+def test_issue_forms_are_forms(name):
+    form = yaml.safe_load((TEMPLATES / f"{name}.yml").read_text(encoding="utf-8"))
+    fields = [part for part in form["body"] if part["type"] != "markdown"]
+    assert {"name", "description", "labels", "body"} == set(form)
+    assert (
+        len({field["id"] for field in fields})
+        == len({field["attributes"]["label"] for field in fields})
+        == len(fields)
+    )
+    assert {field["type"] for field in fields} <= {"textarea", "input", "dropdown"}
+    assert any(field.get("validations", {}).get("required") for field in fields)
+
+
+def test_a_bug_may_be_in_any_command():
+    form = yaml.safe_load((TEMPLATES / "bug.yml").read_text(encoding="utf-8"))
+    (command,) = (part for part in form["body"] if part.get("id") == "command")
+    told = re.findall(r"^## (pbpp \w+)$", (DOCS / "commands.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert len(told) > 5
+    assert sorted(command["attributes"]["options"][:-1]) == told
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: f"{page.parent.name}-{page.stem}")
+def test_every_test_that_a_page_names_is_there(page):
+    if page.name == "CHANGELOG.md":
+        return
+    for name in re.findall(r"\btests/[\w./*-]+\w|\btest_\w+\.py", page.read_text(encoding="utf-8")):
+        pattern = name.removeprefix("tests/") if name.startswith("tests/") else f"**/{name}"
+        assert any((DOCS.parent / "tests").glob(pattern)), name
+
+
+def test_architecture_names_rooms_and_modules_that_are_there():
+    text = (
+        (DOCS.parent / "ARCHITECTURE.md")
+        .read_text(encoding="utf-8")
+        .split("## Rooms by stage")[1]
+        .split("\n## ")[0]
+    )
+    package, looked_at = "", 0
+    for row in re.findall(r"^\| (.*?) \|(.*)\|$", text, re.MULTILINE):
+        if (found := re.fullmatch(r"\*\*`(\w+)`\*\*", row[0])) is not None:
+            package = found[1]
+        rooms = re.findall(r"(\w+)/?", "".join(re.findall(r"`([\w/ ]+)`", row[0]))) if package else []
+        folders = [DOCS.parent / package / room for room in rooms if (DOCS.parent / package / room).is_dir()]
+        for room in rooms:
+            path = DOCS.parent / package / room
+            assert path.is_dir() or path.with_suffix(".py").is_file() or room == package, f"{package}: {room}"
+        for name in re.findall(r"`([a-z_]+)`", row[1]) if package else []:
+            looked_at += 1
+            assert any((folder / f"{name}.py").is_file() for folder in [*folders, DOCS.parent / package]), (
+                name
+            )
+    assert looked_at > 40
+
+
+@pytest.mark.parametrize("package", ["missions", "mavlink_bridge"])
+def test_tests_stand_in_the_rooms_that_they_test(package):
+    rooms, tests = (
+        {path.name for path in (DOCS.parent / folder).iterdir() if path.is_dir()}
+        for folder in (package, f"tests/{package}")
+    )
+    assert len(tests) > 5
+    assert tests - {"__pycache__"} <= rooms

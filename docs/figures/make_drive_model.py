@@ -17,7 +17,7 @@ from missions.ground.frame import LocalFrame
 from missions.vehicle import Steering, Vehicle
 
 HERE = Path(__file__).parent
-DRIVE = HERE.parents[1] / "tests" / "missions" / "data" / "drives" / "yard-3m.csv"
+DRIVE = HERE.parents[1] / "tests" / "missions" / "drive_model" / "data" / "drives" / "yard-3m.csv"
 FAST = Vehicle(waypoint_radius_m=3.0, speed_mps=5.0)
 SLOW = Vehicle(waypoint_radius_m=2.0, speed_mps=2.0)
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from mavlink_bridge.mavlink.messages import Statustext
 from missions.harmless import harmless
 
-_EVERY_S = 1.0
-_MOST_WAITING = 8
-_MOST_CHARACTERS = 50
+_EVERY_S = 1.0  # 50 bytes a second are 1 % of a radio at 57600 baud; chosen, not measured
+_MOST_WAITING = 8  # later than 8 s a text is no news; chosen, not measured
+_MOST_CHARACTERS = 50  # STATUSTEXT.text
 
 
 class Announcer:

@@ -27,7 +27,7 @@ _CURRENT = (
 """What MISSION_CURRENT tells of each list; the ids are 0 where the autopilot does not fill them."""
 
 _FENCE_TOTAL, _MISSION_TOTAL = "FENCE_TOTAL", "MIS_TOTAL"
-_REBOOT_MS = 5000
+_REBOOT_MS = 5000  # GLOBAL_POSITION_INT.time_boot_ms this much earlier is no message out of order; chosen, not measured
 
 POLL_EVERY_S = 60.0
 """How often lists are read again without any sign of change."""

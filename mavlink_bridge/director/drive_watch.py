@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 OUTSIDE_M = 0.25
 """How far outside the foreseen band counts: the vehicle's own estimate of its place is off by as much."""
 
-PROGRESS_EVERY_S = 1.0
-_STANDING_MPS = 0.15
-_STANDING_S = 3.0
+PROGRESS_EVERY_S = 1.0  # as heartbeats; chosen, not measured
+_STANDING_MPS = 0.15  # beyond the noise of a position that stands; chosen, not measured
+_STANDING_S = 3.0  # longer than a pivot's turning point or a change of direction; chosen, not measured
 _ACTIVE, _COMPLETE = 3, 5
 """MISSION_STATE_ACTIVE and _COMPLETE."""
 

@@ -25,7 +25,7 @@ _PARAMETERS = (
     "FENCE_MARGIN_XY",
 )
 _CIRCLE_ABOUT_HOME = 2
-_HOME_MOVED_M = 0.5
+_HOME_MOVED_M = 0.5  # HOME_POSITION repeated may differ by the fix; chosen, not measured
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,6 +29,7 @@ _STILL_MPS = 0.3
 _STOP_AT_LEAST_S = 0.25
 """Positions come four times a second: one from after the HOLD is waited for."""
 
+# Then a vehicle in HOLD that still reports a speed (a drifting fix, a slope) is taken for stopped; chosen, not measured.
 _STOP_PATIENCE_S = 8.0
 
 

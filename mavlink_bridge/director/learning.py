@@ -37,8 +37,8 @@ MISSION_TYPES = {
 }
 
 _POSITION_STREAM, _STATUS_STREAM = 6, 2
-_STREAM_HZ = 4
-_ASK_STREAMS_EVERY_S = 3.0
+_STREAM_HZ = 4  # what a drive is watched with; chosen, not measured
+_ASK_STREAMS_EVERY_S = 3.0  # until they come: a request may be lost; chosen, not measured
 _HOME_S = 60.0  # the longest that a command may take
 _FIX_PATIENCE_S = 3.0
 """What is promised rests on the fix, so that whether it is known must not be a matter of luck; not every vehicle tells it."""

@@ -30,6 +30,7 @@ _CLICK_S = 1.5
 """A ground station's GUIDED within this time of its go-to click is part of the click."""
 
 _LATE_CLICK_S = 3.0
+"""A click that came to us at once may come to the vehicle so much later, by a radio that repeats it; chosen, not measured."""
 
 _MODE_OF_COMMAND = {
     Command.NAV_RETURN_TO_LAUNCH: RTL_MODE,

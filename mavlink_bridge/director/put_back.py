@@ -21,7 +21,7 @@ _PATIENCE_S = 4.0
 _STALE_S = 1.5
 """So long after HOLD was sent a heartbeat from before our AUTO may still come, and look like the answer."""
 
-_MOST_SENDS = 16
+_MOST_SENDS = 16  # as of a mode switch; chosen, not measured
 
 
 class PutBack:

@@ -24,9 +24,9 @@ _SOURCES = {
 _CLICKS = frozenset(
     {TargetSource.REPOSITION, TargetSource.POSITION_TARGET, TargetSource.GUIDED_ITEM, TargetSource.ECHO}
 )
-_SAME_M = 0.2
-_SAID_AGAIN_S = 3.0
-_ECHO_MOVED_M = 0.5
+_SAME_M = 0.2  # far more than the rounding of the wire (1 cm), far less than two clicks differ by; chosen, not measured
+_SAID_AGAIN_S = 3.0  # ground stations repeat a command that is not acknowledged within about a second; chosen, not measured
+_ECHO_MOVED_M = 0.5  # the vehicle reports the target that it was given a little off; chosen, not measured
 
 
 @dataclass(frozen=True, slots=True)

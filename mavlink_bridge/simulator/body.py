@@ -15,6 +15,7 @@ Measured: it drives 0.05 to 0.17 m to the left of its line, and its estimate dif
 _OFFSET_FROM_MPS = 0.5
 """From this speed on the offset is whole; a rover that stands knows where it is."""
 
+# max_wheel_turn, turning_circle and skid_turn_rate of ArduPilot's SITL (SIM_Rover.h).
 _STEERING_LOCK_RAD = math.radians(35.0)
 _TURNING_CIRCLE_M = 1.8  # in diameter: twice the 0.9 m of TURN_RADIUS
 _SKID_TURN_RATE_RADPS = math.radians(140.0)

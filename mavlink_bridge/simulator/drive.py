@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from mavlink_bridge.simulator.body import Body
 
+# So near to the next leg a pivot ends; chosen, not measured: ArduPilot's AR_PIVOT_ANGLE_ACCURACY is 5°.
 _PIVOT_ACCURACY_RAD = math.radians(10.0)
 
 

@@ -16,9 +16,8 @@ from missions.checking.mission_end import crossed_zones, end_warnings, return_pl
 from missions.drive_model import Envelope, beyond_measured, envelope
 from missions.drive_model.avoidance import with_avoidance
 from missions.errors import SituationError, StartBlockedError
-from missions.geo import LatLon, bearing_deg, distance_m
-from missions.ground.frame import LocalPoint
-from missions.ground.from_situation import ground_for
+from missions.geo import LatLon, LocalPoint, bearing_deg, distance_m
+from missions.ground.from_situation import ground_for, heading_at
 from missions.ground.ground import EDGE_BOW_M, Ground
 from missions.ground.known_fence import fence_warnings, known_fence
 from missions.ground.legs import drawn_leg
@@ -117,10 +116,6 @@ class MissionCheck:
         Each as often as it is driven.
     clearance_m : float
         What was to be kept while driving.
-    duration_s : float
-        The time for all of it; of a mission without end for one time round.
-    troubles : tuple of str
-        What was not understood; with any of these the mission does not hold.
     dangers : tuple of str
         What is known to end in the fence, whatever the legs keep; with any of these the mission does not hold.
     warnings : tuple of str
@@ -133,8 +128,6 @@ class MissionCheck:
     course: Course
     legs: tuple[CheckedLeg, ...]
     clearance_m: float
-    duration_s: float
-    troubles: tuple[str, ...]
     dangers: tuple[str, ...]
     warnings: tuple[str, ...]
     fence: Fence
@@ -151,6 +144,16 @@ class MissionCheck:
     def holds(self) -> bool:
         """Whether every leg keeps its clearance, everything was understood, and nothing is known to end in the fence."""
         return not self.broken and not self.troubles and not self.dangers
+
+    @property
+    def troubles(self) -> tuple[str, ...]:
+        """What was not understood; with any of these the mission does not hold."""
+        return self.course.troubles
+
+    @property
+    def duration_s(self) -> float:
+        """The time for all of it; of a mission without end for one time round."""
+        return self.envelope.duration_s
 
     @property
     def length_m(self) -> float:
@@ -170,7 +173,7 @@ class MissionCheck:
     @property
     def path(self) -> tuple[LatLon, ...]:
         """The drawn lines, start first."""
-        return (self.legs[0].leg.start, *(leg.leg.end for leg in self.legs))
+        return self.course.path
 
 
 def check_mission(mission: Mission, situation: Situation, request: Request = _ANYTHING) -> MissionCheck:
@@ -199,41 +202,33 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
     request = replace(request, widest=False, speed_mps=None, corner_allowance_m=None)
     vehicle = known_vehicle(situation, request)
     asked = promise(situation, request, vehicle)
-    home = situation.home.value if situation.home else mission.home
-    if home and not situation.home:
-        situation = replace(situation, home=Known(home, None, "the mission"))
-    pose = situation.pose.value if situation.pose else None
-    start = request.start or (pose.position if pose else home)
+    situation = _with_home(situation, mission)
+    home = situation.home.value if situation.home else None
+    start = request.start or (situation.pose.value.position if situation.pose else home)
     course = _course(mission, situation, vehicle, start, home)
-    path = (course.legs[0].start, *(leg.end for leg in course.legs))
-    near_home = [home] if home and distance_m(home, path[0]) < _FAR_M else []
-    ground = ground_for(situation, vehicle, (*path, *near_home))
-    heading_deg = pose.heading_deg if pose and pose.position == start else None
+    ground = ground_for(situation, vehicle, (*course.path, *_near(home, course)))
+    heading_deg = heading_at(situation, start) if start else None
     forecast = _forecast(course, ground, vehicle, heading_deg)
     legs = _checked_legs(course, ground, forecast, asked.required_m, seams_of(ground, vehicle))
-    hazard = start_hazard(ground, ground.frame.to_local(start), vehicle) if start else None
-    dangers = (f"{hazard}; {hazard.details['advice']}",) if isinstance(hazard, StartBlockedError) else ()
+    dangers, hazards = _at_start(ground, start, vehicle)
     warnings = [
         *parameter_remarks(situation),
         *fence_warnings(vehicle, situation),
         *ground.warnings,
         *asked.warnings,
         *course.notes,
+        *hazards,
+        *_seam_warnings(vehicle, legs),
+        *_start_warnings(start, heading_deg, legs[0], asked.required_m),
+        *_drive_warnings(vehicle, forecast, course),
+        *return_warnings(situation, vehicle, ground, course.path),
+        *end_warnings(situation, vehicle, course),
     ]
-    warnings += [hazard] if isinstance(hazard, str) else []
-    if any(leg.stops_at_seam for leg in legs):
-        warnings.append(f"{seam_reason(vehicle)}; {seam_advice(vehicle)}")
-    warnings += _start_warnings(start, heading_deg, legs[0], asked.required_m)
-    warnings += _drive_warnings(vehicle, forecast, course)
-    warnings += return_warnings(situation, vehicle, ground, path)
-    warnings += end_warnings(situation, vehicle, course)
     return MissionCheck(
         mission=mission,
         course=course,
         legs=legs,
         clearance_m=asked.promised_m,
-        duration_s=forecast.duration_s,
-        troubles=course.troubles,
         dangers=dangers,
         warnings=tuple(dict.fromkeys(warnings)),
         fence=fence,
@@ -291,12 +286,10 @@ def _course(
 
 
 def _forecast(course: Course, ground: Ground, vehicle: Vehicle, heading_deg: float | None) -> Envelope:
-    places = [course.legs[0].start, *(leg.end for leg in course.legs)]
-    points = ground.frame.to_local_array(places)
     if heading_deg is None:  # as plans do
-        heading_deg = bearing_deg(*places[:2])
+        heading_deg = bearing_deg(*course.path[:2])
     forecast = envelope(
-        points,
+        ground.frame.to_local_array(course.path),
         vehicle,
         heading_deg=heading_deg,
         speeds=[leg.speed_mps for leg in course.legs],
@@ -422,6 +415,32 @@ def _driven_m(forecast: Envelope, ground: Ground, count: int) -> NDArray[np.floa
     for number in sorted(bare - {0}):
         legs_m[number] = min(legs_m[number], legs_m[number - 1])
     return legs_m
+
+
+def _with_home(situation: Situation, mission: Mission) -> Situation:
+    """Return the situation with the mission's home where it knows none."""
+    if situation.home or not mission.home:
+        return situation
+    return replace(situation, home=Known(mission.home, None, "the mission"))
+
+
+def _near(home: LatLon | None, course: Course) -> list[LatLon]:
+    """Return home where it is so near that it is laid out with the mission."""
+    return [home] if home and distance_m(home, course.path[0]) < _FAR_M else []
+
+
+def _at_start(ground: Ground, start: LatLon | None, vehicle: Vehicle) -> tuple[tuple[str, ...], list[str]]:
+    """Return what is known to end in the fence from the start, and warnings of what may stop the vehicle there."""
+    hazard = start_hazard(ground, ground.frame.to_local(start), vehicle) if start else None
+    if isinstance(hazard, StartBlockedError):
+        return (f"{hazard}; {hazard.details['advice']}",), []
+    return (), [hazard] if hazard else []
+
+
+def _seam_warnings(vehicle: Vehicle, legs: tuple[CheckedLeg, ...]) -> list[str]:
+    return (
+        [f"{seam_reason(vehicle)}; {seam_advice(vehicle)}"] if any(leg.stops_at_seam for leg in legs) else []
+    )
 
 
 def _start_warnings(

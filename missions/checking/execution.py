@@ -94,6 +94,11 @@ class Course:
     is_endless: bool = False
     ends_in_loiter: bool = False
 
+    @property
+    def path(self) -> tuple[LatLon, ...]:
+        """The places between the legs, the start first."""
+        return (self.legs[0].start, *(leg.end for leg in self.legs))
+
 
 def is_navigation(item: MissionItem) -> bool:
     """Return whether an item is a navigation command: one that the vehicle is busy with until it is done (AP_Mission::is_nav_cmd)."""

@@ -3,7 +3,8 @@
 ArduPilot's avoidance (AVOID_ENABLE, FENCE_MARGIN) limits the speed towards a fence to the position gain times the distance that is
 left to the margin. A rover that comes to a corner before a fence is slowed while its target point goes on round the corner, and
 drives beside the line until the error dies away. The target point waits for it in part (AR_WPNav's time scaling). Target point and
-rover are followed here, the rover as a point without inertia, to see how far it gets behind.
+rover are followed here, the rover as a point without inertia, to see how far it gets behind. In this module a point or a way is one complex
+number, east + j north: turning a way is then a multiplication.
 """
 
 from __future__ import annotations
@@ -74,7 +75,7 @@ def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry) -> Env
     if not vehicle.avoids_fence or fence.is_empty or not band.legs:
         return band
     target = _TargetPoint(band, vehicle)
-    lags = target.lags(vehicle, FenceAhead(fence, target.places, vehicle))
+    lags = target.lags(vehicle, FenceAhead(fence, _plane(target.places), vehicle))
     pieces = target.pieces(lags)
     if not pieces:
         return band
@@ -129,7 +130,9 @@ class _TargetPoint:
         is_slowed = np.zeros(len(steps), dtype=np.bool_)
         near = self._near_corners()[:-1]
         for side in _SIDES:
-            allowed_mps = fence.speeds_mps(self.places[:-1][near], side * (steps / moved_m)[near])
+            allowed_mps = fence.speeds_mps(
+                _plane(self.places[:-1][near]), _plane(side * (steps / moved_m)[near])
+            )
             is_slowed[near] |= allowed_mps < _SLOWED_SHARE * moved_m[near] / _STEP_S
         if not is_slowed.any():
             return []
@@ -156,7 +159,7 @@ class _TargetPoint:
         span = slice(begin, min(begin + _SAMPLES_A_PIECE + 1, len(behind)))
         targets = self.places[span]
         ground = np.concatenate([targets, targets - LAG_RESERVE * behind[span]])
-        core = shapely.MultiPoint(np.column_stack((ground.real, ground.imag))).convex_hull
+        core = shapely.MultiPoint(_plane(ground)).convex_hull
         leg = int(np.searchsorted(self._passed_s, self.times_s[begin]))
         return (
             core,
@@ -170,6 +173,11 @@ class _TargetPoint:
             return self.band.legs[-1].first + 1
         nearest = min(range(len(self._passed_s)), key=lambda number: abs(self._passed_s[number] - time_s))
         return self.band.corners[nearest].waypoint
+
+
+def _plane(numbers: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Return complex numbers as points, shape (n, 2)."""
+    return numbers.view(np.float64).reshape(-1, 2)
 
 
 def _profile(leg: Leg, vehicle: Vehicle) -> LegProfile:
@@ -204,7 +212,8 @@ def _followed(
         here = places[sample] + (at - sample) * _STEP_S * velocity - behind
         wanted = velocity + vehicle.position_gain_per_s * behind
         wanted_mps = abs(wanted) or 1.0
-        allowed_mps = fence.speed_mps(here, wanted / wanted_mps, top_mps)
+        way = wanted / wanted_mps
+        allowed_mps = fence.speed_mps((here.real, here.imag), (way.real, way.imag), top_mps)
         wanted *= min(1.0, top_mps / wanted_mps, allowed_mps / wanted_mps)
         rover.follow(wanted, (velocities[sample + 1] - velocity) / _STEP_S)
         scale += (_scale(velocity, behind, rover.velocity, vehicle) - scale) * _STEP_S / _SETTLE_S

@@ -10,7 +10,8 @@ import numpy as np
 import shapely
 
 from missions.drive_model import corner as at_corner
-from missions.drive_model.legs_and_corners import Stray, Vector
+from missions.drive_model.legs_and_corners import Stray
+from missions.geo import Vector
 from missions.vehicle import Autopilot
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from missions.drive_model.legs_and_corners import Route
+    from missions.drive_model.legs_and_corners import DrivePlan
 
 BLEND_SAMPLES = 6  # straight pieces of a blend; chosen, not measured
 NEGLIGIBLE_M = 0.03  # a swing below this is left out; chosen: about a tenth of the band, 0.25 to 0.45 m
@@ -68,48 +69,48 @@ def _shifted(place: Vector, direction: Vector, along_m: float) -> Vector:
     return (place[0] + direction[0] * along_m, place[1] + direction[1] * along_m)
 
 
-def add_start(pieces: Pieces, route: Route, array: NDArray[np.float64], behind_m: float) -> None:
+def add_start(pieces: Pieces, drive: DrivePlan, array: NDArray[np.float64], behind_m: float) -> None:
     """Add the place it starts from, with its swing to the side and behind it."""
     place = (float(array[0, 0]), float(array[0, 1]))
-    if not route.legs:
+    if not drive.legs:
         pieces.add(
             [(float(east_m), float(north_m)) for east_m, north_m in array], at_corner.BAND_AT_REST_M, 0
         )
         return
-    leg, stray = route.legs[0], route.strays[0]
+    leg, stray = drive.legs[0], drive.strays[0]
     vertices = [place]
     swings = stray.widest_m >= NEGLIGIBLE_M
-    ahead_m = min(at_corner.swing_length_m(route.vehicle), leg.profile.length_m) if swings else 0.0
+    ahead_m = min(at_corner.swing_length_m(drive.vehicle), leg.profile.length_m) if swings else 0.0
     for along_m in (-behind_m, ahead_m):
         vertices += _beside(_shifted(place, leg.direction, along_m), leg.direction, stray)
     pieces.add(vertices, leg.band_m, 0)
 
 
-def add_leg(pieces: Pieces, route: Route, number: int) -> None:
+def add_leg(pieces: Pieces, drive: DrivePlan, number: int) -> None:
     """Add a leg from one blend to the next, as wide as the tails of earlier swings make it."""
-    leg = route.legs[number]
-    begin_s, end_s = route.span_s(number)
+    leg = drive.legs[number]
+    begin_s, end_s = drive.span_s(number)
     times_s = [begin_s]
-    if route.stray_at(number, begin_s).widest_m >= NEGLIGIBLE_M:
+    if drive.stray_at(number, begin_s).widest_m >= NEGLIGIBLE_M:
         times_s += [begin_s + time_s for time_s in TAIL_TIMES_S if begin_s + time_s < end_s]
     times_s.append(end_s)
-    rungs = [_beside(leg.at(time_s), leg.direction, route.stray_at(number, time_s)) for time_s in times_s]
-    waypoint = waypoint_after(route, number)
+    rungs = [_beside(leg.at(time_s), leg.direction, drive.stray_at(number, time_s)) for time_s in times_s]
+    waypoint = waypoint_after(drive, number)
     for rung, following in itertools.pairwise(rungs):
         pieces.add([*rung, *following], leg.band_m, waypoint)
 
 
-def waypoint_after(route: Route, leg: int) -> int:
+def waypoint_after(drive: DrivePlan, leg: int) -> int:
     """Return the number of the waypoint that a leg leads to."""
-    return route.corners[leg].waypoint if leg < len(route.corners) else route.legs[leg].first + 1
+    return drive.corners[leg].waypoint if leg < len(drive.corners) else drive.legs[leg].first + 1
 
 
-def add_corner(pieces: Pieces, route: Route, number: int) -> None:
+def add_corner(pieces: Pieces, drive: DrivePlan, number: int) -> None:
     """Add the blend of two legs, and the area of a swing that does not follow it."""
-    corner, before, after = route.corners[number], route.legs[number], route.legs[number + 1]
+    corner, before, after = drive.corners[number], drive.legs[number], drive.legs[number + 1]
     band_m = max(before.band_m, after.band_m)
-    path = _blend_path(route, number)
-    left = route.stray_at(number, before.profile.duration_s - corner.blend.duration_s).widest_m
+    path = _blend_path(drive, number)
+    left = drive.stray_at(number, before.profile.duration_s - corner.blend.duration_s).widest_m
     # The band about a blend is narrower on its inside: the same strip, moved outwards.
     outwards_m = (band_m - min(band_m, at_corner.INSIDE_BAND_M)) / 2
     side = Stray(outwards_m, -outwards_m) if corner.turn_deg >= 0 else Stray(-outwards_m, outwards_m)
@@ -121,15 +122,15 @@ def add_corner(pieces: Pieces, route: Route, number: int) -> None:
     for rung, following in itertools.pairwise(rungs):
         pieces.add([*rung, *following, *corner_places], band_m - outwards_m, corner.waypoint)
     if wide or len(path) == 1:
-        pieces.add(_swing_hull(route, number), band_m, corner.waypoint)
-        pieces.add(_swing_strip(route, number), band_m, corner.waypoint)
-    if route.vehicle.autopilot is Autopilot.PX4 and not corner.stops:
-        pieces.add(_whole_corner(route, number), band_m, corner.waypoint)
+        pieces.add(_swing_hull(drive, number), band_m, corner.waypoint)
+        pieces.add(_swing_strip(drive, number), band_m, corner.waypoint)
+    if drive.vehicle.autopilot is Autopilot.PX4 and not corner.stops:
+        pieces.add(_whole_corner(drive, number), band_m, corner.waypoint)
 
 
-def _blend_path(route: Route, number: int) -> list[tuple[Vector, Vector]]:
+def _blend_path(drive: DrivePlan, number: int) -> list[tuple[Vector, Vector]]:
     """Return places and directions along the blend of two legs; one place where the rover stops."""
-    corner, before, after = route.corners[number], route.legs[number], route.legs[number + 1]
+    corner, before, after = drive.corners[number], drive.legs[number], drive.legs[number + 1]
     duration_s = corner.blend.duration_s
     if duration_s == 0:
         return [(corner.places[0], before.direction)]
@@ -148,35 +149,35 @@ def _blend_path(route: Route, number: int) -> list[tuple[Vector, Vector]]:
     return path
 
 
-def _swing_hull(route: Route, number: int) -> list[Vector]:
+def _swing_hull(drive: DrivePlan, number: int) -> list[Vector]:
     """Return the ground behind the waypoint that a turn needs which the rover cannot follow."""
-    corner, after = route.corners[number], route.legs[number + 1]
+    corner, after = drive.corners[number], drive.legs[number + 1]
     hull = [*corner.places]
     for along_m in (-corner.behind_m, 0.0):
         place = _shifted(after.start, after.direction, along_m)
-        hull += _beside(place, after.direction, route.strays[number + 1])
+        hull += _beside(place, after.direction, drive.strays[number + 1])
     return hull
 
 
-def _swing_strip(route: Route, number: int) -> list[Vector]:
+def _swing_strip(drive: DrivePlan, number: int) -> list[Vector]:
     """Return the strip along the next leg in which a swing has not begun to die away."""
-    corner, after = route.corners[number], route.legs[number + 1]
+    corner, after = drive.corners[number], drive.legs[number + 1]
     ahead_m = after.profile.travelled_m(corner.blend.duration_s)
     if corner.swing_m >= NEGLIGIBLE_M and not corner.pivots:
-        swing_length_m = at_corner.swing_length_m(route.vehicle)
+        swing_length_m = at_corner.swing_length_m(drive.vehicle)
         ahead_m = max(ahead_m, min(swing_length_m, after.profile.length_m))
     strip: list[Vector] = []
     for along_m in (0.0, ahead_m):
         strip += _beside(
-            _shifted(after.start, after.direction, along_m), after.direction, route.strays[number + 1]
+            _shifted(after.start, after.direction, along_m), after.direction, drive.strays[number + 1]
         )
     return strip
 
 
-def _whole_corner(route: Route, number: int) -> list[Vector]:
+def _whole_corner(drive: DrivePlan, number: int) -> list[Vector]:
     """Return the ground of a corner that is turned within the acceptance radius along a path that was not measured."""
-    corner, before, after = route.corners[number], route.legs[number], route.legs[number + 1]
-    radius_m = route.vehicle.waypoint_radius_m
+    corner, before, after = drive.corners[number], drive.legs[number], drive.legs[number + 1]
+    radius_m = drive.vehicle.waypoint_radius_m
     return [
         *corner.places,
         _shifted(before.end, before.direction, -radius_m),
@@ -184,14 +185,14 @@ def _whole_corner(route: Route, number: int) -> list[Vector]:
     ]
 
 
-def add_end(pieces: Pieces, route: Route) -> None:
+def add_end(pieces: Pieces, drive: DrivePlan) -> None:
     """Add the last place, and how far a rover runs past it."""
-    if not route.legs:
+    if not drive.legs:
         return
-    leg = route.legs[-1]
-    stray = route.stray_at(len(route.legs) - 1, leg.profile.duration_s)
+    leg = drive.legs[-1]
+    stray = drive.stray_at(len(drive.legs) - 1, leg.profile.duration_s)
     past = _shifted(leg.end, leg.direction, max(at_corner.END_OVERRUN_M - leg.band_m, 0.0))
-    waypoint = waypoint_after(route, len(route.legs) - 1)
+    waypoint = waypoint_after(drive, len(drive.legs) - 1)
     pieces.add(
         [*_beside(leg.end, leg.direction, stray), *_beside(past, leg.direction, stray)], leg.band_m, waypoint
     )

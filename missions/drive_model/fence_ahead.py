@@ -1,4 +1,7 @@
-"""What the vehicle's avoidance sees: how far ahead a fence lies, and what speed that leaves it (AC_Avoid, AR_PosControl)."""
+"""What the vehicle's avoidance sees: how far ahead a fence lies, and what speed that leaves it (AC_Avoid, AR_PosControl).
+
+Inside, a point or a way is one complex number, east + j north: turning a way is then a multiplication, and edges are met many at once.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +12,10 @@ import numpy as np
 import shapely
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
     from shapely.geometry.base import BaseGeometry
 
+    from missions.geo import Vector
     from missions.vehicle import Vehicle
 
 _MOVED_M = 5.0
@@ -25,29 +29,26 @@ _FEW = 24  # more edges than this are quicker in numpy than one by one; chosen, 
 class FenceAhead:
     """The straight edges of a fence that a drive has to do with.
 
-    Numbers are complex: east is the real part, north the imaginary one.
-
     Parameters
     ----------
     fence : shapely geometry
         The lines it avoids, metres.
-    places : ndarray of complex
-        Where it drives.
+    places : ndarray of float, shape (n, 2)
+        Where it drives, east and north in metres.
     vehicle : Vehicle
         What drives.
     """
 
-    def __init__(self, fence: BaseGeometry, places: NDArray[np.complex128], vehicle: Vehicle) -> None:
+    def __init__(self, fence: BaseGeometry, places: NDArray[np.float64], vehicle: Vehicle) -> None:
         self._stops_within_m = vehicle.stops_within_m
         self._gain_per_s, self._accel_mps2 = vehicle.position_gain_per_s, vehicle.accel_max_mps2
         self._linear_m = self._accel_mps2 / self._gain_per_s**2
         points, lines = shapely.get_coordinates(shapely.get_parts(fence), return_index=True)
-        joined = lines[1:] == lines[:-1]
-        corners = points[:, 0] + 1j * points[:, 1]
-        self._starts, self._ends = corners[:-1][joined], corners[1:][joined]
-        near = self._touch(_corners(places), self.counts_within_m(vehicle.speed_mps))
-        self._starts, self._ends = self._starts[near], self._ends[near]
-        self._steps = self._ends - self._starts
+        self._edges = np.stack((points[:-1], points[1:]), axis=1)[lines[1:] == lines[:-1]]
+        within_m = self.counts_within_m(vehicle.speed_mps)
+        self._edges = self._edges[self._touch(places.min(axis=0), places.max(axis=0), within_m)]
+        self._starts = _complex(self._edges[:, 0])
+        self._steps = _complex(self._edges[:, 1]) - self._starts
         self._centre, self._reach_m = 0j, -math.inf
         self._near = self._starts, self._steps
         self._near_edges: list[tuple[complex, complex]] = []
@@ -56,16 +57,17 @@ class FenceAhead:
         """Return the distance beyond which an edge does not slow a rover that drives at a speed."""
         return self._stops_within_m + max(top_mps / self._gain_per_s, top_mps**2 / self._accel_mps2)
 
-    def speeds_mps(self, places: NDArray[np.complex128], ways: NDArray[np.complex128]) -> NDArray[np.float64]:
+    def speeds_mps(self, places: NDArray[np.float64], ways: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the speed that is allowed at each place in its own direction (sqrt_controller of what is left to the margin)."""
-        left_m = np.maximum(self._ahead_m(places, ways) - self._stops_within_m, 0.0)
+        left_m = np.maximum(self._ahead_m(_complex(places), _complex(ways)) - self._stops_within_m, 0.0)
         far_mps = np.sqrt(2 * self._accel_mps2 * np.maximum(left_m - self._linear_m / 2, 0.0))
         return np.where(left_m <= self._linear_m, self._gain_per_s * left_m, far_mps)
 
-    def speed_mps(self, place: complex, way: complex, top_mps: float) -> float:
+    def speed_mps(self, place: Vector, way: Vector, top_mps: float) -> float:
         """Return the speed that is allowed at one place in one direction; exact up to ``top_mps``, and above that no less."""
-        self._look_about(place, self.counts_within_m(top_mps) + _SPARE_M)
-        left_m = max(self._one_ahead_m(place, way) - self._stops_within_m, 0.0)
+        here = complex(*place)
+        self._look_about(here, self.counts_within_m(top_mps) + _SPARE_M)
+        left_m = max(self._one_ahead_m(here, complex(*way)) - self._stops_within_m, 0.0)
         if left_m <= self._linear_m:
             return self._gain_per_s * left_m
         return math.sqrt(2 * self._accel_mps2 * max(left_m - self._linear_m / 2, 0.0))
@@ -75,20 +77,17 @@ class FenceAhead:
         if abs(place - self._centre) <= _MOVED_M and reach_m <= self._reach_m:
             return
         self._centre, self._reach_m = place, reach_m
-        near = self._touch((place, place), reach_m + _MOVED_M)
+        here = (place.real, place.imag)
+        near = self._touch(here, here, reach_m + _MOVED_M)
         self._near = self._starts[near], self._steps[near]
         self._near_edges = list(zip(*(part.tolist() for part in self._near), strict=True))
 
-    def _touch(self, box: tuple[complex, complex], reach_m: float) -> NDArray[np.bool_]:
+    def _touch(self, low: ArrayLike, high: ArrayLike, reach_m: float) -> NDArray[np.bool_]:
         """Return which edges may come within reach of a box."""
-        near = np.ones(len(self._starts), dtype=np.bool_)
-        for part, (low, high) in (
-            (np.real, (box[0].real, box[1].real)),
-            (np.imag, (box[0].imag, box[1].imag)),
-        ):
-            starts, ends = part(self._starts), part(self._ends)
-            near &= (np.maximum(starts, ends) >= low - reach_m) & (np.minimum(starts, ends) <= high + reach_m)
-        return near
+        starts, ends = self._edges[:, 0], self._edges[:, 1]
+        near = np.maximum(starts, ends) >= np.subtract(low, reach_m)
+        near &= np.minimum(starts, ends) <= np.add(high, reach_m)
+        return np.asarray(near.all(axis=1))
 
     def _ahead_m(self, places: NDArray[np.complex128], ways: NDArray[np.complex128]) -> NDArray[np.float64]:
         """Return how far ahead the first edge lies; infinite without one."""
@@ -122,6 +121,6 @@ class FenceAhead:
         return first_m
 
 
-def _corners(places: NDArray[np.complex128]) -> tuple[complex, complex]:
-    low = complex(places.real.min(), places.imag.min())
-    return low, complex(places.real.max(), places.imag.max())
+def _complex(points: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """Return points, shape (n, 2), as east + j north."""
+    return np.ascontiguousarray(points).view(np.complex128)[:, 0]

@@ -7,8 +7,9 @@ import math
 from typing import TYPE_CHECKING
 
 from missions.drive_model import corner as at_corner
-from missions.drive_model.legs_and_corners import Bend, CornerPlan, LegPlan, Route, Stray, Vector
+from missions.drive_model.legs_and_corners import Bend, CornerPlan, DrivePlan, LegPlan, Stray
 from missions.drive_model.motion import leg_profile
+from missions.geo import change_deg
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -16,26 +17,27 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from missions.geo import Vector
     from missions.vehicle import Vehicle
 
 SAME_PLACE_M = 0.3
 """Points nearer to one another are one place for a rover: it can make nothing of a leg between them but a stop."""
 
 
-def plan_route(
+def drive_plan(
     points: NDArray[np.float64],
     vehicle: Vehicle,
     speeds: Sequence[float | None] | None,
     stops: Mapping[int, float],
     start: Stray,
-) -> Route:
+) -> DrivePlan:
     """Return the legs and corners of a list of points; points that lie on one another are one place, and a stop."""
     groups = _grouped(points)
     legs = tuple(
         _leg(vehicle, before, after, None if speeds is None else speeds[after[0][0] - 1])
         for before, after in itertools.pairwise(groups)
     )
-    turns_deg = [_turn_deg(before.direction, after.direction) for before, after in itertools.pairwise(legs)]
+    turns_deg = [change_deg(before.direction, after.direction) for before, after in itertools.pairwise(legs)]
     runs_m = _runs_m(legs, turns_deg)
     asked = [None if speeds is None else speeds[leg.first] for leg in legs]
     corners = []
@@ -56,7 +58,7 @@ def plan_route(
         left = strays[-1].after(passed_s, vehicle.position_gain_per_s)
         stray = left.turned(corner.turn_deg).swung(corner.turn_deg, corner.swing_m)
         strays.append(stray.widened(corner.stray_m))
-    return Route(vehicle, legs, tuple(corners), tuple(strays))
+    return DrivePlan(vehicle, legs, tuple(corners), tuple(strays))
 
 
 def _grouped(points: NDArray[np.float64]) -> list[list[tuple[int, Vector]]]:
@@ -148,9 +150,3 @@ def _stray_m(places: int, delay_s: float) -> float:
     if places > 1:
         return at_corner.SAME_PLACE_STRAY_M
     return at_corner.DELAY_STRAY_M if delay_s > 0 else 0.0
-
-
-def _turn_deg(before: Vector, after: Vector) -> float:
-    cross = before[0] * after[1] - before[1] * after[0]
-    dot = before[0] * after[0] + before[1] * after[1]
-    return -math.degrees(math.atan2(cross, dot))

@@ -11,9 +11,8 @@ from missions.drive_model import corner as at_corner
 if TYPE_CHECKING:
     from missions.drive_model.corner import Blend
     from missions.drive_model.motion import LegProfile
+    from missions.geo import Vector
     from missions.vehicle import Vehicle
-
-Vector = tuple[float, float]
 
 KEPT_ACROSS = 0.3
 """What is left to either side, at the least, of an error that a corner turns from sideways to lengthways."""
@@ -155,7 +154,7 @@ class Bend:
 
 
 @dataclass(frozen=True, slots=True)
-class Route:
+class DrivePlan:
     """A drive: n legs, the n - 1 corners between them, and the errors that each leg begins with."""
 
     vehicle: Vehicle

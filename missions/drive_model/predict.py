@@ -12,7 +12,7 @@ import numpy as np
 from missions.drive_model import corner as at_corner
 from missions.drive_model.band import Pieces, add_corner, add_end, add_leg, add_start, convex
 from missions.drive_model.envelope import Envelope
-from missions.drive_model.from_points import SAME_PLACE_M, plan_route
+from missions.drive_model.from_points import SAME_PLACE_M, drive_plan
 from missions.drive_model.legs_and_corners import Stray
 from missions.drive_model.summary import arrivals_s, told_corner, told_leg
 from missions.errors import InvalidPositionError, VehicleError
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from missions.drive_model.envelope import Corner
-    from missions.drive_model.legs_and_corners import Route
+    from missions.drive_model.legs_and_corners import DrivePlan
     from missions.vehicle import Vehicle
 
 
@@ -81,8 +81,8 @@ def plan_drive(
     if heading_deg is None and len(array) > 1:
         # Starting straight on it is sooner at speed, and then strays further from short legs than after the worst start.
         starts.append(_start(array, vehicle, _bearing_deg(array)))
-    routes = tuple(plan_route(array, vehicle, speeds, stops or {}, stray) for stray, _ in starts)
-    return Drive(array, routes, tuple(behind_m for _, behind_m in starts))
+    plans = tuple(drive_plan(array, vehicle, speeds, stops or {}, stray) for stray, _ in starts)
+    return Drive(array, plans, tuple(behind_m for _, behind_m in starts))
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,27 +93,27 @@ class Drive:
     ----------
     points : ndarray of float, shape (n, 2)
         What is driven, east and north in metres.
-    routes : tuple of Route
+    plans : tuple of DrivePlan
         Legs and corners; the second one, where there is one, for another heading at the start.
     behind_m : tuple of float
         How far behind its place each start takes the rover.
     """
 
     points: NDArray[np.float64]
-    routes: tuple[Route, ...]
+    plans: tuple[DrivePlan, ...]
     behind_m: tuple[float, ...]
 
     @cached_property
     def arrivals_s(self) -> NDArray[np.float64]:
         """When the rover passes each point, from its start on, shape (n,)."""
-        return arrivals_s(self.routes[0], len(self.points))
+        return arrivals_s(self.plans[0], len(self.points))
 
     @cached_property
     def pieces(self) -> Pieces:
         """The pieces of the band, as the places about which they lie."""
         pieces = Pieces()
-        for route, behind_m in zip(self.routes, self.behind_m, strict=True):
-            _add_route(pieces, route, self.points, behind_m)
+        for plan, behind_m in zip(self.plans, self.behind_m, strict=True):
+            _add_plan(pieces, plan, self.points, behind_m)
         return pieces
 
     @property
@@ -123,25 +123,25 @@ class Drive:
 
     def with_cores(self, cores: NDArray[np.object_]) -> Envelope:
         """Return the band from the convex hulls of its pieces, already known."""
-        route = self.routes[0]
+        plan = self.plans[0]
         return Envelope(
             points=self.points,
             cores=cores,
             bands_m=np.asarray(self.pieces.bands_m),
             waypoints=np.asarray(self.pieces.waypoints, dtype=np.int64),
-            corners=tuple(told_corner(route, number) for number in range(len(route.corners))),
-            legs=tuple(told_leg(route, number) for number in range(len(route.legs))),
+            corners=tuple(told_corner(plan, number) for number in range(len(plan.corners))),
+            legs=tuple(told_leg(plan, number) for number in range(len(plan.legs))),
             arrivals_s=self.arrivals_s,
         )
 
 
-def _add_route(pieces: Pieces, route: Route, points: NDArray[np.float64], behind_m: float) -> None:
-    add_start(pieces, route, points, behind_m)
-    for number in range(len(route.legs)):
-        add_leg(pieces, route, number)
-        if number < len(route.corners):
-            add_corner(pieces, route, number)
-    add_end(pieces, route)
+def _add_plan(pieces: Pieces, plan: DrivePlan, points: NDArray[np.float64], behind_m: float) -> None:
+    add_start(pieces, plan, points, behind_m)
+    for number in range(len(plan.legs)):
+        add_leg(pieces, plan, number)
+        if number < len(plan.corners):
+            add_corner(pieces, plan, number)
+    add_end(pieces, plan)
 
 
 def _bearing_deg(points: NDArray[np.float64]) -> float:
@@ -186,7 +186,7 @@ def corner_forecast(
         ]
     )
     stops = {} if stop_s is None else {1: stop_s}
-    return told_corner(plan_route(points, vehicle, [speed_mps, speed_mps], stops, Stray()), 0)
+    return told_corner(drive_plan(points, vehicle, [speed_mps, speed_mps], stops, Stray()), 0)
 
 
 def _checked(points: ArrayLike) -> NDArray[np.float64]:

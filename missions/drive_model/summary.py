@@ -14,27 +14,27 @@ from missions.vehicle import Autopilot
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from missions.drive_model.legs_and_corners import LegPlan, Route
+    from missions.drive_model.legs_and_corners import DrivePlan, LegPlan
 
 START_AND_END_LAG_S = 2.0
 """For both together, besides the motions of the legs (docs/drive-model.md, 5)."""
 
 
-def told_corner(route: Route, number: int) -> Corner:
+def told_corner(drive: DrivePlan, number: int) -> Corner:
     """Return the prediction for a corner."""
-    plan, before, after = route.corners[number], route.legs[number], route.legs[number + 1]
+    plan, before, after = drive.corners[number], drive.legs[number], drive.legs[number + 1]
     band_m = max(before.band_m, after.band_m)
     blend_s = before.profile.duration_s - plan.blend.duration_s
-    coming_m = route.stray_at(number, blend_s).widest_m
-    midway = route.stray_at(number, before.profile.duration_s / 2).seen_from(plan.turn_deg)
-    going = route.strays[number + 1].seen_from(plan.turn_deg)
+    coming_m = drive.stray_at(number, blend_s).widest_m
+    midway = drive.stray_at(number, before.profile.duration_s / 2).seen_from(plan.turn_deg)
+    going = drive.strays[number + 1].seen_from(plan.turn_deg)
     return Corner(
         waypoint=plan.waypoint,
         turn_deg=plan.turn_deg,
         stops=plan.stops,
         pivots=plan.pivots,
         inside_cut_m=max(
-            _cut_m(route, number) + coming_m + min(band_m, at_corner.INSIDE_BAND_M),
+            _cut_m(drive, number) + coming_m + min(band_m, at_corner.INSIDE_BAND_M),
             max(going.right_m, midway.right_m) + band_m,
         ),
         outside_overshoot_m=max(coming_m, going.left_m, midway.left_m) + band_m,
@@ -45,19 +45,19 @@ def told_corner(route: Route, number: int) -> Corner:
     )
 
 
-def _cut_m(route: Route, number: int) -> float:
-    plan = route.corners[number]
+def _cut_m(drive: DrivePlan, number: int) -> float:
+    plan = drive.corners[number]
     sine = abs(math.sin(math.radians(plan.turn_deg)))
-    if route.vehicle.autopilot is Autopilot.PX4 and not plan.stops:
-        return route.vehicle.waypoint_radius_m * (sine if abs(plan.turn_deg) < 90 else 1.0)
+    if drive.vehicle.autopilot is Autopilot.PX4 and not plan.stops:
+        return drive.vehicle.waypoint_radius_m * (sine if abs(plan.turn_deg) < 90 else 1.0)
     return plan.blend.reach_m * sine
 
 
-def told_leg(route: Route, number: int) -> Leg:
+def told_leg(drive: DrivePlan, number: int) -> Leg:
     """Return the prediction for a leg."""
-    leg: LegPlan = route.legs[number]
-    begin_s, _ = route.span_s(number)
-    stray = route.stray_at(number, begin_s)
+    leg: LegPlan = drive.legs[number]
+    begin_s, _ = drive.span_s(number)
+    stray = drive.stray_at(number, begin_s)
     return Leg(
         first=leg.first,
         length_m=leg.profile.length_m,
@@ -68,22 +68,22 @@ def told_leg(route: Route, number: int) -> Leg:
     )
 
 
-def arrivals_s(route: Route, count: int) -> NDArray[np.float64]:
+def arrivals_s(drive: DrivePlan, count: int) -> NDArray[np.float64]:
     """Return when each point is passed: the motions of the legs one after another, less their overlaps."""
     times_s = np.zeros(count)
     clock_s = (
-        START_AND_END_LAG_S / 2 + at_corner.swing_time_s(route.strays[0].widest_m, route.vehicle.speed_mps)
-        if route.legs
+        START_AND_END_LAG_S / 2 + at_corner.swing_time_s(drive.strays[0].widest_m, drive.vehicle.speed_mps)
+        if drive.legs
         else 0.0
     )
-    for number, leg in enumerate(route.legs):
+    for number, leg in enumerate(drive.legs):
         clock_s += leg.profile.duration_s
-        if number == len(route.corners):
+        if number == len(drive.corners):
             clock_s += START_AND_END_LAG_S / 2
             times_s[leg.first + 1 :] = clock_s
             break
-        corner = route.corners[number]
-        ramps_s = (leg.profile.ramp.duration_s + route.legs[number + 1].profile.ramp.duration_s) / 2
+        corner = drive.corners[number]
+        ramps_s = (leg.profile.ramp.duration_s + drive.legs[number + 1].profile.ramp.duration_s) / 2
         extra_s = corner.time_lost_s - ramps_s  # negative by the overlap of the two motions
         times_s[leg.first + 1 : corner.waypoint + 1] = clock_s - corner.blend.duration_s / 2
         clock_s += extra_s

@@ -27,6 +27,7 @@ from missions.drive_model import convex, plan_drive
 from missions.drive_model.avoidance import with_avoidance
 from missions.fitting import moves
 from missions.fitting import polyline as drawn
+from missions.geo import LocalPoint
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from missions.drive_model import Drive
-    from missions.fitting.polyline import Drawing, Vector
+    from missions.fitting.polyline import Drawing
     from missions.ground.ground import Ground
     from missions.vehicle import Vehicle
 
@@ -66,14 +67,14 @@ class Measured:
     ----------
     missing_m : tuple of float
         What is missing of the required clearance at each point, 0 where nothing is.
-    worst : tuple of (float, float)
+    worst : tuple of LocalPoint
         Where the band comes nearest to a fence, for each point; nan where nothing is missing.
     cost_s : float
         Time, and what is missing as time.
     """
 
     missing_m: tuple[float, ...]
-    worst: tuple[Vector, ...]
+    worst: tuple[LocalPoint, ...]
     cost_s: float
 
     @property
@@ -104,7 +105,7 @@ class Gauge:
         self.ground, self.vehicle = ground, vehicle
         self._heading_deg = heading_deg
         self._trials: dict[tuple[Drawing, bool, bool], Trial] = {}
-        self._legs_m: dict[tuple[Vector, Vector], float] = {}
+        self._legs_m: dict[tuple[LocalPoint, LocalPoint], float] = {}
 
     def trial(self, drawing: Drawing, begin: int, end: int) -> Trial:
         """Return the points from ``begin`` to before ``end``, for measuring; its ends that are not ends of the lines do not count."""
@@ -279,7 +280,7 @@ class Trial:
         least_m = np.full(len(required_m), np.inf)
         np.minimum.at(least_m, self._waypoints, self._clearances_m)
         missing_m = np.maximum(required_m - least_m, self._asked_lines_m)
-        for corner in self._drive.routes[0].corners:
+        for corner in self._drive.plans[0].corners:
             turns_back = abs(corner.turn_deg) > TURN_BACK_DEG and not corner.pivots
             if not corner.bounded or turns_back:
                 here = slice(corner.waypoint, corner.waypoint + 2)
@@ -304,19 +305,18 @@ class Trial:
             + self._other_cost_s
         )
 
-    def _worst(self) -> tuple[Vector, ...]:
+    def _worst(self) -> tuple[LocalPoint, ...]:
         pieces = np.full(len(self._part), -1)
         for piece in np.argsort(-self._clearances_m):
             pieces[self._waypoints[piece]] = piece
         return tuple(
-            self._nearest(int(piece)) if missing > ENOUGH_M and piece >= 0 else (math.nan, math.nan)
+            self._nearest(int(piece)) if missing > ENOUGH_M and piece >= 0 else LocalPoint(math.nan, math.nan)
             for piece, missing in zip(pieces, self.missing_m, strict=True)
         )
 
-    def _nearest(self, piece: int) -> Vector:
+    def _nearest(self, piece: int) -> LocalPoint:
         line = shapely.shortest_line(self._cores[piece], self._gauge.ground.edge)
-        east_m, north_m = shapely.get_coordinates(line)[0].tolist()
-        return (east_m, north_m)
+        return LocalPoint(*shapely.get_coordinates(line)[0].tolist())
 
 
 def _near_turns(drawing: Drawing) -> int:

@@ -18,12 +18,15 @@ from typing import TYPE_CHECKING
 import shapely
 
 from missions.fitting import polyline as drawn
-from missions.fitting.polyline import Drawing, DrawnPoint, Vector, shifted
+from missions.fitting.polyline import Drawing, DrawnPoint, shifted
+from missions.geo import LocalPoint
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from shapely.geometry.base import BaseGeometry
+
+    from missions.geo import Vector
 
 REACH_M = 8.0
 """How far around a place the fences on both sides are looked at, and how far beside the new leg old corners give way to it.
@@ -44,30 +47,30 @@ class Gap:
 
     Parameters
     ----------
-    middle : (float, float)
+    middle : LocalPoint
         Half-way between the fences where they are nearest, in metres.
     through : (float, float)
         The unit vector across that shortest line, the way that the leg leads.
     """
 
-    middle: Vector
+    middle: LocalPoint
     through: Vector
 
     def off(self, point: DrawnPoint) -> tuple[float, float]:
         """Return how far behind the narrowest place a point lies, and how far beside the way through."""
-        east_m, north_m = point.east_m - self.middle[0], point.north_m - self.middle[1]
+        east_m, north_m = point.place.east_m - self.middle.east_m, point.place.north_m - self.middle.north_m
         along_m = east_m * self.through[0] + north_m * self.through[1]
         return along_m, abs(east_m * self.through[1] - north_m * self.through[0])
 
 
-def find_gap(edge: BaseGeometry, place: Vector, ahead: Vector) -> Gap | None:
+def find_gap(edge: BaseGeometry, place: LocalPoint, ahead: Vector) -> Gap | None:
     """Find the narrow place that a leg leads through.
 
     Parameters
     ----------
     edge : shapely geometry
         The boundary of the allowed ground, in metres.
-    place : (float, float)
+    place : LocalPoint
         A place on the leg.
     ahead : (float, float)
         The leg's direction, a unit vector.
@@ -92,10 +95,10 @@ def find_gap(edge: BaseGeometry, place: Vector, ahead: Vector) -> Gap | None:
     through = ((north_a - north_b) / width_m, (east_b - east_a) / width_m)
     if through[0] * ahead[0] + through[1] * ahead[1] < 0:
         through = (-through[0], -through[1])
-    return Gap(((east_a + east_b) / 2, (north_a + north_b) / 2), through)
+    return Gap(LocalPoint((east_a + east_b) / 2, (north_a + north_b) / 2), through)
 
 
-def _free_m(edge: BaseGeometry, place: Vector, ahead: Vector, way_m: float) -> float:
+def _free_m(edge: BaseGeometry, place: LocalPoint, ahead: Vector, way_m: float) -> float:
     """Return how far a leg can be followed in one direction without meeting a fence: what lies behind a fence is on no side."""
     ray = shapely.LineString([place, shifted(place, ahead, way_m)])
     met = shapely.intersection(ray, edge)

@@ -36,13 +36,13 @@ from missions.fitting import polyline as drawn
 from missions.fitting.cost import ENOUGH_M, Gauge
 from missions.fitting.gap import find_gap, straight_through
 from missions.geo import rounded
-from missions.ground.frame import LocalPoint
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
     from missions.fitting.cost import Measured, Trial
-    from missions.fitting.polyline import Drawing, Vector
+    from missions.fitting.polyline import Drawing
+    from missions.geo import LocalPoint, Vector
     from missions.ground.ground import Ground
     from missions.vehicle import Vehicle
 
@@ -127,10 +127,9 @@ class Fitting:
             measured = self.measure(drawing)
         return drawing, measured
 
-    def _rounded(self, place: Vector) -> Vector:
+    def _rounded(self, place: LocalPoint) -> LocalPoint:
         frame = self.ground.frame
-        east_m, north_m = frame.to_local(rounded(frame.to_lat_lon(LocalPoint(*place))))
-        return (east_m, north_m)
+        return frame.to_local(rounded(frame.to_lat_lon(place)))
 
     def _allow(self, measurements: int) -> None:
         self._until = min(self.measurements + measurements, self.most_measurements)
@@ -152,7 +151,7 @@ class Fitting:
     def _gauge(self) -> Gauge:
         return Gauge(self.ground, self.vehicle, self.heading_deg)
 
-    def _away(self, place: Vector) -> Vector:
+    def _away(self, place: LocalPoint) -> Vector:
         """Return the unit vector from the nearest fence to a place."""
         line = shapely.shortest_line(self.ground.edge, shapely.Point(place))
         (east_a, north_a), (east_b, north_b) = shapely.get_coordinates(line).tolist()

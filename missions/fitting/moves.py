@@ -22,7 +22,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from missions.fitting import polyline as drawn
-from missions.fitting.polyline import Drawing, Vector, shifted
+from missions.fitting.polyline import Drawing, shifted
+from missions.geo import LocalPoint, Vector, heading_vector
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -92,7 +93,9 @@ def eased(drawing: Drawing, index: int, step_m: float) -> Iterator[Drawing]:
         yield _with(drawing, index, shifted(drawing[index].place, way, step_m))
 
 
-def bent(drawing: Drawing, index: int, place: Vector, away: Vector, missing_m: float) -> Iterator[Drawing]:
+def bent(
+    drawing: Drawing, index: int, place: LocalPoint, away: Vector, missing_m: float
+) -> Iterator[Drawing]:
     """Bend the leg to a point, or the one after it, away from a fence by a corner at a place beside it."""
     along = drawn.distances_m(drawing)
     longer, there = drawn.with_point_at(drawing, _along_m(drawing, along, place, index), APART_M)
@@ -107,7 +110,7 @@ def together(drawing: Drawing, index: int, missing_m: float) -> Iterator[Drawing
         if drawn.is_end_or_fixed(drawing, index) or drawn.is_end_or_fixed(drawing, other):
             continue
         for number in range(8):
-            way = _vector(45.0 * number)
+            way = heading_vector(45.0 * number)
             for share in (0.7, 1.5, 3.0):  # as coarse as `MOVES`, in eight directions
                 by_m = share * missing_m + 0.02
                 both = _with(drawing, index, shifted(drawing[index].place, way, by_m))
@@ -119,8 +122,7 @@ def prolonged(drawing: Drawing, index: int) -> Iterator[Drawing]:
     if drawn.is_end_or_fixed(drawing, index):
         return
     here = drawing[index]
-    before = drawn.direction(drawing[index - 1], here)
-    after = drawn.direction(here, drawing[index + 1])
+    before, after = drawn.directions(drawing, index)
     for length_m in PROLONGED_M:
         later = here.at(shifted(here.place, before, length_m))
         earlier = here.at(shifted(here.place, after, -length_m))
@@ -142,7 +144,8 @@ def merged(drawing: Drawing, index: int) -> Iterator[Drawing]:
     if drawn.is_end_or_fixed(drawing, index) or drawn.is_end_or_fixed(drawing, index + 1):
         return
     here, following = drawing[index], drawing[index + 1]
-    middle = ((here.east_m + following.east_m) / 2, (here.north_m + following.north_m) / 2)
+    (east_a, north_a), (east_b, north_b) = here.place, following.place
+    middle = LocalPoint((east_a + east_b) / 2, (north_a + north_b) / 2)
     meeting = drawn.crossing(drawing[index - 1], here, following, drawing[index + 2])
     for place in (meeting, middle):
         if place is not None and math.dist(place, middle) < 3 * math.dist(here.place, following.place):
@@ -155,10 +158,7 @@ def split(drawing: Drawing, index: int) -> Iterator[Drawing]:
     if out is None:
         return
     turn_deg = abs(drawn.turn_deg(drawing, index))
-    before, after = (
-        drawn.direction(drawing[index - 1], drawing[index]),
-        drawn.direction(drawing[index], drawing[index + 1]),
-    )
+    before, after = drawn.directions(drawing, index)
     middle = _between(before, after) if turn_deg < 175 else (-out[1], out[0])
     here = drawing[index]
     # The shares of a spacing below are chosen, not measured: shapes to try.
@@ -178,7 +178,7 @@ def split(drawing: Drawing, index: int) -> Iterator[Drawing]:
             yield (*drawing[:index], *pair, *drawing[index + 1 :])
 
 
-def slowed(drawing: Drawing, index: int, place: Vector, speed_mps: float) -> Iterator[Drawing]:
+def slowed(drawing: Drawing, index: int, place: LocalPoint, speed_mps: float) -> Iterator[Drawing]:
     """Drive a stretch slower than at a speed: from before a place near a point, or the leg to it, to behind it."""
     along = drawn.distances_m(drawing)
     at_m = _along_m(drawing, along, place, index)
@@ -194,7 +194,7 @@ def slowed(drawing: Drawing, index: int, place: Vector, speed_mps: float) -> Ite
             )
 
 
-def crawling(drawing: Drawing, spots: list[Vector], speed_mps: float) -> Drawing:
+def crawling(drawing: Drawing, spots: list[LocalPoint], speed_mps: float) -> Drawing:
     """Drive at the slowest speed for a good way about each of some spots near the lines."""
     slow_mps = min(SLOW_MPS)
     if slow_mps >= speed_mps:
@@ -232,12 +232,14 @@ def headed(drawing: Drawing, heading_deg: float) -> Iterator[Drawing]:
     start = drawing[0]
     for length_m in HEAD_M:
         for side_deg in SIDE_DEG:
-            first = start.at(shifted(start.place, _vector(heading_deg + side_deg), length_m))
+            first = start.at(shifted(start.place, heading_vector(heading_deg + side_deg), length_m))
             first = replace(first, is_fixed=False)
             yield (start, first, *drawing[1:])
             if side_deg:
                 # Chosen: on round to the same side, to come back to the route behind.
-                second = first.at(shifted(first.place, _vector(heading_deg + 2.5 * side_deg), length_m))
+                second = first.at(
+                    shifted(first.place, heading_vector(heading_deg + 2.5 * side_deg), length_m)
+                )
                 yield (start, first, second, *drawing[1:])
 
 
@@ -245,7 +247,7 @@ def approached(drawing: Drawing, index: int) -> Iterator[Drawing]:
     """Come to a fixed point, or leave it, from another side."""
     here = drawing[index]
     for number in range(APPROACHES):
-        way = _vector(360.0 * number / APPROACHES)
+        way = heading_vector(360.0 * number / APPROACHES)
         for length_m in APPROACH_M:
             point = replace(here.at(shifted(here.place, way, length_m)), is_fixed=False, stop_s=None)
             if index:
@@ -254,17 +256,13 @@ def approached(drawing: Drawing, index: int) -> Iterator[Drawing]:
                 yield (*drawing[: index + 1], point, *drawing[index + 1 :])
 
 
-def _with(drawing: Drawing, index: int, place: Vector) -> Drawing:
+def _with(drawing: Drawing, index: int, place: LocalPoint) -> Drawing:
     return (*drawing[:index], drawing[index].at(place), *drawing[index + 1 :])
 
 
 def _between(a: Vector, b: Vector) -> Vector:
     length = math.hypot(a[0] + b[0], a[1] + b[1]) or 1.0
     return ((a[0] + b[0]) / length, (a[1] + b[1]) / length)
-
-
-def _vector(bearing_deg: float) -> Vector:
-    return (math.sin(math.radians(bearing_deg)), math.cos(math.radians(bearing_deg)))
 
 
 def _with_change(drawing: Drawing, along_m: float, way: float) -> tuple[Drawing, int]:
@@ -290,15 +288,16 @@ def _slower(point: drawn.DrawnPoint, speed_mps: float) -> drawn.DrawnPoint:
     return replace(point, speed_mps=speed_mps if point.speed_mps is None else min(speed_mps, point.speed_mps))
 
 
-def _along_m(drawing: Drawing, along: list[float], place: Vector, index: int) -> float:
+def _along_m(drawing: Drawing, along: list[float], place: LocalPoint, index: int) -> float:
     """Return how far a place lies along the leg to a point, or along the one after it."""
     best = (math.inf, along[index])
     for leg in (index - 1, index):
         if 0 <= leg < len(drawing) - 1:
             ahead = drawn.direction(drawing[leg], drawing[leg + 1])
             length_m = along[leg + 1] - along[leg]
-            off = (place[0] - drawing[leg].east_m, place[1] - drawing[leg].north_m)
+            here = drawing[leg].place
+            off = (place[0] - here[0], place[1] - here[1])
             there_m = min(max(off[0] * ahead[0] + off[1] * ahead[1], 0.0), length_m)
-            away_m = math.dist(place, shifted(drawing[leg].place, ahead, there_m))
+            away_m = math.dist(place, shifted(here, ahead, there_m))
             best = min(best, (away_m, along[leg] + there_m))
     return best[1]

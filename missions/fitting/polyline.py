@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from missions.geo import LocalPoint, change_deg
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-Vector = tuple[float, float]
+    from missions.geo import Vector
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +25,7 @@ class DrawnPoint:
 
     Parameters
     ----------
-    east_m, north_m : float
+    place : LocalPoint
         Where, in the plane.
     required_m : float
         What the band about it, and about the leg to it, has to keep.
@@ -37,22 +39,16 @@ class DrawnPoint:
         Whether it has to stay: the start, a target.
     """
 
-    east_m: float
-    north_m: float
+    place: LocalPoint
     required_m: float
     line_m: float
     speed_mps: float | None = None
     stop_s: float | None = None
     is_fixed: bool = False
 
-    @property
-    def place(self) -> Vector:
-        """East and north in metres."""
-        return (self.east_m, self.north_m)
-
-    def at(self, place: Vector) -> DrawnPoint:
+    def at(self, place: LocalPoint) -> DrawnPoint:
         """Return the point at another place."""
-        return replace(self, east_m=place[0], north_m=place[1])
+        return replace(self, place=place)
 
 
 Drawing = tuple[DrawnPoint, ...]
@@ -81,42 +77,40 @@ def stops(drawing: Sequence[DrawnPoint]) -> dict[int, float]:
 def direction(a: DrawnPoint, b: DrawnPoint) -> Vector:
     """Return the unit vector from one point to another."""
     length_m = math.dist(a.place, b.place) or 1.0
-    return ((b.east_m - a.east_m) / length_m, (b.north_m - a.north_m) / length_m)
+    return ((b.place[0] - a.place[0]) / length_m, (b.place[1] - a.place[1]) / length_m)
+
+
+def directions(drawing: Sequence[DrawnPoint], index: int) -> tuple[Vector, Vector]:
+    """Return the directions of the legs before and after an inner point."""
+    here = drawing[index]
+    return direction(drawing[index - 1], here), direction(here, drawing[index + 1])
 
 
 def turn_deg(drawing: Sequence[DrawnPoint], index: int) -> float:
     """Return how the course changes at an inner point, positive to the right."""
-    before, after = (
-        direction(drawing[index - 1], drawing[index]),
-        direction(drawing[index], drawing[index + 1]),
-    )
-    cross = before[0] * after[1] - before[1] * after[0]
-    return -math.degrees(math.atan2(cross, before[0] * after[0] + before[1] * after[1]))
+    return change_deg(*directions(drawing, index))
 
 
 def outward(drawing: Sequence[DrawnPoint], index: int) -> Vector | None:
     """Return the unit vector out of a corner along its bisector; None where it hardly turns."""
-    before, after = (
-        direction(drawing[index - 1], drawing[index]),
-        direction(drawing[index], drawing[index + 1]),
-    )
+    before, after = directions(drawing, index)
     east, north = before[0] - after[0], before[1] - after[1]
     length = math.hypot(east, north)
     return (east / length, north / length) if length > 0.02 else None
 
 
-def shifted(place: Vector, along: Vector, by_m: float) -> Vector:
+def shifted(place: LocalPoint, along: Vector, by_m: float) -> LocalPoint:
     """Return a place moved along a unit vector."""
-    return (place[0] + along[0] * by_m, place[1] + along[1] * by_m)
+    return LocalPoint(place[0] + along[0] * by_m, place[1] + along[1] * by_m)
 
 
-def crossing(a: DrawnPoint, b: DrawnPoint, c: DrawnPoint, d: DrawnPoint) -> Vector | None:
+def crossing(a: DrawnPoint, b: DrawnPoint, c: DrawnPoint, d: DrawnPoint) -> LocalPoint | None:
     """Return where the line from a through b, prolonged, meets the line from d through c, prolonged."""
     ahead, back = direction(a, b), direction(d, c)
     cross = ahead[0] * back[1] - ahead[1] * back[0]
     if abs(cross) < 1e-3:
         return None
-    between = (c.east_m - b.east_m, c.north_m - b.north_m)
+    between = (c.place.east_m - b.place.east_m, c.place.north_m - b.place.north_m)
     ahead_m = (between[0] * back[1] - between[1] * back[0]) / cross
     back_m = (between[0] * ahead[1] - between[1] * ahead[0]) / cross
     return shifted(b.place, ahead, ahead_m) if ahead_m >= 0 and back_m >= 0 else None
@@ -130,7 +124,7 @@ def distances_m(drawing: Sequence[DrawnPoint]) -> list[float]:
     return found
 
 
-def place_at(drawing: Drawing, along_m: float) -> Vector:
+def place_at(drawing: Drawing, along_m: float) -> LocalPoint:
     """Return the place at a distance along the lines."""
     along = distances_m(drawing)
     after = next((number for number, there_m in enumerate(along) if there_m > along_m), len(along) - 1)
@@ -145,7 +139,5 @@ def with_point_at(drawing: Drawing, along_m: float, near_m: float) -> tuple[Draw
     if abs(along[nearest] - along_m) <= near_m:
         return drawing, nearest
     after = next(number for number, there_m in enumerate(along) if there_m > along_m)
-    ahead = direction(drawing[after - 1], drawing[after])
-    place = shifted(drawing[after - 1].place, ahead, along_m - along[after - 1])
-    new = replace(drawing[after].at(place), stop_s=None, is_fixed=False)
+    new = replace(drawing[after].at(place_at(drawing, along_m)), stop_s=None, is_fixed=False)
     return (*drawing[:after], new, *drawing[after:]), after

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from missions.errors import InvalidPositionError
-from missions.geo import LatLon, rounded, wrap_lon_deg
+from missions.geo import LatLon, LocalPoint, rounded, wrap_lon_deg
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,13 +29,6 @@ MAX_LATITUDE_DEG = 85.0
 _WGS84_A_M = 6378137.0  # semi-major axis, by definition
 _WGS84_E2 = 6.69437999014e-3  # first eccentricity squared, from the flattening 1/298.257223563
 _AUTOPILOT_M_PER_DEG = 1.113195e5  # AP_Math's LATLON_TO_M
-
-
-class LocalPoint(NamedTuple):
-    """A point in a `LocalFrame`, metres."""
-
-    east_m: float
-    north_m: float
 
 
 class AutopilotScale(NamedTuple):
@@ -102,10 +95,6 @@ class LocalFrame:
         lons_deg = [lon_deg for _, lon_deg in positions]
         lats_deg = [lat_deg for lat_deg, _ in positions]
         return np.column_stack(self._proj(lons_deg, lats_deg)).reshape(-1, 2)
-
-    def to_lat_lons(self, points: NDArray[np.float64]) -> list[LatLon]:
-        """Return the positions of an (n, 2) array, east and north in metres."""
-        return [self.to_lat_lon(LocalPoint(east_m, north_m)) for east_m, north_m in points.tolist()]
 
 
 def frame_around(positions: Sequence[LatLon]) -> LocalFrame:

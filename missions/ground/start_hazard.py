@@ -16,7 +16,7 @@ from missions.fence import ZoneKind
 from missions.vehicle import Steering
 
 if TYPE_CHECKING:
-    from missions.ground.frame import LocalPoint
+    from missions.geo import LocalPoint
     from missions.ground.ground import Ground
     from missions.vehicle import Vehicle
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from missions.picture.scene import Scene
 
 _WIDTH_IN = 8.0  # of a page's text
-_NARROWEST, _TALLEST = 0.45, 1.5
+_NARROWEST, _TALLEST = 0.45, 1.5  # height to width; what is narrower gets room beside it
 _DPI = 150  # 1,200 pixels across
 _UNDATED = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 """A picture of the same plan is the same file."""

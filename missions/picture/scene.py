@@ -13,7 +13,7 @@ from shapely import LineString, Polygon
 
 import pbpp
 from missions.fence import ZoneKind
-from missions.ground.frame import LocalPoint
+from missions.geo import LocalPoint
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

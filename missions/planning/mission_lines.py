@@ -8,8 +8,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from missions.errors import PlanCheckError
-from missions.geo import rounded
-from missions.ground.frame import LocalPoint
+from missions.geo import LocalPoint, rounded
 from missions.ground.ground import EDGE_BOW_M
 from missions.ground.legs import MAX_LEG_M, ROUNDING_RESERVE_M, drawn_leg
 from missions.items import change_speed, waypoint
@@ -45,7 +44,7 @@ class Lines:
 
 def finished(ground: Ground, drawing: Drawing, lead_away: int) -> Lines:
     """Split long legs, round to degE7, drop waypoints that fall together."""
-    path = [rounded(ground.frame.to_lat_lon(LocalPoint(*drawing[0].place)))]
+    path = [rounded(ground.frame.to_lat_lon(drawing[0].place))]
     speeds: list[float | None] = []
     stops: dict[int, float] = {}
     leading = 0
@@ -53,9 +52,8 @@ def finished(ground: Ground, drawing: Drawing, lead_away: int) -> Lines:
         pieces = max(1, math.ceil(math.dist(a.place, b.place) / MAX_LEG_M))
         for piece in range(1, pieces + 1):
             share = piece / pieces
-            place = LocalPoint(
-                a.east_m + (b.east_m - a.east_m) * share, a.north_m + (b.north_m - a.north_m) * share
-            )
+            (east_a, north_a), (east_b, north_b) = a.place, b.place
+            place = LocalPoint(east_a + (east_b - east_a) * share, north_a + (north_b - north_a) * share)
             position = rounded(ground.frame.to_lat_lon(place))
             if position != path[-1]:
                 path.append(position)

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from missions.drive_model import Envelope
-    from missions.ground.frame import LocalPoint
+    from missions.geo import LocalPoint
     from missions.ground.ground import Ground
     from missions.promise import Promise
     from missions.request import Request
@@ -79,7 +79,7 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
     except RouteError as error:
         raise explained(error, vehicle) from None
     lines = finished(ground, found.drawing, found.lead_away)
-    reached = tuple(map(rounded, ground.frame.to_lat_lons(np.array(found.targets))))
+    reached = tuple(rounded(ground.frame.to_lat_lon(target)) for target in found.targets)
     least_m = asked.required_m + (asked.allowance_m or 0.0)
     drawn_clearance_m = check_lines(ground, lines, found.start_clearance_m, least_m)
     band = _band(ground, lines, vehicle, heading_deg)

@@ -10,7 +10,7 @@ import numpy as np
 
 import pbpp
 from missions.fence import ZoneKind
-from missions.ground.frame import LocalPoint
+from missions.geo import LocalPoint
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from missions.drive_model import envelope
-from missions.ground.frame import LocalPoint
+from missions.fitting.polyline import shifted
+from missions.geo import heading_vector
 
 if TYPE_CHECKING:
+    from missions.geo import LocalPoint
     from missions.ground.ground import Ground
     from missions.vehicle import Vehicle
 
@@ -59,9 +60,8 @@ def departures(
     for number in range(WAYS):
         # Ways beside the present heading: straight on is the first of them.
         course_deg = (heading_deg or 0.0) + 360.0 * number / WAYS
-        east, north = math.sin(math.radians(course_deg)), math.cos(math.radians(course_deg))
         for length_m in LENGTHS_M:
-            there = LocalPoint(start.east_m + length_m * east, start.north_m + length_m * north)
+            there = shifted(start, heading_vector(course_deg), length_m)
             facing_deg = course_deg if heading_deg is None else heading_deg
             band = envelope([start, there], vehicle, heading_deg=facing_deg % 360.0)
             turn_deg = abs((course_deg - facing_deg + 180.0) % 360.0 - 180.0)

@@ -13,8 +13,7 @@ from shapely import LineString, MultiPolygon, Point, Polygon
 import pbpp
 from missions.errors import NoRouteError, RouteError, StartBlockedError, TargetBlockedError
 from missions.fence import ZoneKind
-from missions.geo import bearing_deg, distance_m
-from missions.ground.frame import LocalPoint
+from missions.geo import LocalPoint, bearing_deg, distance_m
 from missions.routing.bottleneck import narrowest_place
 from missions.words import metres
 
@@ -62,6 +61,16 @@ class Route:
     start_clearance_m: float
     target_indices: tuple[int, ...]
     blocks: int
+
+    @property
+    def places(self) -> list[LocalPoint]:
+        """The points one by one."""
+        return [LocalPoint(*point) for point in self.points.tolist()]
+
+    @property
+    def targets(self) -> tuple[LocalPoint, ...]:
+        """The targets as reached, in order."""
+        return tuple(self.places[index] for index in self.target_indices)
 
     @property
     def length_m(self) -> float:

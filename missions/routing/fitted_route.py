@@ -16,7 +16,7 @@ from missions.words import metres
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from missions.ground.frame import LocalPoint
+    from missions.geo import LocalPoint
     from missions.ground.ground import Ground
     from missions.promise import Promise
     from missions.request import Request

@@ -10,7 +10,6 @@ from shapely import Point
 
 from missions.errors import NoRouteError
 from missions.fitting import polyline as drawn
-from missions.ground.frame import LocalPoint
 from missions.words import metres
 
 if TYPE_CHECKING:
@@ -42,7 +41,7 @@ def refusal(
     """Return the error that names the corner that refused, by how much and at which fence; with advice where the vehicle cannot turn at its start."""
     index = measured.worst_index
     point = drawing[index]
-    position = ground.frame.to_lat_lon(LocalPoint(*point.place))
+    position = ground.frame.to_lat_lon(point.place)
     barrier, _ = ground.nearest(Point(measured.worst[index]))
     fence = barrier.name if barrier else "no fence in particular"
     turn_deg = drawn.turn_deg(drawing, index) if 0 < index < len(drawing) - 1 else 0.0

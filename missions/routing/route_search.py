@@ -28,7 +28,6 @@ from missions.drive_model import corner_forecast
 from missions.errors import RouteError
 from missions.fitting.local_search import MOST_MEASUREMENTS, Fitting
 from missions.fitting.polyline import Drawing, DrawnPoint
-from missions.ground.frame import LocalPoint
 from missions.routing.departure import ROOM_M, departures
 from missions.routing.drawn_route import find_route
 from missions.routing.refusal import AT_START, block, refusal
@@ -39,6 +38,7 @@ if TYPE_CHECKING:
     from shapely import Polygon
 
     from missions.fitting.cost import Measured
+    from missions.geo import LocalPoint
     from missions.ground.ground import Ground
     from missions.routing.departure import Departure
     from missions.routing.drawn_route import Route
@@ -79,7 +79,7 @@ class DrivenRoute:
         How many of the first legs lead away from a fence that the start stands nearer to than is required.
     start_clearance_m : float
         The start's distance to the nearest fence.
-    targets : tuple of (float, float)
+    targets : tuple of LocalPoint
         The targets as reached, in order.
     blocks : int
         Blocks of the partition that was searched.
@@ -270,12 +270,11 @@ class RouteSearch:
         if not measured.is_enough:
             refused.append((drawing, measured))
             return
-        targets = tuple(LocalPoint(*route.points[index].tolist()) for index in route.target_indices)
         driven = DrivenRoute(
             drawing,
             self._lead_away(drawing),
             route.start_clearance_m,
-            targets,
+            route.targets,
             route.blocks,
             self._least_departing_m(route),
         )
@@ -290,13 +289,12 @@ class RouteSearch:
         leading = {*range(max(route.lead_away, 1) + 1)} - {*route.target_indices}
         return tuple(
             DrawnPoint(
-                east_m,
-                north_m,
+                place,
                 near_m if number in leading else required_m,
                 line_m if number in leading else required_m,
                 is_fixed=number in fixed,
             )
-            for number, (east_m, north_m) in enumerate(route.points.tolist())
+            for number, place in enumerate(route.places)
         )
 
     @cached_property

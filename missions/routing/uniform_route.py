@@ -10,7 +10,6 @@ import numpy as np
 
 from missions.errors import NoRouteError, TargetBlockedError
 from missions.fitting.polyline import DrawnPoint
-from missions.ground.frame import LocalPoint
 from missions.ground.legs import reserve_m
 from missions.routing.bottleneck import widest_clearance_m
 from missions.routing.drawn_route import find_route, simplified
@@ -19,6 +18,7 @@ from missions.routing.route_search import DrivenRoute
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from missions.geo import LocalPoint
     from missions.ground.ground import Ground
     from missions.promise import Promise
     from missions.request import Request
@@ -68,11 +68,8 @@ def uniform_route(
     else:
         drawn_m = asked.required_m + wanted_m
         route = _sparse_route(ground, find, drawn_m + rounding_m)
-    drawing = tuple(
-        DrawnPoint(east_m, north_m, drawn_m, drawn_m) for east_m, north_m in route.points.tolist()
-    )
-    reached = tuple(LocalPoint(*route.points[index].tolist()) for index in route.target_indices)
-    return asked, DrivenRoute(drawing, route.lead_away, route.start_clearance_m, reached, route.blocks)
+    drawing = tuple(DrawnPoint(place, drawn_m, drawn_m) for place in route.places)
+    return asked, DrivenRoute(drawing, route.lead_away, route.start_clearance_m, route.targets, route.blocks)
 
 
 def _sparse_route(ground: Ground, find: Callable[..., Route], clearance_m: float) -> Route:

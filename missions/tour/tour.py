@@ -17,7 +17,7 @@ from missions.editing.repair import repaired_plan
 from missions.editing.shorten import shortened
 from missions.errors import NoRouteError, SituationError
 from missions.fence import ZoneKind
-from missions.ground.frame import LocalPoint
+from missions.geo import LocalPoint
 from missions.ground.from_situation import route_ends, route_ground
 from missions.planning.plan import plan
 from missions.promise import known_vehicle, promise

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 MOST_BY_PROGRAMMING = 12
 """Places that are ordered without HiGHS."""
 
+# Silent, the same answer each time, and a proof; 30 s for each round of cuts is chosen, not measured.
 _OPTIONS = (("output_flag", False), ("threads", 1), ("mip_rel_gap", 0.0), ("time_limit", 30.0))
 _ROUNDS = 60  # of adding cuts; chosen, not measured. When they are used up the answer stands with the bound that was reached
 _FEASIBLE = 2

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .base import TOLERANCE_M, Portals
+from .flat import FlatSlabs, flatten
 from .places import Places
 from .sweep import Sweep
 from .vertices import Ints, Vertices
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
 
     from shapely.geometry import Polygon
 
-    from pbpp.compiled_search import FlatSlabs
     from pbpp.geometry import Floats, Point
 
 __all__ = ["Slabs"]
@@ -108,9 +108,7 @@ class Slabs:
     @cached_property
     def flat(self) -> FlatSlabs:
         """The same as arrays, for the compiled search."""
-        from pbpp.compiled_search import flatten  # noqa: PLC0415 - numba is an extra
-
-        return flatten(self)
+        return flatten(self.vertices, self.ways, self.beside, self.above, self.below)
 
     @cached_property
     def centers(self) -> Floats:

@@ -56,14 +56,14 @@ class Console:
         return self._text.read_text()
 
     def do(self, text, holds, what):
-        """Type a line and wait until it has worked; give what to tell."""
+        """Type a line and wait until it has worked; return what to tell."""
         self._process.stdin.write(text + "\n")
         self._process.stdin.flush()
         assert soon(holds), f"{text}: not so: {what}; its console said:\n{self.said[-2000:]}"
         return f"{text.split(str(self.folder))[0].strip()}: {what}"
 
     def save(self, command, name, count):
-        """Let it read a list back into a file of its folder; give the file and what to tell."""
+        """Let it read a list back into a file of its folder; return the file and what to tell."""
         path = self.folder / name
         told = self.do(
             f"{command} {path}",

@@ -24,7 +24,7 @@ MISSION = [
 
 
 def square(command, lat_e7, lon_e7, size_e7):
-    """Give a square of fence by its south-west corner."""
+    """Return a square of fence by its south-west corner."""
     return [
         MissionItem(command, CoordinateFrame.GLOBAL, (4.0, 0.0, 0.0, 0.0), lat_e7 + north, lon_e7 + east)
         for north, east in ((0, 0), (size_e7, 0), (size_e7, size_e7), (0, size_e7))
@@ -44,18 +44,18 @@ def places(items):
 
 
 def places_in(path):
-    """Give the places in a file of QGC WPL 110."""
+    """Return the places in a file of QGC WPL 110."""
     rows = [line.split("\t") for line in path.read_text().splitlines()[1:]]
     return [(round(float(row[8]) * 1e7), round(float(row[9]) * 1e7)) for row in rows]
 
 
 def same(held, items):
-    """Tell whether the rover holds the items; MAVProxy cuts degrees to degE7 instead of rounding them."""
+    """Return whether the rover holds the items; MAVProxy cuts degrees to degE7 instead of rounding them."""
     return near(places(held), places(items))
 
 
 def same_in(path, items):
-    """Tell whether a file that MAVProxy wrote, with six digits after the point, holds the items; home left to the vehicle."""
+    """Return whether a file that MAVProxy wrote, with six digits after the point, holds the items; home left to the vehicle."""
     first = 1 if items[0].command == Command.NAV_WAYPOINT else 0
     return near(places_in(path)[first:], places(items)[first:], 10)
 

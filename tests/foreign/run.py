@@ -49,7 +49,7 @@ def main() -> int:
 
 
 def environment(folder: Path, pin: str) -> Path | None:
-    """Give the interpreter of an environment with one package, made if it is not there."""
+    """Return the interpreter of an environment with one package, made if it is not there."""
     python = folder / "bin" / "python"
     if (folder / pin).exists():
         return python
@@ -124,7 +124,7 @@ def mavsdk(python: Path, rover: Simulator, folder: Path):
 
 
 def raw(items, mission_type):
-    """Give items as MISSION_ITEM_INT has them; MAVSDK wants exactly one to be the current one."""
+    """Return items as MISSION_ITEM_INT has them; MAVSDK wants exactly one to be the current one."""
     return [
         {
             "seq": seq,

@@ -36,7 +36,7 @@ def test_a_margin_beyond_all_measure_is_refused_shortly(margin_m):
     situation = Situation(
         fence=Known(FENCE, 0.0, "test"), pose=Known(Pose(HOME), 0.0, "test"), parameters=parameters
     )
-    with pytest.raises(MissionError) as refusal:
+    with pytest.raises(MissionError, match=r"FENCE_MARGIN is \S+; possible are 0 to 1000") as refusal:
         plan(situation, Request(targets=(FAR,)))
     assert not re.search(r"\d{10}", str(refusal.value))
     assert len(str(refusal.value)) < 200

@@ -71,7 +71,7 @@ def check_field(field, *, other_methods=True):
     _check_safe(found, field, included, excluded)
     assert np.isclose(found.length_m, returned.length_m, rtol=1e-9)
     assert found.lower_bound_m == found.length_m
-    if "_rounded" not in planner.__dict__:
+    if "rounded" not in planner._space.__dict__:
         expected = shortest_length(planner.free_space, field.start, field.goal)
         tolerance = RELATIVE if not pinches(planner.free_space) else 10.0 * RELATIVE
         assert np.isclose(found.length_m, expected, rtol=tolerance, atol=tolerance)

@@ -73,7 +73,7 @@ def check(seed, counts, *, compiled=False):
     except pbpp.InvalidGeometryError:
         counts["no field"] += 1
         return
-    inner = planner._mitred
+    inner = planner._space.mitred
     free, origin_m = inner.free.geometry, inner.scene.origin_m
     if not inner.free.polygons:
         counts["nothing free"] += 1
@@ -94,8 +94,8 @@ def _check_pair(planner, inner, reference, ends, *, compiled):
     away_m = [inner.free.geometry.distance(shapely.Point(end)) for end in local]
     there, path = verdict_of(planner, start, goal)
     back, returned = verdict_of(planner, goal, start)
-    if planner.__dict__.pop(
-        "_rounded", None
+    if planner._space.__dict__.pop(
+        "rounded", None
     ):  # asked before anyone is told that there is no way: another free space
         return "rounded"
     assert (there in {"start", "goal"}) == (max(away_m) > NEAR_M) or abs(max(away_m) - NEAR_M) < 1e-9, (

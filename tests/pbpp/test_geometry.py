@@ -14,7 +14,7 @@ PENTAGRAM = [(np.sin(a), np.cos(a)) for a in np.arange(5) * 4 * np.pi / 5]
     "ring", [[(0, 0), (1, 1)], [1, 2, 3], [(0, 0, 0)] * 4, [("a", "b")] * 3, [(0, 0), (1,), (2, 2)], []]
 )
 def test_a_ring_needs_three_pairs_of_numbers(square, ring):
-    with pytest.raises(pbpp.InvalidGeometryError) as caught:
+    with pytest.raises(pbpp.InvalidGeometryError, match="exclusion 1") as caught:
         pbpp.Planner([square], [square, ring])
     assert caught.value.part == ("exclusion", 1)
 
@@ -67,7 +67,7 @@ def test_a_self_crossing_inclusion_includes_what_it_encloses_an_odd_number_of_ti
     (star,) = parse_rings([PENTAGRAM], "inclusion")
     assert not shapely.covers(star, Point(0, 0))
     assert shapely.covers(star, Point(0, 0.9))
-    with pytest.raises(pbpp.StartBlockedError):
+    with pytest.raises(pbpp.StartBlockedError, match=r"at a clearance of 0 m free space is 30\.9"):
         pbpp.plan_path([np.array(PENTAGRAM) * 100], [], (0, 0), (0, 90))
 
 

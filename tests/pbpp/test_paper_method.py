@@ -120,7 +120,7 @@ def test_literal_cost_counts_steps():
 
 
 def test_a_block_search_can_be_stopped(graph):
-    with pytest.raises(SearchStoppedError):
+    with pytest.raises(SearchStoppedError, match="stopped before it had found any path"):
         block_sequence(graph, (160.0, 180.0), (30.0, 30.0), should_stop=lambda: True)
 
 

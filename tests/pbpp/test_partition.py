@@ -110,7 +110,7 @@ def test_too_many_blocks_are_refused(square, monkeypatch):
     free = build_free_space(
         parse_scene([square], [[(30, 40), (60, 40), (60, 70), (30, 70)]], union=False), 0.0
     )
-    with pytest.raises(pbpp.TooManyBlocksError):
+    with pytest.raises(pbpp.TooManyBlocksError, match="at least 6 blocks, more than the limit of 5"):
         Blocks(free.polygons)
 
 
@@ -154,7 +154,7 @@ def test_a_gap_narrower_than_rounding_is_closed(square):
     ]
     planner = pbpp.Planner([square], exclusions)
     for method in ("optimal", "pbpp", "pbpp-taut"):
-        with pytest.raises(pbpp.NoPathError):
+        with pytest.raises(pbpp.NoPathError, match="no path joins start and goal"):
             planner.plan((50, 10), (50, 90), method=method)
 
 

@@ -1,3 +1,4 @@
+import gc
 import subprocess
 import sys
 
@@ -78,7 +79,7 @@ def test_nothing_free_is_told(square):
         pbpp.plan_path([square], [square], (50, 50), (60, 60))
     assert caught.value.nearest_free_m is None
     assert caught.value.distance_m == np.inf
-    with pytest.raises(pbpp.StartBlockedError):
+    with pytest.raises(pbpp.StartBlockedError, match="there is no free space at a clearance of 60 m"):
         pbpp.plan_path([square], [], (50, 50), (60, 60), clearance_m=60.0)
 
 
@@ -86,7 +87,9 @@ def test_unreachable_is_told_without_a_search(square):
     wall = [(-10, 40), (110, 40), (110, 60), (-10, 60)]
     planner = pbpp.Planner([square], [wall])
     assert len(planner.free_space.geoms) == 2
-    with pytest.raises(pbpp.NoPathError) as caught:
+    with pytest.raises(
+        pbpp.NoPathError, match="no path joins start and goal at a clearance of 0 m"
+    ) as caught:
         planner.plan((50, 10), (50, 90), should_stop=lambda: pytest.fail("there is nothing to search"))
     assert caught.value.clearance_m == 0.0
 
@@ -105,7 +108,10 @@ def test_inclusions_are_intersected_or_united(square):
     assert both.plan((10, 50), (150, 50)).length_m == pytest.approx(140.0)
     common = pbpp.Planner([square, east], [])
     assert common.free_space.area == pytest.approx(800.0)
-    with pytest.raises(pbpp.StartBlockedError):
+    with pytest.raises(
+        pbpp.StartBlockedError,
+        match=r"the start \(10\.000, 50\.000\) m is blocked: .* free space is 50\.000 m away",
+    ):
         common.plan((10, 50), (70, 50))
 
 
@@ -127,11 +133,11 @@ def test_map_coordinates_keep_their_origin(square):
     path = planner.plan(shift + BOX_WEST, shift + BOX_EAST)
     assert Polygon(np.array(square) + shift).covers(LineString(path.points))
     assert planner.free_space.bounds == pytest.approx((*(shift + 1), *(shift + 99)), abs=1e-6)
-    with pytest.raises(pbpp.StartBlockedError) as caught:
+    with pytest.raises(pbpp.StartBlockedError, match=r"at a clearance of 1 m free space is 2\.00") as caught:
         planner.plan(shift + INSIDE, shift)
     assert caught.value.nearest_free_m == pytest.approx(tuple(shift + BELOW), abs=0.003)
     more = planner.with_exclusion(np.array([(5, 40), (25, 40), (25, 60), (5, 60)]) + shift)
-    with pytest.raises(pbpp.StartBlockedError):
+    with pytest.raises(pbpp.StartBlockedError, match=r"at a clearance of 1 m free space is 6\.00"):
         more.plan(shift + BOX_WEST, shift + BOX_EAST)
 
 
@@ -145,9 +151,9 @@ def test_adding_and_removing_an_obstacle_is_as_from_scratch(square, clearance_m)
     assert added.plan(*query).points.tolist() == scratch.plan(*query).points.tolist()
     assert added.without_exclusion(2).plan(*query).points.tolist() == planner.plan(*query).points.tolist()
     assert len(planner.free_space.geoms[0].interiors) == 2
-    with pytest.raises(IndexError):
+    with pytest.raises(IndexError, match="index 2 is out of bounds"):
         planner.without_exclusion(2)
-    with pytest.raises(pbpp.InvalidGeometryError):
+    with pytest.raises(pbpp.InvalidGeometryError, match="needs at least three"):
         planner.with_exclusion([(0, 0)])
 
 
@@ -162,7 +168,7 @@ def test_a_stopped_search_gives_what_it_has_with_its_bound(load_case):
     never = planner.plan(query[:2], query[2:], should_stop=lambda: False)
     assert never.points.tolist() == best.points.tolist()
     for method in ("pbpp", "pbpp-taut"):
-        with pytest.raises(pbpp.SearchStoppedError):
+        with pytest.raises(pbpp.SearchStoppedError, match="stopped before it had found any path"):
             planner.plan(query[:2], query[2:], method=method, should_stop=lambda: True)
 
 
@@ -193,3 +199,18 @@ def test_free_space_helps_to_find_free_points(square):
     free = pbpp.Planner([square], [BOX], clearance_m=2.0).free_space
     assert isinstance(free, shapely.MultiPolygon)
     assert free.distance(Point(50, 50)) == pytest.approx(22.0, abs=1e-6)
+
+
+def test_building_leaves_garbage_collection_as_it_was(square, monkeypatch):
+    seen = []
+    monkeypatch.setattr("pbpp.planner.Field", lambda *_, **__: seen.append(gc.isenabled()) or 1 / 0)
+    try:
+        for switch in (gc.enable, gc.disable):
+            switch()
+            before = gc.isenabled()
+            with pytest.raises(ZeroDivisionError):
+                pbpp.Planner([square], [])
+            assert gc.isenabled() == before
+    finally:
+        gc.enable()
+    assert seen == [False, False]

@@ -86,7 +86,7 @@ def test_touching_corners_are_impassable(square, angle_deg):
     ends = [tuple(turned([[end]], np.radians(angle_deg))[0][0]) for end in ((50.0, 20.0), (50.0, 80.0))]
     if angle_deg == 45.0:  # rounding may leave a gap of some 1e-15 m: it is closed
         boxes[0][2] = boxes[1][0]
-    with pytest.raises(pbpp.NoPathError):
+    with pytest.raises(pbpp.NoPathError, match="no path joins start and goal"):
         pbpp.plan_path(area, boxes, *ends)
 
 

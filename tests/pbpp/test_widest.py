@@ -1,3 +1,5 @@
+import re
+
 import numpy as np
 import pytest
 from field_check import connected, fence
@@ -66,11 +68,15 @@ def test_the_open_plane_has_no_narrowest_place():
 
 def test_no_way_at_all(square):
     wall = [(-10, 40), (110, 40), (110, 60), (-10, 60)]
-    with pytest.raises(pbpp.NoPathError):
+    with pytest.raises(pbpp.NoPathError, match="no path joins start and goal"):
         pbpp.widest([square], [wall], (50, 10), (50, 90))
-    with pytest.raises(pbpp.StartBlockedError):
+    with pytest.raises(
+        pbpp.StartBlockedError, match=r"the start .* is blocked: .* free space is 10\.000 m away"
+    ):
         pbpp.widest([square], [wall], (50, 50), (50, 90))
-    with pytest.raises(pbpp.GoalBlockedError):
+    with pytest.raises(
+        pbpp.GoalBlockedError, match=r"the goal .* is blocked: .* free space is 10\.000 m away"
+    ):
         pbpp.widest([square], [wall], (50, 10), (50, 50))
 
 
@@ -95,8 +101,8 @@ def test_it_is_right_to_a_centimetre(seed):
     ends = field.start, field.goal
     try:
         way = pbpp.widest(field.inclusions, field.exclusions, *ends, union=field.union)
-    except pbpp.PlanningError:
-        with pytest.raises(pbpp.PlanningError):
+    except pbpp.PlanningError as refused:
+        with pytest.raises(type(refused), match=re.escape(str(refused))):
             pbpp.plan_path(field.inclusions, field.exclusions, *ends, union=field.union)
         return
     included, excluded = fence(field)

@@ -1,0 +1,201 @@
+"""``pbpp log``: tables, documents and pictures of logs."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from logbook.making import BEGIN_S, FIELD, Log
+from typer.testing import CliRunner
+
+from mavlink_bridge.cli.app import app
+from missions.errors import MissionFormatError
+from missions.fence import Fence
+from missions.geo import LatLon
+from missions.picture.track import TrackPicture, draw_track, track_figure
+
+
+def run(*arguments: str):
+    return CliRunner(env={"COLUMNS": "160"}).invoke(app, ["log", *arguments])
+
+
+def test_tells_people_what_happened(logs):
+    result = run(str(logs / "mission-yard.tlog"))
+    assert result.exit_code == 0
+    for text in (
+        "57.7 s from 2026-11-22 02:17:42 UTC, 6120 messages",
+        "38.1 m driven, nearest to the fence 0.00 m",
+        "exclusion polygon 1",
+        "Drive from 43.4 s: items 1 to 2",
+        "1 of 2 waypoints reached",
+        "predicted",
+        "within the predicted corridor",
+        "read-back",
+        "16 of 16",
+        "255/230",
+        "GLOBAL_POSITION_INT",
+        "INITIALISING",
+        "WP_RADIUS",
+    ):
+        assert text in result.stdout
+
+
+def test_one_document_with_everything(logs):
+    result = run(str(logs / "mission-yard.tlog"), str(logs / "no-fence.tlog"), "--json")
+    document = json.loads(result.stdout)
+    assert (result.exit_code, document["status"], document["command"]) == (0, "ok", "log")
+    yard, bare = document["logs"]
+    assert yard["log"] == "mission-yard.tlog"
+    assert {(row["system"], row["component"]) for row in yard["messages"]} == {(1, 1), (1, 190), (255, 230)}
+    (vehicle,) = yard["vehicles"]
+    assert vehicle["fences"][0]["exclusion_polygons"] == 2
+    assert vehicle["mission_items"] == 2
+    assert vehicle["home"] == [40.071374, -105.22993]
+    assert [transfer["kind"] for transfer in vehicle["transfers"]] == ["fence", "fence", "mission", "mission"]
+    assert vehicle["nearest"]["clearance_m"] == 0.0
+    assert vehicle["intrusions"][0]["zone"] == "exclusion polygon 1"
+    (drive,) = vehicle["drives"]
+    assert drive["is_as_foreseen"] is True
+    assert drive["took_s"] == 6.5
+    assert drive["foreseen"]["took_s"] > 6
+    assert bare["vehicles"][0]["nearest"] is None
+    assert bare["vehicles"][0]["targets"][0]["position"] == [40.0717, -105.2295]
+
+
+def test_a_log_among_several_that_is_none(logs, tmp_path):
+    (tmp_path / "none.tlog").write_text("no log at all\n" * 10)
+    arguments = (str(tmp_path / "none.tlog"), str(logs / "no-fence.tlog"))
+    result = run(*arguments, "--json")
+    document = json.loads(result.stdout)
+    assert (result.exit_code, document["status"], document["exit_code"]) == (3, "error", 3)
+    assert document["logs"][0]["error"] == "LogError"
+    assert document["logs"][1]["vehicles"]
+    people = run(*arguments)
+    assert people.exit_code == 3
+    assert "none.tlog" in people.stderr
+    assert "no-fence.tlog" in people.stdout
+    assert run(*arguments[:1]).exit_code == 3
+
+
+def test_wrong_usage(logs):
+    yard = str(logs / "mission-yard.tlog")
+    assert run(yard, yard, "--plot", "a.png").exit_code == 2
+    assert run(yard, "--plot", "a.bmp").exit_code == 3
+    assert run(yard, "--system", "9").exit_code == 3
+    assert run("missing.tlog").exit_code == 3
+    assert run().exit_code == 2
+
+
+def test_many_rows_are_cut_and_said(tmp_path):
+    log = Log()
+    log.parameters()
+    for count in range(120):
+        log.heartbeat(count % 2, armed=bool(count % 3))
+    log.now_s += 8000
+    log.heartbeat()
+    result = run(str(log.write(tmp_path / "busy.tlog")))
+    assert "the last 40 of 121" in result.stdout
+    assert "2 h 13 min 21 s" in result.stdout
+    assert "no fence was transferred" in result.stdout
+
+
+def test_strange_names_and_clocks_are_told_plainly(tmp_path):
+    log = Log()
+    log.heartbeat()
+    log.now_s += 200 * 86_400
+    log.heartbeat()
+    path = log.write(tmp_path / "[bold]odd.tlog")
+    path.write_bytes(path.read_bytes() + b"\xfe\xfe\xfe")
+    result = run(str(path))
+    assert "[bold]odd.tlog" in result.stdout
+    assert "clock was set 1 times" in result.stdout
+    assert "Damage passed over" in result.stdout
+
+
+def test_a_clock_that_stands_still_is_told(tmp_path):
+    log = Log()
+    for _ in range(12):
+        log.heartbeat()
+    log.rows = [(0.0, sender, message) for _, sender, message in log.rows]
+    path = log.write(tmp_path / "still.tlog")
+    told = "the log's clock stands still: 12 heartbeats of one vehicle"
+    assert told in run(str(path)).stdout.replace("\n", " ")
+    document = json.loads(run(str(path), "--json").stdout)
+    assert document["logs"][0]["clock_trouble"].startswith(told)
+
+
+@pytest.mark.parametrize(
+    ("begins_s", "told"), [(3.3e10, "3015-09-24 10:40:00 UTC"), (2.6e11, "2.6e+11 s after 1970")]
+)
+def test_a_clock_that_was_far_off_is_told_too(tmp_path, begins_s, told):
+    """Some systems know no dates after the year 3000, Python none after 9999."""
+    log = Log(now_s=begins_s - BEGIN_S)
+    log.heartbeat()
+    result = run(str(log.write(tmp_path / "odd.tlog")))
+    assert result.exit_code == 0
+    assert told in result.stdout
+
+
+@pytest.mark.parametrize("suffix", [".png", ".svg", ".html"])
+def test_pictures(logs, tmp_path, suffix):
+    path = tmp_path / f"drive{suffix}"
+    result = run(str(logs / "mission-yard.tlog"), "--plot", str(path))
+    assert result.exit_code == 0
+    assert f"Wrote {path}" in result.stdout
+    content = path.read_bytes()
+    assert len(content) > 5000
+    if suffix == ".svg":
+        text = content.decode()
+        assert all(name in text for name in ("AUTO", "HOLD", "inclusion", "exclusion", "mission"))
+
+
+def test_a_picture_of_nothing_or_of_several_is_refused(tmp_path, logs):
+    log = Log()
+    log.row((255, 230), log_heartbeat())
+    nothing = str(log.write(tmp_path / "station.tlog"))
+    assert run(nothing, "--plot", str(tmp_path / "a.png")).exit_code == 3
+    log.heartbeat()
+    silent = str(log.write(tmp_path / "silent.tlog"))
+    assert run(silent, "--plot", str(tmp_path / "a.png")).exit_code == 3
+    log.row((2, 1), log_heartbeat(mav_type=10, autopilot=3))
+    several = str(log.write(tmp_path / "several.tlog"))
+    assert run(several, "--plot", str(tmp_path / "a.png")).exit_code == 2
+    yard = str(logs / "mission-yard.tlog")
+    assert run(yard, "--plot", str(tmp_path / "nowhere" / "a.png")).exit_code == 3
+
+
+def log_heartbeat(mav_type=6, autopilot=8):
+    from mavlink_bridge.mavlink.messages import Heartbeat
+
+    return Heartbeat(mav_type, autopilot)
+
+
+def test_the_picture_shows_each_mode_once_and_the_track_in_place():
+    places = [LatLon(40.0, -105.0), LatLon(40.0001, -105.0), LatLon(40.0002, -105.0)]
+    picture = TrackPicture(
+        fence=Fence(FIELD.zones),
+        parts=(
+            ("AUTO", tuple(places[:2])),
+            ("HOLD", tuple(places[1:])),
+            ("AUTO", tuple(places[1:])),
+        ),
+        targets=(places[2],),
+    )
+    axes = track_figure(picture).axes[0]
+    labels = [line.get_label() for line in axes.get_lines() if not line.get_label().startswith("_")]
+    assert labels == ["inclusion", "AUTO", "HOLD", "target"]
+    auto = next(line for line in axes.get_lines() if line.get_label() == "AUTO")
+    north_m = auto.get_ydata()
+    assert north_m[1] - north_m[0] == pytest.approx(11.1, abs=0.05)
+    west, south, east, north = picture.bounds_m
+    assert (east - west, north - south) == pytest.approx((112.0, 112.0), abs=1.0)
+    with pytest.raises(MissionFormatError, match="nothing to draw"):
+        TrackPicture(fence=None, parts=())
+    with pytest.raises(MissionFormatError, match=r"drive\.bmp: no picture format"):
+        draw_track(picture, places_path())
+
+
+def places_path():
+    from pathlib import Path
+
+    return Path("drive.bmp")

@@ -1,0 +1,213 @@
+"""What happens while a plan is in the making: it takes seconds on a small computer, and the messages go on."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import pytest
+from director.test_bridge_director import (
+    FAR,
+    IN_BARN,
+    NEAR,
+    arm,
+    conductor,
+    driving,
+    ready,
+    upload,
+    wall_across_the_route,
+)
+from director.test_takeover import modes_sent, unheard, wait
+
+from mavlink_bridge.cli.live import PlanMaker
+from mavlink_bridge.director import EventName, State, route_desk
+from mavlink_bridge.director.plan_task import PlanTask
+from mavlink_bridge.mavlink import messages as m
+from missions.errors import PlanCheckError
+from missions.fence import fence_to_items
+from missions.geo import distance_m
+from missions.planning.plan import plan
+
+MANUAL = 0
+LONG_S = 5.0
+
+
+def planning(planning_s: float = LONG_S):
+    """Return a bridge in the middle of a plan that takes long."""
+    run = conductor()
+    run.planning_s = planning_s
+    ready(run)
+    arm(run)
+    run.run_until(lambda: run.director.situation.armed)
+    run.director.take_target(FAR, run.now_s)
+    run.run_until(lambda: run.director.pending_plan is not None, 20)
+    wait(run, 1.0)
+    return run
+
+
+def test_a_plan_that_takes_long_is_waited_for_and_the_messages_go_on():
+    run = planning()
+    asked_s = run.now_s
+    task = run.director.pending_plan
+    heard_s = run.director.heard_s
+    wait(run, 2.5)
+    assert run.director.pending_plan is task
+    assert run.director.heard_s > heard_s
+    planned_s = run.run_until(run.happened(EventName.PLANNED), 20)
+    assert planned_s - asked_s == pytest.approx(LONG_S - 1.0, abs=0.1)
+    run.run_until(lambda: run.director.state is State.DRIVING, 20)
+
+
+def test_a_takeover_while_it_plans_leaves_the_plan():
+    run = planning()
+    unheard(run, m.SetMode(1, 1, MANUAL))
+    run.run_until(lambda: run.director.state is State.LET_GO, 3)
+    assert run.director.pending_plan is None
+    before = len(run.sent)
+    wait(run, 2 * LONG_S)
+    assert run.director.state is State.LET_GO
+    assert not run.happened(EventName.PLANNED)()
+    assert modes_sent(run, before) == []
+
+
+def test_another_target_while_it_plans_is_the_one_that_is_driven_to():
+    run = planning()
+    obsolete = run.director.pending_plan
+    run.director.take_target(NEAR, run.now_s)
+    run.run_until(lambda: run.director.pending_plan is not None, 10)
+    assert run.director.pending_plan is not obsolete
+    run.director.plan_made(obsolete, obsolete.made(), run.now_s)
+    assert not run.happened(EventName.PLANNED)()
+    run.run_until(lambda: run.director.state is State.ARRIVED)
+    assert distance_m(run.vehicles[0].position, NEAR) < 4.0
+
+
+def test_a_fence_that_changes_while_it_plans_is_planned_around():
+    run = planning()
+    upload(run, m.MissionType.FENCE, fence_to_items(wall_across_the_route()))
+    changed = len(run.events)
+    run.run_until(run.happened(EventName.PLANNED, changed), 3 * LONG_S)
+    names = [event.name for event in run.events[changed:]]
+    assert names.index(EventName.FENCE_CHANGED) < names.index(EventName.PLANNED)
+    assert run.director.plan.fence == wall_across_the_route()
+    run.run_until(lambda: run.director.state is State.ARRIVED)
+    assert run.vehicles[0].breaches == 0
+
+
+def test_silence_while_it_plans():
+    run = planning(100.0)
+    run.is_cut = True
+    run.run_until(lambda: run.director.state is State.LOST, 10)
+    assert run.director.pending_plan is None
+
+
+def test_no_plan_is_told_as_ever():
+    run = ready(conductor(drive=False))
+    run.director.take_target(IN_BARN, run.now_s)
+    run.run_until(run.happened(EventName.NO_PLAN), 10)
+    assert run.director.state is State.READY
+
+
+def test_what_changed_is_read_while_the_vehicle_comes_to_rest():
+    """Before, it was read when it stood: two round trips in which nothing else happened."""
+    run = driving(conductor())
+    run.run_until(lambda: run.director.drive is not None and run.director.drive.driven_m > 12)
+    run.director.take_target(NEAR, run.now_s)
+    run.run_until(lambda: run.director.state is State.HOLDING)
+    upload(run, m.MissionType.FENCE, fence_to_items(wall_across_the_route()))
+    run.run_until(lambda: run.director.situation.fence.value == wall_across_the_route(), 3)
+    assert run.director.state is State.HOLDING
+
+
+class Waiting:
+    """Stands for a director that waits for a plan."""
+
+    def __init__(self, task: PlanTask | None) -> None:
+        self.pending_plan = task
+
+
+def test_the_shell_makes_plans_beside_the_link():
+    may_end = threading.Event()
+
+    def slow(situation, request):
+        may_end.wait(30)
+        return plan(situation, request)
+
+    run = ready(conductor())
+    run.director.take_target(FAR, run.now_s)
+    task = PlanTask(run.director.situation, run.director._parts.desk.request())
+    waiting = Waiting(task)
+    plans = PlanMaker(waiting, slow)
+    idle_s = plans.longest_wait_s()
+    assert plans.take() is None
+    assert plans.take() is None  # in the making
+    assert plans.longest_wait_s() < idle_s
+    may_end.set()
+    made = taken(plans)
+    assert made[0] is task
+    assert made[1].targets[-1] == FAR
+    waiting.pending_plan = None
+    assert plans.take() is None
+    assert plans.longest_wait_s() == idle_s
+
+
+def test_a_plan_that_nobody_waits_for_any_more_is_left():
+    made_for = []
+
+    def note(_situation, request):
+        made_for.append(request)
+        return request
+
+    first, second = PlanTask(None, "first"), PlanTask(None, "second")
+    waiting = Waiting(first)
+    plans = PlanMaker(waiting, note)
+    plans.take()
+    waiting.pending_plan = second
+    assert taken(plans) == (second, "second")
+    assert made_for == ["first", "second"]
+
+
+def test_what_nobody_expected_of_a_planner_is_a_reason_for_no_plan():
+    _, made = taken(PlanMaker(Waiting(PlanTask(None, None)), breaking_down))
+    assert isinstance(made, PlanCheckError)
+    assert isinstance(made.__cause__, ZeroDivisionError)
+
+
+def taken(plans: PlanMaker):
+    until_s = time.monotonic() + 60
+    while time.monotonic() < until_s:
+        if (made := plans.take()) is not None:
+            return made
+        time.sleep(0.001)
+    raise AssertionError("no plan")
+
+
+def breaking_down(*_arguments):
+    raise ZeroDivisionError("float division by zero")
+
+
+def test_a_defect_while_planning_is_told_and_the_bridge_lives_on():
+    run = conductor()
+    run.planner = breaking_down
+    ready(run)
+    arm(run)
+    run.run_until(lambda: run.director.situation.armed)
+    run.director.take_target(FAR, run.now_s)
+    run.run_until(run.happened(EventName.NO_PLAN), 20)
+    event = run.last(EventName.NO_PLAN)
+    assert "planning broke down: ZeroDivisionError: float division by zero" in event.text
+    wait(run, 2.0)
+    assert not run.director.is_done
+    run.planner = plan
+    run.director.take_target(NEAR, run.now_s)
+    run.run_until(lambda: run.director.state is State.DRIVING, 30)
+
+
+def test_a_defect_while_a_drive_is_checked_holds_the_vehicle(monkeypatch):
+    run = driving(conductor())
+    monkeypatch.setattr(route_desk, "recheck", breaking_down)
+    changed = len(run.events)
+    upload(run, m.MissionType.FENCE, fence_to_items(wall_across_the_route()))
+    run.run_until(run.happened(EventName.HOLDING, changed), 20)
+    assert "a defect" in run.last(EventName.ROUTE_BROKEN).text
+    assert not run.director.is_done

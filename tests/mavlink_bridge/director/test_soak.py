@@ -1,0 +1,28 @@
+"""A little of the soak (see `soak`), in every run of the tests."""
+
+from __future__ import annotations
+
+import pytest
+from director.soak import soak
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_few_minutes_keep_every_promise(seed):
+    run = soak(seed, hours=0.08)
+    assert run.violations == []
+    assert run.counts["target"] > 1
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_everything_at_once_keeps_every_promise(seed):
+    """Something new about every second: in the middle of every step of the bridge's own."""
+    run = soak(seed, hours=0.05, pace_s=(0.05, 2.5))
+    assert run.violations == []
+    assert run.counts["target"] > 10
+
+
+@pytest.mark.parametrize("orders", [{"arm": False}, {"drive": False}, {"upload": False, "drive": False}])
+def test_nothing_is_done_beyond_the_orders(orders):
+    run = soak(7, hours=0.04, pace_s=(0.05, 2.5), **orders)
+    assert run.violations == []
+    assert run.counts["target"] > 10

@@ -1,0 +1,84 @@
+"""How far ahead a fence lies, and what speed avoidance leaves: one place at a time, many at once, and by shapely."""
+
+from __future__ import annotations
+
+import cmath
+import math
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from missions.drive_model.fence_ahead import FenceAhead
+from missions.vehicle import Vehicle, vehicle_from_parameters
+
+AVOIDING = {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 4.0, "AVOID_ENABLE": 3.0, "FENCE_MARGIN": 2.0}
+RAY_M = 1000.0
+
+
+def vehicle_at(speed_mps: float) -> Vehicle:
+    return vehicle_from_parameters({**AVOIDING, "WP_SPEED": speed_mps})
+
+
+def expected_mps(fence: shapely.Geometry, place: complex, way: complex, vehicle: Vehicle) -> float:
+    """Return the speed by ArduPilot's sqrt_controller of the distance that shapely measures."""
+    end = place + RAY_M * way
+    met = shapely.LineString([(place.real, place.imag), (end.real, end.imag)]).intersection(fence)
+    if met.is_empty:
+        return math.inf
+    left_m = max(met.distance(shapely.Point(place.real, place.imag)) - vehicle.fence.margin_m, 0.0)
+    gain, accel = vehicle.position_gain_per_s, vehicle.accel_max_mps2
+    if left_m <= accel / gain**2:
+        return gain * left_m
+    return math.sqrt(2 * accel * (left_m - accel / gain**2 / 2))
+
+
+def ring(corners: int, radius_m: float, east_m: float, north_m: float) -> shapely.LinearRing:
+    around = [cmath.rect(radius_m, math.tau * number / corners) for number in range(corners)]
+    return shapely.LinearRing([(east_m + at.real, north_m + at.imag) for at in around])
+
+
+@pytest.mark.parametrize("corners", [3, 200])
+@settings(max_examples=60)
+@given(
+    speed_mps=st.sampled_from([1.0, 2.0, 5.0]),
+    east_m=st.floats(-15.0, 15.0),
+    north_m=st.floats(-15.0, 15.0),
+    ways=st.lists(st.floats(0.0, math.tau), min_size=1, max_size=6),
+)
+def test_the_speed_is_that_of_the_first_edge_ahead(
+    corners: int, speed_mps: float, east_m: float, north_m: float, ways: list[float]
+) -> None:
+    vehicle = vehicle_at(speed_mps)
+    fence = shapely.union_all([ring(corners, 20.3, 0.0, 0.0), ring(corners, 4.1, 5.0, 30.0)])
+    place = complex(east_m, north_m)
+    ahead = FenceAhead(fence, np.array([(-20.0, -20.0), (20.0, 20.0)]), vehicle)
+    units = [cmath.rect(1.0, way) for way in ways]
+    many_mps = ahead.speeds_mps(
+        np.full((len(units), 2), (east_m, north_m)), np.array([(unit.real, unit.imag) for unit in units])
+    )
+    for unit, one_of_many_mps in zip(units, many_mps, strict=True):
+        wanted_mps = min(expected_mps(fence, place, unit, vehicle), speed_mps)
+        assert min(float(one_of_many_mps), speed_mps) == pytest.approx(wanted_mps, abs=1e-6)
+        one_mps = ahead.speed_mps((east_m, north_m), (unit.real, unit.imag), speed_mps)
+        assert min(one_mps, speed_mps) == pytest.approx(wanted_mps, abs=1e-6)
+
+
+def test_places_far_apart_look_at_their_own_edges() -> None:
+    vehicle = vehicle_at(2.0)
+    walls = shapely.MultiLineString([[(10.0, -5.0), (10.0, 5.0)], [(210.0, -5.0), (210.0, 5.0)]])
+    ahead = FenceAhead(walls, np.array([(0.0, 0.0), (200.0, 0.0)]), vehicle)
+    for east_m in (0.0, 200.0, 1.0):
+        assert ahead.speed_mps((east_m, 0.0), (1.0, 0.0), 2.0) == pytest.approx(
+            expected_mps(walls, complex(east_m), 1 + 0j, vehicle)
+        )
+
+
+def test_an_edge_along_the_way_is_met_at_its_neighbour() -> None:
+    vehicle = vehicle_at(2.0)
+    corner = shapely.LineString([(4.0, 0.0), (8.0, 0.0), (8.0, 3.0)])
+    ahead = FenceAhead(corner, np.array([(0.0, 0.0)]), vehicle)
+    left_m = 8.0 - vehicle.fence.margin_m
+    assert ahead.speed_mps((0.0, 0.0), (1.0, 0.0), 2.0) == pytest.approx(vehicle.position_gain_per_s * left_m)

@@ -1,0 +1,143 @@
+"""A start inside the margin of a fence that the vehicle avoids: refused where measured rovers backed into it, said where they stood."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from charts import IN, OUT, box, place, situation_of
+
+from missions.checking.check import check_mission
+from missions.editing.repair import repair_mission
+from missions.errors import StartBlockedError
+from missions.fence import CircleZone
+from missions.items import waypoint
+from missions.planning.plan import plan
+from missions.request import Request
+from missions.situation import Mission
+
+AVOIDING = {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 4.0, "FENCE_MARGIN": 2.0, "AVOID_ENABLE": 3.0, "AVOID_BACKUP_SPD": 0.75,
+            "SERVO1_FUNCTION": 26.0, "SERVO3_FUNCTION": 70.0}  # fmt: skip
+SKID = {"SERVO1_FUNCTION": 73.0, "SERVO3_FUNCTION": 74.0, "WP_PIVOT_ANGLE": 60.0}
+FIELD, WALL = box(IN, -100, -100, 100, 100), box(OUT, -20, 10, 20, 20)
+TARGET = (0.0, -60.0)
+
+
+def route(north_m, zones=(FIELD, WALL), east_m=0.0, **parameters):
+    situation = situation_of(*zones, **{**AVOIDING, **parameters})
+    return plan(situation, Request(place(east_m, north_m), (place(*TARGET),), 2.2))
+
+
+def check(north_m, **parameters):
+    mission = Mission((waypoint(place(*TARGET)),), place(0, north_m))
+    situation = situation_of(FIELD, WALL, **{**AVOIDING, **parameters})
+    return check_mission(mission, situation, Request(place(0, north_m), clearance_m=2.2))
+
+
+def said(warnings, word):
+    return [warning for warning in warnings if word in warning]
+
+
+@pytest.mark.parametrize("away_m", [0.5, 1.0, 1.5, 1.7])
+def test_a_steered_rover_is_not_sent_from_there(away_m) -> None:
+    reason = (
+        f"the start is {away_m:.2f} m from exclusion polygon 1, nearer than FENCE_MARGIN (2 m) plus 0.05 m to a fence that the vehicle avoids: from there it "
+        "backs up, and measured rovers backed into the fence (29 of 42 starts, whichever way they headed)"
+    )
+    with pytest.raises(StartBlockedError, match=f"^{re.escape(reason)}$") as caught:
+        route(10 - away_m)
+    assert caught.value.details["advice"] == (
+        "drive it 2.05 m away from the fence by hand, or set AVOID_BACKUP_SPD 0 or AVOID_ENABLE 0 until it is there"
+    )
+    assert caught.value.details["distance_m"] == pytest.approx(away_m, abs=0.01)
+
+
+@pytest.mark.parametrize("away_m", [2.1, 3.0])
+def test_from_the_margin_on_it_leaves_as_usual(away_m) -> None:
+    assert not said(route(10 - away_m).warnings, "that the vehicle avoids")
+
+
+@pytest.mark.parametrize(
+    "parameters",
+    [
+        {"AVOID_ENABLE": 0},
+        {"AVOID_ENABLE": 2},
+        {"FENCE_ENABLE": 0},
+        {"FENCE_MARGIN": 0.9},
+        {"FENCE_MARGIN_XY": 0.9},
+    ],
+    ids=str,
+)
+def test_it_leaves_where_its_avoidance_does_not_reach(parameters) -> None:
+    assert not said(route(9.0, **parameters).warnings, "that the vehicle avoids")
+
+
+def test_the_flat_margin_counts_where_it_is_the_larger() -> None:
+    with pytest.raises(StartBlockedError, match=r"nearer than FENCE_MARGIN_XY \(3 m\)"):
+        route(7.5, FENCE_MARGIN_XY=3.0)
+
+
+@pytest.mark.parametrize(
+    ("zones", "east_m", "north_m", "fence"),
+    [
+        ((FIELD,), 99.0, 0.0, "inclusion polygon 1"),
+        ((FIELD, CircleZone(OUT, place(0, 20), 5.0)), 0.0, 14.0, "exclusion circle 1"),
+        ((CircleZone(IN, place(0, 0), 80.0),), 0.0, 79.0, "inclusion circle 1"),
+    ],
+)
+def test_every_kind_of_fence_counts(zones, east_m, north_m, fence) -> None:
+    with pytest.raises(StartBlockedError, match=fence):
+        route(north_m, zones, east_m)
+
+
+def test_the_edge_of_an_inclusion_that_it_is_not_in_does_not_count() -> None:
+    """In a union the vehicle avoids the edges of those inclusions that it is in."""
+    other = box(IN, -10, -40, 10, -20)
+    found = plan(
+        situation_of(FIELD, other, **{**AVOIDING, "FENCE_OPTIONS": 2.0}),
+        Request(place(11.0, -30.0), (place(60, -30),), 2.2),
+    )
+    assert not said(found.warnings, "that the vehicle avoids")
+
+
+def test_what_else_rovers_do_there_is_said() -> None:
+    (text,) = said(route(9.0, AVOID_BACKUP_SPD=0.0).warnings, "that the vehicle avoids")
+    assert text.endswith("but 1 of 3 that were to drive along it stood still")
+    (text,) = said(route(9.0, **SKID).warnings, "that the vehicle avoids")
+    assert "skid-steered rovers did not move from there (41 of 42 starts); drive it 2.05 m away" in text
+    assert not said(route(9.0, **SKID, AVOID_BACKUP_SPD=0.0).warnings, "that the vehicle avoids")
+
+
+def test_a_check_does_not_hold_there() -> None:
+    found = check(9.0)
+    assert not found.broken
+    assert not found.holds
+    (danger,) = found.dangers
+    assert "measured rovers backed into the fence" in danger
+    assert danger.endswith("until it is there")
+    assert check(7.9).holds
+    assert check(9.0, AVOID_BACKUP_SPD=0.0).holds
+    skid = check(9.0, **SKID)
+    assert skid.holds
+    assert said(skid.warnings, "did not move from there")
+
+
+def test_a_mission_from_there_is_not_repaired() -> None:
+    mission = Mission((waypoint(place(*TARGET)),), place(0, 9))
+    with pytest.raises(StartBlockedError, match=r"cannot be repaired: the start is 1\.00 m from"):
+        repair_mission(mission, situation_of(FIELD, WALL, **AVOIDING), Request(place(0, 9), clearance_m=2.2))
+
+
+def test_a_margin_of_nothing_is_said_and_a_tenth_of_a_metre_promised() -> None:
+    zones = (FIELD, box(OUT, -20, 30, 20, 40))
+    situation = situation_of(*zones, **{**AVOIDING, "FENCE_MARGIN": 0.0})
+    found = plan(situation, Request(place(0, 0), (place(*TARGET),), 0.0))
+    assert found.clearance_m == 0.1
+    assert said(found.warnings, "FENCE_MARGIN 0 m does not switch avoidance off")
+    assert said(found.warnings, "Set FENCE_MARGIN 0.1 or more, or AVOID_ENABLE 2 (without bit 0)")
+    for changed in ({"FENCE_MARGIN": 0.1}, {"AVOID_ENABLE": 2.0}, {"FENCE_ENABLE": 0.0}):
+        found = plan(
+            situation_of(*zones, **{**AVOIDING, "FENCE_MARGIN": 0.0, **changed}),
+            Request(place(0, 0), (place(*TARGET),), 0.0),
+        )
+        assert not said(found.warnings, "does not switch avoidance off")

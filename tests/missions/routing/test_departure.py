@@ -1,0 +1,71 @@
+"""Leaving a start near fences: the ways out, and what they keep."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from charts import FIELD, OUT, WALL, box, place, situation_of
+
+from missions.drive_model import envelope
+from missions.geo import LocalPoint
+from missions.ground.from_situation import ground_for
+from missions.routing.departure import LENGTHS_M, WAYS, departures
+from missions.vehicle import Steering, Vehicle
+
+
+def ground_of(*zones):
+    situation = situation_of(*zones)
+    return ground_for(situation, Vehicle(), (place(0, 0),))
+
+
+@pytest.mark.parametrize("heading_deg", [None, 0.0, 200.0])
+def test_ways_all_round_the_one_that_keeps_most_first(heading_deg: float | None) -> None:
+    ground = ground_of(FIELD, WALL)
+    start = ground.frame.to_local(place(-9, 0))
+    found = departures(ground, Vehicle(), start, heading_deg)
+    assert len(found) == WAYS * len(LENGTHS_M)
+    kept_m = [one.kept_m for one in found]
+    assert kept_m == sorted(kept_m, reverse=True)
+    for one in found[:: WAYS // 4]:
+        course_deg = math.degrees(
+            math.atan2(one.there.east_m - start.east_m, one.there.north_m - start.north_m)
+        )
+        facing_deg = course_deg if heading_deg is None else heading_deg
+        band = envelope([start, one.there], Vehicle(), heading_deg=facing_deg)
+        assert band.area.distance(ground.edge) == pytest.approx(max(one.kept_m, 0.0), abs=0.02)
+        off_deg = abs((course_deg - facing_deg + 180) % 360 - 180)
+        assert one.turn_deg == pytest.approx(off_deg, abs=1e-6)
+
+
+def test_facing_a_wall_the_best_way_turns_and_straight_on_is_the_worst() -> None:
+    ground = ground_of(FIELD, WALL)
+    start = ground.frame.to_local(place(-9, 0))
+    found = departures(ground, Vehicle(), start, 90.0)
+    assert found[0].turn_deg > 45.0
+    assert found[-1].kept_m < 0.0
+    free = departures(ground, Vehicle(), start, 270.0)
+    assert free[0].turn_deg < 45.0
+    assert free[0].kept_m > found[0].kept_m + 0.3
+
+
+def test_a_vehicle_that_turns_on_the_spot_keeps_more() -> None:
+    ground = ground_of(FIELD, WALL)
+    start = ground.frame.to_local(place(-9, 0))
+    best_m = [
+        departures(ground, Vehicle(steering=steering), start, 90.0)[0].kept_m
+        for steering in (Steering.ACKERMANN, Steering.SKID)
+    ]
+    assert best_m[0] < best_m[1] - 0.3
+
+
+def test_in_a_pen_no_way_keeps_anything() -> None:
+    walls = [
+        box(OUT, -30, 3, 30, 4),
+        box(OUT, -30, -4, 30, -3),
+        box(OUT, -4, -4, -3, 4),
+        box(OUT, 3, -4, 4, 4),
+    ]
+    ground = ground_of(FIELD, *walls)
+    found = departures(ground, Vehicle(), LocalPoint(*ground.frame.to_local(place(0, 0))), 0.0)
+    assert found[0].kept_m < 0.0

@@ -77,7 +77,7 @@ _CIRCLE_KINDS = {
     Command.FENCE_CIRCLE_INCLUSION: ZoneKind.INCLUSION,
     Command.FENCE_CIRCLE_EXCLUSION: ZoneKind.EXCLUSION,
 }
-_HOME_CIRCLE = 5005
+_HOME_CIRCLE = 5005  # MAV_CMD_NAV_FENCE_HOME_CIRCLE_INCLUSION, in MAVLink's development dialect
 _VERTEX_COMMANDS = {kind: command for command, kind in _VERTEX_KINDS.items()}
 _CIRCLE_COMMANDS = {kind: command for command, kind in _CIRCLE_KINDS.items()}
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _ONE_OF = {"MultiPoint": "Point", "MultiLineString": "LineString", "MultiPolygon": "Polygon"}
 _GEOMETRIES = ("Point", "LineString", "Polygon", *_ONE_OF, "GeometryCollection")
 _WGS84 = ("CRS84", "CRS84H", "EPSG::4326", "EPSG:4326", "EPSG::4979", "EPSG:4979")
-_WGS84_CODES = (4326, 4979)
+_WGS84_CODES = (4326, 4979)  # EPSG, without and with height
 
 
 def read(text: str, source: str, choices: Choices = NO_CHOICES) -> Situation:

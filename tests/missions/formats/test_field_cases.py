@@ -279,8 +279,13 @@ def test_hidden_placemarks_are_told_and_can_be_asked_for(tmp_path):
 # Other files
 
 
-@pytest.mark.parametrize(("name", "kind"), [("a.bin", "a DataFlash log of ArduPilot"), ("a.ulg", "a PX4 ULog")])
-@pytest.mark.parametrize("command", [("convert",), ("log",), ("plan", "--fence"), ("plan", "--target", "1,2", "--log"), ("replay",)])
+@pytest.mark.parametrize(
+    ("name", "kind"), [("a.bin", "a DataFlash log of ArduPilot"), ("a.ulg", "a PX4 ULog")]
+)
+@pytest.mark.parametrize(
+    "command",
+    [("convert",), ("log",), ("plan", "--fence"), ("plan", "--target", "1,2", "--log"), ("replay",)],
+)
 def test_other_logs_are_named(tmp_path, name, kind, command):
     for known in ("plan", "log", "replay"):
         load(known)

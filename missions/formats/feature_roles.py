@@ -16,57 +16,15 @@ if TYPE_CHECKING:
     from missions.formats.choices import Choices
     from missions.formats.features import Feature
 
+_KEEP_OUT = (
+    "exclude, excluded, keep out, keepout, keep off, keep away, stay out, stay off, stay away, no go, nogo, no fly, nofly, no fly zone, nfz, "
+    "no drive, no entry, no access, no mow, nomow, do not enter, off limits, avoid, forbidden, restricted, prohibited, obstacle, "
+    "sperrzone, sperrgebiet, sperrfläche, verboten, verbotszone, flugverbotszone, ausschluss, ausschlusszone, "
+    "interdit, interdite, prohibido, prohibida, vietato, vietata, verboden"
+)
 _ROLES = {role.value: role for role in Role} | {
     **dict.fromkeys(("include", "keep in", "keepin", "stay in"), Role.INCLUSION),
-    **dict.fromkeys(
-        (
-            *(
-                "exclude",
-                "excluded",
-                "keep out",
-                "keepout",
-                "keep off",
-                "keep away",
-                "stay out",
-                "stay off",
-                "stay away",
-            ),
-            *(
-                "no go",
-                "nogo",
-                "no fly",
-                "nofly",
-                "no fly zone",
-                "nfz",
-                "no drive",
-                "no entry",
-                "no access",
-                "no mow",
-                "nomow",
-            ),
-            *("do not enter", "off limits", "avoid", "forbidden", "restricted", "prohibited", "obstacle"),
-            *(
-                "sperrzone",
-                "sperrgebiet",
-                "sperrfläche",
-                "verboten",
-                "verbotszone",
-                "flugverbotszone",
-                "ausschluss",
-            ),
-            *(
-                "ausschlusszone",
-                "interdit",
-                "interdite",
-                "prohibido",
-                "prohibida",
-                "vietato",
-                "vietata",
-                "verboden",
-            ),
-        ),
-        Role.EXCLUSION,
-    ),
+    **dict.fromkeys(_KEEP_OUT.split(", "), Role.EXCLUSION),
     **dict.fromkeys(("mission", "path"), Role.ROUTE),
     "mission item": Role.WAYPOINT,
     "rally": Role.RALLY_POINT,

@@ -162,7 +162,9 @@ def _position(word: str, element: Element) -> LatLon:
     except ValueError:
         more = [math.nan] * 2
     if len(more) > 1:
-        raise element.error(f"{word[:60]!r}; expected longitude,latitude[,altitude] in decimal degrees")
+        raise element.error(
+            f"{word[:60]!r}; expected longitude,latitude[,altitude] in decimal degrees, with decimal points"
+        )
     return _checked(lat_deg, lon_deg, element)
 
 

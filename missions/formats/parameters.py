@@ -14,6 +14,7 @@ from missions.situation import Situation
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,15}")
 _LINE = re.compile(r"^([A-Za-z][A-Za-z0-9_]*)[\s,=:]+([^\s_]+)(?:\s|$)")
+_COLUMNS = re.compile(r"[\s,=:]+")
 _MOST_LETTERS = 16  # of PARAM_VALUE.param_id
 
 _MOST = 3.4028234663852886e38
@@ -57,7 +58,7 @@ def read(text: str, source: str) -> Situation:
     remarks = []
     for number, line in enumerate(lines_of(text, source), start=1):
         content = line.partition("#")[0].strip()
-        if not content or _NOT_A_PARAMETER in content.split()[:3]:
+        if not content or _NOT_A_PARAMETER in _COLUMNS.split(content)[:3]:
             continue
         name, value = _parse(content, f"{source}: line {number}")
         if len(name) > _MOST_LETTERS:

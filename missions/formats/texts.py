@@ -20,6 +20,11 @@ _CHUNK = 1 << 16
 _DIRECTORY_ENTRY = b"PK\x01\x02"
 _MOST_FILES = 10_000  # chosen: a .kmz holds a KML and its pictures
 _XML_ENCODING = re.compile(rb"""\s*<\?xml[^>]*\sencoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")
+_ENCODINGS = re.compile(
+    r"utf-?(8|16)(-sig)?|us-ascii|ascii|iso-?8859-\d+|latin-?\d+|windows-\d+|cp\d+|gbk?|gb2312|gb18030|big5|euc-(jp|kr)|shift_jis",
+    re.IGNORECASE,
+)
+"""Python knows others that are no encodings of texts, or slow."""
 
 
 class Text(NamedTuple):
@@ -57,20 +62,28 @@ def _decoded(data: bytes, path: Path) -> str:
     is_utf16 = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))  # Notepad's "Unicode"
     declared = _XML_ENCODING.match(data[:200])
     encoding = "utf-16" if is_utf16 else declared[1].decode() if declared else "utf-8-sig"
-    try:
-        if encoding.lower() in ("utf-8", "utf8"):
-            encoding = "utf-8-sig"
-        return data.decode(encoding)
-    except LookupError:
+    if encoding.lower() in ("utf-8", "utf8"):
+        encoding = "utf-8-sig"
+    if not _is_known(encoding):
         raise MissionFormatError(
             f"{path}: the encoding {encoding!r} is not known; save the file as UTF-8", file=str(path)
-        ) from None
+        )
+    try:
+        return data.decode(encoding)
     except UnicodeError as error:
         place = f" (byte {error.start})" if isinstance(error, UnicodeDecodeError) else ""
         wanted = "UTF-8" if encoding == "utf-8-sig" else encoding
         raise MissionFormatError(
             f"{path} is not a text file{place}; expected {wanted}", file=str(path)
         ) from None
+
+
+def _is_known(encoding: str) -> bool:
+    try:
+        codecs.lookup(encoding)
+    except LookupError:
+        return False
+    return _ENCODINGS.fullmatch(encoding) is not None
 
 
 def _bounded(file: IO[bytes], source: str) -> bytes:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from missions.errors import InvalidPositionError, MissionFormatError
@@ -35,6 +37,8 @@ def read_path(path: Path, choices: Choices = NO_CHOICES) -> Situation:
     """
     source, kind = str(path), _KINDS[path.suffix.lower()]
     _check_file(path)
+    from shapely.errors import ShapelyError  # noqa: PLC0415 - slow to come, only for these
+
     try:
         import pyogrio  # noqa: PLC0415 - an extra
     except ImportError:
@@ -44,20 +48,35 @@ def read_path(path: Path, choices: Choices = NO_CHOICES) -> Situation:
             advice="pip install 'pbpp-rover[gis]', or export it as .geojson in EPSG:4326",
         ) from None
     features: list[Feature] = []
-    try:
-        for layer, _ in pyogrio.list_layers(path):
-            meta, _, shapes, columns = pyogrio.raw.read(
-                path, layer=layer, force_2d=True, max_features=MOST_POSITIONS
-            )
-            if shapes is not None:
-                rows = [dict(zip(meta["fields"], row, strict=True)) for row in zip(*columns, strict=True)]
-                rows = rows or [{} for _ in shapes]
-                features += _features(meta["crs"], shapes, rows, f"{source}: layer {layer}")
-    except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError, ValueError, RuntimeError) as error:
-        raise MissionFormatError(
-            f"{path} is {kind} that cannot be read: {error}", file=source, advice=_EXPORT
-        ) from None
-    return situation_of(features, source, choices)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        try:
+            for layer, _ in pyogrio.list_layers(path):
+                features += _features_of_layer(pyogrio, path, layer)
+        except (
+            pyogrio.errors.DataSourceError,
+            pyogrio.errors.DataLayerError,
+            ShapelyError,
+            ValueError,
+            RuntimeError,
+        ) as error:
+            raise MissionFormatError(
+                f"{path} is {kind} that cannot be read: {error}", file=source, advice=_EXPORT
+            ) from None
+    situation = situation_of(features, source, choices)
+    remarks = (f"{source}: {warning.message}" for warning in said)
+    return replace(situation, remarks=(*remarks, *situation.remarks))
+
+
+def _features_of_layer(pyogrio: Any, path: Path, layer: str) -> Iterator[Feature]:  # noqa: ANN401 - a module
+    meta, _, shapes, columns = pyogrio.raw.read(path, layer=layer, force_2d=True, max_features=MOST_POSITIONS)
+    if shapes is None:
+        return
+    rows: list[dict[str, object]] = [{} for _ in shapes]
+    for name, column in zip(meta["fields"], columns, strict=True):
+        for row, value in zip(rows, column, strict=True):
+            row[name] = value
+    yield from _features(meta["crs"], shapes, rows, f"{path}: layer {layer}")
 
 
 _EXPORT = "export it again, or as .geojson in EPSG:4326"

@@ -35,7 +35,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from mavlink_bridge.link import Link, open_link
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.codec import Codec
-from mavlink_bridge.mavlink.rover import HOLD_MODE
+from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.protocol.upload import Upload
 from mavlink_bridge.simulator import Simulator, SimulatorConfig
@@ -286,7 +286,7 @@ def fence_across_the_route(faults: Faults) -> dict[str, float]:
             items = fence_to_items(Fence((*yard.zones, WALL)))
             station.run(Upload(Peer(1, 1, *_GROUND_STATION), m.MissionType.FENCE, items), timeout_s=60)
             changed_s = time.time()
-            stood_s = wait_for(lambda: vehicle.mode == HOLD_MODE, 20, "HOLD")
+            stood_s = wait_for(lambda: vehicle.mode == Mode.HOLD, 20, "HOLD")
             known_s = bridge.await_event("fence_changed", after=before)["time_s"]
             verified_s = bridge.await_event("verified", after=before)["time_s"]
             driving_s = bridge.await_event("driving", after=before)["time_s"]

@@ -14,7 +14,7 @@ import statistics
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -26,7 +26,8 @@ from typing import TYPE_CHECKING
 from drive_fields import Field, make_field
 from drive_more_fields import make_more
 
-from mavlink_bridge.simulator.config import Mode, SimulatorConfig
+from mavlink_bridge.mavlink.rover import Mode
+from mavlink_bridge.simulator.config import SimulatorConfig
 from mavlink_bridge.simulator.rover import TICK_S
 from mavlink_bridge.simulator.vehicle import SimulatedVehicle
 from missions.errors import MissionError
@@ -34,7 +35,7 @@ from missions.fence import fence_to_items
 from missions.geo import distance_m
 from missions.ground.from_situation import ground_for
 from missions.planning.plan import plan
-from missions.request import Request
+from missions.request import GoTo
 from missions.routing.bottleneck import widest_clearance_m
 from missions.situation import Known, Pose, Situation
 from missions.vehicle import vehicle_from_parameters
@@ -158,7 +159,7 @@ def _run(field: Field, name: str) -> Run:
     widest_m = widest_clearance_m(
         ground, [ground.frame.to_local(field.start), ground.frame.to_local(field.target)]
     )
-    request = Request(targets=(field.target,), clearance_m=field.clearance_m)
+    request = GoTo(target=field.target, clearance_m=field.clearance_m)
     known = {
         "seed": field.seed,
         "kind": field.kind,
@@ -172,9 +173,7 @@ def _run(field: Field, name: str) -> Run:
     except MissionError as error:
         return Run(**known, refusal=str(error), planning_s=time.process_time() - begun_s)  # type: ignore[arg-type]
     planning_s = time.process_time() - begun_s
-    shortest = plan(
-        situation, Request(targets=(field.target,), clearance_m=field.clearance_m, corner_allowance_m=0.0)
-    )
+    shortest = plan(situation, replace(request, corner_allowance_m=0.0))
     driven_s, rover, arrived = _drive(field, planned, parameters)
     return Run(
         **known,  # type: ignore[arg-type]
@@ -210,11 +209,11 @@ def _drive(field: Field, planned: Plan, parameters: dict[str, float]) -> tuple[f
     now_s = 1.0
     rover.set_mode(Mode.AUTO, now_s)
     limit_s = 3 * planned.duration_s + 60.0
-    while rover.mode == Mode.AUTO and not rover.route.is_complete and now_s < limit_s:
+    while rover.mode == Mode.AUTO and not rover.mission_run.is_complete and now_s < limit_s:
         now_s += TICK_S
         rover.step(now_s)
     near = distance_m(vehicle.position, planned.targets[-1]) < max(parameters["WP_RADIUS"], 1.5) + 1.0
-    return now_s - 1.0, vehicle, rover.route.is_complete and near
+    return now_s - 1.0, vehicle, rover.mission_run.is_complete and near
 
 
 def _made() -> str:

@@ -2,22 +2,19 @@
 
 # begin
 import sys
-from dataclasses import replace
 from pathlib import Path
 
-from missions import Mission, MissionError, Request, plan_mission, read_situation, write_mission
+from missions import GoTo, MissionError, plan, read_situation
 from missions.geo import parse_lat_lon
-from missions.situation import Known
 
 
 def main(fence: Path, start: str, target: str, mission: Path) -> None:
     """Plan, say how long the route is, write it."""
     situation = read_situation(fence)
-    request = Request(start=parse_lat_lon(start), targets=(parse_lat_lon(target),), clearance_m=2.0)
-    plan = plan_mission(situation, request)
-    print(f"{plan.length_m:.1f} m, at least {plan.drawn_clearance_m:.2f} m from every fence")
-    found = Known(Mission(plan.items, plan.start), None, "planned")
-    write_mission(replace(situation, mission=found), mission)
+    request = GoTo(start=parse_lat_lon(start), target=parse_lat_lon(target), clearance_m=2.0)
+    planned = plan(situation, request)
+    print(f"{planned.length_m:.1f} m, at least {planned.drawn_clearance_m:.2f} m from every fence")
+    planned.write(mission, situation)
 
 
 # end

@@ -5,13 +5,13 @@ import sys
 
 from mavlink_bridge import Director, Orders, open_link
 from mavlink_bridge.link import now_s
-from missions import Plan, Request
+from missions import GoTo, Plan
 from missions.geo import parse_lat_lon
 
 
 def plan_to(connection: str, target: str) -> Plan:
     """Return the plan; what goes wrong is raised as a BridgeError or MissionError."""
-    orders = Orders(identity=(245, 190), request=Request(targets=(parse_lat_lon(target),)), once=True)
+    orders = Orders(identity=(245, 190), request=GoTo(target=parse_lat_lon(target)), once=True)
     director = Director(orders)
 
     def step() -> None:

@@ -7,6 +7,7 @@ read-backs) and takes what others send to it as requests.
 from __future__ import annotations
 
 from dataclasses import replace
+from enum import StrEnum
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -33,6 +34,15 @@ KINDS: dict[int, ListKind] = {
     m.MissionType.RALLY: ListKind.RALLY,
 }
 """The list that a mission_type stands for."""
+
+
+class TargetMessage(StrEnum):
+    """What carries a target to the vehicle; the source of what is known of it."""
+
+    REPOSITION = "DO_REPOSITION"
+    POSITION_TARGET = "SET_POSITION_TARGET_GLOBAL_INT"
+    GUIDED_ITEM = "MISSION_ITEM with current 2"
+
 
 _GLOBAL_FRAMES = frozenset(
     {
@@ -154,8 +164,7 @@ def _acknowledged(situation: Situation, frame: Frame, time_s: float) -> Situatio
     """Close an upload: taken over if the vehicle accepted it and every item was seen."""
     message = frame.message
     assert isinstance(message, m.MissionAck)
-    kinds = _kinds(message)
-    for kind in kinds:
+    for kind in kinds_of(message.mission_type):
         transfer = situation.transfers.get((kind, True))
         if transfer is None or message.type == m.MissionResult.INVALID_SEQUENCE:
             continue
@@ -199,14 +208,13 @@ def _upload_item(situation: Situation, message: Message, time_s: float) -> Situa
         if message.current == _GUIDED_ALTITUDE or message.frame not in _GLOBAL_FRAMES:
             return situation
         item = item_from_message(message)
-        return _targeted(situation, _place(item.lat_e7, item.lon_e7), time_s, "MISSION_ITEM with current 2")
+        return _targeted(situation, _place(item.lat_e7, item.lon_e7), time_s, TargetMessage.GUIDED_ITEM)
     return _add_item(situation, message, time_s, to_vehicle=True)
 
 
 def _clear(situation: Situation, message: Message, _time_s: float) -> Situation:
     assert isinstance(message, m.MissionClearAll)
-    kinds = _kinds(message)
-    for kind in kinds:
+    for kind in kinds_of(message.mission_type):
         situation = _with_transfer(situation, kind, ListTransfer(to_vehicle=True, count=0, items={}))
     return situation
 
@@ -220,7 +228,7 @@ def _command_int(situation: Situation, message: Message, time_s: float) -> Situa
     assert isinstance(message, m.CommandInt)
     if message.command != Command.DO_REPOSITION or message.frame not in _GLOBAL_FRAMES:
         return situation
-    return _targeted(situation, _place(message.x, message.y), time_s, "DO_REPOSITION")
+    return _targeted(situation, _place(message.x, message.y), time_s, TargetMessage.REPOSITION)
 
 
 def _command_long(situation: Situation, message: Message, time_s: float) -> Situation:
@@ -231,7 +239,7 @@ def _command_long(situation: Situation, message: Message, time_s: float) -> Situ
         position = checked_lat_lon(message.param5, message.param6)
     except InvalidPositionError:
         return situation
-    return _targeted(situation, position if position != (0, 0) else None, time_s, "DO_REPOSITION")
+    return _targeted(situation, position if position != (0, 0) else None, time_s, TargetMessage.REPOSITION)
 
 
 def _position_target(situation: Situation, message: Message, time_s: float) -> Situation:
@@ -239,7 +247,7 @@ def _position_target(situation: Situation, message: Message, time_s: float) -> S
     if message.type_mask & _IGNORE_X_OR_Y or message.coordinate_frame not in _GLOBAL_FRAMES:
         return situation
     position = _place(message.lat_int, message.lon_int)
-    return _targeted(situation, position, time_s, "SET_POSITION_TARGET_GLOBAL_INT")
+    return _targeted(situation, position, time_s, TargetMessage.POSITION_TARGET)
 
 
 _TOLD: dict[type[Message], Callable[[Situation, Frame, float], Situation]] = {
@@ -386,7 +394,9 @@ def _with_mission(
     return replace(situation, mission=Known(mission, time_s, source))
 
 
-def _targeted(situation: Situation, position: LatLon | None, time_s: float, source: str) -> Situation:
+def _targeted(
+    situation: Situation, position: LatLon | None, time_s: float, source: TargetMessage
+) -> Situation:
     return replace(situation, target=Known(position, time_s, source)) if position else situation
 
 
@@ -404,8 +414,9 @@ def _kind(message: Any) -> ListKind | None:  # noqa: ANN401 - any message of the
     return KINDS.get(message.mission_type)
 
 
-def _kinds(message: m.MissionAck | m.MissionClearAll) -> list[ListKind]:
-    if message.mission_type == m.MissionType.ALL:
-        return list(ListKind)
-    kind = _kind(message)
-    return [kind] if kind else []
+def kinds_of(mission_type: int) -> tuple[ListKind, ...]:
+    """Return the lists that a mission_type stands for: one, all, or none that is known here."""
+    if mission_type == m.MissionType.ALL:
+        return tuple(ListKind)
+    kind = KINDS.get(mission_type)
+    return (kind,) if kind else ()

@@ -263,6 +263,7 @@ class Link:
         timeout_s: float | None = None,
         on_frames: Callable[[list[Frame]], None] | None = None,
         on_step: Callable[[], None] | None = None,
+        on_sent: Callable[[], None] | None = None,
         until: Callable[[], bool] = lambda: False,
         longest_wait_s: Callable[[], float] = lambda: 0.5,
     ) -> None:
@@ -278,6 +279,8 @@ class Link:
             Sees every batch of frames before the machine does.
         on_step : callable, optional
             Called before each step's messages are sent, for progress bars and for what the machine hands out.
+        on_sent : callable, optional
+            Called after they are sent, for what takes time.
         until : callable, optional
             Ends the run early when it gives True; nothing more is sent then.
         longest_wait_s : callable, optional
@@ -294,6 +297,8 @@ class Link:
             if on_step:
                 on_step()
             self.send_all(machine.messages_to_send())
+            if on_sent:
+                on_sent()
             if machine.is_done:
                 return
             if timeout_s is not None and self.now_s() - begun_s > timeout_s:
@@ -308,6 +313,39 @@ class Link:
             for frame in frames:
                 machine.receive(frame, came_s)
             machine.handle_timer(came_s)  # not a later time: what came while we were busy is still unread
+
+    def listen(
+        self,
+        for_s: float,
+        *,
+        on_frames: Callable[[list[Frame]], None],
+        until: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """Listen for a while, or until it is enough."""
+        self.run(_Listen(for_s), on_frames=on_frames, until=until)
+
+
+class _Listen:
+    """A machine that sends nothing and ends after a while."""
+
+    progress = (0, 0)
+
+    def __init__(self, for_s: float) -> None:
+        self.bound_s = for_s
+        self.deadline_s: float | None = None
+        self.is_done = False
+
+    def start(self, now_s: float) -> None:
+        self.deadline_s = now_s + self.bound_s
+
+    def receive(self, frame: Frame, now_s: float) -> None:
+        pass
+
+    def handle_timer(self, now_s: float) -> None:
+        self.is_done = self.deadline_s is not None and now_s >= self.deadline_s
+
+    def messages_to_send(self) -> list[Message]:
+        return []
 
 
 _NETWORK_ADVICE = "are address and port right, does the other side run (tcp), and does nobody else listen on this port (udpin, tcpin)?"

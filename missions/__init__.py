@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from importlib import import_module
 from typing import TYPE_CHECKING
+from warnings import warn
 
 if TYPE_CHECKING:
     from missions.checking.check import CheckedLeg, MissionCheck, check_mission
@@ -24,32 +25,36 @@ if TYPE_CHECKING:
     from missions.geo import LatLon
     from missions.items import MissionItem, waypoint
     from missions.planned import Plan
-    from missions.planning.plan import plan as plan_mission
-    from missions.request import Request
+    from missions.planning.plan import plan
+    from missions.request import End, GoTo, Method, Order, RepairMission, Request, Tour
     from missions.situation import Known, Mission, Situation
-    from missions.tour.tour import plan_tour
     from missions.vehicle import Vehicle, vehicle_from_parameters
 
 __all__ = [
     "CheckedLeg",
     "CircleZone",
+    "End",
     "Fence",
+    "GoTo",
     "Known",
     "LatLon",
+    "Method",
     "Mission",
     "MissionCheck",
     "MissionError",
     "MissionItem",
+    "Order",
     "Plan",
     "PolygonZone",
     "Repair",
+    "RepairMission",
     "Request",
     "Situation",
+    "Tour",
     "Vehicle",
     "ZoneKind",
     "check_mission",
-    "plan_mission",
-    "plan_tour",
+    "plan",
     "read_fence",
     "read_mission",
     "read_parameters",
@@ -64,23 +69,28 @@ __all__ = [
 _HOMES = {
     "CheckedLeg": "checking.check",
     "CircleZone": "fence",
+    "End": "request",
     "Fence": "fence",
+    "GoTo": "request",
     "Known": "situation",
     "LatLon": "geo",
+    "Method": "request",
     "Mission": "situation",
     "MissionCheck": "checking.check",
     "MissionError": "errors",
     "MissionItem": "items",
+    "Order": "request",
     "Plan": "planned",
     "PolygonZone": "fence",
     "Repair": "editing.repair",
+    "RepairMission": "request",
     "Request": "request",
     "Situation": "situation",
+    "Tour": "request",
     "Vehicle": "vehicle",
     "ZoneKind": "fence",
     "check_mission": "checking.check",
-    "plan_mission": "planning.plan",
-    "plan_tour": "tour.tour",
+    "plan": "planning.plan",
     "read_fence": "formats",
     "read_mission": "formats",
     "read_parameters": "formats",
@@ -93,8 +103,18 @@ _HOMES = {
 }
 
 
+_DEPRECATED = {"plan_mission": "plan", "plan_tour": "plan"}
+
+
 def __getattr__(name: str) -> object:
+    if name in _DEPRECATED:
+        warn(
+            f"missions.{name} is deprecated: call missions.{_DEPRECATED[name]}",
+            DeprecationWarning,
+            stacklevel=2,
+        )
+    name = _DEPRECATED.get(name, name)
     home = _HOMES.get(name)
     if home is None:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{home}"), "plan" if name == "plan_mission" else name)
+    return getattr(import_module(f"{__name__}.{home}"), name)

@@ -8,7 +8,9 @@
     ├── FenceMissingError        no fence is known, or only a part of it
     ├── MissionFormatError       a file that cannot be read: file, line, what was expected
     ├── VehicleError             a parameter or a footprint that no vehicle can have
+    ├── RequestError             what is asked of a plan makes no sense: which word, and its value
     ├── SituationError           position, home or target is not known
+    ├── PlanStoppedError         nobody waits for the plan any more
     ├── PlanCheckError           a finished route failed its own check: a defect, never to be driven
     └── RouteError               no route
         ├── StartBlockedError    the vehicle stands where it must not be
@@ -18,6 +20,11 @@
 """
 
 from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 
 class MissionError(Exception):
@@ -46,6 +53,34 @@ class MissionFormatError(MissionError):
 
 class VehicleError(MissionError):
     """A parameter out of its range, or an invalid footprint; the message says which and its value."""
+
+
+class RequestError(MissionError):
+    """What is asked of a plan makes no sense; the message says which word, its value and what was expected."""
+
+
+class PlanStoppedError(MissionError):
+    """Planning was stopped from outside (``should_stop``): nobody waits for the plan any more."""
+
+    @classmethod
+    def when(cls, should_stop: Callable[[], bool] | None) -> Callable[[], bool] | None:
+        """Return what ends planning wherever it is asked whether to stop, and at once if so: half an answer is of no use to anybody.
+
+        Raises
+        ------
+        PlanStoppedError
+            It is to stop already.
+        """
+        if should_stop is None:
+            return None
+
+        def asked() -> bool:
+            if should_stop():
+                raise cls("planning was stopped: nobody waits for this plan any more")
+            return False
+
+        asked()
+        return asked
 
 
 class SituationError(MissionError):

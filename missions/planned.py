@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from importlib import import_module
 from typing import TYPE_CHECKING
 
+from missions.formats import write_mission
+from missions.formats.files import write_file
+from missions.situation import Known, Mission, Situation
+
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from missions.drive_model import Envelope
     from missions.fence import Fence
+    from missions.formats.files import Writer
     from missions.geo import LatLon
     from missions.ground.ground import Ground
     from missions.items import MissionItem
     from missions.vehicle import Vehicle
 
+_NOTHING_ELSE = Situation()
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Plan:
     """A mission and what it promises.
 
@@ -70,6 +80,54 @@ class Plan:
     envelope: Envelope
     home: LatLon | None
     warnings: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        promised = "drawn lines only" if self.clearance_m is None else f"{self.clearance_m:g} m promised"
+        return f"<Plan: {len(self.items)} items, {self.length_m:.1f} m, {self.duration_s:.0f} s, {promised}>"
+
+    def write(
+        self, path: Path | str, situation: Situation = _NOTHING_ELSE, *, write: Writer = write_file
+    ) -> None:
+        """Write the mission; in a format that holds them its fence and home too.
+
+        Parameters
+        ----------
+        path : Path or str
+            The suffix chooses the format.
+        situation : Situation
+            What else is known, such as rally points, for a format that holds it.
+        write : callable
+            What puts the bytes into the file.
+
+        Raises
+        ------
+        MissionFormatError
+            The suffix is unknown or its format holds no missions, or the file cannot be written.
+        """
+        mission = Mission(self.items, self.home or self.start)
+        fence = Known(self.fence, None, "planned")
+        to_write = replace(situation, mission=Known(mission, None, "planned"), fence=fence)
+        write_mission(to_write, path, write=write)
+
+    def plot(self, path: Path | str, *, title: str | None = None, blocks: bool = False) -> None:
+        """Draw the plan to a file: an image or a page, as the suffix says; `missions.picture.draw_plan` can do more.
+
+        Parameters
+        ----------
+        path : Path or str
+            ``.png``, ``.svg``, ``.pdf`` or ``.html``.
+        title : str, optional
+            Default: length, time and clearance.
+        blocks : bool
+            Whether to draw the blocks of the free space's partition too.
+
+        Raises
+        ------
+        MissionFormatError
+            The suffix is unknown, a library is not installed, or the file cannot be written.
+        """
+        # Asked for by name when it is called: pictures stand above plans, and no module may know what stands above it.
+        import_module("missions.picture").draw_plan(self, path, title=title, blocks=blocks)
 
     def path_index(self, seq: int, after: int = 0) -> int:
         """Return which point of the path a mission item drives to; for a change of speed, the one that it is for.

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from missions.errors import VehicleError
 from missions.vehicle import vehicle_from_parameters
 
 if TYPE_CHECKING:
@@ -60,6 +59,11 @@ class Promise:
         """What the predicted track has to keep."""
         return self.promised_m + self.error_m
 
+    @property
+    def drawn_m(self) -> float:
+        """What the drawn lines have to keep."""
+        return self.required_m + (self.allowance_m or 0.0)
+
 
 def known_vehicle(situation: Situation, request: Request) -> Vehicle:
     """Return the vehicle, with the speed that is asked for.
@@ -67,7 +71,7 @@ def known_vehicle(situation: Situation, request: Request) -> Vehicle:
     Raises
     ------
     VehicleError
-        A parameter or the speed cannot be used.
+        A parameter cannot be used.
     """
     # What the vehicle reported, but as no number, must not be taken for what it did not report: a default in its place would be a guess.
     no_numbers = {name: float(came) for name, came in situation.no_numbers.items()}
@@ -79,8 +83,6 @@ def known_vehicle(situation: Situation, request: Request) -> Vehicle:
     )
     if request.speed_mps is None:
         return vehicle
-    if not 0 < request.speed_mps < float("inf"):
-        raise VehicleError(f"a speed of {request.speed_mps:g} m/s is none", speed_mps=request.speed_mps)
     return replace(vehicle, speed_mps=request.speed_mps)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, NamedTuple
 
 from missions.geo import LatLon, to_e7
 from missions.items import Command, CoordinateFrame, MissionItem
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 _RELATIVE_FRAMES = (CoordinateFrame.GLOBAL_RELATIVE_ALT, CoordinateFrame.GLOBAL_RELATIVE_ALT_INT)
 
 
-class RallyPoint(LatLon):
+class RallyPoint(NamedTuple):
     """A place that RTL may lead to, with its altitude above home: nothing to a rover, but part of the list.
 
     Parameters
@@ -24,23 +24,14 @@ class RallyPoint(LatLon):
         Metres above home.
     """
 
+    lat_deg: float
+    lon_deg: float
     alt_m: float = 0.0
 
-    def __new__(cls, lat_deg: float, lon_deg: float, alt_m: float = 0.0) -> Self:
-        """Return a place with its altitude."""
-        point = super().__new__(cls, lat_deg, lon_deg)
-        point.alt_m = alt_m
-        return point
-
-    def __eq__(self, other: object) -> bool:
-        """Return whether places, and for rally points also the altitudes, are equal."""
-        return tuple.__eq__(self, other) is True and getattr(other, "alt_m", self.alt_m) == self.alt_m
-
-    def __ne__(self, other: object) -> bool:
-        """Return whether they are unequal."""
-        return not self == other
-
-    __hash__ = tuple.__hash__
+    @property
+    def position(self) -> LatLon:
+        """Where it is."""
+        return LatLon(self.lat_deg, self.lon_deg)
 
 
 def rally_from_items(items: Iterable[MissionItem]) -> tuple[RallyPoint, ...]:
@@ -61,5 +52,5 @@ def rally_to_items(points: Iterable[RallyPoint]) -> tuple[MissionItem, ...]:
             alt_m=point.alt_m,
         )
         for point in points
-        for lat_e7, lon_e7 in (to_e7(point),)
+        for lat_e7, lon_e7 in (to_e7(point.position),)
     )

@@ -48,10 +48,17 @@ def test_importing_loads_nothing_heavy(package):
 
 def test_planning_from_a_file_never_loads_pymavlink(fields):
     code = (
-        "import sys; from pathlib import Path; from missions import LatLon, Request, Situation, plan_mission, read_situation;"
+        "import sys; from pathlib import Path; from missions import GoTo, LatLon, plan, read_situation;"
         f"s = read_situation(Path({str(fields / 'yard-fence.waypoints')!r}));"
-        "plan_mission(s, Request(start=LatLon(40.071374, -105.22993), targets=(LatLon(40.0720926, -105.2286152),)));"
+        "plan(s, GoTo(start=LatLon(40.071374, -105.22993), target=LatLon(40.0720926, -105.2286152)));"
         "print('pymavlink' in sys.modules)"
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert result.stdout.strip() == "False"
+
+
+@pytest.mark.parametrize("name", ["plan_mission", "plan_tour"])
+def test_a_deprecated_name_is_the_one_in_its_place(name):
+    missions = importlib.import_module("missions")
+    with pytest.warns(DeprecationWarning, match=f"missions.{name} is deprecated: call missions.plan"):
+        assert getattr(missions, name) is missions.plan

@@ -9,17 +9,17 @@ from missions.formats import read_situation
 from missions.geo import LatLon
 from missions.picture import draw_plan
 from missions.planning.plan import plan
-from missions.request import Request
+from missions.request import GoTo, Tour
 
 HERE = Path(__file__).parent
 FIELDS = HERE.parents[1] / "tests" / "fields"
 START = LatLon(40.071374, -105.22993)
 REQUESTS = {
-    "maze": Request(start=START, targets=(LatLon(40.0726316, -105.2290497),), clearance_m=2.0),
-    "yard": Request(
+    "maze": GoTo(start=START, target=LatLon(40.0726316, -105.2290497), clearance_m=2.0),
+    "yard": Tour(
         start=START, targets=(LatLon(40.07209265, -105.22861524), LatLon(40.0720, -105.2300)), clearance_m=2.0
     ),
-    "union": Request(start=START, targets=(LatLon(40.0721, -105.2285),), clearance_m=1.0),
+    "union": GoTo(start=START, target=LatLon(40.0721, -105.2285), clearance_m=1.0),
 }
 
 for name, request in REQUESTS.items():

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.cli.run_log import RunLog
     from mavlink_bridge.director import Director, Event, Orders
     from mavlink_bridge.link import Link
+    from mavlink_bridge.mavlink.messages import Frame, Message
     from mavlink_bridge.mavlink.signing import Signing
     from mavlink_bridge.replay.journal import JournalWriter
     from mavlink_bridge.tlog import TlogWriter
@@ -170,7 +171,7 @@ def bridge(
 
 @dataclass(eq=False)
 class _Journaled:
-    """The director, with every call that is no frame written down."""
+    """The director as a machine, with every call that is no frame written down."""
 
     director: Director
     writer: RunLog | None
@@ -183,6 +184,34 @@ class _Journaled:
         if self.writer is not None:
             place = target if isinstance(target, LatLon) else None
             self.writer.call(Call(self.frames, now_s, name, place, text))
+
+    @property
+    def is_done(self) -> bool:
+        return self.director.is_done
+
+    @property
+    def deadline_s(self) -> float | None:
+        return self.director.deadline_s
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        return self.director.progress
+
+    def start(self, now_s: float) -> None:
+        """Do nothing: the director has begun before any link was open, and lives on over several."""
+
+    def receive(self, frame: Frame, now_s: float) -> None:
+        self.director.receive(frame, now_s)
+        self.frames += 1
+
+    def handle_timer(self, now_s: float) -> None:
+        deadline_s = self.director.deadline_s
+        if deadline_s is not None and deadline_s <= now_s:
+            self.call("timer", now_s)
+            self.director.handle_timer(now_s)
+
+    def messages_to_send(self) -> list[Message]:
+        return self.director.messages_to_send()
 
 
 class _Shell:
@@ -292,37 +321,22 @@ class _Shell:
         return opening.is_over
 
     def _run_link(self, link: Link) -> None:
-        from mavlink_bridge.link import now_s  # noqa: PLC0415 - quick help
-
-        while not self.director.is_done:
+        def step() -> None:
+            now = link.now_s()
             self._notes.tell(link)
-            self._listen_to_keyboard(now_s())
-            self._keep_backup(now_s())
-            self._hand_over_plan(now_s())
+            if not self.director.is_done:
+                self._listen_to_keyboard(now)
+                self._hand_over_plan(now)
+            self._keep_backup(now)
             if self.director.identity is not None and link.identity != self.director.identity:
                 link.speak_as(self.director.identity)
-            link.send_all(self.director.messages_to_send())
-            self._tell_all()
-            deadline_s = self.director.deadline_s
-            wait_s = self._plans.longest_wait_s()
-            if deadline_s is not None:
-                wait_s = min(wait_s, max(0.0, deadline_s - now_s()))
-            came_s, frames = link.receive_at(wait_s)
-            for frame in frames:
-                self.director.receive(frame, came_s)
-                self._written.frames += 1
-            self._run_timer(came_s)  # not a later time: what came while we were busy is still unread
-            if self._view is not None:
-                self._view.show(now_s())
-        link.send_all(self.director.messages_to_send())
-        self._keep_backup(now_s())
-        self._tell_all()
 
-    def _run_timer(self, now: float) -> None:
-        deadline_s = self.director.deadline_s
-        if deadline_s is not None and deadline_s <= now:
-            self._written.call("timer", now)
-            self.director.handle_timer(now)
+        def sent() -> None:  # nothing that is printed holds up what is sent
+            self._tell_all()
+            if self._view is not None:
+                self._view.show(link.now_s())
+
+        link.run(self._written, on_step=step, on_sent=sent, longest_wait_s=self._plans.longest_wait_s)
 
     def _link_closed(self, why: str) -> None:
         self._note(f"link: {why}", is_warning=True)
@@ -336,7 +350,7 @@ class _Shell:
         until_s = now_s() + wait_s
         while now_s() < until_s and not self.director.is_done:
             self._listen_to_keyboard(now_s())
-            self._run_timer(now_s())
+            self._written.handle_timer(now_s())
             self._tell_all()
             if self._view is not None:
                 self._view.show(now_s())

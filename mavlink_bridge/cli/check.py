@@ -47,12 +47,12 @@ from mavlink_bridge.cli.vehicle_options import (
     with_home_option,
     with_vehicle,
 )
-from mavlink_bridge.errors import LinkError, LogError, UsageError
+from mavlink_bridge.errors import LogError, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from mavlink_bridge.cli.session import Address
+    from mavlink_bridge.cli.session import Contact
     from mavlink_bridge.mavlink.messages import Frame
     from missions.checking.check import CheckedLeg, MissionCheck
     from missions.items import MissionItem
@@ -134,10 +134,10 @@ def check(
     if json_output and Path("-") in plots:
         raise UsageError("--plot - and --json both want the standard output; give a file to --plot")
     from missions.checking.check import check_mission  # noqa: PLC0415
-    from missions.request import Request  # noqa: PLC0415
+    from missions.request import GoTo  # noqa: PLC0415
 
     request = with_vehicle(
-        Request(clearance_m=clearance),
+        GoTo(clearance_m=clearance),
         reserve=reserve,
         position_error=position_error,
         size=(length, width, gps),
@@ -153,10 +153,12 @@ def check(
         if situation.ardupilot is False:  # how another autopilot drives its items was not measured
             raise LogError(f"{log}: {not_ardupilot(situation.system, None)}", file=str(log))
     elif connect is not None:
-        from mavlink_bridge.cli.session import Address as At  # noqa: PLC0415 - only with a link
+        from mavlink_bridge.cli.session import Contact  # noqa: PLC0415 - only with a link
 
-        address = At(connect, (source_system, source_component), system, any_vehicle, timeout, signing_key)
-        situation, unknown = _live_situation(address, quiet=quiet or json_output)
+        contact = Contact(
+            connect, (source_system, source_component), system, any_vehicle, timeout, signing_key
+        )
+        situation, unknown = _live_situation(contact, quiet=quiet or json_output)
     maps = MapOptions(role, outermost, ignore_points)
     situation = with_home_option(_with_files(situation, mission, fence, vehicle, maps), home)
     if situation.mission is None:
@@ -245,7 +247,7 @@ def _with_files(
     return found
 
 
-def _live_situation(address: Address, *, quiet: bool) -> tuple[Situation, list[str]]:
+def _live_situation(contact: Contact, *, quiet: bool) -> tuple[Situation, list[str]]:
     """Read mission, fence, rally points and parameters from the vehicle; nothing is written to it. Return also what it did not report.
 
     Raises
@@ -253,50 +255,37 @@ def _live_situation(address: Address, *, quiet: bool) -> tuple[Situation, list[s
     BridgeError
         The vehicle is not there, or does not give them.
     """
-    from mavlink_bridge.cli.download import read_list  # noqa: PLC0415 - only with a link
-    from mavlink_bridge.cli.session import open_session  # noqa: PLC0415
+    from mavlink_bridge.cli.session import open_session  # noqa: PLC0415 - only with a link
+    from mavlink_bridge.director.learning import Learning  # noqa: PLC0415
     from mavlink_bridge.fold import fold  # noqa: PLC0415
-    from mavlink_bridge.link import now_s  # noqa: PLC0415
-    from mavlink_bridge.protocol.parameters import ReadParameters  # noqa: PLC0415
-    from missions.checking.mission_end import PARAMETER_NAMES as END_NAMES  # noqa: PLC0415
-    from missions.fence import fence_from_items  # noqa: PLC0415
-    from missions.items import without_home  # noqa: PLC0415
-    from missions.rally import rally_from_items  # noqa: PLC0415
-    from missions.situation import Known, Mission, Situation  # noqa: PLC0415
-    from missions.vehicle import PARAMETER_NAMES  # noqa: PLC0415
+    from mavlink_bridge.protocol.undisturbed_read import UndisturbedRead  # noqa: PLC0415
+    from missions.situation import ListKind, Situation  # noqa: PLC0415
 
-    with progress_bar(quiet=quiet) as show, open_session(address, show) as session:
-        peer = session.vehicle
+    with progress_bar(quiet=quiet) as show, open_session(contact, show) as session:
+        peer, link = session.vehicle, session.link
         heard = Situation(system=peer.system, component=peer.component)
 
         def listen(frames: list[Frame]) -> None:
             nonlocal heard
             for frame in frames:
-                heard = fold(heard, frame, now_s())
+                heard = fold(heard, frame, link.now_s())
 
         session.listeners.append(listen)
-        session.ask_telemetry()
-        items, fence, rally = (read_list(session, what) for what in ("mission", "fence", "rally"))
-        machine = ReadParameters(session.vehicle, (*PARAMETER_NAMES, *END_NAMES, "BRD_SD_MISSION"))
-        session.run(machine, "reading parameters")
-        # What is promised rests on the fix: whether it is known must not be a matter of luck.
-        session.listen_until(lambda: heard.pose is not None and heard.fix is not None, _TELEMETRY_PATIENCE_S)
-    if machine.outcome is None or machine.outcome.is_silent:
-        raise LinkError("the vehicle does not answer when asked for its parameters")
-    source = "the vehicle"
-    home = items[0].position if items and (items[0].lat_e7, items[0].lon_e7) != (0, 0) else None
-    unknown = []
-    if heard.pose is None:
+        learning = Learning(
+            peer, _TELEMETRY_PATIENCE_S, tuple(ListKind), UndisturbedRead, needs_position=False
+        )
+        session.run(learning, "reading parameters, mission, fence and rally points")
+        if learning.trouble is not None:
+            raise learning.trouble
+        found = learning.merged(heard, link.now_s())
+    unknown = [
+        f"the vehicle gives positions as 32-bit floats: the {kind} is known to about 1 m only"
+        for kind in learning.coarse
+    ]
+    if found.pose is None:
         unknown.append("the vehicle did not tell its position: it is taken to stand at its home")
-    found = replace(
-        heard,
-        fence=Known(fence_from_items(fence), None, source) if fence else None,
-        mission=Known(Mission(without_home(items), home), None, source),
-        rally=Known(rally_from_items(rally), None, source) if rally else None,
-        home=Known(home, None, source) if home else heard.home,
-        parameters={**heard.parameters, **machine.outcome.values},
-    )
-    return found, unknown
+    has_fence = found.fence is not None and found.fence.value.zones
+    return found if has_fence else replace(found, fence=None), unknown
 
 
 def _draw(checked: MissionCheck, situation: Situation, plots: list[Path]) -> None:

@@ -61,7 +61,7 @@ def demo(
     from mavlink_bridge.tlog import TlogWriter  # noqa: PLC0415
     from missions.geo import LatLon  # noqa: PLC0415
     from missions.picture import draw_plan  # noqa: PLC0415
-    from missions.request import Request  # noqa: PLC0415
+    from missions.request import GoTo  # noqa: PLC0415
 
     out.mkdir(parents=True, exist_ok=True)
     make_room(out / "demo.tlog")
@@ -71,7 +71,7 @@ def demo(
         recorder = stack.enter_context(TlogWriter(out / "demo.tlog"))
         rover = _rover(speedup)
         link = stack.enter_context(Link(rover, _IDENTITY, recorder, clock=rover.now_s))
-        request = Request(targets=(LatLon(*_TARGET),), clearance_m=_CLEARANCE_M)
+        request = GoTo(target=LatLon(*_TARGET), clearance_m=_CLEARANCE_M)
         orders = Orders(identity=_IDENTITY, request=request, upload=True, drive=True, arm=True)
         result: LiveResult = conduct(
             link,

@@ -201,10 +201,12 @@ def _test_plan() -> Iterator[_Finding]:
     from missions.formats import read_situation  # noqa: PLC0415
     from missions.geo import LatLon  # noqa: PLC0415
     from missions.planning.plan import plan  # noqa: PLC0415
-    from missions.request import Request  # noqa: PLC0415
+    from missions.request import GoTo  # noqa: PLC0415
     from missions.situation import Situation  # noqa: PLC0415
 
-    request = Request(LatLon(*_START), (LatLon(*_TARGET),), clearance_m=_CLEARANCE_M, corner_allowance_m=0.0)
+    request = GoTo(
+        start=LatLon(*_START), target=LatLon(*_TARGET), clearance_m=_CLEARANCE_M, corner_allowance_m=0.0
+    )
     try:
         with as_file(files("mavlink_bridge.cli") / "data" / "maze-fence.waypoints") as path:
             situation: Situation = replace(read_situation(path), home=None)

@@ -23,7 +23,7 @@ from mavlink_bridge.cli.common import (
 from mavlink_bridge.cli.restoring import reader_warnings
 from mavlink_bridge.cli.terminal import echo
 from mavlink_bridge.cli.upload import RequiredConnectOption, SigningKeyOption
-from mavlink_bridge.errors import LinkError, RefusedError, UsageError
+from mavlink_bridge.errors import BridgeError, LinkError, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -66,10 +66,10 @@ def download(
     _check(what, connect, outputs)
 
     from mavlink_bridge.backup.store import BackupStore  # noqa: PLC0415 - usage errors need not wait for it
-    from mavlink_bridge.cli.session import Address, open_session  # noqa: PLC0415
+    from mavlink_bridge.cli.session import Contact, open_session  # noqa: PLC0415
 
-    address = Address(connect, (source_system, source_component), system, any_vehicle, timeout, signing_key)
-    with progress_bar(quiet=quiet or json_output) as show, open_session(address, show) as session:
+    contact = Contact(connect, (source_system, source_component), system, any_vehicle, timeout, signing_key)
+    with progress_bar(quiet=quiet or json_output) as show, open_session(contact, show) as session:
         store = BackupStore()
         if store.notes():  # else nothing needs to be distinguished
             warn(reader_warnings(store, session.which_vehicle()))
@@ -119,25 +119,17 @@ def read_list(session: Session, what: str) -> tuple[MissionItem, ...]:
         It fell silent.
     """
     from mavlink_bridge.mavlink.messages import MissionType  # noqa: PLC0415
-    from mavlink_bridge.protocol.outcomes import download_refusal  # noqa: PLC0415
-    from mavlink_bridge.protocol.transitions import DownloadState  # noqa: PLC0415
+    from mavlink_bridge.protocol.outcomes import list_read  # noqa: PLC0415
     from mavlink_bridge.protocol.undisturbed_read import UndisturbedRead  # noqa: PLC0415
 
     machine = UndisturbedRead(session.vehicle, MissionType[what.upper()])
     session.run(machine, f"reading the {what}")
-    outcome = machine.outcome
-    assert outcome is not None
-    if machine.is_disturbed:
-        raise RefusedError(f"another station keeps writing the {what}: it was another one while it was read")
-    if outcome.is_complete:
-        if outcome.is_coarse:
-            warn([f"the vehicle gives positions as 32-bit floats: the {what} is known to about 1 m only"])
-        return outcome.items
-    if outcome.state is DownloadState.BUSY:
-        raise RefusedError(f"another ground station keeps the {what} busy (DENIED)", result="DENIED")
-    if outcome.result is not None:
-        raise download_refusal(what, outcome.result)
-    raise LinkError(f"the {what} could not be read: {outcome.shortfall}")
+    items = list_read(machine, what)
+    if isinstance(items, BridgeError):
+        raise items
+    if machine.outcome is not None and machine.outcome.is_coarse:
+        warn([f"the vehicle gives positions as 32-bit floats: the {what} is known to about 1 m only"])
+    return items
 
 
 def _read_parameters(session: Session) -> dict[str, float]:

@@ -11,12 +11,13 @@ import signal
 import sys
 from dataclasses import dataclass
 from enum import StrEnum, auto
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from mavlink_bridge.cli.keyboard import Keyboard
 from mavlink_bridge.cli.terminal import say
 from mavlink_bridge.errors import LinkError
-from mavlink_bridge.mavlink.rover import AUTO_MODE, HOLD_MODE, MODE_NAMES
+from mavlink_bridge.mavlink.rover import Mode, plain_mode_name
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -45,7 +46,7 @@ class Interrupted(KeyboardInterrupt):
         self.details = details
 
 
-class Step(StrEnum):
+class Reaction(StrEnum):
     """What is done next after an interrupt."""
 
     ASK = auto()
@@ -53,7 +54,7 @@ class Step(StrEnum):
     REPORT = auto()
 
 
-def first_step(*, drives: bool, can_ask: bool, is_terminated: bool) -> Step:
+def first_reaction(*, drives: bool, can_ask: bool, is_terminated: bool) -> Reaction:
     """Return what an interrupt leads to.
 
     Parameters
@@ -65,21 +66,21 @@ def first_step(*, drives: bool, can_ask: bool, is_terminated: bool) -> Step:
     is_terminated : bool
         Whether it was a SIGTERM.
     """
-    return Step.ASK if drives and can_ask and not is_terminated else Step.REPORT
+    return Reaction.ASK if drives and can_ask and not is_terminated else Reaction.REPORT
 
 
-def step_after(answer: str | None) -> Step:
+def reaction_to(answer: str | None) -> Reaction:
     """Return what an answer to "HOLD? [Y/n]" leads to; None is no answer: a second interrupt, or the end of the input."""
     if answer is None:
-        return Step.REPORT
+        return Reaction.REPORT
     word = answer.strip().lower()
     if word in ("", "y", "yes", "hold"):
-        return Step.HOLD
-    return Step.REPORT if word in ("n", "no") else Step.ASK
+        return Reaction.HOLD
+    return Reaction.REPORT if word in ("n", "no") else Reaction.ASK
 
 
 @dataclass(frozen=True, slots=True)
-class Ending:
+class InterruptReport:
     """What is known at the end of an interrupted command.
 
     Parameters
@@ -120,7 +121,7 @@ class Ending:
         """Return the details for scripts."""
         doing = self.doing
         return {
-            "mode": _mode_name(doing.mode),
+            "mode": None if doing.mode is None else plain_mode_name(doing.mode),
             "armed": doing.is_armed,
             "speed_mps": None if doing.speed_mps is None else round(doing.speed_mps, 2),
             "age_s": round(doing.age_s, 1),
@@ -151,12 +152,8 @@ def doing_text(doing: Doing) -> str:
     speed = "speed not known" if doing.speed_mps is None else f"{doing.speed_mps:.1f} m/s"
     age_s = max(doing.age_s, 0.0 if doing.speed_mps is None else doing.speed_age_s)
     old = f" ({age_s:.0f} s ago)" if age_s > _OLD_S else ""
-    complete = ", its mission complete" if doing.has_completed and doing.mode == AUTO_MODE else ""
-    return f"{_mode_name(doing.mode)}, {armed}, {speed}{complete}{old}"
-
-
-def _mode_name(mode: int | None) -> str | None:
-    return None if mode is None else MODE_NAMES.get(mode, f"mode {mode}")
+    complete = ", its mission complete" if doing.has_completed and doing.mode == Mode.AUTO else ""
+    return f"{plain_mode_name(doing.mode)}, {armed}, {speed}{complete}{old}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,13 +212,13 @@ def _settled(at_hand: AtHand, interrupt: KeyboardInterrupt) -> Interrupted:
     """Do what an interrupt leads to; a second one ends it at once."""
     drives = at_hand.drives()
     can_ask = at_hand.link is not None and sys.stdin.isatty() and sys.stderr.isatty()
-    step = first_step(drives=drives, can_ask=can_ask, is_terminated=isinstance(interrupt, Terminated))
-    was_asked, is_held = step is Step.ASK, None
+    reaction = first_reaction(drives=drives, can_ask=can_ask, is_terminated=isinstance(interrupt, Terminated))
+    was_asked, is_held = reaction is Reaction.ASK, None
     is_link_lost = at_hand.link is None
     try:
         if was_asked:
-            step = _ask(at_hand)
-        if step is Step.HOLD:
+            reaction = _ask(at_hand)
+        if reaction is Reaction.HOLD:
             is_held = False
             is_held = _hold(at_hand)
         elif at_hand.link is not None and at_hand.peer() is not None:
@@ -232,7 +229,7 @@ def _settled(at_hand: AtHand, interrupt: KeyboardInterrupt) -> Interrupted:
         is_link_lost = True
     _heed_no_more()
     now_s = at_hand.link.now_s() if at_hand.link is not None else _now_s()
-    ending = Ending(
+    ending = InterruptReport(
         said=str(interrupt),
         doing=at_hand.watch().doing(now_s),
         on_it=at_hand.on_it(),
@@ -245,19 +242,19 @@ def _settled(at_hand: AtHand, interrupt: KeyboardInterrupt) -> Interrupted:
     return Interrupted(ending.message(), ending.details())
 
 
-def _ask(at_hand: AtHand) -> Step:
+def _ask(at_hand: AtHand) -> Reaction:
     """Ask whether to stop the vehicle, and listen to it meanwhile."""
     keyboard = at_hand.keyboard or Keyboard()
     keyboard.forget()
-    step = Step.ASK
+    reaction = Reaction.ASK
     say("")  # behind the terminal's ^C
     say(f"the vehicle drives: {_doing_text_now(at_hand)}")
-    while step is Step.ASK:
+    while reaction is Reaction.ASK:
         say("HOLD? [Y/n] ", nl=False)
         while (answer := keyboard.line()) is None and not keyboard.is_closed:
             _hear(at_hand, _LOOK_S)
-        step = step_after(answer)
-    return step
+        reaction = reaction_to(answer)
+    return reaction
 
 
 def _doing_text_now(at_hand: AtHand) -> str:
@@ -267,13 +264,13 @@ def _doing_text_now(at_hand: AtHand) -> str:
 
 def _hold(at_hand: AtHand) -> bool:
     """Switch the vehicle to HOLD, and return whether its heartbeat has confirmed it."""
-    from mavlink_bridge.director.mode_switch import ModeSwitch  # noqa: PLC0415 - quick help
+    from mavlink_bridge.protocol.mode_switch import ModeSwitch  # noqa: PLC0415 - quick help
 
     link, peer = at_hand.link, at_hand.peer()
     assert link is not None
     assert peer is not None
-    switch = ModeSwitch(peer, HOLD_MODE, is_urgent=True, until_seen=True)
-    link.run(switch, on_frames=lambda frames: _take(at_hand, frames))
+    switch = ModeSwitch(peer, Mode.HOLD, is_urgent=True, until_seen=True)
+    link.run(switch, on_frames=partial(_take, at_hand))
     return switch.is_granted
 
 
@@ -281,13 +278,12 @@ def _listen(at_hand: AtHand) -> None:
     """Listen for a heartbeat, so that what is reported of the vehicle is true now."""
     assert at_hand.link is not None
     begun_s = at_hand.link.now_s()
-    while at_hand.watch().heartbeat_s < begun_s and at_hand.link.now_s() < begun_s + _LISTEN_S:
-        _hear(at_hand, _LOOK_S)
+    _hear(at_hand, _LISTEN_S, until=lambda: at_hand.watch().heartbeat_s >= begun_s)
 
 
-def _hear(at_hand: AtHand, timeout_s: float) -> None:
+def _hear(at_hand: AtHand, for_s: float, until: Callable[[], bool] = lambda: False) -> None:
     assert at_hand.link is not None
-    _take(at_hand, at_hand.link.receive(timeout_s))
+    at_hand.link.listen(for_s, on_frames=partial(_take, at_hand), until=until)
 
 
 def _take(at_hand: AtHand, frames: list[Any]) -> None:

@@ -6,12 +6,14 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from functools import partial
 from threading import Thread
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.backup.store import BackupStore
+from mavlink_bridge.backup.upload_note import UploadNote
 from mavlink_bridge.backup.vehicle_lock import VehicleLock
-from mavlink_bridge.backup.vehicle_mark import Kinship, VehicleMark
+from mavlink_bridge.backup.vehicle_mark import VehicleMark
 from mavlink_bridge.cli.common import progress_bar, warn
 from mavlink_bridge.cli.interrupting import AtHand, interruptible, terminable
 from mavlink_bridge.cli.link_notes import LinkNotes
@@ -37,6 +39,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
+    from mavlink_bridge.cli.common import Shown
     from mavlink_bridge.director.plan_task import PlanTask
     from mavlink_bridge.link import Link
     from mavlink_bridge.mavlink.messages import Frame
@@ -145,71 +148,78 @@ def conduct(
     BridgeError, MissionError
         The director's trouble; or what ended the run, with what may be on the vehicle.
     """
-    planning_s: list[float] = []
-    has_driven = False
-    director = Director(replace(orders, once=True), situation)
-    plans = PlanMaker(director, _timed_planner(orders, lambda: has_driven, planning_s))
-    backups = BackupKeeper(director, connection)
-    notes = LinkNotes()
-    taken: Plan | None = None
-    arrival: Mapping[str, object] | None = None
+    run = _Run(Director(replace(orders, once=True), situation), link, connection, on_plan)
+    director, backups = run.director, run.backups
     with progress_bar(quiet=quiet) as show:
-
-        def step() -> None:
-            nonlocal has_driven, taken, arrival
-            has_driven = has_driven or director.state is State.DRIVING
-            show(_STATE_TEXTS[director.state], *director.progress)
-            warn(backups.step(link.now_s()))
-            if (made := plans.take()) is not None:
-                director.plan_made(*made, link.now_s())
-            if director.plan is not None and director.plan is not taken:
-                taken = director.plan
-                with show.aside():  # before anything of it is sent
-                    on_plan(taken, planning_s[-1], director.situation)
-            for event in director.take_events():
-                arrival = event.data if event.name is EventName.ARRIVED else arrival
-                if event.name is EventName.IDENTITY_CLASH:
-                    warn([event.text])
-            notes.tell(link)
-
         at_hand = replace(director_at_hand(director, link), aside=show.aside)
         with (
             interruptible(at_hand) if is_real else nullcontext(),
             ends_in_words(lambda: backups.writing, last_words=backups.release),
         ):
-            link.run(director, on_frames=on_frames, on_step=step, longest_wait_s=plans.longest_wait_s)
+            link.run(
+                director,
+                on_frames=on_frames,
+                on_step=partial(run.step, show),
+                longest_wait_s=run.plans.longest_wait_s,
+            )
     if director.trouble is not None or director.plan is None:
         raise _with_hint(director.trouble or LinkError("the director ended without a plan"))
     outcome = director.upload_outcome
     return LiveResult(
         director.plan,
-        planning_s[-1],
+        run.planning_s,
         director.situation,
         verified=outcome is not None and outcome.is_verified,
         backup=backups.path,
-        arrival=arrival,
+        arrival=run.arrival,
         doing=director.watch.doing(link.now_s()),
     )
 
 
-def _timed_planner(
-    orders: Orders, has_driven: Callable[[], bool], planning_s: list[float]
-) -> Callable[[Situation, Request], Plan]:
-    """Return what makes a live run's plans, and notes how long each took; a mission that is driven in part is not begun anew."""
+class _Run:
+    """What the shell does around the director of a single job."""
 
-    def timed(situation: Situation, request: Request) -> Plan:
-        if request.repairs and has_driven():
+    def __init__(self, director: Director, link: Link, connection: str, on_plan: PlanTaker) -> None:
+        self.director = director
+        self.plans = PlanMaker(director, self._plan)
+        self.backups = BackupKeeper(director, connection)
+        self.planning_s = 0.0
+        self.arrival: Mapping[str, object] | None = None
+        self._link = link
+        self._notes = LinkNotes()
+        self._on_plan = on_plan
+        self._taken: Plan | None = None
+        self._has_driven = False
+
+    def step(self, show: Shown) -> None:
+        """Do what the director waits for, and report what it did."""
+        director, link = self.director, self._link
+        self._has_driven = self._has_driven or director.state is State.DRIVING
+        show(_STATE_TEXTS[director.state], *director.progress)
+        warn(self.backups.step(link.now_s()))
+        if (made := self.plans.take()) is not None:
+            director.plan_made(*made, link.now_s())
+        if director.plan is not None and director.plan is not self._taken:
+            self._taken = director.plan
+            with show.aside():  # before anything of it is sent
+                self._on_plan(self._taken, self.planning_s, director.situation)
+        for event in director.take_events():
+            self.arrival = event.data if event.name is EventName.ARRIVED else self.arrival
+            if event.name is EventName.IDENTITY_CLASH:
+                warn([event.text])
+        self._notes.tell(link)
+
+    def _plan(self, situation: Situation, request: Request, *, should_stop: Callable[[], bool]) -> Plan:
+        """Make a plan, and note how long it took; a mission that is driven in part is not begun anew."""
+        if request.repairs and self._has_driven:
             raise SituationError(
                 "the rest of the mission would no longer keep its clearance, and the vehicle was switched to HOLD: part of the mission "
                 "is driven already, so it is not started again"
             )
-        planned, seconds = timed_plan(situation, request)
-        if request.repairs and orders.drive:
+        planned, self.planning_s = timed_plan(situation, request, should_stop=should_stop)
+        if request.repairs and self.director.orders.drive:
             _check_drivable(planned)
-        planning_s.append(seconds)
         return planned
-
-    return timed
 
 
 def _with_hint(trouble: BridgeError | MissionError) -> BridgeError | MissionError:
@@ -281,7 +291,7 @@ class PlanMaker:
         Makes one; `missions.planning.plan.plan` if not given.
     """
 
-    def __init__(self, director: Director, planner: Callable[[Situation, Request], Plan] = make_plan) -> None:
+    def __init__(self, director: Director, planner: Callable[..., Plan] = make_plan) -> None:
         self._director = director
         self._planner = planner
         self._task: PlanTask | None = None  # in the making, also when nobody waits for it any more
@@ -341,7 +351,6 @@ class BackupKeeper:
         store: BackupStore | None = None,
         journal: Callable[[str, float, str], None] = lambda _name, _now_s, _text: None,
     ) -> None:
-        self.path: Path | None = None
         self._director = director
         self._connection = connection
         self._store = store or BackupStore()
@@ -350,9 +359,13 @@ class BackupKeeper:
         self._guarded: VerifiedUpload | None = None
         self._lock: VehicleLock | None = None
         self._hindrance: BridgeError | None = None
-        self._was_interrupted = False
-        self._noted: VehicleMark | None = None
+        self._note: UploadNote | None = None
         self._settled: object = None
+
+    @property
+    def path(self) -> Path | None:
+        """The backup that the newest upload has made; None where it has made none."""
+        return self._note.backup if self._note is not None else None
 
     @property
     def writing(self) -> Writing | None:
@@ -368,13 +381,12 @@ class BackupKeeper:
         if director.is_uploading and director.upload is not self._guarded:
             self._guard(vehicle)
         if (old := director.pending_backup) is not None:
-            self._keep(vehicle, old, now_s)
+            self._keep(old, now_s)
         outcome = director.upload_outcome
         if outcome is not None and outcome is not self._settled:
             self._settled = outcome
-            is_settled = outcome.held in (Held.OLD, Held.FOREIGN) and not self._was_interrupted
-            if outcome.held is Held.WANTED or is_settled:
-                self._store.end(vehicle, MissionType.MISSION)
+            if self._note is not None:
+                self._note.settle(outcome.held)
         if not director.is_uploading:
             self.release()
         if self._has_warned or director.state in _NOT_KNOWN_YET:
@@ -386,15 +398,8 @@ class BackupKeeper:
         """Let other processes write to the vehicle; a note of an upload that has written nothing goes with it."""
         if self._lock is None:
             return
-        upload = self._guarded
-        if (
-            self._noted is not None
-            and upload is not None
-            and not upload.has_written
-            and not self._was_interrupted
-        ):
-            self._store.end(self._noted, MissionType.MISSION)
-        self._noted = None
+        if self._note is not None and self._guarded is not None and not self._guarded.has_written:
+            self._note.settle(Held.OLD)
         self._lock.free()
         self._lock = None
 
@@ -409,22 +414,22 @@ class BackupKeeper:
     def _guard(self, vehicle: VehicleMark) -> None:
         """Lock the vehicle before its old mission is read: a mission that somebody else was writing meanwhile is no backup."""
         self.release()
-        self._guarded, self._hindrance, self.path = self._director.upload, None, None
+        self._guarded, self._hindrance, self._note = self._director.upload, None, None
         self._lock = VehicleLock(vehicle)
         try:
             if holder := self._lock.take():
                 self._hindrance = holder.error(vehicle)
+            else:
+                self._note = UploadNote(self._store, vehicle, MissionType.MISSION)
         except BackupError as error:
             self._hindrance = error
 
-    def _keep(self, vehicle: VehicleMark, old: tuple[MissionItem, ...], now_s: float) -> None:
+    def _keep(self, old: tuple[MissionItem, ...], now_s: float) -> None:
         try:
             if self._hindrance is not None:
                 raise self._hindrance
-            earlier = self._store.interrupted(vehicle, MissionType.MISSION)
-            self._was_interrupted = any(vehicle.kinship(note.vehicle) is Kinship.SAME for note in earlier)
-            self._noted = vehicle
-            self.path = self._store.begin(vehicle, MissionType.MISSION, old)
+            assert self._note is not None
+            self._note.begin(old)
         except BridgeError as error:
             name = "in_use" if isinstance(error, VehicleInUseError) else "backup_failed"
             self._journal(name, now_s, str(error))

@@ -51,6 +51,7 @@ from mavlink_bridge.cli.vehicle_options import (
     with_vehicle,
 )
 from mavlink_bridge.errors import LogError, UsageError
+from missions.request import RepairMission
 
 if TYPE_CHECKING:
     from missions.situation import Situation
@@ -244,8 +245,8 @@ def plan(
         from mavlink_bridge.mavlink.vehicles import not_ardupilot  # noqa: PLC0415 - only where needed
 
         situation = _offline_situation(fence, log, system, maps, any_vehicle=any_vehicle)
-        if request.via is not None and log is None:
-            situation = with_mission_home(situation, request.via, str(via_mission))
+        if isinstance(request, RepairMission) and request.mission is not None and log is None:
+            situation = with_mission_home(situation, request.mission, str(via_mission))
         situation = with_home_option(with_parameter_file(situation, vehicle), home)
         if request.repairs and situation.ardupilot is False:
             raise LogError(f"{log}: {not_ardupilot(situation.system, None)}", file=str(log))

@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from mavlink_bridge.cli.field_files import NO_OPTIONS, MapOptions, read_mission_file
 from mavlink_bridge.cli.values import metres_or, position_from
 from mavlink_bridge.errors import UsageError
+from missions.request import End, Method, Order, RepairMission, Request, conditions, request_of
 
-if TYPE_CHECKING:
-    from missions.request import Request
-
-METHODS = ("optimal", "pbpp-taut", "pbpp")
-ORDERS = ("given", "best")
-ENDS = ("hold", "loiter", "rtl")
+METHODS, ORDERS, ENDS = tuple(Method), tuple(Order), tuple(End)
 _OWN = "own"
 
 
@@ -29,11 +23,9 @@ def request_from_options(
     UsageError
         An option is not what it has to be.
     """
-    from missions.request import Request  # noqa: PLC0415
-
     if method not in METHODS:
         raise UsageError(f"--method {method!r}: expected one of {', '.join(METHODS)}")
-    return Request(
+    return request_of(
         start=position_from("--start", start) if start is not None else None,
         targets=tuple(position_from("--target", target) for target in targets),
         clearance_m=metres_or("--clearance", clearance, "max"),
@@ -64,7 +56,7 @@ def with_tour(
         if value not in known:
             raise UsageError(f"{option} {value!r}: expected one of {', '.join(known)}")
     if via is None:
-        return replace(request, order=order, comes_back=comes_back, end=end)
+        return request_of(**{**request.words(), "order": order, "comes_back": comes_back, "end": end})
     if request.targets or comes_back or (order, end) != ("given", "hold"):
         raise UsageError(
             "--via-mission keeps the mission's own places, order and end; it does not go with --target, --order, --return, --end"
@@ -76,6 +68,5 @@ def with_tour(
             "--via-mission keeps the mission's own speeds and goes by the drive model; it does not go with --speed, "
             "--corner-allowance, --escape"
         )
-    if via == _OWN:
-        return replace(request, via_own=True)
-    return replace(request, via=read_mission_file(Path(via), maps.of_another_file()))
+    mission = None if via == _OWN else read_mission_file(Path(via), maps.of_another_file())
+    return RepairMission(**conditions(request), mission=mission)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,15 +22,9 @@ def write_outputs(
 ) -> list[Path]:
     """Write the mission and draw the plan; return the files."""
     from mavlink_bridge.cli.kept_files import write_kept  # noqa: PLC0415 - quick help
-    from missions.formats import write_mission  # noqa: PLC0415
-    from missions.situation import Known, Mission  # noqa: PLC0415
 
-    mission = Mission(planned.items, planned.home or planned.start)
-    to_write = replace(
-        situation, mission=Known(mission, None, "pbpp plan"), fence=Known(planned.fence, None, "pbpp plan")
-    )
     for path in outputs:
-        write_mission(to_write, path, write=write_kept)
+        planned.write(path, situation, write=write_kept)
     return [*outputs, *draw(planned, plots, blocks=blocks)]
 
 

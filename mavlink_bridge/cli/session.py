@@ -14,20 +14,16 @@ from mavlink_bridge.cli.link_notes import LinkNotes
 from mavlink_bridge.errors import LinkError, OutcomeError, RefusedError
 from mavlink_bridge.link import open_link, parse_connection
 from mavlink_bridge.mavlink.messages import (
-    AUTOPILOT_VERSION_ID,
     Autopilot,
-    CommandLong,
-    ModeFlag,
-    RequestDataStream,
 )
-from mavlink_bridge.mavlink.rover import AUTO_MODE, MODE_NAMES
+from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.mavlink.vehicles import not_ardupilot
 from mavlink_bridge.protocol.ask_version import AskVersion
-from mavlink_bridge.protocol.command import SendCommand
 from mavlink_bridge.protocol.find import FindVehicle, identity_shared, identity_taken
+from mavlink_bridge.protocol.mode_switch import ModeSwitch
 from mavlink_bridge.protocol.peer import Peer
+from mavlink_bridge.protocol.telemetry import stream_requests
 from mavlink_bridge.protocol.vehicle_watch import VehicleWatch
-from missions.items import Command
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -44,13 +40,9 @@ _MODE_PATIENCE_S = 5.0
 _HEARTBEAT_PATIENCE_S = 5.0
 """A heartbeat comes every second; over a bad link some are lost."""
 
-_STREAMS = (6, 2)
-"""MAV_DATA_STREAM_POSITION and _EXTENDED_STATUS, which holds GPS_RAW_INT."""
-_STREAM_HZ = 4  # positions often enough to follow a drive; chosen, not measured
-
 
 @dataclass(frozen=True, slots=True)
-class Address:
+class Contact:
     """Where the vehicle is and as whom we speak.
 
     Parameters
@@ -84,7 +76,7 @@ class Session:
     ----------
     link : Link
         The open link.
-    address : Address
+    contact : Contact
         Which vehicle.
     show : callable
         Moves the progress bar: text, steps done, steps in all.
@@ -108,17 +100,17 @@ class Session:
         Somebody else on the link speaks with our ids.
     """
 
-    def __init__(self, link: Link, address: Address, show: Callable[[str, int, int], None]) -> None:
+    def __init__(self, link: Link, contact: Contact, show: Callable[[str, int, int], None]) -> None:
         self.link = link
-        self._connection = address.connection
+        self._connection = contact.connection
         self._show = show
         self._notes = LinkNotes()
         self._machine: Machine | None = None
         self._has_written = self._is_refused = self._has_clashed = False
         finder = FindVehicle(
-            address.system,
-            any_vehicle=address.any_vehicle,
-            patience_s=address.timeout_s,
+            contact.system,
+            any_vehicle=contact.any_vehicle,
+            patience_s=contact.timeout_s,
             identity=link.identity,
         )
         self.watch = VehicleWatch()
@@ -201,7 +193,7 @@ class Session:
             raise identity_taken(self.link.identity)
         self._has_written = self._has_written or getattr(machine, "has_written", False)
 
-    def change_mode(self, mode: int) -> None:
+    def change_mode(self, mode: Mode) -> None:
         """Switch the vehicle's mode and wait until its heartbeat reports it.
 
         Raises
@@ -211,47 +203,27 @@ class Session:
         OutcomeError
             It accepted but does not show the mode, or did not answer; or it is to drive, and somebody else has our ids.
         """
-        name = MODE_NAMES[mode]
-        if mode == AUTO_MODE and self._has_clashed:
+        name = mode.name
+        if mode == Mode.AUTO and self._has_clashed:
             raise identity_shared(
                 self.link.identity, "the vehicle is not switched to AUTO; what was uploaded is on it"
             )
-        peer = self.vehicle
-        flags = float(ModeFlag.CUSTOM_MODE_ENABLED)
-        message = CommandLong(
-            peer.system, peer.component, Command.DO_SET_MODE, param1=flags, param2=float(mode)
-        )
-        command = SendCommand(peer, message)
+        switch = ModeSwitch(self.vehicle, mode)
         self._has_changed_mode = True
-        self.run(command, f"switching to {name}")
-        outcome = command.outcome
-        assert outcome is not None
-        if outcome.result is not None and not outcome.is_accepted:
-            texts = "".join(f"; {text}" for text in outcome.texts)
-            raise RefusedError(
-                f"the vehicle refused mode {name}: {outcome.result.name}{texts}", result=outcome.result.name
-            )
+        self.run(switch, f"switching to {name}")
+        if switch.is_refused:
+            result, texts = switch.result_name, "".join(f"; {text}" for text in switch.texts)
+            raise RefusedError(f"the vehicle refused mode {name}: {result}{texts}", result=result)
         if not self.listen_until(lambda: self._is_in(mode), _MODE_PATIENCE_S):
             raise OutcomeError(f"the vehicle does not show mode {name}", mode=name)
 
     def ask_telemetry(self) -> None:
-        """Ask for the position, its quality and the firmware's version, which not every link gets unasked."""
-        peer = self.vehicle
-        self.link.send_all(
-            [
-                *(
-                    RequestDataStream(peer.system, peer.component, stream, _STREAM_HZ, 1)
-                    for stream in _STREAMS
-                ),
-                CommandLong(
-                    peer.system, peer.component, Command.REQUEST_MESSAGE, param1=AUTOPILOT_VERSION_ID
-                ),
-            ]
-        )
+        """Ask for the position, its quality and the mission's state, which not every link gets unasked."""
+        self.link.send_all(stream_requests(self.vehicle))
 
     def listen_until(self, is_enough: Callable[[], bool], for_s: float) -> bool:
         """Listen until a condition holds, no longer than a time; return whether it does."""
-        self.link.run(_Listen(for_s), on_frames=self._listen, until=is_enough)
+        self.link.listen(for_s, on_frames=self._listen, until=is_enough)
         return is_enough()
 
     def _is_in(self, mode: int) -> bool:
@@ -309,7 +281,7 @@ def signing_of(key_file: Path | None) -> Signing | None:
 
 
 @contextmanager
-def open_session(address: Address, show: Callable[[str, int, int], None]) -> Iterator[Session]:
+def open_session(contact: Contact, show: Callable[[str, int, int], None]) -> Iterator[Session]:
     """Open the link, find the vehicle, and close the link at the end.
 
     Raises
@@ -320,32 +292,9 @@ def open_session(address: Address, show: Callable[[str, int, int], None]) -> Ite
         The signing key cannot be used.
     """
     with open_link(
-        address.connection,
-        address.identity,
-        signing=signing_of(address.key_file),
-        timeout_s=address.timeout_s,
+        contact.connection,
+        contact.identity,
+        signing=signing_of(contact.key_file),
+        timeout_s=contact.timeout_s,
     ) as link:
-        yield Session(link, address, show)
-
-
-class _Listen:
-    """A machine that sends nothing and ends after a while."""
-
-    progress = (0, 0)
-
-    def __init__(self, for_s: float) -> None:
-        self.bound_s = for_s
-        self.deadline_s: float | None = None
-        self.is_done = False
-
-    def start(self, now_s: float) -> None:
-        self.deadline_s = now_s + self.bound_s
-
-    def receive(self, frame: Frame, now_s: float) -> None:
-        pass
-
-    def handle_timer(self, now_s: float) -> None:
-        self.is_done = self.deadline_s is not None and now_s >= self.deadline_s
-
-    def messages_to_send(self) -> list[Any]:
-        return []
+        yield Session(link, contact, show)

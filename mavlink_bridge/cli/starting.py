@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.errors import BridgeError, OutcomeError, RefusedError
 from mavlink_bridge.mavlink.messages import MissionType
-from mavlink_bridge.mavlink.rover import AUTO_MODE, HOLD_MODE, MODE_NAMES
+from mavlink_bridge.mavlink.rover import Mode, plain_mode_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -37,7 +37,7 @@ def make_ready(session: Session, *, hold: bool, replace_active: bool) -> None:
     if not session.is_active:
         return
     if hold:
-        session.change_mode(HOLD_MODE)
+        session.change_mode(Mode.HOLD)
     elif not replace_active:
         raise RefusedError(
             "the vehicle is armed and drives its mission in AUTO; nothing was written",
@@ -73,20 +73,20 @@ def start_driving(session: Session) -> None:
         )
     doing = session.doing
     if not doing.is_armed:
-        mode = MODE_NAMES.get(doing.mode or 0, f"mode {doing.mode}")
-        drives_off = ": arming it makes it drive" if doing.mode == AUTO_MODE else ""
+        mode = plain_mode_name(doing.mode or Mode.MANUAL)
+        drives_off = ": arming it makes it drive" if doing.mode == Mode.AUTO else ""
         raise OutcomeError(
             f"all is verified on the vehicle, which is not armed and does not drive: its mode was left alone ({mode}{drives_off})",
             advice=_ADVICE,
             mode=mode,
         )
-    if doing.mode == AUTO_MODE and doing.has_completed:
-        session.change_mode(HOLD_MODE)  # AUTO begins anew only out of another mode
+    if doing.mode == Mode.AUTO and doing.has_completed:
+        session.change_mode(Mode.HOLD)  # AUTO begins anew only out of another mode
     session.drives_by_us = True
     try:
-        session.change_mode(AUTO_MODE)
+        session.change_mode(Mode.AUTO)
     finally:
-        if session.doing.mode != AUTO_MODE and session.doing.is_fresh:
+        if session.doing.mode != Mode.AUTO and session.doing.is_fresh:
             session.drives_by_us = False
     if not session.doing.is_armed:
         session.drives_by_us = False
@@ -97,7 +97,7 @@ def _put_back(session: Session) -> OutcomeError:
     """Take a vehicle that is disarmed out of AUTO, and return what came of it."""
     what = "all is verified on the vehicle, but it was disarmed when it went to AUTO"
     try:
-        session.change_mode(HOLD_MODE)
+        session.change_mode(Mode.HOLD)
     except BridgeError as error:
         return OutcomeError(
             f"{what}, and it is still in AUTO, where arming it makes it drive: {error}", advice=_ADVICE

@@ -6,15 +6,19 @@ import time
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from missions.planned import Plan
     from missions.request import Request
     from missions.situation import Situation
 
 
-def timed_plan(situation: Situation, request: Request) -> tuple[Plan, float]:
+def timed_plan(
+    situation: Situation, request: Request, *, should_stop: Callable[[], bool] | None = None
+) -> tuple[Plan, float]:
     """Return a plan, and how long planning took."""
-    from missions.tour.tour import plan_tour  # noqa: PLC0415 - quick help
+    from missions.planning.plan import plan  # noqa: PLC0415 - quick help
 
     begun_s = time.perf_counter()
-    planned = plan_tour(situation, request)
+    planned = plan(situation, request, should_stop=should_stop)
     return planned, time.perf_counter() - begun_s

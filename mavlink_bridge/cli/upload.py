@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from mavlink_bridge.backup.store import BackupStore
-    from mavlink_bridge.cli.session import Address, Session
+    from mavlink_bridge.cli.session import Contact, Session
     from mavlink_bridge.cli.uploading import Done, Lists
     from missions.items import MissionItem
 
@@ -125,13 +125,13 @@ def upload(
 
     from mavlink_bridge.backup.store import BackupStore  # noqa: PLC0415 - usage errors need not wait for it
     from mavlink_bridge.cli.interrupting import interruptible, terminable  # noqa: PLC0415
-    from mavlink_bridge.cli.session import Address, open_session  # noqa: PLC0415
+    from mavlink_bridge.cli.session import Contact, open_session  # noqa: PLC0415
     from mavlink_bridge.cli.starting import fence_warnings, make_ready, start_driving  # noqa: PLC0415
 
-    address = Address(connect, (source_system, source_component), system, any_vehicle, timeout, signing_key)
+    contact = Contact(connect, (source_system, source_component), system, any_vehicle, timeout, signing_key)
     store = BackupStore()
     if forget:
-        _forget(store, address, json_output=json_output, quiet=quiet)
+        _forget(store, contact, json_output=json_output, quiet=quiet)
         return
 
     from mavlink_bridge.cli.uploading import Uploads  # noqa: PLC0415
@@ -139,7 +139,7 @@ def upload(
     with (
         terminable(),
         progress_bar(quiet=quiet or json_output) as show,
-        open_session(address, show) as session,
+        open_session(contact, show) as session,
     ):
         uploads = Uploads(session, store, replace_active=replace_active)
         with interruptible(session.at_hand(show.aside, uploads.on_it)), uploads.begin():
@@ -164,15 +164,15 @@ def _restoration(file: Path | None, *, for_another: bool) -> Restoration:
     return Restoration(read_backup(file) if file else None, for_another)
 
 
-def _forget(store: BackupStore, address: Address, *, json_output: bool, quiet: bool) -> None:
+def _forget(store: BackupStore, contact: Contact, *, json_output: bool, quiet: bool) -> None:
     """Put notes aside: all that there are, those of a system id, or those that may be about the vehicle on a link."""
-    if address.connection:
+    if contact.connection:
         from mavlink_bridge.cli.session import open_session  # noqa: PLC0415 - usage errors need not wait for it
 
-        with progress_bar(quiet=quiet or json_output) as show, open_session(address, show) as session:
+        with progress_bar(quiet=quiet or json_output) as show, open_session(contact, show) as session:
             notes = store.interrupted(session.which_vehicle())
     else:
-        notes = [note for note in store.notes() if address.system in (None, note.vehicle.system)]
+        notes = [note for note in store.notes() if contact.system in (None, note.vehicle.system)]
     put_aside = store.forget(notes)
     document = [
         {

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from mavlink_bridge.backup.store import BackupStore
+from mavlink_bridge.backup.upload_note import UploadNote
 from mavlink_bridge.backup.vehicle_lock import VehicleLock
-from mavlink_bridge.backup.vehicle_mark import Kinship
 from mavlink_bridge.errors import LinkError, OutcomeError, RefusedError
 from mavlink_bridge.link import now_s
 from mavlink_bridge.mavlink.messages import MissionType
@@ -16,6 +16,7 @@ from mavlink_bridge.protocol.limits import Limits
 from mavlink_bridge.protocol.outcomes import Writing, end_of_parameters, ends_in_words, upload_trouble
 from mavlink_bridge.protocol.parameters import ReadParameters, SetParameter
 from mavlink_bridge.protocol.verified_upload import Held, VerifiedUpload
+from missions.vehicle.asked_parameters import STORAGE_NAMES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -138,10 +139,8 @@ class Uploads:
     def _write_list(
         self, mission_type: MissionType, items: tuple[MissionItem, ...], limits: Limits, restored: Path | None
     ) -> None:
-        session, store, vehicle = self._session, self._store, self.vehicle
-        name = mission_type.name.lower()
-        earlier = store.interrupted(vehicle, mission_type)
-        was_interrupted = any(vehicle.kinship(note.vehicle) is Kinship.SAME for note in earlier)
+        session, name = self._session, mission_type.name.lower()
+        note = UploadNote(self._store, self.vehicle, mission_type)
         machine = VerifiedUpload(
             session.vehicle,
             mission_type,
@@ -154,24 +153,22 @@ class Uploads:
 
         def step() -> None:
             if (old := machine.pending_backup) is not None:
-                self._writing = Writing(name, machine, store.begin(vehicle, mission_type, old))
+                self._writing = Writing(name, machine, note.begin(old))
                 machine.backup_stored(now_s())
 
         begun_s = time.monotonic()
         try:
             session.run(machine, f"{name}: {len(items)} items", step)
         except BaseException:
-            if not machine.has_written and not was_interrupted:
-                store.end(vehicle, mission_type)
+            if not machine.has_written:
+                note.settle(Held.OLD)
             raise
         outcome = machine.outcome
         assert outcome is not None
+        note.settle(outcome.held, restored)
         if trouble := upload_trouble(outcome):
-            if outcome.held in (Held.OLD, Held.FOREIGN) and not was_interrupted:
-                store.end(vehicle, mission_type)
             raise trouble
-        store.end(vehicle, mission_type, restored)
-        self.done.append(Done(mission_type, outcome, self._writing.backup, time.monotonic() - begun_s))
+        self.done.append(Done(mission_type, outcome, note.backup, time.monotonic() - begun_s))
         self._writing = None
         if outcome.pushes:
             self._verified.append(name)
@@ -233,6 +230,6 @@ def _limits(session: Session, lists: Sequence[tuple[MissionType, tuple[MissionIt
     if not any(limits.problem(items, mission_type) for mission_type, items in lists):
         return limits
     # ARMING_CHECK is on every vehicle: an answer to it distinguishes a missing parameter from a lossy link.
-    reading = ReadParameters(session.vehicle, ("ARMING_CHECK", "BRD_SD_MISSION", "BRD_SD_FENCE"))
+    reading = ReadParameters(session.vehicle, ("ARMING_CHECK", *STORAGE_NAMES))
     session.run(reading, "reading the vehicle's limits")
     return Limits.from_parameters(reading.outcome.values) if reading.outcome else limits

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.fold import KINDS
+from mavlink_bridge.fold import KINDS, kinds_of
 from mavlink_bridge.mavlink import messages as m
 from missions.situation import ListKind
 
@@ -107,8 +107,7 @@ class ChangeWatch:
         if isinstance(message, m.MissionAck):
             if self._is_to_us(message) or message.type != m.MissionResult.ACCEPTED:
                 return set()
-            kind = KINDS.get(message.mission_type)
-            return set(ListKind) if message.mission_type == m.MissionType.ALL else {kind} if kind else set()
+            return set(kinds_of(message.mission_type))
         if isinstance(message, m.Statustext):
             text = message.text.lower()
             return {kind for start, kind in _TEXTS.items() if text.startswith(start)}

@@ -9,7 +9,7 @@ from mavlink_bridge.director.operator_watch import OperatorWatch
 from mavlink_bridge.director.states import TRANSITIONS, Cue, Signal, State
 from mavlink_bridge.director.steps import Steps
 from mavlink_bridge.director.voice import Voice
-from mavlink_bridge.mavlink.rover import AUTO_MODE
+from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.protocol.table_machine import TableMachine
 from mavlink_bridge.protocol.vehicle_watch import VehicleWatch
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from mavlink_bridge.director.orders import Orders
+    from mavlink_bridge.director.plan_task import PlanTask
     from mavlink_bridge.director.targets import Target
     from mavlink_bridge.errors import BridgeError
     from mavlink_bridge.mavlink.messages import Frame, Message
@@ -43,8 +44,8 @@ class Core(TableMachine[State, Cue]):
     ----------
     situation, before : Situation
         What is known, and what was before the newest frame.
-    moves : int
-        How often the state has moved; what is counted on only in one stay in a state remembers it.
+    plan_task : PlanTask or None
+        The plan that is to be made; it is waited for in one stay in a state, and dropped with it.
     peer : Peer or None
         The vehicle and our identity, once it was found.
     watch : VehicleWatch
@@ -63,7 +64,7 @@ class Core(TableMachine[State, Cue]):
         self, orders: Orders, situation: Situation, heed: Callable[[Iterable[Signal], float], None]
     ) -> None:
         super().__init__(TRANSITIONS, State.LISTENING)
-        self.moves = 0
+        self.plan_task: PlanTask | None = None
         self.orders = orders
         self.situation = self.before = situation
         self.trouble: BridgeError | MissionError | None = None
@@ -97,7 +98,7 @@ class Core(TableMachine[State, Cue]):
     @property
     def is_driving_ours(self) -> bool:
         """Whether the vehicle drives our mission, whoever started it."""
-        is_auto = bool(self.situation.armed) and self.situation.mode == AUTO_MODE
+        is_auto = bool(self.situation.armed) and self.situation.mode == Mode.AUTO
         return is_auto and self.has_our_mission
 
     def is_from_vehicle(self, frame: Frame) -> bool:
@@ -114,8 +115,15 @@ class Core(TableMachine[State, Cue]):
     def move(self, cue: Cue) -> bool:
         """Go where the table says; False where the state does not list the cue."""
         has_moved = self._move(cue)
-        self.moves += has_moved
+        if has_moved:
+            self.drop_plan_task()
         return has_moved
+
+    def drop_plan_task(self) -> None:
+        """Wait for no plan any more; one in the making is broken off."""
+        if self.plan_task is not None:
+            self.plan_task.is_dropped = True
+            self.plan_task = None
 
     # Speaking
 

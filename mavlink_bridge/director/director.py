@@ -19,7 +19,7 @@ in `handlers`.
 `Halter`            HOLD, and whether the vehicle stands
 `DriveSupervisor`   watches a drive until it has arrived
 `TargetInbox`       targets of all sources, answers to who asked, and a target that waits
-`RouteDesk`         has plans made, and checks the one that stands
+`RouteDesk`         has plans made, drops those nobody waits for, and checks the one that stands
 `MissionWriter`     a plan that stands → a verified mission on the vehicle
 `Starter`           the last look, arming, AUTO, the first item
 `HandOver`          who else has the vehicle: the operator, or the autopilot by a failsafe

@@ -10,7 +10,7 @@ from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.states import Cue, Notice, Signal, State
 from mavlink_bridge.errors import OutcomeError
 from mavlink_bridge.mavlink import messages as m
-from mavlink_bridge.mavlink.rover import AUTO_MODE
+from mavlink_bridge.mavlink.rover import Mode
 from missions.items import Command
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ class DriveSupervisor(Part):
 
     def resumed(self, now_s: float) -> None:
         """Watch a drive that we did not start just now."""
-        self.core.operator.expect(AUTO_MODE, set(), is_armed=True)
+        self.core.operator.expect(Mode.AUTO, set(), is_armed=True)
         self._is_our_start = False
         self._watch(self._resumed_text, now_s).item = self._item_now
 

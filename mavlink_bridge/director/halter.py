@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
-from mavlink_bridge.director.mode_switch import ModeSwitch
 from mavlink_bridge.director.orders import TargetSource
 from mavlink_bridge.director.states import Cue, Notice, Signal, State
 from mavlink_bridge.mavlink import messages as m
-from mavlink_bridge.mavlink.rover import AUTO_MODE, HOLD_MODE
+from mavlink_bridge.mavlink.rover import Mode
+from mavlink_bridge.protocol.mode_switch import ModeSwitch
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -108,7 +108,7 @@ class Halter(Part):
         core = self.core
         if core.peer is None:
             return False
-        if core.orders.hold and core.situation.armed and core.situation.mode == AUTO_MODE:
+        if core.orders.hold and core.situation.armed and core.situation.mode == Mode.AUTO:
             return True
         if not core.orders.drive:
             return False
@@ -120,7 +120,7 @@ class Halter(Part):
         """Return whether the vehicle may be on its way; a click sets it going before any heartbeat says so."""
         was_clicked = target is not None and target.is_click
         situation = self.core.situation
-        return was_clicked or (bool(situation.armed) and situation.mode != HOLD_MODE)
+        return was_clicked or (bool(situation.armed) and situation.mode != Mode.HOLD)
 
     # Stopping
 
@@ -156,7 +156,7 @@ class Halter(Part):
         """Switch to HOLD."""
         assert self.core.peer is not None
         self.expect_hold()
-        self.stopping = ModeSwitch(self.core.peer, HOLD_MODE, is_urgent=True, until_seen=self.may_be_in_auto)
+        self.stopping = ModeSwitch(self.core.peer, Mode.HOLD, is_urgent=True, until_seen=self.may_be_in_auto)
         self.stopping.start(now_s)
 
     def expect_hold(self) -> None:
@@ -164,8 +164,8 @@ class Halter(Part):
         situation = self.core.situation
         before = {situation.mode}
         if self.may_be_in_auto:
-            before.add(AUTO_MODE)
-        self.core.operator.expect(HOLD_MODE, before, is_armed=bool(situation.armed))
+            before.add(Mode.AUTO)
+        self.core.operator.expect(Mode.HOLD, before, is_armed=bool(situation.armed))
 
     def let_go(self) -> None:
         """Stop nothing any more."""
@@ -200,7 +200,7 @@ class Halter(Part):
         if self._held_at_s is None or now_s < self._held_at_s + _STOP_AT_LEAST_S:
             return False
         is_patience_over = (
-            now_s >= self._held_at_s + _STOP_PATIENCE_S and self.core.situation.mode == HOLD_MODE
+            now_s >= self._held_at_s + _STOP_PATIENCE_S and self.core.situation.mode == Mode.HOLD
         )
         if self._speed_mps <= _STILL_MPS or is_patience_over:
             return True

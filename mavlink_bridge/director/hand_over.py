@@ -16,7 +16,7 @@ from mavlink_bridge.director.steps import step
 from mavlink_bridge.director.takeover import Takeover, account_of
 from mavlink_bridge.errors import OutcomeError
 from mavlink_bridge.mavlink import messages as m
-from mavlink_bridge.mavlink.rover import AUTO_MODE, mode_name
+from mavlink_bridge.mavlink.rover import Mode, mode_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -140,7 +140,7 @@ class HandOver(Part):
         """Take a vehicle that is heard again out of our AUTO, where it was disarmed meanwhile."""
         was_in_auto_by_us, self.was_in_auto_by_us = self.was_in_auto_by_us, False
         situation = self.core.situation
-        if was_in_auto_by_us and situation.mode == AUTO_MODE and not situation.armed:
+        if was_in_auto_by_us and situation.mode == Mode.AUTO and not situation.armed:
             self._put_back("the vehicle was disarmed while it was not heard", now_s)
 
     def _put_back(self, what: str, now_s: float) -> None:

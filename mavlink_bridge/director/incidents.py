@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.takeover import DISARMING, Cause
 from mavlink_bridge.mavlink import messages as m
-from mavlink_bridge.mavlink.rover import HOLD_MODE, LOITER_MODE, RTL_MODE, SMART_RTL_MODE, mode_name
+from mavlink_bridge.mavlink.rover import Mode, mode_name
 from missions.checking.fence_place import fence_place
 
 if TYPE_CHECKING:
@@ -48,16 +48,16 @@ _BREACH_TYPES = {1: "minimum altitude", 2: "maximum altitude", 3: "boundary"}
 
 _ACTIONS: dict[int, frozenset[int]] = {
     0: frozenset(),
-    1: frozenset({RTL_MODE, HOLD_MODE}),
-    2: frozenset({HOLD_MODE}),
-    3: frozenset({SMART_RTL_MODE, RTL_MODE, HOLD_MODE}),
-    4: frozenset({SMART_RTL_MODE, HOLD_MODE}),
+    1: frozenset({Mode.RTL, Mode.HOLD}),
+    2: frozenset({Mode.HOLD}),
+    3: frozenset({Mode.SMART_RTL, Mode.RTL, Mode.HOLD}),
+    4: frozenset({Mode.SMART_RTL, Mode.HOLD}),
     5: frozenset({DISARMING}),
-    6: frozenset({LOITER_MODE, HOLD_MODE}),
+    6: frozenset({Mode.LOITER, Mode.HOLD}),
 }
 """What FENCE_ACTION and FS_ACTION let a Rover do: it goes to HOLD where it cannot do what is asked, or is more than 100 m outside."""
 
-_ANY_ACTION = frozenset({RTL_MODE, SMART_RTL_MODE, HOLD_MODE, LOITER_MODE, DISARMING})
+_ANY_ACTION = frozenset({Mode.RTL, Mode.SMART_RTL, Mode.HOLD, Mode.LOITER, DISARMING})
 _RADIO, _GCS, _EKF, _BATTERY = "radio failsafe", "ground station failsafe", "EKF failsafe", "battery failsafe"
 _CRASH, _TERMINATION = "crash check", "termination"
 _FAILSAFES: tuple[tuple[re.Pattern[str], str], ...] = (
@@ -72,9 +72,9 @@ _FAILSAFES: tuple[tuple[re.Pattern[str], str], ...] = (
 """Texts of failsafes, and what they are called."""
 
 _ACTIONS_OF = {
-    _EKF: frozenset({HOLD_MODE}),
-    _CRASH: frozenset({HOLD_MODE, DISARMING}),
-    _TERMINATION: frozenset({HOLD_MODE, DISARMING}),
+    _EKF: frozenset({Mode.HOLD}),
+    _CRASH: frozenset({Mode.HOLD, DISARMING}),
+    _TERMINATION: frozenset({Mode.HOLD, DISARMING}),
 }
 _FS_ACTION = frozenset({_RADIO, _GCS})
 """Failsafes whose answer is FS_ACTION's."""

@@ -9,44 +9,38 @@ from typing import TYPE_CHECKING
 from mavlink_bridge.backup.vehicle_mark import uid_of
 from mavlink_bridge.director.steps import Steps, step
 from mavlink_bridge.errors import BridgeError, LinkError
-from mavlink_bridge.fold import with_list
+from mavlink_bridge.fold import KINDS, with_list
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.protocol.ask_version import VERSION_PATIENCE_S, AskVersion
 from mavlink_bridge.protocol.command import SendCommand
 from mavlink_bridge.protocol.download import Download
-from mavlink_bridge.protocol.outcomes import download_refusal
+from mavlink_bridge.protocol.outcomes import list_read
 from mavlink_bridge.protocol.pace import MOST_S
 from mavlink_bridge.protocol.parameters import ReadParameters
-from mavlink_bridge.protocol.transitions import DownloadState
+from mavlink_bridge.protocol.table_machine import Outbox
+from mavlink_bridge.protocol.telemetry import stream_requests
 from missions.items import Command
 from missions.situation import ListKind
-from missions.vehicle import PARAMETER_NAMES
+from missions.vehicle.asked_parameters import ASKED_NAMES
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from mavlink_bridge.mavlink.messages import Frame, Message
     from mavlink_bridge.protocol.peer import Peer
+    from mavlink_bridge.protocol.undisturbed_read import UndisturbedRead
     from missions.items import MissionItem
     from missions.situation import Situation
 
-MISSION_TYPES = {
-    ListKind.MISSION: m.MissionType.MISSION,
-    ListKind.FENCE: m.MissionType.FENCE,
-    ListKind.RALLY: m.MissionType.RALLY,
-}
+MISSION_TYPES = {kind: m.MissionType(number) for number, kind in KINDS.items()}
 
-_POSITION_STREAM, _STATUS_STREAM = 6, 2
-_STREAM_HZ = 4  # what a drive is watched with; chosen, not measured
 _ASK_STREAMS_EVERY_S = 3.0  # until they come: a request may be lost; chosen, not measured
 _HOME_S = 60.0  # the longest that a command may take
 _FIX_PATIENCE_S = 3.0
 """What is promised rests on the fix, so that whether it is known must not be a matter of luck; not every vehicle tells it."""
-_MORE_NAMES = ("BRD_SD_MISSION", "BRD_SD_FENCE", "MIS_DONE_BEHAVE")
-"""How much it stores, and what it does at the end of a mission."""
 
 
-class Learning:
+class Learning(Outbox):
     """Learns a vehicle; a machine as all others, its outcome in `trouble` and `merged`.
 
     Parameters
@@ -57,6 +51,10 @@ class Learning:
         How long to wait for a position.
     kinds : sequence of ListKind
         The lists that are read.
+    read : callable
+        Returns the machine that reads one.
+    needs_position : bool
+        Whether it is a trouble where the vehicle tells no position.
 
     Attributes
     ----------
@@ -64,19 +62,32 @@ class Learning:
         What could not be learnt.
     uid : str
         The uid of the vehicle's board; empty where it tells none.
+    coarse : list of ListKind
+        The lists that came with positions as 32-bit floats, good to about a metre.
     """
 
-    def __init__(self, peer: Peer, patience_s: float, kinds: Sequence[ListKind]) -> None:
+    def __init__(
+        self,
+        peer: Peer,
+        patience_s: float,
+        kinds: Sequence[ListKind],
+        read: Callable[[Peer, m.MissionType], Download | UndisturbedRead] = Download,
+        *,
+        needs_position: bool = True,
+    ) -> None:
+        super().__init__()
         self.trouble: BridgeError | None = None
         self.uid = ""
         self._peer = peer
         self._patience_s = patience_s
         self._kinds = tuple(kinds)
+        self._read = read
+        self._needs_position = needs_position
+        self.coarse: list[ListKind] = []
         self._steps = Steps()
-        self._outgoing: list[Message] = []
         self._parameters: dict[str, float] = {}
         self._lists: dict[ListKind, tuple[MissionItem, ...]] = {}
-        self._has_position = False
+        self._awaits_position = True
         self._awaits_fix = True
         self._fix_until_s = 0.0
         self._streams_due_s = 0.0
@@ -85,7 +96,7 @@ class Learning:
     @property
     def is_done(self) -> bool:
         """Whether all is learnt, or something cannot be."""
-        return self.trouble is not None or (not self._steps and self._has_position and not self._awaits_fix)
+        return self.trouble is not None or (not (self._steps or self._awaits_position or self._awaits_fix))
 
     @property
     def progress(self) -> tuple[int, int]:
@@ -101,7 +112,7 @@ class Learning:
     @property
     def deadline_s(self) -> float | None:
         """When `handle_timer` wants to be called."""
-        times = [self._streams_due_s] if not self._has_position else []
+        times = [self._streams_due_s] if self._awaits_position else []
         if not self._steps:
             times.append(self._position_until_s)
             if self._awaits_fix:
@@ -118,9 +129,9 @@ class Learning:
         home = m.CommandLong(peer.system, peer.component, Command.GET_HOME_POSITION)
         self._steps.run(
             [
-                step(ReadParameters(peer, (*PARAMETER_NAMES, *_MORE_NAMES)), self._take_parameters),
+                step(ReadParameters(peer, ASKED_NAMES), self._take_parameters),
                 *(
-                    step(Download(peer, MISSION_TYPES[kind]), partial(self._take_list, kind))
+                    step(self._read(peer, MISSION_TYPES[kind]), partial(self._take_list, kind))
                     for kind in self._kinds
                 ),
                 # Which vehicle it is, and its firmware, which decides what some parameters are by default.
@@ -134,7 +145,7 @@ class Learning:
         """Take a frame."""
         message = frame.message
         if isinstance(message, m.GlobalPositionInt) and self._peer.accepts(frame):
-            self._has_position = self._has_position or (message.lat, message.lon) != (0, 0)
+            self._awaits_position = self._awaits_position and (message.lat, message.lon) == (0, 0)
         elif isinstance(message, m.GpsRawInt) and self._peer.accepts(frame):
             self._awaits_fix = False
         self._steps.receive(frame, now_s)
@@ -144,17 +155,17 @@ class Learning:
         self._steps.handle_timer(now_s)
         if not self._steps and now_s >= self._fix_until_s:
             self._awaits_fix = False
-        if not self._has_position:
+        if self._awaits_position:
             self._ask_streams(now_s)
             if not self._steps and now_s >= self._position_until_s:
-                self._fail(
-                    LinkError(f"the vehicle told no position within {self._patience_s:g} s (no GPS fix?)")
-                )
+                self._awaits_position = False
+                if self._needs_position:
+                    why = f"the vehicle told no position within {self._patience_s:g} s (no GPS fix?)"
+                    self._fail(LinkError(why))
 
     def messages_to_send(self) -> list[Message]:
         """Return and forget what is to be sent now."""
-        outgoing, self._outgoing = self._outgoing, []
-        return outgoing + self._steps.messages_to_send()
+        return super().messages_to_send() + self._steps.messages_to_send()
 
     def merged(self, situation: Situation, now_s: float) -> Situation:
         """Return a situation with what was learnt."""
@@ -166,9 +177,7 @@ class Learning:
     def _ask_streams(self, now_s: float) -> None:
         if now_s >= self._streams_due_s:
             self._streams_due_s = now_s + _ASK_STREAMS_EVERY_S
-            peer = self._peer
-            for stream in (_POSITION_STREAM, _STATUS_STREAM):
-                self._outgoing.append(m.RequestDataStream(peer.system, peer.component, stream, _STREAM_HZ, 1))
+            self._outgoing += stream_requests(self._peer)
 
     def _take_parameters(self, machine: ReadParameters, _now_s: float) -> None:
         outcome = machine.outcome
@@ -177,12 +186,14 @@ class Learning:
             return
         self._parameters = dict(outcome.values)
 
-    def _take_list(self, kind: ListKind, machine: Download, _now_s: float) -> None:
-        items = list_of(machine, kind)
+    def _take_list(self, kind: ListKind, machine: Download | UndisturbedRead, _now_s: float) -> None:
+        items = list_read(machine, kind)
         if isinstance(items, BridgeError):
             self._fail(items)
-        else:
-            self._lists[kind] = items
+            return
+        self._lists[kind] = items
+        if machine.outcome is not None and machine.outcome.is_coarse:
+            self.coarse.append(kind)
 
     def _take_version(self, machine: AskVersion, _now_s: float) -> None:
         self.uid = uid_of(machine.version)
@@ -204,15 +215,3 @@ def with_read_list(
     if kind is ListKind.FENCE and situation.fence_trouble is not None:
         return replace(situation, fence=None)
     return situation
-
-
-def list_of(machine: Download, kind: ListKind) -> tuple[MissionItem, ...] | BridgeError:
-    """Return what a finished download brought, or the error that it is."""
-    outcome = machine.outcome
-    if outcome is not None and outcome.is_complete:
-        return outcome.items
-    if outcome is not None and outcome.result is not None:
-        return download_refusal(str(kind), outcome.result)
-    if outcome is not None and outcome.state is DownloadState.TOO_SLOW:
-        return LinkError(f"the vehicle's {kind} could not be read: {outcome.shortfall}")
-    return LinkError(f"the vehicle's {kind} could not be read ({outcome.state if outcome else 'no outcome'})")

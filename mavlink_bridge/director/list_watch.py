@@ -10,13 +10,14 @@ from mavlink_bridge.director.changes import ChangeWatch
 from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.grounds import Grounds
-from mavlink_bridge.director.learning import MISSION_TYPES, list_of, with_read_list
+from mavlink_bridge.director.learning import MISSION_TYPES, with_read_list
 from mavlink_bridge.director.orders import TargetSource
 from mavlink_bridge.director.states import Notice, Signal, State
 from mavlink_bridge.director.steps import step
 from mavlink_bridge.errors import BridgeError
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.protocol.download import Download
+from mavlink_bridge.protocol.outcomes import list_read
 from missions.situation import ListKind
 from missions.vehicle import PARAMETER_NAMES
 from missions.vehicle.parameter_remarks import no_number_remarks
@@ -149,7 +150,7 @@ class ListWatch(Part):
 
     def _take_reread(self, kind: ListKind, machine: Download, now_s: float) -> Sequence[Signal]:
         """Take what a download brought; where nothing was answered, it stays suspect."""
-        items = list_of(machine, kind)
+        items = list_read(machine, kind)
         if isinstance(items, BridgeError):
             if machine.outcome is not None and machine.outcome.result is None:
                 self._suspect(kind)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.director.takeover import Takeover
 from mavlink_bridge.mavlink import messages as m
-from mavlink_bridge.mavlink.rover import AUTO_MODE, GUIDED_MODE, HOLD_MODE, RTL_MODE, mode_of
+from mavlink_bridge.mavlink.rover import Mode, mode_of
 from missions.items import Command
 
 if TYPE_CHECKING:
@@ -33,9 +33,9 @@ _LATE_CLICK_S = 3.0
 """A click that came to us at once may come to the vehicle so much later, by a radio that repeats it; chosen, not measured."""
 
 _MODE_OF_COMMAND = {
-    Command.NAV_RETURN_TO_LAUNCH: RTL_MODE,
-    Command.NAV_LOITER_UNLIM: HOLD_MODE,
-    Command.MISSION_START: AUTO_MODE,
+    Command.NAV_RETURN_TO_LAUNCH: Mode.RTL,
+    Command.NAV_LOITER_UNLIM: Mode.HOLD,
+    Command.MISSION_START: Mode.AUTO,
 }
 """Commands that ArduPilot answers with a change of mode."""
 
@@ -101,8 +101,8 @@ class OperatorWatch:
 
     def is_late_click(self, heartbeat: m.Heartbeat, now_s: float) -> bool:
         """Return whether a click has set the vehicle going after our HOLD, having come to it by a slower way than to us."""
-        is_guided = heartbeat.custom_mode == GUIDED_MODE
-        return is_guided and self._ours == HOLD_MODE and now_s - self._clicked_s <= _LATE_CLICK_S
+        is_guided = heartbeat.custom_mode == Mode.GUIDED
+        return is_guided and self._ours == Mode.HOLD and now_s - self._clicked_s <= _LATE_CLICK_S
 
     def overhear(self, frame: Frame, system: int, component: int, now_s: float) -> Takeover | None:
         """Return what somebody asks of the vehicle; None where it takes nothing out of our hands."""
@@ -116,9 +116,9 @@ class OperatorWatch:
         if _is_disarming(message):
             return Takeover(None, asker)
         mode = _mode_asked_for(message)
-        if mode is None or (mode == AUTO_MODE and self._ours == AUTO_MODE):
+        if mode is None or (mode == Mode.AUTO and self._ours == Mode.AUTO):
             return None
-        if mode == GUIDED_MODE and now_s - self._clicked_s <= _CLICK_S:
+        if mode == Mode.GUIDED and now_s - self._clicked_s <= _CLICK_S:
             return None
         return Takeover(mode, asker)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from missions.request import Request
+from missions.request import GoTo, Request
 
 
 class TargetSource(StrEnum):
@@ -70,7 +70,7 @@ class Orders:
     own_component: int = PATH_PLANNER_COMPONENT
     system: int | None = None
     any_vehicle: bool = False
-    request: Request = field(default_factory=Request)
+    request: Request = field(default_factory=GoTo)
     upload: bool = False
     drive: bool = False
     arm: bool = False

@@ -16,9 +16,11 @@ if TYPE_CHECKING:
     from missions.situation import Situation
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(eq=False, slots=True)
 class PlanTask:
     """A plan to be made; each is itself alone.
+
+    It is made in a thread of the shell's. A plain flag is all that passes between that and the director: one sets it, once, and the other reads it.
 
     Parameters
     ----------
@@ -26,15 +28,18 @@ class PlanTask:
         What was known when it was asked for.
     request : Request
         What is asked of it.
+    is_dropped : bool
+        Whether nobody waits for it any more.
     """
 
     situation: Situation
     request: Request
+    is_dropped: bool = False
 
-    def made(self, planner: Callable[[Situation, Request], Plan] = make_plan) -> Plan | MissionError:
-        """Return the plan, or why there is none; a defect of ours is one reason, and no end of what waits for the plan."""
+    def made(self, planner: Callable[..., Plan] = make_plan) -> Plan | MissionError:
+        """Return the plan, or why there is none: dropped, for one; a defect of ours is a reason too, and no end of what waits for the plan."""
         try:
-            return planner(self.situation, self.request)
+            return planner(self.situation, self.request, should_stop=lambda: self.is_dropped)
         except MissionError as error:
             return error
         except Exception as error:  # noqa: BLE001 - whatever it is, the vehicle must not lose its bridge by it

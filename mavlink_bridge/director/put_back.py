@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.mavlink.messages import CommandLong, Heartbeat, ModeFlag
-from mavlink_bridge.mavlink.rover import AUTO_MODE, HOLD_MODE
-from missions.items import Command
+from mavlink_bridge.mavlink.messages import Heartbeat, ModeFlag
+from mavlink_bridge.mavlink.rover import Mode
+from mavlink_bridge.protocol.mode_switch import set_mode
+from mavlink_bridge.protocol.table_machine import Outbox
 
 if TYPE_CHECKING:
-    from mavlink_bridge.mavlink.messages import Frame, Message
+    from mavlink_bridge.mavlink.messages import Frame
     from mavlink_bridge.protocol.peer import Peer
 
 _PATIENCE_S = 4.0
@@ -24,7 +25,7 @@ _STALE_S = 1.5
 _MOST_SENDS = 16  # as of a mode switch; chosen, not measured
 
 
-class PutBack:
+class PutBack(Outbox):
     """Switches a vehicle to HOLD as long as it is shown disarmed and in AUTO.
 
     Parameters
@@ -34,8 +35,8 @@ class PutBack:
     """
 
     def __init__(self, peer: Peer) -> None:
+        super().__init__()
         self._peer = peer
-        self._outgoing: list[Message] = []
         self._sends = 0
         self._until_s = 0.0
         self._sent_s = 0.0
@@ -56,7 +57,7 @@ class PutBack:
     @property
     def is_left_in_auto(self) -> bool:
         """Whether the vehicle was last shown disarmed and in AUTO all the same."""
-        return self._mode == AUTO_MODE and self._is_armed is False
+        return self._mode == Mode.AUTO and self._is_armed is False
 
     @property
     def was_needed(self) -> bool:
@@ -79,16 +80,11 @@ class PutBack:
         elif self._sends:
             self.is_done = now_s >= self._sent_s + _STALE_S
         else:
-            self.is_done = self._mode not in (AUTO_MODE, HOLD_MODE)
+            self.is_done = self._mode not in (Mode.AUTO, Mode.HOLD)
 
     def handle_timer(self, now_s: float) -> None:
         """Take notice that time has passed."""
         self.is_done = self.is_done or now_s >= self._until_s
-
-    def messages_to_send(self) -> list[Message]:
-        """Return and forget what is to be sent now."""
-        outgoing, self._outgoing = self._outgoing, []
-        return outgoing
 
     def _send_hold(self, now_s: float) -> None:
         if self._sends >= _MOST_SENDS:
@@ -96,14 +92,5 @@ class PutBack:
             return
         self._until_s = now_s + _PATIENCE_S
         self._sent_s = now_s
-        self._outgoing.append(
-            CommandLong(
-                self._peer.system,
-                self._peer.component,
-                Command.DO_SET_MODE,
-                self._sends,
-                param1=ModeFlag.CUSTOM_MODE_ENABLED,
-                param2=HOLD_MODE,
-            )
-        )
+        self._send(set_mode(self._peer, Mode.HOLD, self._sends))
         self._sends += 1

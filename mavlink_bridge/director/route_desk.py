@@ -40,9 +40,7 @@ class RouteDesk(Part):
         super().__init__(core)
         self._lists = lists
         self._driver = driver
-        self._task: PlanTask | None = None
         self._made: Plan | MissionError | None = None
-        self._moves = 0  # a task counts as long as the state has not moved since
         self._planned_on = Grounds.of(core.situation)
         self.is_own_idea = False
 
@@ -60,8 +58,7 @@ class RouteDesk(Part):
     @property
     def pending(self) -> PlanTask | None:
         """The plan that is waited for."""
-        is_waiting = self.core.state is State.PLANNING and self._moves == self.core.moves
-        return self._task if is_waiting and self._made is None else None
+        return self.core.plan_task if self._made is None else None
 
     def plan_made(self, task: PlanTask, made: Plan | MissionError, now_s: float) -> Sequence[Signal]:
         """Take a plan, or why there is none; what is not waited for any more is left."""
@@ -73,15 +70,15 @@ class RouteDesk(Part):
     def _go_on(self, now_s: float) -> Sequence[Signal]:
         """Have a plan made around what is known by now, and go on with the one that was."""
         core = self.core
-        if self._moves != core.moves:
-            self._forget_task()
+        if core.plan_task is None:
+            self._made = None
         if core.steps:
             return []
         if self._lists.is_outdated:
             self._lists.reread_suspects(now_s)
-        elif self._task is None:
+        elif core.plan_task is None:
             self._planned_on = Grounds.of(core.situation)
-            self._task = PlanTask(core.situation, self.request())
+            core.plan_task = PlanTask(core.situation, self.request())
         elif isinstance(self._made, MissionError):
             core.plan = None
             return [Cue.NO_PLAN]
@@ -89,10 +86,6 @@ class RouteDesk(Part):
             core.plan = self._made
             return [Cue.PLANNED]
         return []
-
-    def _forget_task(self) -> None:
-        self._task = self._made = None
-        self._moves = self.core.moves
 
     def no_plan(self, now_s: float) -> Sequence[Signal]:
         """Report why there is no plan."""
@@ -104,7 +97,7 @@ class RouteDesk(Part):
         """Return what is asked of the next plan: the orders' request, for the newest target, from where the vehicle is."""
         core, request = self.core, self.core.orders.request
         if core.target is not None and core.target.position not in request.targets:
-            request = replace(request, targets=(core.target.position,))
+            request = request.to(core.target.position)
         return request if core.orders.once else replace(request, start=None)
 
     # Whether the plan still holds
@@ -131,7 +124,7 @@ class RouteDesk(Part):
     def fence_changed(self, now_s: float) -> Sequence[Signal]:
         """Look at the route again, whose grounds are others than before."""
         core = self.core
-        self._forget_task()
+        core.drop_plan_task()
         if core.state is State.READY and core.target is not None:
             return [Notice.ROUTE_OUTDATED]
         if core.plan is None or core.state in _MAKING_A_ROUTE or core.state is State.ARRIVED:

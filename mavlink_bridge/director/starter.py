@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
-from mavlink_bridge.director.mode_switch import AwaitHeartbeat, ModeSwitch
 from mavlink_bridge.director.states import Cue, Signal
 from mavlink_bridge.director.steps import Step, step
 from mavlink_bridge.errors import OutcomeError, RefusedError
 from mavlink_bridge.mavlink import messages as m
-from mavlink_bridge.mavlink.rover import AUTO_MODE, HOLD_MODE, mode_name
+from mavlink_bridge.mavlink.rover import Mode, mode_name
 from mavlink_bridge.protocol.command import SendCommand
+from mavlink_bridge.protocol.mode_switch import AwaitHeartbeat, ModeSwitch
 from missions.items import Command
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class Starter(Part):
         if not situation.armed and not core.orders.arm:
             return self._refuse_unarmed(now_s)
         if (
-            situation.mode != HOLD_MODE
+            situation.mode != Mode.HOLD
         ):  # it starts from HOLD: any other mode is then known for somebody else's
             halter.command_hold(now_s)
             self.look_once_more(now_s)
@@ -74,7 +74,7 @@ class Starter(Part):
         """Leave the mode of a disarmed vehicle alone: in AUTO, arming it would drive off."""
         situation = self.core.situation
         mode = mode_name(situation.mode)
-        drives_off = ": arming it makes it drive" if situation.mode == AUTO_MODE else ""
+        drives_off = ": arming it makes it drive" if situation.mode == Mode.AUTO else ""
         trouble = OutcomeError(
             f"the mission is verified on the vehicle, which is not armed and does not drive: its mode was left alone ({mode}{drives_off})",
             advice=START_YOURSELF,
@@ -94,8 +94,8 @@ class Starter(Part):
         core, situation = self.core, self.core.situation
         assert core.peer is not None
         self._halter.may_be_in_auto = True
-        core.operator.expect(AUTO_MODE, {situation.mode}, is_armed=bool(situation.armed))
-        core.steps.run([step(ModeSwitch(core.peer, AUTO_MODE), self._in_auto)], now_s)
+        core.operator.expect(Mode.AUTO, {situation.mode}, is_armed=bool(situation.armed))
+        core.steps.run([step(ModeSwitch(core.peer, Mode.AUTO), self._in_auto)], now_s)
 
     def _in_auto(self, machine: ModeSwitch, now_s: float) -> Sequence[Signal]:
         if not machine.is_granted:

@@ -184,7 +184,7 @@ class TargetInbox(Part):
     @property
     def _rally_place(self) -> LatLon | None:
         rally = self.core.situation.rally
-        return rally.value[-1] if rally and rally.value else None
+        return rally.value[-1].position if rally and rally.value else None
 
 
 def _is_same(a: LatLon | None, b: LatLon | None) -> bool:

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.director.addressed import is_command_to
 from mavlink_bridge.director.orders import TargetSource
+from mavlink_bridge.fold import TargetMessage
 from mavlink_bridge.mavlink import messages as m
-from mavlink_bridge.mavlink.rover import GUIDED_MODE
+from mavlink_bridge.mavlink.rover import Mode
 from missions.geo import distance_m, from_e7
 
 if TYPE_CHECKING:
@@ -16,10 +17,10 @@ if TYPE_CHECKING:
     from missions.geo import LatLon
     from missions.situation import Situation
 
-_SOURCES = {
-    "DO_REPOSITION": TargetSource.REPOSITION,
-    "SET_POSITION_TARGET_GLOBAL_INT": TargetSource.POSITION_TARGET,
-    "MISSION_ITEM with current 2": TargetSource.GUIDED_ITEM,
+_SOURCES: dict[str, TargetSource] = {
+    TargetMessage.REPOSITION: TargetSource.REPOSITION,
+    TargetMessage.POSITION_TARGET: TargetSource.POSITION_TARGET,
+    TargetMessage.GUIDED_ITEM: TargetSource.GUIDED_ITEM,
 }
 _CLICKS = frozenset(
     {TargetSource.REPOSITION, TargetSource.POSITION_TARGET, TargetSource.GUIDED_ITEM, TargetSource.ECHO}
@@ -61,7 +62,7 @@ class Target:
     def sets_going(self, mode: int | None) -> bool:
         """Return whether it has made a vehicle in this mode drive straight to it."""
         is_command = self.source is TargetSource.REPOSITION
-        return self.is_click and (is_command or mode == GUIDED_MODE)
+        return self.is_click and (is_command or mode == Mode.GUIDED)
 
 
 class TargetWatch:
@@ -117,7 +118,7 @@ class TargetWatch:
     def _echoed(self, frame: Frame, after: Situation) -> Target | None:
         """Take the vehicle's echo for a target: in GUIDED only, in AUTO it may be a corner of its own avoidance."""
         message = frame.message
-        if not isinstance(message, m.PositionTargetGlobalInt) or after.mode != GUIDED_MODE:
+        if not isinstance(message, m.PositionTargetGlobalInt) or after.mode != Mode.GUIDED:
             return None
         if frame.system != after.system or (message.lat_int, message.lon_int) == (0, 0):
             return None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from typing import TYPE_CHECKING, Final
 
-from mavlink_bridge.logbook.grade import STANDING_MPS, DriveGrader, Field, Grade, way_of
+from mavlink_bridge.logbook.grade import STANDING_MPS, DriveGrader, Grade, GradedField, way_of
 from mavlink_bridge.mavlink.modes import drives_mission
 
 if TYPE_CHECKING:
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from mavlink_bridge.logbook.track import FenceMeter, Fix
+    from mavlink_bridge.logbook.track import FenceMeter, TrackFix
     from missions.ground.frame import LocalFrame
     from missions.situation import Situation
     from missions.vehicle import Vehicle
@@ -31,12 +31,12 @@ class Drives:
     def __init__(self) -> None:
         self.grades: list[Grade] = []
         self._grader: DriveGrader | None = None
-        self._recent: deque[Fix] = deque(maxlen=_MOST_RECENT)
+        self._recent: deque[TrackFix] = deque(maxlen=_MOST_RECENT)
 
     def drive(
         self,
         situation: Situation,
-        fixes: Sequence[Fix],
+        fixes: Sequence[TrackFix],
         clearances_m: NDArray[np.float64] | None,
         vehicle: Vehicle,
         frame: LocalFrame,
@@ -46,7 +46,7 @@ class Drives:
         if not _is_driving(situation):
             self.end()
         elif self._grader is None:
-            self._begin(situation, fixes[0], Field(frame, meter, vehicle))
+            self._begin(situation, fixes[0], GradedField(frame, meter, vehicle))
         if self._grader is not None:
             self._grader.drive(fixes, clearances_m)
         self._recent.extend(fixes)
@@ -62,7 +62,7 @@ class Drives:
         if grader is not None and (grade := grader.finish()) is not None:
             self.grades.append(grade)
 
-    def _begin(self, situation: Situation, first: Fix, field: Field) -> None:
+    def _begin(self, situation: Situation, first: TrackFix, field: GradedField) -> None:
         assert situation.mission is not None
         home_first = situation.ardupilot is not False
         way = way_of(situation.mission.value.items, max(int(home_first), first.item), home_first=home_first)
@@ -75,7 +75,7 @@ class Drives:
             clearances_m = field.meter.at_points(points) if field.meter else None
             self._grader.drive(before, clearances_m)
 
-    def _from_standing(self, first: Fix) -> list[Fix]:
+    def _from_standing(self, first: TrackFix) -> list[TrackFix]:
         """Return the positions shortly before, from the last at which it stood; none where it still stands or none is known."""
         if first.speed_mps <= STANDING_MPS:
             return []

@@ -6,17 +6,20 @@ What is predicted comes from the drive model (`missions.drive_model`), for the m
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 import shapely
 from shapely import LineString
 
+from missions.checking.execution import follow_mission
 from missions.drive_model import envelope
 from missions.drive_model.avoidance import with_avoidance
 from missions.errors import MissionError
+from missions.geo import LatLon
 from missions.items import Command
+from missions.situation import Mission
 from missions.vehicle import Autopilot
 
 if TYPE_CHECKING:
@@ -24,9 +27,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from mavlink_bridge.logbook.track import FenceMeter, Fix
+    from mavlink_bridge.logbook.track import FenceMeter, TrackFix
     from missions.drive_model import Envelope
-    from missions.geo import LatLon
     from missions.ground.frame import LocalFrame
     from missions.items import MissionItem
     from missions.vehicle import Vehicle
@@ -144,33 +146,37 @@ def way_of(items: Sequence[MissionItem], first_item: int, *, home_first: bool) -
     home_first : bool
         Whether seq 0 is home (ArduPilot), so that the items begin at seq 1.
     """
-    seqs: list[int] = []
-    positions: list[LatLon] = []
-    speeds: list[float | None] = []
-    stops: dict[int, float] = {}
-    odd: str | None = None
-    speed_mps: float | None = None
-    for seq, item in enumerate(items, start=int(home_first)):
-        if item.command == Command.DO_CHANGE_SPEED and item.params[1] > 0:
-            speed_mps = item.params[1]
-        if seq < first_item:
-            continue
-        is_navigation = item.command < Command.NAV_LAST
-        if odd is None and (item.command in _ODD or (is_navigation and item.command not in _PLAIN)):
-            odd = f"item {seq} (MAV_CMD {item.command})"
-        if item.is_placed:
-            seqs.append(seq)
-            positions.append(item.position)
-            speeds.append(speed_mps)
-            if item.command == Command.NAV_WAYPOINT and item.params[0] > 0:
-                stops[len(seqs)] = item.params[0]
-        elif item.command == Command.NAV_DELAY and seqs and item.params[0] > 0:
-            stops[len(seqs)] = stops.get(len(seqs), 0.0) + item.params[0]
-    return MissionWay(tuple(seqs), tuple(positions), tuple(speeds), stops, odd)
+    numbered = list(enumerate(items, start=int(home_first)))
+    odd = next((entry for entry in numbered if entry[0] >= first_item and _is_odd(entry[1])), None)
+    listed = Mission(tuple(map(_as_listed, items)))
+    legs = follow_mission(listed, LatLon(0.0, 0.0), most_legs=len(items) + 1).legs
+    seqs = [leg.last_item - 1 + int(home_first) for leg in legs]
+    to_come = [(seq, leg) for seq, leg in zip(seqs, legs, strict=True) if seq >= first_item]
+    return MissionWay(
+        seqs=tuple(seq for seq, _ in to_come),
+        positions=tuple(leg.end for _, leg in to_come),
+        speeds=tuple(leg.speed_mps for _, leg in to_come),
+        stops={number: leg.stop_s for number, (_, leg) in enumerate(to_come, 1) if leg.stop_s},
+        odd=None if odd is None else f"item {odd[0]} (MAV_CMD {odd[1].command})",
+    )
+
+
+def _is_odd(item: MissionItem) -> bool:
+    """Return whether the drive model cannot predict an item."""
+    is_navigation = item.command < Command.NAV_LAST
+    return item.command in _ODD or (is_navigation and item.command not in _PLAIN)
+
+
+def _as_listed(item: MissionItem) -> MissionItem:
+    """Return an item as the track is compared with it: the places in their order, whatever is odd about what happens there or between them."""
+    if item.command in _PLAIN:
+        return item
+    command = Command.NAV_WAYPOINT if item.is_placed else Command.DO_FENCE_ENABLE
+    return replace(item, command=command, params=(0.0, 0.0, 0.0, 0.0))
 
 
 @dataclass(frozen=True, slots=True)
-class Field:
+class GradedField:
     """What a drive is measured in: the plane, the fence where one is known, the vehicle by its parameters."""
 
     frame: LocalFrame
@@ -197,12 +203,12 @@ class DriveGrader:
     ----------
     way : MissionWay
         With at least one waypoint.
-    start : Fix
+    start : TrackFix
         Where the drive began.
-    field : Field
+    field : GradedField
     """
 
-    def __init__(self, way: MissionWay, start: Fix, field: Field) -> None:
+    def __init__(self, way: MissionWay, start: TrackFix, field: GradedField) -> None:
         self.way = way
         self._start = start
         self._field = field
@@ -223,7 +229,7 @@ class DriveGrader:
             ]
         )
 
-    def drive(self, fixes: Sequence[Fix], clearances_m: NDArray[np.float64] | None) -> None:
+    def drive(self, fixes: Sequence[TrackFix], clearances_m: NDArray[np.float64] | None) -> None:
         """Take positions, and what the track to each keeps to the fence."""
         tally = self._tally
         track = self._field.frame.to_local_array([fix.position for fix in (self._last, *fixes)])

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from mavlink_bridge.errors import LogError, VehicleNotFoundError
+from mavlink_bridge.logbook.log_situation import vehicle_of
 from mavlink_bridge.mavlink.messages import Heartbeat
-from mavlink_bridge.mavlink.vehicles import choose_vehicle, vehicles_heard
 from mavlink_bridge.tlog import TlogReader
 
 if TYPE_CHECKING:
@@ -39,11 +38,7 @@ def vehicle_frames(
     LogError
         The log is unusable, or holds no such vehicle, or several and none was chosen.
     """
-    heard = vehicles_heard(entry.frame for entry in TlogReader(path, {Heartbeat}))
-    try:
-        vehicle = choose_vehicle(heard, system, any_vehicle=any_vehicle)
-    except VehicleNotFoundError as error:
-        raise LogError(f"{path}: {error}", file=str(path)) from None
+    vehicle = vehicle_of(path, TlogReader(path, {Heartbeat}), system, any_vehicle=any_vehicle)
     return _frames(path, vehicle.system)
 
 

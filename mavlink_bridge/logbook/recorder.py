@@ -21,7 +21,7 @@ from mavlink_bridge.logbook.facts import (
     TrackPart,
     VehicleLog,
 )
-from mavlink_bridge.logbook.track import FenceMeter, Fix, Odometer, pieces
+from mavlink_bridge.logbook.track import FenceMeter, Odometer, TrackFix, pieces
 from mavlink_bridge.logbook.transfers import TRANSFER_TYPES, TransferWatch
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.modes import mode_name
@@ -29,7 +29,7 @@ from missions.errors import MissionError
 from missions.geo import distance_m
 from missions.ground.frame import MAX_LATITUDE_DEG, frame_around
 from missions.ground.from_situation import ground_for
-from missions.vehicle import PARAMETER_NAMES, Vehicle, vehicle_from_parameters
+from missions.vehicle import PARAMETER_NAMES, PX4_PREFIXES, Vehicle, vehicle_from_parameters
 from missions.vehicle.parameter_remarks import no_number_remarks
 
 if TYPE_CHECKING:
@@ -48,13 +48,12 @@ T = TypeVar("T")
 RECORDED = FOLDED | TRANSFER_TYPES | {m.MissionCurrent, m.MissionItemReached, m.FenceStatus}
 """The message types that a recorder looks at."""
 
-_PX4_PREFIXES = ("NAV_ACC_RAD", "RA_", "RD_", "RO_", "GF_")
 _BATCH: Final = 4096  # positions measured against the fence at once; chosen, it changes no answer
 _MOST_TARGETS, _MOST_INTRUSIONS = 1000, 1000  # the last ones are kept; chosen, bounds memory
 _SAME_M, _SAID_AGAIN_S = 0.2, 3.0  # within both a target is the same one repeated; chosen, not measured
 
 
-class Recorder:
+class VehicleRecorder:
     """Folds a vehicle's frames and notes what happens; positions are measured in batches, so memory does not grow with the log.
 
     Parameters
@@ -78,8 +77,8 @@ class Recorder:
         self._fences: list[tuple[float, Fence]] = []
         self._breaches: list[ReportedBreach] = []
         self._breach_count: int | None = None
-        self._batch: list[Fix] = []
-        self._before: Fix | None = None
+        self._batch: list[TrackFix] = []
+        self._before: TrackFix | None = None
         self._positions = self._without_fix = 0
         self._item = 0
         self._frame: LocalFrame | None = None
@@ -238,7 +237,7 @@ class Recorder:
             self._note("positions near a pole were not measured")
             return
         speed_mps = math.hypot(message.vx, message.vy) / 100
-        fix = Fix(
+        fix = TrackFix(
             now_s,
             message.time_boot_ms / 1000,
             pose.value.position,
@@ -311,7 +310,7 @@ class Recorder:
 
     def _note_nearest(
         self,
-        fixes: list[Fix],
+        fixes: list[TrackFix],
         track: NDArray[np.object_],
         points: NDArray[np.float64],
         clearances_m: NDArray[np.float64],
@@ -326,7 +325,7 @@ class Recorder:
 
     def _note_intrusions(
         self,
-        fixes: list[Fix],
+        fixes: list[TrackFix],
         track: NDArray[np.object_],
         points: NDArray[np.float64],
         depths_m: NDArray[np.float64],
@@ -364,4 +363,4 @@ def _is_other_ground(before: Situation, after: Situation) -> bool:
 
 
 def _matters(name: str) -> bool:
-    return name in PARAMETER_NAMES or name.startswith(_PX4_PREFIXES)
+    return name in PARAMETER_NAMES or name.startswith(PX4_PREFIXES)

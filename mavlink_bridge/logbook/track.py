@@ -26,7 +26,7 @@ _JOINED_M, _JOINED_S = 20.0, 3.0
 _MOST_POINTS: Final = 20_000  # of a track's parts; chosen, bounds memory and pictures
 
 
-class Fix(NamedTuple):
+class TrackFix(NamedTuple):
     """A position as GLOBAL_POSITION_INT reports it.
 
     Parameters
@@ -51,12 +51,12 @@ class Fix(NamedTuple):
     heading_deg: float | None
 
 
-def pieces(fixes: list[Fix], points: NDArray[np.float64]) -> NDArray[np.object_]:
+def pieces(fixes: list[TrackFix], points: NDArray[np.float64]) -> NDArray[np.object_]:
     """Return the track fix by fix as lines from the one before; as points at the first and where something is missing.
 
     Parameters
     ----------
-    fixes : list of Fix
+    fixes : list of TrackFix
     points : ndarray of float, shape (n, 2)
         Their places in metres.
     """
@@ -166,7 +166,7 @@ class Odometer:
         self._spacing_m = MOVED_M
         self._kept: tuple[float, float] | None = None
 
-    def drive(self, mode: str, fixes: list[Fix], points: NDArray[np.float64]) -> float:
+    def drive(self, mode: str, fixes: list[TrackFix], points: NDArray[np.float64]) -> float:
         """Take positions driven in a mode; return how far that was, in metres."""
         if not self.parts or self.parts[-1][0] != mode:
             joint = [self.parts[-1][1][-1]] if self.parts else []

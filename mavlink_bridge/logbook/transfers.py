@@ -6,14 +6,14 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.fold import KINDS
+from mavlink_bridge.fold import KINDS, kinds_of
 from mavlink_bridge.logbook.facts import Ending, Sender, Transfer, Way
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.protocol.wire import mission_result
-from missions.situation import ListKind
 
 if TYPE_CHECKING:
     from mavlink_bridge.mavlink.messages import Frame, Message
+    from missions.situation import ListKind
 
 _GUIDED = (2, 3)
 """MISSION_ITEM.current of what is no item but a target or an altitude."""
@@ -85,13 +85,9 @@ class TransferWatch:
 
     def _told(self, message: Message, now_s: float) -> None:
         if isinstance(message, m.MissionAck):
-            kinds = (
-                tuple(ListKind) if message.mission_type == m.MissionType.ALL else _kinds(message.mission_type)
-            )
-            for kind in kinds:
-                self._answered(kind, message, now_s)
-            return
-        for kind in _kinds(message.mission_type):  # type: ignore[attr-defined]
+            for each in kinds_of(message.mission_type):
+                self._answered(each, message, now_s)
+        elif (kind := _kind(message)) is not None:
             station = _addressee(message)
             if isinstance(message, m.MissionCount):
                 self._begin(kind, Way.READ_BACK, station, message.count, now_s)
@@ -103,11 +99,9 @@ class TransferWatch:
 
     def _asked(self, message: Message, sender: Sender, now_s: float) -> None:
         if isinstance(message, m.MissionClearAll):
-            is_all = message.mission_type == m.MissionType.ALL
-            for kind in tuple(ListKind) if is_all else _kinds(message.mission_type):
-                self._begin(kind, Way.CLEAR, sender, 0, now_s)
-            return
-        for kind in _kinds(message.mission_type):  # type: ignore[attr-defined]
+            for each in kinds_of(message.mission_type):
+                self._begin(each, Way.CLEAR, sender, 0, now_s)
+        elif (kind := _kind(message)) is not None:
             if isinstance(message, m.MissionCount):
                 self._begin(kind, Way.UPLOAD, sender, message.count, now_s)
             elif isinstance(message, m.MissionWritePartialList):
@@ -180,9 +174,8 @@ class TransferWatch:
         )
 
 
-def _kinds(mission_type: int) -> tuple[ListKind, ...]:
-    kind = KINDS.get(mission_type)
-    return (kind,) if kind else ()
+def _kind(message: Message) -> ListKind | None:
+    return KINDS.get(message.mission_type)  # type: ignore[attr-defined]
 
 
 def _addressee(message: Message) -> Sender | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -11,10 +12,14 @@ from typing import TYPE_CHECKING
 from mavlink_bridge.mavlink.messages import Autopilot, Capability
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from mavlink_bridge.mavlink.messages import AutopilotVersion
     from missions.situation import Situation
 
 _BANNER = re.compile(r"(?:ArduRover|APMrover2|Rover) V(\d{1,2})\.(\d{1,2})(?:\.(\d{1,2}))?")
+
+_MOST_NEWEST = 32  # about the root of a thousand parameters: then both kinds of copy cost the same
 
 
 def with_parameter(situation: Situation, name: str, value: float) -> Situation:
@@ -26,13 +31,54 @@ def with_parameter(situation: Situation, name: str, value: float) -> Situation:
         if situation.no_numbers.get(name) == str(value):
             return situation
         return replace(situation, no_numbers=MappingProxyType({**situation.no_numbers, name: str(value)}))
-    if situation.parameters.get(name) == value and name not in situation.no_numbers:
+    parameters, no_numbers = situation.parameters, situation.no_numbers
+    if name in no_numbers:
+        no_numbers = MappingProxyType({key: came for key, came in no_numbers.items() if key != name})
+    elif parameters.get(name) == value:
         return situation
-    return replace(
-        situation,
-        parameters=MappingProxyType({**situation.parameters, name: value}),
-        no_numbers=MappingProxyType({key: came for key, came in situation.no_numbers.items() if key != name}),
-    )
+    known = parameters if isinstance(parameters, Parameters) else Parameters(parameters)
+    return replace(situation, parameters=known.with_one(name, value), no_numbers=no_numbers)
+
+
+class Parameters(Mapping[str, float]):
+    """Parameters as they come, one by one.
+
+    What `with_one` returns shares all but the newest few with what it was made of, which stays as it is: to copy a thousand of them for each one that
+    comes took more than half of the time in which a log is folded.
+
+    Parameters
+    ----------
+    older : mapping of str to float
+        Not changed any more by anybody.
+    newest : mapping of str to float, optional
+        Those that came since; they count before the older ones.
+    """
+
+    __slots__ = ("_newest", "_older")
+
+    def __init__(self, older: Mapping[str, float], newest: Mapping[str, float] | None = None) -> None:
+        self._older = older
+        self._newest = newest or {}
+
+    def with_one(self, name: str, value: float) -> Parameters:
+        """Return these and one more, or one with another value."""
+        newest = {**self._newest, name: value}
+        if len(newest) < _MOST_NEWEST:
+            return Parameters(self._older, newest)
+        return Parameters({**self._older, **newest})
+
+    def __getitem__(self, name: str) -> float:
+        """Return a parameter's value."""
+        return self._newest[name] if name in self._newest else self._older[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Return the names, in the order in which they first came."""
+        yield from self._older
+        yield from (name for name in self._newest if name not in self._older)
+
+    def __len__(self) -> int:
+        """Return how many there are."""
+        return sum(1 for _ in self)
 
 
 def with_autopilot(situation: Situation, autopilot: int) -> Situation:

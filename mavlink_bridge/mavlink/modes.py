@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from mavlink_bridge.mavlink.messages import MavType
-from mavlink_bridge.mavlink.rover import AUTO_MODE, MODE_NAMES
+from mavlink_bridge.mavlink.rover import Mode, plain_mode_name
 
 _PX4_MAIN: Final = {
     1: "MANUAL",
@@ -47,7 +47,7 @@ def mode_name(mode: int, mav_type: int | None, *, ardupilot: bool | None) -> str
         name = _PX4_MAIN.get(main, f"mode {mode}")
         return f"{name}.{_PX4_AUTO.get(sub, sub)}" if main == _PX4_AUTO_MAIN and sub else name
     is_rover = mav_type in (None, MavType.GROUND_ROVER, MavType.SURFACE_BOAT)
-    return MODE_NAMES.get(mode, f"mode {mode}") if is_rover else f"mode {mode}"
+    return plain_mode_name(mode) if is_rover else f"mode {mode}"
 
 
 def drives_mission(mode: int | None, mav_type: int | None, *, ardupilot: bool | None) -> bool:
@@ -56,4 +56,4 @@ def drives_mission(mode: int | None, mav_type: int | None, *, ardupilot: bool | 
         return False
     if ardupilot is False:
         return (mode >> 16 & 0xFF, mode >> 24 & 0xFF) == (_PX4_AUTO_MAIN, _PX4_MISSION)
-    return mode == AUTO_MODE and mav_type in (None, MavType.GROUND_ROVER, MavType.SURFACE_BOAT)
+    return mode == Mode.AUTO and mav_type in (None, MavType.GROUND_ROVER, MavType.SURFACE_BOAT)

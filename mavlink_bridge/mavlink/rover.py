@@ -1,44 +1,45 @@
-"""What is ArduPilot Rover's own: its mode numbers."""
+"""What is ArduPilot Rover's own: its modes."""
 
 from __future__ import annotations
 
 import math
+from enum import IntEnum
 
-# HEARTBEAT.custom_mode of ArduPilot Rover (ROVER_MODE in ardupilotmega.xml).
-AUTO_MODE = 10
-HOLD_MODE = 4
-LOITER_MODE = 5
-RTL_MODE = 11
-SMART_RTL_MODE = 12
-GUIDED_MODE = 15
 
-MODE_NAMES = {
-    0: "MANUAL",
-    1: "ACRO",
-    3: "STEERING",
-    HOLD_MODE: "HOLD",
-    LOITER_MODE: "LOITER",
-    6: "FOLLOW",
-    7: "SIMPLE",
-    8: "DOCK",
-    9: "CIRCLE",
-    AUTO_MODE: "AUTO",
-    RTL_MODE: "RTL",
-    SMART_RTL_MODE: "SMART_RTL",
-    GUIDED_MODE: "GUIDED",
-    16: "INITIALISING",
-}
-"""HEARTBEAT.custom_mode by name."""
+class Mode(IntEnum):
+    """HEARTBEAT.custom_mode of ArduPilot Rover (ROVER_MODE in ardupilotmega.xml)."""
 
+    MANUAL = 0
+    ACRO = 1
+    STEERING = 3
+    HOLD = 4
+    LOITER = 5
+    FOLLOW = 6
+    SIMPLE = 7
+    DOCK = 8
+    CIRCLE = 9
+    AUTO = 10
+    RTL = 11
+    SMART_RTL = 12
+    GUIDED = 15
+    INITIALISING = 16
+
+
+_KNOWN = frozenset(Mode)
 _MOST_MODE = 0xFFFFFFFF
 """HEARTBEAT.custom_mode has 32 bits."""
+
+
+def plain_mode_name(mode: int) -> str:
+    """Return a mode's name; its number where Rover has no such mode."""
+    return Mode(mode).name if mode in _KNOWN else f"mode {mode}"
 
 
 def mode_name(mode: int | None) -> str:
     """Return a mode's name; its number, marked as unknown, where Rover has no such mode."""
     if mode is None:
         return "another mode"
-    return MODE_NAMES.get(mode, f"mode {mode} (unknown)")
+    return plain_mode_name(mode) + ("" if mode in _KNOWN else " (unknown)")
 
 
 def mode_of(param: float) -> int | None:

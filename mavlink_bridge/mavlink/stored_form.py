@@ -156,7 +156,7 @@ _KEPT_PARAMS: dict[int, tuple[Callable[[float], _Stored], ...]] = {
     42702: (_whole, _whole, _float16, _float16),  # NAV_SCRIPT_TIME
     42703: (_whole, _whole, _whole, _whole),  # NAV_ATTITUDE_TIME
 }
-_WITH_PLACE = frozenset(
+STORED_WITH_PLACE = frozenset(
     {
         Command.NAV_WAYPOINT,
         Command.NAV_LOITER_UNLIM,
@@ -324,7 +324,7 @@ def _stored(item: MissionItem, mission_type: MissionType) -> _StoredItem:
         return _StoredItem((command, _whole(item.alt_m)), place, 0.0)
     keepers = _KEPT_PARAMS.get(command, _KEEPS_ALL)
     params = tuple(keep(value) for keep, value in zip(keepers, item.params, strict=True))
-    if command not in _WITH_PLACE:
+    if command not in STORED_WITH_PLACE:
         return _StoredItem((command, params), place, item.alt_m, may_lose_place=True)
     frame = _FRAMES.get(int(item.frame), int(item.frame))
     return _StoredItem((command, frame, params), place, item.alt_m)

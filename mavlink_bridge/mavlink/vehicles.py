@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.mavlink.messages import Frame
 
 
-class Vehicle(NamedTuple):
+class HeardVehicle(NamedTuple):
     """A vehicle heard on a stream: its ids and its MAV_TYPE."""
 
     system: int
@@ -26,11 +26,11 @@ class Vehicle(NamedTuple):
         return self.type in (m.MavType.GROUND_ROVER, m.MavType.SURFACE_BOAT)
 
 
-def vehicles_heard(frames: Iterable[Frame]) -> list[Vehicle]:
+def vehicles_heard(frames: Iterable[Frame]) -> list[HeardVehicle]:
     """Return the vehicles (not ground stations, companions or other components) that sent a HEARTBEAT, in order of system id."""
     return sorted(
         {
-            Vehicle(frame.system, frame.component, frame.message.type)
+            HeardVehicle(frame.system, frame.component, frame.message.type)
             for frame in frames
             if isinstance(frame.message, m.Heartbeat) and is_vehicle(frame.message)
         }
@@ -42,7 +42,7 @@ def is_vehicle(heartbeat: m.Heartbeat) -> bool:
     return heartbeat.autopilot != m.Autopilot.INVALID and heartbeat.type != m.MavType.GCS
 
 
-def choose_vehicle(heard: Sequence[Vehicle], system: int | None, *, any_vehicle: bool) -> Vehicle:
+def choose_vehicle(heard: Sequence[HeardVehicle], system: int | None, *, any_vehicle: bool) -> HeardVehicle:
     """Choose the vehicle that is meant among those heard.
 
     Raises

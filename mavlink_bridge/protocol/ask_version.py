@@ -60,11 +60,6 @@ class AskVersion(TableMachine[VersionState, VersionEvent]):
         self._give_up_s = 0.0
 
     @property
-    def progress(self) -> tuple[int, int]:
-        """Whether it is done, as steps."""
-        return int(self.is_done), 1
-
-    @property
     def bound_s(self) -> float:
         """Longest time from the start to the end."""
         return VERSION_PATIENCE_S

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.errors import IdentityTakenError, LinkError, OutcomeError, VehicleNotFoundError
 from mavlink_bridge.mavlink.messages import Heartbeat
-from mavlink_bridge.mavlink.vehicles import Vehicle, choose_vehicle, is_vehicle
+from mavlink_bridge.mavlink.vehicles import HeardVehicle, choose_vehicle, is_vehicle
 from mavlink_bridge.protocol.table_machine import TableMachine
 from mavlink_bridge.protocol.transitions import FIND, FindEvent, FindState
 
@@ -60,22 +60,17 @@ class FindVehicle(TableMachine[FindState, FindEvent]):
         self._identity = identity
         self._own_component = own_component
         self._until_s = 0.0
-        self._heard: dict[tuple[int, int], tuple[Vehicle, Heartbeat, float]] = {}
+        self._heard: dict[tuple[int, int], tuple[HeardVehicle, Heartbeat, float]] = {}
         self._senders: dict[tuple[int, int], float] = {}  # and when each was heard last
-        self.vehicle: Vehicle | None = None
+        self.vehicle: HeardVehicle | None = None
         self.heartbeat: Heartbeat | None = None
         self.heard_s = 0.0
         self.trouble: LinkError | None = None
 
     @property
-    def outcome(self) -> Vehicle | LinkError | None:
+    def outcome(self) -> HeardVehicle | LinkError | None:
         """The vehicle, or why there is none; None while it runs."""
         return self.vehicle or self.trouble
-
-    @property
-    def progress(self) -> tuple[int, int]:
-        """Whether it is done, as steps."""
-        return int(self.is_done), 1
 
     @property
     def bound_s(self) -> float:
@@ -102,7 +97,7 @@ class FindVehicle(TableMachine[FindState, FindEvent]):
             return
         was_listening = self.state is FindState.LISTENING
         self._heard[frame.system, frame.component] = (
-            Vehicle(frame.system, frame.component, heartbeat.type),
+            HeardVehicle(frame.system, frame.component, heartbeat.type),
             heartbeat,
             now_s,
         )

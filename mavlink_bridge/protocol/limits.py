@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -67,9 +66,3 @@ def fence_bytes(items: Sequence[MissionItem]) -> int:
     return_points = sum(item.command == Command.FENCE_RETURN_POINT for item in items)
     # As measured on ArduPilot Rover 4.7.0-dev: 672 bytes hold one polygon of 83 vertices, 25 triangles or 51 circles.
     return 4 + 2 * round(polygons) + 8 * len(vertices) + 13 * circles + 9 * return_points
-
-
-def limit_in_text(text: str) -> int | None:
-    """Read the item limit from ArduPilot's STATUSTEXT "Only 655 items are supported"; None if it holds no limit."""
-    found = re.search(r"Only (\d+) items are supported", text)
-    return int(found[1]) if found else None

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.errors import BridgeError, DefectError, LinkError, OutcomeError, RefusedError
 from mavlink_bridge.mavlink.messages import MissionResult
+from mavlink_bridge.protocol.transitions import DownloadState
+from mavlink_bridge.protocol.undisturbed_read import UndisturbedRead
 from mavlink_bridge.protocol.verified_upload import Held, OutcomeKind
 from missions.errors import MissionError
 
@@ -19,8 +21,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
     from pathlib import Path
 
+    from mavlink_bridge.protocol.download import Download
     from mavlink_bridge.protocol.parameters import SetParameter
     from mavlink_bridge.protocol.verified_upload import VerifiedUpload, VerifiedUploadOutcome
+    from missions.items import MissionItem
 
 _HELD = {
     Held.WANTED: "the new list is on the vehicle",
@@ -250,7 +254,22 @@ def _ended(
     return ended
 
 
-def download_refusal(what: str, result: MissionResult) -> RefusedError:
+def list_read(machine: Download | UndisturbedRead, what: str) -> tuple[MissionItem, ...] | BridgeError:
+    """Return what a finished reading of a list brought, or the error that it is."""
+    outcome = machine.outcome
+    assert outcome is not None
+    if isinstance(machine, UndisturbedRead) and machine.is_disturbed:
+        return RefusedError(f"another station keeps writing the {what}: it was another one while it was read")
+    if outcome.is_complete:
+        return outcome.items
+    if outcome.state is DownloadState.BUSY:
+        return RefusedError(f"another ground station keeps the {what} busy (DENIED)", result="DENIED")
+    if outcome.result is not None:
+        return _download_refusal(what, outcome.result)
+    return LinkError(f"the {what} could not be read: {outcome.shortfall}")
+
+
+def _download_refusal(what: str, result: MissionResult) -> RefusedError:
     """Return the error that a refused download of a list is; an autopilot that does not know such lists may hold one all the same."""
     why = ""
     if what != "mission" and result is MissionResult.UNSUPPORTED:

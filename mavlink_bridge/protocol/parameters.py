@@ -360,11 +360,6 @@ class SetParameter(TableMachine[ParameterState, ParameterEvent]):
         return SetParameterOutcome(self._name, self._value, self._is_confirmed) if self.is_done else None
 
     @property
-    def progress(self) -> tuple[int, int]:
-        """Whether it is done, as steps."""
-        return int(self.is_done), 1
-
-    @property
     def bound_s(self) -> float:
         """Longest time from the start to the end, whatever the link does."""
         return PATIENCE_S

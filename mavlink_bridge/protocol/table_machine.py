@@ -14,7 +14,22 @@ StateT = TypeVar("StateT", bound="StrEnum")
 EventT = TypeVar("EventT", bound="StrEnum")
 
 
-class TableMachine(Generic[StateT, EventT]):
+class Outbox:
+    """Messages that wait to be sent."""
+
+    def __init__(self) -> None:
+        self._outgoing: list[Message] = []
+
+    def messages_to_send(self) -> list[Message]:
+        """Return what is to be sent now, in order, and forget it."""
+        outgoing, self._outgoing = self._outgoing, []
+        return outgoing
+
+    def _send(self, message: Message) -> None:
+        self._outgoing.append(message)
+
+
+class TableMachine(Outbox, Generic[StateT, EventT]):
     """A state that moves only by its table.
 
     Parameters
@@ -26,19 +41,19 @@ class TableMachine(Generic[StateT, EventT]):
     """
 
     def __init__(self, table: Mapping[StateT, Mapping[EventT, StateT]], state: StateT) -> None:
+        super().__init__()
         self._table = table
         self.state = state
-        self._outgoing: list[Message] = []
 
     @property
     def is_done(self) -> bool:
         """Whether the machine has come to its outcome and wants no more calls."""
         return not self._table[self.state]
 
-    def messages_to_send(self) -> list[Message]:
-        """Return what is to be sent now, in order, and forget it."""
-        outgoing, self._outgoing = self._outgoing, []
-        return outgoing
+    @property
+    def progress(self) -> tuple[int, int]:
+        """Whether it is done, as steps."""
+        return int(self.is_done), 1
 
     def _move(self, event: EventT) -> bool:
         """Go where the table leads; False if the state does not accept the event."""
@@ -47,6 +62,3 @@ class TableMachine(Generic[StateT, EventT]):
             return False
         self.state = following
         return True
-
-    def _send(self, message: Message) -> None:
-        self._outgoing.append(message)

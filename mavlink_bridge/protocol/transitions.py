@@ -446,6 +446,55 @@ FIND = {
     FindState.NOT_FOUND: {},
 }
 
+
+class SwitchState(StrEnum):
+    """Where a mode switch is."""
+
+    IDLE = auto()
+    SENT = auto()
+    ACCEPTED = auto()
+    SEEN = auto()
+    REFUSED = auto()
+    UNANSWERED = auto()
+
+
+class SwitchEvent(StrEnum):
+    """What moves it."""
+
+    START = auto()
+    ACCEPTED = auto()
+    REFUSED = auto()
+    SEEN = auto()
+    SILENCE = auto()
+
+
+MODE_SWITCH: dict[SwitchState, dict[SwitchEvent, SwitchState]] = {
+    SwitchState.IDLE: {SwitchEvent.START: SwitchState.SENT},
+    SwitchState.SENT: {
+        SwitchEvent.ACCEPTED: SwitchState.ACCEPTED,
+        SwitchEvent.REFUSED: SwitchState.REFUSED,
+        SwitchEvent.SEEN: SwitchState.SEEN,
+        SwitchEvent.SILENCE: SwitchState.UNANSWERED,
+    },
+    SwitchState.ACCEPTED: {},
+    SwitchState.SEEN: {},
+    SwitchState.REFUSED: {},
+    SwitchState.UNANSWERED: {},
+}
+MODE_SWITCH_UNTIL_SEEN: dict[SwitchState, dict[SwitchEvent, SwitchState]] = {
+    **MODE_SWITCH,
+    SwitchState.SENT: {
+        SwitchEvent.ACCEPTED: SwitchState.ACCEPTED,
+        SwitchEvent.SEEN: SwitchState.SEEN,
+        SwitchEvent.SILENCE: SwitchState.UNANSWERED,
+    },
+    SwitchState.ACCEPTED: {
+        SwitchEvent.SEEN: SwitchState.SEEN,
+        SwitchEvent.SILENCE: SwitchState.UNANSWERED,
+    },
+}
+"""The same where the answer may be that to another command: only a heartbeat that shows the mode ends it."""
+
 TABLES = {
     "find": FIND,
     "download": DOWNLOAD,
@@ -454,6 +503,7 @@ TABLES = {
     "verified_upload": VERIFIED_UPLOAD,
     "parameters": PARAMETERS,
     "command": COMMAND,
+    "mode_switch": MODE_SWITCH,
     "version": VERSION,
 }
 """All tables by name, for the documentation and the tests."""

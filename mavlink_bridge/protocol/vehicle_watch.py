@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.mavlink.messages import GlobalPositionInt, Heartbeat, MissionCurrent, ModeFlag
-from mavlink_bridge.mavlink.rover import AUTO_MODE
+from mavlink_bridge.mavlink.rover import Mode
 
 if TYPE_CHECKING:
     from mavlink_bridge.mavlink.messages import Message
@@ -54,7 +54,7 @@ class Doing:
     @property
     def drives_mission(self) -> bool:
         """Whether it drives its mission: armed in AUTO, and the mission is not complete."""
-        return bool(self.is_armed) and self.mode == AUTO_MODE and not self.has_completed
+        return bool(self.is_armed) and self.mode == Mode.AUTO and not self.has_completed
 
 
 class VehicleWatch:

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from mavlink_bridge.director import Event, Orders, TargetSource
 from mavlink_bridge.errors import LogError
+from missions.errors import MissionError
 from missions.geo import LatLon
-from missions.request import Request
+from missions.request import request_of
 from missions.vehicle import Footprint
 
 if TYPE_CHECKING:
@@ -137,7 +138,7 @@ def read_journal(path: Path) -> Journal:
                 )
     except OSError as error:
         raise LogError(f"{path} cannot be read: {error.strerror}", file=str(path)) from None
-    except (ValueError, KeyError, TypeError, IndexError) as error:
+    except (ValueError, KeyError, TypeError, IndexError, MissionError) as error:
         line_number = len(calls) + len(events) + 2
         raise LogError(f"{path}: line {line_number} is no journal's: {error!r}", file=str(path)) from None
     return Journal(orders, head["parameters"], tuple(calls), tuple(events))
@@ -145,6 +146,8 @@ def read_journal(path: Path) -> Journal:
 
 def _orders_to_json(orders: Orders) -> dict[str, Any]:
     document = asdict(orders)
+    words = orders.request.words()
+    document["request"] = {**words, "footprint": asdict(words["footprint"])}
     document["target_sources"] = sorted(orders.target_sources)
     return document
 
@@ -156,13 +159,6 @@ def _orders_from_json(document: dict[str, Any]) -> Orders:
             **document,
             "identity": tuple(document["identity"]) if document["identity"] else None,
             "target_sources": frozenset(TargetSource(name) for name in document["target_sources"]),
-            "request": Request(
-                **{
-                    **request,
-                    "start": LatLon(*request["start"]) if request["start"] else None,
-                    "targets": tuple(LatLon(*target) for target in request["targets"]),
-                    "footprint": Footprint(**request.get("footprint", {})),
-                }
-            ),
+            "request": request_of(**{**request, "footprint": Footprint(**request.get("footprint", {}))}),
         }
     )

@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.mavlink.messages import CommandInt, CommandLong, MavResult, Message
+from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.simulator import streams
-from mavlink_bridge.simulator.config import Mode
 from missions.geo import from_e7
 from missions.items import Command, CoordinateFrame
 
@@ -31,7 +31,7 @@ _CHANGE_MODE = 1  # MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
 _LOCAL_FRAMES = (CoordinateFrame.LOCAL_NED, CoordinateFrame.MISSION)
 
 
-class Commands:
+class CommandServer:
     """Does what commands ask for.
 
     Parameters

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from enum import IntEnum
 from typing import TYPE_CHECKING
 
 from missions.geo import LatLon
@@ -12,18 +11,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from missions.items import MissionItem
-
-
-class Mode(IntEnum):
-    """The modes of ArduRover that the simulated rover knows."""
-
-    MANUAL = 0
-    HOLD = 4
-    LOITER = 5
-    AUTO = 10
-    RTL = 11
-    GUIDED = 15
-    INITIALISING = 16
 
 
 DEFAULT_HOME = LatLon(40.071374, -105.229930)

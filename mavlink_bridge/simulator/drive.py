@@ -12,7 +12,7 @@ import math
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.simulator.controllers import Attitude, Position, Settings
-from mavlink_bridge.simulator.scurve import Leg, Limits
+from mavlink_bridge.simulator.scurve import LegMotion, MotionLimits
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 _PIVOT_ACCURACY_RAD = math.radians(10.0)
 
 
-class Drive:
+class Driver:
     """A rover's driver: follows waypoints or stops.
 
     Parameters
@@ -97,7 +97,7 @@ class Drive:
         self._pivot_next = False
         self._pivot_since_s = 0.0
         self._time_scale = 1.0
-        self._leg = self._last_leg = self._next_leg = Leg(
+        self._leg = self._last_leg = self._next_leg = LegMotion(
             self.body.estimate_m, self.body.estimate_m, self._limits
         )
         self._position.reset()
@@ -113,23 +113,23 @@ class Drive:
             self._pivot_next = False
         else:
             origin_m = self._leg.destination_m
-        self._last_leg = self._leg if self._has_arrived else Leg(origin_m, origin_m, self._limits)
+        self._last_leg = self._leg if self._has_arrived else LegMotion(origin_m, origin_m, self._limits)
         if self._is_fast and self._next_leg.length_m and self._next_leg.destination_m == destination_m:
             self._leg = self._next_leg
         else:
             self._last_leg.finish()
-            self._leg = Leg(origin_m, destination_m, self._limits)
+            self._leg = LegMotion(origin_m, destination_m, self._limits)
             self._start_pivot(destination_m - origin_m)
         self._destination_m = destination_m
         self._has_arrived = False
         self._is_fast = False
-        self._next_leg = Leg(destination_m, destination_m, self._limits)
+        self._next_leg = LegMotion(destination_m, destination_m, self._limits)
         self._pivot_next = False
         if next_m is not None and next_m != destination_m:
             turn_rad = abs(cmath.phase((next_m - destination_m) * (destination_m - origin_m).conjugate()))
             self._pivot_next = self._pivots(turn_rad)
             if not self._pivot_next:
-                self._next_leg = Leg(destination_m, next_m, self._limits)
+                self._next_leg = LegMotion(destination_m, next_m, self._limits)
                 self._is_fast = True
 
     def change_speed(self, speed_mps: float) -> None:
@@ -164,7 +164,7 @@ class Drive:
 
     def _apply_speed(self) -> None:
         limits = self._settings
-        self._limits = Limits(self._speed_mps, limits.waypoint_accel_mps2, limits.waypoint_jerk_mps3)
+        self._limits = MotionLimits(self._speed_mps, limits.waypoint_accel_mps2, limits.waypoint_jerk_mps3)
         self._position.settings = limits
         self._position.speed_mps = self._speed_mps
 

@@ -32,7 +32,7 @@ RALLY_LIMIT = 50
 """Rally points the default storage holds (750 bytes, from the source; not measured)."""
 
 
-class ItemList(ABC):
+class StoredList(ABC):
     """One stored list, as an upload and a download see it.
 
     Attributes
@@ -83,7 +83,7 @@ class ItemList(ABC):
         return True
 
 
-class _InPlaceList(ItemList):
+class _InPlaceList(StoredList):
     """A list that an upload cuts at once and overwrites item by item."""
 
     def begin(self, count: int) -> None:
@@ -158,7 +158,7 @@ class RallyList(_InPlaceList):
         return result or self._put(seq, item_rules.kept_rally_item(item))
 
 
-class FenceList(ItemList):
+class FenceList(StoredList):
     """The fence: an upload is held in memory and written when the whole of it is found good.
 
     Parameters

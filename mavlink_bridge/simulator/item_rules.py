@@ -6,8 +6,9 @@ import math
 from dataclasses import replace
 
 from mavlink_bridge.mavlink.messages import MissionResult
+from mavlink_bridge.mavlink.stored_form import STORED_WITH_PLACE
 from mavlink_bridge.simulator.parameters import float32
-from mavlink_bridge.simulator.stored_commands import KEPT, NAN_ALLOWED, PLACED, kept_beyond_params, uint8
+from mavlink_bridge.simulator.stored_commands import KEPT, NAN_ALLOWED, kept_beyond_params, uint8
 from missions.items import Command, CoordinateFrame, MissionItem
 
 MAX_ALT_M = 83_000.0
@@ -49,7 +50,7 @@ def mission_item_result(item: MissionItem, count: int) -> MissionResult:
             return _RESULT_OF_PARAM[index]
     if item.command == Command.DO_JUMP and not 0 < item.params[0] < count:
         return MissionResult.ERROR
-    if item.command in PLACED:
+    if item.command in STORED_WITH_PLACE:
         frames = _RELATIVE_FRAMES + _ABSOLUTE_FRAMES + _TERRAIN_FRAMES
         return _place_result(item, MAX_ALT_M, item.frame in frames)
     return MissionResult.ACCEPTED
@@ -58,7 +59,7 @@ def mission_item_result(item: MissionItem, count: int) -> MissionResult:
 def kept_mission_item(item: MissionItem) -> MissionItem:
     """Return a mission item as it reads back: frame 3, 0 or 10, altitude in whole centimetres, unused parameters 0."""
     params = KEPT[item.command](item.params)
-    if item.command not in PLACED:
+    if item.command not in STORED_WITH_PLACE:
         return MissionItem(item.command, CoordinateFrame.GLOBAL, params, *kept_beyond_params(item))
     if item.frame in _RELATIVE_FRAMES:
         frame = CoordinateFrame.GLOBAL_RELATIVE_ALT

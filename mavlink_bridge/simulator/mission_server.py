@@ -32,7 +32,7 @@ from missions import items
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from mavlink_bridge.simulator.item_lists import ItemList
+    from mavlink_bridge.simulator.item_lists import StoredList
 
 REQUEST_AGAIN_S = 1.0
 """A request that brought no item is repeated after this long."""
@@ -73,11 +73,11 @@ class TransferServer:
 
     Parameters
     ----------
-    stored : ItemList
+    stored : StoredList
         What is written to and read from.
     """
 
-    def __init__(self, stored: ItemList) -> None:
+    def __init__(self, stored: StoredList) -> None:
         self.stored = stored
         self._upload: _UploadUnderWay | None = None
         self._outbox: list[Message] = []
@@ -230,7 +230,7 @@ class TransferServer:
 class MissionServer:
     """All lists of a vehicle; a mission type it does not keep is answered with UNSUPPORTED."""
 
-    def __init__(self, lists: Iterable[ItemList]) -> None:
+    def __init__(self, lists: Iterable[StoredList]) -> None:
         self._servers = {int(stored.mission_type): TransferServer(stored) for stored in lists}
         self._outbox: list[Message] = []
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.simulator.body import Body
-from mavlink_bridge.simulator.config import Mode
 from mavlink_bridge.simulator.controllers import Settings, sqrt_controlled
-from mavlink_bridge.simulator.drive import Drive
+from mavlink_bridge.simulator.drive import Driver
 from mavlink_bridge.simulator.fence_watch import FenceArea
 from mavlink_bridge.simulator.flat import FlatFrame, TrueFrame
-from mavlink_bridge.simulator.route import Route
+from mavlink_bridge.simulator.mission_run import MissionRun
 from missions.geo import from_e7, to_e7
 
 if TYPE_CHECKING:
@@ -31,6 +31,8 @@ _CIRCLE, _POLYGON = 2, 4  # bits 1 and 2 of FENCE_TYPE
 _UNION = 2  # FENCE_OPTIONS bit 1
 _AVOID_FENCE = 1  # AVOID_ENABLE bit 0
 _DRIVING = (Mode.AUTO, Mode.GUIDED, Mode.RTL)
+_MODES = frozenset({*_DRIVING, Mode.MANUAL, Mode.HOLD, Mode.LOITER})
+"""The modes that the simulated rover can be switched to."""
 
 
 class Rover:
@@ -68,23 +70,27 @@ class Rover:
         fence: Callable[[], Sequence[MissionItem]],
     ) -> None:
         self.parameters = parameters
+        self._fence = fence
+        self._mission = mission
+        self.least_clearance_m = math.inf
+        self.breaches = 0
+        self._boot(home, heading_deg)
+
+    def _boot(self, home: LatLon, heading_deg: float) -> None:
+        """Begin at a place, which is home now."""
         self.home = from_e7(*to_e7(home))
         self.frame = FlatFrame(self.home)
         self._true_frame = TrueFrame(self.home)
-        self._fence = fence
-        self._mission = mission
         self.mode = Mode.INITIALISING
         self.is_armed = False
         self.texts: list[tuple[int, str]] = []
         self.reached: list[int] = []
-        self.least_clearance_m = math.inf
-        self.breaches = 0
         self.breached = False
         self.breach_time_s = 0.0
-        settings = Settings.from_parameters(parameters)
+        settings = Settings.from_parameters(self.parameters)
         self.body = Body(0j, math.radians(heading_deg), settings.is_skid)
-        self.drive = Drive(settings, self.body)
-        self.route = Route(mission, self.drive, self.frame)
+        self.drive = Driver(settings, self.body)
+        self.mission_run = MissionRun(self._mission, self.drive, self.frame)
         self._current_before_auto = False
         self.renew_fence()
 
@@ -123,11 +129,7 @@ class Rover:
 
     def reboot(self) -> None:
         """Begin anew where it stands; home is there now."""
-        position, heading_deg = self.position, self.heading_deg
-        least_clearance_m, breaches = self.least_clearance_m, self.breaches
-        self.__init__(self.parameters, position, heading_deg, self._mission, self._fence)  # type: ignore[misc]
-        self.least_clearance_m = min(least_clearance_m, self.least_clearance_m)
-        self.breaches = breaches
+        self._boot(self.position, self.heading_deg)
 
     def renew_settings(self) -> None:
         """Take changed parameters."""
@@ -150,15 +152,12 @@ class Rover:
 
     def set_mode(self, number: int, now_s: float) -> bool:
         """Change the mode; return whether that was possible."""
-        try:
-            mode = Mode(number)
-        except ValueError:
+        if number not in _MODES:
             return False
-        if mode == Mode.INITIALISING:
-            return False
+        mode = Mode(number)
         if mode == self.mode:
             return True
-        if mode == Mode.AUTO and self.route.is_empty:
+        if mode == Mode.AUTO and self.mission_run.is_empty:
             self.texts.append((3, "No Mission. Can't set AUTO."))
             return False
         self.mode = mode
@@ -166,7 +165,7 @@ class Rover:
         if mode == Mode.AUTO:
             if self._current_before_auto:
                 self.texts.append((2, "Internal Errors 0x20000000"))
-            self.route.start(now_s)
+            self.mission_run.start(now_s)
         elif mode == Mode.RTL:
             self.drive.go_to(self.frame.to_flat(self.home), None)
         self._current_before_auto = False
@@ -176,9 +175,9 @@ class Rover:
     def set_current_item(self, seq: int, *, restart: bool, now_s: float) -> bool:
         """Go to a mission item; return whether there is one."""
         if restart:
-            self.route.restart()
+            self.mission_run.restart()
         driving = self.mode == Mode.AUTO
-        known = self.route.set_current(seq, now_s=now_s, driving=driving)
+        known = self.mission_run.set_current(seq, now_s=now_s, driving=driving)
         self._current_before_auto = known and self.mode == Mode.HOLD
         self._pass_on()
         return known
@@ -235,7 +234,7 @@ class Rover:
 
     def _follow(self, now_s: float) -> None:
         if self.mode == Mode.AUTO:
-            self.route.step(now_s)
+            self.mission_run.step(now_s)
             self._pass_on()
         elif self.mode in _DRIVING and self.drive.has_arrived:
             self.drive.stop()
@@ -243,13 +242,13 @@ class Rover:
                 self.reached.append(0)
 
     def _rests(self) -> bool:
-        return self.mode != Mode.AUTO or self.route.is_complete
+        return self.mode != Mode.AUTO or self.mission_run.is_complete
 
     def _pass_on(self) -> None:
-        self.texts += [(6, text) for text in self.route.texts]
-        self.reached += self.route.reached
-        self.route.texts.clear()
-        self.route.reached.clear()
+        self.texts += [(6, text) for text in self.mission_run.texts]
+        self.reached += self.mission_run.reached
+        self.mission_run.texts.clear()
+        self.mission_run.reached.clear()
 
     def _is_avoiding(self) -> bool:
         return self.parameters.flag("AVOID_ENABLE", _AVOID_FENCE) and not self._area.is_empty

@@ -10,7 +10,7 @@ SNAP_MPS4 = 15.0
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class MotionLimits:
     """What a leg may not exceed: speed (m/s), acceleration (m/s²), jerk (m/s³)."""
 
     speed_mps: float
@@ -35,18 +35,18 @@ class _Piece:
         return self.distance_m + t * (self.speed_mps + t * (a / 2 + t * j / 6)), speed_mps, a + t * j
 
 
-class Leg:
+class LegMotion:
     """A straight leg and the time spent on it; the point and its speed are complex, north + east·j.
 
     Parameters
     ----------
     origin_m, destination_m : complex
         Its ends.
-    limits : Limits
+    limits : MotionLimits
         What may not be exceeded.
     """
 
-    def __init__(self, origin_m: complex, destination_m: complex, limits: Limits) -> None:
+    def __init__(self, origin_m: complex, destination_m: complex, limits: MotionLimits) -> None:
         self.origin_m = origin_m
         self.destination_m = destination_m
         self.length_m = abs(destination_m - origin_m)
@@ -151,7 +151,7 @@ class Leg:
         return low_mps
 
 
-def _softened(limits: Limits) -> Limits:
+def _softened(limits: MotionLimits) -> MotionLimits:
     """Return limits whose constant jerk takes as long as the real one, which rises and falls by the snap limit."""
     rise_s = math.pi * limits.jerk_mps3 / (2 * SNAP_MPS4)
     ramp_s = limits.accel_mps2 / limits.jerk_mps3 + rise_s

@@ -34,7 +34,7 @@ _MAX_BACKLOG_BYTES = 4_000_000  # a client that reads nothing loses what comes a
 _LONGEST_WAIT_S = 0.5  # chosen, not measured: the shell looks up at least so often
 _MOST_AT_ONCE_S, _MOST_REAL_AT_ONCE_S = 1.0, 0.1  # of the rover's time in one turn, see `_advance`; chosen
 
-Address = tuple[str, int]
+SocketAddress = tuple[str, int]
 
 
 class _Client:
@@ -318,7 +318,7 @@ class Simulator:
             end.close()
 
 
-def _parse(listen: str) -> tuple[str, Address]:
+def _parse(listen: str) -> tuple[str, SocketAddress]:
     kind, _, rest = listen.partition(":")
     host, _, port = rest.rpartition(":")
     kind = {"udp": "udpin"}.get(kind, kind)

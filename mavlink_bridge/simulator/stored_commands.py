@@ -1,7 +1,7 @@
 """Which mission commands ArduRover stores, and what of each: all that ``AP_Mission::mavlink_int_to_mission_cmd`` takes.
 
 Read from ArduPilot's source (AP_Mission.cpp and .h, 4.7.0-dev): how `mission_cmd_to_mavlink_int` gives back what the packed structures hold.
-What a stored command makes the rover do is another matter: `route` does some of them, `NOT_DRIVEN` lists the others.
+What a stored command makes the rover do is another matter: `mission_run` does some of them, `NOT_DRIVEN` lists the others.
 """
 
 from __future__ import annotations
@@ -17,31 +17,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 Params = tuple[float, float, float, float]
-
-PLACED = frozenset(
-    {
-        Command.NAV_WAYPOINT,
-        Command.NAV_LOITER_UNLIM,
-        Command.NAV_LOITER_TURNS,
-        Command.NAV_LOITER_TIME,
-        Command.NAV_LAND,
-        Command.NAV_TAKEOFF,
-        Command.NAV_GUIDED_ENABLE,
-        Command.DO_SET_HOME,
-        30,  # NAV_CONTINUE_AND_CHANGE_ALT
-        31,  # NAV_LOITER_TO_ALT
-        82,  # NAV_SPLINE_WAYPOINT
-        84,  # NAV_VTOL_TAKEOFF
-        85,  # NAV_VTOL_LAND
-        94,  # NAV_PAYLOAD_PLACE
-        188,  # DO_RETURN_PATH_START
-        189,  # DO_LAND_START
-        191,  # DO_GO_AROUND
-        195,  # DO_SET_ROI_LOCATION
-        201,  # DO_SET_ROI
-    }
-)
-"""Mission commands that ArduPilot keeps with a place (``AP_Mission::stored_in_location``)."""
 
 NAN_ALLOWED = frozenset(
     {(Command.NAV_WAYPOINT, 3), (Command.NAV_LAND, 3), (Command.NAV_TAKEOFF, 3), (84, 3), (85, 2), (85, 3)}

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.simulator import streams
-from mavlink_bridge.simulator.config import Mode
 from missions.geo import to_e7
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ _BOUNDARY = 3  # FENCE_BREACH_BOUNDARY
 
 
 @dataclass(frozen=True, slots=True)
-class State:
+class TelemetrySource:
     """What telemetry is about: the rover, the items in its mission (home included), its time since boot, whether it has a position.
 
     The ids are those of mission, fence and rally points, 0 where none are known; the uid is the board's own.
@@ -56,13 +56,13 @@ class State:
     uid: bytes = b""
 
 
-def telemetry(message_id: int, state: State) -> m.Message | None:
+def telemetry(message_id: int, state: TelemetrySource) -> m.Message | None:
     """Return a message by its id, None where the rover has no such message."""
     build = _BUILDERS.get(message_id)
     return build(state) if build else None
 
 
-def _heartbeat(state: State) -> m.Message:
+def _heartbeat(state: TelemetrySource) -> m.Message:
     base_mode = m.ModeFlag.CUSTOM_MODE_ENABLED
     if state.rover.mode in (Mode.MANUAL, Mode.INITIALISING):
         base_mode |= 64
@@ -76,7 +76,7 @@ def _heartbeat(state: State) -> m.Message:
     )
 
 
-def _sys_status(state: State) -> m.Message:
+def _sys_status(state: TelemetrySource) -> m.Message:
     enabled = _SENSORS if state.rover.parameters["FENCE_ENABLE"] else _SENSORS & ~_FENCE_SENSOR
     health = _SENSORS | (_PREARM_OK if state.is_ready else 0)
     if not state.is_ready:
@@ -86,7 +86,7 @@ def _sys_status(state: State) -> m.Message:
     return m.SysStatus(_SENSORS_PRESENT, enabled, health)
 
 
-def _global_position(state: State) -> m.Message:
+def _global_position(state: TelemetrySource) -> m.Message:
     lat_e7, lon_e7 = to_e7(state.rover.estimate) if state.is_ready else (0, 0)
     velocity_mps = state.rover.body.velocity_mps
     return m.GlobalPositionInt(
@@ -99,7 +99,7 @@ def _global_position(state: State) -> m.Message:
     )
 
 
-def _gps_raw(state: State) -> m.Message:
+def _gps_raw(state: TelemetrySource) -> m.Message:
     time_usec = round(state.boot_s * 1e6)
     if not state.is_ready:
         return m.GpsRawInt(time_usec, 0, 0, 0, 0, satellites_visible=0)
@@ -108,17 +108,17 @@ def _gps_raw(state: State) -> m.Message:
     )
 
 
-def _mission_current(state: State) -> m.Message:
+def _mission_current(state: TelemetrySource) -> m.Message:
     if state.mission_count <= 1:
         progress = _NO_MISSION
-    elif state.rover.route.is_complete:
+    elif state.rover.mission_run.is_complete:
         progress = _COMPLETE
-    elif state.rover.route.seq == 0:
+    elif state.rover.mission_run.seq == 0:
         progress = _NOT_STARTED
     else:
         progress = _ACTIVE_MISSION if state.rover.mode == Mode.AUTO else _PAUSED
     return m.MissionCurrent(
-        state.rover.route.seq,
+        state.rover.mission_run.seq,
         max(0, state.mission_count - 1),
         progress,
         int(state.rover.mode == Mode.AUTO),
@@ -126,7 +126,7 @@ def _mission_current(state: State) -> m.Message:
     )
 
 
-def _nav_controller(state: State) -> m.Message | None:
+def _nav_controller(state: TelemetrySource) -> m.Message | None:
     target_m = state.rover.drive.destination_m
     if target_m is None:
         return None
@@ -137,7 +137,7 @@ def _nav_controller(state: State) -> m.Message | None:
     )
 
 
-def _vfr_hud(state: State) -> m.Message:
+def _vfr_hud(state: TelemetrySource) -> m.Message:
     speed_mps = abs(state.rover.body.speed_mps)
     throttle = round(abs(state.rover.drive.throttle) * 100)
     return m.VfrHud(
@@ -145,14 +145,14 @@ def _vfr_hud(state: State) -> m.Message:
     )
 
 
-def _position_target(state: State) -> m.Message | None:
+def _position_target(state: TelemetrySource) -> m.Message | None:
     target = state.rover.destination
     if target is None:
         return None
     return m.PositionTargetGlobalInt(_boot_ms(state.boot_s), 0, _POSITION_ONLY, *to_e7(target), 0.0)
 
 
-def _fence_status(state: State) -> m.Message | None:
+def _fence_status(state: TelemetrySource) -> m.Message | None:
     if not state.rover.parameters["FENCE_ENABLE"]:
         return None
     breached = state.rover.breached
@@ -165,19 +165,19 @@ def _fence_status(state: State) -> m.Message | None:
     )
 
 
-def _simstate(state: State) -> m.Message:
+def _simstate(state: TelemetrySource) -> m.Message:
     return m.Simstate(state.rover.body.heading_rad, *to_e7(state.rover.position))
 
 
-def _ekf(state: State) -> m.Message:
+def _ekf(state: TelemetrySource) -> m.Message:
     return m.EkfStatusReport(_EKF_GOOD if state.is_ready else _EKF_UNINITIALISED)
 
 
-def _home(state: State) -> m.Message | None:
+def _home(state: TelemetrySource) -> m.Message | None:
     return m.HomePosition(*to_e7(state.rover.home)) if state.is_ready else None
 
 
-def _version(state: State) -> m.Message:
+def _version(state: TelemetrySource) -> m.Message:
     return m.AutopilotVersion(
         int(_CAPABILITIES), _VERSION_4_7_0_DEV, uid2=tuple(state.uid.ljust(18, b"\0")[:18])
     )
@@ -187,7 +187,7 @@ def _boot_ms(boot_s: float) -> int:
     return round(boot_s * 1000) % 2**32
 
 
-_BUILDERS: dict[int, Callable[[State], m.Message | None]] = {
+_BUILDERS: dict[int, Callable[[TelemetrySource], m.Message | None]] = {
     streams.HEARTBEAT: _heartbeat,
     streams.SYS_STATUS: _sys_status,
     streams.GPS_RAW_INT: _gps_raw,

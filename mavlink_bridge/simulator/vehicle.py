@@ -12,14 +12,15 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.errors import RefusedError
 from mavlink_bridge.mavlink import messages as m
-from mavlink_bridge.simulator.commands import Commands
-from mavlink_bridge.simulator.config import Mode, SimulatorConfig
-from mavlink_bridge.simulator.item_lists import FenceList, ItemList, MissionList, RallyList
+from mavlink_bridge.mavlink.rover import Mode
+from mavlink_bridge.simulator.commands import CommandServer
+from mavlink_bridge.simulator.config import SimulatorConfig
+from mavlink_bridge.simulator.item_lists import FenceList, MissionList, RallyList, StoredList
 from mavlink_bridge.simulator.mission_server import MissionServer
 from mavlink_bridge.simulator.parameters import ParameterStore, kind
 from mavlink_bridge.simulator.rover import TICK_S, Rover
 from mavlink_bridge.simulator.streams import DEFAULT_RATES_HZ, FENCE_STATUS, HEARTBEAT, Streams
-from mavlink_bridge.simulator.telemetry import State, telemetry
+from mavlink_bridge.simulator.telemetry import TelemetrySource, telemetry
 from missions.geo import from_e7
 from missions.items import with_home
 
@@ -76,7 +77,7 @@ class SimulatedVehicle:
             self.parameters.whole("BRD_SD_MISSION"),
         )
         self._fence, self._rally = FenceList(self.parameters.whole("BRD_SD_FENCE")), RallyList()
-        self._lists: tuple[ItemList, ...] = (self._mission, self._fence, self._rally)
+        self._lists: tuple[StoredList, ...] = (self._mission, self._fence, self._rally)
         if self.config.mission:
             _store(self._mission, with_home(self.config.mission, self._home))
         _store(self._fence, self.config.fence)
@@ -92,7 +93,7 @@ class SimulatedVehicle:
         self._home = self.rover.home
         self._outbox: list[m.Message] = []
         self._update_totals(announce=False)
-        self._commands = Commands(
+        self._commands = CommandServer(
             self.rover, lambda: self._streams, self._report, self._parameter_changed, self._is_ready
         )
         self._begin(0.0)
@@ -348,7 +349,7 @@ class SimulatedVehicle:
         mission_id, fence_id, rally_id = (
             _id_of(stored.items) if self.config.list_ids else 0 for stored in self._lists
         )
-        state = State(
+        state = TelemetrySource(
             self.rover,
             len(self._mission),
             now_s - self._boot_s,
@@ -364,7 +365,7 @@ def _id_of(items: Sequence[MissionItem]) -> int:
     return zlib.crc32(repr(tuple(items)).encode()) if items else 0
 
 
-def _store(stored: ItemList, items: Sequence[MissionItem]) -> None:
+def _store(stored: StoredList, items: Sequence[MissionItem]) -> None:
     """Write a list the way an upload would."""
     if not items:
         return
@@ -382,5 +383,5 @@ def _store(stored: ItemList, items: Sequence[MissionItem]) -> None:
     stored.texts.clear()
 
 
-def _read(stored: ItemList) -> tuple[MissionItem, ...]:
+def _read(stored: StoredList) -> tuple[MissionItem, ...]:
     return tuple(item for item in map(stored.read, range(len(stored))) if item is not None)

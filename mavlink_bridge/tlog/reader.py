@@ -81,11 +81,7 @@ class TlogReader:
 
     def __iter__(self) -> Iterator[LogEntry]:
         for block, places in self.blocks():
-            time_s, link = block.times(places)
-            system, component = block.senders(places)
-            messages = decode(block.scan, block.which[places])
-            frames = build(Frame, (system.tolist(), component.tolist(), messages))
-            yield from build(LogEntry, (time_s.tolist(), link.tolist(), frames))
+            yield from entries(block, places)
 
     def blocks(self) -> Iterator[tuple[Block, NDArray[np.int64]]]:
         """Walk through the log without decoding: each window's frames, and the places among them of the wanted good ones."""
@@ -101,6 +97,15 @@ class TlogReader:
                 self._damage = _damage(walk.tally, bad_crcs)
                 yield block, places
             self._damage = _damage(walk.tally, bad_crcs)
+
+
+def entries(block: Block, places: NDArray[np.int64]) -> list[LogEntry]:
+    """Return frames of a block, decoded."""
+    time_s, link = block.times(places)
+    system, component = block.senders(places)
+    messages = decode(block.scan, block.which[places])
+    frames = build(Frame, (system.tolist(), component.tolist(), messages))
+    return build(LogEntry, (time_s.tolist(), link.tolist(), frames))
 
 
 def read_columns(path: Path | str, message_class: type[Message]) -> dict[str, NDArray[Any]]:

@@ -69,12 +69,28 @@ def survey(path: Path) -> tuple[list[Traffic], Damage]:
         The file is missing, unreadable, empty, or holds no MAVLink frame.
     """
     reader = TlogReader(path, [])
-    found: dict[int, Traffic] = {}
+    count = TrafficCount()
     for block, _ in reader.blocks():
+        count.take(block)
+    return count.rows, reader.damage
+
+
+class TrafficCount:
+    """Counts messages by sender and type, block by block."""
+
+    def __init__(self) -> None:
+        self._found: dict[int, Traffic] = {}
+
+    def take(self, block: Block) -> None:
+        """Count a block's messages."""
         for key, traffic in _block_traffic(block).items():
-            known = found.get(key)
-            found[key] = traffic if known is None else _joined(known, traffic)
-    return [found[key] for key in sorted(found)], reader.damage
+            known = self._found.get(key)
+            self._found[key] = traffic if known is None else _joined(known, traffic)
+
+    @property
+    def rows(self) -> list[Traffic]:
+        """What was counted, ordered by system, component and message id."""
+        return [self._found[key] for key in sorted(self._found)]
 
 
 def _block_traffic(block: Block) -> dict[int, Traffic]:

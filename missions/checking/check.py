@@ -25,7 +25,7 @@ from missions.ground.seams import Seam, first_stop, is_seam, seam_advice, seam_r
 from missions.ground.start_hazard import start_hazard
 from missions.planned import Plan
 from missions.promise import known_vehicle, promise
-from missions.request import Request
+from missions.request import GoTo
 from missions.situation import Known
 from missions.vehicle import real_number
 from missions.vehicle.parameter_remarks import parameter_remarks
@@ -36,13 +36,14 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
     from missions.fence import Fence
+    from missions.request import Request
     from missions.situation import Mission, Situation
     from missions.vehicle import Vehicle
 
 # A home farther off is not laid out with the mission. Chosen, not measured: it bounds the frame
 _FAR_M = 50_000.0
 _STEP_M = 0.5  # between the places of the first leg that are asked for their clearance; chosen, not measured
-_ANYTHING = Request()
+_ANYTHING = GoTo()
 
 TOLERANCE_M = 0.01
 """A leg that falls short by no more than this keeps its promise: positions are rounded to degE7."""

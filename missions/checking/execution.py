@@ -114,6 +114,7 @@ def follow_mission(
     return_speed_mps: float | None = None,
     circle_m: float = CIRCLE_M,
     own_speed_mps: float = 0.0,
+    most_legs: int = MOST_LEGS,
 ) -> Course:
     """Follow a mission from its first item to its end.
 
@@ -133,21 +134,31 @@ def follow_mission(
         The radius of LOITER_TURNS without one of their own (CIRC_RADIUS).
     own_speed_mps : float
         The vehicle's own speed, which holds until the mission changes it.
+    most_legs : int
+        How many legs are followed.
     """
     for most_repeats in (None, _FEW_TIMES):
         walk = _Execution(
-            mission.items, start, home, return_to, return_speed_mps, circle_m, own_speed_mps, most_repeats
+            mission.items,
+            start,
+            home,
+            return_to,
+            return_speed_mps,
+            circle_m,
+            own_speed_mps,
+            most_repeats,
+            most_legs,
         )
         walk.run()
-        if len(walk.legs) < MOST_LEGS:
+        if len(walk.legs) < most_legs:
             break
-    if len(walk.legs) >= MOST_LEGS:
+    if len(walk.legs) >= most_legs:
         walk.troubles.append(
-            f"the mission drives more than {MOST_LEGS} legs; what comes after them was not followed"
+            f"the mission drives more than {most_legs} legs; what comes after them was not followed"
         )
     elif most_repeats is not None:
         walk.notes.append(
-            f"the mission drives more than {MOST_LEGS} legs; length and time count each jump {_FEW_TIMES} times"
+            f"the mission drives more than {most_legs} legs; length and time count each jump {_FEW_TIMES} times"
         )
     return Course(
         tuple(walk.legs),
@@ -170,6 +181,7 @@ class _Execution:
     default_circle_m: float
     own_speed_mps: float
     most_repeats: int | None
+    most_legs: int
     here_item: int = 0
     speed_mps: float | None = None
     is_conditional: bool = False
@@ -185,7 +197,7 @@ class _Execution:
     def run(self) -> None:
         index: int | None = 0
         jumps_in_a_row = 0
-        while index is not None and index < len(self.items) and len(self.legs) < MOST_LEGS:
+        while index is not None and index < len(self.items) and len(self.legs) < self.most_legs:
             item = self.items[index]
             if item.command in (Command.DO_JUMP, _DO_JUMP_TAG):
                 jumps_in_a_row += 1

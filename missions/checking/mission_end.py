@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from enum import StrEnum
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -12,6 +11,7 @@ from shapely import MultiPoint
 from missions.fence import ZoneKind
 from missions.geo import LatLon, distance_m
 from missions.items import Command, MissionItem, waypoint
+from missions.request import End
 from missions.vehicle import Autopilot, real_number, whole_number
 
 if TYPE_CHECKING:
@@ -35,25 +35,7 @@ _RTL_ACTIONS = {
 }
 """Values that end in RTL, at once or where SmartRTL cannot be had."""
 
-PARAMETER_NAMES = (
-    *_RTL_ACTIONS,
-    "MIS_DONE_BEHAVE",
-    "RTL_SPEED",
-    "RALLY_INCL_HOME",
-    "RALLY_LIMIT_KM",
-    "CIRC_RADIUS",
-)
-"""The parameters that matter here, for asking a vehicle."""
-
 _DONE_MODES = {1: "Loiter", 2: "Acro", 3: "Manual"}
-
-
-class End(StrEnum):
-    """What the vehicle does at the end of a mission."""
-
-    HOLD = "hold"
-    LOITER = "loiter"
-    RTL = "rtl"
 
 
 def ending(items: Sequence[MissionItem], end: End) -> tuple[MissionItem, ...]:
@@ -77,7 +59,7 @@ def return_place(situation: Situation, here: LatLon, home: LatLon | None) -> Lat
 
     Home takes part where RALLY_INCL_HOME is 1, and where the nearest rally point is farther away than RALLY_LIMIT_KM.
     """
-    rally = situation.rally.value if situation.rally else ()
+    rally = [point.position for point in situation.rally.value] if situation.rally else []
     if not rally:
         return home
     nearest = min(rally, key=lambda place: distance_m(here, place))

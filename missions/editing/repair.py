@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 from missions.checking.check import MissionCheck, check_mission, plan_of
 from missions.editing.edited_mission import ItemList
 from missions.editing.shorten import shortened
-from missions.errors import NoRouteError, RouteError, SituationError, StartBlockedError
+from missions.errors import NoRouteError, PlanStoppedError, RouteError, SituationError, StartBlockedError
+from missions.finishing.route_plan import plan_route
 from missions.geo import bearing_deg, distance_m, to_e7
 from missions.ground.legs import ROUNDING_RESERVE_M
 from missions.items import change_speed
-from missions.planning.plan import plan
+from missions.request import Tour, conditions, request_of
 from missions.situation import Known, Mission, Pose
 from missions.vehicle.item_limit import most_items
 from missions.words import metres
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from missions.geo import LatLon
     from missions.items import MissionItem
     from missions.planned import Plan
-    from missions.request import Request
+    from missions.request import RepairMission, Request
     from missions.situation import Situation
 
 # Chosen, not measured: routes that break the legs beside them are made anew so often; bounds the time
@@ -67,7 +68,7 @@ class _Detour:
 
 
 def repaired_plan(
-    situation: Situation, request: Request, *, should_stop: Callable[[], bool] | None = None
+    situation: Situation, request: RepairMission, *, should_stop: Callable[[], bool] | None = None
 ) -> Plan:
     """Repair the request's mission, else the situation's, and return it as a plan.
 
@@ -78,7 +79,7 @@ def repaired_plan(
     MissionError
         As `repair_mission`.
     """
-    mission = request.via or (situation.mission.value if situation.mission else None)
+    mission = request.mission or (situation.mission.value if situation.mission else None)
     if mission is None or not mission.items:
         raise SituationError("there is no mission to repair: none was told (--via-mission FILE gives one)")
     repair = repair_mission(mission, situation, request, should_stop=should_stop)
@@ -105,10 +106,16 @@ def repair_mission(
     situation : Situation
         Fence, parameters, home and where the vehicle is.
     request : Request
-        Start, clearance, ``snap_m`` for places that are blocked, method; its targets are not used.
+        Start, clearance, ``snap_m`` for places that are blocked, method: what a `RepairMission` may ask for.
+    should_stop : callable, optional
+        Asked now and then; once it returns True, nobody waits for the repair any more.
 
     Raises
     ------
+    PlanStoppedError
+        It was stopped.
+    RequestError
+        More is asked for than a repair keeps: targets, an end, a speed.
     RouteError
         A leg cannot be replaced (the message says which and why), or the corners between legs keep breaking the promise.
     SituationError
@@ -116,37 +123,21 @@ def repair_mission(
     FenceMissingError, FenceError, VehicleError, InvalidPositionError
         As `missions.checking.check.check_mission`.
     """
-    asked = check_mission(mission, situation, request)
-    if asked.troubles:
-        raise SituationError(f"the mission cannot be repaired: {'; '.join(asked.troubles)}")
-    if asked.dangers:
-        raise StartBlockedError(f"the mission cannot be repaired: {'; '.join(asked.dangers)}")
+    should_stop = PlanStoppedError.when(should_stop)
+    request = request_of(**{**request.words(), "via": mission, "via_own": False})
+    asked = _checked(mission, situation, request)
     repaired, checked = ItemList(mission), asked
     keys = {_key(leg.leg) for leg in asked.broken}
     clearance_m = asked.clearance_m
     for _ in range(_ROUNDS):
         if checked.holds:
-            _check_jumps(repaired)
-            changes = _changes(repaired)
-            most = most_items(situation.parameters) - 1
-            if len(checked.mission.items) > most:
-                long = checked.mission
-                checked = shortened(
-                    long, repaired.own_seqs, situation, request, most=most, should_stop=should_stop
-                )
-                left_out = len(long.items) - len(checked.mission.items)
-                changes = (
-                    *changes,
-                    f"{left_out} item{'s' * (left_out != 1)} of the routes left out so that the vehicle can hold it ({most + 1})",
-                )
-            return Repair(checked.mission, checked, changes)
+            return _within_storage(repaired, checked, situation, request, should_stop)
         try:
-            routed = _routed(asked, keys, situation, replace(request, clearance_m=clearance_m), should_stop)
+            repaired = _routed(asked, keys, situation, replace(request, clearance_m=clearance_m), should_stop)
         except RouteError:
             if clearance_m > asked.clearance_m:
                 break  # there is no more room: the error found before is raised
             raise
-        repaired = routed
         checked = check_mission(repaired.mission(), situation, request)
         found = {repaired.origin(leg.leg) for leg in checked.broken}
         more = found if not found <= keys else _beside(asked, found)
@@ -154,8 +145,59 @@ def repair_mission(
             missing_m = max(leg.asked_m - leg.driven_clearance_m for leg in checked.broken)
             clearance_m += min(missing_m, _MOST_EXTRA_M) + _EXTRA_M
         keys |= more
+    raise _unrepaired(repaired, checked)
+
+
+def _checked(mission: Mission, situation: Situation, request: Request) -> MissionCheck:
+    """Return what a mission keeps.
+
+    Raises
+    ------
+    SituationError, StartBlockedError
+        It cannot be repaired, whatever it keeps.
+    """
+    asked = check_mission(mission, situation, request)
+    if asked.troubles:
+        raise SituationError(f"the mission cannot be repaired: {'; '.join(asked.troubles)}")
+    if asked.dangers:
+        raise StartBlockedError(f"the mission cannot be repaired: {'; '.join(asked.dangers)}")
+    return asked
+
+
+def _within_storage(
+    repaired: ItemList,
+    checked: MissionCheck,
+    situation: Situation,
+    request: Request,
+    should_stop: Callable[[], bool] | None,
+) -> Repair:
+    """Return a repaired mission with as many items as the vehicle holds.
+
+    Raises
+    ------
+    SituationError, MissionTooLongError
+        It holds more jumps than the autopilot counts, or cannot be shortened so far.
+    """
+    _check_jumps(repaired)
+    changes = _changes(repaired)
+    most = most_items(situation.parameters) - 1
+    count = len(checked.mission.items)
+    if count > most:
+        checked = shortened(
+            checked.mission, repaired.own_seqs, situation, request, most=most, should_stop=should_stop
+        )
+        left_out = count - len(checked.mission.items)
+        changes = (
+            *changes,
+            f"{left_out} item{'s' * (left_out != 1)} of the routes left out so that the vehicle can hold it ({most + 1})",
+        )
+    return Repair(checked.mission, checked, changes)
+
+
+def _unrepaired(repaired: ItemList, checked: MissionCheck) -> NoRouteError:
+    """Return the error for a mission whose corners keep breaking the promise."""
     worst = min(checked.broken, key=lambda leg: leg.driven_clearance_m - leg.asked_m)
-    raise NoRouteError(
+    return NoRouteError(
         f"the mission cannot be repaired: about {_names(repaired.origin(worst.leg))} the vehicle would still come "
         f"{metres(worst.driven_clearance_m)} near {worst.fence} at {worst.at}; {metres(worst.asked_m)} are to be kept",
         driven_clearance_m=round(worst.driven_clearance_m, 3),
@@ -256,16 +298,12 @@ def _detours(
     """
     first = run[0]
     local = replace(situation, pose=_pose(first, asked, situation), mission=None)
-    wanted = replace(
-        request,
-        start=first.start,
+    wanted = Tour(
+        **{**conditions(request), "start": first.start, "speed_mps": first.speed_mps},
         targets=tuple(leg.end for leg in run),
-        via=None,
-        via_own=False,
-        speed_mps=first.speed_mps,
     )
     try:
-        planned = plan(local, wanted, should_stop=should_stop)
+        planned = plan_route(local, wanted, should_stop=should_stop)
     except RouteError as error:
         names = " and ".join(_names(_key(leg)) for leg in run)
         raise type(error)(f"{names}: {error}", **error.details) from None

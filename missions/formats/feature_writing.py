@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 from missions.fence import Fence, PolygonZone, Zone
 from missions.formats.features import Feature, Role, Shape
 from missions.formats.numbers import xy_for_file
-from missions.geo import LatLon
 from missions.items import file_frame
 from missions.situation import Mission
 
 if TYPE_CHECKING:
+    from missions.geo import LatLon
     from missions.items import MissionItem
     from missions.rally import RallyPoint
     from missions.situation import Situation
@@ -47,7 +47,7 @@ def _point_feature(role: Role, position: LatLon) -> Feature:
 
 def _rally_feature(point: RallyPoint) -> Feature:
     properties: dict[str, object] = {"role": Role.RALLY_POINT.value, "altitude_m": point.alt_m}
-    return _feature(Shape.POINT, ((LatLon(*point),),), properties, Role.RALLY_POINT.value)
+    return _feature(Shape.POINT, ((point.position,),), properties, Role.RALLY_POINT.value)
 
 
 def _zone_feature(zone: Zone, name: str) -> Feature:

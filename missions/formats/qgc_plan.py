@@ -78,7 +78,7 @@ def write(situation: Situation) -> str:
             "circles": [_circle_json(zone) for zone in fence.zones if isinstance(zone, CircleZone)],
             **({"breachReturn": [*_pair(fence.return_point), 0]} if fence.return_point else {}),
         },
-        "rallyPoints": {"version": 2, "points": [[*_pair(point), point.alt_m] for point in rally]},
+        "rallyPoints": {"version": 2, "points": [[*_pair(point.position), point.alt_m] for point in rally]},
     }
     return json.dumps(document, indent=4) + "\n"
 

@@ -20,7 +20,6 @@ from missions.vehicle import Autopilot
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
-    from missions.errors import RouteError
     from missions.ground.ground import Ground
     from missions.vehicle import Vehicle
 
@@ -124,15 +123,6 @@ def seam_reason(vehicle: Vehicle) -> str:
         f"with AVOID_ENABLE {vehicle.avoid_bits} (bit 0) the vehicle stops {vehicle.fence.margin_name} {vehicle.stops_within_m:g} m "
         "before the edge of the inclusion that it is in, for good, although FENCE_OPTIONS bit 1 joins it to others"
     )
-
-
-def explained(error: RouteError, vehicle: Vehicle) -> RouteError:
-    """Return a route's error, with why seams part its ends where they do."""
-    fences = error.details.get("fences")
-    if not isinstance(fences, list) or not any(is_seam(str(name)) for name in fences):
-        return error
-    details = {**error.details, "advice": seam_advice(vehicle), "seam": True}
-    return type(error)(f"{error}: {seam_reason(vehicle)}", **details)
 
 
 def _area(shape: BaseGeometry) -> shapely.MultiPolygon:

@@ -1,1 +1,1 @@
-"""The way from a situation and a request to a plan: the one door for the command line, the bridge and replays."""
+"""The door: from a situation and a request to a plan, for the command line, the bridge, replays and programs."""

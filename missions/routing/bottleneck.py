@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -69,18 +69,11 @@ def narrowest_place(
     return NarrowestPlace(way.clearance_m, tuple(_part_name(ground, part) for part in way.parts), at)
 
 
-def narrowest_places(
-    ground: Ground, points: Sequence[LocalPoint], should_stop: Callable[[], bool] | None = None
-) -> list[NarrowestPlace | None]:
-    """Find the narrowest place on the way from each point to the next."""
-    return [narrowest_place(ground, a, b, should_stop) for a, b in itertools.pairwise(points)]
-
-
 def widest_clearance_m(
     ground: Ground, points: Sequence[LocalPoint], should_stop: Callable[[], bool] | None = None
 ) -> float:
     """Return the greatest clearance that a route over all points keeps; 0 where there is no route."""
-    return kept_m(narrowest_places(ground, points, should_stop))
+    return kept_m([narrowest_place(ground, a, b, should_stop) for a, b in pairwise(points)])
 
 
 def kept_m(places: Sequence[NarrowestPlace | None]) -> float:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,10 +12,10 @@ import shapely
 from shapely import LineString, MultiPolygon, Point, Polygon
 
 import pbpp
-from missions.errors import NoRouteError, RouteError, StartBlockedError, TargetBlockedError
 from missions.fence import ZoneKind
 from missions.geo import LocalPoint, bearing_deg, distance_m
 from missions.routing.bottleneck import narrowest_place
+from missions.routing.no_route import NoRoute, NoRouteKind
 from missions.words import metres
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
     from missions.geo import LatLon
     from missions.ground.ground import Ground
+    from missions.routing.bottleneck import NarrowestPlace
 
 _INSIDE_M = 0.005
 """Points put on the edge of free space stand this far inside it, so that rounding leaves them there."""
@@ -78,33 +80,16 @@ class Route:
         return float(np.hypot(*np.diff(self.points, axis=0).T).sum())
 
 
-def find_route(  # noqa: PLR0913 - what is sought, and how
-    ground: Ground,
-    start: LocalPoint,
-    targets: list[LocalPoint],
-    clearance_m: float,
-    *,
-    promised_m: float | None = None,
-    blocked: Sequence[Polygon] = (),
-    method: str = "optimal",
-    snap_m: float = 0.0,
-    escape: bool = False,
-    should_stop: Callable[[], bool] | None = None,
-) -> Route:
-    """Find the shortest route over the targets in the order given.
+@dataclass(frozen=True, eq=False)
+class Sought:
+    """What a route is sought for, at whatever clearance.
 
     Parameters
     ----------
     ground : Ground
         The field.
     start, targets : LocalPoint
-        Where from, and where to.
-    clearance_m : float
-        What the drawn lines keep to any fence; where the start is nearer, the route first leads away, never nearer than the start is.
-    promised_m : float, optional
-        What of it is promised while driving, for error messages.
-    blocked : sequence of shapely polygon
-        Places to keep away from as from exclusions, to find another way round.
+        Where from, and where to, in the order of visits.
     method : str
         ``optimal``, ``pbpp-taut`` or ``pbpp``.
     snap_m : float
@@ -113,37 +98,28 @@ def find_route(  # noqa: PLR0913 - what is sought, and how
         Whether a start on forbidden ground is left by the shortest straight line that crosses no other forbidden ground.
     should_stop : callable, optional
         Asked now and then; True ends the search.
-
-    Raises
-    ------
-    StartBlockedError, TargetBlockedError, NoRouteError
-        With the fences that are to blame and the distances in metres.
     """
-    planner = pbpp.Planner(
-        ground.areas(ZoneKind.INCLUSION),
-        [*ground.areas(ZoneKind.EXCLUSION), *blocked],
-        clearance_m=clearance_m,
-        union=ground.union,
+
+    ground: Ground
+    start: LocalPoint
+    targets: Sequence[LocalPoint]
+    method: str = "optimal"
+    snap_m: float = 0.0
+    escape: bool = False
+    should_stop: Callable[[], bool] | None = None
+    _narrowest: dict[tuple[LocalPoint, LocalPoint], NarrowestPlace | None] = field(
+        default_factory=dict, init=False
     )
-    search = _Search(ground, planner, clearance_m, method, should_stop, promised_m, bool(blocked))
-    start_clearance_m = search.check_start(start, escape=escape)
-    goals = [search.free_target(target, snap_m, start) for target in targets]
-    lead: list[LocalPoint] = [start]
-    if start_clearance_m < 0:
-        lead = search.escape(start, goals[0])
-    elif not search.is_free(start):
-        lead = search.lead_away(start, start_clearance_m, goals[0])
-    points = [np.array(lead)]
-    target_indices = []
-    blocks = 0
-    here = lead[-1]
-    for goal in goals:
-        path = search.path(here, goal)
-        points.append(path.points[1:])
-        target_indices.append(sum(map(len, points)) - 1)
-        blocks = max(blocks, path.blocks)
-        here = goal
-    return Route(np.concatenate(points), len(lead) - 1, start_clearance_m, tuple(target_indices), blocks)
+
+    def narrowest_place(self, a: LocalPoint, b: LocalPoint) -> NarrowestPlace | None:
+        """Return the narrowest place of the widest route between two points, whatever the clearance: looked for once."""
+        if (a, b) not in self._narrowest:
+            self._narrowest[a, b] = narrowest_place(self.ground, a, b, self.should_stop)
+        return self._narrowest[a, b]
+
+    def narrowest_places(self) -> list[NarrowestPlace | None]:
+        """Return those on the way from the start to the first target, and from each to the next."""
+        return [self.narrowest_place(a, b) for a, b in pairwise((self.start, *self.targets))]
 
 
 def simplified(ground: Ground, route: Route, clearance_m: float) -> Route:
@@ -166,17 +142,82 @@ def simplified(ground: Ground, route: Route, clearance_m: float) -> Route:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Search:
-    """One planner and the field it plans in."""
+class _NoWayError(Exception):
+    """Carries the reason out of a search that has come to its end."""
 
-    ground: Ground
-    planner: pbpp.Planner
+    def __init__(self, why: NoRoute) -> None:
+        super().__init__(why.text)
+        self.why = why
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnRoutes:
+    """Routes drawn at one clearance: what is free at it is computed once for all of them.
+
+    Parameters
+    ----------
+    sought : Sought
+        What for.
+    clearance_m : float
+        What the drawn lines keep to any fence; where the start is nearer, a route first leads away, never nearer than the start is.
+    planner : pbpp.Planner
+        Plans at that clearance.
+    promised_m : float, optional
+        What of it is promised while driving, for people.
+    is_other_way : bool
+        Whether places are blocked that are none of the fence's, to find another way round.
+    """
+
+    sought: Sought
     clearance_m: float
-    method: str
-    should_stop: Callable[[], bool] | None
+    planner: pbpp.Planner
     promised_m: float | None = None
     is_other_way: bool = False
+
+    @classmethod
+    def at(cls, sought: Sought, clearance_m: float, promised_m: float | None = None) -> DrawnRoutes:
+        """Return those at a clearance."""
+        inclusions, exclusions = (
+            sought.ground.areas(kind) for kind in (ZoneKind.INCLUSION, ZoneKind.EXCLUSION)
+        )
+        planner = pbpp.Planner(inclusions, exclusions, clearance_m=clearance_m, union=sought.ground.union)
+        return cls(sought, clearance_m, planner, promised_m)
+
+    def around(self, place: Polygon) -> DrawnRoutes:
+        """Return those that keep away from one more place, as from an exclusion."""
+        return replace(self, planner=self.planner.with_exclusion(place), is_other_way=True)
+
+    def find(self, start: LocalPoint | None = None) -> Route | NoRoute:
+        """Find the shortest route over the targets in their order, from their start or another one."""
+        try:
+            return self._shortest(start or self.sought.start)
+        except _NoWayError as end:
+            return end.why
+
+    def _shortest(self, start: LocalPoint) -> Route:
+        start_clearance_m = self.check_start(start)
+        goals = [self.free_target(target, start) for target in self.sought.targets]
+        lead: list[LocalPoint] = [start]
+        if start_clearance_m < 0:
+            lead = self.escape(start, goals[0])
+        elif not self.is_free(start):
+            lead = self.lead_away(start, start_clearance_m, goals[0])
+        points = [np.array(lead)]
+        target_indices = []
+        blocks = 0
+        here = lead[-1]
+        for goal in goals:
+            path = self.path(here, goal)
+            points.append(path.points[1:])
+            target_indices.append(sum(map(len, points)) - 1)
+            blocks = max(blocks, path.blocks)
+            here = goal
+        return Route(np.concatenate(points), len(lead) - 1, start_clearance_m, tuple(target_indices), blocks)
+
+    @property
+    def ground(self) -> Ground:
+        """The field."""
+        return self.sought.ground
 
     @property
     def asked(self) -> str:
@@ -198,25 +239,28 @@ class _Search:
 
         Raises
         ------
-        NoRouteError
+        _NoWayError
             There is no such place.
         """
         reach_m = self.clearance_m * _CHORD_SHARE + _ROUNDED_EXCESS_M + _INSIDE_M
         inner = self.ground.allowed.buffer(-reach_m, quad_segs=_CHORDS)
         parts: list[Polygon] = [part for part in shapely.get_parts(inner) if not part.is_empty]
         if not parts:
-            raise NoRouteError(
-                f"nowhere in the field is {metres(self.clearance_m)} away from every fence",
-                clearance_m=self.clearance_m,
+            raise _NoWayError(
+                NoRoute(
+                    NoRouteKind.NOWHERE_FREE,
+                    f"nowhere in the field is {metres(self.clearance_m)} away from every fence",
+                    {"clearance_m": self.clearance_m},
+                )
             )
         return parts
 
-    def check_start(self, start: LocalPoint, *, escape: bool) -> float:
+    def check_start(self, start: LocalPoint) -> float:
         """Return the start's clearance; on ground that it may escape from, minus the distance to free ground.
 
         Raises
         ------
-        StartBlockedError
+        _NoWayError
             The start is on forbidden ground.
         """
         point = Point(start)
@@ -225,22 +269,30 @@ class _Search:
             return self.ground.clearance_m(point)
         free = self.ground.nearest_point(self.ground.allowed, point)
         distance, bearing, position = self._way(start, free)
-        if escape:
+        if self.sought.escape:
             return -max(distance, _INSIDE_M)
-        names = _names([barrier.name for barrier in forbidding])
-        raise StartBlockedError(
-            f"the start is on forbidden ground ({self._position(start)}): {names}; "
+        names = [barrier.name for barrier in forbidding]
+        raise _blocked(
+            NoRouteKind.START_BLOCKED,
+            f"the start is on forbidden ground ({self._position(start)}): {_names(names)}; "
             f"free ground is {distance:.2f} m away, bearing {round(bearing) % 360}°, at {position}",
-            fences=[barrier.name for barrier in forbidding],
+            names,
             distance_m=round(distance, 3),
             bearing_deg=round(bearing, 1),
             nearest_free=list(position),
         )
 
-    def free_target(self, target: LocalPoint, snap_m: float, start: LocalPoint) -> LocalPoint:
-        """Return the target, or the nearest free point within ``snap_m``, on the start's side of the fences if there is one."""
+    def free_target(self, target: LocalPoint, start: LocalPoint) -> LocalPoint:
+        """Return the target, or the nearest free point that it may be moved to, on the start's side of the fences if there is one.
+
+        Raises
+        ------
+        _NoWayError
+            There is none that near.
+        """
         if self.is_free(target):
             return target
+        snap_m = self.sought.snap_m
         point = Point(target)
         free = self.ground.nearest_point(self._component(start), point)
         if not snap_m or point.distance(free) > snap_m:
@@ -256,9 +308,10 @@ class _Search:
         else:
             names = [nearest.name] if nearest else []
             problem = f"the target is {metres(gap_m)} from {_names(names)}, nearer than {self.asked}"
-        raise TargetBlockedError(
+        raise _blocked(
+            NoRouteKind.TARGET_BLOCKED,
             f"{problem}; the nearest free point is {distance:.2f} m away, bearing {round(bearing) % 360}°, at {position}",
-            fences=names,
+            names,
             clearance_m=round(self.clearance_m, 3),
             distance_m=round(distance, 3),
             bearing_deg=round(bearing, 1),
@@ -267,10 +320,11 @@ class _Search:
 
     def path(self, start: LocalPoint, goal: LocalPoint) -> pbpp.PlannedPath:
         """Plan between two free points."""
+        method, should_stop = self.sought.method, self.sought.should_stop
         try:
-            return self.planner.plan(start, goal, method=self.method, should_stop=self.should_stop)
+            return self.planner.plan(start, goal, method=method, should_stop=should_stop)
         except (pbpp.NoPathError, pbpp.StartBlockedError, pbpp.GoalBlockedError):
-            raise self._no_route(start, goal) from None
+            raise _NoWayError(self._no_route(start, goal)) from None
 
     def lead_away(self, start: LocalPoint, start_clearance_m: float, goal: LocalPoint) -> list[LocalPoint]:
         """Return the first points of a route that leaves a fence's neighbourhood without ever coming nearer to one.
@@ -287,14 +341,14 @@ class _Search:
                 detours_m = np.hypot(*(exits - start).T) + np.hypot(*(exits - onward).T)
                 east_m, north_m = exits[np.argmin(detours_m)].tolist()
                 return [start, LocalPoint(east_m, north_m)]
-        raise self._no_route(start, goal)
+        raise _NoWayError(self._no_route(start, goal))
 
     def escape(self, start: LocalPoint, goal: LocalPoint) -> list[LocalPoint]:
         """Return the first points of a route off forbidden ground: straight out, across no other forbidden ground.
 
         Raises
         ------
-        StartBlockedError
+        _NoWayError
             Every such line crosses other forbidden ground.
         """
         ground = self.ground
@@ -320,10 +374,11 @@ class _Search:
                 east_m, north_m = exits[keeps][np.argmin(shapely.length(legs[keeps]))].tolist()
                 return [start, LocalPoint(east_m, north_m)]
         names = [barrier.name for barrier in forbidding]
-        raise StartBlockedError(
+        raise _blocked(
+            NoRouteKind.START_BLOCKED,
             f"the start is on forbidden ground ({self._position(start)}): {_names(names)}; every straight way out crosses other "
             "forbidden ground",
-            fences=names,
+            names,
         )
 
     def _exits(
@@ -347,34 +402,34 @@ class _Search:
         """Return the part of free ground that a point is on, or nearest to."""
         return min(self.roomy, key=lambda part: float(part.distance(Point(point))))
 
-    def _no_route(self, start: LocalPoint, goal: LocalPoint) -> RouteError:
-        """Return the error for no route: how wide a route there is, or which fences part start and target (those along the edge of the smaller area)."""
+    def _no_route(self, start: LocalPoint, goal: LocalPoint) -> NoRoute:
+        """Return how wide a route there is, or which fences part start and target (those along the edge of the smaller area)."""
+        asked_m = {"clearance_m": round(self.clearance_m, 3)}
         if self.is_other_way:
-            return NoRouteError(
-                f"no other way round keeps {self.asked}", clearance_m=round(self.clearance_m, 3)
-            )
-        place = narrowest_place(self.ground, start, goal, self.should_stop)
+            return NoRoute(NoRouteKind.NO_OTHER_WAY, f"no other way round keeps {self.asked}", asked_m)
+        place = self.sought.narrowest_place(start, goal)
         if place is not None:
-            return NoRouteError(
-                f"no route keeps {self.asked}; {place}",
-                clearance_m=round(self.clearance_m, 3),
-                widest_m=round(place.clearance_m, 3),
-                fences=list(place.between),
-                narrowest_at=list(place.at) if place.at else None,
+            facts = {
+                **asked_m,
+                "widest_m": round(place.clearance_m, 3),
+                "fences": list(place.between),
+                "narrowest_at": list(place.at) if place.at else None,
+            }
+            return NoRoute(
+                NoRouteKind.TOO_NARROW, f"no route keeps {self.asked}; {place}", facts, place.between
             )
         areas = {"start": self._component(start), "target": self._component(goal)}
         walled = min(areas, key=lambda end: areas[end].area)
         outline = areas[walled].exterior
         reach_m = self.clearance_m * 1.01 + 2 * _INSIDE_M + 0.01
         names = [b.name for b in self.ground.barriers if self.ground.distance_m(b, outline) <= reach_m]
-        return NoRouteError(
+        other = "choose another target" if walled == "target" else "drive it out by hand"
+        return NoRoute(
+            NoRouteKind.WALLED_IN,
             f"no route exists, at any clearance: the {walled} is walled in by {_names(names)}",
-            clearance_m=round(self.clearance_m, 3),
-            walled_in=walled,
-            fences=names,
-            advice=f"no clearance helps: open a way through {_names(names)}, or choose another target"
-            if walled == "target"
-            else f"no clearance helps: open a way through {_names(names)}, or drive it out by hand",
+            {**asked_m, "walled_in": walled, "fences": names},
+            names,
+            advice=f"no clearance helps: open a way through {_names(names)}, or {other}",
         )
 
     def _way(self, point: LocalPoint, to: Point) -> tuple[float, float, LatLon]:
@@ -385,6 +440,11 @@ class _Search:
 
     def _position(self, point: LocalPoint) -> LatLon:
         return self.ground.frame.to_lat_lon(point)
+
+
+def _blocked(kind: NoRouteKind, text: str, fences: list[str], **facts: object) -> _NoWayError:
+    """Return the end of a search whose start or target is blocked."""
+    return _NoWayError(NoRoute(kind, text, {"fences": fences, **facts}, fences))
 
 
 def _names(names: list[str]) -> str:

@@ -1,4 +1,4 @@
-"""Where a route could not be fitted: the error that names the place, and the block that keeps the next route away from it."""
+"""Where a route could not be fitted: the refusal that names the place, and the block that keeps the next route away from it."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import shapely
 from shapely import Point
 
-from missions.errors import NoRouteError
 from missions.fitting import polyline as drawn
+from missions.routing.no_route import NoRoute, NoRouteKind
 from missions.words import metres
 
 if TYPE_CHECKING:
@@ -37,8 +37,8 @@ def refusal(
     measured: Measured,
     *,
     held_at_start: bool,
-) -> NoRouteError:
-    """Return the error that names the corner that refused, by how much and at which fence; with advice where the vehicle cannot turn at its start."""
+) -> NoRoute:
+    """Return which corner refused, by how much and at which fence; with advice where the vehicle cannot turn at its start."""
     index = measured.worst_index
     point = drawing[index]
     position = ground.frame.to_lat_lon(point.place)
@@ -53,17 +53,23 @@ def refusal(
         if index == len(drawing) - 1
         else f"the corner of {abs(turn_deg):.0f}° at {position}"
     )
-    advice = {"advice": _START_ADVICE} if index == 0 or held_at_start else {}
-    return NoRouteError(
+    kept_m = max(kept_m, 0.0)
+    facts = {
+        "clearance_m": round(required_m, 3),
+        "corner": list(position),
+        "turn_deg": round(turn_deg, 1),
+        "kept_m": round(kept_m, 3),
+        "fences": [fence],
+        "at_start": index <= AT_START,
+    }
+    return NoRoute(
+        NoRouteKind.CORNER,
         f"no route keeps {metres(required_m)} while driving: at {where} this vehicle would come as near as "
-        f"{metres(max(kept_m, 0.0))} to {fence}, whatever was tried",
-        clearance_m=round(required_m, 3),
-        corner=list(position),
-        turn_deg=round(turn_deg, 1),
-        kept_m=round(max(kept_m, 0.0), 3),
-        fences=[fence],
+        f"{metres(kept_m)} to {fence}, whatever was tried",
+        facts,
+        [fence],
+        advice=_START_ADVICE if index == 0 or held_at_start else None,
         at_start=index <= AT_START,
-        **advice,
     )
 
 

@@ -17,7 +17,7 @@ corner that refused; it does not prove that no route exists.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -25,23 +25,21 @@ import numpy as np
 from shapely import Point
 
 from missions.drive_model import corner_forecast
-from missions.errors import RouteError
 from missions.fitting.local_search import MOST_MEASUREMENTS, Fitting
 from missions.fitting.polyline import Drawing, DrawnPoint
+from missions.ground.legs import reserve_m
 from missions.routing.departure import ROOM_M, departures
-from missions.routing.drawn_route import find_route
+from missions.routing.drawn_route import DrawnRoutes, Route
+from missions.routing.no_route import NoRoute
 from missions.routing.refusal import AT_START, block, refusal
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-
-    from shapely import Polygon
+    from collections.abc import Iterator, Sequence
 
     from missions.fitting.cost import Measured
     from missions.geo import LocalPoint
-    from missions.ground.ground import Ground
     from missions.routing.departure import Departure
-    from missions.routing.drawn_route import Route
+    from missions.routing.drawn_route import Sought
     from missions.vehicle import Vehicle
 
 SLOW_MPS = 1.0
@@ -96,180 +94,151 @@ class DrivenRoute:
 
 
 @dataclass(frozen=True, eq=False)
+class _Attempt:
+    """One route fitted to the vehicle: what became of its lines, and the driven route where they keep what is required."""
+
+    drawing: Drawing
+    measured: Measured
+    driven: DrivenRoute | None
+
+    @property
+    def is_refused_at_start(self) -> bool:
+        """Whether most is missing because of how it begins."""
+        return self.driven is None and self.measured.worst_index <= AT_START
+
+
+@dataclass(frozen=True, eq=False)
 class RouteSearch:
     """What is looked for.
 
     Parameters
     ----------
-    ground : Ground
-        The field.
-    start, targets : LocalPoint
-        Where from, and where to.
+    sought : Sought
+        The field, the ends, and how to search.
     required_m : float
         What the driven band has to keep to any fence.
-    reserve_m : float
-        For rounding the drawn lines.
     vehicle : Vehicle
         What drives.
     heading_deg : float or None
-        Where it faces.
-    snap_m : float
-        A blocked target is moved to free ground within this distance.
-    method : str
-        ``optimal``, ``pbpp-taut`` or ``pbpp``.
-    should_stop : callable, optional
-        Asked now and then; True ends the search.
-    escape : bool
-        Whether a start on forbidden ground may be left.
+        Where it faces at the start, clockwise from north; None is along the first leg.
     measurements : int, optional
         How often the drive model may be asked.
     """
 
-    ground: Ground
-    start: LocalPoint
-    targets: Sequence[LocalPoint]
+    sought: Sought
     required_m: float
-    reserve_m: float
     vehicle: Vehicle
     heading_deg: float | None
-    snap_m: float = 0.0
-    method: str = "optimal"
-    should_stop: Callable[[], bool] | None = None
-    escape: bool = False
     measurements: int | None = None
+    _drawn: dict[float, DrawnRoutes] = field(default_factory=dict, init=False)
 
-    def find(self) -> DrivenRoute:
-        """Find the quickest of the routes tried whose band keeps what is required.
-
-        Raises
-        ------
-        StartBlockedError, TargetBlockedError, NoRouteError
-            No route; with the fences or the corner to blame.
-        """
-        fitting = self._fitting(MOST_MEASUREMENTS)
+    def find(self) -> DrivenRoute | NoRoute:
+        """Find the quickest of the routes tried whose band keeps what is required."""
         fast_m, slow_m = self._bands_m()
-        refused: list[tuple[Drawing, Measured]] = []
-        found: list[tuple[float, DrivenRoute]] = []
         routes = self._first_routes(fast_m, slow_m)
-        for route, _ in routes:
-            self._fit(fitting, route, found, refused)
-            if found and route is routes[0][0] and len(routes) > 1 and not self._is_shorter(routes):
-                break
-        if not found and refused[-1][1].worst_index <= AT_START:
-            fitting = self._fitting(LATER_MEASUREMENTS)
-            for departing in self._departing_routes(slow_m):
-                self._fit(fitting, departing, found, refused)
-                if found or self._is_stopped():
-                    break
-        is_held = not found and self._is_held_at_start(refused, fast_m - slow_m)
-        if not found and not is_held:
-            self._fit_slowly(routes[-1][0], found, refused)
-            self._fit_other_ways(routes[-1], found, refused)
-        if not found:
-            drawing, measured = min(refused, key=lambda one: sum(one[1].missing_m))
-            raise refusal(
-                self.ground, self.required_m, self.reserve_m, drawing, measured, held_at_start=is_held
-            )
-        return min(found, key=lambda one: one[0])[1]
-
-    def _is_held_at_start(self, refused: Sequence[tuple[Drawing, Measured]], narrower_m: float) -> bool:
-        """Return whether nothing more is worth trying, as the vehicle cannot turn at its start.
-
-        However slowly it drives it swings as far where it starts with its heading wrong; only its band becomes narrower.
-        """
-        return all(
-            measured.worst_index <= AT_START and measured.missing_m[0] > narrower_m + _HELD_M
-            for _, measured in refused
+        if isinstance(routes, NoRoute):
+            return routes
+        attempts = self._fit_first([route for route, _ in routes])
+        if attempts[-1].is_refused_at_start and not _found(attempts):
+            attempts += self._until_found(self._departing(slow_m))
+        is_held = not _found(attempts) and self._is_held_at_start(attempts, fast_m - slow_m)
+        if not _found(attempts) and not is_held:
+            attempts += self._until_found(self._slowly(routes[-1][0]))
+        if not _found(attempts) and not is_held:
+            attempts += self._until_found(self._other_ways(*routes[-1], attempts[-1]))
+        if found := _found(attempts):
+            return min(found, key=lambda one: one[0])[1]
+        least = min(attempts, key=lambda one: sum(one.measured.missing_m))
+        return refusal(
+            self.sought.ground,
+            self.required_m,
+            self._reserve_m,
+            least.drawing,
+            least.measured,
+            held_at_start=is_held,
         )
-
-    def _fit_slowly(
-        self,
-        route: Route,
-        found: list[tuple[float, DrivenRoute]],
-        refused: list[tuple[Drawing, Measured]],
-    ) -> None:
-        """Drive a route slowly all the way, so that nothing changes at corners."""
-        for speed_mps in SLOW_ALL_THE_WAY_MPS:
-            if not found and speed_mps < self.vehicle.speed_mps and not self._is_stopped():
-                self._fit(self._fitting(LATER_MEASUREMENTS), route, found, refused, speed_mps)
-
-    def _fit_other_ways(
-        self,
-        refusing: tuple[Route, float],
-        found: list[tuple[float, DrivenRoute]],
-        refused: list[tuple[Drawing, Measured]],
-    ) -> None:
-        """Keep away from where routes were refused, and draw others with the same band."""
-        route, band_m = refusing
-        fitting = self._fitting(LATER_MEASUREMENTS)
-        blocked: list[Polygon] = []
-        while not found and len(blocked) < _OTHER_WAYS and not self._is_stopped():
-            drawing, measured = refused[-1]
-            blocked.append(block(route, drawing, measured))
-            try:
-                route = self._draw(band_m, blocked)
-            except RouteError:
-                break
-            self._fit(fitting, route, found, refused)
-
-    def _fitting(self, measurements: int) -> Fitting:
-        most = min(measurements, self.measurements or measurements)
-        return Fitting(self.ground, self.vehicle, self.heading_deg, self.should_stop, most)
 
     def _bands_m(self) -> tuple[float, float]:
         fast_m = corner_forecast(0.0, self.vehicle).outside_overshoot_m
         slow_mps = min(SLOW_MPS, self.vehicle.speed_mps)
         return fast_m, corner_forecast(0.0, self.vehicle, speed_mps=slow_mps).outside_overshoot_m
 
-    def _first_routes(self, fast_m: float, slow_m: float) -> list[tuple[Route, float]]:
-        """Return the shortest route at full speed's band, and the one at the slow speed's."""
-        routes = []
-        try:
-            routes.append((self._draw(fast_m, ()), fast_m))
-        except RouteError:
-            if slow_m == fast_m:
-                raise
-        if slow_m < fast_m:
-            try:
-                routes.append((self._draw(slow_m, ()), slow_m))
-            except RouteError:
-                if not routes:
-                    raise
-        return routes
+    def _first_routes(self, fast_m: float, slow_m: float) -> list[tuple[Route, DrawnRoutes]] | NoRoute:
+        """Return the shortest route at full speed's band, and the one at the slow speed's; why there is none where there is neither."""
+        all_drawn = [
+            self._drawn_at(band_m) for band_m in sorted({fast_m, slow_m}, reverse=True) if band_m <= fast_m
+        ]
+        tried = [(drawn.find(), drawn) for drawn in all_drawn]
+        found = [(route, drawn) for route, drawn in tried if isinstance(route, Route)]
+        last = tried[-1][0]
+        return last if isinstance(last, NoRoute) and not found else found
 
-    @staticmethod
-    def _is_shorter(routes: list[tuple[Route, float]]) -> bool:
-        return routes[1][0].length_m < _SHORTER_SHARE * routes[0][0].length_m
+    def _fit_first(self, routes: Sequence[Route]) -> list[_Attempt]:
+        """Fit the first routes: the second only where the first fails, or is longer by some per cent."""
+        fitting = self._fitting(MOST_MEASUREMENTS)
+        attempts = [self._fit(fitting, routes[0])]
+        is_shorter = routes[-1].length_m < _SHORTER_SHARE * routes[0].length_m
+        if len(routes) > 1 and (is_shorter or not _found(attempts)):
+            attempts.append(self._fit(fitting, routes[1]))
+        return attempts
 
-    def _draw(self, band_m: float, blocked: Sequence[Polygon], start: LocalPoint | None = None) -> Route:
-        clearance_m = self.required_m + band_m + self.reserve_m
-        return find_route(
-            self.ground,
-            start or self.start,
-            list(self.targets),
-            clearance_m,
-            promised_m=self.required_m,
-            blocked=blocked,
-            snap_m=self.snap_m,
-            method=self.method,
-            escape=self.escape,
-            should_stop=self.should_stop,
+    def _until_found(self, attempts: Iterator[_Attempt]) -> list[_Attempt]:
+        """Return attempts up to the first that succeeds."""
+        made = []
+        for attempt in attempts:
+            made.append(attempt)
+            if attempt.driven is not None or self._is_stopped():
+                break
+        return made
+
+    def _is_held_at_start(self, attempts: Sequence[_Attempt], narrower_m: float) -> bool:
+        """Return whether nothing more is worth trying, as the vehicle cannot turn at its start.
+
+        However slowly it drives it swings as far where it starts with its heading wrong; only its band becomes narrower.
+        """
+        return all(
+            one.is_refused_at_start and one.measured.missing_m[0] > narrower_m + _HELD_M for one in attempts
         )
 
-    def _fit(
-        self,
-        fitting: Fitting,
-        route: Route,
-        found: list[tuple[float, DrivenRoute]],
-        refused: list[tuple[Drawing, Measured]],
-        speed_mps: float | None = None,
-    ) -> None:
+    def _departing(self, band_m: float) -> Iterator[_Attempt]:
+        """Leave by first legs that the vehicle can drive as it faces."""
+        fitting = self._fitting(LATER_MEASUREMENTS)
+        return (self._fit(fitting, route) for route in self._departing_routes(band_m))
+
+    def _slowly(self, route: Route) -> Iterator[_Attempt]:
+        """Drive a route slowly all the way, so that nothing changes at corners."""
+        for speed_mps in SLOW_ALL_THE_WAY_MPS:
+            if speed_mps < self.vehicle.speed_mps:
+                yield self._fit(self._fitting(LATER_MEASUREMENTS), route, speed_mps)
+
+    def _other_ways(self, route: Route, drawn: DrawnRoutes, refused: _Attempt) -> Iterator[_Attempt]:
+        """Keep away from where routes were refused, and draw others with the same band."""
+        fitting = self._fitting(LATER_MEASUREMENTS)
+        for _ in range(_OTHER_WAYS):
+            drawn = drawn.around(block(route, refused.drawing, refused.measured))
+            other = drawn.find()
+            if isinstance(other, NoRoute):
+                return
+            route, refused = other, self._fit(fitting, other)
+            yield refused
+
+    def _fitting(self, measurements: int) -> Fitting:
+        most = min(measurements, self.measurements or measurements)
+        return Fitting(self.sought.ground, self.vehicle, self.heading_deg, self.sought.should_stop, most)
+
+    def _drawn_at(self, band_m: float) -> DrawnRoutes:
+        """Return the routes drawn with room for a band; what is free at it is computed once."""
+        if band_m not in self._drawn:
+            clearance_m = self.required_m + band_m + self._reserve_m
+            self._drawn[band_m] = DrawnRoutes.at(self.sought, clearance_m, self.required_m)
+        return self._drawn[band_m]
+
+    def _fit(self, fitting: Fitting, route: Route, speed_mps: float | None = None) -> _Attempt:
         drawing, measured = fitting.fit(
             tuple(replace(point, speed_mps=speed_mps) for point in self._drawing(route))
         )
         if not measured.is_enough:
-            refused.append((drawing, measured))
-            return
+            return _Attempt(drawing, measured, None)
         driven = DrivenRoute(
             drawing,
             self._lead_away(drawing),
@@ -278,12 +247,12 @@ class RouteSearch:
             route.blocks,
             self._least_departing_m(route),
         )
-        found.append((measured.cost_s, driven))
+        return _Attempt(drawing, measured, driven)
 
     def _drawing(self, route: Route) -> Drawing:
         """Return a route's lines with what each point has to keep: where the route leads away, no less than the start does."""
-        required_m = self.required_m + self.reserve_m
-        near_m = self._least_departing_m(route) + self.reserve_m
+        required_m = self.required_m + self._reserve_m
+        near_m = self._least_departing_m(route) + self._reserve_m
         line_m = min(required_m, route.start_clearance_m) if route.start_clearance_m >= 0 else -math.inf
         fixed = {0, *route.target_indices} | ({1} if route.start_clearance_m < 0 else set())
         leading = {*range(max(route.lead_away, 1) + 1)} - {*route.target_indices}
@@ -298,40 +267,45 @@ class RouteSearch:
         )
 
     @cached_property
+    def _reserve_m(self) -> float:
+        return reserve_m(self.sought.ground)
+
+    @cached_property
     def departure_m(self) -> float:
         """What the band has to keep on the first leg: what is required, or what the vehicle's turning at this start leaves of it.
 
         A vehicle that stands near a fence, or faces it, can do no better than to leave by the best way.
         """
-        if self.ground.clearance_m(Point(self.start)) >= self.required_m + ROOM_M:
+        if self.sought.ground.clearance_m(Point(self.sought.start)) >= self.required_m + ROOM_M:
             return self.required_m
         best_m = self._departures[0].kept_m
-        if best_m >= self.required_m + self.reserve_m:
+        if best_m >= self.required_m + self._reserve_m:
             return self.required_m
-        return min(self.required_m, best_m - 2 * self.reserve_m - _DEPARTURE_SLACK_M)
+        return min(self.required_m, best_m - 2 * self._reserve_m - _DEPARTURE_SLACK_M)
 
     @cached_property
     def _departures(self) -> list[Departure]:
-        return departures(self.ground, self.vehicle, self.start, self.heading_deg)
+        return departures(self.sought.ground, self.vehicle, self.sought.start, self.heading_deg)
 
     def _departing_routes(self, band_m: float) -> Iterator[Route]:
         """Return routes by the first legs that the vehicle can drive as it faces, the shortest first."""
-        keeps_m = self.departure_m + self.reserve_m
+        keeps_m = self.departure_m + self._reserve_m
         routes = []
         for departure in self._departures:
             if departure.kept_m < keeps_m:
                 break
-            try:
-                onward = self._draw(band_m, (), departure.there)
-            except RouteError:
-                continue
-            if onward.lead_away or _turn_at_deg(self.start, onward) > _MOST_TURN_DEG:
+            onward = self._drawn_at(band_m).find(departure.there)
+            if (
+                isinstance(onward, NoRoute)
+                or onward.lead_away
+                or _turn_at_deg(self.sought.start, onward) > _MOST_TURN_DEG
+            ):
                 continue
             route = replace(
                 onward,
-                points=np.vstack([self.start, onward.points]),
+                points=np.vstack([self.sought.start, onward.points]),
                 lead_away=int(self.departure_m < self.required_m),
-                start_clearance_m=self.ground.clearance_m(Point(self.start)),
+                start_clearance_m=self.sought.ground.clearance_m(Point(self.sought.start)),
                 target_indices=tuple(index + 1 for index in onward.target_indices),
             )
             routes.append((route.length_m + _TURN_COST_M_PER_DEG * _turned_deg(route), route))
@@ -348,7 +322,12 @@ class RouteSearch:
         return near.index(False) if False in near else len(near)
 
     def _is_stopped(self) -> bool:
-        return self.should_stop is not None and self.should_stop()
+        return self.sought.should_stop is not None and self.sought.should_stop()
+
+
+def _found(attempts: Sequence[_Attempt]) -> list[tuple[float, DrivenRoute]]:
+    """Return the routes that were found, with what each costs."""
+    return [(one.measured.cost_s, one.driven) for one in attempts if one.driven is not None]
 
 
 def _turn_at_deg(start: LocalPoint, onward: Route) -> float:

@@ -3,26 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from missions.errors import NoRouteError, TargetBlockedError
 from missions.fitting.polyline import DrawnPoint
 from missions.ground.legs import reserve_m
-from missions.routing.bottleneck import widest_clearance_m
-from missions.routing.drawn_route import find_route, simplified
+from missions.routing.bottleneck import kept_m
+from missions.routing.drawn_route import DrawnRoutes, Route, simplified
+from missions.routing.no_route import NoRoute, NoRouteKind
 from missions.routing.route_search import DrivenRoute
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from missions.geo import LocalPoint
-    from missions.ground.ground import Ground
     from missions.promise import Promise
-    from missions.request import Request
-    from missions.routing.drawn_route import Route
+    from missions.routing.drawn_route import Sought
 
 _TINY_LEG_M = 1.5  # two shorter legs mean that the route winds round a corner; chosen, not measured
 # Added to the clearance to draw rounder corners, widest first; chosen, not measured
@@ -32,58 +26,40 @@ _WIDEST_SHARE = 0.97
 """What of the widest clearance a route keeps: round corners of the last millimetre would need a waypoint every half metre."""
 
 
-def uniform_route(
-    ground: Ground,
-    ends: Sequence[LocalPoint],
-    asked: Promise,
-    request: Request,
-    should_stop: Callable[[], bool] | None = None,
-) -> tuple[Promise, DrivenRoute]:
-    """Return the shortest route at the promise and its allowance, or the widest one; and what can be promised for it.
+def uniform_route(sought: Sought, asked: Promise) -> tuple[Promise, DrivenRoute] | NoRoute:
+    """Return the shortest route at the promise and its allowance, and what is promised for it; else why there is none."""
+    route = _sparse_route(sought, asked.drawn_m + reserve_m(sought.ground))
+    return route if isinstance(route, NoRoute) else (asked, _driven(route, asked.drawn_m))
 
-    Raises
-    ------
-    StartBlockedError, TargetBlockedError, NoRouteError
-        No route.
-    """
+
+def widest_uniform_route(sought: Sought, asked: Promise) -> tuple[Promise, DrivenRoute] | NoRoute:
+    """Return the widest route, and what can be promised for it; else why there is none."""
+    widest_m = kept_m(sought.narrowest_places())
+    clearance_m, route = _widest_route(sought, widest_m)
+    if isinstance(route, NoRoute):
+        return route
+    simplified_m = _WIDEST_SHARE * clearance_m
+    drawn_m = simplified_m - reserve_m(sought.ground)
     wanted_m = asked.allowance_m or 0.0
-    start, *targets = ends
-    find = partial(
-        find_route,
-        ground,
-        start,
-        targets,
-        snap_m=request.snap_m,
-        method=request.method,
-        escape=request.escape,
-        should_stop=should_stop,
-    )
-    rounding_m = reserve_m(ground)
-    if request.widest:
-        route, kept_m = _widest_route(find, widest_clearance_m(ground, ends, should_stop))
-        route = simplified(ground, route, _WIDEST_SHARE * kept_m)
-        drawn_m = _WIDEST_SHARE * kept_m - rounding_m
-        promised_m = max(0.0, drawn_m - wanted_m - asked.error_m)
-        asked = replace(asked, promised_m=promised_m, error_m=drawn_m - wanted_m - promised_m)
-    else:
-        drawn_m = asked.required_m + wanted_m
-        route = _sparse_route(ground, find, drawn_m + rounding_m)
+    promised_m = max(0.0, drawn_m - wanted_m - asked.error_m)
+    promise = replace(asked, promised_m=promised_m, error_m=drawn_m - wanted_m - promised_m)
+    return promise, _driven(simplified(sought.ground, route, simplified_m), drawn_m)
+
+
+def _driven(route: Route, drawn_m: float) -> DrivenRoute:
     drawing = tuple(DrawnPoint(place, drawn_m, drawn_m) for place in route.places)
-    return asked, DrivenRoute(drawing, route.lead_away, route.start_clearance_m, route.targets, route.blocks)
+    return DrivenRoute(drawing, route.lead_away, route.start_clearance_m, route.targets, route.blocks)
 
 
-def _sparse_route(ground: Ground, find: Callable[..., Route], clearance_m: float) -> Route:
+def _sparse_route(sought: Sought, clearance_m: float) -> Route | NoRoute:
     """Return the route at a clearance; where it winds round corners in tiny legs, one a little wider off with fewer waypoints."""
-    route = find(clearance_m=clearance_m)
+    route = DrawnRoutes.at(sought, clearance_m).find()
+    if isinstance(route, NoRoute) or not _has_tiny_legs(route):
+        return route
     for wider_m in _WIDER_M:
-        if not _has_tiny_legs(route):
-            break
-        try:
-            wider = find(clearance_m=clearance_m + wider_m)
-        except (NoRouteError, TargetBlockedError):
-            continue
-        if wider.lead_away == route.lead_away:
-            return simplified(ground, wider, clearance_m)
+        wider = DrawnRoutes.at(sought, clearance_m + wider_m).find()
+        if isinstance(wider, Route) and wider.lead_away == route.lead_away:
+            return simplified(sought.ground, wider, clearance_m)
     return route
 
 
@@ -92,11 +68,12 @@ def _has_tiny_legs(route: Route) -> bool:
     return bool((legs_m[route.lead_away :] < _TINY_LEG_M).sum() > 1)
 
 
-def _widest_route(find: Callable[..., Route], clearance_m: float) -> tuple[Route, float]:
+def _widest_route(sought: Sought, clearance_m: float) -> tuple[float, Route | NoRoute]:
     """Return the route at the widest clearance, and that clearance: a little less where corners are mitred in the narrowest place."""
+    route = DrawnRoutes.at(sought, clearance_m).find()
     for _ in range(_WIDEST_TRIES):
-        try:
-            return find(clearance_m=clearance_m), clearance_m
-        except (NoRouteError, TargetBlockedError):
-            clearance_m *= 0.98  # chosen: a try gives away 2 %
-    return find(clearance_m=clearance_m), clearance_m
+        if isinstance(route, Route) or route.kind is NoRouteKind.START_BLOCKED:
+            break
+        clearance_m *= 0.98  # chosen: a try gives away 2 %
+        route = DrawnRoutes.at(sought, clearance_m).find()
+    return clearance_m, route

@@ -10,21 +10,19 @@ import numpy as np
 from shapely import Point
 
 import pbpp
-from missions.checking.check import check_mission, plan_of
-from missions.checking.mission_end import End, ending
+from missions.checking.check import check_mission
+from missions.checking.mission_end import ending
 from missions.drive_model import corner_forecast
-from missions.editing.repair import repaired_plan
-from missions.editing.shorten import shortened
 from missions.errors import NoRouteError, SituationError
 from missions.fence import ZoneKind
+from missions.finishing.route_plan import plan_route
 from missions.geo import LocalPoint
 from missions.ground.from_situation import route_ends, route_ground
-from missions.planning.plan import plan
 from missions.promise import known_vehicle, promise
+from missions.request import End, Order
 from missions.routing.bottleneck import widest_clearance_m
 from missions.situation import Mission
 from missions.tour.visit_order import VisitOrder, length_of, shortest_order
-from missions.vehicle.item_limit import most_items
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -34,7 +32,7 @@ if TYPE_CHECKING:
     from missions.geo import LatLon
     from missions.ground.ground import Ground
     from missions.planned import Plan
-    from missions.request import Request
+    from missions.request import Request, Tour
     from missions.situation import Situation
 
 _WIDEST_SHARE = 0.9  # of the widest, to measure lengths where no route keeps the asked clearance: chosen, so that all places stay connected
@@ -64,36 +62,29 @@ class TargetOrder:
     bound_m: float
 
 
-def plan_tour(
-    situation: Situation, request: Request, *, should_stop: Callable[[], bool] | None = None
-) -> Plan:
-    """Plan all that a request may ask for: one target or several, in the best order, home again, with an end; or a mission repaired.
+def plan_tour(situation: Situation, request: Tour, *, should_stop: Callable[[], bool] | None = None) -> Plan:
+    """Plan a route over one target or several, in the best order, home again, with an end.
 
     Raises
     ------
     MissionError
-        As `missions.planning.plan.plan` and `missions.editing.repair.repair_mission`; NoRouteError too where RTL at the end would break the promise.
+        As `missions.planning.plan.plan`; NoRouteError too where RTL at the end would break the promise.
     """
-    if request.repairs:
-        return repaired_plan(situation, request, should_stop=should_stop)
     start, targets = route_ends(situation, request)
     said: list[str] = []
-    if request.order == "best" and len(targets) > 1:
+    if request.order is Order.BEST and len(targets) > 1:
         found = target_order(situation, request, should_stop=should_stop)
         targets = tuple(targets[index] for index in found.indices)
         said = _order_text(found)
     if request.comes_back:
         targets = (*targets, situation.home.value if situation.home else start)
-    # The targets are given only where they have to be: else the plan itself notes where they come from.
-    asked = replace(request, targets=targets) if len(targets) > 1 or request.targets else request
-    planned = plan(situation, asked, should_stop=should_stop)
+    planned = plan_route(situation, replace(request, targets=targets), should_stop=should_stop)
     planned = with_end(planned, situation, request)
-    planned = with_room(planned, situation, request, should_stop=should_stop)
-    return replace(planned, warnings=(*said, *planned.warnings)) if said else planned
+    return replace(planned, warnings=(*said, *planned.warnings))
 
 
 def target_order(
-    situation: Situation, request: Request, *, should_stop: Callable[[], bool] | None = None
+    situation: Situation, request: Tour, *, should_stop: Callable[[], bool] | None = None
 ) -> TargetOrder:
     """Find the order of a request's targets in which the routes around the fences are shortest.
 
@@ -181,50 +172,7 @@ def _length_m(
         return float("inf")
 
 
-def with_room(
-    planned: Plan, situation: Situation, request: Request, *, should_stop: Callable[[], bool] | None = None
-) -> Plan:
-    """Return a plan that fits into the vehicle's storage, without what can be left out of its route.
-
-    Raises
-    ------
-    MissionTooLongError
-        It cannot be shortened so far.
-    """
-    most = most_items(situation.parameters) - 1
-    if len(planned.items) <= most:
-        return planned
-    wanted = replace(request, clearance_m=planned.clearance_m, start=planned.start)
-    is_fitted = (
-        request.corner_allowance_m is None
-    )  # else drawn lines were asked for, which a check does not judge
-    own = _own_items(planned, request) if is_fitted else ()
-    mission = Mission(planned.items, planned.home)
-    checked = shortened(mission, own, situation, wanted, most=most, may_slow=True, should_stop=should_stop)
-    left_out = len(planned.items) - len(checked.mission.items)
-    said = f"{left_out} item{'s' * (left_out != 1)} of the route left out so that the vehicle can hold it ({most + 1})"
-    return replace(
-        plan_of(checked, situation, method=planned.method),
-        targets=planned.targets,
-        straight_line_m=planned.straight_line_m,
-        clearance_m=planned.clearance_m,
-        asked_m=planned.asked_m,
-        blocks=planned.blocks,
-        home=planned.home,
-        warnings=(*planned.warnings, said),
-    )
-
-
-def _own_items(planned: Plan, request: Request) -> frozenset[int]:
-    """Return the seqs of a plan's own items: all but the targets, and the speed that is set first."""
-    kept = {1} if request.speed_mps is not None else set()
-    points = iter(range(1, len(planned.path)))
-    for target in planned.targets:
-        kept.add(planned.seqs[next(point for point in points if planned.path[point] == target)])
-    return frozenset(range(1, len(planned.items) + 1)) - kept
-
-
-def with_end(planned: Plan, situation: Situation, request: Request) -> Plan:
+def with_end(planned: Plan, situation: Situation, request: Tour) -> Plan:
     """Return a plan with the end that is asked for.
 
     Raises
@@ -234,7 +182,7 @@ def with_end(planned: Plan, situation: Situation, request: Request) -> Plan:
     SituationError
         RTL, and home is not known.
     """
-    end = End(request.end)
+    end = request.end
     if end is End.HOLD:
         return planned
     items = ending(planned.items, end)
@@ -244,7 +192,7 @@ def with_end(planned: Plan, situation: Situation, request: Request) -> Plan:
         raise SituationError(
             "RTL leads home, and home is not known; give it (--home LAT,LON), or end with hold or loiter"
         )
-    wanted = replace(request, clearance_m=planned.clearance_m, start=planned.start)
+    wanted = replace(request, widest=False, clearance_m=planned.clearance_m, start=planned.start)
     checked = check_mission(Mission(items, planned.home), situation, wanted)
     last = checked.legs[-1]
     is_broken = last.breaks if planned.clearance_m is not None else last.drawn_clearance_m < planned.asked_m

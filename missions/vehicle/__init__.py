@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "PARAMETER_NAMES",
+    "PX4_PREFIXES",
     "Assumed",
     "Autopilot",
     "FenceParameters",
@@ -57,7 +58,7 @@ def vehicle_from_parameters(
     VehicleError
         A value that is not a number or out of its range, with its name.
     """
-    has_px4s = any(name.startswith(_PX4_PREFIXES) for name in parameters)
+    has_px4s = any(name.startswith(PX4_PREFIXES) for name in parameters)
     has_ardupilots = any(name.startswith(_ARDUPILOT_PREFIXES) for name in parameters)
     reader = ParameterReader(parameters)
     is_ardupilot = ardupilot if ardupilot is not None else has_ardupilots or not has_px4s
@@ -65,5 +66,5 @@ def vehicle_from_parameters(
     return made_by(reader, mav_type, firmware)
 
 
-_PX4_PREFIXES = ("NAV_ACC_RAD", "RA_", "RD_", "RO_", "GF_")
+PX4_PREFIXES = ("NAV_ACC_RAD", "RA_", "RD_", "RO_", "GF_")
 _ARDUPILOT_PREFIXES = ("WP_", "CRUISE_", "ATC_", "TURN_RADIUS", "FENCE_", "AVOID_", "OA_")

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from missions.errors import VehicleError
 from missions.vehicle import whole_number
+from missions.vehicle.asked_parameters import STORAGE_NAMES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -36,7 +37,7 @@ def sd_card_bytes(parameters: Mapping[str, float], name: str) -> int:
 def storage_remarks(parameters: Mapping[str, float]) -> list[str]:
     """Return remarks on storage that no vehicle can have."""
     remarks = []
-    for name in ("BRD_SD_MISSION", "BRD_SD_FENCE"):
+    for name in STORAGE_NAMES:
         try:
             whole_number(parameters, name, 0, most=_MOST_SD_KB)
         except VehicleError as error:

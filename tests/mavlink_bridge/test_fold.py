@@ -150,6 +150,24 @@ class TestVehicle:
         assert first.parameters == {"FENCE_MARGIN": 2.5}
         assert after(NEW, ((2, component), m.ParamValue("FENCE_MARGIN", 2.5, 9, 1, 0))) == NEW
 
+    @given(
+        st.lists(
+            st.tuples(st.sampled_from([f"P{number}" for number in range(80)]), st.floats(-9, 9, width=32))
+        )
+    )
+    def test_no_situation_changes_by_what_comes_after_it(self, told: list[tuple[str, float]]) -> None:
+        situation, wanted = NEW, {}
+        known = []
+        for name, value in told:
+            situation = after(situation, (ROVER, m.ParamValue(name, value, 9, 80, 0)))
+            wanted = {**wanted, name: value}
+            known.append((situation.parameters, wanted))
+        for parameters, values in known:
+            assert parameters == values
+            assert list(parameters) == list(values)
+            assert len(parameters) == len(values)
+            assert all(parameters.get(f"P{number}") == values.get(f"P{number}") for number in range(80))
+
 
 class TestFence:
     KIND = m.MissionType.FENCE
@@ -410,7 +428,7 @@ class TestMission:
         for told in (upload(items, 2), read_back(items, 2)):
             found = after(NEW, *told)
             assert found.rally is not None
-            assert found.rally.value == (THERE,)
+            assert [point.position for point in found.rally.value] == [THERE]
 
 
 class TestTarget:

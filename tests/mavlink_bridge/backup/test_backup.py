@@ -6,6 +6,7 @@ import hashlib
 import json
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given
@@ -14,9 +15,15 @@ from protocol.test_wire import ITEMS
 from protocol.twin import plain_fence, plain_mission
 
 from mavlink_bridge.backup.store import BackupStore, read_backup
+from mavlink_bridge.backup.upload_note import UploadNote
+from mavlink_bridge.backup.vehicle_lock import VehicleLock
 from mavlink_bridge.backup.vehicle_mark import Kinship, VehicleMark, uid_of
-from mavlink_bridge.errors import BackupError, OutcomeError
+from mavlink_bridge.cli.live import BackupKeeper
+from mavlink_bridge.director import State
+from mavlink_bridge.errors import BackupError, BridgeError, OutcomeError, VehicleInUseError
 from mavlink_bridge.mavlink.messages import AutopilotVersion, MissionType
+from mavlink_bridge.protocol.peer import Peer
+from mavlink_bridge.protocol.verified_outcome import Held
 from missions.items import MissionItem
 
 MISSION, FENCE = MissionType.MISSION, MissionType.FENCE
@@ -274,3 +281,59 @@ def test_the_users_state_folder(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     monkeypatch.setenv("HOME", str(tmp_path))
     assert tmp_path in BackupStore().folder.parents
+
+
+@pytest.mark.parametrize(
+    ("held", "stays"), [(Held.OLD, True), (Held.FOREIGN, True), (Held.UNKNOWN, True), (Held.WANTED, False)]
+)
+@pytest.mark.parametrize("has_begun", [False, True])
+def test_the_note_of_an_interrupted_upload_outlives_a_later_one_that_does_not_get_through(
+    tmp_path, held, stays, has_begun
+):
+    store = BackupStore(tmp_path)
+    original = store.begin(ONE, MISSION, plain_mission(3))
+    note = UploadNote(store, ONE, MISSION)
+    if has_begun:
+        assert note.begin(plain_mission(2)) == original
+    note.settle(held)
+    assert [kept.backup.path for kept in store.notes()] == ([original] if stays else [])
+
+
+@pytest.mark.parametrize("held", Held)
+def test_an_own_note_goes_where_it_is_known_what_the_vehicle_holds(tmp_path, held):
+    store = BackupStore(tmp_path)
+    note = UploadNote(store, ONE, MISSION)
+    note.begin(plain_mission(2))
+    note.settle(held)
+    assert bool(store.notes()) is (held in (Held.UNFINISHED, Held.UNKNOWN))
+
+
+@pytest.mark.parametrize("is_in_use", [False, True])
+def test_a_bridge_that_may_not_write_leaves_the_note_of_who_did(state_folder, is_in_use):
+    """Before, an upload that was refused by the bridge's own check took the note of an earlier one away, or of another process."""
+    store = BackupStore()
+    upload = SimpleNamespace(has_written=False)
+    director = SimpleNamespace(
+        peer=Peer(1, 1, 1, 195),
+        vehicle_uid=ONE.uid,
+        upload=upload,
+        is_uploading=True,
+        pending_backup=None,
+        upload_outcome=None,
+        state=State.UPLOADING,
+        backup_failed=lambda error, _now_s: failures.append(error),
+    )
+    failures: list[BridgeError] = []
+    other = VehicleLock(ONE)
+    assert not is_in_use or other.take() is None
+    store.begin(ONE, MISSION, plain_mission(3))
+    keeper = BackupKeeper(director, ONE.connection)
+    keeper.step(0.0)
+    director.pending_backup = plain_mission(2) if is_in_use else None
+    keeper.step(0.1)
+    assert [type(failure) for failure in failures] == ([VehicleInUseError] if is_in_use else [])
+    director.pending_backup, director.is_uploading = None, False
+    director.upload_outcome = SimpleNamespace(held=Held.OLD)
+    keeper.step(0.2)
+    assert len(store.notes()) == 1
+    other.free()

@@ -15,7 +15,7 @@ from mavlink_bridge.cli.live import conduct
 from mavlink_bridge.director import Orders
 from mavlink_bridge.link import open_link
 from mavlink_bridge.mavlink.messages import CommandLong
-from mavlink_bridge.mavlink.rover import AUTO_MODE, HOLD_MODE
+from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.protocol.command import SendCommand
 from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.simulator import Simulator, SimulatorConfig
@@ -162,7 +162,7 @@ def test_what_a_live_vehicle_does_not_tell_is_said(fields, yard, monkeypatch):
         parameters={"FENCE_ENABLE": 1.0},
         streams=False,
     )
-    monkeypatch.setattr("mavlink_bridge.cli.session.Session.ask_telemetry", lambda _session: None)
+    monkeypatch.setattr("mavlink_bridge.director.learning.stream_requests", lambda _peer: [])
     with Simulator(config, "tcpin:127.0.0.1:0") as simulator:
         document = document_of("check", "--connect", simulator.connection, "--clearance", "2", code=8)
         assert (
@@ -342,7 +342,7 @@ def test_a_fence_that_changes_on_the_way_stops_a_repaired_mission(tmp_path, fiel
     def meddle(frames) -> None:
         nonlocal is_changed
         is_on_its_way = any(getattr(frame.message, "seq", 0) == 2 for frame in frames)
-        if is_on_its_way and not is_changed and simulator.vehicle.mode == AUTO_MODE:
+        if is_on_its_way and not is_changed and simulator.vehicle.mode == Mode.AUTO:
             is_changed = True
             told = run(
                 "upload",
@@ -367,7 +367,7 @@ def test_a_fence_that_changes_on_the_way_stops_a_repaired_mission(tmp_path, fiel
         ):
             conduct(link, orders, quiet=True, on_frames=meddle)
         assert is_changed
-        assert simulator.vehicle.mode == HOLD_MODE
+        assert simulator.vehicle.mode == Mode.HOLD
 
 
 @pytest.mark.parametrize(

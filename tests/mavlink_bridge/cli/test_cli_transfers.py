@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from mavlink_bridge.backup.store import BackupStore
 from mavlink_bridge.cli.app import app
 from mavlink_bridge.mavlink.messages import MissionType
-from mavlink_bridge.mavlink.rover import AUTO_MODE, HOLD_MODE
+from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.simulator import Simulator, SimulatorConfig
 from missions.formats import read_situation
 from missions.formats.waypoints import format_items
@@ -209,23 +209,23 @@ def slow_rover():
 
 def test_a_driving_vehicle_is_left_alone_unless_told(slow_rover, tmp_path):
     rover = slow_rover
-    put(rover, AUTO_MODE)
+    put(rover, Mode.AUTO)
     path, short = mission_file(tmp_path), mission_file(tmp_path, plain_mission(9, 3), "short.waypoints")
     code, _, output = run(rover, "upload", path)
     assert code == 6
     assert "--hold" in output
     code, _, output = run(rover, "upload", path, "--hold")
     assert code == 0, output
-    assert rover.vehicle.mode == HOLD_MODE
-    put(rover, AUTO_MODE)
+    assert rover.vehicle.mode == Mode.HOLD
+    put(rover, Mode.AUTO)
     assert run(rover, "upload", short, "--hold", "--drive")[0] == 0
-    assert rover.vehicle.mode == AUTO_MODE
+    assert rover.vehicle.mode == Mode.AUTO
     assert run(rover, "upload", path, "--replace-active")[0] == 0
     assert len(rover.vehicle.mission) == 20
 
 
 def test_a_disarmed_vehicle_is_not_left_in_auto(rover, tmp_path):
-    for mode in (HOLD_MODE, 0):
+    for mode in (Mode.HOLD, 0):
         put(rover, mode)
         rover.vehicle.rover.is_armed = False
         code, document, _ = run(rover, "upload", mission_file(tmp_path), "--drive", "--json")
@@ -236,11 +236,11 @@ def test_a_disarmed_vehicle_is_not_left_in_auto(rover, tmp_path):
 
 
 def test_disarmed_between_the_look_and_the_switch_it_is_put_back(rover, tmp_path, monkeypatch):
-    put(rover, HOLD_MODE)
+    put(rover, Mode.HOLD)
     set_mode = rover.vehicle.rover.set_mode
 
     def disarmed_meanwhile(number, now_s):
-        if number == AUTO_MODE:
+        if number == Mode.AUTO:
             rover.vehicle.rover.disarm()
         return set_mode(number, now_s)
 
@@ -248,17 +248,17 @@ def test_disarmed_between_the_look_and_the_switch_it_is_put_back(rover, tmp_path
     code, document, _ = run(rover, "upload", mission_file(tmp_path), "--drive", "--json")
     assert code == 7
     assert "switched back to HOLD and does not drive" in document["message"]
-    assert rover.vehicle.mode == HOLD_MODE
+    assert rover.vehicle.mode == Mode.HOLD
 
 
 def test_a_mission_that_is_complete_is_replaced_and_begun_anew(rover, tmp_path):
-    put(rover, AUTO_MODE)
-    rover.vehicle.rover.route.is_complete = True
+    put(rover, Mode.AUTO)
+    rover.vehicle.rover.mission_run.is_complete = True
     path = mission_file(tmp_path)
     assert run(rover, "upload", path)[0] == 0
-    assert (rover.vehicle.mode, rover.vehicle.rover.route.is_complete) == (AUTO_MODE, True)
+    assert (rover.vehicle.mode, rover.vehicle.rover.mission_run.is_complete) == (Mode.AUTO, True)
     assert run(rover, "upload", path, "--drive")[0] == 0
-    assert (rover.vehicle.mode, rover.vehicle.rover.route.is_complete) == (AUTO_MODE, False)
+    assert (rover.vehicle.mode, rover.vehicle.rover.mission_run.is_complete) == (Mode.AUTO, False)
 
 
 def test_nobody_there(tmp_path):

@@ -21,7 +21,7 @@ from mavlink_bridge.mavlink.messages import (
     MissionRequestInt,
     MissionRequestList,
 )
-from mavlink_bridge.mavlink.rover import AUTO_MODE
+from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.simulator import Simulator, SimulatorConfig
 from missions.fence import fence_to_items
 from missions.formats import read_fence
@@ -117,7 +117,7 @@ def test_an_upload_is_not_driven_then(rover, forge, mission_file):
         "; written and verified before: mission"
     )
     assert is_held(rover, NEW)
-    assert rover.vehicle.mode != AUTO_MODE
+    assert rover.vehicle.mode != Mode.AUTO
 
 
 def test_a_download_goes_on(rover, forge, tmp_path):

@@ -21,20 +21,20 @@ from mavlink_bridge.cli import interrupting
 from mavlink_bridge.cli.app import app
 from mavlink_bridge.cli.interrupting import (
     AtHand,
-    Ending,
     Interrupted,
-    Step,
+    InterruptReport,
+    Reaction,
     Terminated,
     doing_text,
-    first_step,
+    first_reaction,
     interruptible,
-    step_after,
+    reaction_to,
     terminable,
 )
 from mavlink_bridge.errors import LinkError
 from mavlink_bridge.link import Link
 from mavlink_bridge.mavlink import messages as m
-from mavlink_bridge.mavlink.rover import AUTO_MODE, HOLD_MODE
+from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.protocol.vehicle_watch import Doing, VehicleWatch
 from mavlink_bridge.protocol.verified_upload import VerifiedUpload
@@ -46,38 +46,38 @@ from missions.items import waypoint
 
 HOME = LatLon(40.071374, -105.229930)
 TARGET = "40.0720926,-105.2286152"
-DRIVING = Doing(AUTO_MODE, True, 5.0, age_s=0.3, speed_age_s=0.1)
+DRIVING = Doing(Mode.AUTO, True, 5.0, age_s=0.3, speed_age_s=0.1)
 
 
 @pytest.mark.parametrize("drives", [True, False])
 @pytest.mark.parametrize("can_ask", [True, False])
 @pytest.mark.parametrize("is_terminated", [True, False])
 def test_only_a_person_at_a_terminal_is_asked_and_only_while_it_drives_by_us(drives, can_ask, is_terminated):
-    wanted = Step.ASK if drives and can_ask and not is_terminated else Step.REPORT
-    assert first_step(drives=drives, can_ask=can_ask, is_terminated=is_terminated) is wanted
+    wanted = Reaction.ASK if drives and can_ask and not is_terminated else Reaction.REPORT
+    assert first_reaction(drives=drives, can_ask=can_ask, is_terminated=is_terminated) is wanted
 
 
 @pytest.mark.parametrize(
     ("answer", "step"),
     [
-        *[(answer, Step.HOLD) for answer in ("", "y", "Y", "yes", " Yes ", "hold", "HOLD")],
-        *[(answer, Step.REPORT) for answer in ("n", "N", "no", None)],
-        *[(answer, Step.ASK) for answer in ("perhaps", "40.07,-105.2", "nn")],
+        *[(answer, Reaction.HOLD) for answer in ("", "y", "Y", "yes", " Yes ", "hold", "HOLD")],
+        *[(answer, Reaction.REPORT) for answer in ("n", "N", "no", None)],
+        *[(answer, Reaction.ASK) for answer in ("perhaps", "40.07,-105.2", "nn")],
     ],
 )
 def test_answers(answer, step):
-    assert step_after(answer) is step
+    assert reaction_to(answer) is step
 
 
 @pytest.mark.parametrize(
     ("doing", "text"),
     [
         (DRIVING, "AUTO, armed, 5.0 m/s"),
-        (Doing(HOLD_MODE, False, None, age_s=0.2), "HOLD, not armed, speed not known"),
+        (Doing(Mode.HOLD, False, None, age_s=0.2), "HOLD, not armed, speed not known"),
         (Doing(), "its mode is not known, no heartbeat was heard"),
-        (Doing(AUTO_MODE, True, 0.0, has_completed=True, age_s=0, speed_age_s=0), "AUTO, armed, 0.0 m/s, its mission complete"),
+        (Doing(Mode.AUTO, True, 0.0, has_completed=True, age_s=0, speed_age_s=0), "AUTO, armed, 0.0 m/s, its mission complete"),
         (Doing(99, True, 1.0, age_s=12.4, speed_age_s=0.1), "mode 99, armed, 1.0 m/s (12 s ago)"),
-        (Doing(AUTO_MODE, True, 1.0, age_s=0.1, speed_age_s=30.0), "AUTO, armed, 1.0 m/s (30 s ago)"),
+        (Doing(Mode.AUTO, True, 1.0, age_s=0.1, speed_age_s=30.0), "AUTO, armed, 1.0 m/s (30 s ago)"),
     ],
 )  # fmt: skip
 def test_what_a_vehicle_does_in_words(doing, text):
@@ -87,16 +87,16 @@ def test_what_a_vehicle_does_in_words(doing, text):
 @pytest.mark.parametrize(
     ("ending", "message"),
     [
-        (Ending("", Doing(HOLD_MODE, False, 0.0, age_s=0, speed_age_s=0), ""),
+        (InterruptReport("", Doing(Mode.HOLD, False, 0.0, age_s=0, speed_age_s=0), ""),
          "interrupted; the vehicle was left as it was: HOLD, not armed, 0.0 m/s; nothing was written to it"),
-        (Ending("", DRIVING, "the mission on it is ours", drives=True),
+        (InterruptReport("", DRIVING, "the mission on it is ours", drives=True),
          "interrupted; nothing was sent; the vehicle goes on with the mission that pbpp started: AUTO, armed, 5.0 m/s; the mission on it is ours"),
-        (Ending("", Doing(HOLD_MODE, True, 0.1, age_s=0, speed_age_s=0), "x", drives=True, was_asked=True, is_held=True),
+        (InterruptReport("", Doing(Mode.HOLD, True, 0.1, age_s=0, speed_age_s=0), "x", drives=True, was_asked=True, is_held=True),
          "interrupted; the vehicle was switched to HOLD, confirmed by its heartbeat: HOLD, armed, 0.1 m/s; x"),
-        (Ending("", DRIVING, "x", drives=True, is_held=False),
+        (InterruptReport("", DRIVING, "x", drives=True, is_held=False),
          "interrupted; HOLD was sent, but no heartbeat confirms it: AUTO, armed, 5.0 m/s; x"),
-        (Ending("part old, part new", DRIVING, ""), "part old, part new; the vehicle now: AUTO, armed, 5.0 m/s"),
-        (Ending("", DRIVING, "x", drives=True, is_link_lost=True),
+        (InterruptReport("part old, part new", DRIVING, ""), "part old, part new; the vehicle now: AUTO, armed, 5.0 m/s"),
+        (InterruptReport("", DRIVING, "x", drives=True, is_link_lost=True),
          "interrupted; nothing was sent; the vehicle goes on with the mission that pbpp started: AUTO, armed, 5.0 m/s, when it was last heard (the link is lost); x"),
     ],
 )  # fmt: skip
@@ -105,26 +105,28 @@ def test_what_is_said_at_the_end(ending, message):
 
 
 def test_what_scripts_are_told():
-    assert Ending("", DRIVING, "", drives=True).details() == {
+    assert InterruptReport("", DRIVING, "", drives=True).details() == {
         "mode": "AUTO", "armed": True, "speed_mps": 5.0, "age_s": 0.3, "drives": True, "hold": "not sent",
     }  # fmt: skip
-    held = Ending("", Doing(HOLD_MODE, True, None, age_s=0.5), "", drives=True, is_held=True).details()
+    held = InterruptReport(
+        "", Doing(Mode.HOLD, True, None, age_s=0.5), "", drives=True, is_held=True
+    ).details()
     assert (held["drives"], held["hold"], held["speed_mps"]) == (False, "confirmed", None)
 
 
 def test_what_is_heard_of_a_vehicle():
     watch = VehicleWatch()
     assert watch.is_active(0.0) is None
-    watch.receive(m.Heartbeat(10, 3, 129, AUTO_MODE, 4), 10.0)
+    watch.receive(m.Heartbeat(10, 3, 129, Mode.AUTO, 4), 10.0)
     watch.receive(m.GlobalPositionInt(0, 0, 0, vx=300, vy=400), 10.5)
     assert watch.is_active(11.0) is True
     assert watch.is_active(13.1) is None
-    assert watch.doing(11.0) == Doing(AUTO_MODE, True, 5.0, age_s=1.0, speed_age_s=0.5)
+    assert watch.doing(11.0) == Doing(Mode.AUTO, True, 5.0, age_s=1.0, speed_age_s=0.5)
     watch.receive(m.MissionCurrent(3, 3, mission_state=5), 10.0)
     assert watch.is_active(11.0) is False
-    watch.receive(m.Heartbeat(10, 3, 129, AUTO_MODE, 4), 14.0)
+    watch.receive(m.Heartbeat(10, 3, 129, Mode.AUTO, 4), 14.0)
     assert watch.is_active(14.0) is True, "an old word of the mission's end is none"
-    watch.receive(m.Heartbeat(10, 3, 1, AUTO_MODE, 4), 15.0)
+    watch.receive(m.Heartbeat(10, 3, 1, Mode.AUTO, 4), 15.0)
     assert watch.is_active(15.0) is False
 
 
@@ -158,7 +160,7 @@ def driven():
     at_hand = AtHand(link, lambda: peer, lambda: watch, lambda: True, lambda: "on it")
     wait(link, 4)
     link.send(m.CommandLong(1, 1, 400, param1=1.0))
-    link.send(m.CommandLong(1, 1, 176, param1=1.0, param2=AUTO_MODE))
+    link.send(m.CommandLong(1, 1, 176, param1=1.0, param2=Mode.AUTO))
     wait(link, 6, watch)
     return rover, at_hand
 
@@ -184,7 +186,7 @@ def interrupt(at_hand, monkeypatch, *, keyboard=None, kind=KeyboardInterrupt, te
 def test_hold_is_sent_and_confirmed(driven, monkeypatch, answers):
     rover, at_hand = driven
     told = interrupt(at_hand, monkeypatch, keyboard=Typed(*answers))
-    assert rover.vehicle.mode == HOLD_MODE
+    assert rover.vehicle.mode == Mode.HOLD
     assert "switched to HOLD, confirmed by its heartbeat: HOLD, armed" in str(told)
     assert (told.details["hold"], told.details["mode"], told.details["drives"]) == (
         "confirmed",
@@ -200,7 +202,7 @@ def test_nothing_is_sent_for_a_no_a_second_interrupt_or_a_closed_input(driven, m
     send = at_hand.link.send
     monkeypatch.setattr(at_hand.link, "send", lambda message: (sent.append(message), send(message)))
     told = interrupt(at_hand, monkeypatch, keyboard=keyboard)
-    assert rover.vehicle.mode == AUTO_MODE
+    assert rover.vehicle.mode == Mode.AUTO
     assert {type(message) for message in sent} <= {m.Heartbeat}
     assert "nothing was sent; the vehicle goes on with the mission that pbpp started: AUTO, armed, " in str(
         told
@@ -212,7 +214,7 @@ def test_nothing_is_sent_for_a_no_a_second_interrupt_or_a_closed_input(driven, m
 def test_without_a_person_nothing_is_sent_and_the_state_is_told(driven, monkeypatch, kind, terminal):
     rover, at_hand = driven
     told = interrupt(at_hand, monkeypatch, keyboard=Typed("y"), kind=kind, terminal=terminal)
-    assert rover.vehicle.mode == AUTO_MODE
+    assert rover.vehicle.mode == Mode.AUTO
     assert told.details["hold"] == "not sent"
     assert told.details["age_s"] < 1.5
     assert math.isclose(told.details["speed_mps"], rover.vehicle.rover.body.speed_mps, abs_tol=0.3)
@@ -228,7 +230,7 @@ def test_a_second_interrupt_while_hold_is_under_way(driven, monkeypatch):
     told = interrupt(at_hand, monkeypatch, keyboard=Typed(""))
     assert "HOLD was sent, but no heartbeat confirms it" in str(told)
     assert told.details["hold"] == "not confirmed"
-    assert rover.vehicle.mode in (HOLD_MODE, AUTO_MODE)
+    assert rover.vehicle.mode in (Mode.HOLD, Mode.AUTO)
 
 
 def test_a_link_that_breaks_meanwhile(driven, monkeypatch):
@@ -237,7 +239,7 @@ def test_a_link_that_breaks_meanwhile(driven, monkeypatch):
     def broken(_timeout_s):
         raise LinkError("the other end closed the link")
 
-    monkeypatch.setattr(at_hand.link, "receive", broken)
+    monkeypatch.setattr(at_hand.link, "receive_at", broken)
     told = interrupt(at_hand, monkeypatch, terminal=False)
     assert "(the link is lost)" in str(told)
 
@@ -257,7 +259,7 @@ def started(simulator, tmp_path, command: str, **streams) -> subprocess.Popen:
 def is_driving(simulator) -> bool:
     until_s = time.monotonic() + 60
     while time.monotonic() < until_s:
-        if simulator.vehicle.mode == AUTO_MODE and simulator.vehicle.rover.body.speed_mps > 0.5:
+        if simulator.vehicle.mode == Mode.AUTO and simulator.vehicle.rover.body.speed_mps > 0.5:
             return True
         time.sleep(0.02)
     return False
@@ -276,8 +278,8 @@ def take_terminal() -> None:
 @pytest.mark.parametrize(
     ("command", "answer", "mode", "said"),
     [
-        ("plan", "\n", HOLD_MODE, "switched to HOLD, confirmed by its heartbeat"),
-        ("bridge", "n\n", AUTO_MODE, "nothing was sent; the vehicle goes on"),
+        ("plan", "\n", Mode.HOLD, "switched to HOLD, confirmed by its heartbeat"),
+        ("bridge", "n\n", Mode.AUTO, "nothing was sent; the vehicle goes on"),
     ],
 )
 def test_at_a_real_terminal(fields, tmp_path, command, answer, mode, said):
@@ -359,7 +361,7 @@ def test_a_service_that_is_ended_sends_nothing_and_tells_the_state(fields, tmp_p
         process.send_signal(getattr(signal, name))
         _, errors = process.communicate(timeout=60)
         assert process.returncode == 130
-        assert simulator.vehicle.mode == AUTO_MODE
+        assert simulator.vehicle.mode == Mode.AUTO
     assert "nothing was sent; the vehicle goes on with the mission that pbpp started: AUTO, armed, " in errors
     assert "left as it was" not in errors
     assert json.dumps(errors).count("error: ") == 1

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 from mavlink_bridge.cli.app import app
 from mavlink_bridge.mavlink.messages import CommandLong
-from mavlink_bridge.mavlink.rover import AUTO_MODE, HOLD_MODE
+from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.simulator import Simulator, SimulatorConfig
 from missions.fence import fence_to_items
 from missions.formats import read_fence, read_situation
@@ -75,7 +75,7 @@ def test_a_vehicle_armed_in_auto_is_left_alone(config):
     with Simulator(far, "tcpin:127.0.0.1:0") as simulator:
         before = simulator.vehicle.mission
         _command(simulator, Command.COMPONENT_ARM_DISARM, 1.0)
-        _command(simulator, Command.DO_SET_MODE, 1.0, AUTO_MODE)
+        _command(simulator, Command.DO_SET_MODE, 1.0, Mode.AUTO)
         result = run("plan", "--connect", simulator.connection, "--target", TARGET, "--upload", "--json")
         assert simulator.vehicle.mission == before
     document = json.loads(result.stdout)
@@ -112,7 +112,7 @@ def test_drives_only_a_vehicle_that_is_armed(config):
         result = run(
             "plan", "--connect", simulator.connection, "--target", TARGET, "--upload", "--drive", "--json"
         )
-        assert simulator.vehicle.mode != AUTO_MODE
+        assert simulator.vehicle.mode != Mode.AUTO
         assert not simulator.vehicle.is_armed
     document = json.loads(result.stdout)
     assert (result.exit_code, document["error"]) == (7, "OutcomeError")
@@ -130,7 +130,7 @@ def test_a_drive_ends_with_what_it_was_like(config, tmp_path):
     with Simulator(fast, "tcpin:127.0.0.1:0", speedup=10) as simulator:
         result = driven(simulator, "--json", "-o", str(tmp_path / "m.plan"))
         vehicle = simulator.vehicle
-        assert (vehicle.mode, vehicle.is_armed, vehicle.breaches) == (HOLD_MODE, True, 0)
+        assert (vehicle.mode, vehicle.is_armed, vehicle.breaches) == (Mode.HOLD, True, 0)
         again = run("plan", "--connect", simulator.connection, "--target", "40.07125,-105.2292", "--upload", "--json")  # fmt: skip
     document = json.loads(result.stdout)
     assert result.exit_code == 0, result.output
@@ -169,12 +169,12 @@ def test_hold_stops_it_first(config):
     far = replace(config, mission=tuple(waypoint(LatLon(40.0722, -105.2300 + 0.0002 * i)) for i in range(4)))
     with Simulator(far, "tcpin:127.0.0.1:0") as simulator:
         _command(simulator, Command.COMPONENT_ARM_DISARM, 1.0)
-        _command(simulator, Command.DO_SET_MODE, 1.0, AUTO_MODE)
+        _command(simulator, Command.DO_SET_MODE, 1.0, Mode.AUTO)
         plan = ("plan", "--connect", simulator.connection, "--target", TARGET, "--upload", "--json")
         refused = json.loads(run(*plan).stdout)
         assert (refused["exit_code"], refused["advice"]) == (6, "--hold switches it to HOLD first")
         assert json.loads(run(*plan, "--hold").stdout)["verified"] is True
-        assert (simulator.vehicle.mode, simulator.vehicle.is_armed) == (HOLD_MODE, True)
+        assert (simulator.vehicle.mode, simulator.vehicle.is_armed) == (Mode.HOLD, True)
 
 
 def test_sim_says_where_it_listens_and_ends_when_asked(fields):

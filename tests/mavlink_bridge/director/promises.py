@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.director import State
 from mavlink_bridge.mavlink import messages as m
-from mavlink_bridge.mavlink.rover import AUTO_MODE, GUIDED_MODE, HOLD_MODE
+from mavlink_bridge.mavlink.rover import Mode
 from missions.items import Command
 
 if TYPE_CHECKING:
@@ -35,6 +35,7 @@ class Promises:
         self._is_armed = False
         self._heartbeats = 0
         self._has_clashed = False
+        self._was_clashing = False  # when it last sent: an upload that has ended since leaves its last words
         self._took: tuple[float, int | None] | None = None  # when, and to which mode
         self._knows = False
         self._asked_s = -1e9
@@ -50,6 +51,7 @@ class Promises:
             messages = messages_to_send()
             for message in messages:
                 self._check(message)
+            self._was_clashing = run.director.state is State.CLASHING
             return messages
 
         run.director.receive = listen
@@ -91,7 +93,7 @@ class Promises:
             return
         mode = self._took[1]
         # HOLD by somebody looks like our own; GUIDED right after a click may be the click's.
-        shows_mode = mode not in (None, HOLD_MODE, GUIDED_MODE) and self._mode == mode
+        shows_mode = mode not in (None, Mode.HOLD, Mode.GUIDED) and self._mode == mode
         self._knows = self._knows or shows_mode
 
     # What the bridge sends
@@ -120,9 +122,10 @@ class Promises:
             return
         is_hold = isinstance(message, m.CommandLong) and (message.command, message.param2) == (
             Command.DO_SET_MODE,
-            HOLD_MODE,
+            Mode.HOLD,
         )
-        if isinstance(message, m.MissionAck) or self._run.director.state is State.CLASHING or is_hold:
+        is_uploads_end = isinstance(message, m.MissionAck | m.MissionRequestInt) and self._was_clashing
+        if is_uploads_end or self._run.director.state is State.CLASHING or is_hold:
             return
         self._break(f"{type(message).__name__} after somebody spoke with our ids")
 
@@ -130,11 +133,11 @@ class Promises:
         self._check_taken_over(f"mode {mode}")
         if not self._run.director.orders.drive:
             self._break("a mode change without orders to drive")
-        if mode not in (HOLD_MODE, AUTO_MODE):
+        if mode not in (Mode.HOLD, Mode.AUTO):
             self._break(f"mode {mode} is none of ours")
-        if mode != AUTO_MODE:
+        if mode != Mode.AUTO:
             return
-        if self._mode != HOLD_MODE:
+        if self._mode != Mode.HOLD:
             self._break(f"AUTO though the last heartbeat said mode {self._mode}")
         if self._heartbeats == self._last_auto_heartbeats:
             self._break("AUTO twice without a heartbeat in between")
@@ -148,7 +151,7 @@ class Promises:
             self._break("an upload without orders to")
         if self._run.director.state is State.WITHDRAWING:
             return  # no half mission is left behind
-        if self._mode == AUTO_MODE and self._is_armed:
+        if self._mode == Mode.AUTO and self._is_armed:
             self._break("an upload under a vehicle that drives")
 
     def _check_taken_over(self, what: str) -> None:

@@ -22,7 +22,7 @@ from director.promises import Promises
 
 from mavlink_bridge.director import Director, Orders, State
 from mavlink_bridge.mavlink import messages as m
-from mavlink_bridge.mavlink.rover import HOLD_MODE
+from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.protocol.upload import Upload
 from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig
@@ -48,7 +48,7 @@ PLACES = (
     LatLon(40.0714600, -105.2295800),  # in the barn
     LatLon(40.0740000, -105.2286152),  # outside
 )
-OPERATOR_MODES = (0, HOLD_MODE, 11)
+OPERATOR_MODES = (0, Mode.HOLD, 11)
 MOST_GROWTH = 1.05
 """How far apart the sizes of memory may be, once it has settled."""
 

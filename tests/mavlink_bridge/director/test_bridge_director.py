@@ -13,7 +13,7 @@ from shapely import LineString
 
 from mavlink_bridge.director import SCHEMA, TRANSITIONS, Director, EventName, Orders, State, TargetSource
 from mavlink_bridge.mavlink import messages as m
-from mavlink_bridge.mavlink.rover import GUIDED_MODE, HOLD_MODE
+from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.protocol.upload import Upload
 from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig
@@ -115,8 +115,8 @@ def test_a_click_becomes_a_verified_mission_and_a_drive():
 def test_without_orders_to_drive_it_changes_no_mode_and_warns_of_an_unsafe_straight_line():
     run = ready(conductor(drive=False))
     arm(run)
-    run.ground_station(m.SetMode(1, 1, GUIDED_MODE))
-    run.run_until(lambda: run.director.situation.mode == GUIDED_MODE and run.director.situation.armed)
+    run.ground_station(m.SetMode(1, 1, Mode.GUIDED))
+    run.run_until(lambda: run.director.situation.mode == Mode.GUIDED and run.director.situation.armed)
     run.ground_station(reposition(FAR))
     run.run_until(run.happened(EventName.VERIFIED), 20)
     assert run.last(EventName.STRAIGHT_LINE_UNSAFE).data["fence"] == "exclusion polygon 1"
@@ -217,8 +217,8 @@ def test_other_ways_to_ask_and_how_to_close_them(source, message):
 
 def test_the_echo_of_a_target_in_guided():
     run = ready(conductor(drive=False, target_sources=frozenset({TargetSource.ECHO})))
-    run.ground_station(m.SetMode(1, 1, GUIDED_MODE))
-    run.run_until(lambda: run.director.situation.mode == GUIDED_MODE)
+    run.ground_station(m.SetMode(1, 1, Mode.GUIDED))
+    run.run_until(lambda: run.director.situation.mode == Mode.GUIDED)
     echo = m.Frame(1, 1, m.PositionTargetGlobalInt(0, 0, 0xDF8, *to_e7(FAR), 0.0))
     for _ in range(3):
         run.down.push(echo, run.now_s)
@@ -247,7 +247,7 @@ def test_a_fence_across_the_route_while_driving():
     run.run_until(lambda: run.director.drive is not None and run.director.drive.driven_m > 15)
     upload(run, m.MissionType.FENCE, fence_to_items(wall_across_the_route()))
     known_s = run.run_until(run.happened(EventName.FENCE_CHANGED), 5)
-    held_s = run.run_until(lambda: run.vehicles[0].mode == HOLD_MODE, 5)
+    held_s = run.run_until(lambda: run.vehicles[0].mode == Mode.HOLD, 5)
     assert held_s - known_s <= 0.5
     assert run.last(EventName.ROUTE_BROKEN).data["fence"] == "exclusion circle 2"
     run.run_until(lambda: run.director.state is State.ARRIVED)
@@ -335,7 +335,7 @@ def test_a_fence_across_the_route_without_orders_to_drive_is_a_loud_warning():
     assert run.happened(EventName.ROUTE_BROKEN, before)()
 
 
-@pytest.mark.parametrize("mode", [HOLD_MODE, 0, 11])
+@pytest.mark.parametrize("mode", [Mode.HOLD, 0, 11])
 def test_the_operator_takes_over_and_a_new_target_gives_back(mode):
     run = driving(conductor())
     run.run_until(lambda: run.director.drive is not None and run.director.drive.driven_m > 10)
@@ -346,7 +346,7 @@ def test_the_operator_takes_over_and_a_new_target_gives_back(mode):
         run.step()
     assert run.vehicles[0].mode == mode
     assert not [message for message in run.sent[sent:] if isinstance(message, m.CommandLong)]
-    run.ground_station(m.SetMode(1, 1, HOLD_MODE))
+    run.ground_station(m.SetMode(1, 1, Mode.HOLD))
     run.director.take_target(NEAR, run.now_s)
     run.run_until(lambda: run.director.state is State.ARRIVED)
     assert distance_m(run.vehicles[0].position, NEAR) < 4.0
@@ -463,7 +463,7 @@ def test_over_a_bad_link_a_fence_across_the_route_is_driven_around_within_ten_se
     run.run_until(lambda: run.director.drive is not None and run.director.drive.driven_m > 12)
     upload(run, m.MissionType.FENCE, fence_to_items(wall_across_the_route()))
     changed_s = run.now_s
-    run.run_until(lambda: run.vehicles[0].mode == HOLD_MODE, 20)
+    run.run_until(lambda: run.vehicles[0].mode == Mode.HOLD, 20)
     assert run.run_until(lambda: run.director.state is State.DRIVING, 20) - changed_s <= 10
     run.run_until(lambda: run.director.state is State.ARRIVED)
     assert run.vehicles[0].breaches == 0

@@ -11,7 +11,7 @@ from director.conducting import Conductor
 from mavlink_bridge.director import TRANSITIONS, Director, Orders, State
 from mavlink_bridge.errors import LinkError, OutcomeError, RefusedError, VehicleNotFoundError
 from mavlink_bridge.mavlink import messages as m
-from mavlink_bridge.mavlink.rover import AUTO_MODE, HOLD_MODE
+from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig
 from mavlink_bridge.simulator.faults import Faults
 from missions.fence import fence_to_items
@@ -41,7 +41,7 @@ def conductor(*vehicles: SimulatedVehicle, faults: Faults | None = None, **order
 def arm_and_auto(vehicle: SimulatedVehicle) -> None:
     for message in (
         m.CommandLong(1, 1, Command.COMPONENT_ARM_DISARM, param1=1.0),
-        m.CommandLong(1, 1, Command.DO_SET_MODE, param1=1.0, param2=AUTO_MODE),
+        m.CommandLong(1, 1, Command.DO_SET_MODE, param1=1.0, param2=Mode.AUTO),
     ):
         vehicle.receive(m.Frame(255, 190, message), 0.1)
         vehicle.handle_timer(0.2)
@@ -166,13 +166,13 @@ def test_somebody_else_takes_the_vehicle_out_of_auto():
 
     def hold(run: Conductor) -> None:
         if run.director.state is State.DRIVING and run.director.drive.item > 1:
-            run.vehicles[0].receive(m.Frame(255, 190, m.SetMode(1, 1, HOLD_MODE)), run.now_s)
+            run.vehicles[0].receive(m.Frame(255, 190, m.SetMode(1, 1, Mode.HOLD)), run.now_s)
 
     run.meddle = hold
     assert run.run() is State.FAILED
     assert isinstance(run.director.trouble, OutcomeError)
     assert "went to HOLD by itself or by somebody unheard, such as a transmitter" in str(run.director.trouble)
-    assert vehicle.mode == HOLD_MODE
+    assert vehicle.mode == Mode.HOLD
 
 
 def test_does_not_arm_unasked():

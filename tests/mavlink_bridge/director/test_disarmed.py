@@ -11,7 +11,7 @@ from director.test_takeover import MANUAL, armings_sent, modes_sent, unheard, wa
 from mavlink_bridge.director import EventName, State
 from mavlink_bridge.errors import OutcomeError
 from mavlink_bridge.mavlink import messages as m
-from mavlink_bridge.mavlink.rover import AUTO_MODE, HOLD_MODE
+from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.simulator.faults import Faults
 from missions.geo import distance_m
 from missions.items import Command
@@ -36,10 +36,10 @@ def disarm_when(run, is_time) -> list[float]:
 
 
 def sends_auto(run) -> bool:
-    return AUTO_MODE in modes_sent(run)
+    return Mode.AUTO in modes_sent(run)
 
 
-@pytest.mark.parametrize("mode", [MANUAL, HOLD_MODE, 15])
+@pytest.mark.parametrize("mode", [MANUAL, Mode.HOLD, 15])
 def test_the_mode_of_a_disarmed_vehicle_is_left_alone(mode):
     run = conductor(request=ONE_JOB, once=True)
     run.vehicles[0].rover.mode = type(run.vehicles[0].mode)(mode)
@@ -56,7 +56,7 @@ def test_the_mode_of_a_disarmed_vehicle_is_left_alone(mode):
 
 def test_a_disarmed_vehicle_that_somebody_left_in_auto_is_told_of():
     run = conductor(request=ONE_JOB, once=True)
-    run.vehicles[0].rover.mode = type(run.vehicles[0].mode)(AUTO_MODE)
+    run.vehicles[0].rover.mode = type(run.vehicles[0].mode)(Mode.AUTO)
     assert run.run() is State.FAILED
     assert "(AUTO: arming it makes it drive)" in str(run.director.trouble)
     assert modes_sent(run) == []
@@ -89,7 +89,7 @@ def test_disarmed_between_the_look_and_the_switch_it_is_put_back_to_hold(once, l
     run.run_until(lambda: bool(when) and run.director.state in (State.FAILED, State.LET_GO), 60)
     wait(run, 6)
     vehicle = run.vehicles[0]
-    assert (vehicle.mode, vehicle.is_armed) == (HOLD_MODE, False)
+    assert (vehicle.mode, vehicle.is_armed) == (Mode.HOLD, False)
     assert "the vehicle was disarmed by itself or by somebody unheard, such as a transmitter" in str(
         run.director.trouble
     )
@@ -106,11 +106,11 @@ def test_over_a_bad_link_too():
         run = conductor(once=True, request=ONE_JOB, faults=Faults(loss=0.25, latency_s=0.1, jitter_s=0.2))
         run.up, run.down = (type(run.up)(run.faults, 10 * seed + side) for side in (1, 2))
         unheard(run, ARM)
-        when = disarm_when(run, lambda run=run: run.vehicles[0].mode == AUTO_MODE)
+        when = disarm_when(run, lambda run=run: run.vehicles[0].mode == Mode.AUTO)
         assert run.run() is State.FAILED
         if when:  # else the link was so bad that it never came to AUTO
             ended += 1
-            assert run.vehicles[0].mode == HOLD_MODE, seed
+            assert run.vehicles[0].mode == Mode.HOLD, seed
             assert "switched back from AUTO to HOLD" in str(run.director.trouble)
     assert ended >= 12
 
@@ -132,7 +132,7 @@ def test_somebody_with_our_ids_does_not_leave_it_in_auto(disarmed_s, clash_s):
     wait(run, clash_s)
     run.director.receive(m.Frame(*run.director.identity, m.Heartbeat(6, 8)), run.now_s)
     wait(run, 12)
-    assert (run.vehicles[0].mode, run.vehicles[0].is_armed) == (HOLD_MODE, False)
+    assert (run.vehicles[0].mode, run.vehicles[0].is_armed) == (Mode.HOLD, False)
     assert run.director.state is State.FAILED
 
 
@@ -145,7 +145,7 @@ def test_disarmed_while_the_link_was_lost_it_is_put_back_too(unheard_s):
     wait(run, unheard_s)
     run.is_cut = False
     wait(run, 15)
-    assert (run.vehicles[0].mode, run.vehicles[0].is_armed) == (HOLD_MODE, False)
+    assert (run.vehicles[0].mode, run.vehicles[0].is_armed) == (Mode.HOLD, False)
     assert "disarmed while it was not heard; it was switched back from AUTO" in str(run.director.trouble)
 
 
@@ -157,7 +157,7 @@ def test_what_drives_on_while_the_link_was_lost_is_not_touched():
     run.is_cut = False
     sent = len(run.sent)
     wait(run, 15)
-    assert run.vehicles[0].mode == AUTO_MODE
+    assert run.vehicles[0].mode == Mode.AUTO
     assert modes_sent(run, sent) == []
 
 
@@ -179,11 +179,11 @@ def test_who_switches_or_arms_it_first_has_it():
 def test_a_vehicle_that_does_not_go_to_hold_is_told_of():
     run = conductor(once=True, request=ONE_JOB)
     arm(run)
-    when = disarm_when(run, lambda: run.vehicles[0].mode == AUTO_MODE)
+    when = disarm_when(run, lambda: run.vehicles[0].mode == Mode.AUTO)
     push = run.up.push
 
     def deaf(frame, now_s) -> None:
-        is_hold = isinstance(frame.message, m.CommandLong) and frame.message.param2 == HOLD_MODE
+        is_hold = isinstance(frame.message, m.CommandLong) and frame.message.param2 == Mode.HOLD
         if not (when and is_hold):
             push(frame, now_s)
 
@@ -197,14 +197,14 @@ def test_after_our_drive_it_stands_in_hold(once):
     run = conductor(once=once, request=ONE_JOB)
     arm(run)
     run.run_until(run.happened(EventName.ARRIVED))
-    run.run_until(lambda: run.vehicles[0].mode == HOLD_MODE, 3)
+    run.run_until(lambda: run.vehicles[0].mode == Mode.HOLD, 3)
     assert run.vehicles[0].is_armed
     assert run.last(EventName.ARRIVED).text.endswith("; HOLD")
     if once:
         assert run.run() is State.DONE
     assert run.director.trouble is None
     wait(run, 3)
-    assert modes_sent(run)[-1] == HOLD_MODE
+    assert modes_sent(run)[-1] == Mode.HOLD
 
 
 def test_a_hold_that_is_lost_after_arrival_is_sent_again_until_it_shows():
@@ -213,7 +213,7 @@ def test_a_hold_that_is_lost_after_arrival_is_sent_again_until_it_shows():
     run.run_until(run.happened(EventName.ARRIVED))
     run.up._faults = run.down._faults = Faults(loss=0.5)
     assert run.run() is State.DONE
-    assert run.vehicles[0].mode == HOLD_MODE
+    assert run.vehicles[0].mode == Mode.HOLD
 
 
 def test_an_arrival_without_hold_is_an_outcome():
@@ -222,7 +222,7 @@ def test_an_arrival_without_hold_is_an_outcome():
     push, deaf_since = run.up.push, []
 
     def deaf(frame, now_s) -> None:
-        is_hold = isinstance(frame.message, m.CommandLong) and frame.message.param2 == HOLD_MODE
+        is_hold = isinstance(frame.message, m.CommandLong) and frame.message.param2 == Mode.HOLD
         if not (deaf_since and is_hold):
             push(frame, now_s)
 
@@ -251,17 +251,17 @@ def test_what_the_vehicle_does_at_the_end_by_its_own_settings_is_left_to_it(beha
     arm(run)
     assert run.run() is State.DONE
     assert run.last(EventName.ARRIVED).text.endswith(" s")
-    assert run.vehicles[0].mode == AUTO_MODE
+    assert run.vehicles[0].mode == Mode.AUTO
 
 
 def test_a_drive_that_somebody_else_began_is_not_held_at_its_end():
     run = conductor(drive=False, request=ONE_JOB)
     run.run_until(run.happened(EventName.VERIFIED))
     arm(run)
-    unheard(run, m.SetMode(1, 1, AUTO_MODE))
+    unheard(run, m.SetMode(1, 1, Mode.AUTO))
     run.run_until(run.happened(EventName.ARRIVED))
     wait(run, 3)
-    assert run.vehicles[0].mode == AUTO_MODE
+    assert run.vehicles[0].mode == Mode.AUTO
     assert modes_sent(run) == []
 
 
@@ -272,8 +272,8 @@ def test_hold_stops_a_vehicle_that_drives_its_mission_before_it_is_replaced():
     run.vehicles[0] = first.vehicles[0]
     run.now_s = first.now_s
     assert run.run() is State.DONE
-    assert modes_sent(run)[0] == HOLD_MODE
-    assert run.vehicles[0].mode == HOLD_MODE
+    assert modes_sent(run)[0] == Mode.HOLD
+    assert run.vehicles[0].mode == Mode.HOLD
     assert run.director.upload_outcome.is_verified
 
 
@@ -292,7 +292,7 @@ def test_a_mission_that_the_vehicle_calls_complete_may_be_replaced():
     first = conductor(drive=False, request=ONE_JOB)
     first.run_until(first.happened(EventName.VERIFIED))
     arm(first)
-    unheard(first, m.SetMode(1, 1, AUTO_MODE))
+    unheard(first, m.SetMode(1, 1, Mode.AUTO))
     first.run_until(first.happened(EventName.ARRIVED))
     wait(first, 5)
     run = conductor(once=True, drive=False, request=replace(ONE_JOB, targets=(NEAR,)))
@@ -300,6 +300,6 @@ def test_a_mission_that_the_vehicle_calls_complete_may_be_replaced():
     run.now_s = first.now_s
     place = run.vehicles[0].position
     assert run.run() is State.DONE
-    assert run.vehicles[0].mode == AUTO_MODE
+    assert run.vehicles[0].mode == Mode.AUTO
     wait(run, 5)
     assert distance_m(run.vehicles[0].position, place) < 0.1

@@ -9,7 +9,7 @@ from director.test_takeover import deaf_to, modes_sent, unheard, wait
 from mavlink_bridge.director import EventName, Severity, State
 from mavlink_bridge.errors import IdentityTakenError, OutcomeError
 from mavlink_bridge.mavlink import messages as m
-from mavlink_bridge.mavlink.rover import AUTO_MODE, GUIDED_MODE, HOLD_MODE
+from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.simulator.faults import Faults
 from missions.geo import distance_m, to_e7
 from missions.items import Command
@@ -61,12 +61,12 @@ def test_a_flood_while_it_drives_is_one_event_and_one_hold():
     for _ in range(150):
         spoof(run, count=20)
         run.step()
-    assert run.vehicles[0].mode == HOLD_MODE
+    assert run.vehicles[0].mode == Mode.HOLD
     (told,) = clashes(run)
     assert told.severity is Severity.CRITICAL
     assert told.data == {"system": 1, "component": 195, "held": True}
     assert told.text == f"{TOLD}; HOLD; nothing more is done until a target is typed; clicks are ignored"
-    assert [message.param2 for message in asked_of_vehicle(run, since)] == [HOLD_MODE]
+    assert [message.param2 for message in asked_of_vehicle(run, since)] == [Mode.HOLD]
     assert run.director.state is State.CLASHED
     assert run.director.drive is None
     assert is_left_alone(run)
@@ -78,7 +78,7 @@ def test_a_typed_target_settles_it_and_all_is_read_anew():
     run = driving(conductor())
     wait(run, 3)
     spoof(run)
-    run.run_until(lambda: run.vehicles[0].mode == HOLD_MODE, 3)
+    run.run_until(lambda: run.vehicles[0].mode == Mode.HOLD, 3)
     wait(run, 2)
     told = len(run.events)
     run.director.take_target(NEAR, run.now_s)
@@ -156,7 +156,7 @@ def test_an_upload_under_way_is_brought_to_its_end_and_nothing_more():
     assert run.vehicles[0].mission[-1].position == FAR
     run.step()  # the read-back's last MISSION_ACK
     assert is_left_alone(run)
-    assert AUTO_MODE not in modes_sent(run)
+    assert Mode.AUTO not in modes_sent(run)
 
 
 def test_a_target_typed_while_the_upload_ends_is_gone_into_then():
@@ -191,8 +191,8 @@ def test_a_hold_that_does_not_get_through_is_sent_again():
     push, cut_until_s = run.up.push, run.now_s + 2.0
     run.up.push = lambda frame, now_s: push(frame, now_s) if now_s > cut_until_s else None
     spoof(run, count=10)
-    run.run_until(lambda: run.vehicles[0].mode == HOLD_MODE, 4)
-    assert set(modes_sent(run, -10)) == {HOLD_MODE}
+    run.run_until(lambda: run.vehicles[0].mode == Mode.HOLD, 4)
+    assert set(modes_sent(run, -10)) == {Mode.HOLD}
     wait(run, 2)
     assert is_left_alone(run)
 
@@ -212,7 +212,7 @@ def test_who_takes_the_vehicle_while_our_hold_is_under_way_has_it(has_target, is
     unheard(run, m.SetMode(1, 1, 0))
     wait(run, 1.5)
     assert is_left_alone(run)
-    assert run.vehicles[0].mode in (0, GUIDED_MODE)  # by the clicks
+    assert run.vehicles[0].mode in (0, Mode.GUIDED)  # by the clicks
     assert run.director.state is State.CLASHED
 
 
@@ -233,8 +233,8 @@ def test_a_hold_under_way_is_not_doubled():
     spoof(run, count=10)
     wait(run, 5)
     assert run.director.state is State.CLASHED
-    assert run.vehicles[0].mode == HOLD_MODE
-    assert modes_sent(run, since) == [HOLD_MODE]
+    assert run.vehicles[0].mode == Mode.HOLD
+    assert modes_sent(run, since) == [Mode.HOLD]
 
 
 def test_our_drive_that_is_out_of_sight_is_held_too():
@@ -245,7 +245,7 @@ def test_our_drive_that_is_out_of_sight_is_held_too():
     spoof(run)
     wait(run, 1)
     assert clashes(run)[0].data["held"] is True
-    assert run.vehicles[0].mode == HOLD_MODE
+    assert run.vehicles[0].mode == Mode.HOLD
 
 
 def test_without_orders_to_drive_no_mode_is_switched():
@@ -253,12 +253,12 @@ def test_without_orders_to_drive_no_mode_is_switched():
     run.director.take_target(FAR, run.now_s)
     run.run_until(lambda: run.director.state is State.VERIFIED)
     arm(run)
-    run.ground_station(m.SetMode(1, 1, AUTO_MODE))
+    run.ground_station(m.SetMode(1, 1, Mode.AUTO))
     run.run_until(lambda: run.director.state is State.DRIVING, 5)
     spoof(run, count=10)
     wait(run, 5)
     assert modes_sent(run) == []
-    assert run.vehicles[0].mode == AUTO_MODE
+    assert run.vehicles[0].mode == Mode.AUTO
     assert clashes(run)[0].data["held"] is False
 
 
@@ -353,7 +353,7 @@ def test_a_single_drive_is_held(state):
     assert str(run.director.trouble) == f"{TOLD}: the vehicle was switched to HOLD; the mission is on it"
     assert "--source-component" in run.director.trouble.details["advice"]
     wait(run, 3)
-    assert run.vehicles[0].mode == HOLD_MODE
+    assert run.vehicles[0].mode == Mode.HOLD
     assert len(clashes(run)) == 1
 
 
@@ -370,10 +370,10 @@ def test_another_autopilot_with_the_vehicles_ids_is_no_news_of_it():
     run = driving(conductor())
     wait(run, 3)
     since = len(run.sent)
-    for mode, flags in ((HOLD_MODE, 0), (GUIDED_MODE, 128), (0, 129)):
+    for mode, flags in ((Mode.HOLD, 0), (Mode.GUIDED, 128), (0, 129)):
         run.director.receive(m.Frame(1, 1, m.Heartbeat(10, 12, flags, mode)), run.now_s)
         wait(run, 0.5)
-        assert run.director.situation.mode == AUTO_MODE
+        assert run.director.situation.mode == Mode.AUTO
     assert run.director.state is State.DRIVING
     assert modes_sent(run, since) == []
 
@@ -385,7 +385,7 @@ def test_a_vehicle_whose_autopilot_was_swapped_is_driven_no_more():
 
     def swapped(frame, now_s):
         if isinstance(frame.message, m.Heartbeat) and frame.system == 1 and frame.component == 1:
-            frame = m.Frame(1, 1, m.Heartbeat(10, 12, 129, AUTO_MODE))
+            frame = m.Frame(1, 1, m.Heartbeat(10, 12, 129, Mode.AUTO))
         receive(frame, now_s)
 
     run.director.receive = swapped

@@ -11,7 +11,7 @@ from director.test_takeover import unheard, wait
 from mavlink_bridge.director import EventName, State
 from mavlink_bridge.director.operator_watch import OperatorWatch
 from mavlink_bridge.mavlink import messages as m
-from mavlink_bridge.mavlink.rover import AUTO_MODE, HOLD_MODE, RTL_MODE, mode_name, mode_of
+from mavlink_bridge.mavlink.rover import Mode, mode_name, mode_of
 from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig
 from missions.fence import CircleZone, Fence, ZoneKind, fence_to_items
 from missions.geo import to_e7
@@ -77,26 +77,26 @@ def test_a_breach_of_ours_is_told_with_place_and_fence_and_who_switched():
         "the autopilot switched the vehicle to RTL itself: fence breach; waiting for a new target"
     )
     wait(run, 20)
-    assert run.vehicles[0].mode == RTL_MODE
+    assert run.vehicles[0].mode == Mode.RTL
 
 
 @pytest.mark.parametrize(
     ("heard", "mode", "reason"),
     [
-        (BREACHED, RTL_MODE, "fence breach"),
-        (BREACHED, HOLD_MODE, "fence breach"),
-        (text("Polygon fence breached"), RTL_MODE, "fence breach"),
-        (text("Radio Failsafe"), RTL_MODE, "radio failsafe"),
-        (text("throttle Failsafe"), HOLD_MODE, "radio failsafe"),
-        (text("GCS Failsafe"), HOLD_MODE, "ground station failsafe"),
-        (text("EKF variance"), HOLD_MODE, "EKF failsafe"),
-        (text("EKF failsafe"), HOLD_MODE, "EKF failsafe"),
-        (text("Battery 1 is critical 10.20V used 4100 mAh"), RTL_MODE, "battery failsafe"),
-        (text("Crash: Going to HOLD"), HOLD_MODE, "crash check"),
+        (BREACHED, Mode.RTL, "fence breach"),
+        (BREACHED, Mode.HOLD, "fence breach"),
+        (text("Polygon fence breached"), Mode.RTL, "fence breach"),
+        (text("Radio Failsafe"), Mode.RTL, "radio failsafe"),
+        (text("throttle Failsafe"), Mode.HOLD, "radio failsafe"),
+        (text("GCS Failsafe"), Mode.HOLD, "ground station failsafe"),
+        (text("EKF variance"), Mode.HOLD, "EKF failsafe"),
+        (text("EKF failsafe"), Mode.HOLD, "EKF failsafe"),
+        (text("Battery 1 is critical 10.20V used 4100 mAh"), Mode.RTL, "battery failsafe"),
+        (text("Crash: Going to HOLD"), Mode.HOLD, "crash check"),
     ],
 )
 def test_a_mode_that_the_autopilot_chose_itself_is_told_so(heard, mode, reason):
-    run = on_its_way()
+    run = on_its_way(FS_ACTION=1.0)  # RTL, or HOLD where that cannot be had
     told(run, heard)
     unheard(run, m.SetMode(1, 1, mode))
     found = taken_over(run)
@@ -106,13 +106,13 @@ def test_a_mode_that_the_autopilot_chose_itself_is_told_so(heard, mode, reason):
 @pytest.mark.parametrize(
     ("heard", "mode", "event"),
     [
-        (BREACHED, RTL_MODE, EventName.BREACH),
-        (text("EKF failsafe"), HOLD_MODE, EventName.FAILSAFE),
-        (text("GCS Failsafe"), RTL_MODE, EventName.FAILSAFE),
+        (BREACHED, Mode.RTL, EventName.BREACH),
+        (text("EKF failsafe"), Mode.HOLD, EventName.FAILSAFE),
+        (text("GCS Failsafe"), Mode.RTL, EventName.FAILSAFE),
     ],
 )
 def test_where_the_mode_is_seen_first_nothing_is_claimed_until_the_cause_is_heard(heard, mode, event):
-    run = on_its_way()
+    run = on_its_way(FS_ACTION=1.0)  # RTL, or HOLD where that cannot be had
     unheard(run, m.SetMode(1, 1, mode))
     found = taken_over(run)
     assert (found["by"], found["reason"]) == ("unknown", None)
@@ -128,17 +128,17 @@ def test_where_the_mode_is_seen_first_nothing_is_claimed_until_the_cause_is_hear
 @pytest.mark.parametrize(
     ("parameters", "heard", "mode"),
     [
-        ({}, [], RTL_MODE),
+        ({}, [], Mode.RTL),
         ({}, [BREACHED], MANUAL),
-        ({"FENCE_ACTION": 0.0}, [BREACHED], RTL_MODE),
-        ({"FENCE_ACTION": 2.0}, [BREACHED], RTL_MODE),
-        ({}, [text("EKF failsafe")], RTL_MODE),
-        ({}, [text("EKF failsafe cleared")], HOLD_MODE),
-        ({}, [text("GCS Failsafe Cleared")], RTL_MODE),
-        ({}, [text("GCS Failsafe"), text("Failsafe - Continuing Auto Mode")], RTL_MODE),
-        ({}, [m.ParamValue("FS_ACTION", 0.0, 9, 1, 0), text("GCS Failsafe")], RTL_MODE),
-        ({}, [m.ParamValue("FS_ACTION", float("nan"), 9, 1, 0), text("GCS Failsafe")], RTL_MODE),
-        ({}, [text("PreArm: Radio failsafe on")], RTL_MODE),
+        ({"FENCE_ACTION": 0.0}, [BREACHED], Mode.RTL),
+        ({"FENCE_ACTION": 2.0}, [BREACHED], Mode.RTL),
+        ({}, [text("EKF failsafe")], Mode.RTL),
+        ({}, [text("EKF failsafe cleared")], Mode.HOLD),
+        ({}, [text("GCS Failsafe Cleared")], Mode.RTL),
+        ({}, [text("GCS Failsafe"), text("Failsafe - Continuing Auto Mode")], Mode.RTL),
+        ({}, [m.ParamValue("FS_ACTION", 0.0, 9, 1, 0), text("GCS Failsafe")], Mode.RTL),
+        ({}, [m.ParamValue("FS_ACTION", float("nan"), 9, 1, 0), text("GCS Failsafe")], Mode.RTL),
+        ({}, [text("PreArm: Radio failsafe on")], Mode.RTL),
     ],
 )
 def test_what_is_not_certain_is_said_so(parameters, heard, mode):
@@ -154,14 +154,14 @@ def test_an_old_failsafe_explains_nothing():
     run = on_its_way()
     told(run, text("GCS Failsafe"))
     wait(run, 3)
-    unheard(run, m.SetMode(1, 1, RTL_MODE))
+    unheard(run, m.SetMode(1, 1, Mode.RTL))
     assert taken_over(run)["by"] == "unknown"
 
 
 def test_a_command_that_is_overheard_is_its_askers_also_after_a_breach():
     run = on_its_way()
     told(run, BREACHED)
-    run.ground_station(m.SetMode(1, 1, RTL_MODE))
+    run.ground_station(m.SetMode(1, 1, Mode.RTL))
     found = taken_over(run)
     assert (found["by"], found["reason"]) == ("ground_station", "system 255 component 190")
     assert "system 255 component 190 switched the vehicle to RTL" in found["text"]
@@ -256,7 +256,7 @@ def test_failsafes_are_told_once_and_not_said_to_ground_stations_again():
 def test_modes_in_commands_are_whole_numbers_of_32_bits_or_nonsense(param, mode):
     assert mode_of(param) == mode
     watch = OperatorWatch()
-    watch.expect(AUTO_MODE, set(), is_armed=True)
+    watch.expect(Mode.AUTO, set(), is_armed=True)
     command = m.CommandLong(1, 1, Command.DO_SET_MODE, param1=1.0, param2=param)
     found = watch.overhear(m.Frame(255, 190, command), 1, 1, 100.0)
     assert (found.mode if found else None) == mode

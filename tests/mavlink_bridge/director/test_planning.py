@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 
 import pytest
 from director.test_bridge_director import (
     FAR,
+    FENCE,
+    HOME,
     IN_BARN,
     NEAR,
     arm,
@@ -23,10 +26,14 @@ from mavlink_bridge.cli.live import PlanMaker
 from mavlink_bridge.director import EventName, State, route_desk
 from mavlink_bridge.director.plan_task import PlanTask
 from mavlink_bridge.mavlink import messages as m
-from missions.errors import PlanCheckError
-from missions.fence import fence_to_items
-from missions.geo import distance_m
+from mavlink_bridge.mavlink.messages import Frame
+from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig
+from missions.errors import PlanCheckError, PlanStoppedError
+from missions.fence import CircleZone, Fence, ZoneKind, fence_to_items
+from missions.geo import LatLon, distance_m
+from missions.items import Command
 from missions.planning.plan import plan
+from missions.request import End, GoTo, RepairMission, Tour
 
 MANUAL = 0
 LONG_S = 5.0
@@ -119,6 +126,60 @@ def test_what_changed_is_read_while_the_vehicle_comes_to_rest():
     assert run.director.state is State.HOLDING
 
 
+def test_a_mission_longer_than_the_vehicle_holds_is_shortened_or_refused(monkeypatch):
+    posts = (
+        CircleZone(
+            ZoneKind.EXCLUSION, LatLon(40.0714 + 0.00012 * i + 0.00005 * j, -105.2297 + 0.00025 * j), 2.0
+        )
+        for i in range(6)
+        for j in range(5)
+    )
+    parameters = {"FENCE_ENABLE": 1.0, "WP_SPEED": 3.0, "WP_RADIUS": 3.0}
+    config = SimulatorConfig(
+        home=HOME, fence=fence_to_items(Fence((*FENCE.zones, *posts))), parameters=parameters
+    )
+
+    def verified_or_refused(most: int):
+        monkeypatch.setattr("missions.planning.plan.most_items", lambda _parameters: most)
+        vehicle = SimulatedVehicle(config)
+        run = ready(conductor(vehicle=vehicle, drive=False, request=GoTo(clearance_m=1.5)))
+        run.director.take_target(FAR, run.now_s)
+        ends = (run.happened(EventName.VERIFIED), run.happened(EventName.NO_PLAN))
+        run.run_until(lambda: any(end() for end in ends), 20)
+        return run
+
+    whole = verified_or_refused(655).director.plan
+    most = len(whole.items)  # one less, with home
+    run = verified_or_refused(most)
+    assert len(run.vehicles[0].mission) <= most
+    assert any(f"so that the vehicle can hold it ({most})" in text for text in run.director.plan.warnings)
+    assert run.director.plan.targets == whole.targets
+    assert run.director.plan.driven_clearance_m >= 1.5 - 0.01
+    run = verified_or_refused(2)
+    assert run.last(EventName.NO_PLAN).data["error"] == "MissionTooLongError"
+    assert not run.happened(EventName.UPLOADING)()
+
+
+def test_home_again_and_an_end_are_asked_of_the_bridge_too():
+    asked = Tour(clearance_m=2.5, comes_back=True, end=End.LOITER)
+    run = ready(conductor(drive=False, request=asked))
+    home = run.director.situation.home.value
+    run.director.take_target(FAR, run.now_s)
+    run.run_until(run.happened(EventName.VERIFIED), 20)
+    assert [distance_m(*pair) < 0.1 for pair in zip(run.director.plan.targets, (FAR, home), strict=True)] == [
+        True,
+        True,
+    ]
+    assert run.vehicles[0].mission[-1].command == Command.NAV_LOITER_UNLIM
+
+
+def test_a_target_that_is_heard_leaves_a_repair_what_it_is():
+    run = ready(conductor(drive=False, request=RepairMission(clearance_m=2.5)))
+    run.director.take_target(FAR, run.now_s)
+    run.run_until(run.happened(EventName.NO_PLAN), 10)
+    assert "no mission to repair" in run.last(EventName.NO_PLAN).text
+
+
 class Waiting:
     """Stands for a director that waits for a plan."""
 
@@ -129,7 +190,7 @@ class Waiting:
 def test_the_shell_makes_plans_beside_the_link():
     may_end = threading.Event()
 
-    def slow(situation, request):
+    def slow(situation, request, **_options):
         may_end.wait(30)
         return plan(situation, request)
 
@@ -154,7 +215,7 @@ def test_the_shell_makes_plans_beside_the_link():
 def test_a_plan_that_nobody_waits_for_any_more_is_left():
     made_for = []
 
-    def note(_situation, request):
+    def note(_situation, request, **_options):
         made_for.append(request)
         return request
 
@@ -165,6 +226,67 @@ def test_a_plan_that_nobody_waits_for_any_more_is_left():
     waiting.pending_plan = second
     assert taken(plans) == (second, "second")
     assert made_for == ["first", "second"]
+
+
+def take_over(run):
+    unheard(run, m.SetMode(1, 1, MANUAL))
+
+
+def change_the_fence(run):
+    upload(run, m.MissionType.FENCE, fence_to_items(wall_across_the_route()))
+
+
+def go_elsewhere(run):
+    run.director.take_target(NEAR, run.now_s)
+
+
+def fall_silent(run):
+    run.is_cut = True
+
+
+def speak_with_our_ids(run):
+    for _ in range(2):
+        run.director.receive(Frame(*run.director.identity, m.Statustext(6, "another program")), run.now_s)
+
+
+@pytest.mark.parametrize(
+    "happens", [take_over, change_the_fence, go_elsewhere, fall_silent, speak_with_our_ids]
+)
+def test_a_plan_is_dropped_as_soon_as_nobody_waits_for_it(happens):
+    run = planning(1000.0)
+    task = run.director.pending_plan
+    wait(run, 3.0)
+    assert not task.is_dropped
+    happens(run)
+    run.run_until(lambda: run.director.pending_plan is not task, 10)
+    assert task.is_dropped
+    assert isinstance(task.made(), PlanStoppedError)  # and at once, for the search is left at its first look
+
+
+def test_an_outdated_plan_stops_and_the_next_begins_at_once():
+    """On the shell's own thread: what nobody waits for takes no time from what somebody does."""
+    begun = []
+
+    def again_and_again(situation, request, *, should_stop):
+        begun.append((request.targets, time.monotonic()))
+        until_s = time.monotonic() + (60 if request.targets == (FAR,) else 0)
+        while True:
+            planned = plan(situation, request, should_stop=should_stop)
+            if time.monotonic() >= until_s:
+                return planned
+
+    run = planning(math.inf)
+    plans = PlanMaker(run.director, again_and_again)
+    assert plans.take() is None
+    time.sleep(0.5)
+    assert plans.take() is None  # it takes a minute
+    run.director.take_target(NEAR, run.now_s)
+    changed_s = time.monotonic()
+    run.run_until(lambda: run.director.pending_plan is not None, 10)
+    _, made = taken(plans)
+    assert made.targets == (NEAR,)
+    assert [targets for targets, _ in begun] == [(FAR,), (NEAR,)]
+    assert begun[1][1] - changed_s < 5.0
 
 
 def test_what_nobody_expected_of_a_planner_is_a_reason_for_no_plan():
@@ -182,7 +304,7 @@ def taken(plans: PlanMaker):
     raise AssertionError("no plan")
 
 
-def breaking_down(*_arguments):
+def breaking_down(*_arguments, **_options):
     raise ZeroDivisionError("float division by zero")
 
 

@@ -13,8 +13,8 @@ from missions.fence import fence_to_items
 from missions.formats import read_fence, read_mission
 from missions.geo import LatLon, distance_m
 from missions.items import Command, CoordinateFrame, MissionItem
+from missions.planning.plan import plan
 from missions.request import Request
-from missions.tour.tour import plan_tour
 
 FIELDS = Path(__file__).parents[2] / "fields"
 HOME = LatLon(40.071374, -105.229930)
@@ -39,7 +39,7 @@ def conductor(*items: MissionItem) -> tuple[Conductor, SimulatedVehicle]:
         once=True,
         target_sources=frozenset(),
     )
-    return Conductor(Director(orders), [vehicle], planner=plan_tour), vehicle
+    return Conductor(Director(orders), [vehicle], planner=plan), vehicle
 
 
 def test_the_vehicles_own_mission_with_a_jump_a_delay_and_a_condition():
@@ -55,7 +55,7 @@ def test_the_vehicles_own_mission_with_a_jump_a_delay_and_a_condition():
     ]
     # It was watched there, back and there again, as the jump says.
     assert run.director.plan.length_m > 3 * distance_m(FIRST.position, LAST.position)
-    assert rover.rover.route.is_complete
+    assert rover.rover.mission_run.is_complete
     assert distance_m(rover.position, LAST.position) < 4.0
 
 
@@ -66,7 +66,7 @@ def test_the_end_is_seen_without_the_word_that_it_was_reached():
         None if isinstance(frame.message, m.MissionItemReached) else push(frame, now_s)
     )
     assert run.run(1000.0) is State.DONE
-    assert rover.rover.route.is_complete
+    assert rover.rover.mission_run.is_complete
 
 
 def test_a_click_on_the_way_makes_no_other_route():

@@ -23,7 +23,7 @@ from director.test_bridge_director import (
 
 from mavlink_bridge.director import EventName, State, TargetSource
 from mavlink_bridge.mavlink import messages as m
-from mavlink_bridge.mavlink.rover import AUTO_MODE, GUIDED_MODE, HOLD_MODE
+from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig
 from missions.fence import fence_to_items
 from missions.geo import LatLon, distance_m, to_e7
@@ -56,7 +56,7 @@ def armings_sent(run: Conductor, since: int = 0) -> int:
 
 
 def is_holding(message: m.Message) -> bool:
-    return isinstance(message, m.Heartbeat) and message.custom_mode == HOLD_MODE
+    return isinstance(message, m.Heartbeat) and message.custom_mode == Mode.HOLD
 
 
 def wait(run: Conductor, seconds: float) -> None:
@@ -95,7 +95,7 @@ def test_a_takeover_nobody_announces_right_after_our_hold(mode, after_s):
     run = driving(conductor())
     wait(run, 6)
     run.director.take_target(NEAR, run.now_s)
-    run.run_until(lambda: run.vehicles[0].mode == HOLD_MODE, 2)
+    run.run_until(lambda: run.vehicles[0].mode == Mode.HOLD, 2)
     wait(run, after_s)
     unheard(run, m.SetMode(1, 1, mode))
     assert left_alone(run, mode)
@@ -119,7 +119,7 @@ def test_a_takeover_while_auto_is_in_flight():
     run.director.take_target(FAR, run.now_s)
     run.run_until(lambda: run.director.state is State.VERIFIED or run.director.state is State.STARTING, 20)
     deaf_to(run, m.CommandAck)
-    run.run_until(lambda: AUTO_MODE in modes_sent(run), 5)
+    run.run_until(lambda: Mode.AUTO in modes_sent(run), 5)
     wait(run, 0.1)
     unheard(run, m.SetMode(1, 1, MANUAL))
     assert left_alone(run, MANUAL)
@@ -131,10 +131,10 @@ def test_a_hold_that_somebody_presses_is_told_from_ours_where_it_is_overheard():
     wait(run, 6)
     run.director.take_target(NEAR, run.now_s)
     run.run_until(lambda: run.director.state is State.UPLOADING, 10)
-    run.ground_station(m.SetMode(1, 1, HOLD_MODE))
+    run.ground_station(m.SetMode(1, 1, Mode.HOLD))
     run.run_until(run.happened(EventName.TAKEN_OVER), 2)
     run.run_until(lambda: run.director.state is State.LET_GO, 20)
-    assert left_alone(run, HOLD_MODE)
+    assert left_alone(run, Mode.HOLD)
 
 
 def test_a_takeover_and_back_to_hold_during_an_upload_is_not_forgotten():
@@ -146,10 +146,10 @@ def test_a_takeover_and_back_to_hold_during_an_upload_is_not_forgotten():
     unheard(run, m.SetMode(1, 1, MANUAL))
     run.run_until(run.happened(EventName.TAKEN_OVER), 3)
     assert run.director.state is State.WITHDRAWING
-    unheard(run, m.SetMode(1, 1, HOLD_MODE))
+    unheard(run, m.SetMode(1, 1, Mode.HOLD))
     hearing_all(run)
     run.run_until(lambda: run.director.state is State.LET_GO, 60)
-    assert left_alone(run, HOLD_MODE)
+    assert left_alone(run, Mode.HOLD)
     assert run.vehicles[0].mission[-1].position == NEAR  # no half mission was left behind
 
 
@@ -160,8 +160,8 @@ def test_a_click_during_an_upload_stops_the_vehicle_at_once():
     run.run_until(lambda: run.director.state is State.UPLOADING, 10)
     clicked_s = run.now_s
     run.ground_station(reposition(FAR))
-    run.run_until(lambda: run.vehicles[0].mode == GUIDED_MODE, 0.2)
-    assert run.run_until(lambda: run.vehicles[0].mode == HOLD_MODE, 2) - clicked_s <= 0.5
+    run.run_until(lambda: run.vehicles[0].mode == Mode.GUIDED, 0.2)
+    assert run.run_until(lambda: run.vehicles[0].mode == Mode.HOLD, 2) - clicked_s <= 0.5
     run.run_until(lambda: run.director.state is State.ARRIVED)
     assert distance_m(run.vehicles[0].position, FAR) < 4.0
     assert run.vehicles[0].breaches == 0
@@ -173,7 +173,7 @@ def test_a_click_while_the_bridge_still_learns_stops_the_vehicle_at_once():
     arm(run)
     run.ground_station(reposition(FAR))
     clicked_s = run.now_s
-    assert run.run_until(lambda: run.vehicles[0].mode == HOLD_MODE, 2) - clicked_s <= 0.5
+    assert run.run_until(lambda: run.vehicles[0].mode == Mode.HOLD, 2) - clicked_s <= 0.5
     run.run_until(lambda: run.director.state is State.ARRIVED)
     assert distance_m(run.vehicles[0].position, FAR) < 4.0
 
@@ -189,7 +189,7 @@ def test_a_second_click_stops_it_again(state):
     wait(run, 0.3 if state is State.HOLDING else 0.0)
     clicked_s = run.now_s
     run.ground_station(reposition(FAR))
-    assert run.run_until(lambda: run.vehicles[0].mode == HOLD_MODE, 2) - clicked_s <= 0.5
+    assert run.run_until(lambda: run.vehicles[0].mode == Mode.HOLD, 2) - clicked_s <= 0.5
     run.director.orders = replace(run.director.orders, confirm=False)
     run.run_until(lambda: run.director.state is State.ARRIVED)
     assert distance_m(run.vehicles[0].position, FAR) < 4.0
@@ -201,11 +201,11 @@ def test_a_click_that_the_ground_station_repeats_stops_it_again(again_after_s):
     run = ready(conductor())
     arm(run)
     run.ground_station(reposition(FAR))
-    run.run_until(lambda: run.vehicles[0].mode == HOLD_MODE, 1)
+    run.run_until(lambda: run.vehicles[0].mode == Mode.HOLD, 1)
     wait(run, again_after_s)
     run.ground_station(reposition(FAR))
     again_s = run.now_s
-    assert run.run_until(lambda: run.vehicles[0].mode == HOLD_MODE, 2) - again_s <= 0.5
+    assert run.run_until(lambda: run.vehicles[0].mode == Mode.HOLD, 2) - again_s <= 0.5
     run.run_until(lambda: run.director.state is State.ARRIVED)
     assert run.vehicles[0].breaches == 0
 
@@ -214,7 +214,7 @@ def test_a_click_that_reaches_the_vehicle_after_our_hold():
     run = ready(conductor())
     arm(run)
     run.down.push(m.Frame(255, 190, reposition(FAR)), run.now_s)  # we hear it first
-    run.run_until(lambda: run.vehicles[0].mode == HOLD_MODE, 1)
+    run.run_until(lambda: run.vehicles[0].mode == Mode.HOLD, 1)
     wait(run, 0.2)
     unheard(run, reposition(FAR))
     run.run_until(lambda: run.director.state is State.ARRIVED)
@@ -231,7 +231,7 @@ def test_a_target_while_it_starts_does_not_drive_the_route_before(after_s):
     wait(run, after_s)
     run.director.take_target(NEAR, run.now_s)
     run.run_until(lambda: run.director.state is State.UPLOADING, 20)
-    assert run.vehicles[0].mode == HOLD_MODE
+    assert run.vehicles[0].mode == Mode.HOLD
     run.run_until(lambda: run.director.state is State.ARRIVED)
     assert distance_m(run.vehicles[0].position, NEAR) < 4.0
 
@@ -271,7 +271,7 @@ def test_a_fence_that_changed_unheard_is_read_before_the_drive():
     upload(run, m.MissionType.FENCE, fence_to_items(wall_across_the_route()))
     hearing_all(run)
     broken_before_driving = []
-    run.meddle = lambda run: broken_before_driving.append(vehicle.mode == AUTO_MODE)
+    run.meddle = lambda run: broken_before_driving.append(vehicle.mode == Mode.AUTO)
     run.run_until(run.happened(EventName.ROUTE_BROKEN), 40)
     assert not any(broken_before_driving)
     run.meddle = None
@@ -301,16 +301,16 @@ def test_after_a_lost_link_a_takeover_in_the_meantime_counts():
     run.is_cut = True
     unheard(run, m.SetMode(1, 1, MANUAL))
     run.run_until(lambda: run.director.state is State.LOST, 10)
-    unheard(run, m.SetMode(1, 1, HOLD_MODE))
+    unheard(run, m.SetMode(1, 1, Mode.HOLD))
     run.is_cut = False
     run.run_until(lambda: run.director.state is State.READY, 20)
-    assert left_alone(run, HOLD_MODE)
+    assert left_alone(run, Mode.HOLD)
 
 
 def test_after_arrival_a_lost_link_drives_nowhere():
     run = driving(conductor(arm=True), NEAR)
     run.run_until(lambda: run.director.state is State.ARRIVED)
-    run.run_until(lambda: run.vehicles[0].mode == HOLD_MODE, 2)
+    run.run_until(lambda: run.vehicles[0].mode == Mode.HOLD, 2)
     wait(run, 1)
     unheard(run, m.SetMode(1, 1, MANUAL))
     cut(run)
@@ -377,10 +377,10 @@ def test_a_target_that_was_blocked_long_ago_takes_no_vehicle_from_its_operator()
     arm(run)
     run.director.take_target(IN_BARN, run.now_s)
     run.run_until(run.happened(EventName.NO_PLAN), 10)
-    unheard(run, m.SetMode(1, 1, GUIDED_MODE))
+    unheard(run, m.SetMode(1, 1, Mode.GUIDED))
     wait(run, 5)
     upload(run, m.MissionType.FENCE, fence_to_items(wall_across_the_route()))
-    assert left_alone(run, GUIDED_MODE)
+    assert left_alone(run, Mode.GUIDED)
 
 
 def test_a_yes_to_nothing_is_no_yes_to_what_comes():
@@ -429,7 +429,7 @@ def test_a_parameter_of_the_fence_that_changes_under_the_drive():
         run.ground_station(m.ParamSet(1, 1, name, value, 9))
         wait(run, 0.5)
     run.run_until(run.happened(EventName.ROUTE_BROKEN), 5)
-    run.run_until(lambda: run.vehicles[0].mode == HOLD_MODE, 1)
+    run.run_until(lambda: run.vehicles[0].mode == Mode.HOLD, 1)
     run.run_until(run.happened(EventName.NO_PLAN), 20)  # the target lies outside the circle
     assert run.vehicles[0].breaches == 0
 
@@ -501,7 +501,7 @@ def test_somebody_who_drives_the_uploaded_mission_is_watched():
     run.director.take_target(FAR, run.now_s)
     run.run_until(lambda: run.director.state is State.VERIFIED, 10)
     arm(run)
-    run.ground_station(m.SetMode(1, 1, AUTO_MODE))
+    run.ground_station(m.SetMode(1, 1, Mode.AUTO))
     run.run_until(lambda: run.director.state is State.DRIVING, 5)
     run.run_until(run.happened(EventName.ARRIVED), 200)
     assert not modes_sent(run)
@@ -538,7 +538,7 @@ def test_it_drives_only_after_a_heartbeat_that_is_younger_than_the_upload():
     run.run_until(run.happened(EventName.VERIFIED), 20)
     deaf_to(run, m.Heartbeat)
     wait(run, 3)
-    assert AUTO_MODE not in modes_sent(run)
+    assert Mode.AUTO not in modes_sent(run)
     hearing_all(run)
     run.run_until(lambda: run.director.state is State.DRIVING, 5)
 
@@ -548,7 +548,7 @@ def test_the_heartbeat_before_the_drive_is_asked_for():
     arm(run)
     run.director.take_target(FAR, run.now_s)
     verified_s = run.run_until(run.happened(EventName.VERIFIED), 20)
-    assert run.run_until(lambda: AUTO_MODE in modes_sent(run), 5) - verified_s <= 0.2
+    assert run.run_until(lambda: Mode.AUTO in modes_sent(run), 5) - verified_s <= 0.2
 
 
 def test_hold_is_sent_again_each_half_second_until_it_is_answered():
@@ -558,7 +558,7 @@ def test_hold_is_sent_again_each_half_second_until_it_is_answered():
     begun = len(run.sent)
     run.director.take_target(NEAR, run.now_s)
     wait(run, 1.9)
-    assert modes_sent(run, begun) == [HOLD_MODE] * 4
+    assert modes_sent(run, begun) == [Mode.HOLD] * 4
 
 
 def test_a_heartbeat_that_was_overtaken_is_no_takeover():
@@ -567,9 +567,9 @@ def test_a_heartbeat_that_was_overtaken_is_no_takeover():
     heard, push = [], run.down.push
     run.down.push = lambda frame, now_s: (heard.append(frame), push(frame, now_s))
     run.director.take_target(FAR, run.now_s)
-    run.run_until(lambda: AUTO_MODE in modes_sent(run), 20)
+    run.run_until(lambda: Mode.AUTO in modes_sent(run), 20)
     held = next(frame for frame in heard if is_holding(frame.message))
-    run.run_until(lambda: run.director.situation.mode == AUTO_MODE, 5)
+    run.run_until(lambda: run.director.situation.mode == Mode.AUTO, 5)
     run.director.receive(held, run.now_s + 0.1)
     run.run_until(lambda: run.director.state is State.ARRIVED)
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.codec import Codec
-from mavlink_bridge.mavlink.rover import AUTO_MODE
+from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.protocol.wire import item_to_message
 from mavlink_bridge.tlog import SENT_LINK, TlogWriter
@@ -93,7 +93,7 @@ class Log:
         self,
         points: Sequence[tuple[float, float]],
         speed_mps: float = 2.0,
-        mode: int = AUTO_MODE,
+        mode: int = Mode.AUTO,
         first_item: int = 1,
     ) -> None:
         """Stand, then drive along lines; each end of a line reaches the next item."""

@@ -10,7 +10,7 @@ from logbook.making import FIELD, ORIGIN, ROVER, Log, place
 from mavlink_bridge.logbook import read_logbook
 from mavlink_bridge.logbook.grade import way_of
 from mavlink_bridge.mavlink import messages as m
-from mavlink_bridge.mavlink.rover import HOLD_MODE
+from mavlink_bridge.mavlink.rover import Mode
 from missions.fence import Fence
 from missions.items import Command, MissionItem, waypoint, with_home
 
@@ -38,7 +38,7 @@ def begun(fence=FIELD, lines=LINES):
 def test_a_drive_along_the_lines(tmp_path):
     log = begun()
     log.drive(LINES)
-    log.heartbeat(HOLD_MODE, armed=True)
+    log.heartbeat(Mode.HOLD, armed=True)
     vehicle = read(log, tmp_path)
     (grade,) = vehicle.grades
     assert (grade.first_item, grade.last_item, grade.items) == (1, 2, 2)
@@ -122,7 +122,7 @@ def test_a_drive_in_another_mode_or_unarmed_is_none(tmp_path):
 def test_a_drive_broken_off_is_compared_as_far_as_it_came(tmp_path):
     log = begun()
     log.drive([(0.0, 0.0), (0.0, 30.0)])
-    log.heartbeat(HOLD_MODE, armed=True)
+    log.heartbeat(Mode.HOLD, armed=True)
     log.position(0.0, 30.0)
     (grade,) = read(log, tmp_path).grades
     assert (grade.reached, grade.arrived, grade.last_item) == (1, False, 1)

@@ -97,7 +97,10 @@ def test_the_mission_and_the_rally_points(logs: Path, fields: Path) -> None:
     drawn_rally = read_situation(fields / "union-rally.waypoints").rally
     assert rally is not None
     assert drawn_rally is not None
-    assert all(distance_m(a, rounded(b)) < 0.02 for a, b in zip(rally.value, drawn_rally.value, strict=True))
+    assert all(
+        distance_m(a.position, rounded(b.position)) < 0.02
+        for a, b in zip(rally.value, drawn_rally.value, strict=True)
+    )
 
 
 def test_no_fence_was_transferred(logs: Path) -> None:

@@ -10,7 +10,7 @@ from logbook.making import BEGIN_S, FIELD, FRAME, PARAMETERS, ROVER, STATION, Lo
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.logbook import read_logbook, recorder, track
 from mavlink_bridge.logbook.document import as_document
-from mavlink_bridge.logbook.track import Fix, Odometer
+from mavlink_bridge.logbook.track import Odometer, TrackFix
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.messages import MissionType
 from mavlink_bridge.mavlink.modes import drives_mission, mode_name
@@ -187,7 +187,7 @@ def test_the_drawn_track_stays_small(monkeypatch):
     total_m = 0.0
     for begin in range(0, 5000, 50):
         points = [(float(east_m), 0.0) for east_m in range(begin, begin + 50)]
-        fixes = [Fix(0.0, 0.0, place(*point), 1.0, 0, None) for point in points]
+        fixes = [TrackFix(0.0, 0.0, place(*point), 1.0, 0, None) for point in points]
         array = FRAME.to_local_array([fix.position for fix in fixes])
         total_m += odometer.drive("AUTO", fixes, array)
     ((_, positions),) = odometer.parts

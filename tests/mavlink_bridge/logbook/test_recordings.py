@@ -12,7 +12,7 @@ from shapely import Point, Polygon
 
 from mavlink_bridge.logbook import Ending, Way, read_logbook
 from mavlink_bridge.mavlink.messages import GlobalPositionInt
-from mavlink_bridge.mavlink.rover import MODE_NAMES
+from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.tlog import read_columns
 from missions.fence import CircleZone, PolygonZone, ZoneKind
 from missions.formats import read_fence
@@ -55,7 +55,7 @@ def test_the_facts_of_the_manifest(recording):
     assert [mode for mode, before in zip(modes, [None, *modes[:-1]], strict=True) if mode != before] == facts[
         "modes"
     ]
-    assert {span.name for span in vehicle.modes} == {MODE_NAMES[mode] for mode in modes}
+    assert {span.name for span in vehicle.modes} == {Mode(mode).name for mode in modes}
     assert [
         (round(target.time_s, 1), *np.round(np.array(target.position) * 1e7)) for target in vehicle.targets
     ] == [

@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from protocol.twin import PEER, plain_mission
 
 from mavlink_bridge.director.learning import Learning
-from mavlink_bridge.director.mode_switch import ModeSwitch
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.messages import Frame, MissionType
 from mavlink_bridge.protocol.command import SendCommand
 from mavlink_bridge.protocol.download import Download
 from mavlink_bridge.protocol.find import FindVehicle
+from mavlink_bridge.protocol.mode_switch import ModeSwitch
 from mavlink_bridge.protocol.pace import MOST_S
 from mavlink_bridge.protocol.parameters import ReadParameters, SetParameter
 from mavlink_bridge.protocol.undisturbed_read import UndisturbedRead

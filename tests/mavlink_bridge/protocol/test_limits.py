@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from protocol.twin import plain_fence, plain_mission
 
 from mavlink_bridge.mavlink.messages import MissionType
-from mavlink_bridge.protocol.limits import Limits, fence_bytes, limit_in_text
+from mavlink_bridge.protocol.limits import Limits, fence_bytes
 from mavlink_bridge.simulator import item_rules
 from missions.items import MissionItem
 
@@ -54,8 +54,3 @@ def test_limits_from_parameters():
     sd = Limits.from_parameters({"BRD_SD_MISSION": 64.0, "BRD_SD_FENCE": 64.0})
     assert (sd.mission_items, sd.fence_items, sd.fence_bytes) == (4368, 4096, 65536)
     assert sd.problem(plain_fence(30, vertices=4), FENCE) is None
-
-
-def test_the_vehicles_own_words():
-    assert limit_in_text("Only 655 items are supported") == 655
-    assert limit_in_text("Flight plan received") is None

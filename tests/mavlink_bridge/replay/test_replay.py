@@ -16,7 +16,8 @@ from mavlink_bridge.replay.journal import Call, JournalWriter, journal_path, rea
 from mavlink_bridge.replay.replay import replay_foreign
 from mavlink_bridge.tlog import TlogReader
 from missions.geo import LatLon
-from missions.request import Request
+from missions.request import End, GoTo, Order, RepairMission, Request, Tour
+from missions.vehicle import Footprint
 
 FOLDER = Path(__file__).parents[3] / "sitl_logs"
 MANIFEST = tomllib.loads((FOLDER / "manifest.toml").read_text(encoding="utf-8"))
@@ -115,6 +116,24 @@ def test_a_journal_reads_back_as_written(tmp_path):
     with path.open("w") as file:
         JournalWriter(file, replace(ORDERS, identity=None, request=Request()), {})
     assert read_journal(path).orders.identity is None
+
+
+def test_a_journal_keeps_what_a_tour_asks_for_and_refuses_what_makes_no_sense(tmp_path):
+    path = journal_path(tmp_path / "run.tlog")
+    tour = Tour(
+        targets=(LatLon(3.0, 4.0), LatLon(1.0, 2.0)),
+        order=Order.BEST,
+        comes_back=True,
+        end=End.LOITER,
+        method="pbpp",
+    )
+    for asked in (tour, GoTo(), RepairMission(footprint=Footprint(1.0, 0.5))):
+        with path.open("w") as file:
+            JournalWriter(file, replace(ORDERS, request=asked), {})
+        assert read_journal(path).orders.request.words() == asked.words()
+    path.write_text(path.read_text().replace('"snap_m": 0.0', '"snap_m": -1.0'))
+    with pytest.raises(LogError, match=r"snap_m -1\.0: expected a finite number of at least 0"):
+        read_journal(path)
 
 
 @pytest.mark.parametrize(

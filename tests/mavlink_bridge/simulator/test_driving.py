@@ -10,8 +10,8 @@ from simulator.station import HOME, Bench, at, kept, line, placed, square, verte
 
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.messages import MavResult, MissionType
+from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.simulator import SimulatorConfig
-from mavlink_bridge.simulator.config import Mode
 from mavlink_bridge.simulator.fence_watch import FenceArea
 from mavlink_bridge.simulator.flat import FlatFrame, TrueFrame
 from missions.geo import LatLon, distance_m
@@ -33,7 +33,7 @@ def command(number, *params) -> MissionItem:
 
 
 def is_complete(bench):
-    return lambda: bench.vehicle.rover.route.is_complete
+    return lambda: bench.vehicle.rover.mission_run.is_complete
 
 
 def north_m(bench) -> float:
@@ -146,7 +146,7 @@ def test_union_of_inclusions():
         bench.start_auto()
         bench.run(40.0)
     assert both.vehicle.breaches == 0
-    assert both.vehicle.rover.route.is_complete
+    assert both.vehicle.rover.mission_run.is_complete
     assert one.vehicle.least_clearance_m < 0
 
 
@@ -192,7 +192,7 @@ def test_a_delay_stops_the_rover():
     bench.start_auto()
     slowest = math.inf
     stood_s = 0.0
-    while not bench.vehicle.rover.route.is_complete:
+    while not bench.vehicle.rover.mission_run.is_complete:
         bench.run(0.1)
         speed = abs(bench.vehicle.rover.body.speed_mps)
         if 8.0 < north_m(bench) < 12.0:
@@ -206,7 +206,7 @@ def test_speed_changes_hold_from_their_place_on():
     mission = [*line(2), command(Command.DO_CHANGE_SPEED, 1.0, 1.0), *line(4)[2:]]
     bench = bench_of(mission)
     bench.start_auto()
-    bench.run_until(lambda: bench.vehicle.rover.route.seq == 4, 60.0)
+    bench.run_until(lambda: bench.vehicle.rover.mission_run.seq == 4, 60.0)
     bench.run(6.0)
     assert bench.vehicle.rover.body.speed_mps == pytest.approx(1.0, abs=0.1)
     assert bench.command(Command.DO_CHANGE_SPEED, 1, 2.0) == MavResult.ACCEPTED
@@ -240,7 +240,7 @@ def test_a_mission_of_jumps_only_is_complete():
     bench = bench_of([command(Command.DO_JUMP, 1.0, -1.0)])
     bench.start_auto()
     bench.run(1.0)
-    assert bench.vehicle.rover.route.is_complete
+    assert bench.vehicle.rover.mission_run.is_complete
 
 
 def test_a_jump_to_itself_ends_the_look_ahead():
@@ -275,7 +275,7 @@ def test_loitering_without_limit_never_ends():
 def test_hold_stops_and_auto_resumes():
     bench = bench_of(line(6))
     bench.start_auto()
-    bench.run_until(lambda: bench.vehicle.rover.route.seq == 3, 60.0)
+    bench.run_until(lambda: bench.vehicle.rover.mission_run.seq == 3, 60.0)
     bench.command(Command.DO_SET_MODE, 1, 4)
     bench.run(15.0)
     assert bench.vehicle.rover.body.speed_mps == pytest.approx(0.0, abs=0.01)
@@ -295,7 +295,7 @@ def test_disarming_lets_it_roll_out():
     bench.command(Command.COMPONENT_ARM_DISARM, 0)
     bench.run(20.0)
     assert bench.vehicle.rover.body.speed_mps == pytest.approx(0.0, abs=0.01)
-    assert not bench.vehicle.rover.route.is_complete
+    assert not bench.vehicle.rover.mission_run.is_complete
     bench.command(Command.COMPONENT_ARM_DISARM, 1)
     bench.run_until(is_complete(bench), 120.0)
 
@@ -304,10 +304,10 @@ def test_a_mission_changed_under_way_restarts_the_item():
     bench = bench_of(line(6))
     bench.start_auto()
     bench.run(6.0)
-    seq = bench.vehicle.rover.route.seq
+    seq = bench.vehicle.rover.mission_run.seq
     bench.upload_mission([kept(waypoint(at(10.0 * (n + 1), 20.0))) for n in range(6)])
     assert "Auto mission changed, restarted command" in bench.texts()
-    assert bench.vehicle.rover.route.seq == seq
+    assert bench.vehicle.rover.mission_run.seq == seq
     bench.run_until(is_complete(bench), 90.0)
     assert distance_m(bench.vehicle.position, at(60, 20)) < 1.5
 
@@ -318,7 +318,7 @@ def test_a_mission_cleared_under_way_ends_it():
     bench.run(6.0)
     bench.count(0)
     bench.run(1.0)
-    assert bench.vehicle.rover.route.is_complete
+    assert bench.vehicle.rover.mission_run.is_complete
 
 
 def test_guided_goes_stops_and_says_so():
@@ -372,7 +372,7 @@ def test_skid_steering_pivots_at_sharp_corners():
     bench = bench_of(corner, **skid)
     bench.start_auto()
     slowest = math.inf
-    while not bench.vehicle.rover.route.is_complete:
+    while not bench.vehicle.rover.mission_run.is_complete:
         bench.run(0.1)
         if distance_m(bench.vehicle.position, at(20, 0)) < 0.4:
             slowest = min(slowest, abs(bench.vehicle.rover.body.speed_mps))

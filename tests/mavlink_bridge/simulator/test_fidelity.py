@@ -131,7 +131,7 @@ def test_whole_missions(run, time_ratio, fields):
     )
     bench.start_auto()
     driven = []
-    while not bench.vehicle.rover.route.is_complete:
+    while not bench.vehicle.rover.mission_run.is_complete:
         assert bench.now_s < 150.0
         bench.run(TICK_S)
         driven.append((frame.to_flat(bench.vehicle.position), bench.now_s))

@@ -172,7 +172,7 @@ def test_it_drives_in_the_background():
         heard(link, "COMMAND_ACK", result=0)
         link.mav.command_long_send(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0)
         heard(link, "MISSION_ITEM_REACHED", seq=2)
-    assert simulator.vehicle.rover.route.is_complete
+    assert simulator.vehicle.rover.mission_run.is_complete
     assert 30.0 < simulator.vehicle.least_clearance_m < 36.0
 
 

@@ -13,11 +13,11 @@ from simulator.station import Bench, at, kept
 
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.messages import MissionResult, MissionType
-from mavlink_bridge.mavlink.stored_form import is_same_item
+from mavlink_bridge.mavlink.rover import Mode
+from mavlink_bridge.mavlink.stored_form import STORED_WITH_PLACE, is_same_item
 from mavlink_bridge.simulator import SimulatorConfig
-from mavlink_bridge.simulator.config import Mode
 from mavlink_bridge.simulator.item_rules import kept_mission_item, mission_item_result
-from mavlink_bridge.simulator.stored_commands import KEPT, NOT_DRIVEN, PLACED
+from mavlink_bridge.simulator.stored_commands import KEPT, NOT_DRIVEN
 from missions.geo import distance_m, to_e7
 from missions.items import MissionItem, waypoint
 
@@ -63,7 +63,7 @@ NOT_IMITATED = {
 
 
 def item_of(command: int, params: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)) -> MissionItem:
-    lat_e7, lon_e7 = to_e7(at(10, 5)) if command in PLACED else (0, 0)
+    lat_e7, lon_e7 = to_e7(at(10, 5)) if command in STORED_WITH_PLACE else (0, 0)
     return MissionItem(command, 3, params, lat_e7, lon_e7)
 
 
@@ -99,7 +99,7 @@ def test_commands_of_mowers_and_sprayers_are_stored_and_passed_over(command):
     bench.start_auto()
     bench.run_until(lambda: distance_m(bench.vehicle.position, at(24, 0)) < 3.5, 60.0)
     assert bench.vehicle.mode == Mode.AUTO
-    assert bench.vehicle.rover.route.seq == 3
+    assert bench.vehicle.rover.mission_run.seq == 3
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,8 @@ from simulator.station import HOME, TICK_S, Bench, at, line, placed, square
 from mavlink_bridge.errors import BridgeError
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.messages import Capability, MavResult, ModeFlag
+from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig
-from mavlink_bridge.simulator.config import Mode
 from mavlink_bridge.simulator.parameters import DEFAULTS
 from missions.items import Command, MissionItem
 
@@ -308,7 +308,7 @@ def test_mission_current_tells_the_state_of_the_mission():
     bench.command(Command.DO_SET_MODE, 1, 4)
     assert current() == (1, 2, 4, 0)
     bench.command(Command.DO_SET_MODE, 1, 10)
-    bench.run_until(lambda: bench.vehicle.rover.route.is_complete, 60.0)
+    bench.run_until(lambda: bench.vehicle.rover.mission_run.is_complete, 60.0)
     assert current() == (2, 2, 5, 1)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from mavlink_bridge.simulator.body import Body
 from mavlink_bridge.simulator.controllers import Settings
-from mavlink_bridge.simulator.drive import Drive
+from mavlink_bridge.simulator.drive import Driver
 from mavlink_bridge.simulator.parameters import ParameterStore
 
 TICK_S = 0.02
@@ -72,7 +72,7 @@ def drive(points_m: list[complex], limits: Settings, *, heading_rad: float | Non
     """Drive along points without stops; return the track."""
     first_rad = cmath.phase(points_m[1] - points_m[0]) if heading_rad is None else heading_rad
     body = Body(points_m[0], first_rad, limits.is_skid)
-    driver = Drive(limits, body)
+    driver = Driver(limits, body)
     after = [*points_m[2:], None, None]
     index = 1
     rows = []

@@ -22,6 +22,7 @@ from missions.geo import LatLon, rounded
 from missions.items import CoordinateFrame, MissionItem, waypoint
 from missions.picture import draw_plan
 from missions.planning.plan import plan
+from missions.rally import RallyPoint
 from missions.request import Request
 from missions.situation import Known, Mission, Pose, Situation
 from missions.vehicle import Footprint
@@ -251,10 +252,10 @@ def test_what_calls_for_rtl_is_named():
 
 
 def test_rtl_goes_to_the_nearest_rally_point():
-    rally = (place(110.0, 80.0), place(-40.0, 60.0))
+    rally = tuple(RallyPoint(*position) for position in (place(110.0, 80.0), place(-40.0, 60.0)))
     situation = replace(situation_of(FIELD, BARN), rally=Known(rally, None, "test"))
     found = check_mission(mission_of((100.0, -10.0), (100.0, 80.0), RTL), situation, Request(clearance_m=2.0))
-    assert found.legs[-1].leg.end == rally[0]
+    assert found.legs[-1].leg.end == rally[0].position
     home_too = replace(situation, parameters={"RALLY_INCL_HOME": 1.0})
     back = check_mission(mission_of((10.0, -10.0), RTL), home_too, Request(clearance_m=2.0))
     assert back.legs[-1].leg.end == HOME
@@ -265,7 +266,7 @@ def test_rtl_goes_to_the_nearest_rally_point():
     no_home = check_mission(
         mission_of((100.0, -10.0), (100.0, 80.0), RTL, home=None), situation, Request(clearance_m=2.0)
     )
-    assert no_home.legs[-1].leg.end == rally[0]
+    assert no_home.legs[-1].leg.end == rally[0].position
 
 
 def test_the_mode_after_the_mission_is_said():

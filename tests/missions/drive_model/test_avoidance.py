@@ -11,7 +11,8 @@ import pytest
 import shapely
 from charts import HOME, OUT, Chart, box, place
 
-from mavlink_bridge.simulator.config import Mode, SimulatorConfig
+from mavlink_bridge.mavlink.rover import Mode
+from mavlink_bridge.simulator.config import SimulatorConfig
 from mavlink_bridge.simulator.rover import TICK_S
 from mavlink_bridge.simulator.vehicle import SimulatedVehicle
 from missions.drive_model import envelope
@@ -81,11 +82,11 @@ def driven(
     now_s = 1.0
     rover.set_mode(Mode.AUTO, now_s)
     track = []
-    while rover.mode == Mode.AUTO and not rover.route.is_complete and now_s < 120.0:
+    while rover.mode == Mode.AUTO and not rover.mission_run.is_complete and now_s < 120.0:
         now_s += TICK_S
         rover.step(now_s)
         track.append(rover.position)
-    assert rover.route.is_complete
+    assert rover.mission_run.is_complete
     return shapely.MultiPoint(Chart(HOME).points(track[::5]))
 
 

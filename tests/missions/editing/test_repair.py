@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -13,14 +14,13 @@ from shapely import LineString, Polygon
 from missions.checking.check import check_mission
 from missions.checking.execution import follow_mission
 from missions.editing.repair import MOST_TRACKED_JUMPS, Repair, repair_mission, repaired_plan
-from missions.errors import NoRouteError, RouteError, SituationError, TargetBlockedError
+from missions.errors import NoRouteError, PlanStoppedError, RouteError, SituationError, TargetBlockedError
 from missions.fence import Fence, Zone
 from missions.formats import read_fence, read_mission
 from missions.items import CoordinateFrame, MissionItem, change_speed, waypoint
 from missions.planning.plan import plan
-from missions.request import Request
+from missions.request import RepairMission, Request
 from missions.situation import Known, Mission, Pose, Situation
-from missions.tour.tour import plan_tour
 
 if TYPE_CHECKING:
     from missions.geo import LatLon
@@ -254,7 +254,7 @@ def test_more_jumps_than_the_autopilot_counts_are_refused():
 def test_a_repaired_mission_is_a_plan():
     situation = situation_of(FIELD, BARN)
     asked = Request(clearance_m=2.0, via=Mission((WEST, SERVO, EAST), HOME))
-    made = plan_tour(situation, asked)
+    made = plan(situation, asked)
     assert SERVO in made.items
     assert made.path[0] == HOME
     assert made.path[-1] == EAST.position
@@ -281,7 +281,7 @@ def test_slow_stretches_and_stops_of_a_route_end_with_it(monkeypatch):
             speeds=(*made.speeds[:-1], 0.5),
         )
 
-    monkeypatch.setattr("missions.editing.repair.plan", slow_to_the_end)
+    monkeypatch.setattr("missions.editing.repair.plan_route", slow_to_the_end)
     found = repair(WEST, EAST, SERVO, go(120, 30))
     stopping = replace(EAST, params=(1.0, 0.0, 0.0, 0.0))
     at = kept(found, change_speed(0.5), stopping, change_speed(2.0), SERVO, go(120, 30))
@@ -332,3 +332,16 @@ def test_random_missions_in_random_fields():
         assert after.is_endless == before.is_endless
         assert len(after.legs) >= len(before.legs)
     assert len(refused) <= 2
+
+
+def test_a_repair_that_is_stopped_ends_with_one_error():
+    asked = itertools.count(1)
+    through = Mission((WEST, EAST), HOME)
+    with pytest.raises(PlanStoppedError, match="nobody waits"):
+        repair_mission(
+            through,
+            situation_of(FIELD, BARN),
+            RepairMission(clearance_m=2.0),
+            should_stop=lambda: next(asked) >= 3,
+        )
+    assert next(asked) == 4

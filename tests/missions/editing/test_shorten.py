@@ -18,9 +18,9 @@ from missions.errors import MissionTooLongError
 from missions.fence import CircleZone, Fence, Zone, ZoneKind
 from missions.geo import distance_m
 from missions.items import Command, CoordinateFrame, MissionItem, change_speed, waypoint
+from missions.planning.plan import plan
 from missions.request import Request
 from missions.situation import Known, Mission, Situation
-from missions.tour.tour import plan_tour
 from missions.vehicle.item_limit import most_items
 
 MAP = Chart(HOME)
@@ -150,11 +150,11 @@ def test_a_long_tour_fits_or_says_why_not(monkeypatch):
     targets = tuple(place(*spots[7 * number % len(spots)]) for number in range(14))
     situation = situation_of(*field_of_posts(), WP_SPEED=2.0)
     request = Request(start=place(-95.0, 0.0), targets=targets, clearance_m=1.0)
-    whole = plan_tour(situation, request)
+    whole = plan(situation, request)
     most = len(whole.items)  # one less, with home
-    monkeypatch.setattr("missions.tour.tour.plan", lambda *_arguments, **_options: whole)
-    monkeypatch.setattr("missions.tour.tour.most_items", lambda _parameters: most)
-    fitted = plan_tour(situation, request)
+    monkeypatch.setattr("missions.planning.plan.plan_tour", lambda *_arguments, **_options: whole)
+    monkeypatch.setattr("missions.planning.plan.most_items", lambda _parameters: most)
+    fitted = plan(situation, request)
     assert len(fitted.items) + 1 <= most
     assert fitted.targets == whole.targets
     assert set(fitted.targets) <= set(fitted.path)
@@ -163,7 +163,7 @@ def test_a_long_tour_fits_or_says_why_not(monkeypatch):
     assert_clear_of_posts(fitted.path, 1.0)
     assert check_mission(Mission(fitted.items), situation, request).holds
     with pytest.raises(MissionTooLongError, match=f"the vehicle holds {most}: 0 of 0 items"):
-        plan_tour(situation, replace(request, corner_allowance_m=1.0))
+        plan(situation, replace(request, corner_allowance_m=1.0))
 
 
 def assert_clear_of_posts(path, least_m: float) -> None:
@@ -215,8 +215,8 @@ def test_rtl_at_the_end_needs_an_item_too(monkeypatch):
         start=place(0.0, 0.0), targets=(place(20.0, 0.0), place(40.0, 0.0)), clearance_m=1.0, end="rtl"
     )
     situation = replace(situation, home=Known(place(0.0, 0.0), None, "test"))
-    monkeypatch.setattr("missions.tour.tour.most_items", lambda _parameters: 4)
-    assert len(plan_tour(situation, request).items) == 3
-    monkeypatch.setattr("missions.tour.tour.most_items", lambda _parameters: 3)
+    monkeypatch.setattr("missions.planning.plan.most_items", lambda _parameters: 4)
+    assert len(plan(situation, request).items) == 3
+    monkeypatch.setattr("missions.planning.plan.most_items", lambda _parameters: 3)
     with pytest.raises(MissionTooLongError, match="needs 4 items with home, and the vehicle holds 3"):
-        plan_tour(situation, request)
+        plan(situation, request)

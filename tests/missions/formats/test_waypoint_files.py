@@ -16,6 +16,7 @@ from missions.fence import Fence, PolygonZone, ZoneKind, fence_to_items
 from missions.formats import read_fence, read_mission, read_situation, waypoints, write_mission
 from missions.geo import LatLon
 from missions.items import MissionItem, waypoint
+from missions.rally import RallyPoint
 from missions.situation import Known, Mission, Situation
 
 if TYPE_CHECKING:
@@ -110,7 +111,7 @@ def test_the_recorded_mission_and_rally_files(fields: Path) -> None:
     ]
     rally = read_situation(fields / "union-rally.waypoints").rally
     assert rally is not None
-    assert rally.value == (LatLon(40.0720926, -105.2301648), LatLon(40.0721376, -105.22858))
+    assert rally.value == (RallyPoint(40.0720926, -105.2301648), RallyPoint(40.0721376, -105.22858))
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
@@ -138,7 +139,7 @@ def test_fence_and_rally_files_with_a_home_line(command: str) -> None:
     assert situation.home.value == LatLon(40.071374, -105.22993)
     rally = waypoints.read(text_of(home, "1\t0\t3\t5100\t0\t0\t0\t0\t40.07\t-105.2\t0\t1"), "f")
     assert rally.rally is not None
-    assert rally.rally.value == (LatLon(40.07, -105.2),)
+    assert rally.rally.value == (RallyPoint(40.07, -105.2),)
     assert rally.home == situation.home
 
 

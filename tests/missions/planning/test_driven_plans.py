@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections import Counter
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -15,19 +16,25 @@ from hypothesis import HealthCheck, given, settings
 from shapely import LineString, Point
 from strategies import RandomField, random_fields
 
+import pbpp
 from missions.drive_model import envelope
-from missions.errors import NoRouteError, RouteError, StartBlockedError, TargetBlockedError, VehicleError
+from missions.errors import NoRouteError, RequestError, RouteError, StartBlockedError, TargetBlockedError
 from missions.fence import CircleZone
 from missions.geo import LatLon
+from missions.ground.from_situation import ground_for
 from missions.items import Command
 from missions.planning.plan import plan
 from missions.request import Request
+from missions.routing.drawn_route import DrawnRoutes, Sought
 from missions.routing.fitted_route import FittedRoute
+from missions.routing.no_route import NoRoute, NoRouteKind
 from missions.routing.route_search import RouteSearch
 from missions.situation import Fix, Known, Pose, Situation
-from missions.vehicle import Footprint
+from missions.vehicle import Footprint, vehicle_from_parameters
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from missions.planned import Plan
 
 VEHICLES = [
@@ -222,7 +229,7 @@ class TestClearance:
 
     @pytest.mark.parametrize("speed_mps", [0.0, -1.0, math.inf, math.nan])
     def test_speeds_that_are_none(self, speed_mps: float) -> None:
-        with pytest.raises(VehicleError, match="is none"):
+        with pytest.raises(RequestError, match=r"speed_mps .*: expected a finite number above 0"):
             plan(situation_of(FIELD), Request(place(0, 0), (place(5, 5),), speed_mps=speed_mps))
 
 
@@ -328,8 +335,8 @@ def test_a_start_that_nothing_mends_is_refused_without_trying_it_slowly(
 
     lane = box(IN, -2.9, -60, 2.9, 60)
     situation = facing(situation_of(lane, **VEHICLES[1]), 0, 40, 0.0)
-    monkeypatch.setattr(RouteSearch, "_fit_slowly", never)
-    monkeypatch.setattr(RouteSearch, "_fit_other_ways", never)
+    monkeypatch.setattr(RouteSearch, "_slowly", never)
+    monkeypatch.setattr(RouteSearch, "_other_ways", never)
     with pytest.raises(NoRouteError, match="at the start this vehicle would come as near as") as caught:
         plan(situation, Request(targets=(place(0, -50),), clearance_m=1.0))
     assert "turn it by hand" in str(caught.value.details["advice"])
@@ -358,10 +365,10 @@ def test_where_no_clearance_helps_the_advice_is_another(monkeypatch: pytest.Monk
 
 
 def test_a_gap_that_no_clearance_lets_this_vehicle_through_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refused(*_: object) -> None:
-        raise NoRouteError("none of the shares")
+    def refused(*_: object) -> NoRoute:
+        return NoRoute(NoRouteKind.CORNER, "none of the shares")
 
-    monkeypatch.setattr(FittedRoute, "_widest", refused)
+    monkeypatch.setattr(FittedRoute, "widest", refused)
     walls = [box(OUT, -3, -60, 3, -2.5), box(OUT, -3, 2.5, 3, 60)]
     situation = facing(situation_of(box(IN, -60, -60, 60, 60), *walls, WP_SPEED=5.0), -50, 0, 90.0)
     with pytest.raises(
@@ -376,3 +383,70 @@ def test_a_target_that_no_clearance_frees_has_its_own_advice() -> None:
     with pytest.raises(TargetBlockedError, match=r"the target .*: exclusion polygon 1;") as caught:
         plan(situation, Request(targets=(place(0, 0),), widest=True))
     assert "advice" not in caught.value.details
+
+
+def counted(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
+    """Count how often free space is computed, from nothing or with one place more; and how often the widest way is looked for."""
+    counts: Counter[str] = Counter()
+    made, added, widest = pbpp.Planner.__init__, pbpp.Planner.with_exclusion, pbpp.widest
+
+    def counting(name: str, function: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*arguments: object, **options: object) -> object:
+            counts[name] += 1
+            return function(*arguments, **options)
+
+        return call
+
+    monkeypatch.setattr(pbpp.Planner, "__init__", counting("whole", made))
+    monkeypatch.setattr(pbpp.Planner, "with_exclusion", counting("one place more", added))
+    monkeypatch.setattr(pbpp, "widest", counting("widest", widest))
+    return counts
+
+
+def test_free_space_is_computed_once_for_each_band(monkeypatch: pytest.MonkeyPatch) -> None:
+    counts = counted(monkeypatch)
+    situation = situation_of(FIELD, WALL, **VEHICLES[0])
+    plan(situation, Request(place(-50, 0), (place(50, 0),), 2.0))
+    assert counts == {"whole": 2}  # at full speed's band and at the slow one's
+    counts.clear()
+    plan(situation, Request(place(-50, 0), (place(50, 0),), 2.0, corner_allowance_m=0.0))
+    assert counts == {"whole": 1}
+
+
+def test_a_place_more_is_added_to_the_free_space_that_is_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    situation = situation_of(FIELD, WALL)
+    ground = ground_for(situation, vehicle_from_parameters({}), [place(-50, 0), place(50, 0)])
+    ends = [ground.frame.to_local(place(east_m, 0)) for east_m in (-50, 50)]
+    counts = counted(monkeypatch)
+    routes = DrawnRoutes.at(Sought(ground, ends[0], ends[1:]), 2.0)
+    straight = routes.find()
+    square = LineString(straight.points).interpolate(0.5, normalized=True).buffer(3.0, cap_style="square")
+    other = routes.around(square).find()
+    assert counts == {"whole": 1, "one place more": 1}
+    assert LineString(other.points).distance(square) >= 2.0 - 1e-6
+    inclusions, exclusions = (ground.areas(kind) for kind in (IN, OUT))
+    scratch = pbpp.Planner(inclusions, [*exclusions, square], clearance_m=2.0).plan(*ends)
+    assert scratch.points.tolist() == other.points.tolist()
+
+
+def test_other_ways_and_first_legs_are_drawn_in_the_free_space_that_is_there(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Each once took its own: up to five ways round, and 72 first legs."""
+    counts = counted(monkeypatch)
+    lane = box(IN, -2.9, -60, 2.9, 60)
+    facing_away = facing(situation_of(lane, **VEHICLES[1]), 0, 40, 0.0)
+    with pytest.raises(NoRouteError, match="at the start this vehicle would come as near as"):
+        plan(facing_away, Request(targets=(place(0, -50),), clearance_m=1.0))
+    assert counts["whole"] <= 2
+    assert counts["widest"] == 0
+
+
+def test_the_widest_way_is_looked_for_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It was for each band that is too wide, and again for what the error says of it."""
+    counts = counted(monkeypatch)
+    walls = [box(OUT, -3, -60, 3, -2.5), box(OUT, -3, 2.5, 3, 60)]
+    situation = facing(situation_of(box(IN, -60, -60, 60, 60), *walls, WP_SPEED=5.0), -50, 0, 90.0)
+    with pytest.raises(NoRouteError, match="the widest keeps"):
+        plan(situation, Request(targets=(place(50, 0),), clearance_m=2.4))
+    assert counts["widest"] == 1

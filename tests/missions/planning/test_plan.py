@@ -33,6 +33,7 @@ from missions.errors import (
     FenceMissingError,
     InvalidPositionError,
     NoRouteError,
+    PlanStoppedError,
     RouteError,
     SituationError,
     StartBlockedError,
@@ -664,16 +665,17 @@ class TestWhatIsNotKnown:
         assert any("does not enforce" in warning for warning in warnings)
 
 
-def test_a_plan_that_is_stopped_is_safe_or_none() -> None:
-    try:
-        result = plan(
-            situation_of(FIELD, WALL), Request(place(-50, 0), (place(50, 0),), 2.0), should_stop=lambda: True
-        )
-    except RouteError:
-        return
-    chart = Chart(result.ground.frame.origin)
-    assert chart.fence_clearance_m(result.fence, result.path) >= 2 - MERCATOR_TOLERANCE_M
-    assert result.driven_clearance_m >= 2
+@pytest.mark.parametrize("last", [1, 2, 5])
+@pytest.mark.parametrize(
+    "how", [{"clearance_m": 2.0}, {"widest": True}, {"clearance_m": 2.0, "order": "best", "comes_back": True}]
+)
+def test_a_plan_that_is_stopped_ends_with_one_error_wherever_it_is(how: dict[str, object], last: int) -> None:
+    """Also where a search would take the stop for a refusal, and a widest route for its answer."""
+    asked = itertools.count(1)
+    ends = {"start": place(-50, 0), "targets": (place(50, 0), place(40, 30))}
+    with pytest.raises(PlanStoppedError, match="nobody waits"):
+        plan(situation_of(FIELD, WALL), Request(**ends, **how), should_stop=lambda: next(asked) >= last)
+    assert next(asked) == last + 1  # it was not asked again
 
 
 @pytest.mark.parametrize(("name", "ends"), [("maze", [(40.0714396, -105.2297785), (40.0726316, -105.2290497)]), ("yard", [(40.0714699, -105.2297855), (40.0720926, -105.2286152)])])  # fmt: skip

@@ -16,9 +16,9 @@ from missions.errors import NoRouteError, SituationError, TargetBlockedError
 from missions.fence import Fence, Zone
 from missions.items import Command
 from missions.planning.plan import plan
-from missions.request import Request
+from missions.request import Request, Tour
 from missions.situation import Known, Situation
-from missions.tour.tour import plan_tour, route_lengths_m, target_order
+from missions.tour.tour import route_lengths_m, target_order
 
 if TYPE_CHECKING:
     from missions.geo import LatLon
@@ -93,24 +93,24 @@ def test_the_best_order_is_the_shortest_of_all_plans(comes_back):
 
 
 def test_the_nearest_as_the_crow_flies_may_come_last():
-    made = plan_tour(WALLED, request(NEAR_BUT_BEHIND, FAR_BUT_HERE, order="best"))
+    made = plan(WALLED, request(NEAR_BUT_BEHIND, FAR_BUT_HERE, order="best"))
     assert [tuple(target) for target in made.targets] == [tuple(FAR_BUT_HERE), tuple(NEAR_BUT_BEHIND)]
     assert made.warnings[0].startswith("the targets are visited in the order 2, 1: ")
-    given = plan_tour(WALLED, request(NEAR_BUT_BEHIND, FAR_BUT_HERE))
+    given = plan(WALLED, request(NEAR_BUT_BEHIND, FAR_BUT_HERE))
     assert given.targets == (NEAR_BUT_BEHIND, FAR_BUT_HERE)
     assert made.length_m < given.length_m
 
 
 def test_an_order_that_was_best_already_needs_no_words():
-    made = plan_tour(WALLED, request(FAR_BUT_HERE, NEAR_BUT_BEHIND, order="best"))
+    made = plan(WALLED, request(FAR_BUT_HERE, NEAR_BUT_BEHIND, order="best"))
     assert not any("order" in text for text in made.warnings)
 
 
 def test_return_leads_home_else_to_the_start():
     away = place(-20, 40)
-    made = plan_tour(WALLED, replace(request(FAR_BUT_HERE, comes_back=True), start=away))
+    made = plan(WALLED, replace(request(FAR_BUT_HERE, comes_back=True), start=away))
     assert made.path[-1] == HOME
-    homeless = plan_tour(
+    homeless = plan(
         situation_of(FIELD, WALL, home=None), replace(request(FAR_BUT_HERE, comes_back=True), start=away)
     )
     assert homeless.path[-1] == away
@@ -118,16 +118,16 @@ def test_return_leads_home_else_to_the_start():
 
 
 def test_ends():
-    held = plan_tour(WALLED, request(FAR_BUT_HERE))
-    loitering = plan_tour(WALLED, request(FAR_BUT_HERE, end="loiter"))
+    held = plan(WALLED, request(FAR_BUT_HERE))
+    loitering = plan(WALLED, request(FAR_BUT_HERE, end="loiter"))
     assert [item.command for item in loitering.items[:-1]] == [item.command for item in held.items[:-1]]
     assert loitering.items[-1].command == Command.NAV_LOITER_UNLIM
     assert loitering.items[-1].position == held.items[-1].position == FAR_BUT_HERE
 
 
 def test_rtl_where_the_straight_line_home_is_free():
-    held = plan_tour(WALLED, request(FAR_BUT_HERE))
-    returning = plan_tour(WALLED, request(FAR_BUT_HERE, end="rtl"))
+    held = plan(WALLED, request(FAR_BUT_HERE))
+    returning = plan(WALLED, request(FAR_BUT_HERE, end="rtl"))
     assert returning.items[: len(held.items)] == held.items
     assert [item.command for item in returning.items[len(held.items) :]] == [Command.NAV_RETURN_TO_LAUNCH]
     assert returning.path == (*held.path, HOME)
@@ -146,9 +146,9 @@ def test_rtl_through_a_wall_is_refused_unless_the_way_home_is_part_of_the_missio
     with pytest.raises(
         NoRouteError, match=r"RTL at the end .* through exclusion polygon 1 at .*--return"
     ) as refused:
-        plan_tour(WALLED, request(NEAR_BUT_BEHIND, end="rtl"))
+        plan(WALLED, request(NEAR_BUT_BEHIND, end="rtl"))
     assert refused.value.details["fences"] == ["exclusion polygon 1"]
-    made = plan_tour(WALLED, request(NEAR_BUT_BEHIND, end="rtl", comes_back=True))
+    made = plan(WALLED, request(NEAR_BUT_BEHIND, end="rtl", comes_back=True))
     assert made.items[-1].command == Command.NAV_RETURN_TO_LAUNCH
     assert made.path[-2:] == (HOME, HOME)
     line = LineString(plane(list(made.path)))
@@ -157,15 +157,15 @@ def test_rtl_through_a_wall_is_refused_unless_the_way_home_is_part_of_the_missio
 
 def test_rtl_near_a_wall_is_refused_too():
     with pytest.raises(NoRouteError, match=r"m near exclusion polygon 1"):
-        plan_tour(situation_of(FIELD, box(OUT, 2.2, 30, 6, 40)), request(place(0, 80), end="rtl"))
+        plan(situation_of(FIELD, box(OUT, 2.2, 30, 6, 40)), request(place(0, 80), end="rtl"))
     drawn = request(place(0, 80), end="rtl", corner_allowance_m=0.0)
-    made = plan_tour(situation_of(FIELD, box(OUT, 2.2, 30, 6, 40)), drawn)
+    made = plan(situation_of(FIELD, box(OUT, 2.2, 30, 6, 40)), drawn)
     assert made.drawn_clearance_m == pytest.approx(2.2, abs=0.01)
 
 
 def test_rtl_without_a_home_is_refused():
     with pytest.raises(SituationError, match="home is not known"):
-        plan_tour(situation_of(FIELD, home=None), request(FAR_BUT_HERE, end="rtl"))
+        plan(situation_of(FIELD, home=None), request(FAR_BUT_HERE, end="rtl"))
 
 
 def test_a_target_that_cannot_be_reached_is_named():
@@ -176,27 +176,27 @@ def test_a_target_that_cannot_be_reached_is_named():
         box(OUT, 90, 10, 140, 20),
     )
     with pytest.raises(NoRouteError, match=r"to target 2 \(") as refused:
-        plan_tour(situation_of(FIELD, *island), request(FAR_BUT_HERE, place(115, 60), order="best"))
+        plan(situation_of(FIELD, *island), request(FAR_BUT_HERE, place(115, 60), order="best"))
     assert refused.value.details["target"] == list(place(115, 60))
 
 
 def test_a_blocked_target_is_told_by_the_plan():
     with pytest.raises(TargetBlockedError, match=r"the target .*: exclusion polygon 1;"):
-        plan_tour(WALLED, request(place(42, 60), FAR_BUT_HERE, order="best"))
-    made = plan_tour(WALLED, request(place(39, 60), FAR_BUT_HERE, order="best", snap_m=5.0))
+        plan(WALLED, request(place(42, 60), FAR_BUT_HERE, order="best"))
+    made = plan(WALLED, request(place(39, 60), FAR_BUT_HERE, order="best", snap_m=5.0))
     assert len(made.targets) == 2
 
 
 def test_the_widest_routes_can_be_ordered_too():
-    made = plan_tour(WALLED, request(NEAR_BUT_BEHIND, FAR_BUT_HERE, order="best", widest=True))
+    made = plan(WALLED, Tour(start=HOME, targets=(NEAR_BUT_BEHIND, FAR_BUT_HERE), order="best", widest=True))
     assert made.targets[0] == FAR_BUT_HERE
 
 
 def test_one_target_needs_no_order():
-    made = plan_tour(WALLED, request(FAR_BUT_HERE, order="best"))
+    made = plan(WALLED, request(FAR_BUT_HERE, order="best"))
     assert made.path == plan(WALLED, request(FAR_BUT_HERE)).path
     newest = replace(WALLED, target=Known(FAR_BUT_HERE, None, "test"))
-    assert plan_tour(newest, Request(clearance_m=2.0)).targets == (FAR_BUT_HERE,)
+    assert plan(newest, Request(clearance_m=2.0)).targets == (FAR_BUT_HERE,)
 
 
 def test_fifteen_targets():

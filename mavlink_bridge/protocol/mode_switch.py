@@ -8,15 +8,16 @@ heartbeat has to show it.
 
 from __future__ import annotations
 
-from enum import StrEnum, auto
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.mavlink.messages import CommandAck, CommandLong, Heartbeat, MavResult, ModeFlag
-from mavlink_bridge.protocol.table_machine import TableMachine
+from mavlink_bridge.protocol.table_machine import Outbox, TableMachine
+from mavlink_bridge.protocol.texts import Reasons
+from mavlink_bridge.protocol.transitions import MODE_SWITCH, MODE_SWITCH_UNTIL_SEEN, SwitchEvent, SwitchState
 from missions.items import Command
 
 if TYPE_CHECKING:
-    from mavlink_bridge.mavlink.messages import Frame, Message
+    from mavlink_bridge.mavlink.messages import Frame
     from mavlink_bridge.protocol.peer import Peer
 
 _HURRY_S = 0.5  # HOLD is sent again without waiting for heartbeats; chosen, not measured
@@ -27,54 +28,6 @@ _SETTLE_S = 0.5
 _MOST_SENDS = 16  # at 50 % loss all are lost once in 65,000 times; chosen, not measured
 _MOST_S = 60.0  # 16 sends at a heartbeat a second take 16 s; where heartbeats are lost it takes longer
 _HEARTBEAT_ID = 0.0
-
-
-class SwitchState(StrEnum):
-    """Where a mode switch is."""
-
-    IDLE = auto()
-    SENT = auto()
-    ACCEPTED = auto()
-    SEEN = auto()
-    REFUSED = auto()
-    UNANSWERED = auto()
-
-
-class SwitchEvent(StrEnum):
-    """What moves it."""
-
-    START = auto()
-    ACCEPTED = auto()
-    REFUSED = auto()
-    SEEN = auto()
-    SILENCE = auto()
-
-
-_ASKING: dict[SwitchState, dict[SwitchEvent, SwitchState]] = {
-    SwitchState.IDLE: {SwitchEvent.START: SwitchState.SENT},
-    SwitchState.SENT: {
-        SwitchEvent.ACCEPTED: SwitchState.ACCEPTED,
-        SwitchEvent.REFUSED: SwitchState.REFUSED,
-        SwitchEvent.SEEN: SwitchState.SEEN,
-        SwitchEvent.SILENCE: SwitchState.UNANSWERED,
-    },
-    SwitchState.ACCEPTED: {},
-    SwitchState.SEEN: {},
-    SwitchState.REFUSED: {},
-    SwitchState.UNANSWERED: {},
-}
-_UNTIL_SEEN: dict[SwitchState, dict[SwitchEvent, SwitchState]] = {
-    **_ASKING,
-    SwitchState.SENT: {
-        SwitchEvent.ACCEPTED: SwitchState.ACCEPTED,
-        SwitchEvent.SEEN: SwitchState.SEEN,
-        SwitchEvent.SILENCE: SwitchState.UNANSWERED,
-    },
-    SwitchState.ACCEPTED: {
-        SwitchEvent.SEEN: SwitchState.SEEN,
-        SwitchEvent.SILENCE: SwitchState.UNANSWERED,
-    },
-}
 
 
 class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
@@ -93,7 +46,7 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
     """
 
     def __init__(self, peer: Peer, mode: int, *, is_urgent: bool = False, until_seen: bool = False) -> None:
-        super().__init__(_UNTIL_SEEN if until_seen else _ASKING, SwitchState.IDLE)
+        super().__init__(MODE_SWITCH_UNTIL_SEEN if until_seen else MODE_SWITCH, SwitchState.IDLE)
         self._peer = peer
         self._mode = mode
         self._is_urgent = is_urgent
@@ -101,6 +54,7 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
         self._sent_s = 0.0
         self._give_up_s = 0.0
         self._result: MavResult | None = None
+        self._reasons = Reasons(peer)
 
     @property
     def is_granted(self) -> bool:
@@ -108,14 +62,19 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
         return self.state in (SwitchState.ACCEPTED, SwitchState.SEEN)
 
     @property
+    def is_refused(self) -> bool:
+        """Whether the vehicle said no."""
+        return self.state is SwitchState.REFUSED
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """STATUSTEXTs that came meanwhile and may be the reason of a refusal."""
+        return self._reasons.texts
+
+    @property
     def result_name(self) -> str:
         """How it was answered, by name."""
         return self._result.name if self._result is not None else "no answer"
-
-    @property
-    def progress(self) -> tuple[int, int]:
-        """Whether it is done, as steps."""
-        return int(self.is_done), 1
 
     @property
     def deadline_s(self) -> float | None:
@@ -133,6 +92,7 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
         """Send the command."""
         if self._move(SwitchEvent.START):
             self._give_up_s = now_s + _MOST_S
+            self._reasons.ask()
             self._send_once(now_s)
 
     def receive(self, frame: Frame, now_s: float) -> None:
@@ -140,6 +100,7 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
         if self.is_done or not self._peer.accepts(frame):
             return
         message = frame.message
+        self._reasons.take(frame, now_s)
         if isinstance(message, Heartbeat):
             if message.custom_mode == self._mode:
                 self._move(SwitchEvent.SEEN)
@@ -176,30 +137,32 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
             self._move(SwitchEvent.SILENCE)
 
     def _send_once(self, now_s: float) -> None:
-        peer = self._peer
-        self._send(
-            CommandLong(
-                peer.system,
-                peer.component,
-                Command.DO_SET_MODE,
-                min(self._sends, 255),
-                param1=ModeFlag.CUSTOM_MODE_ENABLED,
-                param2=self._mode,
-            )
-        )
+        self._send(set_mode(self._peer, self._mode, self._sends))
         self._sends += 1
         self._sent_s = now_s
 
 
-class AwaitHeartbeat:
+def set_mode(peer: Peer, mode: int, confirmation: int) -> CommandLong:
+    """Return the command that switches to a mode, for the first time (0) or once more."""
+    return CommandLong(
+        peer.system,
+        peer.component,
+        Command.DO_SET_MODE,
+        confirmation,
+        param1=ModeFlag.CUSTOM_MODE_ENABLED,
+        param2=mode,
+    )
+
+
+class AwaitHeartbeat(Outbox):
     """Asks for a heartbeat and waits for the vehicle's next: what it tells is no older than our wish to act on it.
 
     One comes every second also unasked, so nothing is asked twice.
     """
 
     def __init__(self, peer: Peer) -> None:
+        super().__init__()
         self._peer = peer
-        self._outgoing: list[Message] = []
         self.is_done = False
 
     @property
@@ -215,9 +178,7 @@ class AwaitHeartbeat:
     def start(self, now_s: float) -> None:  # noqa: ARG002 - the contract of machines
         """Ask."""
         peer = self._peer
-        self._outgoing.append(
-            CommandLong(peer.system, peer.component, Command.REQUEST_MESSAGE, param1=_HEARTBEAT_ID)
-        )
+        self._send(CommandLong(peer.system, peer.component, Command.REQUEST_MESSAGE, param1=_HEARTBEAT_ID))
 
     def receive(self, frame: Frame, now_s: float) -> None:  # noqa: ARG002 - the contract of machines
         """Take a frame."""
@@ -225,8 +186,3 @@ class AwaitHeartbeat:
 
     def handle_timer(self, now_s: float) -> None:
         """Take notice that time has passed."""
-
-    def messages_to_send(self) -> list[Message]:
-        """Return and forget what is to be sent now."""
-        outgoing, self._outgoing = self._outgoing, []
-        return outgoing

@@ -9,7 +9,7 @@ from missions.items import Command, MissionItem
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from mavlink_bridge.simulator.drive import Drive
+    from mavlink_bridge.simulator.drive import Driver
     from mavlink_bridge.simulator.flat import FlatFrame
 
 _TURNS = (Command.NAV_LOITER_TURNS, Command.NAV_LOITER_TIME)
@@ -18,20 +18,20 @@ _NAVIGATION = (*_PLACED, Command.NAV_RETURN_TO_LAUNCH, Command.NAV_DELAY)
 _MAX_COMMANDS = 64  # passed at once, so that jumps in a circle end; chosen, not measured
 
 
-class Route:
+class MissionRun:
     """The mission as it is driven.
 
     Parameters
     ----------
     items : callable
         Returns the mission as it reads back; item 0 is home.
-    drive : Drive
+    drive : Driver
         The driver.
     frame : FlatFrame
         Where the driver's metres count from.
     """
 
-    def __init__(self, items: Callable[[], Sequence[MissionItem]], drive: Drive, frame: FlatFrame) -> None:
+    def __init__(self, items: Callable[[], Sequence[MissionItem]], drive: Driver, frame: FlatFrame) -> None:
         self._items = items
         self._drive = drive
         self._frame = frame

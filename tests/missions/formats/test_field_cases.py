@@ -71,7 +71,7 @@ def test_a_fence_of_points_is_read_under_both_suffixes():
 
 def test_a_rally_list_of_mavproxy():
     rally = read_situation(CASES / "14-rally-txt" / "rally.txt").rally
-    assert [(*point, point.alt_m) for point in rally.value] == [(48.1005, 11.5005, 0.0)]
+    assert [tuple(point) for point in rally.value] == [(48.1005, 11.5005, 0.0)]
 
 
 def test_a_first_line_of_seq_1_is_no_home():

@@ -184,7 +184,7 @@ def test_rally_lines_are_read_as_pymavlink_reads_them(tmp_path):
     loader = mavwp.MAVRallyLoader()
     loader.load(str(path))
     theirs = [(p.lat / 1e7, p.lng / 1e7, p.alt) for p in (loader.rally_point(i) for i in range(2))]
-    assert [(*point, point.alt_m) for point in read_situation(path).rally.value] == theirs
+    assert [tuple(point) for point in read_situation(path).rally.value] == theirs
     for line in (
         "RALLY 48.1 11.5",
         "48.1 11.5",

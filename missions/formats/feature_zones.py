@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from shapely import Polygon
     from shapely.geometry.base import BaseGeometry
 
+    from missions.errors import MissionFormatError
     from missions.formats.choices import Choices
     from missions.formats.features import Feature
 
@@ -36,8 +37,11 @@ def roles_of_zones(
         What zones or points are is not certain; the message names them, the advice the options that settle it.
     """
     unknown = [feature for feature, role in zones if role is None]
-    if unknown and choices.outermost_is_inclusion and not points:
-        outer = _outermost(unknown)
+    fields = [feature for feature, role in zones if role is not Role.EXCLUSION]
+    if unknown and choices.outermost_is_inclusion:
+        if points:
+            raise _uncertain((), points, fields)
+        outer = _outermost(fields)
         return [
             (feature, role or (Role.INCLUSION if feature is outer else Role.EXCLUSION))
             for feature, role in zones
@@ -48,11 +52,13 @@ def roles_of_zones(
         taken = f"{lone} is the only zone and nothing says what it is: taken for an inclusion, the area to stay in"
         remarks = (f"{lone.where}: {taken} (otherwise: {lone.role_option('exclusion')})",)
     if unknown or points:
-        raise _uncertain(unknown, points)
+        raise _uncertain(unknown, points, fields)
     return [(feature, role or Role.INCLUSION) for feature, role in zones], remarks
 
 
-def _uncertain(zones: Sequence[Feature], points: Sequence[Feature]) -> Exception:
+def _uncertain(
+    zones: Sequence[Feature], points: Sequence[Feature], fields: Sequence[Feature]
+) -> MissionFormatError:
     problems = []
     if zones:
         problems.append(
@@ -60,21 +66,19 @@ def _uncertain(zones: Sequence[Feature], points: Sequence[Feature]) -> Exception
         )
     if points:
         problems.append(f"nothing says what {_listed(points)} {'are' if len(points) > 1 else 'is'}")
-    options = []
-    if len(zones) == 1:
-        options.append(f"{zones[0].role_option('exclusion')} (or =inclusion, =ignore)")
-    elif zones and _find_outermost(zones) is not None:
-        options.append("--outermost inclusion (the others are exclusions then)")
+    first = (*zones, *points)[0]
+    options, notes = [], []
+    if len(zones) > 1 and _find_outermost(fields) is not None:
+        options.append("--outermost inclusion")
+        notes.append("the others are exclusions then")
     elif zones:
         options += [zone.role_option("exclusion") for zone in zones[:5]]
-        options.append("(or =inclusion, =ignore)")
+        notes.append("or =inclusion, =ignore")
     if points:
         options.append("--ignore-points")
-    first = (*zones, *points)[0]
-    advice = f"add to the command: {' '.join(options)}"
-    if points and not zones:
-        advice += f"; or say what they are, such as {first.role_option('waypoint')}"
-    return first.error("; ".join(problems), advice=advice)
+        notes += [] if zones else [f"or say what they are, such as {first.role_option('waypoint')}"]
+    advice = f"add to the command: {' '.join(options)} ({'; '.join(notes)})"
+    return first.error("; ".join(problems), advice=advice.removesuffix(" ()"))
 
 
 def _listed(features: Sequence[Feature]) -> str:

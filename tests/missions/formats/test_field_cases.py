@@ -18,7 +18,7 @@ from mavlink_bridge.protocol.wire import item_from_message, item_to_message
 from mavlink_bridge.simulator.item_rules import kept_mission_item, mission_item_result
 from missions.errors import MissionFormatError
 from missions.fence import ZoneKind
-from missions.formats import read_fence, read_mission, read_parameters, read_situation
+from missions.formats import Choices, read_fence, read_mission, read_parameters, read_situation
 from missions.geo import LatLon
 
 CASES = Path(__file__).parent / "cases"
@@ -379,6 +379,41 @@ def test_outermost_needs_one_zone_around_all_others(tmp_path):
     )
     assert result.exit_code == 3
     assert "none of these zones holds all others: polygon 'N0', polygon 'N0.0005'" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("field", "tree", "wanted"),
+    [
+        ("inclusion", None, ["inclusion", "exclusion"]),
+        (None, "exclusion", ["inclusion", "exclusion"]),
+        (None, None, ["inclusion", "exclusion"]),
+        ("exclusion", None, ["exclusion", "inclusion"]),
+    ],
+)
+def test_outermost_goes_by_all_zones_that_are_no_exclusions(tmp_path, field, tree, wanted):
+    squares = [(11.5, 48.1, 0.001, field), (11.5004, 48.1004, 0.0002, tree)]
+    features = [
+        {
+            "type": "Feature",
+            "properties": {"role": role},
+            "geometry": {
+                "type": "Polygon",
+                "coordinates": [[[x, y], [x + w, y], [x + w, y + w], [x, y + w]]],
+            },
+        }
+        for x, y, w, role in squares
+    ]
+    features.append(
+        {"type": "Feature", "properties": {}, "geometry": {"type": "Point", "coordinates": [11.5, 48.1]}}
+    )
+    path = tmp_path / "two.geojson"
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    if None in (field, tree):
+        with pytest.raises(MissionFormatError, match="nothing says what point 1 is") as caught:
+            read_situation(path, Choices(outermost_is_inclusion=True))
+        assert "polygon" not in str(caught.value)
+    situation = read_situation(path, Choices(outermost_is_inclusion=True, ignores_points=True))
+    assert [zone.kind for zone in situation.fence.value.zones] == wanted
 
 
 @pytest.mark.parametrize("radius_m", [3.0, 60.0])

@@ -5,15 +5,20 @@ from __future__ import annotations
 import json
 import random
 import re
+import sys
+import types
+import warnings
 import zipfile
 from contextlib import nullcontext
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
+import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink import mavwp
-from shapely import Polygon, box, union_all
+from shapely import LineString, MultiPolygon, Point, Polygon, box, union_all
 
 from missions.errors import MissionFormatError
 from missions.fence import CircleZone, PolygonZone, ZoneKind
@@ -357,3 +362,84 @@ def test_a_shapefile_is_named_where_the_extra_is_missing_or_it_is_broken(tmp_pat
         read_situation(tmp_path / "y.zip")
     with pytest.raises(MissionFormatError, match=r"none\.shp cannot be read: No such file"):
         read_situation(tmp_path / "none.shp")
+
+
+class Library(types.ModuleType):
+    """What pyogrio gives for one layer, where it is not installed."""
+
+    def __init__(self, crs: str | None, shapes: list, names: list[str | None], warning: str = "") -> None:
+        super().__init__("pyogrio")
+        self.errors = types.SimpleNamespace(
+            DataSourceError=type("DataSourceError", (Exception,), {}),
+            DataLayerError=type("DataLayerError", (Exception,), {}),
+        )
+        self.raw = types.SimpleNamespace(read=self._read)
+        self._held = crs, shapes, names, warning
+
+    def list_layers(self, _path):
+        return [("layer", "Polygon")]
+
+    def _read(self, path, *, layer, force_2d, max_features):
+        crs, shapes, names, warning = self._held
+        assert (layer, force_2d) == ("layer", True)
+        assert len(shapes) <= max_features
+        if warning:
+            warnings.warn(warning, UserWarning, stacklevel=1)
+        if "broken" in path.name:
+            raise self.errors.DataSourceError("no such thing")
+        if "table" in path.name:
+            return {"crs": None, "fields": []}, None, None, []
+        return (
+            {"crs": crs, "fields": ["NAME", "id"]},
+            None,
+            shapely.to_wkb(shapes),
+            [names, np.arange(len(names))],
+        )
+
+
+LINE = LineString([(11.5001, 48.1001), (11.5008, 48.1008)])
+
+
+def test_features_of_a_library_are_features_of_ours(tmp_path, monkeypatch):
+    shapes = [MultiPolygon([FIELD]), TREE, LINE, None, Point(11.5, 48.1)]
+    names = ["Field", None, "Path", "nothing", "Home"]
+    monkeypatch.setitem(sys.modules, "pyogrio", Library("EPSG:4326", shapes, names, "half of it"))
+    path = tmp_path / "f.gpkg"
+    path.write_bytes(b"x")
+    situation = read_situation(path, Choices(outermost_is_inclusion=True))
+    assert [zone.kind for zone in situation.fence.value.zones] == ["inclusion", "exclusion"]
+    assert places_of(situation) == [LatLon(48.1001, 11.5001), LatLon(48.1008, 11.5008)]
+    assert situation.home.value == LatLon(48.1, 11.5)
+    assert situation.remarks == (f"{path}: half of it",)
+    for name, problem in (
+        ("broken.gpkg", "a GeoPackage that cannot be read: no such thing"),
+        ("table.gpkg", "there is nothing in it"),
+    ):
+        (tmp_path / name).write_bytes(b"x")
+        with pytest.raises(MissionFormatError, match=problem):
+            read_situation(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("crs", "shape", "problem"),
+    [
+        (None, FIELD, "does not say its projection"),
+        ("EPSG:4326", box(11, 91, 12, 92), "layer layer, feature 1: latitude 91° is beyond"),
+        ("EPSG:0", FIELD, "a shapefile that cannot be read"),
+    ],
+)
+def test_what_a_library_gives_is_checked(tmp_path, monkeypatch, crs, shape, problem):
+    monkeypatch.setitem(sys.modules, "pyogrio", Library(crs, [shape], ["Field"]))
+    (tmp_path / "f.shp").write_bytes(b"x")
+    with pytest.raises(MissionFormatError, match=problem):
+        read_situation(tmp_path / "f.shp")
+
+
+def test_where_the_library_is_missing_it_is_named(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyogrio", None)
+    (tmp_path / "f.shp").write_bytes(b"x")
+    with pytest.raises(
+        MissionFormatError, match="is a shapefile, which is read with the extra gis"
+    ) as caught:
+        read_situation(tmp_path / "f.shp")
+    assert "pbpp-rover[gis]" in str(caught.value.details["advice"])

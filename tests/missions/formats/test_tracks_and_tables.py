@@ -25,7 +25,7 @@ from missions.fence import CircleZone, PolygonZone, ZoneKind
 from missions.formats import Choices, geojson, gpx, read_mission, read_situation, waypoints, write_situation
 from missions.formats.features import Role
 from missions.geo import LatLon
-from missions.items import Command, waypoint
+from missions.items import Command, MissionItem, waypoint
 from missions.situation import Known, Mission, Situation
 
 if TYPE_CHECKING:
@@ -443,3 +443,37 @@ def test_where_the_library_is_missing_it_is_named(tmp_path, monkeypatch):
     ) as caught:
         read_situation(tmp_path / "f.shp")
     assert "pbpp-rover[gis]" in str(caught.value.details["advice"])
+
+
+@pytest.mark.parametrize(
+    ("text", "suffix", "problem"),
+    [
+        ('{"type":"Feature","properties":{"role":"waypoint","command":178},"geometry":{"type":"Point","coordinates":[1,2]}}', ".geojson", "a point, and command 178 has no place"),
+        ("<kml><Placemark><Track><coord>1 2</coord><coord>1 x</coord></Track></Placemark></kml>", ".kml", "line 1: '1 x'; expected longitude latitude altitude"),
+        ("<kml><Placemark><Track><coord>1 2</coord><coord>100 -120</coord></Track></Placemark></kml>", ".kml", "latitude -120° is beyond"),
+        ("<kml><Placemark><Point><coordinates>-35.3,149.1</coordinates></Point></Placemark></kml>", ".kml", "latitude 149.1° is beyond ±90°; the order here is longitude, latitude: are they swapped?"),
+        ('lat,lon\n1,2\n"' + "x" * 140_000 + '",1\n', ".csv", "line 3: field larger than field limit"),
+        ('{"fileType":"Plan","version":1,"geoFence":[]}', ".plan", "geoFence: expected an object"),
+    ],
+)  # fmt: skip
+def test_more_that_is_refused(tmp_path, text, suffix, problem):
+    path = tmp_path / f"x{suffix}"
+    path.write_text(text)
+    with pytest.raises(MissionFormatError, match=re.escape(problem)):
+        read_situation(path)
+
+
+def test_what_is_not_set_is_refused_where_it_means_something(tmp_path):
+    nan = float("nan")
+    items = (waypoint(A), MissionItem(Command.DO_CHANGE_SPEED, 2, (1.0, nan, nan, nan)))
+    situation = Situation(mission=Known(Mission(items), None, ""))
+    with pytest.raises(MissionFormatError, match=r"item 2: param2 of command 178 is not set \(NaN\)"):
+        write_situation(situation, tmp_path / "x.waypoints")
+    items = (waypoint(A), MissionItem(Command.DO_JUMP, 2, (1.0, 2.0, nan, nan)))
+    write_situation(Situation(mission=Known(Mission(items), None, "")), tmp_path / "x.waypoints")
+    assert read_mission(tmp_path / "x.waypoints").items[1].params == (1.0, 2.0, 0.0, 0.0)
+    placeless = Situation(mission=Known(Mission(items[1:]), None, ""))
+    with pytest.raises(
+        MissionFormatError, match=r"a \.csv file holds places, and no item of the mission has one"
+    ):
+        write_situation(placeless, tmp_path / "x.csv")

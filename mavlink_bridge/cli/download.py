@@ -151,6 +151,8 @@ def _write_plan(path: Path, what: str, items: tuple[MissionItem, ...]) -> None:
 
 
 def _details(what: str, items: tuple[MissionItem, ...], parameters: Mapping[str, float]) -> dict[str, Any]:
+    from missions.formats.numbers import xy_for_file  # noqa: PLC0415 - quick help
+
     if what == "parameters":
         return {"parameters": dict(parameters)}
     return {
@@ -160,8 +162,7 @@ def _details(what: str, items: tuple[MissionItem, ...], parameters: Mapping[str,
                 "command": int(item.command),
                 "frame": int(item.frame),
                 "params": [_number(value) for value in item.params],
-                "lat": item.lat_e7 / 1e7,
-                "lon": item.lon_e7 / 1e7,
+                **dict(zip(("lat", "lon"), xy_for_file(item), strict=True)),
                 "alt_m": _number(item.alt_m),
             }
             for seq, item in enumerate(items)

@@ -19,6 +19,7 @@ from mavlink_bridge.protocol.parameters import ReadParameters
 from mavlink_bridge.protocol.undisturbed_read import UndisturbedRead
 from missions.fence import fence_from_items
 from missions.formats import write_mission
+from missions.formats.numbers import xy_for_file
 from missions.formats.parameters import is_parameter_name
 from missions.formats.waypoints import format_items
 from missions.items import without_home
@@ -151,8 +152,6 @@ def _write_plan(path: Path, what: str, items: tuple[MissionItem, ...]) -> None:
 
 
 def _details(what: str, items: tuple[MissionItem, ...], parameters: Mapping[str, float]) -> dict[str, Any]:
-    from missions.formats.numbers import xy_for_file  # noqa: PLC0415 - quick help
-
     if what == "parameters":
         return {"parameters": dict(parameters)}
     return {

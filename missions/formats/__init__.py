@@ -14,7 +14,6 @@ from missions.foreign_files import kind_of_suffix
 from missions.formats import (
     fen,
     geojson,
-    gis,
     gpx,
     kml,
     parameters,
@@ -136,6 +135,8 @@ def read_situation(path: Path | str, choices: Choices = NO_CHOICES) -> Situation
             advice="leave --role out; to change a zone, edit the file in the ground station",
         )
     if format_.read is None:
+        from missions.formats import gis  # noqa: PLC0415 - its libraries are slow to come
+
         return gis.read_path(path, choices)
     text, remarks = read_text(path)
     extra = (choices,) if format_.is_map else ()

@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 from missions.fence import CircleZone, PolygonZone, Zone, ZoneKind
 from missions.formats.feature_roles import may_be_inclusion
 from missions.formats.features import Role
-from missions.geo import LatLon, to_e7, wrap_lon_deg
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from shapely import Polygon
-    from shapely.geometry.base import BaseGeometry
-
     from missions.errors import MissionFormatError
     from missions.formats.choices import Choices
     from missions.formats.features import Feature
-
-_M_PER_DEG = 111_320.0
-_TOUCHING_DEG = 1e-7  # 1 cm: what was drawn along an edge may lie that far beyond it
 
 
 def roles_of_zones(
@@ -98,37 +90,9 @@ def _outermost(zones: Sequence[Feature]) -> Feature:
 
 
 def _find_outermost(zones: Sequence[Feature]) -> Feature | None:
-    """Return the zone that holds all others, None without one."""
-    import shapely  # noqa: PLC0415 - slow to come, only for these
+    from missions.formats.zone_shapes import find_outermost  # noqa: PLC0415 - shapely is slow to come, only for these
 
-    origin = zones[0].lines[0][0]
-    shapes = [_outline(zone, origin) for zone in zones]
-    largest = max(range(len(shapes)), key=lambda i: shapes[i].area)
-    grown = shapes[largest].buffer(_TOUCHING_DEG)
-    try:
-        holds_all = all(shapely.covers(grown, shape) for shape in shapes)
-    except shapely.GEOSException:
-        return None
-    return zones[largest] if holds_all else None
-
-
-def _outline(zone: Feature, origin: LatLon) -> BaseGeometry:
-    """Return a zone in degrees about an origin, circles as wide as they are in latitude and longitude."""
-    import shapely  # noqa: PLC0415
-    from shapely import affinity  # noqa: PLC0415
-
-    points = [_about(position, origin) for position in zone.lines[0]]
-    radius_m = zone.radius_m()
-    if radius_m is None:
-        return shapely.make_valid(shapely.Polygon(points))
-    (east, north), cos = points[0], max(0.01, math.cos(math.radians(zone.position.lat_deg)))
-    circle = shapely.Point(east, north).buffer(radius_m / _M_PER_DEG)
-    return affinity.scale(circle, 1 / cos, 1)
-
-
-def _about(position: LatLon, origin: LatLon) -> tuple[float, float]:
-    # Rounded, for numbers like 1e-316 make GEOS lose whole triangles
-    return round(wrap_lon_deg(position.lon_deg - origin.lon_deg), 12), round(position.lat_deg, 12)
+    return find_outermost(zones)
 
 
 def zones_of(feature: Feature, role: Role) -> list[Zone]:
@@ -145,50 +109,7 @@ def zones_of(feature: Feature, role: Role) -> list[Zone]:
         return [CircleZone(kind, feature.position, radius_m)]
     outer, *holes = feature.lines
     if kind is ZoneKind.EXCLUSION and holes:
-        return [PolygonZone(kind, ring) for ring in _cut_along_holes(feature)]
+        from missions.formats.zone_shapes import cut_along_holes  # noqa: PLC0415 - as above
+
+        return [PolygonZone(kind, ring) for ring in cut_along_holes(feature)]
     return [PolygonZone(kind, outer), *(PolygonZone(ZoneKind.EXCLUSION, hole) for hole in holes)]
-
-
-def _cut_along_holes(feature: Feature) -> list[tuple[LatLon, ...]]:
-    """Return rings without holes that together cover a polygon with holes: a fence has no ground inside an exclusion.
-
-    Cuts run along meridians of whole degE7, so that both sides of a cut keep the same line when they are rounded for the vehicle.
-    """
-    from shapely import Polygon  # noqa: PLC0415
-
-    origin = feature.lines[0][0]
-    outer, *holes = ([_about(position, origin) for position in ring] for ring in feature.lines)
-    whole = Polygon(outer, holes)
-    if not whole.is_valid:
-        raise feature.error(
-            "an exclusion whose rings cross or touch; draw it anew, or as several without holes"
-        )
-    waiting, done = [whole], []
-    while waiting:
-        piece = waiting.pop()
-        if piece.interiors:
-            waiting += _halves(piece, origin)
-        else:
-            done.append(tuple(_on_earth(point, origin) for point in piece.exterior.coords[:-1]))
-    return done
-
-
-def _halves(polygon: Polygon, origin: LatLon) -> list[Polygon]:
-    from shapely import Polygon, box  # noqa: PLC0415
-
-    west, south, east, north = polygon.bounds
-    hole_west, _, hole_east, _ = polygon.interiors[0].bounds
-    middle = LatLon(0.0, origin.lon_deg + (hole_west + hole_east) / 2)
-    cut = to_e7(middle)[1] / 1e7 - origin.lon_deg
-    sides = (box(west - 1, south - 1, cut, north + 1), box(cut, south - 1, east + 1, north + 1))
-    pieces = [polygon.intersection(side) for side in sides]
-    return [
-        part
-        for piece in pieces
-        for part in getattr(piece, "geoms", [piece])
-        if isinstance(part, Polygon) and part.area > 0
-    ]
-
-
-def _on_earth(point: tuple[float, ...], origin: LatLon) -> LatLon:
-    return LatLon(point[1], wrap_lon_deg(point[0] + origin.lon_deg))

@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import warnings
+import zipfile
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
+
+import shapely
+from pyproj import Transformer
+from shapely.errors import ShapelyError
 
 from missions.errors import InvalidPositionError, MissionFormatError
 from missions.formats.bounds import MOST_BYTES, MOST_POSITIONS, check_bound
@@ -37,8 +42,6 @@ def read_path(path: Path, choices: Choices = NO_CHOICES) -> Situation:
     """
     source, kind = str(path), _KINDS[path.suffix.lower()]
     _check_file(path)
-    from shapely.errors import ShapelyError  # noqa: PLC0415 - slow to come, only for these
-
     try:
         import pyogrio  # noqa: PLC0415 - an extra
     except ImportError:
@@ -84,8 +87,6 @@ _EXPORT = "export it again, or as .geojson in EPSG:4326"
 
 def _check_file(path: Path) -> None:
     """Check size, and of an archive what is in it, before the library is let loose on it."""
-    import zipfile  # noqa: PLC0415 - slow to come
-
     source = str(path)
     try:
         check_bound(path.stat().st_size, MOST_BYTES, "bytes", source)
@@ -111,9 +112,6 @@ def _check_file(path: Path) -> None:
 
 
 def _features(crs: str | None, shapes: Any, rows: list[dict[str, object]], where: str) -> Iterator[Feature]:  # noqa: ANN401 - an array of WKB
-    import shapely  # noqa: PLC0415 - slow to come, only for these
-    from pyproj import Transformer  # noqa: PLC0415
-
     if crs is None:
         raise MissionFormatError(
             f"{where}: it does not say its projection (a shapefile's .prj)",

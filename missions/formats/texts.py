@@ -5,6 +5,8 @@ from __future__ import annotations
 import codecs
 import io
 import re
+import zipfile
+import zlib
 from typing import TYPE_CHECKING, NamedTuple
 
 from missions.errors import MissionFormatError
@@ -103,9 +105,6 @@ def _bounded(file: IO[bytes], source: str) -> bytes:
 
 def _unzipped(data: bytes, path: Path) -> tuple[bytes, tuple[str, ...]]:
     """Return the KML of a zip file, as KMZ wants it: doc.kml, else the first."""
-    import zipfile  # noqa: PLC0415 - slow to come, only for these
-    import zlib  # noqa: PLC0415
-
     check_bound(data.count(_DIRECTORY_ENTRY), _MOST_FILES, "files in it", str(path))
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:

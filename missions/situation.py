@@ -127,6 +127,8 @@ class Situation:
         Lists on their way, by kind and direction (True: to the vehicle).
     fence_trouble : str or None
         Why the newest fence that was seen could not be used.
+    remarks : tuple of str
+        What reading a file passed over or took for something: to be told.
     """
 
     system: int | None = None
@@ -150,3 +152,4 @@ class Situation:
         default_factory=lambda: MappingProxyType({})
     )
     fence_trouble: str | None = None
+    remarks: tuple[str, ...] = ()

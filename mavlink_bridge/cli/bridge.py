@@ -15,6 +15,7 @@ import typer
 from mavlink_bridge.cli.bridge_view import LiveView
 from mavlink_bridge.cli.common import warn
 from mavlink_bridge.cli.failing import ERRORS_ONLY, exit_code_of, telling
+from mavlink_bridge.cli.field_files import read_vehicle_file
 from mavlink_bridge.cli.interrupting import AtHand, interruptible, terminable
 from mavlink_bridge.cli.keyboard import Keyboard
 from mavlink_bridge.cli.link_notes import LinkNotes
@@ -34,7 +35,6 @@ from mavlink_bridge.link import ONE_SHOT_IDENTITY, now_s, open_link, parse_conne
 from mavlink_bridge.mavlink.echoes import SentFrames
 from mavlink_bridge.protocol.outcomes import ends_in_words
 from mavlink_bridge.replay.journal import Call
-from missions.formats import read_parameters
 from missions.geo import LatLon
 from missions.situation import Situation
 
@@ -60,7 +60,7 @@ def bridge(options: BridgeOptions) -> None:
     """Run the director on a link until its single job is done, or for ever."""
     check_permissions(upload=options.upload, drive=options.drive, arm=options.arm)
     orders = _orders(options)
-    parameters = read_parameters(options.vehicle) if options.vehicle else {}
+    parameters = read_vehicle_file(options.vehicle) if options.vehicle else {}
     with contextlib.ExitStack() as stack:
         recorder, journal = _recorders(stack, options.log, orders, parameters)
         director = Director(orders, Situation(parameters=parameters))

@@ -13,17 +13,17 @@ from rich.table import Table
 from mavlink_bridge.cli.common import warn
 from mavlink_bridge.cli.drawing import cell, console
 from mavlink_bridge.cli.failing import ExitCode
+from mavlink_bridge.cli.field_files import read_fence_file, read_file, read_vehicle_file, with_mission_home
 from mavlink_bridge.cli.pictures import check_plots, draw
 from mavlink_bridge.cli.terminal import echo, print_json
 from mavlink_bridge.cli.values import position_from
 from mavlink_bridge.cli.vehicle_options import with_home_option, with_vehicle
 from mavlink_bridge.errors import UsageError
 from missions.checking.check import check_mission, plan_of
-from missions.errors import FenceMissingError
-from missions.formats import read_mission, read_parameters, read_situation
+from missions.formats import mission_of
 from missions.picture.plans import plan_scene
 from missions.request import GoTo
-from missions.situation import Known, Situation
+from missions.situation import Situation
 from missions.vehicle.item_limit import most_items
 from missions.words import metres
 
@@ -47,7 +47,12 @@ def check(options: CheckOptions) -> None:
     if begin is None and options.log is not None and situation.home is not None:
         begin = situation.home.value  # at a log's end the vehicle may stand anywhere on its way
     checked = check_mission(situation.mission.value, situation, replace(request, start=begin))
-    warnings = [*unknown, *checked.warnings, *_storage_warnings(checked.mission.items, situation)]
+    warnings = [
+        *situation.remarks,
+        *unknown,
+        *checked.warnings,
+        *_storage_warnings(checked.mission.items, situation),
+    ]
     warn(warnings)
     draw(partial(_scene, checked, situation), options.plot)
     if options.json_output:
@@ -70,8 +75,7 @@ def _situation(options: CheckOptions) -> tuple[Situation, list[str]]:
         from mavlink_bridge.cli.check_on_link import live_situation  # noqa: PLC0415 - and for links
 
         situation, unknown = live_situation(options)
-    situation = _with_files(situation, options.mission, options.fence, options.vehicle)
-    return with_home_option(situation, options.home), unknown
+    return with_home_option(_with_files(situation, options), options.home), unknown
 
 
 def _check_options(options: CheckOptions) -> None:
@@ -92,32 +96,33 @@ def _storage_warnings(items: Sequence[MissionItem], situation: Situation) -> lis
     return [f"{count} mission items with home; the vehicle holds {most}"] if count > most else []
 
 
-def _with_files(
-    source: Situation | None, mission: Path | None, fence: Path | None, vehicle: Path | None
-) -> Situation:
+def _with_files(source: Situation | None, options: CheckOptions) -> Situation:
     """Put what files hold in the place of what the log or the link reported; of parameters the vehicle's own count more."""
     found = source or Situation()
-    if fence is not None:
-        told = read_situation(fence)
-        if told.fence is None:
-            raise FenceMissingError(f"{fence} holds no fence", file=str(fence))
+    if options.fence is not None:
+        told = read_fence_file(options.fence, options)
         found = replace(
-            found, fence=told.fence, fence_trouble=None, transfers={}, home=found.home or told.home
+            found,
+            fence=told.fence,
+            fence_trouble=None,
+            transfers={},
+            home=found.home or told.home,
+            remarks=told.remarks,
         )
-    if mission is not None:
-        read_mission(mission)  # which names what is wrong where no fence can be used
-        told = read_situation(mission)
-        assert told.mission is not None
-        home = told.mission.value.home
+    if options.mission is not None:
+        told = read_file(options.mission, options, by_name=options.fence is None)
+        drawn = mission_of(told, options.mission)
         found = replace(
             found,
             mission=told.mission,
-            fence=told.fence if fence is None and told.fence else found.fence,
+            fence=told.fence if options.fence is None and told.fence else found.fence,
             rally=found.rally or told.rally,
-            home=found.home if source or not home else Known(home, None, str(mission)),
+            remarks=(*found.remarks, *told.remarks),
         )
-    if vehicle is not None:
-        found = replace(found, parameters={**read_parameters(vehicle), **found.parameters})
+        if source is None:
+            found = with_mission_home(found, drawn, str(options.mission))
+    if options.vehicle is not None:
+        found = replace(found, parameters={**read_vehicle_file(options.vehicle), **found.parameters})
     return found
 
 

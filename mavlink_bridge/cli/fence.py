@@ -6,13 +6,13 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.cli.common import is_same_file
+from mavlink_bridge.cli.field_files import read_fence_file
 from mavlink_bridge.cli.kept_files import write_kept
 from mavlink_bridge.cli.options.fence import ACTIONS
 from mavlink_bridge.cli.terminal import echo, print_json
 from mavlink_bridge.errors import UsageError
-from missions.errors import FenceMissingError
 from missions.fence import ZoneKind
-from missions.formats import Part, check_writable_format, format_of, read_situation, write_situation
+from missions.formats import Part, check_writable_format, format_of, write_situation
 from missions.ground.merged_fence import merged_fence
 from missions.words import counted
 
@@ -27,10 +27,9 @@ def fence(options: FenceOptions) -> None:
     if is_same_file(options.source, options.output):
         raise UsageError(f"{options.output} would be written over what it is made of; give another -o FILE")
     check_writable_format(options.output, Part.FENCE)
-    situation = read_situation(options.source)
+    situation = read_fence_file(options.source, options)
     known = situation.fence
-    if known is None:
-        raise FenceMissingError(f"{options.source} holds no fence", file=str(options.source))
+    assert known is not None
     merged = merged_fence(known.value)
     situation = replace(situation, fence=replace(known, value=merged))
     part = None if format_of(options.output, "write").together else Part.FENCE
@@ -47,6 +46,7 @@ def fence(options: FenceOptions) -> None:
                 "merged_inclusions": before if before > 1 else 0,
                 "zones": len(merged.zones),
                 "vertices": merged.vertex_count,
+                "warnings": list(situation.remarks),
             }
         )
     elif not options.quiet:

@@ -16,6 +16,7 @@ from mavlink_bridge.backup.vehicle_lock import VehicleLock
 from mavlink_bridge.backup.vehicle_mark import VehicleMark
 from mavlink_bridge.cli.common import warn
 from mavlink_bridge.cli.drawing import progress_bar
+from mavlink_bridge.cli.field_files import read_vehicle_file
 from mavlink_bridge.cli.interrupting import AtHand, interruptible, terminable
 from mavlink_bridge.cli.link_notes import LinkNotes
 from mavlink_bridge.cli.restoring import interrupted_warnings
@@ -30,7 +31,6 @@ from mavlink_bridge.protocol.vehicle_watch import Doing
 from mavlink_bridge.protocol.verified_upload import Held, OutcomeKind
 from missions.checking.execution import follow_mission
 from missions.errors import SituationError
-from missions.formats import read_parameters
 from missions.items import Command
 from missions.planned import Plan
 from missions.planning.plan import plan as make_plan
@@ -116,7 +116,7 @@ def plan_live(
     BridgeError, MissionError
         What went wrong, on the link or in planning.
     """
-    parameters = read_parameters(vehicle_file) if vehicle_file else {}
+    parameters = read_vehicle_file(vehicle_file) if vehicle_file else {}
     identity = orders.identity or ONE_SHOT_IDENTITY
     with terminable(), open_link(connection, identity, signing=signing_of(key_file)) as link:
         return conduct(

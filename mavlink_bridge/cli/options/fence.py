@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from mavlink_bridge.cli.options.shared import CommonOptions
+from mavlink_bridge.cli.options.shared import CommonOptions, IgnorePointsOption, OutermostOption, RoleOption
 
 ACTIONS = ("merge",)
 
@@ -29,3 +29,6 @@ class FenceOptions(CommonOptions):
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FILE", help="Where to: .plan, .waypoints, .geojson, …")
     ]
+    role: RoleOption = field(default_factory=list)
+    outermost: OutermostOption = None
+    ignore_points: IgnorePointsOption = False

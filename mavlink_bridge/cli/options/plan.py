@@ -14,10 +14,13 @@ from mavlink_bridge.cli.options.shared import (
     ConnectOption,
     GpsOption,
     HomeOption,
+    IgnorePointsOption,
     LengthOption,
     LinkOptions,
+    OutermostOption,
     PositionErrorOption,
     ReserveOption,
+    RoleOption,
     WidthOption,
 )
 from mavlink_bridge.cli.values import LEAST_MPS, MOST_M, MOST_MPS, within
@@ -133,6 +136,9 @@ class PlanOptions(LinkOptions):
             rich_help_panel=_TOURS,
         ),
     ] = None
+    role: RoleOption = field(default_factory=list)
+    outermost: OutermostOption = None
+    ignore_points: IgnorePointsOption = False
     method: Annotated[str, typer.Option(metavar="|".join(METHODS), help="How to search.")] = "optimal"
     output: Annotated[
         list[Path],

@@ -56,6 +56,38 @@ def test_what_is_written_is_the_merged_fence(pieces, tmp_path, suffix):
     )
 
 
+def test_pieces_of_a_map_whose_roles_are_said_beside_it(tmp_path):
+    path, output = tmp_path / "pieces.geojson", tmp_path / "field.plan"
+    features = [
+        {
+            "type": "Feature",
+            "properties": {"name": f"piece {number}"},
+            "geometry": {
+                "type": "Polygon",
+                "coordinates": [[[lon, lat] for lat, lon in (*zone.vertices, zone.vertices[0])]],
+            },
+        }
+        for number, zone in enumerate(PIECES.zones[:2], start=1)
+    ]
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    unsaid = run("fence", "merge", path, "-o", output)
+    assert (unsaid.exit_code, output.exists()) == (3, False)
+    assert "--role" in unsaid.stderr
+    said = ("--role", "piece 1=inclusion", "--role", "piece 2=inclusion")
+    document = json.loads(run("fence", "merge", path, "-o", output, *said, "--json").stdout)
+    assert (document["merged_inclusions"], document["zones"], document["warnings"]) == (2, 1, [])
+    assert read_fence(output).zones == merged_fence(Fence(PIECES.zones[:2])).zones
+
+
+def test_exclusions_out_of_reach_are_left_out_with_a_word(tmp_path):
+    path, output = tmp_path / "pieces.waypoints", tmp_path / "field.plan"
+    far = box(OUT, 90_000, 0, 90_100, 100)
+    write_fence(Fence((*PIECES.zones, far)), path)
+    result = run("fence", "merge", path, "-o", output)
+    assert (result.exit_code, len(read_fence(output).zones)) == (0, 2)
+    assert "left out: 1" in result.stderr
+
+
 def test_the_other_parts_of_a_plan_stay(fields, tmp_path):
     plan = tmp_path / "both.plan"
     assert run("plan", "--fence", fields / "yard-fence.waypoints", "--start", "40.071374,-105.229930",

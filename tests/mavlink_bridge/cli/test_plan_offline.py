@@ -362,7 +362,7 @@ WRONG_FENCES: list[tuple[str, str | bytes, str]] = [
     ("string.plan", qgc(circle("40", 30)), "center[0]: expected a number"),
     ("kind.plan", qgc(polygon([[40, -105]] * 3, "yes")), "inclusion: expected true or false"),
     ("area.plan", qgc(polygon([[40, -105]] * 3)), "inclusion polygon 1 has no area"),
-    ("version.plan", qgc({"version": 1, "polygon": []}), "geoFence version 1; expected 2"),
+    ("version.plan", qgc({"version": 1, "polygon": []}), "holds no fence"),
     ("list.plan", "[]", "expected a QGroundControl plan"),
     ("deep.plan", "[" * 1_000_000, "nested too deeply"),
     ("cut.plan", qgc(circle(40, 30))[:-5], "not JSON"),
@@ -373,7 +373,7 @@ WRONG_FENCES: list[tuple[str, str | bytes, str]] = [
     ("mixed.waypoints", wpl(TRIANGLE + "\n3\t0\t0\t16\t0\t0\t0\t0\t40.07\t-105.2\t0\t1"), "line 5: fence item 3: command 16 does not belong"),
     ("pole.waypoints", wpl(TRIANGLE.replace("40.0", "86.0")), "is beyond ±85°"),
     ("apart.plan", qgc({"version": 2, "polygons": [], "circles": [circle(40, 30)["circles"][0], circle(40.5, 30)["circles"][0]]}), "leave no ground in common"),
-    ("suffix.tlog", "x", "no format to read for the suffix '.tlog'"),
+    ("suffix.tlog", "x", "is a telemetry log; read are .plan"),
     ("suffix", "x", "no format to read for the suffix ''"),
 ]  # fmt: skip
 

@@ -15,11 +15,16 @@ from mavlink_bridge.cli.failing import ExitCode
 from mavlink_bridge.cli.plan_results import draw
 from mavlink_bridge.cli.terminal import echo, print_json
 from mavlink_bridge.cli.values import position_from
-from mavlink_bridge.cli.vehicle_options import with_home_option, with_vehicle
+from mavlink_bridge.cli.vehicle_options import (
+    described_vehicle,
+    with_description,
+    with_home_option,
+    with_vehicle,
+)
 from mavlink_bridge.errors import UsageError
 from missions.checking.check import check_mission, plan_of
 from missions.errors import FenceMissingError
-from missions.formats import read_mission, read_parameters, read_situation
+from missions.formats import read_mission, read_situation
 from missions.picture import check_picture_format
 from missions.request import GoTo
 from missions.situation import Known, Situation
@@ -68,7 +73,8 @@ def _situation(options: CheckOptions) -> tuple[Situation, list[str]]:
         from mavlink_bridge.cli.check_on_link import live_situation  # noqa: PLC0415 - and for links
 
         situation, unknown = live_situation(options)
-    situation = _with_files(situation, options.mission, options.fence, options.vehicle)
+    situation = _with_files(situation, options.mission, options.fence)
+    situation = with_description(situation, described_vehicle(options.vehicle, options.firmware))
     return with_home_option(situation, options.home), unknown
 
 
@@ -92,10 +98,8 @@ def _storage_warnings(items: Sequence[MissionItem], situation: Situation) -> lis
     return [f"{count} mission items with home; the vehicle holds {most}"] if count > most else []
 
 
-def _with_files(
-    source: Situation | None, mission: Path | None, fence: Path | None, vehicle: Path | None
-) -> Situation:
-    """Put what files hold in the place of what the log or the link reported; of parameters the vehicle's own count more."""
+def _with_files(source: Situation | None, mission: Path | None, fence: Path | None) -> Situation:
+    """Put what files hold in the place of what the log or the link reported."""
     found = source or Situation()
     if fence is not None:
         told = read_situation(fence)
@@ -116,8 +120,6 @@ def _with_files(
             rally=found.rally or told.rally,
             home=found.home if source or not home else Known(home, None, str(mission)),
         )
-    if vehicle is not None:
-        found = replace(found, parameters={**read_parameters(vehicle), **found.parameters})
     return found
 
 
@@ -129,6 +131,7 @@ def _draw(checked: MissionCheck, situation: Situation, plots: list[Path]) -> Non
         f"{checked.length_m:.1f} m, about {checked.duration_s:.0f} s: "
         + (f"{broken} of {len(checked.legs)} legs break" if broken else f"{len(checked.legs)} legs keep")
         + f" {checked.clearance_m:g} m"
+        + ", extrapolated" * bool(checked.extrapolated)
     )
     draw(plan_of(checked, situation), plots, title=title)
 
@@ -154,7 +157,9 @@ def _report(checked: MissionCheck, plots: list[Path]) -> None:
         echo(f"DANGER: {danger}", typer.colors.RED)
     for leg in checked.broken:
         echo(f"BREAKS: {_sentence(leg)}", typer.colors.RED)
-    if checked.holds:
+    if checked.holds and checked.extrapolated:
+        echo(f"Every leg is predicted to keep {checked.clearance_m:g} m while driving; that was not measured")
+    elif checked.holds:
         echo(f"Every leg keeps {checked.clearance_m:g} m while driving")
 
 
@@ -204,6 +209,7 @@ def _document(
         "legs": [_leg_document(leg) for leg in checked.legs],
         "not_understood": list(checked.troubles),
         "dangers": list(checked.dangers),
+        "extrapolated": list(checked.extrapolated),
         "outputs": [str(path) for path in plots],
         "warnings": warnings,
     }

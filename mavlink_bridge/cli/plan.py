@@ -12,10 +12,15 @@ from mavlink_bridge.cli.plan_request import request_from_options, with_tour
 from mavlink_bridge.cli.plan_results import Told, arrival_document, report_end
 from mavlink_bridge.cli.terminal import print_json
 from mavlink_bridge.cli.timed_plan import timed_plan
-from mavlink_bridge.cli.vehicle_options import with_home_option, with_vehicle
+from mavlink_bridge.cli.vehicle_options import (
+    described_vehicle,
+    with_description,
+    with_home_option,
+    with_vehicle,
+)
 from mavlink_bridge.errors import UsageError
 from missions.errors import FenceMissingError, MissionFormatError
-from missions.formats import check_writable_format, read_parameters, read_situation
+from missions.formats import check_writable_format, read_situation
 from missions.picture import check_picture_format
 
 if TYPE_CHECKING:
@@ -64,15 +69,13 @@ def _request(options: PlanOptions) -> Request:
         options.snap,
         options.method,
     )
-    request = replace(with_vehicle(request, options), speed_mps=options.speed, escape=options.escape)
+    request = replace(
+        with_vehicle(request, options),
+        speed_mps=options.speed,
+        escape=options.escape,
+        trusts_model=options.trust_model,
+    )
     return with_tour(request, options.order, options.end, options.via_mission, comes_back=options.come_back)
-
-
-def with_parameter_file(situation: Situation, vehicle: Path | None) -> Situation:
-    """Add the parameters of a file to those that the vehicle itself reported."""
-    if vehicle is None:
-        return situation
-    return replace(situation, parameters={**read_parameters(vehicle), **situation.parameters})
 
 
 def _check_options(options: PlanOptions) -> None:
@@ -110,4 +113,6 @@ def _offline_situation(options: PlanOptions, request: Request) -> Situation:
         situation = read_situation(options.fence)
         if situation.fence is None:
             raise FenceMissingError(f"{options.fence} holds no fence", file=str(options.fence))
-    return with_home_option(with_parameter_file(situation, options.vehicle), options.home)
+    return with_home_option(
+        with_description(situation, described_vehicle(options.vehicle, options.firmware)), options.home
+    )

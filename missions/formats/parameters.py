@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 from missions.errors import MissionFormatError
+from missions.firmware import firmware_from_remark
 from missions.formats.files import read_text
 from missions.situation import Situation
 
@@ -28,11 +29,16 @@ def read_parameters(path: Path | str) -> dict[str, float]:
     MissionFormatError
         The file is missing or a line is not a name and a number; the message says which.
     """
-    return dict(read(read_text(Path(path)), str(path)).parameters)
+    return dict(read_parameter_file(path).parameters)
+
+
+def read_parameter_file(path: Path | str) -> Situation:
+    """Read a parameter file as `read_parameters` does, with the firmware's version where one of its remarks names it."""
+    return read(read_text(Path(path)), str(path))
 
 
 def read(text: str, source: str) -> Situation:
-    """Read a file's text.
+    """Read a file's text: parameters, and the firmware's version where a remark names it ("# Version: 4.5.7" of QGroundControl).
 
     Raises
     ------
@@ -40,18 +46,21 @@ def read(text: str, source: str) -> Situation:
         With the line and what was expected there.
     """
     parameters = {}
+    firmware = None
     for number, line in enumerate(text.splitlines(), start=1):
+        firmware = firmware or firmware_from_remark(line)
         content = line.partition("#")[0].strip()
         if content and not content.startswith(_NOT_A_PARAMETER):
             name, value = _parse(content, f"{source}: line {number}")
             parameters[name] = value
-    return Situation(parameters=parameters)
+    return Situation(parameters=parameters, firmware=firmware)
 
 
 def write(situation: Situation) -> str:
     """Return the text of a file with the situation's parameters by name, as exact as the 32-bit floats of MAVLink."""
     rows = [f"{name:<16} {value:.9g}\n" for name, value in sorted(situation.parameters.items())]
-    return "".join(rows)
+    remark = f"# Version: {situation.firmware}\n" if situation.firmware else ""
+    return remark + "".join(rows)
 
 
 def is_parameter_name(text: str) -> bool:

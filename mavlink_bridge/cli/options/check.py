@@ -12,6 +12,7 @@ from mavlink_bridge.cli.options.shared import (
     OUTPUT_PANEL,
     VEHICLE_PANEL,
     ConnectOption,
+    FirmwareOption,
     GpsOption,
     HomeOption,
     LengthOption,
@@ -75,6 +76,7 @@ class CheckOptions(LinkOptions):
             rich_help_panel=OUTPUT_PANEL,
         ),
     ] = field(default_factory=list)
+    firmware: FirmwareOption = None
     reserve: ReserveOption = 0.0
     position_error: PositionErrorOption = None
     length: LengthOption = 0.0

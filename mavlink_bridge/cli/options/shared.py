@@ -10,6 +10,8 @@ import typer
 
 from mavlink_bridge.cli.options_file import take_options
 from mavlink_bridge.cli.values import MOST_M, MOST_S, MOST_VEHICLE_M, within
+from missions.errors import VehicleError
+from missions.firmware import Firmware, read_firmware
 
 LINK_PANEL, OUTPUT_PANEL, VEHICLE_PANEL = "Link", "Output", "Vehicle"
 """How help groups what many commands have."""
@@ -108,6 +110,32 @@ GpsOption = Annotated[
     typer.Option(
         metavar="FORWARD,RIGHT",
         help="The GPS antenna from the middle of the vehicle, metres.",
+        rich_help_panel=VEHICLE_PANEL,
+    ),
+]
+
+
+def _firmware(text: str) -> Firmware:
+    try:
+        return read_firmware(text)
+    except VehicleError as error:
+        raise typer.BadParameter(str(error)) from None
+
+
+FirmwareOption = Annotated[
+    Firmware | None,
+    typer.Option(
+        metavar="VERSION",
+        parser=_firmware,
+        help="The autopilot's version (4.5, 4.6.3), where the source does not report it.",
+        rich_help_panel=VEHICLE_PANEL,
+    ),
+]
+TrustOption = Annotated[
+    bool,
+    typer.Option(
+        "--trust-model",
+        help="Promise also where the drive lies outside what was measured.",
         rich_help_panel=VEHICLE_PANEL,
     ),
 ]

@@ -5,7 +5,9 @@ from typing import TYPE_CHECKING
 import pytest
 
 from missions.errors import MissionFormatError
+from missions.firmware import Firmware
 from missions.formats import read_parameters
+from missions.formats.parameters import read_parameter_file, write
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -94,3 +96,22 @@ def test_what_no_32_bit_float_holds_is_no_value(tmp_path: Path, value: str) -> N
     path.write_text(f"FENCE_TYPE {value}\n", encoding="utf-8")
     with pytest.raises(MissionFormatError, match="line 1: expected a parameter's name and a number"):
         read_parameters(path)
+
+
+@pytest.mark.parametrize(
+    ("remark", "firmware"),
+    [
+        ("# Version: 4.5.7 ", Firmware(4, 5, 7)),
+        ("# Version: 4.7.0 dev", Firmware(4, 7, 0, 0)),
+        ("#NOTE: 12/2/2025 ArduRover V4.6.3 (3fc7011a)", Firmware(4, 6, 3)),
+        ("# Git Revision: 4.5.7", None),
+        ("#NOTE: 12/2/2025 10:00:00 Frame : rover", None),
+    ],
+)
+def test_a_remark_may_name_the_firmware(tmp_path: Path, remark: str, firmware: Firmware | None) -> None:
+    path = tmp_path / "rover.parm"
+    path.write_text(f"# Onboard parameters for Vehicle 1\n{remark}\nWP_SPEED 2\n", encoding="utf-8")
+    found = read_parameter_file(path)
+    assert (dict(found.parameters), found.firmware) == ({"WP_SPEED": 2.0}, firmware)
+    path.write_text(write(found), encoding="utf-8")
+    assert read_parameter_file(path) == found

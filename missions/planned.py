@@ -42,7 +42,8 @@ class Plan:
     speeds : tuple of float or None
         The speed asked for on each leg of the path in m/s; None is the vehicle's own.
     clearance_m : float or None
-        Promised for the rover as it drives: what was asked for, or less where the start leaves less; None where only drawn lines were asked for.
+        Promised for the rover as it drives: what was asked for, or less where the start leaves less; None where only drawn lines were asked for,
+        and where the drive is extrapolated.
     asked_m : float
         What the drawn lines have to keep (less where the first ones lead away from a fence nearby); where the route is fitted to the
         drive model, the driven band too: the promise, the position's error and the owner's reserve.
@@ -62,6 +63,8 @@ class Plan:
         For the mission's home item.
     asked_targets : tuple of LatLon
         The targets as they were asked for, before blocked ones were moved; empty where nobody asked for targets.
+    extrapolated : tuple of str
+        In what the drive lies outside what was measured.
     """
 
     items: tuple[MissionItem, ...]
@@ -86,6 +89,7 @@ class Plan:
     home: LatLon | None
     warnings: tuple[str, ...]
     asked_targets: tuple[LatLon, ...] = ()
+    extrapolated: tuple[str, ...] = ()
 
     @property
     def turn_count(self) -> int:

@@ -57,6 +57,7 @@ def plan_document(planned: Plan) -> dict[str, object]:
         },
         "blocks": planned.blocks,
         "mission_items": len(planned.items) + 1,
+        "extrapolated": list(planned.extrapolated),
         "warnings": list(planned.warnings),
     }
 
@@ -123,6 +124,8 @@ def report_plan(planned: Plan, written: list[Path]) -> None:
         if planned.clearance_m is not None
         else "nothing promised for the driven track"
     )
+    if planned.extrapolated:
+        promise += ", extrapolated beyond what was measured"
     waypoints = sum(item.is_placed for item in planned.items)
     turns = planned.turn_count
     echo(

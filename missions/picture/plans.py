@@ -92,7 +92,8 @@ def plan_scene(
 
 def plan_title(plan: Plan, crossing: tuple[int, ...]) -> tuple[str, ...]:
     """Return the title: how long the route is, what it keeps, and which legs alone are not safe."""
-    length = f"{plan.length_m:.1f} m, about {plan.duration_s:.0f} s"
+    extrapolated = ", extrapolated" if plan.extrapolated else ""
+    length = f"{plan.length_m:.1f} m, about {plan.duration_s:.0f} s{extrapolated}"
     drawn_m = plan.drawn_clearance_m
     if crossing:
         if len(crossing) > _MOST_NAMED:

@@ -227,6 +227,8 @@ def test_titles(plans: dict[str, Plan]) -> None:
     )
     drawn = replace(plan, clearance_m=None)
     assert plan_scene(drawn).title[1].endswith("none promised while driving")
+    extrapolated = replace(drawn, extrapolated=("OA_TYPE 2: not measured",))
+    assert plan_scene(extrapolated).title == (f"{length}, extrapolated", plan_scene(drawn).title[1])
     free = replace(plan, drawn_clearance_m=float("inf"), clearance_m=None)
     assert plan_scene(free).title == (f"{length}, no fence near",)
     assert (

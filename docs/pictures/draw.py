@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from missions.formats import read_situation
+from missions.formats import read_mission, read_situation
+from missions.formats.parameters import read_parameters
 from missions.geo import LatLon
 from missions.picture import draw_plan
 from missions.planning.plan import plan
-from missions.request import GoTo, Tour
+from missions.request import GoTo, RepairMission, Tour
 
 HERE = Path(__file__).parent
 FIELDS = HERE.parents[1] / "tests" / "fields"
@@ -26,3 +27,10 @@ for name, request in REQUESTS.items():
     situation = read_situation(FIELDS / f"{name}-fence.waypoints")
     parameters = {"WP_RADIUS": 2.0, "WP_SPEED": 4.0, "FENCE_OPTIONS": 2.0 if name == "union" else 0.0}
     draw_plan(plan(replace(situation, parameters=parameters), request), HERE / f"{name}.png")
+
+survey = read_mission(FIELDS / "trees-rows.waypoints")
+rows = RepairMission(start=survey.home, mission=survey)
+trees = replace(
+    read_situation(FIELDS / "trees-fence.waypoints"), parameters=read_parameters(FIELDS / "trees-mower.parm")
+)
+draw_plan(plan(trees, rows), HERE / "rows.png")

@@ -1,4 +1,10 @@
-"""Repairing a mission: legs that break the clearance are replaced by routes; everything else keeps its place and meaning."""
+"""Repairing a mission: legs that break the clearance are replaced by routes; everything else keeps its place and meaning.
+
+**How.** A leg between two places of the mission is a line that somebody drew, a row of a survey perhaps. Its route keeps to that line but near
+what is in the way: places on the line are targets of the route too, a run-in before and behind it. The run-in is as short as the vehicle can
+drive without slowing down; where none can be driven, the route leaves the line from end to end. The whole is checked as any mission is. A leg
+that misses little gets that much more room; one that misses it again, or more, is planned from end to end, together with those beside it.
+"""
 
 from __future__ import annotations
 
@@ -43,6 +49,7 @@ if TYPE_CHECKING:
 
 # Chosen, not measured: routes that break the legs beside them are made anew so often; bounds the time
 _ROUNDS = 8
+# Chosen on one survey (docs/targets.md) for four vehicles: 1 m slowed them down, beyond 8 m a row is a row no more
 _RUN_INS_M = (2.0, 4.0, 8.0)
 """How far before and after what is in the way a route leaves a leg's own line: the first that needs no slower stretch."""
 _EXTRA_M, _MOST_EXTRA_M = 0.1, 0.5
@@ -89,7 +96,7 @@ class _Routed:
     keys : set of LegKey
         All of them.
     bent : set of LegKey
-        Those planned from end to end: their own lines nobody drew, or they broke when they kept to them.
+        Those planned from end to end: nobody drew their lines, or they broke when they kept to them.
     clearance_m : float
         What routes promise.
     spare_m : dict of LegKey to float

@@ -77,6 +77,7 @@ _CIRCLE_KINDS = {
     Command.FENCE_CIRCLE_INCLUSION: ZoneKind.INCLUSION,
     Command.FENCE_CIRCLE_EXCLUSION: ZoneKind.EXCLUSION,
 }
+_HOME_CIRCLE = 5005  # MAV_CMD_NAV_FENCE_HOME_CIRCLE_INCLUSION, in MAVLink's development dialect
 _VERTEX_COMMANDS = {kind: command for command, kind in _VERTEX_KINDS.items()}
 _CIRCLE_COMMANDS = {kind: command for command, kind in _CIRCLE_KINDS.items()}
 
@@ -109,7 +110,12 @@ def fence_from_items(items: Sequence[MissionItem]) -> Fence:
                 raise FenceError(f"fence item {seq}: a second return point", item=seq)
             return_point = _position(item, seq)
         else:
-            raise FenceError(f"fence item {seq}: command {item.command} does not belong in a fence", item=seq)
+            reason = (
+                "is a circle around home, a fence item that ArduPilot Rover does not take"
+                if item.command == _HOME_CIRCLE
+                else "does not belong in a fence"
+            )
+            raise FenceError(f"fence item {seq}: command {item.command} {reason}", item=seq)
         seq += 1
     return Fence(tuple(zones), return_point)
 

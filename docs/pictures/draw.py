@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from missions.firmware import Firmware
 from missions.formats import read_mission, read_situation
 from missions.formats.parameters import read_parameters
 from missions.geo import LatLon
@@ -26,11 +27,16 @@ REQUESTS = {
 for name, request in REQUESTS.items():
     situation = read_situation(FIELDS / f"{name}-fence.waypoints")
     parameters = {"WP_RADIUS": 2.0, "WP_SPEED": 4.0, "FENCE_OPTIONS": 2.0 if name == "union" else 0.0}
-    draw_plan(plan(replace(situation, parameters=parameters), request), HERE / f"{name}.png")
+    draw_plan(
+        plan(replace(situation, parameters=parameters, firmware=Firmware(4, 6)), request),
+        HERE / f"{name}.png",
+    )
 
 survey = read_mission(FIELDS / "trees-rows.waypoints")
 rows = RepairMission(start=survey.home, mission=survey)
 trees = replace(
-    read_situation(FIELDS / "trees-fence.waypoints"), parameters=read_parameters(FIELDS / "trees-mower.parm")
+    read_situation(FIELDS / "trees-fence.waypoints"),
+    parameters=read_parameters(FIELDS / "trees-mower.parm"),
+    firmware=Firmware(4, 6),
 )
 draw_plan(plan(trees, rows), HERE / "rows.png")

@@ -12,17 +12,22 @@ from rich.table import Table
 from mavlink_bridge.cli.common import check_one_stdout, warn
 from mavlink_bridge.cli.drawing import cell, console
 from mavlink_bridge.cli.failing import ExitCode
+from mavlink_bridge.cli.field_files import read_fence_file, read_file, with_mission_home
 from mavlink_bridge.cli.plan_results import draw
 from mavlink_bridge.cli.terminal import echo, print_json
 from mavlink_bridge.cli.values import position_from
-from mavlink_bridge.cli.vehicle_options import with_home_option, with_vehicle
+from mavlink_bridge.cli.vehicle_options import (
+    described_vehicle,
+    with_description,
+    with_home_option,
+    with_vehicle,
+)
 from mavlink_bridge.errors import UsageError
 from missions.checking.check import check_mission, plan_of
-from missions.errors import FenceMissingError
-from missions.formats import read_mission, read_parameters, read_situation
+from missions.formats import mission_of
 from missions.picture import check_picture_format
 from missions.request import GoTo
-from missions.situation import Known, Situation
+from missions.situation import Situation
 from missions.vehicle.item_limit import most_items
 from missions.words import metres
 
@@ -45,7 +50,12 @@ def check(options: CheckOptions) -> None:
     if begin is None and options.log is not None and situation.home is not None:
         begin = situation.home.value  # at a log's end the vehicle may stand anywhere on its way
     checked = check_mission(situation.mission.value, situation, replace(request, start=begin))
-    warnings = [*unknown, *checked.warnings, *_storage_warnings(checked.mission.items, situation)]
+    warnings = [
+        *situation.remarks,
+        *unknown,
+        *checked.warnings,
+        *_storage_warnings(checked.mission.items, situation),
+    ]
     warn(warnings)
     _draw(checked, situation, options.plot)
     if options.json_output:
@@ -68,7 +78,8 @@ def _situation(options: CheckOptions) -> tuple[Situation, list[str]]:
         from mavlink_bridge.cli.check_on_link import live_situation  # noqa: PLC0415 - and for links
 
         situation, unknown = live_situation(options)
-    situation = _with_files(situation, options.mission, options.fence, options.vehicle)
+    situation = _with_files(situation, options)
+    situation = with_description(situation, described_vehicle(options.vehicle, options.firmware))
     return with_home_option(situation, options.home), unknown
 
 
@@ -92,32 +103,31 @@ def _storage_warnings(items: Sequence[MissionItem], situation: Situation) -> lis
     return [f"{count} mission items with home; the vehicle holds {most}"] if count > most else []
 
 
-def _with_files(
-    source: Situation | None, mission: Path | None, fence: Path | None, vehicle: Path | None
-) -> Situation:
-    """Put what files hold in the place of what the log or the link reported; of parameters the vehicle's own count more."""
+def _with_files(source: Situation | None, options: CheckOptions) -> Situation:
+    """Put what files hold in the place of what the log or the link reported."""
     found = source or Situation()
-    if fence is not None:
-        told = read_situation(fence)
-        if told.fence is None:
-            raise FenceMissingError(f"{fence} holds no fence", file=str(fence))
+    if options.fence is not None:
+        told = read_fence_file(options.fence, options)
         found = replace(
-            found, fence=told.fence, fence_trouble=None, transfers={}, home=found.home or told.home
+            found,
+            fence=told.fence,
+            fence_trouble=None,
+            transfers={},
+            home=found.home or told.home,
+            remarks=told.remarks,
         )
-    if mission is not None:
-        read_mission(mission)  # which names what is wrong where no fence can be used
-        told = read_situation(mission)
-        assert told.mission is not None
-        home = told.mission.value.home
+    if options.mission is not None:
+        told = read_file(options.mission, options, by_name=options.fence is None)
+        drawn = mission_of(told, options.mission)
         found = replace(
             found,
             mission=told.mission,
-            fence=told.fence if fence is None and told.fence else found.fence,
+            fence=told.fence if options.fence is None and told.fence else found.fence,
             rally=found.rally or told.rally,
-            home=found.home if source or not home else Known(home, None, str(mission)),
+            remarks=(*found.remarks, *told.remarks),
         )
-    if vehicle is not None:
-        found = replace(found, parameters={**read_parameters(vehicle), **found.parameters})
+        if source is None:
+            found = with_mission_home(found, drawn, str(options.mission))
     return found
 
 
@@ -129,6 +139,7 @@ def _draw(checked: MissionCheck, situation: Situation, plots: list[Path]) -> Non
         f"{checked.length_m:.1f} m, about {checked.duration_s:.0f} s: "
         + (f"{broken} of {len(checked.legs)} legs break" if broken else f"{len(checked.legs)} legs keep")
         + f" {checked.clearance_m:g} m"
+        + ", extrapolated" * bool(checked.extrapolated)
     )
     draw(plan_of(checked, situation), plots, title=title)
 
@@ -154,7 +165,9 @@ def _report(checked: MissionCheck, plots: list[Path]) -> None:
         echo(f"DANGER: {danger}", typer.colors.RED)
     for leg in checked.broken:
         echo(f"BREAKS: {_sentence(leg)}", typer.colors.RED)
-    if checked.holds:
+    if checked.holds and checked.extrapolated:
+        echo(f"Every leg is predicted to keep {checked.clearance_m:g} m while driving; that was not measured")
+    elif checked.holds:
         echo(f"Every leg keeps {checked.clearance_m:g} m while driving")
 
 
@@ -204,6 +217,7 @@ def _document(
         "legs": [_leg_document(leg) for leg in checked.legs],
         "not_understood": list(checked.troubles),
         "dangers": list(checked.dangers),
+        "extrapolated": list(checked.extrapolated),
         "outputs": [str(path) for path in plots],
         "warnings": warnings,
     }

@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.cli.common import is_same_file, warn
+from mavlink_bridge.cli.field_files import read_file
 from mavlink_bridge.cli.kept_files import write_kept
 from mavlink_bridge.cli.terminal import echo, print_json
 from mavlink_bridge.cli.values import position_from
 from mavlink_bridge.errors import UsageError
-from missions.formats import Part, format_of, parts_of, read_situation, write_situation
+from missions.formats import Part, format_of, parts_of, write_situation
 
 if TYPE_CHECKING:
     from mavlink_bridge.cli.options.convert import ConvertOptions
@@ -23,11 +24,12 @@ def convert(options: ConvertOptions) -> None:
     if is_same_file(options.source, options.output):
         raise UsageError(f"{options.output} would be written over what it is made of; give another OUT")
     part = _part(options.only)
-    situation = _with_return_point(read_situation(options.source), options.return_point)
+    situation = _with_return_point(read_file(options.source, options), options.return_point)
     _check_choice(situation, options.source, options.output, part)
     written = write_situation(situation, options.output, part, write=write_kept)
-    warnings = _left_out(situation, written, options.output) if part is None else []
-    warn(warnings)
+    left_out = _left_out(situation, written, options.output) if part is None else []
+    warn(left_out)
+    warnings = [*situation.remarks, *left_out]
     document = {
         "status": "ok",
         "command": "convert",
@@ -79,11 +81,11 @@ def _left_out(situation: Situation, written: tuple[Part, ...], output: Path) -> 
         if one not in written
     ]
     mission = situation.mission
-    if mission is not None and output.suffix.lower() == ".gpx":
+    if mission is not None and output.suffix.lower() in (".gpx", ".csv"):
         placeless = sum(not item.is_placed for item in mission.value.items)
         if placeless:
             texts.append(
-                f"{placeless} mission items without a place left out: a .gpx file holds the route only"
+                f"{placeless} mission items without a place left out: a {output.suffix} file holds the route only"
             )
     fence = situation.fence
     if fence is not None and fence.value.return_point and output.suffix.lower() == ".poly":

@@ -19,6 +19,7 @@ from mavlink_bridge.protocol.parameters import ReadParameters
 from mavlink_bridge.protocol.undisturbed_read import UndisturbedRead
 from missions.fence import fence_from_items
 from missions.formats import write_mission
+from missions.formats.numbers import xy_for_file
 from missions.formats.parameters import is_parameter_name
 from missions.formats.waypoints import format_items
 from missions.items import without_home
@@ -160,8 +161,7 @@ def _details(what: str, items: tuple[MissionItem, ...], parameters: Mapping[str,
                 "command": int(item.command),
                 "frame": int(item.frame),
                 "params": [_number(value) for value in item.params],
-                "lat": item.lat_e7 / 1e7,
-                "lon": item.lon_e7 / 1e7,
+                **dict(zip(("lat", "lon"), xy_for_file(item), strict=True)),
                 "alt_m": _number(item.alt_m),
             }
             for seq, item in enumerate(items)

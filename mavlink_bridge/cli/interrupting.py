@@ -17,7 +17,9 @@ from typing import TYPE_CHECKING, Any
 from mavlink_bridge.cli.keyboard import Keyboard
 from mavlink_bridge.cli.terminal import say
 from mavlink_bridge.errors import LinkError
+from mavlink_bridge.link import now_s
 from mavlink_bridge.mavlink.rover import Mode, plain_mode_name
+from mavlink_bridge.protocol.mode_switch import ModeSwitch
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -228,10 +230,10 @@ def _settled(at_hand: AtHand, interrupt: KeyboardInterrupt) -> Interrupted:
     except LinkError:
         is_link_lost = True
     _heed_no_more()
-    now_s = at_hand.link.now_s() if at_hand.link is not None else _now_s()
+    at_s = at_hand.link.now_s() if at_hand.link is not None else now_s()
     ending = InterruptReport(
         said=str(interrupt),
-        doing=at_hand.watch().doing(now_s),
+        doing=at_hand.watch().doing(at_s),
         on_it=at_hand.on_it(),
         drives=drives,
         was_asked=was_asked,
@@ -264,8 +266,6 @@ def _doing_text_now(at_hand: AtHand) -> str:
 
 def _hold(at_hand: AtHand) -> bool:
     """Switch the vehicle to HOLD, and return whether its heartbeat has confirmed it."""
-    from mavlink_bridge.protocol.mode_switch import ModeSwitch  # noqa: PLC0415 - quick help
-
     link, peer = at_hand.link, at_hand.peer()
     assert link is not None
     assert peer is not None
@@ -292,12 +292,6 @@ def _take(at_hand: AtHand, frames: list[Any]) -> None:
     for frame in frames:
         if peer is not None and (frame.system, frame.component) == (peer.system, peer.component):
             at_hand.watch().receive(frame.message, link.now_s())
-
-
-def _now_s() -> float:
-    from mavlink_bridge.link import now_s  # noqa: PLC0415 - quick help
-
-    return now_s()
 
 
 def _heed_no_more() -> None:

@@ -30,7 +30,6 @@ from mavlink_bridge.protocol.vehicle_watch import Doing
 from mavlink_bridge.protocol.verified_upload import Held, OutcomeKind
 from missions.checking.execution import follow_mission
 from missions.errors import SituationError
-from missions.formats import read_parameters
 from missions.items import Command
 from missions.planned import Plan
 from missions.planning.plan import plan as make_plan
@@ -104,7 +103,7 @@ def plan_live(
     connection: str,
     orders: Orders,
     *,
-    vehicle_file: Path | None,
+    described: Situation,
     key_file: Path | None,
     quiet: bool,
     on_plan: PlanTaker = _take_none,
@@ -116,13 +115,12 @@ def plan_live(
     BridgeError, MissionError
         What went wrong, on the link or in planning.
     """
-    parameters = read_parameters(vehicle_file) if vehicle_file else {}
     identity = orders.identity or ONE_SHOT_IDENTITY
     with terminable(), open_link(connection, identity, signing=signing_of(key_file)) as link:
         return conduct(
             link,
             orders,
-            Situation(parameters=parameters),
+            described,
             connection=str(parse_connection(connection)),
             quiet=quiet,
             on_plan=on_plan,

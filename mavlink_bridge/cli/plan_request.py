@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from mavlink_bridge.cli.field_files import read_mission_file
 from mavlink_bridge.cli.options.plan import ENDS, METHODS, ORDERS
 from mavlink_bridge.cli.values import metres_or, position_from
 from mavlink_bridge.errors import UsageError
-from missions.formats import read_mission
 from missions.request import RepairMission, Request, conditions, request_of
+
+if TYPE_CHECKING:
+    from mavlink_bridge.cli.options.plan import PlanOptions
 
 _OWN = "own"
 
@@ -36,7 +40,7 @@ def request_from_options(
     )
 
 
-def with_tour(request: Request, order: str, end: str, via: str | None, *, comes_back: bool) -> Request:
+def with_tour(request: Request, options: PlanOptions) -> Request:
     """Add order, way home, end or a mission to repair.
 
     Raises
@@ -44,6 +48,7 @@ def with_tour(request: Request, order: str, end: str, via: str | None, *, comes_
     UsageError
         An option is not what it has to be, or does not go with another.
     """
+    order, end, via, comes_back = options.order, options.end, options.via_mission, options.come_back
     for option, value, known in (("--order", order, ORDERS), ("--end", end, ENDS)):
         if value not in known:
             raise UsageError(f"{option} {value!r}: expected one of {', '.join(known)}")
@@ -60,4 +65,5 @@ def with_tour(request: Request, order: str, end: str, via: str | None, *, comes_
             "--via-mission keeps the mission's own speeds and goes by the drive model; it does not go with --speed, "
             "--corner-allowance, --escape"
         )
-    return RepairMission(**conditions(request), mission=None if via == _OWN else read_mission(Path(via)))
+    mission = None if via == _OWN else read_mission_file(Path(via), options)
+    return RepairMission(**conditions(request), mission=mission)

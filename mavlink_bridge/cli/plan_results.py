@@ -69,6 +69,7 @@ def plan_document(planned: Plan) -> dict[str, object]:
         },
         "blocks": planned.blocks,
         "mission_items": len(planned.items) + 1,
+        "extrapolated": list(planned.extrapolated),
         "warnings": list(planned.warnings),
     }
 
@@ -97,6 +98,7 @@ class Told:
         self._is_silent = is_silent
         self._plan: Plan | None = None
         self._planning_s = 0.0
+        self._remarks: tuple[str, ...] = ()
         self._written: list[Path] = []
 
     def tell(self, planned: Plan, planning_s: float, situation: Situation) -> None:
@@ -108,13 +110,14 @@ class Told:
                 echo("New route:")
             report_plan(planned, self._written)
             sys.stdout.flush()
-        self._plan, self._planning_s = planned, planning_s
+        self._plan, self._planning_s, self._remarks = planned, planning_s, situation.remarks
 
     def document(self) -> dict[str, object]:
         """Return the newest plan for the JSON document."""
         assert self._plan is not None
         return {
             **plan_document(self._plan),
+            "warnings": [*self._remarks, *self._plan.warnings],
             "planning_s": round(self._planning_s, 6),
             "outputs": [str(path) for path in self._written],
         }
@@ -133,6 +136,8 @@ def report_plan(planned: Plan, written: list[Path]) -> None:
         if planned.clearance_m is not None
         else "nothing promised for the driven track"
     )
+    if planned.extrapolated:
+        promise += ", extrapolated beyond what was measured"
     waypoints = sum(item.is_placed for item in planned.items)
     turns = max(0, waypoints - len(planned.targets))
     echo(

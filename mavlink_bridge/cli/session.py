@@ -17,6 +17,7 @@ from mavlink_bridge.mavlink.messages import (
     Autopilot,
 )
 from mavlink_bridge.mavlink.rover import Mode
+from mavlink_bridge.mavlink.signing import Signing, SigningKey
 from mavlink_bridge.mavlink.vehicles import not_ardupilot
 from mavlink_bridge.protocol.ask_version import AskVersion
 from mavlink_bridge.protocol.find import FindVehicle, identity_shared, identity_taken
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
 
     from mavlink_bridge.link import Link
     from mavlink_bridge.mavlink.messages import Frame
-    from mavlink_bridge.mavlink.signing import Signing
     from mavlink_bridge.protocol.machine import Machine
     from mavlink_bridge.protocol.vehicle_watch import Doing
 
@@ -275,8 +275,6 @@ def signing_of(key_file: Path | None) -> Signing | None:
     """
     if key_file is None:
         return None
-    from mavlink_bridge.mavlink.signing import Signing, SigningKey  # noqa: PLC0415 - only where a key is given
-
     return Signing(SigningKey.read(key_file), time.time)
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from mavlink_bridge.cli.field_files import read_file, read_mission_file
 from mavlink_bridge.cli.terminal import echo, print_json
 from mavlink_bridge.cli.values import MOST_FLOAT32, checked_number, position_from
 from mavlink_bridge.errors import LinkError, UsageError
@@ -17,7 +18,7 @@ from mavlink_bridge.simulator.faults import Faults
 from mavlink_bridge.simulator.parameters import DEFAULTS
 from mavlink_bridge.simulator.shell import Simulator
 from missions.fence import fence_to_items
-from missions.formats import read_fence, read_mission
+from missions.formats import fence_of
 
 if TYPE_CHECKING:
     from mavlink_bridge.cli.options.sim import SimOptions
@@ -54,8 +55,10 @@ def _config(options: SimOptions) -> SimulatorConfig:
         system=options.system,
         home=position,
         heading_deg=heading_deg,
-        fence=fence_to_items(read_fence(options.fence)) if options.fence else (),
-        mission=tuple(read_mission(options.mission).items) if options.mission else (),
+        fence=fence_to_items(fence_of(read_file(options.fence, options), options.fence))
+        if options.fence
+        else (),
+        mission=read_mission_file(options.mission, options).items if options.mission else (),
         parameters=dict(_parse_parameter(text) for text in options.param),
     )
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
+from missions.planning.plan import plan
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -17,8 +19,6 @@ def timed_plan(
     situation: Situation, request: Request, *, should_stop: Callable[[], bool] | None = None
 ) -> tuple[Plan, float]:
     """Return a plan, and how long planning took."""
-    from missions.planning.plan import plan  # noqa: PLC0415 - quick help
-
     begun_s = time.perf_counter()
     planned = plan(situation, request, should_stop=should_stop)
     return planned, time.perf_counter() - begun_s

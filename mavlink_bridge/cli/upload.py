@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.backup.store import BackupStore, read_backup
 from mavlink_bridge.cli.common import warn
+from mavlink_bridge.cli.field_files import read_file, read_vehicle_file
 from mavlink_bridge.cli.interrupting import interruptible, terminable
 from mavlink_bridge.cli.options.upload import LISTS
 from mavlink_bridge.cli.options_session import session_for
@@ -17,7 +18,6 @@ from mavlink_bridge.errors import UsageError
 from mavlink_bridge.mavlink.messages import MissionType
 from mavlink_bridge.protocol.sendable import check_items, check_parameters
 from missions.fence import fence_to_items
-from missions.formats import read_parameters, read_situation
 from missions.geo import LatLon
 from missions.items import with_home
 from missions.rally import rally_to_items
@@ -40,7 +40,7 @@ def upload(options: UploadOptions) -> None:
     restoration = None
     if options.restore:
         restoration = Restoration(read_backup(options.file) if options.file else None, options.other_vehicle)
-    lists, parameters = _content(options.file, options.only, restoration)
+    lists, parameters = _content(options, restoration)
     store = BackupStore()
     if options.forget:
         _forget(store, options)
@@ -104,10 +104,9 @@ def _forget(store: BackupStore, options: UploadOptions) -> None:
             echo("no interrupted upload is noted")
 
 
-def _content(
-    file: Path | None, only: Sequence[str], restoration: Restoration | None
-) -> tuple[Lists, Mapping[str, float]]:
+def _content(options: UploadOptions, restoration: Restoration | None) -> tuple[Lists, Mapping[str, float]]:
     """Read the file, lists as they go over the wire or parameters; all that it holds can be sent."""
+    file, only = options.file, options.only
     if unknown := [name for name in only if name not in LISTS]:
         raise UsageError(f"--only {unknown[0]}: expected one of {', '.join(LISTS)}")
     if restoration is not None and restoration.backup is not None:
@@ -115,10 +114,10 @@ def _content(
     if file is None or restoration is not None:
         return [], {}
     if file.suffix.lower() in _PARAMETER_SUFFIXES:
-        parameters = read_parameters(file)
+        parameters = read_vehicle_file(file).parameters
         check_parameters(parameters)
         return [], parameters
-    found = _lists_of(file)
+    found = _lists_of(file, options)
     chosen = [name for name in LISTS if name in found and (not only or name in only)]
     if not chosen:
         raise UsageError(f"{file} holds no {' or '.join(only or LISTS)}")
@@ -128,8 +127,8 @@ def _content(
     return lists, {}
 
 
-def _lists_of(file: Path) -> dict[str, tuple[MissionItem, ...]]:
-    situation = read_situation(file)
+def _lists_of(file: Path, options: UploadOptions) -> dict[str, tuple[MissionItem, ...]]:
+    situation = read_file(file, options)
     found: dict[str, tuple[MissionItem, ...]] = {}
     if situation.fence and situation.fence.value.zones:
         found["fence"] = fence_to_items(situation.fence.value)

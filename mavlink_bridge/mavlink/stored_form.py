@@ -181,6 +181,18 @@ STORED_WITH_PLACE = frozenset(
 )
 """Commands stored with a place and a frame (``AP_Mission::stored_in_location``); others read back with frame 0 and mostly without a place."""
 
+_NAN_TAKEN = frozenset(
+    {
+        (int(Command.NAV_WAYPOINT), 3),
+        (int(Command.NAV_LAND), 3),
+        (int(Command.NAV_TAKEOFF), 3),
+        (84, 3),
+        (85, 2),
+        (85, 3),
+    }
+)
+"""Commands and the parameters of theirs, counted from 0, in which ArduPilot takes NaN."""
+
 _POLYGON_VERTICES = frozenset(
     {Command.FENCE_POLYGON_VERTEX_INCLUSION, Command.FENCE_POLYGON_VERTEX_EXCLUSION}
 )
@@ -215,6 +227,21 @@ def _brief(item: MissionItem) -> str:
     return f"command {int(item.command)} ({params}) at {item.position}, {item.alt_m:g} m in frame {int(item.frame)}"
 
 
+def sendable_params(item: MissionItem) -> tuple[float, float, float, float]:
+    """Return an item's parameters, with 0 for a NaN that ArduPilot would refuse and of which it keeps nothing.
+
+    QGroundControl leaves headings unset (null), and ArduPilot refuses that of NAV_LOITER_UNLIM (ArduPilot #27482).
+    """
+    keepers = _KEPT_PARAMS.get(int(item.command), _KEEPS_ALL)
+    a, b, c, d = (
+        0.0
+        if math.isnan(value) and keep in (_dropped, _flag) and (int(item.command), i) not in _NAN_TAKEN
+        else value
+        for i, (value, keep) in enumerate(zip(item.params, keepers, strict=True))
+    )
+    return a, b, c, d
+
+
 def is_same_item(a: MissionItem, b: MissionItem, mission_type: MissionType, *, coarse: bool = False) -> bool:
     """Return whether two items are the same once stored; ``coarse`` compares positions as 32-bit floats carry them."""
     if a == b:
@@ -222,10 +249,11 @@ def is_same_item(a: MissionItem, b: MissionItem, mission_type: MissionType, *, c
     stored_a, stored_b = _stored(a, mission_type), _stored(b, mission_type)
     if stored_a.fixed != stored_b.fixed:
         return False
-    if stored_a.may_lose_place and (_has_none(stored_a) or _has_none(stored_b)):
-        return True
-    if not _is_near(stored_a.alt_m, stored_b.alt_m):
+    may_lose = stored_a.may_lose_place
+    if not (_is_near(stored_a.alt_m, stored_b.alt_m) or (may_lose and 0 in (stored_a.alt_m, stored_b.alt_m))):
         return False
+    if may_lose and (0, 0) in (stored_a.place, stored_b.place):
+        return True
     if not coarse:
         return stored_a.place == stored_b.place
     return all(
@@ -300,10 +328,6 @@ def _stored(item: MissionItem, mission_type: MissionType) -> _StoredItem:
         return _StoredItem((command, params), place, item.alt_m, may_lose_place=True)
     frame = _FRAMES.get(int(item.frame), int(item.frame))
     return _StoredItem((command, frame, params), place, item.alt_m)
-
-
-def _has_none(stored: _StoredItem) -> bool:
-    return stored.place == (0, 0) and stored.alt_m == 0
 
 
 def _is_near(a_m: float, b_m: float) -> bool:

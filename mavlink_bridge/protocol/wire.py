@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.mavlink import messages
 from mavlink_bridge.mavlink.messages import MissionResult
+from mavlink_bridge.mavlink.stored_form import sendable_params
 from missions.items import CoordinateFrame, MissionItem
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ def item_to_message(
     item: MissionItem, seq: int, peer: Peer, mission_type: MissionType
 ) -> messages.MissionItemInt:
     """Return the MISSION_ITEM_INT that sends one item to the peer."""
+    param1, param2, param3, param4 = sendable_params(item)
     return messages.MissionItemInt(
         target_system=peer.system,
         target_component=peer.component,
@@ -34,10 +36,10 @@ def item_to_message(
         command=int(item.command),
         current=int(item.current),
         autocontinue=int(item.autocontinue),
-        param1=item.params[0],
-        param2=item.params[1],
-        param3=item.params[2],
-        param4=item.params[3],
+        param1=param1,
+        param2=param2,
+        param3=param3,
+        param4=param4,
         x=item.lat_e7,
         y=item.lon_e7,
         z=item.alt_m,

@@ -17,6 +17,7 @@ from mavlink_bridge.errors import LogError
 from mavlink_bridge.tlog.follow import Follower
 from mavlink_bridge.tlog.scan import Scan
 from mavlink_bridge.tlog.wire import MAX_FRAME_BYTES, TIMESTAMP_BYTES
+from missions.foreign_files import kind_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -118,13 +119,15 @@ def find_gap_bytes(file: LogFile) -> int:
     Raises
     ------
     LogError
-        There is no MAVLink frame in the file.
+        There is no MAVLink frame in the file, or it is of another kind.
     """
     begin = 0
     is_end = False
     with file.open() as source:
         while not is_end:
             data, is_end = source.window(begin)
+            if begin == 0:
+                _check_kind(bytes(data[:16]), file.path)
             scan = Scan(data, TIMESTAMP_BYTES, len(data))
             known = np.flatnonzero(scan.is_known)
             good = known[scan.intact(known)]
@@ -134,6 +137,15 @@ def find_gap_bytes(file: LogFile) -> int:
                 return TIMESTAMP_BYTES  # ids foreign to us, but three records in a row that fit
             begin += len(data) - MAX_FRAME_BYTES
     raise LogError(f"{file.path}: no MAVLink frame in it", path=str(file.path))
+
+
+def _check_kind(head: bytes, path: Path) -> None:
+    kind = kind_of(head)
+    if kind is not None:
+        what, advice = kind
+        raise LogError(
+            f"{path} is {what}; a telemetry log (.tlog) is what is read", path=str(path), advice=advice
+        )
 
 
 def _vote(at: NDArray[np.int64], end: NDArray[np.int64], path: Path) -> int:

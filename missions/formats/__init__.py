@@ -1,18 +1,33 @@
 """Files with fences, missions, rally points and parameters; the suffix chooses the format (docs/files.md).
 
-Each format is one module with ``read(text, source) -> Situation``, ``write(situation) -> str`` or both.
+Each format is one module with ``read(text, source) -> Situation``, ``write(situation) -> str`` or both; those of maps take `Choices`, too.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from missions.errors import FenceMissingError, MissionFormatError
-from missions.formats import fen, geojson, gpx, kml, parameters, poly, qgc_plan, waypoints
-from missions.formats.files import read_text, write_file
+from missions.foreign_files import kind_of_suffix
+from missions.formats import (
+    fen,
+    geojson,
+    gpx,
+    kml,
+    parameters,
+    poly,
+    positions_csv,
+    qgc_plan,
+    text_lists,
+    waypoints,
+)
+from missions.formats.choices import NO_CHOICES, Choices
+from missions.formats.files import write_file
 from missions.formats.parameters import read_parameters
 from missions.formats.parts import Part, only, parts_of
+from missions.formats.texts import read_text
 from missions.situation import Known, Situation
 
 if TYPE_CHECKING:
@@ -24,10 +39,14 @@ if TYPE_CHECKING:
 
 __all__ = [
     "FORMATS",
+    "NO_CHOICES",
+    "Choices",
     "Format",
     "Part",
     "check_writable_format",
+    "fence_of",
     "format_of",
+    "mission_of",
     "parts_of",
     "read_fence",
     "read_mission",
@@ -46,26 +65,30 @@ class Format(NamedTuple):
     Parameters
     ----------
     read : callable or None
-        From a text and the name of its file to a situation; None where it is only written.
+        From a text and the name of its file to a situation, for maps also by `Choices`; None where it is no text.
     write : callable or None
         From a situation to a text; None where it is only read.
     holds : tuple of Part
         What can be written into a file.
     together : bool
         Whether a file can hold all of that at once; else one part, the first that is there.
+    is_map : bool
+        Whether it holds features, which do not always say what they are.
     """
 
-    read: Callable[[str, str], Situation] | None
+    read: Callable[..., Situation] | None
     write: Callable[[Situation], str] | None
     holds: tuple[Part, ...]
     together: bool = True
+    is_map: bool = False
 
 
 _LISTS = (Part.MISSION, Part.FENCE, Part.RALLY)
 _PLAN = Format(qgc_plan.read, qgc_plan.write, _LISTS)
-_WAYPOINTS = Format(waypoints.read, waypoints.write, _LISTS, together=False)
-_GEOJSON = Format(geojson.read, geojson.write, _LISTS)
+_WAYPOINTS = Format(text_lists.read, waypoints.write, _LISTS, together=False)
+_GEOJSON = Format(geojson.read, geojson.write, _LISTS, is_map=True)
 _PARAMETERS = Format(parameters.read, parameters.write, (Part.PARAMETERS,))
+_GIS = Format(None, None, (), is_map=True)
 
 FORMATS: dict[str, Format] = {
     ".plan": _PLAN,
@@ -75,16 +98,28 @@ FORMATS: dict[str, Format] = {
     ".poly": Format(poly.read, poly.write, (Part.FENCE,)),
     ".geojson": _GEOJSON,
     ".json": _GEOJSON,
-    ".kml": Format(kml.read, kml.write, _LISTS),
-    ".kmz": Format(kml.read, None, ()),
-    ".gpx": Format(None, gpx.write, (Part.MISSION,)),
+    ".kml": Format(kml.read, kml.write, _LISTS, is_map=True),
+    ".kmz": Format(kml.read, None, (), is_map=True),
+    ".gpx": Format(gpx.read, gpx.write, (Part.MISSION,), is_map=True),
+    ".csv": Format(positions_csv.read, positions_csv.write, (Part.MISSION,), is_map=True),
+    ".shp": _GIS,
+    ".zip": _GIS,
+    ".gpkg": _GIS,
     ".parm": _PARAMETERS,
     ".param": _PARAMETERS,
+    ".params": _PARAMETERS,
 }
 
 
-def read_situation(path: Path | str) -> Situation:
-    """Read what a file holds: fence, mission, rally points, home, parameters.
+def read_situation(path: Path | str, choices: Choices = NO_CHOICES) -> Situation:
+    """Read what a file holds: fence, mission, rally points, home, parameters; and remarks on what was passed over.
+
+    Parameters
+    ----------
+    path : Path or str
+        The suffix chooses the format.
+    choices : Choices, optional
+        What the features of a map are, where the file does not say it.
 
     Raises
     ------
@@ -92,13 +127,21 @@ def read_situation(path: Path | str) -> Situation:
         The file is missing, its suffix is unknown, or it cannot be read as its format; the message says where.
     """
     path = Path(path)
-    read = format_of(path).read
-    if read is None:
+    format_ = format_of(path)
+    if choices.roles and not format_.is_map:
         raise MissionFormatError(
-            f"{path}: {path.suffix} files are only written; to read, known are {_known(reading=True)}",
+            f"{path}: --role is for maps; a {path.suffix} file says itself what each of its zones is",
             file=str(path),
+            advice="leave --role out; to change a zone, edit the file in the ground station",
         )
-    return read(read_text(path), str(path))
+    if format_.read is None:
+        from missions.formats import gis  # noqa: PLC0415 - its libraries are slow to come
+
+        return gis.read_path(path, choices)
+    text, remarks = read_text(path)
+    extra = (choices,) if format_.is_map else ()
+    situation = format_.read(text, str(path), *extra)
+    return replace(situation, remarks=(*remarks, *situation.remarks))
 
 
 def read_fence(path: Path | str) -> Fence:
@@ -111,7 +154,18 @@ def read_fence(path: Path | str) -> Fence:
     FenceMissingError
         The file holds no fence.
     """
-    fence = read_situation(path).fence
+    return fence_of(read_situation(path), path)
+
+
+def fence_of(situation: Situation, path: Path | str) -> Fence:
+    """Return the fence of a situation that was read from a file.
+
+    Raises
+    ------
+    FenceMissingError
+        It has none.
+    """
+    fence = situation.fence
     if fence is None or not fence.value.zones:
         raise FenceMissingError(
             f"{path} holds no fence",
@@ -132,14 +186,24 @@ def read_mission(path: Path | str) -> Mission:
     MissionFormatError
         As `read_situation`, or the file holds no mission.
     """
-    mission = read_situation(path).mission
-    if mission is None:
+    return mission_of(read_situation(path), path)
+
+
+def mission_of(situation: Situation, path: Path | str) -> Mission:
+    """Return the mission of a situation that was read from a file.
+
+    Raises
+    ------
+    MissionFormatError
+        It has none.
+    """
+    if situation.mission is None:
         raise MissionFormatError(
             f"{path} holds no mission",
             file=str(path),
             advice="give a file that holds one, such as a .plan or .waypoints",
         )
-    return mission.value
+    return situation.mission.value
 
 
 def write_situation(
@@ -172,6 +236,12 @@ def write_situation(
     path = Path(path)
     format_ = format_of(path, "write", part)
     wanted = [one for one in parts_of(situation) if one in format_.holds and part in (None, one)]
+    if not parts_of(situation):
+        raise MissionFormatError(
+            f"{path}: there is nothing to write: no mission, fence, rally points or parameters",
+            file=str(path),
+            advice="look at what the file to write from holds",
+        )
     if not wanted:
         held = " or ".join(format_.holds)
         raise MissionFormatError(
@@ -255,6 +325,13 @@ def format_of(path: Path, verb: str = "read", part: Part | None = None) -> Forma
         It has none.
     """
     found = FORMATS.get(path.suffix.lower())
+    foreign = kind_of_suffix(path.suffix) if verb == "read" and found is None else None
+    if foreign is not None:
+        raise MissionFormatError(
+            f"{path} is {foreign[0]}; read are {_known(part, reading=True)}",
+            file=str(path),
+            advice=foreign[1],
+        )
     if found is None or (verb == "write" and found.write is None):
         raise MissionFormatError(
             f"{path}: no format to {verb} for the suffix {path.suffix!r}; "
@@ -269,6 +346,6 @@ def _known(part: Part | None = None, *, reading: bool = False) -> str:
     suffixes = (
         suffix
         for suffix, format_ in FORMATS.items()
-        if (format_.read if reading else format_.write) and (part is None or part in format_.holds)
+        if (reading or format_.write) and (part is None or part in format_.holds)
     )
     return ", ".join(suffixes)

@@ -1,18 +1,19 @@
-"""From the features of a GeoJSON or KML file to a situation.
-
-A polygon without a role is an inclusion if it is the only zone, and an error otherwise.
-"""
+"""From the features of a map's file (GeoJSON, KML, GPX, CSV, shapefile) to a situation."""
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import TYPE_CHECKING
 
-from missions.errors import InvalidPositionError
-from missions.fence import CircleZone, Fence, PolygonZone, Zone, ZoneKind
+from missions.errors import InvalidPositionError, MissionFormatError
+from missions.fence import Fence
+from missions.formats.bounds import MOST_FEATURES, check_bound
+from missions.formats.choices import NO_CHOICES
 from missions.formats.feature_roles import role_of
-from missions.formats.features import Role, Shape
-from missions.formats.numbers import place_e7
+from missions.formats.feature_zones import roles_of_zones, zones_of
+from missions.formats.features import Role, Shape, numbered
+from missions.formats.numbers import has_place, xy_from_file
 from missions.geo import to_e7
 from missions.items import Command, CoordinateFrame, MissionItem, waypoint
 from missions.rally import RallyPoint
@@ -21,36 +22,55 @@ from missions.situation import Known, Mission, Situation
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from missions.formats.choices import Choices
     from missions.formats.features import Feature
     from missions.geo import LatLon
 
 
-def situation_of(features: Iterable[Feature], source: str) -> Situation:
+def situation_of(features: Iterable[Feature], source: str, choices: Choices = NO_CHOICES) -> Situation:
     """Read what features mean.
 
     Raises
     ------
     MissionFormatError
-        A feature without a role, or with an impossible one; the message says which and what was expected.
+        A feature of which it is not certain what it is, or that cannot be what it is said to be; the message says which and what settles it.
     """
     found: dict[Role, list[Feature]] = {role: [] for role in Role}
     zones: list[tuple[Feature, Role | None]] = []
-    for feature in features:
-        role = role_of(feature)
-        if feature.shape is Shape.POLYGON or feature.radius_m() is not None:
+    unknown_points = []
+    drawn = list(itertools.islice(features, MOST_FEATURES + 1))
+    check_bound(len(drawn), MOST_FEATURES, "features", source)
+    all_features = numbered(drawn)
+    if not all_features:
+        raise MissionFormatError(f"{source}: there is nothing in it", file=source)
+    choices.check_names(all_features, source)
+    remarks = []
+    for feature in all_features:
+        role = role_of(feature, choices)
+        is_zone = feature.shape is Shape.POLYGON or feature.radius_m() is not None
+        if is_zone:
             zones += [(feature, role)] * (role is not Role.DRAWING)
         elif role is not None:
             found[role].append(feature)
+        elif feature.fallback is not None:
+            found[feature.fallback].append(feature)
         elif feature.shape is Shape.LINE:
             found[Role.ROUTE].append(feature)
-        elif feature.shape is Shape.POINT:
-            called = f" ({feature.names[0]!r})" if feature.names else ""
+        elif feature.shape is Shape.TRACK:
             raise feature.error(
-                f"a point{called} of which is not said what it is; expected a radius (metres) and a role of inclusion or exclusion, "
-                'or a role like "waypoint" or "home"; to leave it out, a role "drawing" or a folder of that name'
+                f"{feature} was recorded, not planned",
+                advice=f"drive it as a route: {feature.role_option('route')}",
             )
+        elif feature.shape is Shape.POINT:
+            unknown_points.append(feature)
+        if feature.is_hidden and role is Role.DRAWING and choices.role_for(feature) is None:
+            remarks.append(f"{feature.where}: {feature} is hidden (visibility 0): passed over")
+    sorted_zones, taken = roles_of_zones(zones, choices, unknown_points)
+    fence = Fence(
+        tuple(zone for pair in sorted_zones for zone in zones_of(*pair)), _lone(found[Role.RETURN_POINT])
+    )
+    remarks += taken
     home = _lone(found[Role.HOME])
-    fence = _fence(zones, _lone(found[Role.RETURN_POINT]))
     items = _items(found[Role.WAYPOINT], found[Role.ROUTE])
     rally = tuple(map(_rally_point, found[Role.RALLY_POINT]))
     return Situation(
@@ -58,6 +78,7 @@ def situation_of(features: Iterable[Feature], source: str) -> Situation:
         mission=Known(Mission(items, home), None, source) if items else None,
         rally=Known(rally, None, source) if rally else None,
         home=Known(home, None, source) if home else None,
+        remarks=tuple(remarks),
     )
 
 
@@ -74,38 +95,15 @@ def _lone(features: Sequence[Feature]) -> LatLon | None:
     return features[0].position if features else None
 
 
-def _fence(zones: Sequence[tuple[Feature, Role | None]], return_point: LatLon | None) -> Fence:
-    read: list[Zone] = []
-    for feature, said in zones:
-        if said is None and len(zones) > 1:
-            raise feature.error(
-                'of several zones each must say what it is; expected a role (or "fence") of inclusion or exclusion'
-            )
-        kind = ZoneKind.EXCLUSION if said is Role.EXCLUSION else ZoneKind.INCLUSION
-        radius_m = feature.radius_m()
-        if radius_m is not None and feature.shape is Shape.POINT:
-            read.append(CircleZone(kind, feature.position, radius_m))
-        else:
-            read += _polygons(feature, kind)
-    return Fence(tuple(read), return_point)
-
-
-def _polygons(feature: Feature, kind: ZoneKind) -> list[Zone]:
-    """Return the zone of a polygon, and an exclusion for every hole of an inclusion."""
-    outer, *holes = feature.lines
-    if holes and kind is ZoneKind.EXCLUSION:
-        raise feature.error(
-            "an exclusion with a hole; expected one without: a fence has no ground inside an exclusion"
-        )
-    return [PolygonZone(kind, outer), *(PolygonZone(ZoneKind.EXCLUSION, hole) for hole in holes)]
-
-
 def _items(waypoints: Sequence[Feature], routes: Sequence[Feature]) -> tuple[MissionItem, ...]:
     """Return the mission's items: those given one by one, else the places along the one line."""
     if waypoints:
         return tuple(map(_item, _in_order(waypoints)))
     if len(routes) > 1:
-        raise routes[1].error('a second line; expected one route (a role of "drawing" has others left out)')
+        raise routes[1].error(
+            f"a second line, {routes[1]}; expected one route",
+            advice=f"leave it out with {routes[1].role_option('ignore')}",
+        )
     return tuple(waypoint(position) for feature in routes for position in feature.lines[0])
 
 
@@ -124,19 +122,26 @@ def _in_order(waypoints: Sequence[Feature]) -> list[Feature]:
 
 def _item(feature: Feature) -> MissionItem:
     command = feature.whole("command", Command.NAV_WAYPOINT)
+    frame = feature.whole("frame", CoordinateFrame.GLOBAL_RELATIVE_ALT)
     if feature.shape is Shape.POINT:
+        if not has_place(command, frame):
+            raise feature.error(
+                f"a point, and command {command} has no place; expected a command that has one"
+            )
         lat_e7, lon_e7 = to_e7(feature.position)
     elif feature.properties.get("command") is None:
         raise feature.error("a waypoint without a place; expected a point, or a command that needs none")
     else:
         try:
-            lat_e7, lon_e7 = place_e7(command, feature.number("param5", 0.0), feature.number("param6", 0.0))
+            lat_e7, lon_e7 = xy_from_file(
+                command, frame, feature.number("param5", 0.0), feature.number("param6", 0.0)
+            )
         except InvalidPositionError as error:
             raise feature.error(str(error)) from None
     params = [_param(feature, f"param{i}") for i in range(1, 5)]
     return MissionItem(
         command,
-        feature.whole("frame", CoordinateFrame.GLOBAL_RELATIVE_ALT),
+        frame,
         (params[0], params[1], params[2], params[3]),
         lat_e7,
         lon_e7,

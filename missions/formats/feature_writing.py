@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from missions.fence import Fence, PolygonZone, Zone
 from missions.formats.features import Feature, Role, Shape
+from missions.formats.numbers import xy_for_file
 from missions.items import file_frame
 from missions.situation import Mission
 
@@ -69,5 +70,5 @@ def _item_feature(item: MissionItem, seq: int) -> Feature:
     }
     if item.is_placed:
         return _feature(Shape.POINT, ((item.position,),), properties, f"waypoint {seq}")
-    properties |= {"param5": item.lat_e7 / 1e7, "param6": item.lon_e7 / 1e7}
+    properties |= dict(zip(("param5", "param6"), xy_for_file(item), strict=True))
     return _feature(Shape.NOWHERE, (), properties, f"mission item {seq}")

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from collections import Counter
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from shlex import quote
 from typing import TYPE_CHECKING
 
 from missions.errors import MissionFormatError
 from missions.formats.numbers import number, whole
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from missions.geo import LatLon
 
@@ -21,6 +23,7 @@ class Shape(StrEnum):
 
     POINT = "point"
     LINE = "line"
+    TRACK = "track"
     POLYGON = "polygon"
     NOWHERE = "feature without a geometry"
 
@@ -51,9 +54,17 @@ class Feature:
     properties : mapping of str to object
         Numbers, texts or booleans by name.
     names : tuple of str
-        Its name and those of the folders it lies in, innermost first.
+        Its name, empty where only folders have one, and those of the folders it lies in, innermost first.
     where : str
         File and place, for errors.
+    label : str
+        Its shape and number in the file, such as ``polygon 2``.
+    handle : str
+        What ``--role`` calls it: its name where no other has that, else its label.
+    fallback : Role, optional
+        What it is where nothing is said of it.
+    is_hidden : bool
+        Whether the program that it comes from does not show it.
     """
 
     shape: Shape
@@ -61,10 +72,22 @@ class Feature:
     properties: Mapping[str, object] = field(default_factory=dict)
     names: tuple[str, ...] = ()
     where: str = ""
+    label: str = ""
+    handle: str = ""
+    fallback: Role | None = None
+    is_hidden: bool = False
 
-    def error(self, problem: str) -> MissionFormatError:
+    def error(self, problem: str, **details: object) -> MissionFormatError:
         """Return an error that names the place in the file."""
-        return MissionFormatError(f"{self.where}: {problem}", where=self.where)
+        return MissionFormatError(f"{self.where}: {problem}", where=self.where, **details)
+
+    def role_option(self, role: str) -> str:
+        """Return the command line's option that gives it a role."""
+        word = "ignore" if role == Role.DRAWING else role
+        return f"--role {quote(f'{self.handle}={word}')}"
+
+    def __str__(self) -> str:
+        return f"{self.shape} {self.names[0]!r}" if self.names and self.names[0] else self.label or self.shape
 
     @property
     def position(self) -> LatLon:
@@ -100,6 +123,25 @@ class Feature:
             return whole(self.number(key, default), key, 65535)
         except ValueError as error:
             raise self.error(str(error)) from None
+
+
+def numbered(features: Sequence[Feature]) -> list[Feature]:
+    """Return features with what they are called."""
+    names = Counter(name_key(feature.names[0]) for feature in features if feature.names)
+    counts: Counter[Shape] = Counter()
+    result = []
+    for feature in features:
+        counts[feature.shape] += 1
+        label = f"{'feature' if feature.shape is Shape.NOWHERE else feature.shape} {counts[feature.shape]}"
+        own = feature.names[0] if feature.names else ""
+        is_unique = own.strip() and names[name_key(own)] == 1
+        result.append(replace(feature, label=label, handle=own if is_unique else label))
+    return result
+
+
+def name_key(name: str) -> str:
+    """Return what two spellings of a name have in common."""
+    return " ".join(name.split()).casefold()
 
 
 _RADIUS_KEYS = ("radius_m", "radius")

@@ -1,16 +1,13 @@
-"""Texts from files, and files written: the one place that creates, replaces and keeps them."""
+"""Files written: the one place that creates, replaces and keeps them."""
 
 from __future__ import annotations
 
-import codecs
 import errno
 import itertools
 import os
 import secrets
 import shutil
 import stat
-import zipfile
-import zlib
 from contextlib import suppress
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -22,57 +19,6 @@ if TYPE_CHECKING:
 
 Writer: TypeAlias = "Callable[[Path, bytes], None]"
 """What puts bytes into a file: `write_file`, or what looks first at the file that is there."""
-
-_MOST_BYTES = 100_000_000
-"""A small zip file may hold a huge one."""
-
-
-def read_text(path: Path) -> str:
-    """Read a text file: UTF-8, or the encoding of its byte order mark; of a zipped KML (.kmz) the KML in it.
-
-    Raises
-    ------
-    MissionFormatError
-        The file is missing or is no text; the message says where.
-    """
-    try:
-        data = _unzipped(path) if path.suffix.lower() == ".kmz" else path.read_bytes()
-    except OSError as error:
-        raise MissionFormatError(
-            f"{path} cannot be read: {error.strerror}",
-            file=str(path),
-            advice="look at the path and its spelling",
-        ) from None
-    is_utf16 = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))  # Notepad's "Unicode"
-    try:
-        text = data.decode("utf-16" if is_utf16 else "utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise MissionFormatError(
-            f"{path} is not a text file (byte {error.start}); expected UTF-8", file=str(path)
-        ) from None
-    return text.replace("\r\n", "\n").replace("\r", "\n")
-
-
-def _unzipped(path: Path) -> bytes:
-    """Return the first KML of a zip file, as KMZ wants it."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            found = next((one for one in archive.infolist() if one.filename.lower().endswith(".kml")), None)
-            if found is None:
-                raise MissionFormatError(f"{path} holds no .kml", file=str(path))
-            if found.file_size > _MOST_BYTES:
-                raise MissionFormatError(
-                    f"{path}: {found.filename} is {found.file_size / 1e6:.0f} MB; expected at most {_MOST_BYTES / 1e6:.0f} MB",
-                    file=str(path),
-                )
-            return archive.read(found)
-    except (
-        zipfile.BadZipFile,
-        RuntimeError,
-        NotImplementedError,
-        zlib.error,
-    ) as error:  # broken, encrypted, packed otherwise
-        raise MissionFormatError(f"{path} is no zip file that can be read: {error}", file=str(path)) from None
 
 
 def write_file(path: Path, data: bytes, make_way: Callable[[], object] = lambda: None) -> None:

@@ -6,22 +6,26 @@ import json
 import math
 from typing import TYPE_CHECKING, Any
 
+from missions.formats.bounds import check_depth
+from missions.formats.choices import NO_CHOICES
 from missions.formats.feature_reading import situation_of
 from missions.formats.feature_writing import features_of
 from missions.formats.features import Feature, Shape
 from missions.formats.json_node import parse_json
 
 if TYPE_CHECKING:
+    from missions.formats.choices import Choices
     from missions.formats.json_node import JsonNode
     from missions.geo import LatLon
     from missions.situation import Situation
 
 _ONE_OF = {"MultiPoint": "Point", "MultiLineString": "LineString", "MultiPolygon": "Polygon"}
 _GEOMETRIES = ("Point", "LineString", "Polygon", *_ONE_OF, "GeometryCollection")
-_WGS84 = ("CRS84", "EPSG::4326", "EPSG:4326")
+_WGS84 = ("CRS84", "CRS84H", "EPSG::4326", "EPSG:4326", "EPSG::4979", "EPSG:4979")
+_WGS84_CODES = (4326, 4979)  # EPSG, without and with height
 
 
-def read(text: str, source: str) -> Situation:
+def read(text: str, source: str, choices: Choices = NO_CHOICES) -> Situation:
     """Read a file's text.
 
     Raises
@@ -31,7 +35,7 @@ def read(text: str, source: str) -> Situation:
     """
     node = parse_json(text, source)
     _check_reference_system(node)
-    return situation_of(_features(node), source)
+    return situation_of(_features(node), source, choices)
 
 
 def write(situation: Situation) -> str:
@@ -45,9 +49,15 @@ def _check_reference_system(node: JsonNode) -> None:
     """Refuse coordinates of another system: metres of a map grid may pass for degrees."""
     if "crs" not in node or node["crs"].value is None:
         return
-    name = node["crs"]["properties"]["name"]
+    properties = node["crs"]["properties"]
+    if "code" in properties and str(properties["code"].value) in map(str, _WGS84_CODES):
+        return
+    name = properties["code" if "code" in properties else "name"]
     if not str(name.value).upper().endswith(_WGS84):
-        raise name.error(f"{name.value!r}; expected longitude and latitude in WGS 84 (CRS84)")
+        raise name.error(
+            f"{name.value!r}; expected longitude and latitude in WGS 84 (CRS84)",
+            advice="export it in EPSG:4326 (QGIS: Export, Save Features As…, CRS EPSG:4326)",
+        )
 
 
 def _features(node: JsonNode) -> list[Feature]:
@@ -72,8 +82,9 @@ def _feature(node: JsonNode) -> list[Feature]:
 
 
 def _shapes(
-    node: JsonNode, properties: dict[str, object], names: tuple[str, ...], at: JsonNode
+    node: JsonNode, properties: dict[str, object], names: tuple[str, ...], at: JsonNode, depth: int = 1
 ) -> list[Feature]:
+    check_depth(depth, _place(at))
     kind = node["type"].value
     if kind not in _GEOMETRIES:
         raise node["type"].error(
@@ -81,7 +92,9 @@ def _shapes(
         )
     if kind == "GeometryCollection":
         geometries = _members(node["geometries"], "geometries")
-        return [shape for geometry in geometries for shape in _shapes(geometry, properties, names, at)]
+        return [
+            shape for geometry in geometries for shape in _shapes(geometry, properties, names, at, depth + 1)
+        ]
     coordinates = node["coordinates"]
     parts = _members(coordinates, "parts") if kind in _ONE_OF else [coordinates]
     return [Feature(*_shape(_ONE_OF.get(kind, kind), part), properties, names, _place(at)) for part in parts]

@@ -1,14 +1,76 @@
-"""GPX 1.1 (out only): the mission's places as a route, home as a waypoint."""
+"""GPX 1.1: routes, tracks and way points; written are the mission's places as a route, home as a way point."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from missions.errors import MissionFormatError
+from missions.errors import InvalidPositionError, MissionFormatError
+from missions.formats.choices import NO_CHOICES
+from missions.formats.feature_reading import situation_of
+from missions.formats.features import Feature, Role, Shape, name_key
+from missions.formats.numbers import number
+from missions.formats.xml_tree import parse_xml
+from missions.geo import checked_lat_lon
 
 if TYPE_CHECKING:
+    from missions.formats.choices import Choices
+    from missions.formats.xml_tree import Element
     from missions.geo import LatLon
     from missions.situation import Situation
+
+
+def read(text: str, source: str, choices: Choices = NO_CHOICES) -> Situation:
+    """Read a file's text: its one route is the mission, or where there is none its one track, or its way points.
+
+    A way point named home is home.
+
+    Raises
+    ------
+    MissionFormatError
+        With the line and what was expected there.
+    """
+    root = parse_xml(text, source)
+    if root.name != "gpx":
+        raise root.error(f"<{root.name}>; expected <gpx>")
+    routes = [_line(route, route, "rtept", Shape.LINE) for route in root.all("rte")]
+    tracks = [
+        _line(segment, track, "trkpt", Shape.TRACK)
+        for track in root.all("trk")
+        for segment in track.all("trkseg")
+    ]
+    drawn = [feature for feature in (*routes, *tracks) if feature.lines[0]]
+    points = [_way_point(element) for element in root.all("wpt")]
+    places = [point for point in points if name_key(point.names[0]) != Role.HOME]
+    remarks: tuple[str, ...] = ()
+    if len(drawn) == 1 and drawn[0].shape is Shape.TRACK:
+        drawn = [replace(drawn[0], fallback=Role.ROUTE)]
+        remarks = (f"{source}: the recorded track is taken for the route",)
+    elif not drawn and places:
+        points = [replace(point, fallback=Role.WAYPOINT) for point in points]
+        remarks = (f"{source}: {len(places)} way points are taken for the mission, in the order of the file",)
+    situation = situation_of([*drawn, *points], source, choices)
+    return replace(situation, remarks=(*(remarks if situation.mission else ()), *situation.remarks))
+
+
+def _line(element: Element, named: Element, point: str, shape: Shape) -> Feature:
+    places = tuple(map(_position, element.all(point)))
+    if len(places) == 1:
+        raise element.error("1 position; expected at least 2")
+    return Feature(shape, (places,), {}, (named.text_of("name"),), element.where)
+
+
+def _way_point(element: Element) -> Feature:
+    return Feature(Shape.POINT, ((_position(element),),), {}, (element.text_of("name"),), element.where)
+
+
+def _position(element: Element) -> LatLon:
+    values = [element.attributes.get(key, "") for key in ("lat", "lon")]
+    try:
+        lat_deg, lon_deg = map(number, values)
+        return checked_lat_lon(lat_deg, lon_deg)
+    except (ValueError, InvalidPositionError) as error:
+        raise element.error(f"{error}; expected lat and lon in decimal degrees") from None
 
 
 def write(situation: Situation) -> str:

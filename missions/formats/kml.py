@@ -11,22 +11,25 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from missions.errors import InvalidPositionError
+from missions.formats.bounds import MOST_POSITIONS, check_bound
+from missions.formats.choices import NO_CHOICES
 from missions.formats.feature_reading import situation_of
 from missions.formats.feature_writing import features_of
 from missions.formats.features import Feature, Role, Shape
-from missions.formats.numbers import number
+from missions.formats.numbers import number, swapped_hint
 from missions.formats.xml_tree import parse_xml
 from missions.geo import LatLon, checked_lat_lon
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
+    from missions.formats.choices import Choices
     from missions.formats.xml_tree import Element
     from missions.situation import Situation
 
 _FOLDERS = ("kml", "Document", "Folder")
 _SHAPES = ("Point", "LineString", "LinearRing", "Polygon", "MultiGeometry")
-_OTHER_SHAPES = ("Model", "Track", "MultiTrack")
+_TRACKS = ("Track", "MultiTrack")
 _CIRCLE_CORNERS = 72  # every 5°: to look at; pbpp reads the circle's own data back
 _STYLES = {  # colours of the pictures, as KML writes them: opacity, blue, green, red
     Role.INCLUSION: "<LineStyle><color>ff739e00</color><width>3</width></LineStyle><PolyStyle><fill>0</fill></PolyStyle>",
@@ -35,7 +38,7 @@ _STYLES = {  # colours of the pictures, as KML writes them: opacity, blue, green
 }
 
 
-def read(text: str, source: str) -> Situation:
+def read(text: str, source: str, choices: Choices = NO_CHOICES) -> Situation:
     """Read a file's text.
 
     Raises
@@ -43,10 +46,11 @@ def read(text: str, source: str) -> Situation:
     MissionFormatError
         With the line and what was expected there.
     """
+    check_bound(text.count(",") // 2, MOST_POSITIONS, "positions", source)
     root = parse_xml(text, source)
     if root.name != "kml":
         raise root.error(f"<{root.name}>; expected <kml>")
-    return situation_of(_features(root, ()), source)
+    return situation_of(_features(root, ()), source, choices)
 
 
 def write(situation: Situation) -> str:
@@ -68,26 +72,27 @@ def write(situation: Situation) -> str:
     )
 
 
-def _features(element: Element, names: tuple[str, ...]) -> Iterator[Feature]:
+def _features(element: Element, names: tuple[str, ...], *, is_hidden: bool = False) -> Iterator[Feature]:
     own = element.text_of("name")
     names = (own, *names) if own else names
+    is_hidden = is_hidden or element.text_of("visibility") == "0"
     for child in element.children:
         if child.name in _FOLDERS:
-            yield from _features(child, names)
+            yield from _features(child, names, is_hidden=is_hidden)
         elif child.name == "Placemark":
-            yield from _placemark(child, names)
+            yield from _placemark(child, names, is_hidden=is_hidden)
         elif child.name == "NetworkLink":
             raise child.error("a NetworkLink; nothing is fetched from elsewhere: save what it leads to")
 
 
-def _placemark(element: Element, names: tuple[str, ...]) -> list[Feature]:
-    own = element.text_of("name")
-    names = (own, *names) if own else names
+def _placemark(element: Element, names: tuple[str, ...], *, is_hidden: bool) -> list[Feature]:
+    names = (element.text_of("name"), *names)
     properties = dict(_properties(element))
-    shapes = list(_shapes(element))
-    if not shapes:
-        return [Feature(Shape.NOWHERE, (), properties, names, element.where)]
-    return [Feature(shape, lines, properties, names, where) for shape, lines, where in shapes]
+    is_hidden = is_hidden or element.text_of("visibility") == "0"
+    shapes = list(_shapes(element)) or [(Shape.NOWHERE, (), element.where)]
+    return [
+        Feature(shape, lines, properties, names, where, is_hidden=is_hidden) for shape, lines, where in shapes
+    ]
 
 
 def _properties(element: Element) -> Iterator[tuple[str, str]]:
@@ -101,9 +106,14 @@ def _properties(element: Element) -> Iterator[tuple[str, str]]:
 
 def _shapes(element: Element) -> Iterator[tuple[Shape, tuple[tuple[LatLon, ...], ...], str]]:
     for child in element.children:
-        if child.name in _OTHER_SHAPES:
-            raise child.error(f"a {child.name} is not supported; expected one of {', '.join(_SHAPES)}")
-        if child.name == "MultiGeometry":
+        if child.name == "Model":
+            raise child.error(f"a Model is not supported; expected one of {', '.join(_SHAPES)}")
+        if child.name in _TRACKS:
+            for track in (child, *child.all("Track")):
+                positions = tuple(_track_position(coord) for coord in track.all("coord"))
+                if len(positions) > 1:
+                    yield Shape.TRACK, (positions,), track.where
+        elif child.name == "MultiGeometry":
             yield from _shapes(child)
         elif child.name == "Point":
             position, *more = _positions(child, 1)
@@ -138,7 +148,9 @@ def _positions(element: Element, least: int) -> tuple[LatLon, ...]:
     coordinates = element.first("coordinates")
     if coordinates is None:
         raise element.error(f"a {element.name} without <coordinates>")
-    positions = tuple(_position(word, coordinates) for word in coordinates.text.split())
+    # Written by hand there may be blanks around the commas
+    words = ",".join(part.strip() for part in coordinates.text.split(",")).split()
+    positions = tuple(_position(word, coordinates) for word in words)
     if len(positions) < least:
         raise coordinates.error(f"{len(positions)} positions; expected at least {least}")
     return positions
@@ -151,12 +163,25 @@ def _position(word: str, element: Element) -> LatLon:
         more = [math.nan] * 2
     if len(more) > 1:
         raise element.error(
-            f"{word!r}; expected longitude,latitude[,altitude] in decimal degrees, no spaces inside"
+            f"{word[:60]!r}; expected longitude,latitude[,altitude] in decimal degrees, with decimal points"
         )
+    return _checked(lat_deg, lon_deg, element)
+
+
+def _track_position(element: Element) -> LatLon:
+    try:
+        lon_deg, lat_deg, *_ = map(number, element.text.split())
+    except ValueError:
+        raise element.error(f"{element.text[:60]!r}; expected longitude latitude altitude") from None
+    return _checked(lat_deg, lon_deg, element)
+
+
+def _checked(lat_deg: float, lon_deg: float, element: Element) -> LatLon:
     try:
         return checked_lat_lon(lat_deg, lon_deg)
     except InvalidPositionError as error:
-        raise element.error(str(error)) from None
+        hint = swapped_hint(lat_deg, lon_deg, "longitude, latitude")
+        raise element.error(f"{error}{hint}") from None
 
 
 def _folder(name: str, features: Iterable[Feature]) -> list[str]:

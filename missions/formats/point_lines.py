@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 from missions.errors import InvalidPositionError, MissionFormatError
 from missions.fence import CircleZone, PolygonZone, ZoneKind
-from missions.formats.numbers import number
+from missions.formats.bounds import lines_of
+from missions.formats.numbers import number, swapped_hint
 from missions.geo import checked_lat_lon
 
 if TYPE_CHECKING:
@@ -14,6 +16,9 @@ if TYPE_CHECKING:
 
     from missions.fence import Fence
     from missions.geo import LatLon
+
+_POINT = re.compile(r"[-+]?\d+[.,]?\d*\s*[\s,;]\s*[-+]?\d+[.,]?\d*")
+_DECIMAL_COMMAS = re.compile(r"[-+]?\d+,\d+\s*[\s,;]\s*[-+]?\d+,\d+")
 
 
 def read_points(text: str, source: str) -> list[tuple[int, LatLon]]:
@@ -25,11 +30,17 @@ def read_points(text: str, source: str) -> list[tuple[int, LatLon]]:
         With the line and what was expected there.
     """
     points = []
-    for count, line in enumerate(text.splitlines(), start=1):
+    for count, line in enumerate(lines_of(text, source), start=1):
         content = line.partition("#")[0].strip()
         if content:
             points.append((count, _point(content, f"{source}: line {count}")))
     return points
+
+
+def is_point_text(text: str) -> bool:
+    """Return whether a text begins with a point."""
+    lines = (line.partition("#")[0].strip() for line in text[:10_000].splitlines())
+    return _POINT.fullmatch(next(filter(None, lines), "")) is not None
 
 
 def format_points(points: Sequence[LatLon]) -> str:
@@ -64,11 +75,13 @@ def _point(content: str, where: str) -> LatLon:
     try:
         lat_deg, lon_deg = map(number, columns)
     except ValueError:
+        comma = "; write decimals with a point" if _DECIMAL_COMMAS.fullmatch(content) else ""
         raise MissionFormatError(
-            f"{where}: {content!r}; expected latitude and longitude in decimal degrees with a space or a comma between",
+            f"{where}: {content!r}; expected latitude and longitude in decimal degrees with a space or a comma between{comma}",
             where=where,
         ) from None
     try:
         return checked_lat_lon(lat_deg, lon_deg)
     except InvalidPositionError as error:
-        raise MissionFormatError(f"{where}: {error}", where=where) from None
+        hint = swapped_hint(lat_deg, lon_deg, "latitude, longitude")
+        raise MissionFormatError(f"{where}: {error}{hint}", where=where) from None

@@ -1,4 +1,4 @@
-"""QGroundControl's .plan (JSON): mission version 2, geoFence version 2, rallyPoints version 2."""
+"""QGroundControl's .plan (JSON): mission version 2, geoFence version 2, rallyPoints version 2; older fences and rally points are passed over."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from missions.errors import InvalidPositionError
 from missions.fence import CircleZone, Fence, PolygonZone, Zone, ZoneKind
 from missions.formats.json_node import parse_json
-from missions.formats.numbers import place_e7
+from missions.formats.numbers import xy_for_file, xy_from_file
 from missions.geo import LatLon
 from missions.items import Command, MissionItem, file_frame
 from missions.rally import RallyPoint
@@ -37,14 +37,16 @@ def read(text: str, source: str) -> Situation:
     if "fileType" not in node or node["fileType"].value != "Plan":
         raise node.error('expected a QGroundControl plan ("fileType": "Plan")')
     _check_version(node, 1)
+    remarks: list[str] = []
     mission = _mission(node["mission"]) if "mission" in node else None
-    fence = _fence(node["geoFence"]) if "geoFence" in node else None
-    rally = _rally(node["rallyPoints"]) if "rallyPoints" in node else ()
+    fence = _fence(node["geoFence"]) if _is_of_version_2(node, "geoFence", remarks) else None
+    rally = _rally(node["rallyPoints"]) if _is_of_version_2(node, "rallyPoints", remarks) else ()
     return Situation(
         fence=Known(fence, None, source) if fence and fence.zones else None,
         mission=Known(mission, None, source) if mission and mission.items else None,
         rally=Known(rally, None, source) if rally else None,
         home=Known(mission.home, None, source) if mission and mission.home else None,
+        remarks=tuple(remarks),
     )
 
 
@@ -86,9 +88,31 @@ def _check_version(node: JsonNode, expected: int) -> None:
         raise node["version"].error(f"version {node['version'].value!r}; expected {expected}")
 
 
+def _is_of_version_2(plan: JsonNode, key: str, remarks: list[str]) -> bool:
+    """Return whether a part of a plan is there; an empty one, and one of version 1, is passed over as QGroundControl does."""
+    if key not in plan or plan[key].value is None:
+        return False
+    node = plan[key]
+    if not isinstance(node.value, dict):
+        raise node.error("expected an object")
+    if node.value == {} or node.value.get("version") == 1:
+        what = (
+            "is empty" if node.value == {} else "is of version 1, which QGroundControl does not read either"
+        )
+        remarks.append(f"{node.source}: {key} {what}: passed over")
+        return False
+    if (key == "geoFence" or "version" in node) and node["version"].value != 2:
+        raise node["version"].error(f"{key} version {node['version'].value!r}; expected 2")
+    return True
+
+
 def _rally(node: JsonNode) -> tuple[RallyPoint, ...]:
-    _check_version(node, 2)
-    return tuple(map(_rally_point, node["points"].members()))
+    return tuple(map(_rally_point, _members(node, "points")))
+
+
+def _members(node: JsonNode, key: str) -> list[JsonNode]:
+    """Return the members of a list that may be missing."""
+    return node[key].members() if key in node and node[key].value is not None else []
 
 
 def _rally_point(node: JsonNode) -> RallyPoint:
@@ -118,8 +142,8 @@ def _simple_items(node: JsonNode) -> list[JsonNode]:
         return node[_TRANSECTS]["Items"].members()
     kind = node["complexItemType"].value if "complexItemType" in node else node["type"].value
     raise node["type"].error(
-        f"{kind!r} items are not supported; only SimpleItem, and patterns saved with the simple items they stand for "
-        f"({_TRANSECTS}.Items: surveys and corridor scans)"
+        f"a pattern of kind {kind!r}, which QGroundControl saves without its items; read are simple items, surveys and corridor scans",
+        advice="delete the pattern, or upload the plan from QGroundControl and take the mission from the vehicle (pbpp download mission)",
     )
 
 
@@ -152,14 +176,15 @@ def _item(node: JsonNode) -> MissionItem:
         raise node["params"].error(f"{len(params)} params; expected 7")
     values = [math.nan if param.value is None else param.number() for param in params]
     command = node["command"].whole("command", 65535)
-    lat_deg, lon_deg = (0.0 if math.isnan(value) else value for value in values[4:6])
+    frame = node["frame"].whole("frame", 255)
+    param5, param6 = (0.0 if math.isnan(value) else value for value in values[4:6])
     try:
-        lat_e7, lon_e7 = place_e7(command, lat_deg, lon_deg)
+        lat_e7, lon_e7 = xy_from_file(command, frame, param5, param6)
     except InvalidPositionError as error:
         raise node["params"].error(str(error)) from None
     return MissionItem(
         command,
-        node["frame"].whole("frame", 255),
+        frame,
         (values[0], values[1], values[2], values[3]),
         lat_e7,
         lon_e7,
@@ -169,11 +194,10 @@ def _item(node: JsonNode) -> MissionItem:
 
 
 def _fence(node: JsonNode) -> Fence:
-    if node["version"].value != 2:
-        raise node["version"].error(f"geoFence version {node['version'].value!r}; expected 2")
-    zones: list[Zone] = [_polygon(polygon) for polygon in node["polygons"].members()]
-    zones += [_circle(circle) for circle in node["circles"].members()]
-    return Fence(tuple(zones), node["breachReturn"].lat_lon() if "breachReturn" in node else None)
+    zones: list[Zone] = [_polygon(polygon) for polygon in _members(node, "polygons")]
+    zones += [_circle(circle) for circle in _members(node, "circles")]
+    has_return_point = "breachReturn" in node and node["breachReturn"].value is not None
+    return Fence(tuple(zones), node["breachReturn"].lat_lon() if has_return_point else None)
 
 
 def _polygon(node: JsonNode) -> PolygonZone:
@@ -202,8 +226,8 @@ def _pair(position: LatLon) -> list[float]:
 
 
 def _item_json(item: MissionItem, number: int) -> dict[str, Any]:
-    places = [item.lat_e7 / 1e7, item.lon_e7 / 1e7, item.alt_m]
-    params = [value if math.isfinite(value) else None for value in (*item.params, *places)]
+    values = (*item.params, *xy_for_file(item), item.alt_m)
+    params = [value if math.isfinite(value) else None for value in values]
     return {
         "type": "SimpleItem",
         "autoContinue": item.autocontinue,

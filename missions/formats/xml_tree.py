@@ -6,12 +6,10 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from missions.errors import MissionFormatError
+from missions.formats.bounds import MOST_XML_ELEMENTS, check_bound, check_depth
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-# Chosen, not measured: bounds what a hostile file can make of the readers that follow its nesting
-_MOST_DEEP = 100
 
 
 @dataclass(slots=True)
@@ -63,11 +61,14 @@ def parse_xml(text: str, source: str) -> Element:
     parser = expat.ParserCreate()
     root = Element("", source)
     stack = [root]
+    elements = 0
 
     def start(name: str, attributes: dict[str, str]) -> None:
         where = f"{source}: line {parser.CurrentLineNumber}"
-        if len(stack) > _MOST_DEEP:
-            raise MissionFormatError(f"{where}: nested more than {_MOST_DEEP} deep", where=where)
+        check_depth(len(stack), where)
+        nonlocal elements
+        elements += 1
+        check_bound(elements, MOST_XML_ELEMENTS, "XML elements", source)
         element = Element(name.rpartition(":")[2], where, attributes)
         stack[-1].children.append(element)
         stack.append(element)

@@ -12,12 +12,16 @@ from mavlink_bridge.cli.options.shared import (
     OUTPUT_PANEL,
     VEHICLE_PANEL,
     ConnectOption,
+    FirmwareOption,
     GpsOption,
     HomeOption,
+    IgnorePointsOption,
     LengthOption,
     LinkOptions,
+    OutermostOption,
     PositionErrorOption,
     ReserveOption,
+    RoleOption,
     WidthOption,
 )
 from mavlink_bridge.cli.values import MOST_M, within
@@ -75,6 +79,10 @@ class CheckOptions(LinkOptions):
             rich_help_panel=OUTPUT_PANEL,
         ),
     ] = field(default_factory=list)
+    role: RoleOption = field(default_factory=list)
+    outermost: OutermostOption = None
+    ignore_points: IgnorePointsOption = False
+    firmware: FirmwareOption = None
     reserve: ReserveOption = 0.0
     position_error: PositionErrorOption = None
     length: LengthOption = 0.0

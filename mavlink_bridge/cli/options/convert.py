@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from mavlink_bridge.cli.options.shared import CommonOptions
+from mavlink_bridge.cli.options.shared import CommonOptions, IgnorePointsOption, OutermostOption, RoleOption
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,6 +22,8 @@ class ConvertOptions(CommonOptions):
     `pbpp convert field.plan fence.waypoints --only fence`
 
     `pbpp convert mission.waypoints route.gpx`
+
+    `pbpp convert farm.kml field.plan --outermost inclusion --ignore-points`
     """
 
     source: Annotated[
@@ -40,3 +42,6 @@ class ConvertOptions(CommonOptions):
         str | None,
         typer.Option(metavar="LAT,LON", help="The fence's return point, which .fen files must have."),
     ] = None
+    role: RoleOption = field(default_factory=list)
+    outermost: OutermostOption = None
+    ignore_points: IgnorePointsOption = False

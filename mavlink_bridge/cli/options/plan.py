@@ -12,12 +12,17 @@ from mavlink_bridge.cli.options.shared import (
     OUTPUT_PANEL,
     VEHICLE_PANEL,
     ConnectOption,
+    FirmwareOption,
     GpsOption,
     HomeOption,
+    IgnorePointsOption,
     LengthOption,
     LinkOptions,
+    OutermostOption,
     PositionErrorOption,
     ReserveOption,
+    RoleOption,
+    TrustOption,
     WidthOption,
 )
 from mavlink_bridge.cli.values import LEAST_MPS, MOST_M, MOST_MPS, within
@@ -90,6 +95,8 @@ class PlanOptions(LinkOptions):
             rich_help_panel=VEHICLE_PANEL,
         ),
     ] = None
+    firmware: FirmwareOption = None
+    trust_model: TrustOption = False
     reserve: ReserveOption = 0.0
     position_error: PositionErrorOption = None
     length: LengthOption = 0.0
@@ -133,6 +140,9 @@ class PlanOptions(LinkOptions):
             rich_help_panel=_TOURS,
         ),
     ] = None
+    role: RoleOption = field(default_factory=list)
+    outermost: OutermostOption = None
+    ignore_points: IgnorePointsOption = False
     method: Annotated[str, typer.Option(metavar="|".join(METHODS), help="How to search.")] = "optimal"
     output: Annotated[
         list[Path],

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from mavlink_bridge.cli.options.shared import CommonOptions
+from mavlink_bridge.cli.options.shared import CommonOptions, IgnorePointsOption, OutermostOption, RoleOption
 from mavlink_bridge.cli.values import MOST_S, within
 
 MOST_SEED = 2**63 - 1
@@ -69,3 +69,6 @@ class SimOptions(CommonOptions):
     ] = 0.0
     seed: Annotated[int, typer.Option(min=-MOST_SEED, max=MOST_SEED, help="Seed of the link's faults.")] = 0
     system: Annotated[int, typer.Option(min=1, max=255, help="MAVLink system id.")] = 1
+    role: RoleOption = field(default_factory=list)
+    outermost: OutermostOption = None
+    ignore_points: IgnorePointsOption = False

@@ -8,7 +8,13 @@ from typing import Annotated
 
 import typer
 
-from mavlink_bridge.cli.options.shared import LinkOptions, RequiredConnectOption
+from mavlink_bridge.cli.options.shared import (
+    IgnorePointsOption,
+    LinkOptions,
+    OutermostOption,
+    RequiredConnectOption,
+    RoleOption,
+)
 
 LISTS = ("fence", "rally", "mission")  # a fence before the mission that it governs
 
@@ -58,3 +64,6 @@ class UploadOptions(LinkOptions):
         bool,
         typer.Option("--forget", help="Put the notes of interrupted uploads aside; the backups stay."),
     ] = False
+    role: RoleOption = field(default_factory=list)
+    outermost: OutermostOption = None
+    ignore_points: IgnorePointsOption = False

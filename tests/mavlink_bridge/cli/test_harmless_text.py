@@ -215,7 +215,7 @@ class TestFiles:
         ring = [[0, 0], [0, 1], [1, 1], [0, 0]]
         feature = {
             "type": "Feature",
-            "properties": {"role": f"{NASTY}keep away"},
+            "properties": {"role": f"{NASTY}keep calm"},
             "geometry": {"type": "Polygon", "coordinates": [ring]},
         }
         path.write_text(json.dumps({"type": "FeatureCollection", "features": [feature]}))

@@ -287,7 +287,7 @@ class TestFiles:
 
     def test_parameters_from_a_file(self, fields: Path, tmp_path: Path) -> None:
         parameters = tmp_path / "rover.parm"
-        parameters.write_text("FENCE_MARGIN 0.5\nWP_RADIUS 0.7\n")
+        parameters.write_text("# Version: 4.6.3\nFENCE_MARGIN 0.5\nWP_RADIUS 0.7\n")
         source = ("--fence", fields / "yard-fence.waypoints", "--start", START, "--target", TARGET)
         found = document(*source, "--vehicle", parameters)
         assert found["clearance_m"] == 1.0
@@ -295,6 +295,19 @@ class TestFiles:
         assert not any(
             "not known" in warning for warning in found["warnings"] if "FENCE_ENABLE" not in warning
         )
+
+    def test_an_extrapolated_plan_promises_nothing(self, fields: Path, tmp_path: Path) -> None:
+        parameters = tmp_path / "rover.parm"
+        parameters.write_text("WP_SPEED 2\nOA_TYPE 2\n")
+        source = ("--fence", fields / "yard-fence.waypoints", "--start", START, "--target", TARGET)
+        asked = (*source, "--vehicle", parameters, "--firmware", "4.6")
+        found = document(*asked)
+        assert found["clearance_m"] is None
+        assert [text.split(":")[0] for text in found["extrapolated"]] == ["OA_TYPE 2"]
+        trusted = document(*asked, "--trust-model")
+        assert (trusted["clearance_m"], trusted["extrapolated"]) == (2.5, found["extrapolated"])
+        said = run(*asked).stdout
+        assert "nothing promised for the driven track, extrapolated beyond what was measured" in said
 
     def test_several_targets_and_snapping(self, fields: Path, drawn: tuple) -> None:
         source = ("--fence", fields / "yard-fence.waypoints", "--start", START, "--clearance", 1, *drawn)
@@ -362,7 +375,7 @@ WRONG_FENCES: list[tuple[str, str | bytes, str]] = [
     ("string.plan", qgc(circle("40", 30)), "center[0]: expected a number"),
     ("kind.plan", qgc(polygon([[40, -105]] * 3, "yes")), "inclusion: expected true or false"),
     ("area.plan", qgc(polygon([[40, -105]] * 3)), "inclusion polygon 1 has no area"),
-    ("version.plan", qgc({"version": 1, "polygon": []}), "geoFence version 1; expected 2"),
+    ("version.plan", qgc({"version": 1, "polygon": []}), "holds no fence"),
     ("list.plan", "[]", "expected a QGroundControl plan"),
     ("deep.plan", "[" * 1_000_000, "nested too deeply"),
     ("cut.plan", qgc(circle(40, 30))[:-5], "not JSON"),
@@ -373,7 +386,7 @@ WRONG_FENCES: list[tuple[str, str | bytes, str]] = [
     ("mixed.waypoints", wpl(TRIANGLE + "\n3\t0\t0\t16\t0\t0\t0\t0\t40.07\t-105.2\t0\t1"), "line 5: fence item 3: command 16 does not belong"),
     ("pole.waypoints", wpl(TRIANGLE.replace("40.0", "86.0")), "is beyond ±85°"),
     ("apart.plan", qgc({"version": 2, "polygons": [], "circles": [circle(40, 30)["circles"][0], circle(40.5, 30)["circles"][0]]}), "leave no ground in common"),
-    ("suffix.tlog", "x", "no format to read for the suffix '.tlog'"),
+    ("suffix.tlog", "x", "is a telemetry log; read are .plan"),
     ("suffix", "x", "no format to read for the suffix ''"),
 ]  # fmt: skip
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import pytest
 from protocol.scripted import Script, seqs
 from protocol.twin import PEER, plain_mission
@@ -40,7 +42,7 @@ def item(seq, salt=0):
 
 def float_item(seq):
     message = item(seq)
-    values = {name: getattr(message, name) for name in message.__slots__}
+    values = {one.name: getattr(message, one.name) for one in dataclasses.fields(message)}
     return MissionItem(**{**values, "x": message.x / 1e7, "y": message.y / 1e7})
 
 

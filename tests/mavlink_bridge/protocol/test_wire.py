@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import pytest
@@ -38,7 +39,7 @@ def test_an_item_comes_back_as_it_was(item, seq, mission_type):
 
 
 def float_message(**fields):
-    values = dict.fromkeys(messages.MissionItem.__slots__, 0)
+    values = dict.fromkeys((one.name for one in dataclasses.fields(messages.MissionItem)), 0)
     return messages.MissionItem(**{**values, "command": 16, **fields})
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass, field
 
@@ -119,7 +120,7 @@ class Bench:
     ) -> m.MissionItemInt:
         """Return an item as the message a client sends."""
         message = int_message((1, 1), seq, item, mission_type)
-        fields = {name: getattr(message, name) for name in message.__slots__}
+        fields = {one.name: getattr(message, one.name) for one in dataclasses.fields(message)}
         return m.MissionItemInt(**{**fields, "current": current})
 
     def upload(self, items, mission_type: int = MissionType.MISSION) -> tuple[MissionResult, list[str]]:

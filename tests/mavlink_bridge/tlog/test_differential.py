@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import random
 
 import pytest
@@ -101,7 +102,7 @@ def test_columns_hold_what_the_entries_hold(name):
     assert columns["link"].tolist() == [entry.link for entry in entries]
     assert columns["system"].tolist() == [entry.frame.system for entry in entries]
     assert columns["component"].tolist() == [entry.frame.component for entry in entries]
-    for field in message_class.__slots__:
+    for field in (one.name for one in dataclasses.fields(message_class)):
         values = [getattr(entry.frame.message, field) for entry in entries]
         assert columns[field].tolist() == [
             list(value) if isinstance(value, tuple) else value for value in values

@@ -140,7 +140,7 @@ def test_parameters(tmp_path: Path) -> None:
         (["all.plan", "x.tlog"], 3, "no format to write for the suffix '.tlog'"),
         (["all.plan", "x"], 3, "no format to write for the suffix ''"),
         (["all.plan", "x.parm"], 3, "there is no parameters to write"),
-        (["x.gpx", "x.plan"], 3, ".gpx files are only written"),
+        (["x.gpx", "x.plan"], 3, "x.gpx cannot be read: No such file"),
         (["all.plan", "none/x.plan"], 3, "cannot be written: No such file"),
     ],
 )  # fmt: skip

@@ -187,7 +187,7 @@ TRIANGLE = {"type": "Polygon", "coordinates": [[[8.0, 47.0], [8.1, 47.0], [8.1, 
         ({"name": "Exclusion 3"}, ZoneKind.EXCLUSION),
         ({"Name": "the old obstacles"}, ZoneKind.EXCLUSION),
         ({"name": "not excluded from anything", "fence": "inclusion"}, ZoneKind.INCLUSION),
-        ({"name": "conclusion"}, ZoneKind.INCLUSION),
+        ({"name": "conclusion field"}, ZoneKind.INCLUSION),
         ({"name": 7}, ZoneKind.INCLUSION),
     ],
 )
@@ -314,6 +314,21 @@ def test_a_zipped_kml_is_read_as_the_kml_in_it(tmp_path: Path) -> None:
     assert read_fence(packed) == read_fence(plain)
 
 
+def test_kml_in_the_encoding_that_it_declares(tmp_path: Path) -> None:
+    path = tmp_path / "farm.kml"
+    text = '<?xml version="1.0" encoding="ISO-8859-1"?>' + GOOGLE_EARTH.partition("?>")[2].replace(
+        "Barn", "Bärn"
+    )
+    path.write_bytes(text.encode("latin-1"))
+    assert len(read_fence(path).zones) == 4
+    path.write_bytes(text.replace("ISO-8859-1", "unicode_escape").encode("latin-1"))
+    with pytest.raises(MissionFormatError, match="the encoding 'unicode_escape' is not known"):
+        read_situation(path)
+    path.write_bytes(text.replace("ISO-8859-1", "utf-8").encode("latin-1"))
+    with pytest.raises(MissionFormatError, match=r"is not a text file .*expected UTF-8"):
+        read_situation(path)
+
+
 def test_a_pin_in_a_folder_of_drawings_is_left_out() -> None:
     ring = "<LinearRing><coordinates>8,47 8.1,47 8.1,47.1 8,47</coordinates></LinearRing>"
     pin = "<Placemark><name>Gate</name><Point><coordinates>8.05,47.05,450</coordinates></Point></Placemark>"
@@ -321,7 +336,7 @@ def test_a_pin_in_a_folder_of_drawings_is_left_out() -> None:
     situation = kml.read(text, "f")
     assert situation.fence is not None
     assert len(situation.fence.value.zones) == 1
-    with pytest.raises(MissionFormatError, match="a point \\('Gate'\\) of which is not said what it is"):
+    with pytest.raises(MissionFormatError, match="nothing says what point 'Gate' is"):
         kml.read(text.replace("Drawings", "Drawings of the gate"), "f")
 
 

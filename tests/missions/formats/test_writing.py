@@ -125,7 +125,7 @@ def test_parameters(tmp_path: Path) -> None:
         (ALL, "x.fen", Part.MISSION, "a .fen file holds no mission; it holds fence"),
         (replace(ALL, mission=None), "x.gpx", None, "there is no mission to write"),
         (replace(ALL, mission=None), "x.plan", Part.MISSION, "there is no mission to write"),
-        (Situation(), "x.plan", None, "there is no mission or fence or rally to write"),
+        (Situation(), "x.plan", None, "there is nothing to write: no mission, fence, rally points or parameters"),
         (replace(ALL, mission=known(Mission((MissionItem(178),)))), "x.gpx", None, "a .gpx file holds a route, and no item of the mission has a place"),
         (ALL, "x.bin", None, "no format to write for the suffix '.bin'; known are .plan, .waypoints,"),
     ],
@@ -154,13 +154,6 @@ def test_what_cannot_be_written_is_known_before_any_work() -> None:
         MissionFormatError, match=r"no format to write for the suffix '\.tlog'; known are \.plan"
     ):
         check_writable_format(Path("x.tlog"))
-
-
-def test_gpx_is_only_written(tmp_path: Path) -> None:
-    with pytest.raises(
-        MissionFormatError, match=r"x\.gpx: \.gpx files are only written; to read, known are \.plan"
-    ):
-        read_situation(tmp_path / "x.gpx")
 
 
 @pytest.mark.parametrize("kind", ZoneKind)

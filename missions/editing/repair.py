@@ -19,6 +19,7 @@ from missions.editing.shorten import shortened
 from missions.errors import (
     MissionTooLongError,
     NoRouteError,
+    PlanCheckError,
     PlanStoppedError,
     RouteError,
     SituationError,
@@ -198,28 +199,20 @@ def _in_rounds(
     *,
     keeps_lines: bool,
 ) -> Repair | RouteError:
-    """Return the repaired mission, or why the corners between its legs, or its length, cannot be kept within what is allowed.
-
-    Raises
-    ------
-    RouteError
-        A leg cannot be replaced, however it is planned.
-    """
+    """Return the repaired mission, or why there is none: a leg has no route, the corners between legs break the promise, it is too long."""
     repaired, checked = ItemList(asked.mission), asked
     legs = _Routed(
         {_key(leg.leg) for leg in asked.broken},
         {_key(leg.leg) for leg in asked.broken if not leg.leg.first_item or leg.leg.is_return},
         asked.clearance_m,
     )
-    for number in range(_ROUNDS):
+    for _ in range(_ROUNDS):
         legs.bent |= set() if keeps_lines else legs.keys
         try:
             repaired = _routed(asked, legs, situation, request, should_stop)
         except RouteError as error:
             if legs.clearance_m > asked.clearance_m:
                 break  # there is no more room: the error found before is returned
-            if number == 0:
-                raise
             return error
         checked = check_mission(repaired.mission(), situation, request)
         if checked.holds:
@@ -404,7 +397,7 @@ def _detours(
 
     found: list[Plan] = []
     for places in () if _key(first) in legs.bent else _places_on_line(first, asked, situation, wanted):
-        with suppress(RouteError):
+        with suppress(RouteError, PlanCheckError):  # what does not pass its own check is no choice either
             found.append(planned(*places, first.end))
             if _is_steady(found[-1]):
                 break

@@ -1,25 +1,43 @@
-"""Repairing a mission: legs that break the clearance are replaced by routes; everything else keeps its place and meaning."""
+"""Repairing a mission: legs that break the clearance are replaced by routes; everything else keeps its place and meaning.
+
+**How.** A leg between two places of the mission is a line that somebody drew, a row of a survey perhaps. Its route keeps to that line but near
+what is in the way: places on the line are targets of the route too, a run-in before and behind it. The run-in is as short as the vehicle can
+drive without slowing down; where none can be driven, the route leaves the line from end to end. The whole is checked as any mission is. A leg
+that misses little gets that much more room; one that misses it again, or more, is planned from end to end, together with those beside it.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from missions.checking.check import MissionCheck, check_mission, plan_of
+from missions.checking.check import MissionCheck, check_mission, forecast_band_m, plan_of
 from missions.editing.edited_mission import ItemList
+from missions.editing.own_line import places_on_line
 from missions.editing.shorten import shortened
-from missions.errors import NoRouteError, PlanStoppedError, RouteError, SituationError, StartBlockedError
+from missions.errors import (
+    MissionTooLongError,
+    NoRouteError,
+    PlanCheckError,
+    PlanStoppedError,
+    RouteError,
+    SituationError,
+    StartBlockedError,
+)
 from missions.finishing.route_plan import plan_route
 from missions.geo import bearing_deg, distance_m, to_e7
-from missions.ground.legs import ROUNDING_RESERVE_M
+from missions.ground.legs import ROUNDING_RESERVE_M, reserve_m
+from missions.ground.seams import with_seams
 from missions.items import change_speed
+from missions.promise import promise
 from missions.request import Tour, conditions, request_of
 from missions.situation import Known, Mission, Pose
 from missions.vehicle.item_limit import most_items
 from missions.words import metres
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from missions.checking.check import CheckedLeg
     from missions.checking.execution import CourseLeg
@@ -32,6 +50,9 @@ if TYPE_CHECKING:
 
 # Chosen, not measured: routes that break the legs beside them are made anew so often; bounds the time
 _ROUNDS = 8
+# Chosen on one survey (docs/targets.md) for four vehicles: 1 m slowed them down, beyond 8 m a row is a row no more
+_RUN_INS_M = (2.0, 4.0, 8.0)
+"""How far before and after what is in the way a route leaves a leg's own line: the first that needs no slower stretch."""
 _EXTRA_M, _MOST_EXTRA_M = 0.1, 0.5
 """More room for routes where the corners between them and their neighbours need it."""
 
@@ -65,6 +86,42 @@ class _Detour:
     before: tuple[MissionItem, ...]
     goal: MissionItem
     after: tuple[MissionItem, ...]
+
+
+@dataclass(eq=False)
+class _Routed:
+    """The legs that get routes.
+
+    Parameters
+    ----------
+    keys : set of LegKey
+        All of them.
+    bent : set of LegKey
+        Those planned from end to end: nobody drew their lines, or they broke when they kept to them.
+    clearance_m : float
+        What routes promise.
+    spare_m : dict of LegKey to float
+        More of it for those that keep to their lines, where a neighbour's corner took some.
+    """
+
+    keys: set[LegKey]
+    bent: set[LegKey]
+    clearance_m: float
+    spare_m: dict[LegKey, float] = field(default_factory=dict)
+
+    def clearance_of(self, key: LegKey) -> float:
+        """Return what a leg's route promises."""
+        return self.clearance_m + (0.0 if key in self.bent else self.spare_m.get(key, 0.0))
+
+    def give_room(self, missing_m: Mapping[LegKey, float]) -> set[LegKey]:
+        """Give room to legs that keep to their lines and miss little for the first time; return the other ones that miss some."""
+        again = {
+            key: missing_m[key] + _EXTRA_M
+            for key in missing_m.keys() & (self.keys - self.bent - self.spare_m.keys())
+            if missing_m[key] <= _MOST_EXTRA_M
+        }
+        self.spare_m |= again
+        return set(missing_m) - set(again)
 
 
 def repaired_plan(
@@ -126,26 +183,52 @@ def repair_mission(
     should_stop = PlanStoppedError.when(should_stop)
     request = request_of(**{**request.words(), "via": mission, "via_own": False})
     asked = _checked(mission, situation, request)
-    repaired, checked = ItemList(mission), asked
-    keys = {_key(leg.leg) for leg in asked.broken}
-    clearance_m = asked.clearance_m
+    found = _in_rounds(asked, situation, request, should_stop, keeps_lines=True)
+    if isinstance(found, RouteError):
+        found = _in_rounds(asked, situation, request, should_stop, keeps_lines=False)
+    if isinstance(found, RouteError):
+        raise found
+    return found
+
+
+def _in_rounds(
+    asked: MissionCheck,
+    situation: Situation,
+    request: Request,
+    should_stop: Callable[[], bool] | None,
+    *,
+    keeps_lines: bool,
+) -> Repair | RouteError:
+    """Return the repaired mission, or why there is none: a leg has no route, the corners between legs break the promise, it is too long."""
+    repaired, checked = ItemList(asked.mission), asked
+    legs = _Routed(
+        {_key(leg.leg) for leg in asked.broken},
+        {_key(leg.leg) for leg in asked.broken if not leg.leg.first_item or leg.leg.is_return},
+        asked.clearance_m,
+    )
     for _ in range(_ROUNDS):
+        legs.bent |= set() if keeps_lines else legs.keys
+        try:
+            repaired = _routed(asked, legs, situation, request, should_stop)
+        except RouteError as error:
+            if legs.clearance_m > asked.clearance_m:
+                break  # there is no more room: the error found before is returned
+            return error
+        checked = check_mission(repaired.mission(), situation, request)
         if checked.holds:
             return _within_storage(repaired, checked, situation, request, should_stop)
-        try:
-            repaired = _routed(asked, keys, situation, replace(request, clearance_m=clearance_m), should_stop)
-        except RouteError:
-            if clearance_m > asked.clearance_m:
-                break  # there is no more room: the error found before is raised
-            raise
-        checked = check_mission(repaired.mission(), situation, request)
-        found = {repaired.origin(leg.leg) for leg in checked.broken}
-        more = found if not found <= keys else _beside(asked, found)
-        if more <= keys and checked.broken:
-            missing_m = max(leg.asked_m - leg.driven_clearance_m for leg in checked.broken)
-            clearance_m += min(missing_m, _MOST_EXTRA_M) + _EXTRA_M
-        keys |= more
-    raise _unrepaired(repaired, checked)
+        missing_m: dict[LegKey, float] = {}
+        for leg in checked.broken:
+            key = repaired.origin(leg.leg)
+            missing_m[key] = max(missing_m.get(key, 0.0), leg.asked_m - leg.driven_clearance_m)
+        found = legs.give_room(missing_m)
+        near = found | _beside(asked, found)
+        more = found if not found <= legs.keys else near
+        if found and more <= legs.bent:
+            legs.clearance_m += min(max(missing_m.values()), _MOST_EXTRA_M) + _EXTRA_M
+        legs.keys |= more
+        legs.bent |= near & legs.keys
+    return _unrepaired(repaired, checked)
 
 
 def _checked(mission: Mission, situation: Situation, request: Request) -> MissionCheck:
@@ -170,22 +253,25 @@ def _within_storage(
     situation: Situation,
     request: Request,
     should_stop: Callable[[], bool] | None,
-) -> Repair:
-    """Return a repaired mission with as many items as the vehicle holds.
+) -> Repair | MissionTooLongError:
+    """Return a repaired mission with as many items as the vehicle holds, or why it cannot be shortened so far.
 
     Raises
     ------
-    SituationError, MissionTooLongError
-        It holds more jumps than the autopilot counts, or cannot be shortened so far.
+    SituationError
+        It holds more jumps than the autopilot counts.
     """
     _check_jumps(repaired)
     changes = _changes(repaired)
     most = most_items(situation.parameters) - 1
     count = len(checked.mission.items)
     if count > most:
-        checked = shortened(
-            checked.mission, repaired.own_seqs, situation, request, most=most, should_stop=should_stop
-        )
+        try:
+            checked = shortened(
+                checked.mission, repaired.own_seqs, situation, request, most=most, should_stop=should_stop
+            )
+        except MissionTooLongError as error:
+            return error
         left_out = count - len(checked.mission.items)
         changes = (
             *changes,
@@ -207,7 +293,7 @@ def _unrepaired(repaired: ItemList, checked: MissionCheck) -> NoRouteError:
 
 def _routed(
     asked: MissionCheck,
-    keys: set[LegKey],
+    legs: _Routed,
     situation: Situation,
     request: Request,
     should_stop: Callable[[], bool] | None,
@@ -218,12 +304,14 @@ def _routed(
 
     def put(run: Sequence[CourseLeg]) -> None:
         there = [_where_moved(leg, moved) for leg in run]
-        for leg, detour in zip(run, _detours(there, asked, situation, request, should_stop), strict=True):
+        for leg, detour in zip(
+            run, _detours(there, legs, asked, situation, request, should_stop), strict=True
+        ):
             repaired.replace_leg(_key(leg), detour.before, detour.goal, detour.after)
             if detour.goal.is_placed:
                 moved[leg.last_item] = detour.goal.position
 
-    for run in _runs(asked, keys):
+    for run in _runs(asked, legs):
         try:
             put(run)
         except RouteError:
@@ -258,16 +346,17 @@ def _first_driven(checked: MissionCheck) -> list[tuple[int, CheckedLeg]]:
     return list(found.values())
 
 
-def _runs(asked: MissionCheck, keys: set[LegKey]) -> list[list[CourseLeg]]:
-    """Return the legs to be routed, grouped where they are driven one after another at one speed."""
+def _runs(asked: MissionCheck, legs: _Routed) -> list[list[CourseLeg]]:
+    """Return the legs to be routed: those that are bent grouped where they are driven one after another at one speed."""
     runs: list[list[CourseLeg]] = []
     before = -2
     for number, checked in _first_driven(asked):
         leg = checked.leg
-        if _key(leg) not in keys:
+        if _key(leg) not in legs.keys:
             continue
-        follows = runs and number == before + 1 and runs[-1][-1].speed_mps == leg.speed_mps
-        if follows and runs[-1][-1].stop_s is None:
+        last = runs[-1][-1] if runs and number == before + 1 else None
+        follows = last is not None and last.speed_mps == leg.speed_mps and last.stop_s is None
+        if last is not None and follows and {_key(last), _key(leg)} <= legs.bent:
             runs[-1].append(leg)
         else:
             runs.append([leg])
@@ -284,12 +373,13 @@ def _beside(asked: MissionCheck, keys: set[LegKey]) -> set[LegKey]:
 
 def _detours(
     run: Sequence[CourseLeg],
+    legs: _Routed,
     asked: MissionCheck,
     situation: Situation,
     request: Request,
     should_stop: Callable[[], bool] | None,
 ) -> list[_Detour]:
-    """Plan a run of legs.
+    """Plan a run of legs: one that is not bent along its own line up to near what is in the way, where that can be driven.
 
     Raises
     ------
@@ -298,16 +388,47 @@ def _detours(
     """
     first = run[0]
     local = replace(situation, pose=_pose(first, asked, situation), mission=None)
-    wanted = Tour(
-        **{**conditions(request), "start": first.start, "speed_mps": first.speed_mps},
-        targets=tuple(leg.end for leg in run),
-    )
+    clearance_m = legs.clearance_of(_key(first))
+    own = {"start": first.start, "speed_mps": first.speed_mps, "clearance_m": clearance_m}
+    wanted = Tour(**{**conditions(request), **own})
+
+    def planned(*targets: LatLon) -> Plan:
+        return plan_route(local, replace(wanted, targets=targets), should_stop=should_stop)
+
+    found: list[Plan] = []
+    for places in () if _key(first) in legs.bent else _places_on_line(first, asked, situation, wanted):
+        with suppress(RouteError, PlanCheckError):  # what does not pass its own check is no choice either
+            found.append(planned(*places, first.end))
+            if _is_steady(found[-1]):
+                break
     try:
-        planned = plan_route(local, wanted, should_stop=should_stop)
+        plan = min(found, key=_slowness) if found else planned(*(leg.end for leg in run))
     except RouteError as error:
         names = " and ".join(_names(_key(leg)) for leg in run)
         raise type(error)(f"{names}: {error}", **error.details) from None
-    return _split(planned, run, asked.mission)
+    return _split(plan, plan.targets[-len(run) :], run, asked.mission)
+
+
+def _places_on_line(
+    leg: CourseLeg, asked: MissionCheck, situation: Situation, request: Request
+) -> Iterator[list[LatLon]]:
+    """Return where a route may leave the leg's own line and come back to it, first as near to what is in the way as may be."""
+    required_m = promise(situation, request, asked.vehicle).required_m
+    clearance_m = required_m + forecast_band_m(asked.envelope) + reserve_m(asked.ground)
+    ground = with_seams(asked.ground, asked.vehicle)
+    for run_in_m in _RUN_INS_M:
+        if places := places_on_line(ground, leg, clearance_m, run_in_m):
+            yield places
+
+
+def _slowness(plan: Plan) -> tuple[bool, float]:
+    """Return what orders plans: first those without slower stretches and stops, then the quicker ones."""
+    return not _is_steady(plan), plan.duration_s
+
+
+def _is_steady(plan: Plan) -> bool:
+    """Return whether a plan is driven without slower stretches and stops."""
+    return not any(plan.speeds) and not any(item.params[0] > 0 for item in plan.items if item.is_placed)
 
 
 def _pose(first: CourseLeg, asked: MissionCheck, situation: Situation) -> Known[Pose] | None:
@@ -320,12 +441,14 @@ def _pose(first: CourseLeg, asked: MissionCheck, situation: Situation) -> Known[
     return Known(Pose(first.start, heading_deg), None, "the mission")
 
 
-def _split(planned: Plan, run: Sequence[CourseLeg], mission: Mission) -> list[_Detour]:
-    """Return the part of a plan that belongs to each leg of a run."""
+def _split(
+    planned: Plan, ends: Sequence[LatLon], run: Sequence[CourseLeg], mission: Mission
+) -> list[_Detour]:
+    """Return the part of a plan that belongs to each leg of a run, by where each ends now."""
     detours = []
     begin = int(run[0].speed_mps is not None)  # the mission sets its speed itself
     point = 0
-    for leg, target in zip(run, planned.targets, strict=True):
+    for leg, target in zip(run, ends, strict=True):
         goal = mission.items[leg.last_item - 1]
         if not leg.is_return and distance_m(goal.position, target) > ROUNDING_RESERVE_M:
             lat_e7, lon_e7 = to_e7(target)

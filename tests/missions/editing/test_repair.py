@@ -335,6 +335,12 @@ def test_random_missions_in_random_fields():
     assert len(refused) <= 2
 
 
+def test_legs_that_need_their_neighbours_corner_to_move_are_repaired_together():
+    situation, items = random_mission(37)  # leg 4 → 5 by itself ends where this vehicle cannot turn
+    asked = Request(start=place(-55, -55), clearance_m=2.0, snap_m=40.0)
+    assert repair_mission(Mission(items, HOME), situation, asked).check.holds
+
+
 def test_a_repair_that_is_stopped_ends_with_one_error():
     asked = itertools.count(1)
     through = Mission((WEST, EAST), HOME)

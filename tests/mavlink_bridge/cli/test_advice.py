@@ -62,7 +62,7 @@ def test_a_server_that_is_not_there_is_no_matter_of_serial_ports() -> None:
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        (("convert", "{fields}/yard-fence.waypoints", "{out}/fence.xyz"), "the suffix tells the format"),
+        (("convert", "{fields}/yard-fence.waypoints", "{out}/fence.xyz"), "the file extension sets the format"),
         (
             (
                 "check",
@@ -73,7 +73,7 @@ def test_a_server_that_is_not_there_is_no_matter_of_serial_ports() -> None:
             ),
             "give a file that holds one",
         ),
-        (("plan", "--fence", "{fields}/nothing.plan", "--target", "40,-105"), "the path and its spelling"),
+        (("plan", "--fence", "{fields}/nothing.plan", "--target", "40,-105"), "check the path"),
     ],
 )
 def test_files(fields: Path, tmp_path: Path, arguments: tuple[str, ...], expected: str) -> None:

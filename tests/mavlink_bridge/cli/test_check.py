@@ -243,7 +243,7 @@ def test_the_best_order_and_the_way_home(tmp_path, yard):
     )
     assert sorted(best["targets"][:3]) == sorted(given["targets"])
     assert best["targets"][3] == best["path"][-1] == [HOME.lat_deg, HOME.lon_deg]
-    assert best["warnings"][0].startswith("the targets are visited in the order ")
+    assert best["warnings"][0].startswith("targets reordered: ")
     assert (
         document_of("check", "--mission", made, "--fence", yard["fence"], "--clearance", "2")["broken"] == 0
     )
@@ -427,7 +427,7 @@ def test_a_seam_before_which_the_vehicle_stops_is_named_with_its_place(tmp_path)
         r"BREAKS: leg start → 1 crosses the seam at the edge of inclusion polygon 2: the vehicle stops at 40\.07137\d+,-105\.22970\d+",
         result.output,
     )
-    assert "set AVOID_ENABLE 2 (without bit 0), or draw the polygons as one" in result.output
+    assert "set AVOID_ENABLE 2 (without bit 0), or draw the inclusions as one polygon" in result.output
     document = document_of(*asked, code=8)
     assert document["legs"][0]["crosses"][0].startswith("the seam at the edge of inclusion polygon")
     vehicle.write_text(UNION.replace("AVOID_ENABLE 3", "AVOID_ENABLE 2"), encoding="utf-8")

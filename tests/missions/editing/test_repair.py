@@ -241,13 +241,13 @@ def test_what_is_not_understood_cannot_be_repaired():
 
 
 def test_a_circle_that_breaks_cannot_be_repaired():
-    with pytest.raises(NoRouteError, match="cannot be repaired: about leg"):
+    with pytest.raises(NoRouteError, match="cannot be repaired: near leg"):
         repair(go(66, 30, 1.0, 0.0, 6.0, command=18), go(120, 30))
 
 
 def test_more_jumps_than_the_autopilot_counts_are_refused():
     loops = [item for _ in range(MOST_TRACKED_JUMPS + 1) for item in (go(0, 60), jump(1, 0))]
-    with pytest.raises(SituationError, match=f"holds {MOST_TRACKED_JUMPS + 1} jumps"):
+    with pytest.raises(SituationError, match=f"has {MOST_TRACKED_JUMPS + 1} jumps"):
         repair(WEST, EAST, *loops)
 
 
@@ -286,7 +286,7 @@ def test_slow_stretches_and_stops_of_a_route_end_with_it(monkeypatch):
     stopping = replace(EAST, params=(1.0, 0.0, 0.0, 0.0))
     at = kept(found, change_speed(0.5), stopping, change_speed(2.0), SERVO, go(120, 30))
     assert at == list(range(at[0], at[0] + 5))
-    assert "item 2: the vehicle waits 1 s there, so as to turn from rest" in found.changes
+    assert "item 2: the vehicle now waits 1 s there, to turn from standstill" in found.changes
     assert found.check.legs[-1].leg.speed_mps == 2.0
 
 
@@ -337,7 +337,7 @@ def test_random_missions_in_random_fields():
 def test_a_repair_that_is_stopped_ends_with_one_error():
     asked = itertools.count(1)
     through = Mission((WEST, EAST), HOME)
-    with pytest.raises(PlanStoppedError, match="nobody waits"):
+    with pytest.raises(PlanStoppedError, match="no longer needed"):
         repair_mission(
             through,
             situation_of(FIELD, BARN),

@@ -280,7 +280,7 @@ def test_inclusions_without_common_ground_are_refused() -> None:
         match=r"inclusion polygon 1 and inclusion polygon 2 leave no ground in common; with FENCE_OPTIONS 2",
     ):
         drawn(situation_of(*zones), place(-80, -80), place(80, 80))
-    with pytest.raises(FenceError, match="no ground"):
+    with pytest.raises(FenceError, match="the exclusions cover all of inclusion polygon 1"):
         drawn(situation_of(FIELD, box(OUT, -120, -120, 120, 120)), place(0, 0), place(10, 10))
 
 
@@ -336,9 +336,9 @@ def test_a_clearance_within_the_fence_margin_is_warned_of() -> None:
         ({"FENCE_ENABLE": 0.0, "FENCE_TYPE": 6.0}, "FENCE_ENABLE is 0"),
         (
             {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 2.0, "FENCE_RADIUS": 500.0},
-            "FENCE_TYPE has no bit 2 (value 4)",
+            "FENCE_TYPE bit 2 (value 4) is not set",
         ),
-        ({"WP_RADIUS": 1.0}, "FENCE_ENABLE is not known, and 0 by default"),
+        ({"WP_RADIUS": 1.0}, "FENCE_ENABLE unknown, default 0"),
         ({"FENCE_ENABLE": 1.0, "FENCE_TYPE": 4.0}, None),
         ({}, None),
     ],
@@ -350,7 +350,7 @@ def test_a_fence_that_is_not_enforced_is_honoured_with_a_warning(
     assert_keeps(result, 2)
     found = [warning for warning in result.warnings if "does not enforce" in warning]
     assert found == (
-        [f"the autopilot does not enforce this fence ({reason}); the route honours it all the same"]
+        [f"the autopilot does not enforce this fence ({reason}); it is used here anyway"]
         if reason
         else []
     )
@@ -581,24 +581,24 @@ class TestWhatIsNotKnown:
 
     @pytest.mark.parametrize("ends", [(HOME, (LatLon(41.1, -105.2),)), (LatLon(41.1, -105.2), (HOME,))])
     def test_nothing_leads_to_where_no_plane_reaches(self, ends):
-        problem = r"no route: 41\.1000000,-105\.2000000 is 114 km from the fence's centre .*; at most 100 km"
+        problem = r"no route: 41\.1000000,-105\.2000000 is 114 km from the fence's centre .*; the limit is 100 km"
         with pytest.raises(NoRouteError, match=problem):
             plan(situation_of(FIELD), Request(*ends))
 
     @pytest.mark.parametrize(
         ("situation", "request_", "problem"),
         [
-            (Situation(fence=Known(Fence((FIELD,)), None, "")), Request(), "the start is not known"),
-            (situation_of(FIELD), Request(), r"the target is not known: .* \(--target LAT,LON\)"),
+            (Situation(fence=Known(Fence((FIELD,)), None, "")), Request(), "start unknown"),
+            (situation_of(FIELD), Request(), r"target unknown: .* --target LAT,LON"),
             (
                 Situation(fence=Known(Fence((FIELD,)), None, ""), home=Known(HOME, None, ""), mission=Known(Mission(()), None, "")),
                 Request(),
-                "the target is not known",
+                "target unknown",
             ),
             (
                 Situation(fence=Known(Fence((FIELD,)), None, ""), parameters={"FENCE_ENABLE": 1.0}),
                 Request(HOME, (HOME,)),
-                "FENCE_RADIUS 300 m around home, and home is not known",
+                "FENCE_RADIUS 300 m around home, but home is unknown",
             ),
             (
                 Situation(
@@ -617,12 +617,12 @@ class TestWhatIsNotKnown:
         request = Request(HOME, (place(5, 5),))
         with pytest.raises(
             FenceMissingError,
-            match=r"^no fence was transferred: there is nothing to plan around\. Let .*--fence",
+            match=r"^no fence to plan around: no fence was uploaded or downloaded\. Download .*--fence",
         ):
             plan(Situation(), request)
         with pytest.raises(
             FenceMissingError,
-            match=r"^the vehicle holds a fence of 9 points \(FENCE_TOTAL\), but .*FENCE_POINT",
+            match=r"^no fence to plan around: the vehicle holds a fence of 9 points \(FENCE_TOTAL\), but .*FENCE_POINT",
         ):
             plan(Situation(parameters={"FENCE_TOTAL": 9.0}), request)
         with pytest.raises(FenceMissingError, match="the fence from test is empty"):
@@ -631,9 +631,9 @@ class TestWhatIsNotKnown:
     @pytest.mark.parametrize(
         ("transfers", "problem"),
         [
-            ([ListTransfer(True, 5, {0: MissionItem(5002)})], r"a fence upload was seen only in part \(1 of 5 items\)"),
-            ([ListTransfer(False, None, {3: MissionItem(5002)})], r"a fence read-back was seen only in part \(1 of an unknown number of items\)"),
-            ([ListTransfer(True, 1, {0: MissionItem(5004)})], "a fence upload of 1 items was seen, but not that the vehicle accepted it"),
+            ([ListTransfer(True, 5, {0: MissionItem(5002)})], r"a fence upload is incomplete \(1 of 5 items\)"),
+            ([ListTransfer(False, None, {3: MissionItem(5002)})], r"a fence download is incomplete \(1 of an unknown number of items\)"),
+            ([ListTransfer(True, 1, {0: MissionItem(5004)})], "a fence upload of 1 items was not acknowledged"),
         ],
     )  # fmt: skip
     def test_a_fence_seen_in_part(self, transfers: list[ListTransfer], problem: str) -> None:
@@ -644,15 +644,15 @@ class TestWhatIsNotKnown:
         older = Situation(fence=Known(Fence((FIELD,)), 1.0, "old"), transfers=situation.transfers)
         result = drawn(older, HOME, place(5, 5))
         assert any(
-            "an older one counts" in warning
+            "an older fence is used" in warning
             and problem.split(" (", maxsplit=1)[0].split(r" \(", maxsplit=1)[0] in warning
             for warning in result.warnings
         )
 
     def test_a_fence_that_was_unusable(self) -> None:
-        situation = Situation(fence_trouble="fence upload: fence item 3: a circle of radius 0 m")
+        situation = Situation(fence_trouble="fence upload: fence item 3: circle radius 0 m")
         with pytest.raises(
-            FenceMissingError, match=r"a fence was transferred but is unusable \(fence upload: fence item 3"
+            FenceMissingError, match=r"a fence was sent but cannot be used \(fence upload: fence item 3"
         ):
             plan(situation, Request(HOME, (place(5, 5),)))
         older = Situation(
@@ -661,7 +661,7 @@ class TestWhatIsNotKnown:
             parameters={"FENCE_ENABLE": 0.0},
         )
         warnings = drawn(older, HOME, place(5, 5)).warnings
-        assert any("so an older one counts" in warning for warning in warnings)
+        assert any("an older fence is used" in warning for warning in warnings)
         assert any("does not enforce" in warning for warning in warnings)
 
 
@@ -673,7 +673,7 @@ def test_a_plan_that_is_stopped_ends_with_one_error_wherever_it_is(how: dict[str
     """Also where a search would take the stop for a refusal, and a widest route for its answer."""
     asked = itertools.count(1)
     ends = {"start": place(-50, 0), "targets": (place(50, 0), place(40, 30))}
-    with pytest.raises(PlanStoppedError, match="nobody waits"):
+    with pytest.raises(PlanStoppedError, match="no longer needed"):
         plan(situation_of(FIELD, WALL), Request(**ends, **how), should_stop=lambda: next(asked) >= last)
     assert next(asked) == last + 1  # it was not asked again
 

@@ -15,6 +15,7 @@ from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.messages import Frame, Message
 from missions.errors import FenceMissingError
 from missions.fence import CircleZone, Fence, ZoneKind, fence_to_items
+from missions.firmware import Firmware
 from missions.geo import LatLon
 from missions.items import MissionItem, waypoint, with_home
 from missions.planning.plan import plan
@@ -226,9 +227,8 @@ class TestFence:
         found = after(NEW, *told[:missing], *told[missing + 1 :])
         assert found.fence is None
         of = "an unknown number of" if missing == 0 else "2"
-        assert (
-            f"a fence download is incomplete ({2 if missing == 0 else 1} of {of} items)"
-            in why_no_plan(found)
+        assert f"a fence download is incomplete ({2 if missing == 0 else 1} of {of} items)" in why_no_plan(
+            found
         )
 
     @pytest.mark.parametrize("missing", [0, 1, 2])
@@ -249,9 +249,7 @@ class TestFence:
 
     def test_an_upload_without_acknowledgement_leaves_the_old_fence_with_a_warning(self) -> None:
         found = after(NEW, *upload(self.OTHER, self.KIND, result=None))
-        assert "a fence upload of 2 items was not acknowledged (MISSION_ACK)" in why_no_plan(
-            found
-        )
+        assert "a fence upload of 2 items was not acknowledged (MISSION_ACK)" in why_no_plan(found)
         beside = after(NEW, *upload(self.ITEMS, self.KIND), *upload(self.OTHER, self.KIND, result=None))
         assert fence_of(beside) == FENCE
         assert beside.transfers[ListKind.FENCE, True].is_complete
@@ -611,16 +609,16 @@ class TestFirmware:
     @pytest.mark.parametrize(
         ("message", "firmware"),
         [
-            (m.AutopilotVersion(0, 0x040507FF), (4, 5, 7)),
-            (m.AutopilotVersion(0, 0x04070000), (4, 7, 0)),
+            (m.AutopilotVersion(0, 0x040507FF), Firmware(4, 5, 7)),
+            (m.AutopilotVersion(0, 0x04070000), Firmware(4, 7, 0, 0)),
             (m.AutopilotVersion(0, 0), None),
-            (m.Statustext(6, "ArduRover V4.5.7 (0358a9c2)"), (4, 5, 7)),
-            (m.Statustext(6, "ArduRover V4.7.0-dev (ee3f6ed6)"), (4, 7, 0)),
-            (m.Statustext(6, "ArduRover V4.6 beta"), (4, 6, 0)),
+            (m.Statustext(6, "ArduRover V4.5.7 (0358a9c2)"), Firmware(4, 5, 7)),
+            (m.Statustext(6, "ArduRover V4.7.0-dev (ee3f6ed6)"), Firmware(4, 7, 0, 0)),
+            (m.Statustext(6, "ArduRover V4.6 beta"), Firmware(4, 6, 0, 128)),
             (m.Statustext(6, "I like ArduRover V4.5.7"), None),
             (m.Statustext(6, "ArduRover V"), None),
         ],
     )
-    def test_it_is_read(self, message: m.Message, firmware: tuple[int, int, int] | None) -> None:
+    def test_it_is_read(self, message: m.Message, firmware: Firmware | None) -> None:
         assert after(NEW, (ROVER, message)).firmware == firmware
         assert after(NEW, (STATION, message)).firmware is None

@@ -81,7 +81,11 @@ def test_no_items_are_an_empty_fence() -> None:
             3,
             "with 4 vertices, but only 2 are given",
         ),
-        ([*ring(VERTEX_OUT, 3)[:2], replace(item(VERTEX_OUT), params=(math.nan, 0, 0, 0))], 0, "only 2 are given"),
+        (
+            [*ring(VERTEX_OUT, 3)[:2], replace(item(VERTEX_OUT), params=(math.nan, 0, 0, 0))],
+            0,
+            "only 2 are given",
+        ),
         ([item(CIRCLE_OUT, 0)], 0, "circle radius 0 m; it must be greater than 0"),
         ([*ring(VERTEX_IN, 3), item(CIRCLE_IN, -3)], 3, "circle radius -3 m"),
         ([item(CIRCLE_IN, math.nan)], 0, "circle radius nan m"),

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from mavlink_bridge.cli.options.shared import CommonOptions
+from mavlink_bridge.cli.options.shared import CommonOptions, FirmwareOption
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,8 +22,14 @@ class DoctorOptions(CommonOptions):
     `pbpp doctor`
 
     `pbpp doctor --signing-key rover.key --json`
+
+    `pbpp doctor --vehicle rover.parm --firmware 4.6`
     """
 
     signing_key: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Look at this signing key and who may read it.")
     ] = None
+    vehicle: Annotated[
+        Path | None, typer.Option(metavar="FILE.parm", help="Look at the parameters of this vehicle too.")
+    ] = None
+    firmware: FirmwareOption = None

@@ -10,6 +10,8 @@ import typer
 
 from mavlink_bridge.cli.options_file import take_options
 from mavlink_bridge.cli.values import MOST_M, MOST_S, MOST_VEHICLE_M, within
+from missions.errors import VehicleError
+from missions.firmware import Firmware, read_firmware
 
 LINK_PANEL, OUTPUT_PANEL, VEHICLE_PANEL = "Link", "Output", "Vehicle"
 _MAP_PANEL = "Maps: what zones are where the file does not say it"
@@ -132,6 +134,32 @@ IgnorePointsOption = Annotated[
     bool,
     typer.Option(
         "--ignore-points", help="Leave out pins that do not say what they are.", rich_help_panel=_MAP_PANEL
+    ),
+]
+
+
+def _firmware(text: str) -> Firmware:
+    try:
+        return read_firmware(text)
+    except VehicleError as error:
+        raise typer.BadParameter(str(error)) from None
+
+
+FirmwareOption = Annotated[
+    Firmware | None,
+    typer.Option(
+        metavar="VERSION",
+        parser=_firmware,
+        help="The autopilot's version (4.5, 4.6.3), where the source does not report it.",
+        rich_help_panel=VEHICLE_PANEL,
+    ),
+]
+TrustOption = Annotated[
+    bool,
+    typer.Option(
+        "--trust-model",
+        help="Promise also where the drive lies outside what was measured.",
+        rich_help_panel=VEHICLE_PANEL,
     ),
 ]
 

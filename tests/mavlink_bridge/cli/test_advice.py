@@ -62,7 +62,10 @@ def test_a_server_that_is_not_there_is_no_matter_of_serial_ports() -> None:
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        (("convert", "{fields}/yard-fence.waypoints", "{out}/fence.xyz"), "the file extension sets the format"),
+        (
+            ("convert", "{fields}/yard-fence.waypoints", "{out}/fence.xyz"),
+            "the file extension sets the format",
+        ),
         (
             (
                 "check",

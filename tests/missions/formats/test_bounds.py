@@ -91,9 +91,7 @@ def test_a_kmz_packed_otherwise_is_named(tmp_path, method, is_broken):
     if is_broken:
         data[60:75] = bytes(byte ^ 0x5A for byte in data[60:75])
         (tmp_path / "x.kmz").write_bytes(data)
-    with pytest.raises(
-        MissionFormatError, match=r"doc\.kml is not compressed with deflate"
-    ) as caught:
+    with pytest.raises(MissionFormatError, match=r"doc\.kml is not compressed with deflate") as caught:
         read_situation(tmp_path / "x.kmz")
     assert "ordinary zip file" in str(caught.value.details["advice"])
 

@@ -279,9 +279,7 @@ def test_hidden_placemarks_are_told_and_can_be_asked_for(tmp_path):
 # Other files
 
 
-@pytest.mark.parametrize(
-    ("name", "kind"), [("a.bin", "an ArduPilot DataFlash log"), ("a.ulg", "a PX4 ULog")]
-)
+@pytest.mark.parametrize(("name", "kind"), [("a.bin", "an ArduPilot DataFlash log"), ("a.ulg", "a PX4 ULog")])
 @pytest.mark.parametrize(
     "command",
     [("convert",), ("log",), ("plan", "--fence"), ("plan", "--target", "1,2", "--log"), ("replay",)],
@@ -339,7 +337,11 @@ def test_a_mission_starts_at_its_own_home_whatever_the_fence_file_says(tmp_path)
         (("--role", "=inclusion"), 2, "expected NAME=ROLE"),
         (("--role", "Tree 1=obstacle"), 2, "where ROLE is one of inclusion, exclusion"),
         (("--outermost", "exclusion"), 2, "--outermost 'exclusion': expected inclusion"),
-        (("--role", "Tree=exclusion"), 3, "--role 'Tree': no feature has that name; names in the file: 'Boundary'"),
+        (
+            ("--role", "Tree=exclusion"),
+            3,
+            "--role 'Tree': no feature has that name; names in the file: 'Boundary'",
+        ),
         (("--role", "Tree 1=home"), 3, "a polygon cannot be home; expected drawing, exclusion, inclusion"),
     ],
 )

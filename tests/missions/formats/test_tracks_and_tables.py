@@ -438,9 +438,7 @@ def test_what_a_library_gives_is_checked(tmp_path, monkeypatch, crs, shape, prob
 def test_where_the_library_is_missing_it_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyogrio", None)
     (tmp_path / "f.shp").write_bytes(b"x")
-    with pytest.raises(
-        MissionFormatError, match="is a shapefile; reading it needs the gis extra"
-    ) as caught:
+    with pytest.raises(MissionFormatError, match="is a shapefile; reading it needs the gis extra") as caught:
         read_situation(tmp_path / "f.shp")
     assert "pbpp-rover[gis]" in str(caught.value.details["advice"])
 

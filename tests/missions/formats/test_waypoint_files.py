@@ -207,7 +207,9 @@ def test_files_that_cannot_be_read_or_written(tmp_path: Path) -> None:
     situation = Situation(mission=Known(Mission((waypoint(LatLon(1, 2)),)), None, ""))
     with pytest.raises(MissionFormatError, match=r"none\.plan cannot be read: No such file"):
         read_situation(tmp_path / "none.plan")
-    with pytest.raises(MissionFormatError, match=r"is a telemetry log; supported: \.plan, \.waypoints, \.txt"):
+    with pytest.raises(
+        MissionFormatError, match=r"is a telemetry log; supported: \.plan, \.waypoints, \.txt"
+    ):
         read_situation(tmp_path / "x.tlog")
     with pytest.raises(MissionFormatError, match="cannot write files with extension ''"):
         write_mission(situation, tmp_path / "x")

@@ -312,9 +312,7 @@ def test_a_fence_that_leaves_no_ground_is_refused() -> None:
 
 
 def test_an_enforced_home_circle_wants_home() -> None:
-    with pytest.raises(
-        SituationError, match=r"FENCE_RADIUS 50 m around home, but home is unknown"
-    ) as caught:
+    with pytest.raises(SituationError, match=r"FENCE_RADIUS 50 m around home, but home is unknown") as caught:
         ground(square(IN, -100, -100, 200), home_radius_m=50)
     assert caught.value.details["fence_radius_m"] == 50
 

@@ -54,7 +54,10 @@ def test_no_route_crosses_a_seam(zones) -> None:
         match=r"the seam at the edge of .*: with AVOID_ENABLE 3 \(bit 0\) the vehicle stops FENCE_MARGIN 2 m before the edge",
     ) as caught:
         route(zones)
-    assert caught.value.details["advice"] == "set AVOID_ENABLE 2 (without bit 0), or draw the inclusions as one polygon"
+    assert (
+        caught.value.details["advice"]
+        == "set AVOID_ENABLE 2 (without bit 0), or draw the inclusions as one polygon"
+    )
 
 
 @pytest.mark.parametrize(
@@ -81,7 +84,10 @@ def test_where_measured_rovers_pass_a_route_crosses_it(parameters) -> None:
     ("parameters", "advice"),
     [
         ({"OA_TYPE": 2, "AVOID_ENABLE": 0}, "set OA_TYPE 0, or draw the inclusions as one polygon"),
-        ({"OA_TYPE": 1}, "set AVOID_ENABLE 2 (without bit 0) and OA_TYPE 0, or draw the inclusions as one polygon"),
+        (
+            {"OA_TYPE": 1},
+            "set AVOID_ENABLE 2 (without bit 0) and OA_TYPE 0, or draw the inclusions as one polygon",
+        ),
     ],
 )
 def test_path_planning_does_not_cross_it_either(parameters, advice) -> None:
@@ -114,7 +120,10 @@ def test_a_route_within_one_inclusion_is_found_where_the_shorter_one_crosses_a_s
 def test_a_target_before_a_seam_says_what_would_do() -> None:
     with pytest.raises(TargetBlockedError, match="the seam at the edge of inclusion polygon 1") as caught:
         route((WEST, EAST), start=(50, 0), target=(11, 0))
-    assert caught.value.details["advice"] == "set AVOID_ENABLE 2 (without bit 0), or draw the inclusions as one polygon"
+    assert (
+        caught.value.details["advice"]
+        == "set AVOID_ENABLE 2 (without bit 0), or draw the inclusions as one polygon"
+    )
 
 
 def test_a_check_names_the_seam_and_where_the_vehicle_stops() -> None:

@@ -300,7 +300,7 @@ def _with_drift(course: Course, vehicle: Vehicle) -> Course:
         for leg in course.legs
     )
     notes = dict.fromkeys(
-        f"a boat (FRAME_CLASS 2) drifts LOIT_RADIUS {drift_m:g} m about item {leg.last_item}"
+        f"a boat (FRAME_CLASS 2) drifts within LOIT_RADIUS {drift_m:g} m of item {leg.last_item}"
         + (f" for {leg.stop_s:g} s" if leg.stop_s else "")
         for leg in legs
         if leg.stop_s is not None

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from missions.geo import distance_m
 from missions.ground.legs import ROUNDING_RESERVE_M
 from missions.vehicle.parameter_remarks import assumed_remarks
-from missions.words import metres
+from missions.words import HEADING_UNKNOWN, metres
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -59,7 +59,7 @@ def drive_remarks(
         return []
     warnings = []
     if heading_deg is None:
-        warnings.append("heading unknown; assuming the rover faces along the first leg")
+        warnings.append(HEADING_UNKNOWN)
     warnings += assumed_remarks(vehicle)
     # Half a centimetre is not worth a warning; chosen, not measured.
     if asked.allowance_m and driven_m < asked.promised_m - 0.005 and not found.lead_away:

@@ -40,7 +40,7 @@ def test_a_margin_beyond_all_measure_is_refused_shortly(margin_m):
         parameters=parameters,
         firmware=Firmware(4, 6),
     )
-    with pytest.raises(MissionError, match=r"FENCE_MARGIN is \S+; possible are 0 to 1000") as refusal:
+    with pytest.raises(MissionError, match=r"FENCE_MARGIN is \S+; allowed: 0 to 1000") as refusal:
         plan(situation, Request(targets=(FAR,)))
     assert not re.search(r"\d{10}", str(refusal.value))
     assert len(str(refusal.value)) < 200

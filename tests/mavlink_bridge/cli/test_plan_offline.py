@@ -467,7 +467,7 @@ WRONG_OPTIONS: list[tuple[tuple[str, ...], int, str]] = [
     (("--log", "L", "--system", "9"), 3, "system 9 was not heard, only system 1"),
     (("--fence", "F", *ENDS, "--vehicle", "none.parm"), 3, "none.parm cannot be read"),
     (("--fence", "F", *ENDS, "--vehicle", "P"), 3, "line 1: expected a parameter's name and a number"),
-    (("--fence", "F", *ENDS, "--vehicle", "N"), 3, "FENCE_MARGIN is -1; possible are 0 to 1000"),
+    (("--fence", "F", *ENDS, "--vehicle", "N"), 3, "FENCE_MARGIN is -1; allowed: 0 to 1000"),
     (("--fence", "F", "--start", "40.0705,-105.2210", "--target", "40.0790,-105.2299"), 4, "the target is on forbidden ground"),
     (("--fence", "F", "--start", "40.0790,-105.2299", "--target", "40.0705,-105.2210"), 4, "the start is on forbidden ground"),
     (("--fence", "F", *ENDS, "--clearance", "1e6"), 4, "nowhere in the field is"),

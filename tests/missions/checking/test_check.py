@@ -389,7 +389,7 @@ def test_a_boat_drifts_about_the_places_where_it_stops() -> None:
     assert rover.holds
     assert [leg.breaks for leg in boat.legs] == [True, True]
     assert boat.legs[0].crosses == ("exclusion polygon 1",)
-    assert "a boat (FRAME_CLASS 2) drifts LOIT_RADIUS 30 m about item 1 for 60 s" in boat.warnings
+    assert "a boat (FRAME_CLASS 2) drifts within LOIT_RADIUS 30 m of item 1 for 60 s" in boat.warnings
     assert "the drive model was measured on wheels, not on a boat" in boat.extrapolated
 
 

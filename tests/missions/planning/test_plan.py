@@ -321,7 +321,9 @@ def test_margins_come_from_the_parameters() -> None:
         assert result.driven_clearance_m >= clearance_m
         assert_keeps(result, clearance_m)
     assert "FENCE_MARGIN unknown; assuming 2" in result.warnings
-    assert any("assuming" in warning and "WP_RADIUS 2" in warning for warning in result.warnings)
+    assert any(
+        "ArduPilot defaults used" in warning and "WP_RADIUS 2" in warning for warning in result.warnings
+    )
 
 
 def test_a_clearance_within_the_fence_margin_is_warned_of() -> None:
@@ -696,7 +698,7 @@ def test_outside_what_was_measured_nothing_is_promised_unless_the_model_is_trust
     silent, trusted = (plan(situation, replace(request, trusts_model=trusts)) for trusts in (False, True))
     assert (silent.clearance_m, trusted.clearance_m) == (None, 2.0)
     assert silent.driven_clearance_m == trusted.driven_clearance_m >= 2.0
-    for result, words in ((silent, "nothing is promised"), (trusted, "promised all the same")):
+    for result, words in ((silent, "no clearance is promised"), (trusted, "clearance is promised anyway")):
         assert len(result.extrapolated) == 1
         assert result.extrapolated[0].startswith("OA_TYPE 1: ArduPilot plans its own way")
         assert result.extrapolated[0] in result.warnings

@@ -22,3 +22,8 @@ HEADING_UNKNOWN = "heading unknown; assuming the rover faces waypoint 1"
 def left_out_text(count: int, most: int) -> str:
     """Return a sentence on the items of a route that were left out, because the vehicle holds no more than ``most``."""
     return f"{counted(count, 'route item')} left out to fit the vehicle's limit of {most}"
+
+
+def moved_text(name: str, away_m: float, place: object) -> str:
+    """Return a sentence on a target or an item that stood where a fence leaves no room, and was moved."""
+    return f"{name} is blocked by a fence: moved {away_m:.2f} m to {place}"

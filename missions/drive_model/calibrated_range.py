@@ -109,7 +109,7 @@ def _beyond_ranges(vehicle: Vehicle, top_mps: float) -> Iterator[str]:
     )
     no_limit = math.inf  # what 0 means, and what a limit that is not told is taken for
     told = (
-        ("WP_SPEED", top_mps, "m/s", "drives"),
+        ("WP_SPEED", top_mps, "m/s", "the drive"),
         ("WP_RADIUS", radius_m, "m", "corners"),
         ("TURN_RADIUS", vehicle.turn_radius_m, "m", "swings"),
         ("ATC_TURN_MAX_G", vehicle.turn_max_g, "g", "turns"),
@@ -117,7 +117,7 @@ def _beyond_ranges(vehicle: Vehicle, top_mps: float) -> Iterator[str]:
         ("ATC_STR_ACC_MAX", vehicle.turn_accel_max_dps2 or no_limit, "°/s²", "turns"),
         ("ATC_ACCEL_MAX", vehicle.accel_max_mps2, "m/s²", "corners"),
         ("WP_JERK", vehicle.jerk_mps3, "m/s³", "corners"),
-        ("PSC_POS_P", vehicle.position_gain_per_s, "/s", "straying"),
+        ("PSC_POS_P", vehicle.position_gain_per_s, "/s", "tracking"),
     )
     for name, value, unit, what in told:
         row = PARAMETERS[name]

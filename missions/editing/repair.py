@@ -16,7 +16,7 @@ from missions.items import change_speed
 from missions.request import Tour, conditions, request_of
 from missions.situation import Known, Mission, Pose
 from missions.vehicle.item_limit import most_items
-from missions.words import counted, left_out_text, metres
+from missions.words import counted, left_out_text, metres, moved_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -364,9 +364,7 @@ def _changes(repaired: ItemList) -> tuple[str, ...]:
         texts.append(f"{_names(key)}: replaced by a route with {counted(count, 'more waypoint')}")
     for seq, (old, new) in repaired.changed.items():
         if old.position != new.position:
-            texts.append(
-                f"item {seq} was blocked: moved {distance_m(old.position, new.position):.2f} m to {new.position}"
-            )
+            texts.append(moved_text(f"item {seq}", distance_m(old.position, new.position), new.position))
         if old.params != new.params:
             texts.append(
                 f"item {seq}: the vehicle now waits {new.params[0]:g} s there, to turn from standstill"

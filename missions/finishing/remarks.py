@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from missions.geo import distance_m
 from missions.ground.legs import ROUNDING_RESERVE_M
 from missions.vehicle.parameter_remarks import assumed_remarks
-from missions.words import HEADING_UNKNOWN, metres
+from missions.words import HEADING_UNKNOWN, metres, moved_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -41,7 +41,7 @@ def lead_away_remarks(found: DrivenRoute, least_m: float) -> list[str]:
 def moved_target_remarks(targets: Sequence[LatLon], reached: Sequence[LatLon]) -> list[str]:
     """Return remarks on which targets were moved, and how far."""
     return [
-        f"the target {asked} is blocked: moved {distance_m(asked, found):.2f} m to {found}"
+        moved_text(f"target {asked}", distance_m(asked, found), found)
         for asked, found in zip(targets, reached, strict=True)
         if distance_m(asked, found) > ROUNDING_RESERVE_M
     ]
@@ -64,7 +64,7 @@ def drive_remarks(
     # Half a centimetre is not worth a warning; chosen, not measured.
     if asked.allowance_m and driven_m < asked.promised_m - 0.005 and not found.lead_away:
         warnings.append(
-            f"the drive model predicts {metres(driven_m)} at the nearest while driving, less than the {metres(asked.promised_m)} promised "
-            f"with an allowance of {asked.allowance_m:g} m"
+            f"predicted clearance while driving {metres(driven_m)}, less than the {metres(asked.promised_m)} promised "
+            f"with --corner-allowance {asked.allowance_m:g}"
         )
     return warnings

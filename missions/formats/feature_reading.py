@@ -85,7 +85,7 @@ def situation_of(features: Iterable[Feature], source: str, choices: Choices = NO
 def _rally_point(feature: Feature) -> RallyPoint:
     alt_m = feature.number("altitude_m", 0.0)
     if not math.isfinite(alt_m):
-        raise feature.error(f"altitude_m {alt_m}; expected metres")
+        raise feature.error(f"altitude_m {alt_m}; expected a number of metres")
     return RallyPoint(*feature.position, alt_m)
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 _LAT = ("lat", "latitude", "lat_deg", "latitude_deg", "breite", "breitengrad")
 _LON = ("lon", "lng", "long", "longitude", "lon_deg", "longitude_deg", "länge", "längengrad")
-_ORDER = "latitude and longitude as the columns say"
+_ORDER = "latitude and longitude as line 1 names them"
 
 
 def read(text: str, source: str, choices: Choices = NO_CHOICES) -> Situation:

@@ -119,7 +119,7 @@ def _rally_point(node: JsonNode) -> RallyPoint:
         return RallyPoint(*position)
     alt_m = node[2].number()
     if not math.isfinite(alt_m):
-        raise node[2].error(f"altitude {alt_m}; expected metres")
+        raise node[2].error(f"altitude {alt_m}; expected a number of metres")
     return RallyPoint(*position, alt_m)
 
 

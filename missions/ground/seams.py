@@ -29,7 +29,7 @@ _WALL_M = 1e-3
 _PASSES_WITHIN_M = 0.05
 """With this margin and less measured rovers crept across; with 0.1 m none did."""
 
-_NAME = "the seam at the edge of "
+_NAME = "the inner edge of "
 
 
 def is_seam(name: str) -> bool:

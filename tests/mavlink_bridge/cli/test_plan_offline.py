@@ -177,7 +177,7 @@ class TestRecordedLogs:
         found = failure("--log", logs / "union-rally.tlog", "--clearance", 2, *drawn)
         assert (found["exit_code"], found["error"]) == (4, "NoRouteError")
         assert found["message"] == (
-            "no route exists, at any clearance: the start is walled in by inclusion polygon 1 and the seam at the edge of inclusion polygon 2: "
+            "no route exists, at any clearance: the start is walled in by inclusion polygon 1 and the inner edge of inclusion polygon 2: "
             "with AVOID_ENABLE 3 (bit 0) the vehicle stops FENCE_MARGIN 2 m before the edge of its inclusion and does not resume, although "
             "FENCE_OPTIONS bit 1 joins it to others"
         )
@@ -318,7 +318,7 @@ class TestFiles:
         assert blocked["error"] == "TargetBlockedError"
         assert blocked["exit_code"] == 4
         moved = document(*source, *in_the_barn, "--snap", 10)
-        assert any("is blocked: moved" in warning for warning in moved["warnings"])
+        assert any("is blocked by a fence: moved" in warning for warning in moved["warnings"])
 
     def test_a_source_is_not_overwritten_with_a_mission(self, fields: Path, tmp_path: Path) -> None:
         fence = tmp_path / "fence.waypoints"

@@ -222,7 +222,7 @@ def test_a_blocked_place_is_refused_or_moved():
     moved = found.mission.items[-2]
     assert moved.params == inside.params
     assert moved.position != inside.position
-    assert any(text.startswith("item 1 was blocked: moved ") for text in found.changes)
+    assert any(text.startswith("item 1 is blocked by a fence: moved ") for text in found.changes)
 
 
 def test_ground_without_a_way_is_refused():

@@ -145,7 +145,7 @@ def test_roles_and_circles_of_a_table(tmp_path):
         ("lat,lon\n1\n", "line 2: 1 columns; expected 2"),
         ("lat;lon\n48,1;11,5\n", "line 2: '48,1' has a decimal comma"),
         ("lat,lon\nx,11\n", "line 2: 'x' is not a number; expected decimal degrees"),
-        ("lat,lon\n149.1,-35.3\n", "line 2: latitude 149.1° is beyond ±90°; expected latitude and longitude as the columns say: are they swapped?"),
+        ("lat,lon\n149.1,-35.3\n", "line 2: latitude 149.1° is beyond ±90°; expected latitude and longitude as line 1 names them: are they swapped?"),
         ('lat,lon\n"1,2', "line 2: 1 columns; expected 2"),
     ],
 )  # fmt: skip

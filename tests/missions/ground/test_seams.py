@@ -51,7 +51,7 @@ def check(zones, *points, **parameters):
 def test_no_route_crosses_a_seam(zones) -> None:
     with pytest.raises(
         NoRouteError,
-        match=r"the seam at the edge of .*: with AVOID_ENABLE 3 \(bit 0\) the vehicle stops FENCE_MARGIN 2 m before the edge",
+        match=r"the inner edge of .*: with AVOID_ENABLE 3 \(bit 0\) the vehicle stops FENCE_MARGIN 2 m before the edge",
     ) as caught:
         route(zones)
     assert (
@@ -118,7 +118,7 @@ def test_a_route_within_one_inclusion_is_found_where_the_shorter_one_crosses_a_s
 
 
 def test_a_target_before_a_seam_says_what_would_do() -> None:
-    with pytest.raises(TargetBlockedError, match="the seam at the edge of inclusion polygon 1") as caught:
+    with pytest.raises(TargetBlockedError, match="the inner edge of inclusion polygon 1") as caught:
         route((WEST, EAST), start=(50, 0), target=(11, 0))
     assert (
         caught.value.details["advice"]
@@ -136,7 +136,7 @@ def test_a_check_names_the_seam_and_where_the_vehicle_stops() -> None:
     east = Polygon(chart.points(EAST.vertices))
     first = LineString(chart.points([place(-50, 0), place(50, 0)])).intersection(east).coords
     first = shapely.Point(first[0])
-    assert broken.crosses == ("the seam at the edge of inclusion polygon 2",)
+    assert broken.crosses == ("the inner edge of inclusion polygon 2",)
     assert chart.points([broken.at])[0] == pytest.approx((first.x, first.y), abs=0.05)
     assert broken.driven_clearance_m == 0.0
     assert any(
@@ -148,7 +148,7 @@ def test_a_check_names_the_seam_and_where_the_vehicle_stops() -> None:
 def test_a_check_of_a_drive_that_leaves_its_polygon_stops_the_margin_before_its_edge() -> None:
     corner = box(IN, 8, -60, 100, 60)
     found = check((WEST, corner), START, (40, 0))
-    assert found.legs[0].crosses == ("the seam at the edge of inclusion polygon 1",)
+    assert found.legs[0].crosses == ("the inner edge of inclusion polygon 1",)
     east_m = Chart(HOME).points([found.legs[0].at])[0][0]
     assert east_m == pytest.approx(8.0, abs=0.05)
 
@@ -174,5 +174,5 @@ def test_a_repair_leads_round_the_seam_or_says_that_nothing_does() -> None:
     chart = Chart(HOME)
     line = chart.line((place(-80, 0), *(item.position for item in repaired.mission.items if item.is_placed)))
     assert line.distance(Polygon(chart.points(inside.vertices))) >= 2.0
-    with pytest.raises(NoRouteError, match="the seam at the edge of"):
+    with pytest.raises(NoRouteError, match="the inner edge of"):
         repair_mission(mission, situation_of(WEST, EAST, **UNION), request)

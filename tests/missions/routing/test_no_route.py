@@ -69,7 +69,7 @@ def test_a_seam_explains_itself_and_leaves_the_reason_as_it_was():
     why = NoRoute(NoRouteKind.WALLED_IN, "no route", {"fences": ["a"]}, ["a"], advice="open it")
     assert explained(why, vehicle) is why
     seam = NoRoute(
-        NoRouteKind.WALLED_IN, "no route", {}, ["the seam at the edge of inclusion polygon 1"], advice="x"
+        NoRouteKind.WALLED_IN, "no route", {}, ["the inner edge of inclusion polygon 1"], advice="x"
     )
     told = explained(seam, vehicle)
     assert told.text.startswith("no route: with AVOID_ENABLE 1 (bit 0) the vehicle stops")

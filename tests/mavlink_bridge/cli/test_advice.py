@@ -74,7 +74,7 @@ def test_a_server_that_is_not_there_is_no_matter_of_serial_ports() -> None:
                 "--fence",
                 "{fields}/yard-fence.waypoints",
             ),
-            "give a file that holds one",
+            "use a file that contains a mission",
         ),
         (("plan", "--fence", "{fields}/nothing.plan", "--target", "40,-105"), "check the path"),
     ],

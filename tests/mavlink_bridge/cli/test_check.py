@@ -447,7 +447,7 @@ def test_a_start_from_which_rovers_back_into_the_fence_is_a_danger(tmp_path):
     result = run(*asked)
     assert result.exit_code == 8
     assert (
-        "DANGER: the start is 1.11 m from inclusion polygon 1, nearer than FENCE_MARGIN (2 m) plus 0.05 m"
+        "DANGER: the start is 1.11 m from inclusion polygon 1, where fence avoidance acts (within FENCE_MARGIN 2 m plus 0.05 m)"
         in result.output
     )
     document = document_of(*asked, code=8)
@@ -463,7 +463,7 @@ def test_a_slow_mission_and_old_firmware_are_said(tmp_path, yard):
     vehicle.write_text("WP_SPEED 0.5\nFENCE_MARGIN 0\nFENCE_ENABLE 1\nFENCE_TYPE 4\n", encoding="utf-8")
     warnings = check_yard(yard, "--vehicle", str(vehicle))["warnings"]
     assert any(
-        "not measured for steered rovers below 1 m/s, and this one drives 0.5 m/s" in one for one in warnings
+        "steered rovers below 1 m/s were not measured, and this one drives 0.5 m/s" in one for one in warnings
     )
     assert any("FENCE_MARGIN 0 m does not switch avoidance off" in one for one in warnings)
 
@@ -474,5 +474,5 @@ def test_the_firmware_is_taken_from_the_option_else_from_the_file(tmp_path, yard
     assert check_yard(yard, "--vehicle", str(vehicle))["extrapolated"] == []
     vehicle.write_text("# Version: 4.5.7\nWP_SPEED 2\n", encoding="utf-8")
     (old,) = check_yard(yard, "--vehicle", str(vehicle))["extrapolated"]
-    assert "not measured for ArduPilot 4.5.7" in old
+    assert "ArduPilot 4.5.7 was not measured" in old
     assert check_yard(yard, "--vehicle", str(vehicle), "--firmware", "4.6")["extrapolated"] == []

@@ -383,7 +383,7 @@ WRONG_FENCES: list[tuple[str, str | bytes, str]] = [
     ("mission.waypoints", wpl("0\t1\t0\t16\t0\t0\t0\t0\t40.07\t-105.22\t0\t1"), "contains no fence"),
     ("columns.waypoints", wpl(TRIANGLE + "\t9"), "line 4: 13 columns; expected 12"),
     ("words.waypoints", wpl(TRIANGLE.replace("5001", "inclusion")), "line 2: "),
-    ("mixed.waypoints", wpl(TRIANGLE + "\n3\t0\t0\t16\t0\t0\t0\t0\t40.07\t-105.2\t0\t1"), "line 5: fence item 3: command 16 does not belong"),
+    ("mixed.waypoints", wpl(TRIANGLE + "\n3\t0\t0\t16\t0\t0\t0\t0\t40.07\t-105.2\t0\t1"), "line 5: fence item 3: command 16 is not a fence item"),
     ("pole.waypoints", wpl(TRIANGLE.replace("40.0", "86.0")), "is beyond ±85°"),
     ("apart.plan", qgc({"version": 2, "polygons": [], "circles": [circle(40, 30)["circles"][0], circle(40.5, 30)["circles"][0]]}), "leave no ground in common"),
     ("suffix.tlog", "x", "is a telemetry log; supported: .plan"),

@@ -282,7 +282,7 @@ WRONG: list[tuple[tuple[str, ...], int, str]] = [
             ("open.fen", "open.fen"),
             ("words.poly", "line 1"),
             ("fence.xyz", ".xyz"),
-            ("fence", "suffix"),
+            ("fence", "extension"),
         )
     ],
     ((*FROM_TO, "--vehicle", "missing.parm"), INPUT, "missing.parm"),
@@ -293,7 +293,7 @@ WRONG: list[tuple[tuple[str, ...], int, str]] = [
     ((*FROM_TO, "--vehicle", "mission.waypoints"), INPUT, "mission.waypoints"),
     # files that cannot be written
     ((*FROM_TO, "-o", "mission.xyz"), INPUT, ".xyz"),
-    ((*FROM_TO, "-o", "mission"), INPUT, "suffix"),
+    ((*FROM_TO, "-o", "mission"), INPUT, "extension"),
     ((*FROM_TO, "-o", "missing/mission.plan"), INPUT, "missing"),
     ((*FROM_TO, "-o", "folder.plan"), INPUT, "folder.plan"),
     ((*FROM_TO, "-o", "fence.parm"), INPUT, ".parm"),

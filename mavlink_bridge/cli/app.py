@@ -31,6 +31,7 @@ COMMANDS = {
     "upload": "Upload a file to the vehicle, verified; or put an old list back.",
     "download": "Download a mission, fence, rally points or parameters.",
     "convert": "Convert a file from one format to another.",
+    "fence": "Make a fence fit for the vehicle: overlapping inclusions one polygon.",
     "sim": "Run a simulated rover.",
     "demo": "Show the whole loop on a simulated rover.",
     "doctor": "Look at this installation: versions, ports, keys, a test plan.",

@@ -385,7 +385,7 @@ WRONG_FENCES: list[tuple[str, str | bytes, str]] = [
     ("words.waypoints", wpl(TRIANGLE.replace("5001", "inclusion")), "line 2: "),
     ("mixed.waypoints", wpl(TRIANGLE + "\n3\t0\t0\t16\t0\t0\t0\t0\t40.07\t-105.2\t0\t1"), "line 5: fence item 3: command 16 is not a fence item"),
     ("pole.waypoints", wpl(TRIANGLE.replace("40.0", "86.0")), "is beyond ±85°"),
-    ("apart.plan", qgc({"version": 2, "polygons": [], "circles": [circle(40, 30)["circles"][0], circle(40.5, 30)["circles"][0]]}), "leave no ground in common"),
+    ("apart.plan", qgc({"version": 2, "polygons": [], "circles": [circle(40, 30)["circles"][0], circle(40.5, 30)["circles"][0]]}), "have no area in common"),
     ("suffix.tlog", "x", "is a telemetry log; supported: .plan"),
     ("suffix", "x", "cannot read files with extension ''"),
 ]  # fmt: skip

@@ -514,7 +514,7 @@ class TestSnap:
         result = drawn(situation_of(FIELD, WALL), place(50, 0), place(4, 0), snap_m=4.0)
         assert_keeps(result, 2)
         assert length_m([place(4, 0), result.targets[0]]) == pytest.approx(3.01, abs=0.05)
-        assert any(warning.startswith("the target") and "moved 3.0" in warning for warning in result.warnings)
+        assert any(warning.startswith("target ") and "moved 3.0" in warning for warning in result.warnings)
 
     def test_a_free_target_stays(self) -> None:
         result = drawn(situation_of(FIELD, WALL), place(50, 0), place(20, 0), snap_m=4.0)

@@ -24,7 +24,7 @@ def lead_away_remarks(found: DrivenRoute, least_m: float) -> list[str]:
         return []
     if found.start_clearance_m < 0:
         return [
-            f"the start is on forbidden ground, {-found.start_clearance_m:.2f} m from free ground: the first leg drives out of it"
+            f"the start is inside an exclusion or outside the fence, {-found.start_clearance_m:.2f} m from the allowed area: leg 1 drives out of it"
         ]
     if found.lead_away_m is None:
         distance = f"{metres(found.start_clearance_m)} from a fence, nearer than {metres(least_m)}"

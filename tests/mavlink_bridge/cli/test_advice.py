@@ -28,7 +28,9 @@ def advice_of(*arguments: str) -> str:
 
 def test_who_is_walled_in_is_not_told_to_ask_for_less(logs: Path) -> None:
     advice = advice_of("plan", "--log", str(logs / "island-unreachable.tlog"))
-    assert advice == "no clearance helps: open a way through exclusion polygon 1, or choose another target"
+    assert (
+        advice == "less clearance does not help: open a gap in exclusion polygon 1, or choose another target"
+    )
 
 
 def test_who_is_not_walled_in_is(logs: Path) -> None:

@@ -147,7 +147,7 @@ def test_a_live_vehicle_is_asked(fields, yard, streams):
         # The fix is good to 0.3 m: kept on top of what is promised, it is more than FENCE_MARGIN and its reserve ask for.
         assert document["clearance_m"] == 2
         assert document["legs"][-1]["asked_m"] == pytest.approx(2.3)
-        assert any("0.3 m added to the clearance" in text for text in document["warnings"])
+        assert any("added 0.3 m for GPS error" in text for text in document["warnings"])
         assert document["system"] == 1
         assert document["legs"][0]["start"] == pytest.approx(away, abs=1e-5)
         assert not any("did not tell its position" in text for text in document["warnings"])
@@ -168,7 +168,7 @@ def test_what_a_live_vehicle_does_not_tell_is_said(fields, yard, monkeypatch):
         assert (
             "the vehicle did not tell its position: it is taken to stand at its home" in document["warnings"]
         )
-        assert any("did not tell how good its position is" in text for text in document["warnings"])
+        assert any("GPS accuracy unknown" in text for text in document["warnings"])
         assert document["clearance_m"] == pytest.approx(2.1)  # FENCE_MARGIN and a reserve
         monkeypatch.setattr("mavlink_bridge.protocol.parameters.PATIENCE_S", 0.5)
         monkeypatch.setattr(

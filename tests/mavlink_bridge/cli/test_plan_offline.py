@@ -177,7 +177,7 @@ class TestRecordedLogs:
         found = failure("--log", logs / "union-rally.tlog", "--clearance", 2, *drawn)
         assert (found["exit_code"], found["error"]) == (4, "NoRouteError")
         assert found["message"] == (
-            "no route exists, at any clearance: the start is walled in by inclusion polygon 1 and the inner edge of inclusion polygon 2: "
+            "no route at any clearance: the start is enclosed by inclusion polygon 1 and the inner edge of inclusion polygon 2: "
             "with AVOID_ENABLE 3 (bit 0) the vehicle stops FENCE_MARGIN 2 m before the edge of its inclusion and does not resume, although "
             "FENCE_OPTIONS bit 1 joins it to others"
         )
@@ -202,7 +202,7 @@ class TestRecordedLogs:
     def test_an_island(self, logs: Path) -> None:
         found = failure("--log", logs / "island-unreachable.tlog", "--clearance", 1)
         assert (found["exit_code"], found["error"]) == (4, "NoRouteError")
-        assert "walled in by exclusion polygon" in found["message"]
+        assert "enclosed by exclusion polygon" in found["message"]
 
     @pytest.mark.parametrize("name", ["guided-maze", "position-target-yard", "fence-change-yard"])
     def test_the_defaults_promise_something(self, logs: Path, name: str) -> None:
@@ -468,9 +468,9 @@ WRONG_OPTIONS: list[tuple[tuple[str, ...], int, str]] = [
     (("--fence", "F", *ENDS, "--vehicle", "none.parm"), 3, "none.parm cannot be read"),
     (("--fence", "F", *ENDS, "--vehicle", "P"), 3, "line 1: expected a parameter's name and a number"),
     (("--fence", "F", *ENDS, "--vehicle", "N"), 3, "FENCE_MARGIN is -1; allowed: 0 to 1000"),
-    (("--fence", "F", "--start", "40.0705,-105.2210", "--target", "40.0790,-105.2299"), 4, "the target is on forbidden ground"),
-    (("--fence", "F", "--start", "40.0790,-105.2299", "--target", "40.0705,-105.2210"), 4, "the start is on forbidden ground"),
-    (("--fence", "F", *ENDS, "--clearance", "1e6"), 4, "nowhere in the field is"),
+    (("--fence", "F", "--start", "40.0705,-105.2210", "--target", "40.0790,-105.2299"), 4, "the target (40.0790000,-105.2299000) is outside"),
+    (("--fence", "F", "--start", "40.0790,-105.2299", "--target", "40.0705,-105.2210"), 4, "the start (40.0790000,-105.2299000) is outside"),
+    (("--fence", "F", *ENDS, "--clearance", "1e6"), 4, "no place in the field keeps"),
     (("--fence", "F", *ENDS, "--clearance", "1e300"), 2, "expected metres (0 to 1000000) or max"),
 ]  # fmt: skip
 

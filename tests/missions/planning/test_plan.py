@@ -343,7 +343,7 @@ def test_margins_come_from_the_parameters() -> None:
 def test_a_clearance_within_the_fence_margin_is_warned_of() -> None:
     parameters = {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 4.0, "FENCE_MARGIN": 2.0, "AVOID_ENABLE": 1.0}
     near = drawn(situation_of(FIELD, WALL, **parameters), place(-50, 0), place(50, 0), clearance_m=1.0)
-    assert any("nearer than FENCE_MARGIN 2 m" in warning for warning in near.warnings)
+    assert any("within FENCE_MARGIN 2 m" in warning for warning in near.warnings)
     wide = drawn(situation_of(FIELD, WALL, **parameters), place(-50, 0), place(50, 0), clearance_m=2.5)
     assert not any("FENCE_MARGIN" in warning for warning in wide.warnings)
 
@@ -435,7 +435,7 @@ class TestBlockedEnds:
     def test_start_in_an_exclusion(self) -> None:
         with pytest.raises(
             StartBlockedError,
-            match=r"exclusion polygon 1; free ground is 1\.0\d m away, bearing 270°",
+            match=r"exclusion polygon 1; the allowed area is 1\.0\d m away, bearing 270°",
         ) as caught:
             drawn(situation_of(FIELD, WALL), place(-4, 0), place(50, 0))
         error = caught.value
@@ -456,7 +456,7 @@ class TestBlockedEnds:
 
     def test_target_in_an_exclusion(self) -> None:
         with pytest.raises(
-            TargetBlockedError, match=r"the target is on forbidden ground .*: exclusion polygon 1;"
+            TargetBlockedError, match=r"the target \(.*\) is inside exclusion polygon 1;"
         ) as caught:
             drawn(situation_of(FIELD, WALL), place(-50, 0), place(4, 0))
         assert caught.value.details["distance_m"] == pytest.approx(3.01, abs=0.05)
@@ -464,19 +464,19 @@ class TestBlockedEnds:
 
     def test_target_too_near_a_fence(self) -> None:
         with pytest.raises(
-            TargetBlockedError, match=r"the target is 1\.2\d m from exclusion polygon 1, nearer than 2\.0\d m"
+            TargetBlockedError, match=r"the target is 1\.2\d m from exclusion polygon 1, closer than 2\.0\d m"
         ):
             drawn(situation_of(FIELD, WALL), place(-50, 0), place(6.25, 0))
 
     def test_a_second_target_that_is_blocked(self) -> None:
         with pytest.raises(
             TargetBlockedError,
-            match=r"the target .*: exclusion polygon 1; the nearest free point is 7\.0",
+            match=r"the target .* is inside exclusion polygon 1; the nearest free point is 7\.0",
         ):
             drawn(situation_of(FIELD, WALL), place(-50, 0), place(50, 0), place(0, 0))
 
     def test_no_ground_keeps_the_clearance(self) -> None:
-        with pytest.raises(RouteError, match=r"nowhere in the field is 150\.0"):
+        with pytest.raises(RouteError, match=r"no place in the field keeps 150\.0"):
             drawn(situation_of(FIELD, WALL), place(-50, 0), place(50, 0), clearance_m=150)
 
     def test_a_target_off_a_sharp_corner_is_free_if_its_true_distance_says_so(self) -> None:
@@ -542,11 +542,11 @@ class TestUnreachable:
             for sides in [(20, 20, 80, 25), (20, 75, 80, 80), (20, 20, 25, 80), (75, 20, 80, 80)]
         ]
         with pytest.raises(
-            NoRouteError, match=r"no route exists, at any clearance: the target is walled in by"
+            NoRouteError, match=r"no route at any clearance: the target is enclosed by"
         ) as caught:
             drawn(situation_of(FIELD, *court, box(OUT, -50, -50, -40, -40)), place(-50, 0), place(50, 50))
         assert caught.value.details["walled_in"] == "target"
-        assert "no clearance helps: open a way through exclusion polygon 1" in str(
+        assert "less clearance does not help: open a gap in exclusion polygon 1" in str(
             caught.value.details["advice"]
         )
         assert "another target" in str(caught.value.details["advice"])
@@ -555,11 +555,11 @@ class TestUnreachable:
     def test_a_closed_courtyard_around_the_start_and_against_the_edge(self) -> None:
         wall = polygon(OUT, (-100, 0), (-60, 0), (-60, -100), (-50, -100), (-50, 10), (-100, 10))
         with pytest.raises(
-            NoRouteError, match="the start is walled in by inclusion polygon 1 and exclusion polygon 1"
+            NoRouteError, match="the start is enclosed by inclusion polygon 1 and exclusion polygon 1"
         ) as caught:
             drawn(situation_of(FIELD, wall), place(-80, -50), place(50, 50))
         assert caught.value.details["walled_in"] == "start"
-        assert "drive it out by hand" in str(caught.value.details["advice"])
+        assert "drive it out manually" in str(caught.value.details["advice"])
 
     def test_a_gap_too_narrow(self) -> None:
         zones = (box(OUT, -5, -100, 5, -1.5), box(OUT, -5, 1.5, 5, 100))

@@ -60,7 +60,7 @@ def test_where_there_is_no_other_way_round_it_is_said_so():
     here = routes.find().points.mean(axis=0)
     found = routes.around(Point(here).buffer(6.0)).find()
     assert found.kind is NoRouteKind.NO_OTHER_WAY
-    assert found.text == "no other way round keeps 1.00 m"
+    assert found.text == "no other route keeps 1.00 m"
     assert routes.find().points.tolist()  # the one before stays as it was
 
 

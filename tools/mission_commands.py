@@ -1,4 +1,4 @@
-"""Make ``missions/mission_commands.py`` from MAVLink's definitions, as pymavlink carries them: ``python tools/mission_commands.py``."""
+"""Make ``missions/formats/mission_commands.py`` from MAVLink's definitions, as pymavlink carries them: ``python tools/mission_commands.py``."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from textwrap import wrap
 
 from pymavlink.dialects.v20 import all as dialect
 
-OUTPUT = Path(__file__).parents[1] / "missions" / "mission_commands.py"
+OUTPUT = Path(__file__).parents[1] / "missions" / "formats" / "mission_commands.py"
 UNUSED = re.compile(r"\s*(empty|reserved|unused|not used)?\b\.?\s*(\(.*\))?$", re.IGNORECASE)
 TEXT = '''"""MAVLink's commands (MAV_CMD), from its definitions. Made by ``tools/mission_commands.py``: change that, not this."""
 

@@ -10,10 +10,10 @@ from mavlink_bridge.cli.common import warn
 from mavlink_bridge.errors import UsageError
 from missions.errors import FenceError, FenceMissingError
 from missions.fence import ZoneKind
-from missions.fence_reach import REACH_M, is_wide, within_reach
 from missions.formats import Choices, mission_of, read_situation
 from missions.formats.features import Role
 from missions.formats.parameters import read_path
+from missions.ground.fence_reach import REACH_M, is_wide, within_reach
 from missions.situation import Known
 
 if TYPE_CHECKING:

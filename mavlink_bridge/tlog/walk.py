@@ -17,7 +17,6 @@ from mavlink_bridge.errors import LogError
 from mavlink_bridge.tlog.follow import Follower
 from mavlink_bridge.tlog.scan import Scan
 from mavlink_bridge.tlog.wire import MAX_FRAME_BYTES, TIMESTAMP_BYTES
-from missions.foreign_files import kind_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -140,6 +139,8 @@ def find_gap_bytes(file: LogFile) -> int:
 
 
 def _check_kind(head: bytes, path: Path) -> None:
+    from missions.formats.foreign_files import kind_of  # noqa: PLC0415 - formats are slow to come, only for such files
+
     kind = kind_of(head)
     if kind is not None:
         what, advice = kind

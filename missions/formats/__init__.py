@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from missions.errors import FenceMissingError, MissionFormatError
-from missions.foreign_files import kind_of_suffix
 from missions.formats import (
     fen,
     geojson,
@@ -25,6 +24,7 @@ from missions.formats import (
 )
 from missions.formats.choices import NO_CHOICES, Choices
 from missions.formats.files import write_file
+from missions.formats.foreign_files import kind_of_suffix
 from missions.formats.parameters import read_parameters
 from missions.formats.parts import Part, only, parts_of
 from missions.formats.texts import read_text

@@ -8,9 +8,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from missions.errors import InvalidPositionError, MissionFormatError
+from missions.formats.mission_commands import COMMANDS_WITH_PLACE, USED_PARAMS
 from missions.geo import checked_lat_lon, to_e7
 from missions.items import CoordinateFrame
-from missions.mission_commands import COMMANDS_WITH_PLACE, USED_PARAMS
 
 if TYPE_CHECKING:
     from missions.items import MissionItem

@@ -10,8 +10,8 @@ import zlib
 from typing import TYPE_CHECKING, NamedTuple
 
 from missions.errors import MissionFormatError
-from missions.foreign_files import check_head
 from missions.formats.bounds import MOST_BYTES, check_bound
+from missions.formats.foreign_files import check_head
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -6,6 +6,8 @@ import math
 from dataclasses import replace
 from typing import NamedTuple
 
+from shapely import Polygon, box, make_valid
+
 from missions.fence import CircleZone, Fence, PolygonZone, Zone, ZoneKind
 from missions.geo import LatLon, wrap_lon_deg
 
@@ -61,8 +63,6 @@ def is_wide(*zones: Zone) -> bool:
 
 def _cut(zone: PolygonZone, origin_deg: float, reach: _Box) -> list[Zone]:
     """Return what of an exclusion lies within reach of the inclusions; the vertices there are as they were."""
-    from shapely import Polygon, box, make_valid  # noqa: PLC0415 - slow to come, only for these
-
     lons = _lons(zone.vertices, origin_deg)
     # Rounded, for numbers like 1e-316 make GEOS lose whole triangles
     ring = [

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega
 
-from missions import mission_commands
+from missions.formats import mission_commands
 from missions.items import PLACED_COMMANDS
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 def test_the_table_is_as_the_script_makes_it():

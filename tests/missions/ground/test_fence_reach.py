@@ -9,8 +9,8 @@ from shapely import Polygon
 from strategies import away
 
 from missions.fence import CircleZone, Fence, PolygonZone, ZoneKind
-from missions.fence_reach import REACH_M, is_wide, within_reach
 from missions.geo import LatLon
+from missions.ground.fence_reach import REACH_M, is_wide, within_reach
 
 GEOD = Geod(ellps="WGS84")
 CENTRES = st.sampled_from(

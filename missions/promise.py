@@ -91,7 +91,7 @@ def promise(situation: Situation, request: Request, vehicle: Vehicle) -> Promise
     swept_m = request.footprint.swept_radius_m
     if promised_m < swept_m:
         warnings.append(
-            f"clearance raised from {promised_m:g} m to {swept_m:.2f} m: the vehicle's corners need that to turn"
+            f"the vehicle's corners sweep {swept_m:.2f} m when it turns: the clearance of {promised_m:g} m is raised to that"
         )
         promised_m = swept_m
     if request.corner_allowance_m is not None:

@@ -76,7 +76,7 @@ class PlanStoppedError(MissionError):
 
         def asked() -> bool:
             if should_stop():
-                raise cls("planning was stopped: nobody waits for this plan any more")
+                raise cls("planning was stopped: the plan is no longer needed")
             return False
 
         asked()

@@ -107,13 +107,13 @@ def fence_from_items(items: Sequence[MissionItem]) -> Fence:
             zones.append(_circle(item, seq))
         elif item.command == Command.FENCE_RETURN_POINT:
             if return_point is not None:
-                raise FenceError(f"fence item {seq}: a second return point", item=seq)
+                raise FenceError(f"fence item {seq}: second return point; a fence has one at most", item=seq)
             return_point = _position(item, seq)
         else:
             reason = (
-                "is a circle around home, a fence item that ArduPilot Rover does not take"
+                "is a circle around home, which ArduPilot Rover does not accept as a fence item"
                 if item.command == _HOME_CIRCLE
-                else "does not belong in a fence"
+                else "is not a fence item"
             )
             raise FenceError(f"fence item {seq}: command {item.command} {reason}", item=seq)
         seq += 1
@@ -143,11 +143,11 @@ def _polygon(items: Sequence[MissionItem], first: int) -> PolygonZone:
     command, param1 = items[first].command, items[first].params[0]
     kind = _VERTEX_KINDS[Command(command)]
     if math.isfinite(param1) and param1 != int(param1):
-        raise FenceError(f"fence item {first}: a vertex count of {param1:g}", item=first)
+        raise FenceError(f"fence item {first}: vertex count {param1:g} is not a whole number", item=first)
     count = int(param1) if math.isfinite(param1) else 0
     if count < 3:
         raise FenceError(
-            f"fence item {first}: an {kind} polygon of {count} vertices; it needs at least 3", item=first
+            f"fence item {first}: {kind} polygon with {count} vertices; at least 3 are needed", item=first
         )
     run = items[first : first + count]
     for offset, item in enumerate(run):
@@ -156,7 +156,7 @@ def _polygon(items: Sequence[MissionItem], first: int) -> PolygonZone:
             break
     if len(run) < count:
         raise FenceError(
-            f"fence item {first}: an {kind} polygon of {param1:g} vertices has only {len(run)} of them",
+            f"fence item {first}: {kind} polygon with {param1:g} vertices, but only {len(run)} are given",
             item=first,
         )
     return PolygonZone(kind, tuple(_position(item, first + offset) for offset, item in enumerate(run)))
@@ -166,7 +166,7 @@ def _circle(item: MissionItem, seq: int) -> CircleZone:
     radius_m = item.params[0]
     if not (math.isfinite(radius_m) and radius_m > 0):
         raise FenceError(
-            f"fence item {seq}: a circle of radius {radius_m:g} m; it must be positive", item=seq
+            f"fence item {seq}: circle radius {radius_m:g} m; it must be greater than 0", item=seq
         )
     return CircleZone(_CIRCLE_KINDS[Command(item.command)], _position(item, seq), radius_m)
 

@@ -79,7 +79,7 @@ def read_firmware(text: str) -> Firmware:
     firmware = _firmware(_WHOLE.fullmatch(text))
     if firmware is None:
         raise VehicleError(
-            f"{text!r} is no version of a firmware; expected one like 4.5 or 4.6.3", firmware=text
+            f"{text!r} is not a firmware version; expected one such as 4.5 or 4.6.3", firmware=text
         )
     return firmware
 

@@ -22,9 +22,7 @@ LEAST_DEFAULT_M = 1.0
 NARROWEST_BAND_M = 0.3
 """What the band of a straight line at 1 m/s, rounding and the search for the widest route leave of its clearance."""
 
-_FIX_NOT_TOLD = (
-    "the vehicle did not tell how good its position is: no room is kept for its error (--position-error)"
-)
+_FIX_NOT_TOLD = "GPS accuracy unknown: nothing added for GPS error (use --position-error M)"
 
 FIX_ERRORS_M = {3: 1.5, 4: 0.6, 5: 0.3, 6: 0.05}
 """By GPS_FIX_TYPE (3D, DGPS, RTK float, RTK fixed), where the receiver does not report its own error (h_acc). Chosen, not measured: what is kept for its error."""
@@ -121,7 +119,7 @@ def asked_clearance(situation: Situation, request: Request) -> tuple[Vehicle, fl
 
 def _stops(vehicle: Vehicle) -> str:
     return (
-        f"nearer than {vehicle.fence.margin_name} {vehicle.stops_within_m:g} m to the fence the vehicle stops in AUTO for good "
+        f"within {vehicle.fence.margin_name} {vehicle.stops_within_m:g} m of the fence the vehicle stops in AUTO and does not resume "
         "(AVOID_ENABLE)"
     )
 
@@ -137,9 +135,5 @@ def _position_error_m(situation: Situation, request: Request) -> tuple[float, tu
     elif fix.kind in FIX_ERRORS_M:
         error_m = FIX_ERRORS_M[fix.kind]
     else:
-        return 0.0, (
-            "the vehicle has no 3D fix: nothing is added to the clearance for its position error (--position-error)",
-        )
-    return error_m, (
-        f"{error_m:g} m added to the clearance for the position error of the vehicle's fix (--position-error)",
-    )
+        return 0.0, ("no 3D GPS fix: nothing added for GPS error (use --position-error M)",)
+    return error_m, (f"added {error_m:g} m for GPS error (--position-error)",)

@@ -1,4 +1,4 @@
-"""Numbers in texts, short whatever they are: a vehicle or a file may report anything."""
+"""Numbers in texts, short whatever they are: a vehicle or a file may report anything; and sentences that several rooms say alike."""
 
 from __future__ import annotations
 
@@ -14,3 +14,16 @@ def metres(value_m: float) -> str:
 def counted(count: int, name: str) -> str:
     """Return a number of things for people, such as "1 waypoint" and "2 waypoints"."""
     return f"{count} {name}" if count == 1 else f"{count} {name}s"
+
+
+HEADING_UNKNOWN = "heading unknown; assuming the rover faces waypoint 1"
+
+
+def left_out_text(count: int, most: int) -> str:
+    """Return a sentence on the items of a route that were left out, because the vehicle holds no more than ``most``."""
+    return f"{counted(count, 'route item')} left out to fit the vehicle's limit of {most}"
+
+
+def moved_text(name: str, away_m: float, place: object) -> str:
+    """Return a sentence on a target or an item that stood where a fence leaves no room, and was moved."""
+    return f"{name} is blocked by a fence: moved {away_m:.2f} m to {place}"

@@ -93,7 +93,7 @@ def grow(geometries: Geometries, clearance_m: float, *, rounded: bool = False) -
         grown[index] = _in_strips(geometries[index], clearance_m * excess + _PAD_M, segments)
     if (_lack_m(geometries, grown, clearance_m) > 0.0).any():
         raise InvalidGeometryError(
-            f"an obstacle cannot be grown by {clearance_m:g} m: its offset stays too near"
+            f"an obstacle cannot be expanded by {clearance_m:g} m: its new outline still comes too near"
         )
     return grown
 
@@ -135,7 +135,7 @@ def shrink(area: BaseGeometry, clearance_m: float, *, rounded: bool = False) -> 
     if _lack_within_m(area, shrunk, clearance_m) <= 0.0:
         return shrunk
     raise InvalidGeometryError(
-        f"an inclusion cannot be shrunk by {clearance_m:g} m: its offset stays too near"
+        f"an inclusion cannot be shrunk by {clearance_m:g} m: its new outline still comes too near"
     )
 
 

@@ -120,7 +120,7 @@ class Planner:
         compiled: bool = False,
     ) -> None:
         if not (isfinite(clearance_m) and clearance_m >= 0.0):
-            raise InvalidGeometryError(f"the clearance must be a length of at least 0 m, not {clearance_m!r}")
+            raise InvalidGeometryError(f"the clearance must be 0 m or more, not {clearance_m!r}")
         if partition not in {None, "slabs", "blocks"}:
             raise ValueError(f'partition must be "slabs", "blocks" or None, not {partition!r}')
         if compiled:

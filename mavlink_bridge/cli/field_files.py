@@ -85,7 +85,7 @@ def read_fence_file(path: Path, options: MapOptions) -> Situation:
     """
     situation = read_file(path, options)
     if situation.fence is None:
-        raise FenceMissingError(f"{path} holds no fence", file=str(path))
+        raise FenceMissingError(f"{path} contains no fence", file=str(path))
     fence, left_out, cut = within_reach(situation.fence.value)
     if fence.zones and is_wide(*fence.zones) and all(zone.kind is ZoneKind.EXCLUSION for zone in fence.zones):
         raise FenceError(

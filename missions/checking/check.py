@@ -29,7 +29,7 @@ from missions.request import GoTo
 from missions.situation import Known
 from missions.vehicle import real_number
 from missions.vehicle.parameter_remarks import assumed_remarks, parameter_remarks
-from missions.words import metres
+from missions.words import HEADING_UNKNOWN, metres
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -288,7 +288,7 @@ def _course(
         own_speed_mps=vehicle.speed_mps,
     )
     if not course.legs:
-        raise SituationError("; ".join(["the mission holds no leg to check", *course.troubles]))
+        raise SituationError("; ".join(["the mission has no leg to check", *course.troubles]))
     return _with_drift(course, vehicle) if vehicle.boat_drift_m else course
 
 
@@ -300,7 +300,7 @@ def _with_drift(course: Course, vehicle: Vehicle) -> Course:
         for leg in course.legs
     )
     notes = dict.fromkeys(
-        f"a boat (FRAME_CLASS 2) drifts LOIT_RADIUS {drift_m:g} m about item {leg.last_item}"
+        f"a boat (FRAME_CLASS 2) drifts within LOIT_RADIUS {drift_m:g} m of item {leg.last_item}"
         + (f" for {leg.stop_s:g} s" if leg.stop_s else "")
         for leg in legs
         if leg.stop_s is not None
@@ -471,14 +471,14 @@ def _start_warnings(
 ) -> list[str]:
     """Return warnings of what is unknown at the start, and of what its first leg cannot keep."""
     if start is None:
-        return [f"start position unknown; the way to item {first.leg.first_item} was not checked"]
+        return [f"start position unknown; the leg to item {first.leg.first_item} was not checked"]
     warnings = []
     if heading_deg is None:
-        warnings.append("heading unknown; assuming the rover faces along the first leg")
+        warnings.append(HEADING_UNKNOWN)
     if first.asked_m < required_m and not first.crosses:
         warnings.append(
-            f"the start stands nearer to a fence than {metres(required_m)}: its first leg has to keep {metres(first.asked_m)}, "
-            "as much as the vehicle has now"
+            f"the start is closer to a fence than {metres(required_m)}; the first leg only has to keep {metres(first.asked_m)}, "
+            "the vehicle's clearance now"
         )
     return warnings
 
@@ -487,8 +487,8 @@ def _drive_warnings(vehicle: Vehicle, forecast: Envelope, course: Course) -> lis
     """Return warnings of where the drive model does not hold, and of parameters that were not known."""
     items = [course.legs[0].first_item, *(leg.last_item for leg in course.legs)]
     warnings = [
-        f"item {items[corner.waypoint]}: a turn of {abs(corner.turn_deg):.0f}° between short legs; "
-        "measured rovers swung out farther there than the drive model predicts"
+        f"item {items[corner.waypoint]}: {abs(corner.turn_deg):.0f}° turn between short legs; "
+        "in tests rovers swung wider there than predicted"
         for corner in forecast.corners
         if not corner.bounded
     ]

@@ -26,9 +26,9 @@ MOST_LEGS = 2000
 _FEW_TIMES = 2  # a jump taken twice and then passed: every leg that a repeated jump makes occurs
 _SKIPPED = {Command.NAV_TAKEOFF: "TAKEOFF", Command.NAV_LAND: "LAND"}
 _STRAYING = {
-    Command.NAV_GUIDED_ENABLE: "hands the vehicle to another computer (NAV_GUIDED_ENABLE)",
-    Command.NAV_SET_YAW_SPEED: "drives at a heading and a speed (NAV_SET_YAW_SPEED)",
-    42702: "hands the vehicle to a script (NAV_SCRIPT_TIME)",
+    Command.NAV_GUIDED_ENABLE: "hands control to a companion computer (NAV_GUIDED_ENABLE)",
+    Command.NAV_SET_YAW_SPEED: "drives by heading and speed (NAV_SET_YAW_SPEED)",
+    42702: "hands control to a Lua script (NAV_SCRIPT_TIME)",
     42703: "holds an attitude (NAV_ATTITUDE_TIME)",
 }
 _CONDITIONS = range(112, 160)
@@ -154,11 +154,11 @@ def follow_mission(
             break
     if len(walk.legs) >= most_legs:
         walk.troubles.append(
-            f"the mission drives more than {most_legs} legs; what comes after them was not followed"
+            f"the mission has more than {most_legs} legs, jumps included; the rest was not checked"
         )
     elif most_repeats is not None:
         walk.notes.append(
-            f"the mission drives more than {most_legs} legs; length and time count each jump {_FEW_TIMES} times"
+            f"the mission has more than {most_legs} legs, jumps included; length and time count each jump {_FEW_TIMES} times"
         )
     return Course(
         tuple(walk.legs),
@@ -202,7 +202,7 @@ class _Execution:
             if item.command in (Command.DO_JUMP, _DO_JUMP_TAG):
                 jumps_in_a_row += 1
                 if jumps_in_a_row > 2 * len(self.items):
-                    self._trouble(index, "jumps in a circle in which there is no place to drive to")
+                    self._trouble(index, "jumps in a loop without a waypoint")
                     break
                 index = self._jump(index)
                 continue
@@ -229,24 +229,26 @@ class _Execution:
         elif item.command == Command.NAV_DELAY:
             self._stop(item.params[0])
         elif item.command in _SKIPPED:
-            self._note(index, f"is a {_SKIPPED[Command(item.command)]}, which a rover passes over")
+            self._note(index, f"is a {_SKIPPED[Command(item.command)]}, which rovers ignore")
         elif item.command in _STRAYING:
-            self._trouble(index, f"{_STRAYING[item.command]}: where the vehicle goes then is not known")
+            self._trouble(
+                index, f"{_STRAYING[item.command]}: where the vehicle drives then cannot be predicted"
+            )
         elif item.is_placed:
             self._drive(index)
         elif item.command in _PLACED and (item.lat_e7, item.lon_e7) == (0, 0):
             self._stop(item.params[0] if item.command != Command.NAV_LOITER_TURNS else 0.0)
         elif item.command in _PLACED:
-            self._trouble(index, f"has a place in frame {item.frame}, which is none on Earth")
+            self._trouble(index, f"has a position in frame {item.frame}, which is not a global frame")
         else:
             self._trouble(
                 index,
-                f"is command {item.command}, which is not understood: where the vehicle goes then is not known",
+                f"is command {item.command}, which is not supported: where the vehicle drives then cannot be predicted",
             )
         if item.command == Command.NAV_LOITER_UNLIM:
             self.ends_in_loiter = True
             if index + 1 < len(self.items):
-                self._note(index, "loiters without end; what comes after it is never driven")
+                self._note(index, "loiters forever; later items are never reached")
             return False
         return True
 
@@ -264,14 +266,15 @@ class _Execution:
             radius_m = abs(item.params[2])
             circle_m = radius_m if 0 < radius_m < math.inf else self.default_circle_m
             self._note(
-                index, f"circles with a radius of {circle_m:g} m (LOITER_TURNS), which was never measured"
+                index,
+                f"circles with a radius of {circle_m:g} m (LOITER_TURNS); the drive model was not tested for that",
             )
         self._go(index, item.position, stop_s=stop_s, circle_m=circle_m)
 
     def _return(self, index: int) -> None:
         goal = self.return_to(self.here, self.home) if self.here else self.home
         if goal is None:
-            self._trouble(index, "returns to launch, and home is not known")
+            self._trouble(index, "returns to launch, but home is unknown")
             return
         self.speed_mps = self.return_speed_mps  # entering RTL sets the speed anew
         self._go(index, goal, stop_s=0.0, is_return=True)
@@ -314,7 +317,9 @@ class _Execution:
         elif item.command == Command.DO_SET_HOME:
             self.home = self.here if item.params[0] == 1 else item.position
         elif item.command == Command.DO_SET_REVERSE and item.params[0] == 1:
-            self._note(index, "has the vehicle drive in reverse, which was never measured")
+            self._note(
+                index, "sets the vehicle to reverse (DO_SET_REVERSE); the drive model was not tested for that"
+            )
         elif item.command == Command.DO_FENCE_ENABLE and item.params[0] == 0:
             self._note(index, "turns the autopilot's own fence off (DO_FENCE_ENABLE 0)")
 
@@ -331,7 +336,7 @@ class _Execution:
         goal = self._jump_goal(item)
         if goal is None:
             name = "tag" if item.command == _DO_JUMP_TAG else "item"
-            self._trouble(index, f"jumps to {name} {item.params[0]:g}, which is none")
+            self._trouble(index, f"jumps to {name} {item.params[0]:g}, which does not exist")
             return index + 1
         repeats = int(item.params[1]) if math.isfinite(item.params[1]) else 0
         if repeats < 0:
@@ -340,7 +345,7 @@ class _Execution:
             if state in self.seen:
                 self.is_endless = True
                 if index + 1 < len(self.items):
-                    self._note(index, "jumps back without end; what comes after it is never driven that way")
+                    self._note(index, "repeats forever; the items after it are never reached from it")
                 return None
             self.seen.add(state)
         else:

@@ -115,7 +115,7 @@ def return_warnings(
         return []
     to = "to the nearest rally point" if situation.rally else "home"
     text = (
-        f"RTL {_causes(situation, vehicle)}drives straight {to}: called on {legs} of {len(path) - 1} legs it would cross "
+        f"RTL {_causes(situation, vehicle)}drives straight {to}; from {legs} of {len(path) - 1} legs it would cross "
         f"{', '.join(crossed)}"
     )
     return [text]
@@ -127,7 +127,7 @@ def end_warnings(situation: Situation, vehicle: Vehicle, course: Course) -> list
         return []
     mode = _DONE_MODES.get(whole_number(situation.parameters, "MIS_DONE_BEHAVE", 0))
     return (
-        [f"after its last item the vehicle changes to {mode} (MIS_DONE_BEHAVE), not to Hold"] if mode else []
+        [f"after the last item the vehicle switches to {mode} (MIS_DONE_BEHAVE), not to Hold"] if mode else []
     )
 
 

@@ -113,7 +113,7 @@ class _TargetPoint:
         whole_s = begins_s[-1] + profiles[-1].duration_s
         if not whole_s <= _LONGEST_S:
             raise VehicleError(
-                f"at its speeds the drive takes {whole_s / 86400:.3g} days, more than the {_LONGEST_S / 86400:g} that can be foreseen",
+                f"at its speeds the drive takes {whole_s / 86400:.3g} days; at most {_LONGEST_S / 86400:g} days can be predicted",
                 duration_s=whole_s,
             )
         self.times_s = np.arange(0.0, whole_s + _STEP_S, _STEP_S)

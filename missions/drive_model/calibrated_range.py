@@ -27,9 +27,7 @@ SAME_TURN_DEG = 20.0
 SAME_MPS = 3.0
 """Up to such a turn and speed firmware before 4.6 kept within the model's corners too (162 corners on long legs, within 0.04 m); so it did where it pivots."""
 
-_OLD_CORNERS = (
-    "before 4.6 rovers cut corners up to twice as deep, and swing out as far as 5.4 m after sharp ones"
-)
+_OLD_CORNERS = "before 4.6 rovers cut corners up to twice as far, and swing out up to 5.4 m after sharp turns"
 
 
 def beyond_measured(vehicle: Vehicle, *speeds_mps: float | None) -> tuple[str, ...]:
@@ -70,15 +68,15 @@ def _beyond_kinds(vehicle: Vehicle, least_mps: float) -> Iterator[str]:
         yield "the drive model was measured on wheels, not on a boat"
     if vehicle.steering is Steering.ACKERMANN and least_mps < SLOW_MPS:
         yield (
-            f"the promise was not measured for steered rovers below {SLOW_MPS:g} m/s, and this one drives {least_mps:g} m/s: there they swing out "
-            "farther and farther (after 90° 0.7 m at 1 m/s, 1.8 m at 0.5, 3.2 m at 0.3) and count waypoints as reached that they passed at a "
-            f"distance; drive {SLOW_MPS:g} m/s or more, or tune its steering: at 0.3 m/s ATC_STR_RAT_FF 2.5 (not 0.75), or PSC_VEL_P 3 (not 1), brought "
-            "3.2 m down to 1.2 m"
+            f"steered rovers below {SLOW_MPS:g} m/s were not measured, and this one drives {least_mps:g} m/s: slow ones swing out farther "
+            "(after 90° 0.7 m at 1 m/s, 1.8 m at 0.5, 3.2 m at 0.3) and count waypoints as reached that they pass at a "
+            f"distance; drive {SLOW_MPS:g} m/s or faster, or tune the steering: at 0.3 m/s ATC_STR_RAT_FF 2.5 (not 0.75) or PSC_VEL_P 3 (not 1) "
+            "reduced 3.2 m to 1.2 m"
         )
     if vehicle.oa_type:
         yield f"OA_TYPE {vehicle.oa_type}: ArduPilot plans its own way around fences and may leave the route; set OA_TYPE 0"
     if vehicle.has_measured_corners is False:
-        yield f"the promise was not measured for ArduPilot {vehicle.firmware}: {_OLD_CORNERS}"
+        yield f"ArduPilot {vehicle.firmware} was not measured: {_OLD_CORNERS}"
 
 
 def _beyond_corners(vehicle: Vehicle, band: Envelope) -> Iterator[str]:
@@ -99,7 +97,7 @@ def _beyond_corners(vehicle: Vehicle, band: Envelope) -> Iterator[str]:
         )
         yield (
             f"firmware {version}: {_OLD_CORNERS}; this drive has turns of up to {max(turns_deg):.0f}°. Give the version (--firmware 4.6), "
-            "or let the vehicle report it"
+            "or connect to the vehicle"
         )
 
 
@@ -111,7 +109,7 @@ def _beyond_ranges(vehicle: Vehicle, top_mps: float) -> Iterator[str]:
     )
     no_limit = math.inf  # what 0 means, and what a limit that is not told is taken for
     told = (
-        ("WP_SPEED", top_mps, "m/s", "drives"),
+        ("WP_SPEED", top_mps, "m/s", "the drive"),
         ("WP_RADIUS", radius_m, "m", "corners"),
         ("TURN_RADIUS", vehicle.turn_radius_m, "m", "swings"),
         ("ATC_TURN_MAX_G", vehicle.turn_max_g, "g", "turns"),
@@ -119,14 +117,14 @@ def _beyond_ranges(vehicle: Vehicle, top_mps: float) -> Iterator[str]:
         ("ATC_STR_ACC_MAX", vehicle.turn_accel_max_dps2 or no_limit, "°/s²", "turns"),
         ("ATC_ACCEL_MAX", vehicle.accel_max_mps2, "m/s²", "corners"),
         ("WP_JERK", vehicle.jerk_mps3, "m/s³", "corners"),
-        ("PSC_POS_P", vehicle.position_gain_per_s, "/s", "straying"),
+        ("PSC_POS_P", vehicle.position_gain_per_s, "/s", "tracking"),
     )
     for name, value, unit, what in told:
         row = PARAMETERS[name]
         measured = row.measured if is_steered else row.measured_skid
         is_too_slow = name == "WP_SPEED" and is_steered and value < SLOW_MPS  # has a sentence of its own
         if measured and value not in measured and not is_too_slow:
-            yield f"{what} of {vehicle.steering} steering were measured with {name} {measured} {unit}, not {value:g} {unit}"
+            yield f"{name} {value:g} {unit} was not measured (only {measured}, {vehicle.steering} steering): {what} may differ"
 
 
 def _beyond_margin(vehicle: Vehicle) -> Iterator[str]:
@@ -139,9 +137,9 @@ def _beyond_margin(vehicle: Vehicle) -> Iterator[str]:
     )
     if margin_m < LEAST_MARGIN_M:
         yield (
-            f"{name} {margin_m:g} m does not switch avoidance off: the vehicle brakes before the fence just the "
-            "same, and measured rovers came to rest as far as 0.04 m past it, a breach; what is promised was not measured there. "
+            f"{name} {margin_m:g} m does not switch avoidance off: the vehicle still brakes at the "
+            "fence, and in tests rovers stopped up to 0.04 m past it, a breach; clearance was not measured there. "
             f"Set {name} {LEAST_MARGIN_M:g} or more, or AVOID_ENABLE {vehicle.avoid_bits & ~1} (without bit 0)"
         )
     elif measured and margin_m not in measured:
-        yield f"avoidance was measured with {name} {measured} m, not {margin_m:g} m"
+        yield f"{name} {margin_m:g} m was not measured (only {measured}): avoidance may differ"

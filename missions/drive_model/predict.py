@@ -202,11 +202,11 @@ def _check_speeds(speeds: Sequence[float | None] | None, legs: int) -> None:
     if speeds is None:
         return
     if len(speeds) != legs:
-        raise VehicleError(f"a drive of {legs} legs needs as many speeds, not {len(speeds)}", legs=legs)
+        raise VehicleError(f"{legs} legs need {legs} speeds, not {len(speeds)}", legs=legs)
     for number, speed_mps in enumerate(speeds):
         if speed_mps is not None and not LEAST_MPS <= speed_mps < math.inf:
             raise VehicleError(
-                f"a speed of {speed_mps:g} m/s on leg {number} is none that can be foreseen; the least is {LEAST_MPS:g} m/s",
+                f"a speed of {speed_mps:g} m/s on leg {number} cannot be predicted; the minimum is {LEAST_MPS:g} m/s",
                 leg=number,
             )
 

@@ -34,7 +34,7 @@ from missions.promise import promise
 from missions.request import Tour, conditions, request_of
 from missions.situation import Known, Mission, Pose
 from missions.vehicle.item_limit import most_items
-from missions.words import metres
+from missions.words import counted, left_out_text, metres, moved_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -138,7 +138,7 @@ def repaired_plan(
     """
     mission = request.mission or (situation.mission.value if situation.mission else None)
     if mission is None or not mission.items:
-        raise SituationError("there is no mission to repair: none was told (--via-mission FILE gives one)")
+        raise SituationError("no mission to repair; use --via-mission FILE")
     repair = repair_mission(mission, situation, request, should_stop=should_stop)
     made = plan_of(repair.check, situation, method=request.method)
     return replace(made, warnings=(*repair.changes, *made.warnings))
@@ -275,7 +275,7 @@ def _within_storage(
         left_out = count - len(checked.mission.items)
         changes = (
             *changes,
-            f"{left_out} item{'s' * (left_out != 1)} of the routes left out so that the vehicle can hold it ({most + 1})",
+            left_out_text(left_out, most + 1),
         )
     return Repair(checked.mission, checked, changes)
 
@@ -284,8 +284,8 @@ def _unrepaired(repaired: ItemList, checked: MissionCheck) -> NoRouteError:
     """Return the error for a mission whose corners keep breaking the promise."""
     worst = min(checked.broken, key=lambda leg: leg.driven_clearance_m - leg.asked_m)
     return NoRouteError(
-        f"the mission cannot be repaired: about {_names(repaired.origin(worst.leg))} the vehicle would still come "
-        f"{metres(worst.driven_clearance_m)} near {worst.fence} at {worst.at}; {metres(worst.asked_m)} are to be kept",
+        f"the mission cannot be repaired: near {_names(repaired.origin(worst.leg))} the vehicle would still come "
+        f"within {metres(worst.driven_clearance_m)} of {worst.fence} at {worst.at}; {metres(worst.asked_m)} is required",
         driven_clearance_m=round(worst.driven_clearance_m, 3),
         fences=[worst.fence],
     )
@@ -475,7 +475,7 @@ def _split(
 def _check_jumps(repaired: ItemList) -> None:
     if repaired.jumps > MOST_TRACKED_JUMPS:
         raise SituationError(
-            f"the repaired mission holds {repaired.jumps} jumps; the autopilot counts {MOST_TRACKED_JUMPS}",
+            f"the repaired mission has {repaired.jumps} jumps (DO_JUMP); the autopilot supports {MOST_TRACKED_JUMPS}",
             jumps=repaired.jumps,
         )
 
@@ -484,12 +484,12 @@ def _changes(repaired: ItemList) -> tuple[str, ...]:
     """Return sentences that list what was changed."""
     texts = []
     for key, count in repaired.added.items():
-        texts.append(f"{_names(key)}: replaced by a route with {count} waypoint{'s' * (count != 1)} more")
+        texts.append(f"{_names(key)}: replaced by a route with {counted(count, 'more waypoint')}")
     for seq, (old, new) in repaired.changed.items():
         if old.position != new.position:
-            texts.append(
-                f"item {seq} was blocked: moved {distance_m(old.position, new.position):.2f} m to {new.position}"
-            )
+            texts.append(moved_text(f"item {seq}", distance_m(old.position, new.position), new.position))
         if old.params != new.params:
-            texts.append(f"item {seq}: the vehicle waits {new.params[0]:g} s there, so as to turn from rest")
+            texts.append(
+                f"item {seq}: the vehicle now waits {new.params[0]:g} s there, to turn from standstill"
+            )
     return tuple(texts)

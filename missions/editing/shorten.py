@@ -75,8 +75,8 @@ def shortened(
         search.leave_out(again)
     if search.count > most:
         raise MissionTooLongError(
-            f"the mission needs {search.count + 1} items with home, and the vehicle holds {most + 1}: {len(mission.items) - search.count} of "
-            f"{len(own)} items of its route could be left out without coming nearer to a fence; give fewer targets, or drive in parts",
+            f"the mission needs {search.count + 1} items including home, but the vehicle holds {most + 1}; {len(mission.items) - search.count} of "
+            f"{len(own)} route items could be left out without coming closer to a fence",
             items=search.count + 1,
             limit=most + 1,
             left_out=len(mission.items) - search.count,

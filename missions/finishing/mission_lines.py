@@ -110,7 +110,7 @@ def check_lines(ground: Ground, lines: Lines, start_clearance_m: float, asked_m:
     for name, found in parts.items():
         if found and min(found) < least_m[name] - 1e-6:
             raise PlanCheckError(
-                f"the {name} comes {min(found):.4f} m near a fence; at least {least_m[name]:.4f} m was asked. This is a defect",
+                f"the {name} comes within {min(found):.4f} m of a fence; at least {least_m[name]:.4f} m is required. This is a bug, please report it",
                 clearance_m=min(found),
                 asked_m=least_m[name],
             )

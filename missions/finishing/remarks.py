@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from missions.geo import distance_m
 from missions.ground.legs import ROUNDING_RESERVE_M
 from missions.vehicle.parameter_remarks import assumed_remarks
-from missions.words import metres
+from missions.words import HEADING_UNKNOWN, metres, moved_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,7 +24,7 @@ def lead_away_remarks(found: DrivenRoute, least_m: float) -> list[str]:
         return []
     if found.start_clearance_m < 0:
         return [
-            f"the start is on forbidden ground, {-found.start_clearance_m:.2f} m from free ground: the first leg drives out of it"
+            f"the start is inside an exclusion or outside the fence, {-found.start_clearance_m:.2f} m from the allowed area: leg 1 drives out of it"
         ]
     if found.lead_away_m is None:
         distance = f"{metres(found.start_clearance_m)} from a fence, nearer than {metres(least_m)}"
@@ -41,7 +41,7 @@ def lead_away_remarks(found: DrivenRoute, least_m: float) -> list[str]:
 def moved_target_remarks(targets: Sequence[LatLon], reached: Sequence[LatLon]) -> list[str]:
     """Return remarks on which targets were moved, and how far."""
     return [
-        f"the target {asked} is blocked: moved {distance_m(asked, found):.2f} m to {found}"
+        moved_text(f"target {asked}", distance_m(asked, found), found)
         for asked, found in zip(targets, reached, strict=True)
         if distance_m(asked, found) > ROUNDING_RESERVE_M
     ]
@@ -59,12 +59,12 @@ def drive_remarks(
         return []
     warnings = []
     if heading_deg is None:
-        warnings.append("heading unknown; assuming the rover faces along the first leg")
+        warnings.append(HEADING_UNKNOWN)
     warnings += assumed_remarks(vehicle)
     # Half a centimetre is not worth a warning; chosen, not measured.
     if asked.allowance_m and driven_m < asked.promised_m - 0.005 and not found.lead_away:
         warnings.append(
-            f"the drive model predicts {metres(driven_m)} at the nearest while driving, less than the {metres(asked.promised_m)} promised "
-            f"with an allowance of {asked.allowance_m:g} m"
+            f"predicted clearance while driving {metres(driven_m)}, less than the {metres(asked.promised_m)} promised "
+            f"with --corner-allowance {asked.allowance_m:g}"
         )
     return warnings

@@ -189,7 +189,7 @@ def _check_band(ground: Ground, lines: Lines, band: Envelope, found: DrivenRoute
         kept_m = float(clearances_m[part].min(initial=np.inf))
         if kept_m < least_m - _ROUNDING_M:
             raise PlanCheckError(
-                f"the {name} is predicted to be driven within {kept_m:.4f} m of a fence; {least_m:.4f} m was required. This is a defect",
+                f"the {name} is predicted to be driven within {kept_m:.4f} m of a fence; {least_m:.4f} m is required. This is a bug, please report it",
                 clearance_m=kept_m,
                 asked_m=least_m,
             )

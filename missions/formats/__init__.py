@@ -130,7 +130,7 @@ def read_situation(path: Path | str, choices: Choices = NO_CHOICES) -> Situation
     format_ = format_of(path)
     if choices.roles and not format_.is_map:
         raise MissionFormatError(
-            f"{path}: --role is for maps; a {path.suffix} file says itself what each of its zones is",
+            f"{path}: --role is for map files; a {path.suffix} file already says what each zone is",
             file=str(path),
             advice="leave --role out; to change a zone, edit the file in the ground station",
         )
@@ -168,14 +168,14 @@ def fence_of(situation: Situation, path: Path | str) -> Fence:
     fence = situation.fence
     if fence is None or not fence.value.zones:
         raise FenceMissingError(
-            f"{path} holds no fence",
+            f"{path} contains no fence",
             file=str(path),
-            advice="give a file that holds one (--fence), such as a QGroundControl .plan",
+            advice="use a file that contains a fence, such as a QGroundControl .plan (--fence FILE)",
         )
     return fence.value
 
 
-_SUFFIX_ADVICE = "the suffix tells the format: name the file by one of these"
+_SUFFIX_ADVICE = "the file extension sets the format; use one of these"
 
 
 def read_mission(path: Path | str) -> Mission:
@@ -199,9 +199,9 @@ def mission_of(situation: Situation, path: Path | str) -> Mission:
     """
     if situation.mission is None:
         raise MissionFormatError(
-            f"{path} holds no mission",
+            f"{path} contains no mission",
             file=str(path),
-            advice="give a file that holds one, such as a .plan or .waypoints",
+            advice="use a file that contains a mission, such as a .plan or .waypoints",
         )
     return situation.mission.value
 
@@ -238,21 +238,21 @@ def write_situation(
     wanted = [one for one in parts_of(situation) if one in format_.holds and part in (None, one)]
     if not parts_of(situation):
         raise MissionFormatError(
-            f"{path}: there is nothing to write: no mission, fence, rally points or parameters",
+            f"{path}: nothing to write: no mission, fence, rally points or parameters",
             file=str(path),
-            advice="look at what the file to write from holds",
+            advice="check what the input file contains",
         )
     if not wanted:
         held = " or ".join(format_.holds)
         raise MissionFormatError(
             f"{path}: there is no {part or held} to write" if part in (None, *format_.holds)
-            else f"{path}: a {path.suffix} file holds no {part}; it holds {held}",
+            else f"{path}: a {path.suffix} file contains no {part}; it contains {held}",
             file=str(path),
-            advice="choose another suffix, or another file to write from",
+            advice="choose another file extension or another input file",
         )  # fmt: skip
     if len(wanted) > 1 and not format_.together:
         raise MissionFormatError(
-            f"{path}: a {path.suffix} file holds one list, and there are {' and '.join(wanted)}; choose one",
+            f"{path}: a {path.suffix} file contains one list, but there are {' and '.join(wanted)}; choose one",
             file=str(path),
         )
     assert format_.write is not None
@@ -310,7 +310,7 @@ def check_writable_format(path: Path, part: Part = Part.MISSION) -> None:
     """
     if part not in format_of(path, "write", part).holds:
         raise MissionFormatError(
-            f"{path}: a {path.suffix} file holds no {part}; known for it are {_known(part)}",
+            f"{path}: a {path.suffix} file contains no {part}; supported: {_known(part)}",
             file=str(path),
             advice=_SUFFIX_ADVICE,
         )
@@ -328,14 +328,14 @@ def format_of(path: Path, verb: str = "read", part: Part | None = None) -> Forma
     foreign = kind_of_suffix(path.suffix) if verb == "read" and found is None else None
     if foreign is not None:
         raise MissionFormatError(
-            f"{path} is {foreign[0]}; read are {_known(part, reading=True)}",
+            f"{path} is {foreign[0]}; supported: {_known(part, reading=True)}",
             file=str(path),
             advice=foreign[1],
         )
     if found is None or (verb == "write" and found.write is None):
         raise MissionFormatError(
-            f"{path}: no format to {verb} for the suffix {path.suffix!r}; "
-            f"known are {_known(part, reading=verb == 'read')}",
+            f"{path}: cannot {verb} files with extension {path.suffix!r}; "
+            f"supported: {_known(part, reading=verb == 'read')}",
             file=str(path),
             advice=_SUFFIX_ADVICE,
         )

@@ -26,10 +26,10 @@ def check_bound(count: int, most: int, what: str, source: str) -> None:
     """
     if count > most:
         raise MissionFormatError(
-            f"{source}: more than {most:,} {what}; that is the most that is read",
+            f"{source}: more than {most:,} {what}, the limit",
             file=source,
             most=most,
-            advice="keep only the part around the field, and save that",
+            advice="cut the file down to the area around the field",
         )
 
 
@@ -54,4 +54,4 @@ def check_depth(depth: int, where: str) -> None:
         It is; the message names the bound.
     """
     if depth > MOST_DEEP:
-        raise MissionFormatError(f"{where}: nested more than {MOST_DEEP} deep", where=where)
+        raise MissionFormatError(f"{where}: nested more than {MOST_DEEP} levels deep", where=where)

@@ -51,9 +51,10 @@ class Choices:
         }
         for name in self.roles:
             if name_key(name) not in shown:
-                there = ", ".join(map(repr, list(shown.values())[:20])) or "nothing"
+                there = ", ".join(map(repr, list(shown.values())[:20])) or "none"
                 raise MissionFormatError(
-                    f"{source}: --role {name!r}: no feature has that name; there are {there}", file=source
+                    f"{source}: --role {name!r}: no feature has that name; names in the file: {there}",
+                    file=source,
                 )
 
 

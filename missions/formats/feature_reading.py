@@ -42,7 +42,7 @@ def situation_of(features: Iterable[Feature], source: str, choices: Choices = NO
     check_bound(len(drawn), MOST_FEATURES, "features", source)
     all_features = numbered(drawn)
     if not all_features:
-        raise MissionFormatError(f"{source}: there is nothing in it", file=source)
+        raise MissionFormatError(f"{source}: contains no features", file=source)
     choices.check_names(all_features, source)
     remarks = []
     for feature in all_features:
@@ -58,13 +58,13 @@ def situation_of(features: Iterable[Feature], source: str, choices: Choices = NO
             found[Role.ROUTE].append(feature)
         elif feature.shape is Shape.TRACK:
             raise feature.error(
-                f"{feature} was recorded, not planned",
-                advice=f"drive it as a route: {feature.role_option('route')}",
+                f"{feature} is a recorded track, not a planned route",
+                advice=f"to use it as a route: {feature.role_option('route')}",
             )
         elif feature.shape is Shape.POINT:
             unknown_points.append(feature)
         if feature.is_hidden and role is Role.DRAWING and choices.role_for(feature) is None:
-            remarks.append(f"{feature.where}: {feature} is hidden (visibility 0): passed over")
+            remarks.append(f"{feature.where}: {feature} is hidden (visibility 0): skipped")
     sorted_zones, taken = roles_of_zones(zones, choices, unknown_points)
     fence = Fence(
         tuple(zone for pair in sorted_zones for zone in zones_of(*pair)), _lone(found[Role.RETURN_POINT])
@@ -85,7 +85,7 @@ def situation_of(features: Iterable[Feature], source: str, choices: Choices = NO
 def _rally_point(feature: Feature) -> RallyPoint:
     alt_m = feature.number("altitude_m", 0.0)
     if not math.isfinite(alt_m):
-        raise feature.error(f"altitude_m {alt_m}; expected metres")
+        raise feature.error(f"altitude_m {alt_m}; expected a number of metres")
     return RallyPoint(*feature.position, alt_m)
 
 
@@ -115,7 +115,7 @@ def _in_order(waypoints: Sequence[Feature]) -> list[Feature]:
     for feature in waypoints:
         seq = feature.whole("seq", 0)
         if seq in by_seq:
-            raise feature.error(f"a second item of seq {seq}")
+            raise feature.error(f"seq {seq} is used twice")
         by_seq[seq] = feature
     return [by_seq[seq] for seq in sorted(by_seq)]
 
@@ -125,12 +125,10 @@ def _item(feature: Feature) -> MissionItem:
     frame = feature.whole("frame", CoordinateFrame.GLOBAL_RELATIVE_ALT)
     if feature.shape is Shape.POINT:
         if not has_place(command, frame):
-            raise feature.error(
-                f"a point, and command {command} has no place; expected a command that has one"
-            )
+            raise feature.error(f"a point, but command {command} has no position")
         lat_e7, lon_e7 = to_e7(feature.position)
     elif feature.properties.get("command") is None:
-        raise feature.error("a waypoint without a place; expected a point, or a command that needs none")
+        raise feature.error("a waypoint without a position; expected a point, or a command that needs none")
     else:
         try:
             lat_e7, lon_e7 = xy_from_file(

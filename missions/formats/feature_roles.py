@@ -97,7 +97,7 @@ def role_of(feature: Feature, choices: Choices = NO_CHOICES) -> Role | None:
         said = _said_roles(feature)
         if len(said) > 1:
             raise feature.error(
-                f"said to be {' and '.join(sorted(said))} at once", advice=_either(feature, said)
+                f"marked as {' and '.join(sorted(said))} at once", advice=_either(feature, said)
             )
         role = next(iter(said), None) or _named_role(feature.names, feature, possible | _ZONES)
     if (
@@ -126,9 +126,7 @@ def _misfit(feature: Feature, role: Role, possible: Iterable[Role]) -> MissionFo
 
 
 def _either(feature: Feature, roles: Iterable[Role]) -> str:
-    return "say which it is: " + " or ".join(
-        feature.role_option(role) for role in sorted(roles, reverse=True)
-    )
+    return "choose one: " + " or ".join(feature.role_option(role) for role in sorted(roles, reverse=True))
 
 
 def _said_roles(feature: Feature) -> set[Role]:
@@ -160,7 +158,7 @@ def _named_role(names: Iterable[str], feature: Feature, possible: Iterable[Role]
         roles = _roles_in(name) & frozenset(possible)
         if len(roles) > 1:
             raise feature.error(
-                f"the name {name!r} tells of {' and '.join(sorted(roles))}; expected one of them",
+                f"the name {name!r} could mean {' or '.join(sorted(roles))}",
                 advice=_either(feature, roles),
             )
         if roles:

@@ -41,7 +41,7 @@ def roles_of_zones(
     remarks: tuple[str, ...] = ()
     if len(zones) == 1 and unknown and may_be_inclusion(unknown[0]):
         lone = unknown.pop()
-        taken = f"{lone} is the only zone and nothing says what it is: taken for an inclusion, the area to stay in"
+        taken = f"{lone} is the only zone and has no role: used as an inclusion (area to stay in)"
         remarks = (f"{lone.where}: {taken} (otherwise: {lone.role_option('exclusion')})",)
     if unknown or points:
         raise _uncertain(unknown, points, fields)
@@ -54,21 +54,21 @@ def _uncertain(
     problems = []
     if zones:
         problems.append(
-            f"nothing says whether {_listed(zones)} {'are inclusions or exclusions' if len(zones) > 1 else 'is an inclusion or an exclusion'}"
+            f"unclear whether {_listed(zones)} {'are inclusions or exclusions' if len(zones) > 1 else 'is an inclusion or an exclusion'}"
         )
     if points:
-        problems.append(f"nothing says what {_listed(points)} {'are' if len(points) > 1 else 'is'}")
+        problems.append(f"unclear what {_listed(points)} {'are' if len(points) > 1 else 'is'}")
     first = (*zones, *points)[0]
     options, notes = [], []
     if len(zones) > 1 and _find_outermost(fields) is not None:
         options.append("--outermost inclusion")
-        notes.append("the others are exclusions then")
+        notes.append("then all others are exclusions")
     elif zones:
         options += [zone.role_option("exclusion") for zone in zones[:5]]
         notes.append("or =inclusion, =ignore")
     if points:
         options.append("--ignore-points")
-        notes += [] if zones else [f"or say what they are, such as {first.role_option('waypoint')}"]
+        notes += [] if zones else [f"or set a role, such as {first.role_option('waypoint')}"]
     advice = f"add to the command: {' '.join(options)} ({'; '.join(notes)})"
     return first.error("; ".join(problems), advice=advice.removesuffix(" ()"))
 
@@ -83,8 +83,8 @@ def _outermost(zones: Sequence[Feature]) -> Feature:
     found = _find_outermost(zones)
     if found is None:
         raise zones[0].error(
-            f"--outermost: none of these zones holds all others: {_listed(zones)}",
-            advice=f"say what they are one by one: {zones[0].role_option('inclusion')} …",
+            f"--outermost: none of these zones contains all others: {_listed(zones)}",
+            advice=f"set the role of each: {zones[0].role_option('inclusion')} …",
         )
     return found
 

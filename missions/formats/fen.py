@@ -25,14 +25,14 @@ def read(text: str, source: str) -> Situation:
     points = read_points(text, source)
     if len(points) < 5:
         raise MissionFormatError(
-            f"{source}: {len(points)} points; expected the return point, at least 3 vertices and the first of them again",
+            f"{source}: {len(points)} points; expected the return point, at least 3 vertices and the first vertex again",
             file=source,
         )
     ring = [point for _, point in points[1:]]
     if ring[0] != ring[-1]:
         raise MissionFormatError(
-            f"{source}: line {points[-1][0]}: the ring is not closed: expected the point of line {points[1][0]} again, "
-            "or the file is cut short",
+            f"{source}: line {points[-1][0]}: the polygon is not closed: expected the point of line {points[1][0]} again; "
+            "is the file truncated?",
             file=source,
             line=points[-1][0],
         )
@@ -52,5 +52,5 @@ def write(situation: Situation) -> str:
     fence = situation.fence.value
     ring = lone_inclusion(fence, ".fen").vertices
     if fence.return_point is None:
-        raise MissionFormatError("a .fen file begins with the return point, and the fence has none")
+        raise MissionFormatError("a .fen file needs a return point, but the fence has none")
     return format_points([fence.return_point, *ring, ring[0]])

@@ -149,5 +149,5 @@ def unwritable(path: Path, error: OSError) -> MissionFormatError:
     return MissionFormatError(
         f"{path} cannot be written: {error.strerror}",
         file=str(path),
-        advice="choose another place, or make this one writable",
+        advice="choose another folder, or make this one writable",
     )

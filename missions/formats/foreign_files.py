@@ -6,12 +6,12 @@ from missions.errors import MissionFormatError
 
 _LOG_ADVICE = "use the telemetry log (.tlog) that the ground station recorded, with --log"
 _BY_SUFFIX: dict[str, tuple[str, str]] = {
-    ".tlog": ("a telemetry log", "give it with --log FILE.tlog; `pbpp log FILE.tlog` summarises it"),
-    ".bin": ("a DataFlash log of ArduPilot", _LOG_ADVICE),
-    ".log": ("a DataFlash log of ArduPilot, or a program's own log", _LOG_ADVICE),
+    ".tlog": ("a telemetry log", "use --log FILE.tlog; `pbpp log FILE.tlog` summarises it"),
+    ".bin": ("an ArduPilot DataFlash log", _LOG_ADVICE),
+    ".log": ("an ArduPilot DataFlash log, or another program's log", _LOG_ADVICE),
     ".ulg": ("a PX4 ULog", _LOG_ADVICE),
-    ".rlog": ("a raw log of Mission Planner", _LOG_ADVICE),
-    ".mission": ("a mission of iNav (XML)", "save it from the iNav Configurator as .kml, or draw it anew"),
+    ".rlog": ("a Mission Planner raw log", _LOG_ADVICE),
+    ".mission": ("an iNav mission (XML)", "save it from the iNav Configurator as .kml, or draw it again"),
     ".dxf": ("a CAD drawing", "export the zones from it as .geojson or .kml, in WGS 84"),
     ".dbf": ("a shapefile's table", "give the .shp beside it"),
     ".shx": ("a shapefile's index", "give the .shp beside it"),
@@ -31,16 +31,22 @@ _MAGIC: tuple[tuple[bytes, str], ...] = (
     (b"7z\xbc\xaf", ".7z"),
 )
 _KINDS = {
-    ".shp": ("a shapefile", "name it .shp; it is read with the extra gis (pip install 'pbpp-rover[gis]')"),
-    ".gpkg": ("a GeoPackage", "name it .gpkg; it is read with the extra gis (pip install 'pbpp-rover[gis]')"),
+    ".shp": (
+        "a shapefile",
+        "rename it to .shp; reading it needs the gis extra (pip install 'pbpp-rover[gis]')",
+    ),
+    ".gpkg": (
+        "a GeoPackage",
+        "rename it to .gpkg; reading it needs the gis extra (pip install 'pbpp-rover[gis]')",
+    ),
     ".zip": (
         "a zip archive",
-        "name it .kmz where it holds a KML, .zip where it holds a shapefile, or unpack it",
+        "rename it to .kmz if it contains KML, to .zip if it contains a shapefile, or unpack it",
     ),
     ".png": ("a picture (PNG)", "draw the zones on a map and save them as .kml, .geojson or .plan"),
     ".jpg": ("a picture (JPEG)", "draw the zones on a map and save them as .kml, .geojson or .plan"),
     ".pdf": ("a PDF document", "draw the zones on a map and save them as .kml, .geojson or .plan"),
-    ".gz": ("packed by gzip", "unpack it first"),
+    ".gz": ("a gzip archive", "unpack it first"),
     ".7z": ("a 7z archive", "unpack it first"),
 }
 

@@ -46,7 +46,7 @@ def read_path(path: Path, choices: Choices = NO_CHOICES) -> Situation:
         import pyogrio  # noqa: PLC0415 - an extra
     except ImportError:
         raise MissionFormatError(
-            f"{path} is {kind}, which is read with the extra gis",
+            f"{path} is {kind}; reading it needs the gis extra",
             file=source,
             advice="pip install 'pbpp-rover[gis]', or export it as .geojson in EPSG:4326",
         ) from None
@@ -98,23 +98,23 @@ def _check_file(path: Path) -> None:
         raise MissionFormatError(
             f"{path} cannot be read: {error.strerror}",
             file=source,
-            advice="look at the path and its spelling",
+            advice="check the path",
         ) from None
     except (zipfile.BadZipFile, ValueError, NotImplementedError) as error:
-        raise MissionFormatError(f"{path} is no zip file that can be read: {error}", file=source) from None
+        raise MissionFormatError(f"{path} is not a readable zip file: {error}", file=source) from None
     check_bound(sum(part.file_size for part in parts), MOST_BYTES, "bytes when unpacked", source)
     if not any(part.filename.lower().endswith(".shp") for part in parts):
         raise MissionFormatError(
             f"{path} is a zip archive without a shapefile (.shp) in it",
             file=source,
-            advice="unpack it, or name it .kmz where it holds a KML",
+            advice="unpack it, or rename it to .kmz if it contains KML",
         )
 
 
 def _features(crs: str | None, shapes: Any, rows: list[dict[str, object]], where: str) -> Iterator[Feature]:  # noqa: ANN401 - an array of WKB
     if crs is None:
         raise MissionFormatError(
-            f"{where}: it does not say its projection (a shapefile's .prj)",
+            f"{where}: projection unknown (a shapefile's .prj)",
             where=where,
             advice="keep the .prj beside the .shp, or export it as .geojson in EPSG:4326",
         )

@@ -45,10 +45,10 @@ def read(text: str, source: str, choices: Choices = NO_CHOICES) -> Situation:
     remarks: tuple[str, ...] = ()
     if len(drawn) == 1 and drawn[0].shape is Shape.TRACK:
         drawn = [replace(drawn[0], fallback=Role.ROUTE)]
-        remarks = (f"{source}: the recorded track is taken for the route",)
+        remarks = (f"{source}: the recorded track is used as the route",)
     elif not drawn and places:
         points = [replace(point, fallback=Role.WAYPOINT) for point in points]
-        remarks = (f"{source}: {len(places)} way points are taken for the mission, in the order of the file",)
+        remarks = (f"{source}: {len(places)} waypoints are used as the mission, in file order",)
     situation = situation_of([*drawn, *points], source, choices)
     return replace(situation, remarks=(*(remarks if situation.mission else ()), *situation.remarks))
 
@@ -86,7 +86,7 @@ def write(situation: Situation) -> str:
     home = mission.home or (situation.home.value if situation.home else None)
     places = [(seq, item.position) for seq, item in enumerate(mission.items, start=1) if item.is_placed]
     if not places:
-        raise MissionFormatError("a .gpx file holds a route, and no item of the mission has a place")
+        raise MissionFormatError("a .gpx file contains a route, but no mission item has a position")
     return "\n".join(
         [
             '<?xml version="1.0" encoding="UTF-8"?>',

@@ -31,7 +31,7 @@ def parse_json(text: str, source: str) -> JsonNode:
         ) from None
     except (RecursionError, ValueError) as error:
         reason = (
-            "nested too deeply (some 1,000 deep)"
+            "nested too deeply (about 1,000 levels)"
             if isinstance(error, RecursionError)
             else str(error).partition(" for integer")[0]
         )

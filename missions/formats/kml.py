@@ -82,7 +82,7 @@ def _features(element: Element, names: tuple[str, ...], *, is_hidden: bool = Fal
         elif child.name == "Placemark":
             yield from _placemark(child, names, is_hidden=is_hidden)
         elif child.name == "NetworkLink":
-            raise child.error("a NetworkLink; nothing is fetched from elsewhere: save what it leads to")
+            raise child.error("a NetworkLink, which is not followed; save the linked file and use that")
 
 
 def _placemark(element: Element, names: tuple[str, ...], *, is_hidden: bool) -> list[Feature]:

@@ -43,7 +43,7 @@ def _whole_param(command: int, number: int, value: float) -> int:
     ):  # what a ground station left there, such as an old place
         return 0
     raise InvalidPositionError(
-        f"param{number} is {value:.10g}; command {command} has no place, and a mission item carries whole numbers there"
+        f"param{number} is {value:.10g}; command {command} has no position, so a mission item holds a whole number there"
     )
 
 
@@ -79,8 +79,8 @@ def without_nan(item: MissionItem) -> MissionItem:
     for i, value in enumerate(item.params, start=1):
         if math.isnan(value) and str(i) in used:
             raise MissionFormatError(
-                f"param{i} of command {int(item.command)} is not set (NaN), and this format needs a number",
-                advice="set the parameter in the program that the mission comes from, or write a .plan or .geojson",
+                f"param{i} of command {int(item.command)} is not set (NaN), but this format needs a number",
+                advice="set it in the ground station, or save as .plan or .geojson",
             )
     params = item.params
     a, b, c, d = (0.0 if math.isnan(value) else value for value in params)
@@ -90,7 +90,7 @@ def without_nan(item: MissionItem) -> MissionItem:
 def swapped_hint(lat_deg: float, lon_deg: float, order: str) -> str:
     """Return what to add to an error of a position whose numbers would be one the other way round."""
     if 90 < abs(lat_deg) <= 180 and abs(lon_deg) <= 90:
-        return f"; the order here is {order}: are they swapped?"
+        return f"; expected {order}: are they swapped?"
     return ""
 
 

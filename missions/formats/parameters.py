@@ -65,7 +65,7 @@ def read(text: str, source: str) -> Situation:
         name, value = _parse(content, f"{source}: line {number}")
         if len(name) > _MOST_LETTERS:
             remarks.append(
-                f"{source}: line {number}: {name} is passed over: a parameter's name has at most {_MOST_LETTERS} letters, and this {len(name)}"
+                f"{source}: line {number}: {name} skipped: parameter names have at most {_MOST_LETTERS} characters, this one has {len(name)}"
             )
         else:
             parameters[name] = value

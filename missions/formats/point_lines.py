@@ -66,7 +66,7 @@ def lone_inclusion(fence: Fence, suffix: str) -> PolygonZone:
         if (count := fence.count(kind, shape))
     ]
     raise MissionFormatError(
-        f"a {suffix} file holds one inclusion polygon and nothing else; the fence has {', '.join(counts) or 'no zone'}"
+        f"a {suffix} file contains exactly one inclusion polygon; the fence has {', '.join(counts) or 'no zone'}"
     )
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 _LAT = ("lat", "latitude", "lat_deg", "latitude_deg", "breite", "breitengrad")
 _LON = ("lon", "lng", "long", "longitude", "lon_deg", "longitude_deg", "länge", "längengrad")
-_ORDER = "latitude and longitude as the columns say"
+_ORDER = "latitude and longitude as line 1 names them"
 
 
 def read(text: str, source: str, choices: Choices = NO_CHOICES) -> Situation:
@@ -41,7 +41,7 @@ def read(text: str, source: str, choices: Choices = NO_CHOICES) -> Situation:
     except csv.Error as error:
         raise MissionFormatError(f"{source}: line {rows.line_num}: {error}", file=source) from None
     if not numbered:
-        raise MissionFormatError(f"{source}: there is nothing in it", file=source)
+        raise MissionFormatError(f"{source}: the file is empty", file=source)
     heads = [cell.strip().casefold() for cell in numbered[0][1]]
     lat, lon = (_column(heads, names, source) for names in (_LAT, _LON))
     features = [_feature(heads, lat, lon, row, f"{source}: line {line}") for line, row in numbered[1:]]
@@ -98,5 +98,5 @@ def write(situation: Situation) -> str:
         if item.is_placed
     ]
     if not rows:
-        raise MissionFormatError("a .csv file holds places, and no item of the mission has one")
+        raise MissionFormatError("a .csv file contains positions, but no mission item has one")
     return "".join(["lat,lon,name\n", *rows])

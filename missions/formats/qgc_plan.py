@@ -96,10 +96,8 @@ def _is_of_version_2(plan: JsonNode, key: str, remarks: list[str]) -> bool:
     if not isinstance(node.value, dict):
         raise node.error("expected an object")
     if node.value == {} or node.value.get("version") == 1:
-        what = (
-            "is empty" if node.value == {} else "is of version 1, which QGroundControl does not read either"
-        )
-        remarks.append(f"{node.source}: {key} {what}: passed over")
+        what = "is empty" if node.value == {} else "has version 1, which QGroundControl does not read either"
+        remarks.append(f"{node.source}: {key} {what}: skipped")
         return False
     if (key == "geoFence" or "version" in node) and node["version"].value != 2:
         raise node["version"].error(f"{key} version {node['version'].value!r}; expected 2")
@@ -121,7 +119,7 @@ def _rally_point(node: JsonNode) -> RallyPoint:
         return RallyPoint(*position)
     alt_m = node[2].number()
     if not math.isfinite(alt_m):
-        raise node[2].error(f"altitude {alt_m}; expected metres")
+        raise node[2].error(f"altitude {alt_m}; expected a number of metres")
     return RallyPoint(*position, alt_m)
 
 
@@ -142,8 +140,8 @@ def _simple_items(node: JsonNode) -> list[JsonNode]:
         return node[_TRANSECTS]["Items"].members()
     kind = node["complexItemType"].value if "complexItemType" in node else node["type"].value
     raise node["type"].error(
-        f"a pattern of kind {kind!r}, which QGroundControl saves without its items; read are simple items, surveys and corridor scans",
-        advice="delete the pattern, or upload the plan from QGroundControl and take the mission from the vehicle (pbpp download mission)",
+        f"pattern {kind!r}, which QGroundControl saves without its items; supported: simple items, surveys and corridor scans",
+        advice="delete the pattern, or upload the plan from QGroundControl and download the mission from the vehicle (pbpp download mission)",
     )
 
 
@@ -165,7 +163,7 @@ def _jump_by_seq(node: JsonNode, item: MissionItem, seq_of_id: dict[int, int | N
     seq = seq_of_id.get(jump_id)
     if seq is None:
         raise node["params"][0].error(
-            f"expected the doJumpId of one item; {jump_id} is that of none or several"
+            f"expected the doJumpId of exactly one item; {jump_id} belongs to none or several"
         )
     return replace(item, params=(float(seq), *item.params[1:]))
 

@@ -46,5 +46,5 @@ def _point(columns: list[str], where: str) -> RallyPoint:
     except (ValueError, InvalidPositionError) as error:
         raise MissionFormatError(f"{where}: {error}", where=where) from None
     if not math.isfinite(alt_m):
-        raise MissionFormatError(f"{where}: altitude {alt_m}; expected metres", where=where)
+        raise MissionFormatError(f"{where}: altitude {alt_m}; expected a number of metres", where=where)
     return point

@@ -54,7 +54,7 @@ def read_text(path: Path) -> Text:
         raise MissionFormatError(
             f"{path} cannot be read: {error.strerror or error}",
             file=str(path),
-            advice="look at the path and its spelling",
+            advice="check the path",
         ) from None
     check_head(data[:16], str(path), "a text file")
     return Text(_decoded(data, path).replace("\r\n", "\n").replace("\r", "\n"), remarks)
@@ -68,7 +68,7 @@ def _decoded(data: bytes, path: Path) -> str:
         encoding = "utf-8-sig"
     if not _is_known(encoding):
         raise MissionFormatError(
-            f"{path}: the encoding {encoding!r} is not known; save the file as UTF-8", file=str(path)
+            f"{path}: the encoding {encoding!r} is not supported; save the file as UTF-8", file=str(path)
         )
     try:
         return data.decode(encoding)
@@ -95,7 +95,7 @@ def _bounded(file: IO[bytes], source: str) -> bytes:
         size += len(chunk)
         if size > MOST_BYTES:
             raise MissionFormatError(
-                f"{source}: more than {MOST_BYTES / 1e6:.0f} MB; that is the most that is read",
+                f"{source}: more than {MOST_BYTES / 1e6:.0f} MB, the limit",
                 file=source,
                 most=MOST_BYTES,
             )
@@ -113,7 +113,7 @@ def _unzipped(data: bytes, path: Path) -> tuple[bytes, tuple[str, ...]]:
                 zipfile.ZIP_STORED,
                 zipfile.ZIP_DEFLATED,
             ):  # Python unpacks others without a bound
-                raise NotImplementedError(f"{found.filename} is packed by another method than deflate")
+                raise NotImplementedError(f"{found.filename} is not compressed with deflate")
             with archive.open(found) as file:
                 return _bounded(file, f"{path}: {found.filename}"), remarks
     except (
@@ -126,7 +126,7 @@ def _unzipped(data: bytes, path: Path) -> tuple[bytes, tuple[str, ...]]:
     ) as error:
         reason = str(error) or type(error).__name__
         raise MissionFormatError(
-            f"{path} is no zip file that can be read: {reason}", file=str(path), advice=_ZIP_ADVICE
+            f"{path} is not a readable zip file: {reason}", file=str(path), advice=_ZIP_ADVICE
         ) from None
 
 
@@ -136,10 +136,10 @@ _ZIP_ADVICE = "save the .kmz again as an ordinary zip file, or save a .kml"
 def _kml_in(archive: ZipFile, path: Path) -> tuple[ZipInfo, tuple[str, ...]]:
     found = [one for one in archive.infolist() if one.filename.lower().endswith(".kml")]
     if not found:
-        raise MissionFormatError(f"{path} holds no .kml", file=str(path))
+        raise MissionFormatError(f"{path} contains no .kml", file=str(path))
     chosen = next((one for one in found if one.filename.lower() == "doc.kml"), found[0])
     others = [one.filename for one in found if one is not chosen]
     if not others:
         return chosen, ()
     shown = ", ".join(others[:3]) + (f" and {len(others) - 3} more" if len(others) > 3 else "")
-    return chosen, (f"{path}: {chosen.filename} is read; {shown} in the same .kmz is not",)
+    return chosen, (f"{path}: only {chosen.filename} is read, not {shown}",)

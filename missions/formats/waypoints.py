@@ -64,7 +64,7 @@ def read(text: str, source: str) -> Situation:
         raise MissionFormatError(f"{source}: line 1: expected {_HEADER!r}", file=source, line=1)
     if version not in _VERSIONS:
         raise MissionFormatError(
-            f"{source}: line 1: QGC WPL {version} is a version that is not known; read are 110 and 100",
+            f"{source}: line 1: unknown version QGC WPL {version}; supported: 110 and 100",
             file=source,
             line=1,
             advice="save the file from the ground station again, as QGC WPL 110 or as .plan",
@@ -152,7 +152,7 @@ def _row(columns: list[str], version: str, where: str, line: int) -> _Row:
 def _command_100(action: int) -> int:
     if action not in _COMMANDS_100:
         raise ValueError(
-            f"action {action} of QGC WPL 100; known are {', '.join(map(str, sorted(_COMMANDS_100)))}"
+            f"action {action} of QGC WPL 100; supported: {', '.join(map(str, sorted(_COMMANDS_100)))}"
         )
     return _COMMANDS_100[action]
 
@@ -165,7 +165,7 @@ def _seq_remarks(rows: Sequence[_Row], source: str) -> tuple[str, ...]:
     first = rows[0]
     if first.seq not in (0, 1):
         raise MissionFormatError(
-            f"{source}: line {first.line}: seq {first.seq}; a list begins with seq 0 (home) or 1, or the file is cut short",
+            f"{source}: line {first.line}: seq {first.seq}; expected seq 0 (home) or 1; is the file truncated?",
             file=source,
             line=first.line,
         )
@@ -177,11 +177,11 @@ def _seq_remarks(rows: Sequence[_Row], source: str) -> tuple[str, ...]:
     jump = next((row for row in rows if row.item.command in _BY_SEQ), None)
     if jump is not None:
         raise MissionFormatError(
-            f"{problem}, and line {jump.line} jumps to an item by its seq; number the items anew",
+            f"{problem}, but line {jump.line} jumps to an item by its seq; renumber the items",
             file=source,
             line=after.line,
         )
-    return (f"{problem}: items are taken in the order of the lines",)
+    return (f"{problem}: items are read in line order",)
 
 
 def _situation(rows: list[_Row], remarks: tuple[str, ...], source: str) -> Situation:
@@ -204,10 +204,10 @@ def _situation(rows: list[_Row], remarks: tuple[str, ...], source: str) -> Situa
         return replace(known, rally=Known(rally_from_items(row.item for row in rest), None, source))
     if len(rest) == len(rows) and rows[0].seq == 0:
         raise MissionFormatError(
-            f"{source}: line {rows[0].line}: command {rows[0].item.command}; the line of seq 0 is a mission's home (command 16)",
+            f"{source}: line {rows[0].line}: command {rows[0].item.command}; seq 0 must be home (command 16)",
             file=source,
             line=rows[0].line,
-            advice="put a home line before it, or let the items begin with seq 1",
+            advice="add a home line before it, or number the items from 1",
         )
     return replace(known, mission=Known(Mission(tuple(row.item for row in rest), home), None, source))
 
@@ -231,5 +231,5 @@ def _without_more_homes(
         LatLon(0.0, 0.0),
     ):
         count += 1
-    remarks = tuple(f"{source}: line {row.line}: a second home line; passed over" for row in rows[:count])
+    remarks = tuple(f"{source}: line {row.line}: second home line skipped" for row in rows[:count])
     return rows[count:], remarks

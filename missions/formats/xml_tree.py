@@ -82,7 +82,7 @@ def parse_xml(text: str, source: str) -> Element:
 
     def refuse(*_: object) -> None:
         where = f"{source}: line {parser.CurrentLineNumber}"
-        raise MissionFormatError(f"{where}: a document type (<!DOCTYPE …>) is refused", where=where)
+        raise MissionFormatError(f"{where}: a document type (<!DOCTYPE …>) is not supported", where=where)
 
     texts: dict[int, list[str]] = {}
     parser.StartElementHandler, parser.EndElementHandler = start, end

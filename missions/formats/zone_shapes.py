@@ -44,7 +44,7 @@ def cut_along_holes(feature: Feature) -> list[tuple[LatLon, ...]]:
     whole = Polygon(outer, holes)
     if not whole.is_valid:
         raise feature.error(
-            "an exclusion whose rings cross or touch; draw it anew, or as several without holes"
+            "an exclusion whose rings cross or touch; draw it again, or as several without holes"
         )
     waiting, done = [whole], []
     while waiting:

@@ -49,7 +49,7 @@ def check_latitude(position: LatLon) -> None:
     if abs(position.lat_deg) > MAX_LATITUDE_DEG:
         raise InvalidPositionError(
             f"latitude {position.lat_deg:.4f}° is beyond ±{MAX_LATITUDE_DEG:g}°: "
-            "the autopilot's flat frame is too far off so near a pole",
+            "this close to a pole the autopilot's flat-earth positions are too inaccurate",
             lat_deg=position.lat_deg,
         )
 
@@ -104,7 +104,7 @@ def frame_around(positions: Sequence[LatLon]) -> LocalFrame:
         There are no positions, or one lies beyond ±85° latitude.
     """
     if not positions:
-        raise InvalidPositionError("there is no position to lay the planning frame around")
+        raise InvalidPositionError("no position to centre the local frame on")
     lats_deg = [position.lat_deg for position in positions]
     first_lon_deg = positions[0].lon_deg
     lons_deg = [first_lon_deg + wrap_lon_deg(position.lon_deg - first_lon_deg) for position in positions]

@@ -39,7 +39,7 @@ def route_ends(situation: Situation, request: Request) -> tuple[LatLon, tuple[La
     if start is None and situation.home is not None:
         start = situation.home.value
     if start is None:
-        raise SituationError("the start is not known: no position and no home; give one (--start LAT,LON)")
+        raise SituationError("start unknown: no vehicle position and no home; use --start LAT,LON")
     targets = request.targets
     if not targets and situation.target is not None:
         targets = (situation.target.value,)
@@ -47,9 +47,7 @@ def route_ends(situation: Situation, request: Request) -> tuple[LatLon, tuple[La
         place = last_place(situation.mission.value.items)
         targets = (place,) if place else ()
     if not targets:
-        raise SituationError(
-            "the target is not known: none was sent and no mission holds one; give one (--target LAT,LON)"
-        )
+        raise SituationError("target unknown: none was sent and no mission has one; use --target LAT,LON")
     return start, targets
 
 
@@ -114,12 +112,12 @@ def _check_reach(end: LatLon, centre: LatLon) -> None:
         raise NoRouteError(
             f"no route: {_too_far(end, centre, away_m)}",
             distance_m=away_m,
-            advice="is it the right place and the right fence? Latitude comes first: LAT,LON",
+            advice="check the position (LAT,LON, latitude first) and the fence file",
         )
 
 
 def _too_far(position: LatLon, centre: LatLon, away_m: float) -> str:
     return (
         f"{position} is {away_m / 1000:.0f} km from the fence's centre {centre}; "
-        f"at most {MAX_FIELD_M / 1000:.0f} km can be planned"
+        f"the limit is {MAX_FIELD_M / 1000:.0f} km"
     )

@@ -217,8 +217,8 @@ def check_ground(ground: Ground) -> None:
     inclusions = [barrier.name for barrier in ground.barriers if barrier.kind is ZoneKind.INCLUSION]
     names = " and ".join(inclusions)
     if not ground.keep_in.is_empty:
-        raise FenceError(f"the exclusions leave no ground of {names}", zones=inclusions)
-    raise FenceError(f"{names} leave no ground in common; {_COMMON_GROUND}", zones=inclusions)
+        raise FenceError(f"the exclusions cover all of {names}", zones=inclusions)
+    raise FenceError(f"{names} have no area in common; {_COMMON_GROUND}", zones=inclusions)
 
 
 def _within(barriers: list[Barrier], circle: Area, name: str) -> list[Barrier]:
@@ -231,15 +231,15 @@ def _within(barriers: list[Barrier], circle: Area, name: str) -> list[Barrier]:
         elif not area.is_empty:
             found.append(Barrier(f"{barrier.name} within the {name}", barrier.kind, area))
     if not any(barrier.kind is ZoneKind.INCLUSION for barrier in found):
-        raise FenceError(f"no inclusion reaches into the {name}: the vehicle could be nowhere", zone=name)
+        raise FenceError(f"no inclusion overlaps the {name}: there is no allowed area", zone=name)
     return found
 
 
 def _home_circle(home: LatLon | None, radius_m: float) -> CircleZone:
     if home is None:
         raise SituationError(
-            f"the autopilot enforces a circle of FENCE_RADIUS {radius_m:g} m around home, and home is not known; "
-            "for a file or a log give it (--home LAT,LON)",
+            f"the autopilot enforces a circle of FENCE_RADIUS {radius_m:g} m around home, but home is unknown; "
+            "use --home LAT,LON",
             fence_radius_m=radius_m,
         )
     return CircleZone(ZoneKind.INCLUSION, home, radius_m)
@@ -249,7 +249,7 @@ def _area(zone: Zone, name: str, frame: LocalFrame, warnings: list[str]) -> Area
     if isinstance(zone, CircleZone):
         if not zone.radius_m <= _MOST_RADIUS_M:
             raise FenceError(
-                f"{name} has a radius of {zone.radius_m:g} m; at most {_MOST_RADIUS_M:g} m can be planned with",
+                f"{name} has a radius of {zone.radius_m:g} m; the limit is {_MOST_RADIUS_M:g} m",
                 zone=name,
                 radius_m=zone.radius_m,
             )
@@ -268,12 +268,12 @@ def _polygon(zone: PolygonZone, name: str, frame: LocalFrame, warnings: list[str
     warnings.append(
         f"{name} has no area"
         if thin and area.area <= _WALL_M * plain.length
-        else f"{name} crosses or touches itself; it is read by the even-odd rule, as the autopilot tests it"
+        else f"{name} crosses or touches itself; its inside is found by the even-odd rule, as on the autopilot"
     )
     if zone.kind is ZoneKind.EXCLUSION:  # its lines were drawn to keep something out: they stay walls
         return _polygons(area.union(_walls(ring)))
     if area.is_empty:
-        raise FenceError(f"{name} has no area: the vehicle could be nowhere", zone=name)
+        raise FenceError(f"{name} has no area: there is no allowed area", zone=name)
     return area
 
 

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
 _TOTAL = "FENCE_TOTAL"
 _ADVICE = (
-    "Let the ground station read the fence from the vehicle (MAVProxy: fence list; Mission Planner, QGroundControl: "
-    "download in the plan view) while the stream is recorded, or give a fence file (--fence)"
+    "Download the fence from the vehicle in the ground station (MAVProxy: fence list; Mission Planner, QGroundControl: "
+    "download in the Plan view) while the log is recorded, or use a fence file (--fence FILE)"
 )
 
 
@@ -30,9 +30,9 @@ def known_fence(situation: Situation) -> Fence:
     known = situation.fence
     if known is None:
         trouble = fence_trouble(situation) or _never_seen(situation)
-        raise FenceMissingError(f"{trouble}: there is nothing to plan around. {_ADVICE}")
+        raise FenceMissingError(f"no fence to plan around: {trouble}. {_ADVICE}")
     if not known.value.zones:
-        raise FenceMissingError(f"the fence from {known.source} is empty: there is nothing to plan around")
+        raise FenceMissingError(f"no fence to plan around: the fence from {known.source} is empty")
     return known.value
 
 
@@ -40,42 +40,42 @@ def _never_seen(situation: Situation) -> str:
     """Return why no fence is known: none was seen, though the vehicle may report that it holds one."""
     total = situation.parameters.get(_TOTAL, 0.0)
     if not total > 0:
-        return "no fence was transferred"
+        return "no fence was uploaded or downloaded"
     return (
-        f"the vehicle holds a fence of {total:g} points ({_TOTAL}), but none was transferred as mission items "
-        "(older autopilots and stations use FENCE_POINT messages, which are not read)"
+        f"the vehicle holds a fence of {total:g} points ({_TOTAL}), but it was not sent as mission items "
+        "(older autopilots and ground stations use FENCE_POINT messages, which are not supported)"
     )
 
 
 def fence_trouble(situation: Situation) -> str | None:
     """Return why the newest fence that was seen cannot be used; None where it can be."""
     if situation.fence_trouble:
-        return f"a fence was transferred but is unusable ({situation.fence_trouble})"
+        return f"a fence was sent but cannot be used ({situation.fence_trouble})"
     for to_vehicle in (True, False):
         transfer = situation.transfers.get((ListKind.FENCE, to_vehicle))
         if transfer is None:
             continue
-        what = "upload" if to_vehicle else "read-back"
+        what = "upload" if to_vehicle else "download"
         if transfer.is_complete:
-            return f"a fence {what} of {transfer.count} items was seen, but not that the vehicle accepted it"
+            return f"a fence {what} of {transfer.count} items was not acknowledged (MISSION_ACK)"
         of = "an unknown number of" if transfer.count is None else transfer.count
-        return f"a fence {what} was seen only in part ({len(transfer.items)} of {of} items)"
+        return f"a fence {what} is incomplete ({len(transfer.items)} of {of} items)"
     return None
 
 
 def fence_warnings(vehicle: Vehicle, situation: Situation) -> list[str]:
     """Warn of a newer fence that could not be used, and of one that the autopilot does not enforce."""
     trouble = fence_trouble(situation)
-    warnings = [f"{trouble}, so an older one counts"] if trouble else []
+    warnings = [f"{trouble}; an older fence is used"] if trouble else []
     if vehicle.fence.enforces_zones or not situation.parameters:
         return warnings
     if vehicle.fence.enabled:
-        reason = "FENCE_TYPE has no bit 2 (value 4)"
+        reason = "FENCE_TYPE bit 2 (value 4) is not set"
     elif any(assumed.parameter == "FENCE_ENABLE" for assumed in vehicle.assumed):
-        reason = "FENCE_ENABLE is not known, and 0 by default"
+        reason = "FENCE_ENABLE unknown, default 0"
     else:
         reason = "FENCE_ENABLE is 0"
     return [
         *warnings,
-        f"the autopilot does not enforce this fence ({reason}); the route honours it all the same",
+        f"the autopilot does not enforce this fence ({reason}); it is used here anyway",
     ]

@@ -53,7 +53,9 @@ def merged_fence(fence: Fence) -> Fence:
     zones = [zone for number, zone in enumerate(fence.zones) if number not in numbers]
     merged = Fence((outer, *zones, *holes), fence.return_point)
     if not drawn.allowed.covers(lay_out(merged, frame).allowed):
-        raise FenceError("the merged fence would allow ground that the inclusions do not. This is a defect")
+        raise FenceError(
+            "the merged fence would allow ground that the inclusions do not. This is a bug, please report it"
+        )
     return merged
 
 
@@ -67,7 +69,7 @@ def _apart(inside: BaseGeometry, inclusions: list[Barrier]) -> FenceError:
     """Return the error that says which inclusions lie in another area than the first."""
     parts = shapely.get_parts(inside)
     if inside.is_empty:
-        return FenceError("the inclusions have no area: the vehicle could be nowhere")
+        return FenceError("the inclusions have no area: there is no allowed area")
     first = next((part for part in parts if part.intersects(inclusions[0].area)), parts[0])
     others = [zone.name for zone in inclusions if not zone.area.intersects(first)]
     names = ", ".join(others) or "one of them"

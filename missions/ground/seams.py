@@ -29,7 +29,7 @@ _WALL_M = 1e-3
 _PASSES_WITHIN_M = 0.05
 """With this margin and less measured rovers crept across; with 0.1 m none did."""
 
-_NAME = "the seam at the edge of "
+_NAME = "the inner edge of "
 
 
 def is_seam(name: str) -> bool:
@@ -110,18 +110,16 @@ def seam_advice(vehicle: Vehicle) -> str:
         what.append(f"AVOID_ENABLE {vehicle.avoid_bits & ~1} (without bit 0)")
     if vehicle.oa_type:
         what.append("OA_TYPE 0")
-    return f"set {' and '.join(what)}, or draw the polygons as one"
+    return f"set {' and '.join(what)}, or draw the inclusions as one polygon"
 
 
 def seam_reason(vehicle: Vehicle) -> str:
     """Return why the vehicle does not pass."""
     if vehicle.oa_type:
-        return (
-            f"with OA_TYPE {vehicle.oa_type} the vehicle does not leave one inclusion of a union for another"
-        )
+        return f"with OA_TYPE {vehicle.oa_type} the vehicle does not cross from one inclusion into another"
     return (
         f"with AVOID_ENABLE {vehicle.avoid_bits} (bit 0) the vehicle stops {vehicle.fence.margin_name} {vehicle.stops_within_m:g} m "
-        "before the edge of the inclusion that it is in, for good, although FENCE_OPTIONS bit 1 joins it to others"
+        "before the edge of its inclusion and does not resume, although FENCE_OPTIONS bit 1 joins it to others"
     )
 
 

@@ -47,24 +47,22 @@ def start_hazard(ground: Ground, start: LocalPoint, vehicle: Vehicle) -> StartBl
     leaves_from_m = vehicle.stops_within_m + _LEAVES_FROM_M
     if away_m >= leaves_from_m:
         return None
-    margin = f"{vehicle.fence.margin_name} ({vehicle.stops_within_m:g} m) plus {_LEAVES_FROM_M:g} m"
-    where = (
-        f"the start is {away_m:.2f} m from {fence}, nearer than {margin} to a fence that the vehicle avoids"
-    )
-    advice = f"drive it {leaves_from_m:.2f} m away from the fence by hand, or set AVOID_BACKUP_SPD 0 or AVOID_ENABLE 0 until it is there"
+    margin = f"{vehicle.fence.margin_name} {vehicle.stops_within_m:g} m plus {_LEAVES_FROM_M:g} m"
+    where = f"the start is {away_m:.2f} m from {fence}, where fence avoidance acts (within {margin})"
+    advice = f"drive it at least {leaves_from_m:.2f} m away from the fence by hand, or set AVOID_BACKUP_SPD 0 or AVOID_ENABLE 0 until it is there"
     is_steered = vehicle.steering is Steering.ACKERMANN
     if is_steered and vehicle.backs_away:
         return StartBlockedError(
-            f"{where}: from there it backs up, and measured rovers backed into the fence (29 of 42 starts, whichever way they headed)",
+            f"{where}: the vehicle backs up there, and in tests rovers backed into the fence (29 of 42 starts, at any heading)",
             fences=[fence],
             distance_m=round(away_m, 3),
             margin_m=vehicle.stops_within_m,
             advice=advice,
         )
     if is_steered:
-        return f"{where}: with AVOID_BACKUP_SPD 0 measured rovers left it, but 1 of 3 that were to drive along it stood still"
+        return f"{where}: with AVOID_BACKUP_SPD 0 rovers left it in tests, but 1 of 3 that had to drive along it did not move"
     if vehicle.backs_away:
-        return f"{where}: measured skid-steered rovers did not move from there (41 of 42 starts); {advice}"
+        return f"{where}: in tests skid-steered rovers did not move from there (41 of 42 starts); {advice}"
     return None
 
 

@@ -65,7 +65,7 @@ def drive_scene(
     driven = [place for _, positions in parts for place in positions]
     places = [*corners, *driven, *(at for _, at in mission), *targets]
     if not places:
-        raise MissionFormatError("there is nothing to draw: no fence, no track, no mission and no target")
+        raise MissionFormatError("nothing to draw: no fence, no track, no mission and no target")
     frame = frame_around(places)
     ground = lay_out(fence, frame, union=union, around=places)
     items = [f"item {number}\n{at}" for number, at in mission]

@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from missions.planned import Plan
     from missions.request import Request
 
-_NOTHING = "the drive is extrapolated beyond what was measured: nothing is promised for it (--trust-model promises all the same)"
-_TRUSTED = "the drive is extrapolated beyond what was measured, and promised all the same (--trust-model)"
+_NOTHING = "the drive is extrapolated beyond what was measured: no clearance is promised (--trust-model promises it anyway)"
+_TRUSTED = "the drive is extrapolated beyond what was measured; clearance is promised anyway (--trust-model)"
 
 
 def marked(plan: Plan, request: Request) -> Plan:

@@ -15,6 +15,7 @@ from missions.request import RepairMission, Tour
 from missions.situation import Mission
 from missions.tour.tour import plan_tour
 from missions.vehicle.item_limit import most_items
+from missions.words import left_out_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -83,7 +84,6 @@ def _with_room(
     mission = Mission(planned.items, planned.home)
     checked = shortened(mission, own, situation, wanted, most=most, may_slow=True, should_stop=should_stop)
     left_out = len(planned.items) - len(checked.mission.items)
-    said = f"{left_out} item{'s' * (left_out != 1)} of the route left out so that the vehicle can hold it ({most + 1})"
     return replace(
         plan_of(checked, situation, method=planned.method),
         targets=planned.targets,
@@ -93,7 +93,7 @@ def _with_room(
         asked_m=planned.asked_m,
         blocks=planned.blocks,
         home=planned.home,
-        warnings=(*planned.warnings, said),
+        warnings=(*planned.warnings, left_out_text(left_out, most + 1)),
     )
 
 

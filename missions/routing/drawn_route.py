@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from missions.geo import LatLon
-    from missions.ground.ground import Ground
+    from missions.ground.ground import Barrier, Ground
     from missions.routing.bottleneck import NarrowestPlace
 
 _INSIDE_M = 0.005
@@ -249,7 +249,7 @@ class DrawnRoutes:
             raise _NoWayError(
                 NoRoute(
                     NoRouteKind.NOWHERE_FREE,
-                    f"nowhere in the field is {metres(self.clearance_m)} away from every fence",
+                    f"no place in the field keeps {metres(self.clearance_m)} from every fence",
                     {"clearance_m": self.clearance_m},
                 )
             )
@@ -274,8 +274,8 @@ class DrawnRoutes:
         names = [barrier.name for barrier in forbidding]
         raise _blocked(
             NoRouteKind.START_BLOCKED,
-            f"the start is on forbidden ground ({self._position(start)}): {_names(names)}; "
-            f"free ground is {distance:.2f} m away, bearing {round(bearing) % 360}°, at {position}"
+            f"the start ({self._position(start)}) is {_standing(forbidding)}; "
+            f"the allowed area is {distance:.2f} m away, bearing {round(bearing) % 360}°, at {position}"
             f"{self.ground.common_ground_advice(point)}",
             names,
             distance_m=round(distance, 3),
@@ -305,10 +305,10 @@ class DrawnRoutes:
         nearest, gap_m = self.ground.nearest(point)
         if forbidding:
             names = [barrier.name for barrier in forbidding]
-            problem = f"the target is on forbidden ground ({self._position(target)}): {_names(names)}"
+            problem = f"the target ({self._position(target)}) is {_standing(forbidding)}"
         else:
             names = [nearest.name] if nearest else []
-            problem = f"the target is {metres(gap_m)} from {_names(names)}, nearer than {self.asked}"
+            problem = f"the target is {metres(gap_m)} from {_names(names)}, closer than {self.asked}"
         raise _blocked(
             NoRouteKind.TARGET_BLOCKED,
             f"{problem}; the nearest free point is {distance:.2f} m away, bearing {round(bearing) % 360}°, at {position}"
@@ -378,8 +378,7 @@ class DrawnRoutes:
         names = [barrier.name for barrier in forbidding]
         raise _blocked(
             NoRouteKind.START_BLOCKED,
-            f"the start is on forbidden ground ({self._position(start)}): {_names(names)}; every straight way out crosses other "
-            "forbidden ground",
+            f"the start ({self._position(start)}) is {_standing(forbidding)}; every straight way out crosses another fence",
             names,
         )
 
@@ -408,7 +407,7 @@ class DrawnRoutes:
         """Return how wide a route there is, or which fences part start and target (those along the edge of the smaller area)."""
         asked_m = {"clearance_m": round(self.clearance_m, 3)}
         if self.is_other_way:
-            return NoRoute(NoRouteKind.NO_OTHER_WAY, f"no other way round keeps {self.asked}", asked_m)
+            return NoRoute(NoRouteKind.NO_OTHER_WAY, f"no other route keeps {self.asked}", asked_m)
         place = self.sought.narrowest_place(start, goal)
         if place is not None:
             facts = {
@@ -425,13 +424,13 @@ class DrawnRoutes:
         outline = areas[walled].exterior
         reach_m = self.clearance_m * 1.01 + 2 * _INSIDE_M + 0.01
         names = [b.name for b in self.ground.barriers if self.ground.distance_m(b, outline) <= reach_m]
-        other = "choose another target" if walled == "target" else "drive it out by hand"
+        other = "choose another target" if walled == "target" else "drive it out manually"
         return NoRoute(
             NoRouteKind.WALLED_IN,
-            f"no route exists, at any clearance: the {walled} is walled in by {_names(names)}",
+            f"no route at any clearance: the {walled} is enclosed by {_names(names)}",
             {**asked_m, "walled_in": walled, "fences": names},
             names,
-            advice=f"no clearance helps: open a way through {_names(names)}, or {other}",
+            advice=f"less clearance does not help: open a gap in {_names(names)}, or {other}",
         )
 
     def _way(self, point: LocalPoint, to: Point) -> tuple[float, float, LatLon]:
@@ -447,6 +446,14 @@ class DrawnRoutes:
 def _blocked(kind: NoRouteKind, text: str, fences: list[str], **facts: object) -> _NoWayError:
     """Return the end of a search whose start or target is blocked."""
     return _NoWayError(NoRoute(kind, text, {"fences": fences, **facts}, fences))
+
+
+def _standing(forbidding: list[Barrier]) -> str:
+    """Return where a point stands that is not allowed: inside which exclusions, outside which inclusions."""
+    kinds = (("inside", ZoneKind.EXCLUSION), ("outside", ZoneKind.INCLUSION))
+    found = [(word, [b.name for b in forbidding if b.kind is kind]) for word, kind in kinds]
+    said = [f"{word} {_names(names)}" for word, names in found if names]
+    return " and ".join(said) or "inside an exclusion or outside the fence"
 
 
 def _names(names: list[str]) -> str:

@@ -24,7 +24,7 @@ _MEASUREMENTS = 600
 """For each of them."""
 
 _NOTHING_ADVICE = (
-    "less clearance does not help this vehicle: turn it by hand to face its way, let it drive slower (--speed), or widen the "
+    "less clearance does not help this vehicle: turn it by hand to face the route, drive slower (--speed), or widen the "
     "narrowest place"
 )
 

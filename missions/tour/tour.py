@@ -104,7 +104,7 @@ def target_order(
         lost = next(number for number in range(1, len(places)) if not np.isfinite(lengths_m[0, number]))
         name = f"target {lost}" if lost <= len(targets) else "home"
         raise NoRouteError(
-            f"no order of the targets: no route leads from the start to {name} ({places[lost]}) with the clearance asked for",
+            f"the targets cannot be ordered: no route from the start to {name} ({places[lost]}) keeps the clearance asked for",
             target=list(places[lost]),
         )
     found: VisitOrder = shortest_order(lengths_m, ends_at_last=request.comes_back, should_stop=should_stop)
@@ -189,9 +189,7 @@ def with_end(planned: Plan, situation: Situation, request: Tour) -> Plan:
     if end is End.LOITER:
         return replace(planned, items=items)
     if planned.home is None:
-        raise SituationError(
-            "RTL leads home, and home is not known; give it (--home LAT,LON), or end with hold or loiter"
-        )
+        raise SituationError("RTL needs home, which is unknown; use --home LAT,LON, or --end hold or loiter")
     wanted = replace(request, widest=False, clearance_m=planned.clearance_m, start=planned.start)
     checked = check_mission(Mission(items, planned.home), situation, wanted)
     last = checked.legs[-1]
@@ -200,10 +198,10 @@ def with_end(planned: Plan, situation: Situation, request: Tour) -> Plan:
         near = (
             f"through {', '.join(last.crosses)}"
             if last.crosses
-            else f"{last.driven_clearance_m:.2f} m near {last.fence}"
+            else f"within {last.driven_clearance_m:.2f} m of {last.fence}"
         )
         raise NoRouteError(
-            f"RTL at the end would drive straight home, {near} at {last.at}; make the way home part of the mission (--return)",
+            f"RTL at the end would drive straight home, {near} at {last.at}; plan the way home with --return",
             fences=list(last.crosses or (last.fence,)),
             driven_clearance_m=round(last.driven_clearance_m, 3),
         )
@@ -227,10 +225,10 @@ def _order_text(found: TargetOrder) -> list[str]:
     if found.indices != tuple(range(len(found.indices))):
         numbers = ", ".join(str(index + 1) for index in found.indices)
         texts.append(
-            f"the targets are visited in the order {numbers}: {found.length_m:.1f} m around the fences, {found.given_m:.1f} m as given"
+            f"targets reordered: {numbers} ({found.length_m:.1f} m around the fences, {found.given_m:.1f} m in the order given)"
         )
     if found.bound_m < found.length_m * 0.9999:
         texts.append(
-            f"the order was not proved to be the shortest: none is shorter than {found.bound_m:.1f} m ({found.length_m:.1f} m found)"
+            f"this order may not be the shortest: {found.length_m:.1f} m, no order is shorter than {found.bound_m:.1f} m"
         )
     return texts

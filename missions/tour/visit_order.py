@@ -84,7 +84,7 @@ def shortest_order(
         return VisitOrder(order, *[length_of(distances_m, order)] * 2)
     if find_spec("highspy") is None:
         raise SituationError(
-            f"the best order of {free} targets needs HiGHS (up to {MOST_BY_PROGRAMMING} do not): pip install 'pbpp-rover[tour]'",
+            f"ordering more than {MOST_BY_PROGRAMMING} targets needs HiGHS ({free} given): pip install 'pbpp-rover[tour]'",
             targets=free,
         )
     return _by_cuts(distances_m, ends_at_last=ends_at_last, should_stop=should_stop)

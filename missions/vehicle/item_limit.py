@@ -41,5 +41,5 @@ def storage_remarks(parameters: Mapping[str, float]) -> list[str]:
         try:
             whole_number(parameters, name, 0, most=_MOST_SD_KB)
         except VehicleError as error:
-            remarks.append(f"{error}: taken as 0, no storage on an SD card")
+            remarks.append(f"{error}; assuming 0 (no SD card storage)")
     return remarks

@@ -197,7 +197,7 @@ class Footprint:
         if not all(math.isfinite(size) and size >= 0 for size in sizes):
             raise VehicleError(
                 f"a footprint of {self.length_m:g} x {self.width_m:g} m with the GPS at "
-                f"{self.gps_forward_m:g}, {self.gps_right_m:g} m is none",
+                f"{self.gps_forward_m:g}, {self.gps_right_m:g} m is not possible",
                 length_m=self.length_m,
                 width_m=self.width_m,
             )

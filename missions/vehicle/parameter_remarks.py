@@ -28,8 +28,8 @@ def parameter_remarks(situation: Situation) -> list[str]:
 def no_number_remarks(no_numbers: Mapping[str, str], parameters: Mapping[str, float]) -> list[str]:
     """Return which parameters came as no number, and what counts in their place."""
     remarks = [
-        f"{name} came as {came}, which is not a number: "
-        + (f"it stays at {parameters[name]:g}, its last value" if name in parameters else "not known")
+        f"{name} received as {came}, which is not a number: "
+        + (f"last value {parameters[name]:g} kept" if name in parameters else "unknown")
         for name, came in no_numbers.items()
     ]
     more = len(remarks) - _MOST_NAMED
@@ -41,9 +41,13 @@ def assumed_remarks(vehicle: Vehicle) -> list[str]:
     assumed = [
         f"{one.parameter} {one.value:g}"
         for one in vehicle.assumed
-        if one.parameter == "firmware" or row_of(one.parameter).is_told
+        if one.parameter != "firmware" and row_of(one.parameter).is_told
     ]
-    remarks = [f"parameters unknown; assuming {', '.join(assumed)}"] if assumed else []
+    remarks = [f"{one}" for one in vehicle.assumed if one.parameter == "firmware"]
+    if assumed:
+        remarks.append(
+            f"parameters missing, {vehicle.autopilot} defaults used: {', '.join(assumed)} (use --vehicle FILE.param)"
+        )
     if (
         vehicle.steering is Steering.SKID
         and vehicle.autopilot is Autopilot.ARDUPILOT
@@ -51,6 +55,6 @@ def assumed_remarks(vehicle: Vehicle) -> list[str]:
         and any(one.parameter == "WP_PIVOT_ANGLE" for one in vehicle.assumed)
     ):
         remarks.append(
-            "WP_PIVOT_ANGLE unknown: taken as 0, which needs more room (no turning on the spot; the default from ArduPilot 4.7 on, 60 before)"
+            "WP_PIVOT_ANGLE unknown; assuming 0 (no pivot turns, which needs more room; the default is 0 from ArduPilot 4.7 on, 60 before)"
         )
     return remarks

@@ -79,7 +79,7 @@ def _turn_radius_m(read: ParameterReader) -> float:
     steering_angle_rad = read.value("RA_MAX_STR_ANG")
     if not 0 < steering_angle_rad < math.pi / 2:
         raise VehicleError(
-            f"RA_MAX_STR_ANG is {steering_angle_rad:g} rad; it must lie between 0 and 1.57",
+            f"RA_MAX_STR_ANG is {steering_angle_rad:g} rad; it must be between 0 and 1.57",
             parameter="RA_MAX_STR_ANG",
             value=steering_angle_rad,
         )

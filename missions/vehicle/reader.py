@@ -35,7 +35,7 @@ def real_number(
         raise VehicleError(f"{name} is {value}, which is not a number", parameter=name, value=value)
     if not least <= value <= most:
         raise VehicleError(
-            f"{name} is {value:g}; possible are {least:g} to {most:g}",
+            f"{name} is {value:g}; allowed: {least:g} to {most:g}",
             parameter=name,
             value=value,
             least=least,
@@ -86,7 +86,7 @@ class ParameterReader:
         value = real_number(self.parameters, name, 0.0, least=row.possible.least, most=row.possible.most)
         if 0 < value < row.no_less:
             raise VehicleError(
-                f"{name} is {value:g}; possible are 0 and {row.no_less:g} to {row.possible.most:g}",
+                f"{name} is {value:g}; allowed: 0, or {row.no_less:g} to {row.possible.most:g}",
                 parameter=name,
                 value=value,
                 least=row.no_less,

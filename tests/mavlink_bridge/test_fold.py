@@ -227,9 +227,8 @@ class TestFence:
         found = after(NEW, *told[:missing], *told[missing + 1 :])
         assert found.fence is None
         of = "an unknown number of" if missing == 0 else "2"
-        assert (
-            f"a fence read-back was seen only in part ({2 if missing == 0 else 1} of {of} items)"
-            in why_no_plan(found)
+        assert f"a fence download is incomplete ({2 if missing == 0 else 1} of {of} items)" in why_no_plan(
+            found
         )
 
     @pytest.mark.parametrize("missing", [0, 1, 2])
@@ -238,27 +237,25 @@ class TestFence:
         told.pop(missing)
         found = after(NEW, *told)
         assert found.fence is None
-        assert "a fence upload was seen only in part" in why_no_plan(found)
+        assert "a fence upload is incomplete" in why_no_plan(found)
 
     def test_an_accepted_upload_seen_in_part_makes_the_old_fence_stale(self) -> None:
         told = upload(self.OTHER, self.KIND)
         told.pop(2)
         found = after(NEW, *upload(self.ITEMS, self.KIND), *told)
         assert found.fence is None
-        assert "a fence upload was seen only in part (1 of 2 items)" in why_no_plan(found)
+        assert "a fence upload is incomplete (1 of 2 items)" in why_no_plan(found)
         assert fence_of(after(found, *read_back(self.OTHER, self.KIND))) == OTHER_FENCE
 
     def test_an_upload_without_acknowledgement_leaves_the_old_fence_with_a_warning(self) -> None:
         found = after(NEW, *upload(self.OTHER, self.KIND, result=None))
-        assert "a fence upload of 2 items was seen, but not that the vehicle accepted it" in why_no_plan(
-            found
-        )
+        assert "a fence upload of 2 items was not acknowledged (MISSION_ACK)" in why_no_plan(found)
         beside = after(NEW, *upload(self.ITEMS, self.KIND), *upload(self.OTHER, self.KIND, result=None))
         assert fence_of(beside) == FENCE
         assert beside.transfers[ListKind.FENCE, True].is_complete
         start, target = LatLon(40.0722, -105.22993), LatLon(40.0730, -105.22993)
         assert plan(beside, Request(start, (target,), 1.0)).warnings[0] == (
-            "a fence upload of 2 items was seen, but not that the vehicle accepted it, so an older one counts"
+            "a fence upload of 2 items was not acknowledged (MISSION_ACK); an older fence is used"
         )
 
     @pytest.mark.parametrize("result", [1, 3, 4, 6, 14, 15])
@@ -326,7 +323,7 @@ class TestFence:
             NEW, *upload(self.ITEMS, self.KIND), partial, item, (ROVER, m.MissionAck(*STATION, 0, self.KIND))
         )
         assert found.fence is None
-        assert "seen only in part (1 of an unknown number of items)" in why_no_plan(found)
+        assert "is incomplete (1 of an unknown number of items)" in why_no_plan(found)
 
     def test_an_unusable_fence_says_why(self) -> None:
         bad = (replace(self.ITEMS[0], params=(0.0, 0.0, 0.0, 0.0)),)
@@ -334,9 +331,9 @@ class TestFence:
         assert fence_of(found) == FENCE
         assert (
             found.fence_trouble
-            == "fence read-back: fence item 0: a circle of radius 0 m; it must be positive"
+            == "fence read-back: fence item 0: circle radius 0 m; it must be greater than 0"
         )
-        assert "a circle of radius 0 m" in why_no_plan(after(NEW, *read_back(bad, self.KIND)))
+        assert "circle radius 0 m" in why_no_plan(after(NEW, *read_back(bad, self.KIND)))
 
     @pytest.mark.parametrize("kind", [3, 255, 77])
     def test_list_kinds_that_are_none(self, kind: int) -> None:

@@ -47,7 +47,7 @@ def test_it_writes_the_mission_alone_where_a_format_holds_no_more(made, tmp_path
     assert read.mission.value.home == HOME
     made.write(tmp_path / "a.gpx")
     assert (tmp_path / "a.gpx").read_bytes().startswith(b"<?xml")
-    with pytest.raises(MissionFormatError, match="holds no mission"):
+    with pytest.raises(MissionFormatError, match="contains no mission"):
         made.write(tmp_path / "a.poly")
     assert not (tmp_path / "a.poly").exists()
 

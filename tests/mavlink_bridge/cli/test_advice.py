@@ -28,7 +28,9 @@ def advice_of(*arguments: str) -> str:
 
 def test_who_is_walled_in_is_not_told_to_ask_for_less(logs: Path) -> None:
     advice = advice_of("plan", "--log", str(logs / "island-unreachable.tlog"))
-    assert advice == "no clearance helps: open a way through exclusion polygon 1, or choose another target"
+    assert (
+        advice == "less clearance does not help: open a gap in exclusion polygon 1, or choose another target"
+    )
 
 
 def test_who_is_not_walled_in_is(logs: Path) -> None:
@@ -62,7 +64,10 @@ def test_a_server_that_is_not_there_is_no_matter_of_serial_ports() -> None:
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        (("convert", "{fields}/yard-fence.waypoints", "{out}/fence.xyz"), "the suffix tells the format"),
+        (
+            ("convert", "{fields}/yard-fence.waypoints", "{out}/fence.xyz"),
+            "the file extension sets the format",
+        ),
         (
             (
                 "check",
@@ -71,9 +76,9 @@ def test_a_server_that_is_not_there_is_no_matter_of_serial_ports() -> None:
                 "--fence",
                 "{fields}/yard-fence.waypoints",
             ),
-            "give a file that holds one",
+            "use a file that contains a mission",
         ),
-        (("plan", "--fence", "{fields}/nothing.plan", "--target", "40,-105"), "the path and its spelling"),
+        (("plan", "--fence", "{fields}/nothing.plan", "--target", "40,-105"), "check the path"),
     ],
 )
 def test_files(fields: Path, tmp_path: Path, arguments: tuple[str, ...], expected: str) -> None:

@@ -72,6 +72,6 @@ def test_no_command_breaks_down(tmp_path: Path, name: str, value: float) -> None
 
 def test_what_came_is_said_in_a_plan_and_in_the_log(tmp_path: Path) -> None:
     log = recording(tmp_path / "bad.tlog", "MIS_TOTAL", math.nan)
-    said = "MIS_TOTAL came as nan, which is not a number: not known"
+    said = "MIS_TOTAL received as nan, which is not a number: unknown"
     assert f"warning: {said}" in run("plan", "--log", log, *ENDS)[1]
     assert said in run("log", log)[1]

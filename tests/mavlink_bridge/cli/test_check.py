@@ -147,7 +147,7 @@ def test_a_live_vehicle_is_asked(fields, yard, streams):
         # The fix is good to 0.3 m: kept on top of what is promised, it is more than FENCE_MARGIN and its reserve ask for.
         assert document["clearance_m"] == 2
         assert document["legs"][-1]["asked_m"] == pytest.approx(2.3)
-        assert any("0.3 m added to the clearance" in text for text in document["warnings"])
+        assert any("added 0.3 m for GPS error" in text for text in document["warnings"])
         assert document["system"] == 1
         assert document["legs"][0]["start"] == pytest.approx(away, abs=1e-5)
         assert not any("did not tell its position" in text for text in document["warnings"])
@@ -168,7 +168,7 @@ def test_what_a_live_vehicle_does_not_tell_is_said(fields, yard, monkeypatch):
         assert (
             "the vehicle did not tell its position: it is taken to stand at its home" in document["warnings"]
         )
-        assert any("did not tell how good its position is" in text for text in document["warnings"])
+        assert any("GPS accuracy unknown" in text for text in document["warnings"])
         assert document["clearance_m"] == pytest.approx(2.1)  # FENCE_MARGIN and a reserve
         monkeypatch.setattr("mavlink_bridge.protocol.parameters.PATIENCE_S", 0.5)
         monkeypatch.setattr(
@@ -243,7 +243,7 @@ def test_the_best_order_and_the_way_home(tmp_path, yard):
     )
     assert sorted(best["targets"][:3]) == sorted(given["targets"])
     assert best["targets"][3] == best["path"][-1] == [HOME.lat_deg, HOME.lon_deg]
-    assert best["warnings"][0].startswith("the targets are visited in the order ")
+    assert best["warnings"][0].startswith("targets reordered: ")
     assert (
         document_of("check", "--mission", made, "--fence", yard["fence"], "--clearance", "2")["broken"] == 0
     )
@@ -424,12 +424,12 @@ def test_a_seam_before_which_the_vehicle_stops_is_named_with_its_place(tmp_path)
     result = run(*asked)
     assert result.exit_code == 8
     assert re.search(
-        r"BREAKS: leg start → 1 crosses the seam at the edge of inclusion polygon 2: the vehicle stops at 40\.07137\d+,-105\.22970\d+",
+        r"BREAKS: leg start → 1 crosses the inner edge of inclusion polygon 2: the vehicle stops at 40\.07137\d+,-105\.22970\d+",
         result.output,
     )
-    assert "set AVOID_ENABLE 2 (without bit 0), or draw the polygons as one" in result.output
+    assert "set AVOID_ENABLE 2 (without bit 0), or draw the inclusions as one polygon" in result.output
     document = document_of(*asked, code=8)
-    assert document["legs"][0]["crosses"][0].startswith("the seam at the edge of inclusion polygon")
+    assert document["legs"][0]["crosses"][0].startswith("the inner edge of inclusion polygon")
     vehicle.write_text(UNION.replace("AVOID_ENABLE 3", "AVOID_ENABLE 2"), encoding="utf-8")
     assert document_of(*asked)["broken"] == 0
 
@@ -447,7 +447,7 @@ def test_a_start_from_which_rovers_back_into_the_fence_is_a_danger(tmp_path):
     result = run(*asked)
     assert result.exit_code == 8
     assert (
-        "DANGER: the start is 1.11 m from inclusion polygon 1, nearer than FENCE_MARGIN (2 m) plus 0.05 m"
+        "DANGER: the start is 1.11 m from inclusion polygon 1, where fence avoidance acts (within FENCE_MARGIN 2 m plus 0.05 m)"
         in result.output
     )
     document = document_of(*asked, code=8)
@@ -463,7 +463,7 @@ def test_a_slow_mission_and_old_firmware_are_said(tmp_path, yard):
     vehicle.write_text("WP_SPEED 0.5\nFENCE_MARGIN 0\nFENCE_ENABLE 1\nFENCE_TYPE 4\n", encoding="utf-8")
     warnings = check_yard(yard, "--vehicle", str(vehicle))["warnings"]
     assert any(
-        "not measured for steered rovers below 1 m/s, and this one drives 0.5 m/s" in one for one in warnings
+        "steered rovers below 1 m/s were not measured, and this one drives 0.5 m/s" in one for one in warnings
     )
     assert any("FENCE_MARGIN 0 m does not switch avoidance off" in one for one in warnings)
 
@@ -475,6 +475,6 @@ def test_the_firmware_is_taken_from_the_option_else_from_the_file(tmp_path, yard
     vehicle.write_text("# Version: 4.5.7\nWP_SPEED 2\n", encoding="utf-8")
     picture = tmp_path / "check.html"
     (old,) = check_yard(yard, "--vehicle", str(vehicle), "--plot", str(picture))["extrapolated"]
-    assert "not measured for ArduPilot 4.5.7" in old
+    assert "ArduPilot 4.5.7 was not measured" in old
     assert "while driving, extrapolated" in picture.read_text(encoding="utf-8")
     assert check_yard(yard, "--vehicle", str(vehicle), "--firmware", "4.6")["extrapolated"] == []

@@ -59,8 +59,8 @@ class TestVehicle:
         vehicle.write_text("WP_SPEED 8\n", encoding="utf-8")
         result = run("doctor", "--vehicle", vehicle, "--firmware", "4.6.3")
         assert "vehicle: ArduPilot 4.6.3, ackermann steering" in result.stdout
-        assert "WP_SPEED 1 to 5 m/s, not 8 m/s" in result.stdout
-        assert "parameters unknown; assuming" in result.stdout
+        assert "WP_SPEED 8 m/s was not measured (only 1 to 5, ackermann steering)" in result.stdout
+        assert "parameters missing, ArduPilot defaults used" in result.stdout
         assert "of an unknown version (--firmware)" in run("doctor", "--vehicle", vehicle).stdout
 
     def test_a_vehicle_that_is_none_is_wrong(self, tmp_path):

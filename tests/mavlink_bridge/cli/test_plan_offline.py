@@ -177,11 +177,11 @@ class TestRecordedLogs:
         found = failure("--log", logs / "union-rally.tlog", "--clearance", 2, *drawn)
         assert (found["exit_code"], found["error"]) == (4, "NoRouteError")
         assert found["message"] == (
-            "no route exists, at any clearance: the start is walled in by inclusion polygon 1 and the seam at the edge of inclusion polygon 2: "
-            "with AVOID_ENABLE 3 (bit 0) the vehicle stops FENCE_MARGIN 2 m before the edge of the inclusion that it is in, for good, although "
+            "no route at any clearance: the start is enclosed by inclusion polygon 1 and the inner edge of inclusion polygon 2: "
+            "with AVOID_ENABLE 3 (bit 0) the vehicle stops FENCE_MARGIN 2 m before the edge of its inclusion and does not resume, although "
             "FENCE_OPTIONS bit 1 joins it to others"
         )
-        assert found["advice"] == "set AVOID_ENABLE 2 (without bit 0), or draw the polygons as one"
+        assert found["advice"] == "set AVOID_ENABLE 2 (without bit 0), or draw the inclusions as one polygon"
 
     def test_a_union(self, logs: Path, fields: Path, tmp_path: Path, drawn: tuple) -> None:
         vehicle = tmp_path / "rover.parm"
@@ -196,13 +196,13 @@ class TestRecordedLogs:
     def test_no_fence(self, logs: Path) -> None:
         found = failure("--log", logs / "no-fence.tlog")
         assert (found["exit_code"], found["error"]) == (3, "FenceMissingError")
-        assert "no fence was transferred" in found["message"]
+        assert "no fence was uploaded or downloaded" in found["message"]
         assert "--fence" in found["message"]
 
     def test_an_island(self, logs: Path) -> None:
         found = failure("--log", logs / "island-unreachable.tlog", "--clearance", 1)
         assert (found["exit_code"], found["error"]) == (4, "NoRouteError")
-        assert "walled in by exclusion polygon" in found["message"]
+        assert "enclosed by exclusion polygon" in found["message"]
 
     @pytest.mark.parametrize("name", ["guided-maze", "position-target-yard", "fence-change-yard"])
     def test_the_defaults_promise_something(self, logs: Path, name: str) -> None:
@@ -318,7 +318,7 @@ class TestFiles:
         assert blocked["error"] == "TargetBlockedError"
         assert blocked["exit_code"] == 4
         moved = document(*source, *in_the_barn, "--snap", 10)
-        assert any("is blocked: moved" in warning for warning in moved["warnings"])
+        assert any("is blocked by a fence: moved" in warning for warning in moved["warnings"])
 
     def test_a_source_is_not_overwritten_with_a_mission(self, fields: Path, tmp_path: Path) -> None:
         fence = tmp_path / "fence.waypoints"
@@ -362,8 +362,8 @@ WRONG_FENCES: list[tuple[str, str | bytes, str]] = [
     ("empty.plan", "", "line 1: not JSON"),
     ("random.waypoints", random.Random(5).randbytes(3000), "is not a text file"),
     ("random.plan", random.Random(6).randbytes(3000), "is not a text file"),
-    ("two.waypoints", wpl("\n".join(TRIANGLE.splitlines()[:2])), "line 2: fence item 0: an inclusion polygon of 3 vertices has only 2"),
-    ("two2.waypoints", wpl("\n".join(TRIANGLE.replace("\t3\t", "\t2\t").splitlines()[:2])), "an inclusion polygon of 2 vertices; it needs at least 3"),
+    ("two.waypoints", wpl("\n".join(TRIANGLE.splitlines()[:2])), "line 2: fence item 0: inclusion polygon with 3 vertices, but only 2 are given"),
+    ("two2.waypoints", wpl("\n".join(TRIANGLE.replace("\t3\t", "\t2\t").splitlines()[:2])), "inclusion polygon with 2 vertices; at least 3 are needed"),
     ("two.plan", qgc(polygon([[40, -105], [41, -105]])), "geoFence.polygons[0].polygon: 2 vertices"),
     ("nan.waypoints", wpl(TRIANGLE.replace("40.08", "nan")), "line 4: position nan,-105.22 is not"),
     ("nan.plan", qgc(circle(float("nan"), 30)), "geoFence.circles[0].circle.center: position nan"),
@@ -375,19 +375,19 @@ WRONG_FENCES: list[tuple[str, str | bytes, str]] = [
     ("string.plan", qgc(circle("40", 30)), "center[0]: expected a number"),
     ("kind.plan", qgc(polygon([[40, -105]] * 3, "yes")), "inclusion: expected true or false"),
     ("area.plan", qgc(polygon([[40, -105]] * 3)), "inclusion polygon 1 has no area"),
-    ("version.plan", qgc({"version": 1, "polygon": []}), "holds no fence"),
+    ("version.plan", qgc({"version": 1, "polygon": []}), "contains no fence"),
     ("list.plan", "[]", "expected a QGroundControl plan"),
     ("deep.plan", "[" * 1_000_000, "nested too deeply"),
     ("cut.plan", qgc(circle(40, 30))[:-5], "not JSON"),
-    ("none.plan", '{"fileType": "Plan"}', "holds no fence"),
-    ("mission.waypoints", wpl("0\t1\t0\t16\t0\t0\t0\t0\t40.07\t-105.22\t0\t1"), "holds no fence"),
+    ("none.plan", '{"fileType": "Plan"}', "contains no fence"),
+    ("mission.waypoints", wpl("0\t1\t0\t16\t0\t0\t0\t0\t40.07\t-105.22\t0\t1"), "contains no fence"),
     ("columns.waypoints", wpl(TRIANGLE + "\t9"), "line 4: 13 columns; expected 12"),
     ("words.waypoints", wpl(TRIANGLE.replace("5001", "inclusion")), "line 2: "),
-    ("mixed.waypoints", wpl(TRIANGLE + "\n3\t0\t0\t16\t0\t0\t0\t0\t40.07\t-105.2\t0\t1"), "line 5: fence item 3: command 16 does not belong"),
+    ("mixed.waypoints", wpl(TRIANGLE + "\n3\t0\t0\t16\t0\t0\t0\t0\t40.07\t-105.2\t0\t1"), "line 5: fence item 3: command 16 is not a fence item"),
     ("pole.waypoints", wpl(TRIANGLE.replace("40.0", "86.0")), "is beyond ±85°"),
-    ("apart.plan", qgc({"version": 2, "polygons": [], "circles": [circle(40, 30)["circles"][0], circle(40.5, 30)["circles"][0]]}), "leave no ground in common"),
-    ("suffix.tlog", "x", "is a telemetry log; read are .plan"),
-    ("suffix", "x", "no format to read for the suffix ''"),
+    ("apart.plan", qgc({"version": 2, "polygons": [], "circles": [circle(40, 30)["circles"][0], circle(40.5, 30)["circles"][0]]}), "have no area in common"),
+    ("suffix.tlog", "x", "is a telemetry log; supported: .plan"),
+    ("suffix", "x", "cannot read files with extension ''"),
 ]  # fmt: skip
 
 
@@ -448,8 +448,8 @@ WRONG_OPTIONS: list[tuple[tuple[str, ...], int, str]] = [
     (("--fence", "F", *ENDS, "--corner-allowance", "-0.5"), 2, "--corner-allowance '-0.5': expected metres"),
     (("--fence", "F", *ENDS, "--snap", "inf"), 2, "--snap"),
     (("--fence", "F", *ENDS, "--method", "best"), 2, "--method 'best': expected one of"),
-    (("--fence", "F", *ENDS, "-o", "x.docx"), 3, "no format to write for the suffix '.docx'"),
-    (("--fence", "F", *ENDS, "-o", "x.tlog"), 3, "no format to write for the suffix '.tlog'"),
+    (("--fence", "F", *ENDS, "-o", "x.docx"), 3, "cannot write files with extension '.docx'"),
+    (("--fence", "F", *ENDS, "-o", "x.tlog"), 3, "cannot write files with extension '.tlog'"),
     (("--fence", "F", *ENDS, "--plot", "x.txt"), 3, "no picture format for the suffix '.txt'"),
     (("--fence", "F", *ENDS, "-o", "no/where/x.plan"), 3, "cannot be written"),
     (("--fence", "F", *ENDS, "--plot", "no/where/x.png"), 3, "cannot be written"),
@@ -458,19 +458,19 @@ WRONG_OPTIONS: list[tuple[tuple[str, ...], int, str]] = [
     (("--fence", "F", "--start", "40,-105", "--target", "nan,5"), 2, "is not a pair of numbers"),
     (("--fence", "F", "--start", "91,-105", "--target", "40,5"), 2, "latitude 91° is beyond"),
     (("--fence", "F", "--start", "40,-105", "--target", "40,181"), 2, "longitude 181° is beyond"),
-    (("--fence", "F", "--target", "40.0750,-105.2205"), 3, "the start is not known"),
-    (("--fence", "F", "--start", "40.0705,-105.2210"), 3, "the target is not known"),
+    (("--fence", "F", "--target", "40.0750,-105.2205"), 3, "start unknown"),
+    (("--fence", "F", "--start", "40.0705,-105.2210"), 3, "target unknown"),
     (("--fence", "F", "--start", "40.0705,-105.2210", "--target", "43,-105"), 4, "from the fence's centre"),
     (("--fence", "none.plan", *ENDS), 3, "cannot be read: No such file"),
-    (("--fence", ".", *ENDS), 3, "no format to read"),
+    (("--fence", ".", *ENDS), 3, "cannot read files with extension"),
     (("--log", "none.tlog"), 3, "none.tlog"),
     (("--log", "L", "--system", "9"), 3, "system 9 was not heard, only system 1"),
     (("--fence", "F", *ENDS, "--vehicle", "none.parm"), 3, "none.parm cannot be read"),
     (("--fence", "F", *ENDS, "--vehicle", "P"), 3, "line 1: expected a parameter's name and a number"),
-    (("--fence", "F", *ENDS, "--vehicle", "N"), 3, "FENCE_MARGIN is -1; possible are 0 to 1000"),
-    (("--fence", "F", "--start", "40.0705,-105.2210", "--target", "40.0790,-105.2299"), 4, "the target is on forbidden ground"),
-    (("--fence", "F", "--start", "40.0790,-105.2299", "--target", "40.0705,-105.2210"), 4, "the start is on forbidden ground"),
-    (("--fence", "F", *ENDS, "--clearance", "1e6"), 4, "nowhere in the field is"),
+    (("--fence", "F", *ENDS, "--vehicle", "N"), 3, "FENCE_MARGIN is -1; allowed: 0 to 1000"),
+    (("--fence", "F", "--start", "40.0705,-105.2210", "--target", "40.0790,-105.2299"), 4, "the target (40.0790000,-105.2299000) is outside"),
+    (("--fence", "F", "--start", "40.0790,-105.2299", "--target", "40.0705,-105.2210"), 4, "the start (40.0790000,-105.2299000) is outside"),
+    (("--fence", "F", *ENDS, "--clearance", "1e6"), 4, "no place in the field keeps"),
     (("--fence", "F", *ENDS, "--clearance", "1e300"), 2, "expected metres (0 to 1000000) or max"),
 ]  # fmt: skip
 
@@ -596,7 +596,7 @@ class TestAsAProcess:
         done = self.call("plan", "--log", logs / "no-fence.tlog")
         assert done.returncode == 3
         assert done.stdout == ""
-        assert done.stderr.startswith("error: no fence was transferred")
+        assert done.stderr.startswith("error: no fence to plan around: no fence was uploaded or downloaded")
         assert done.stderr.splitlines()[1].startswith("advice: ")
         assert len(done.stderr.splitlines()) == 2
 

@@ -282,7 +282,7 @@ WRONG: list[tuple[tuple[str, ...], int, str]] = [
             ("open.fen", "open.fen"),
             ("words.poly", "line 1"),
             ("fence.xyz", ".xyz"),
-            ("fence", "suffix"),
+            ("fence", "extension"),
         )
     ],
     ((*FROM_TO, "--vehicle", "missing.parm"), INPUT, "missing.parm"),
@@ -293,7 +293,7 @@ WRONG: list[tuple[tuple[str, ...], int, str]] = [
     ((*FROM_TO, "--vehicle", "mission.waypoints"), INPUT, "mission.waypoints"),
     # files that cannot be written
     ((*FROM_TO, "-o", "mission.xyz"), INPUT, ".xyz"),
-    ((*FROM_TO, "-o", "mission"), INPUT, "suffix"),
+    ((*FROM_TO, "-o", "mission"), INPUT, "extension"),
     ((*FROM_TO, "-o", "missing/mission.plan"), INPUT, "missing"),
     ((*FROM_TO, "-o", "folder.plan"), INPUT, "folder.plan"),
     ((*FROM_TO, "-o", "fence.parm"), INPUT, ".parm"),
@@ -476,8 +476,8 @@ def check_lines(stderr: str) -> str:
     ("arguments", "advice"),
     [
         ((*FROM_TO, "-o", "missing/mission.plan"), "make missing first, or choose another place"),
-        ((*FROM_TO, "-o", "folder.plan"), "choose another place, or make this one writable"),
-        ((*FROM_TO, "--plot", "folder.png"), "choose another place, or make this one writable"),
+        ((*FROM_TO, "-o", "folder.plan"), "choose another folder, or make this one writable"),
+        ((*FROM_TO, "--plot", "folder.png"), "choose another folder, or make this one writable"),
     ],
 )
 def test_nobody_is_told_to_mend_a_file_that_could_not_be_written(arguments, advice):

@@ -585,7 +585,7 @@ def test_a_parameter_that_comes_as_no_number_while_it_drives_is_told_once_and_ch
     matters = name.startswith("FENCE_")
     assert len(told) == matters
     if matters:
-        assert told[0].text.startswith(f"{name} came as {came}, which is not a number: it stays at ")
+        assert told[0].text.startswith(f"{name} received as {came}, which is not a number: last value ")
     run.run_until(lambda: run.director.state is State.ARRIVED)
 
 
@@ -603,4 +603,4 @@ def test_a_parameter_that_cannot_be_does_not_end_the_bridge(name, came):
         return
     run.director.take_target(HOME, run.now_s)
     run.run_until(lambda: run.events[-1].name is EventName.NO_PLAN)
-    assert f"{name} is {came:g}; possible are 0 to 32767" in run.events[-1].text
+    assert f"{name} is {came:g}; allowed: 0 to 32767" in run.events[-1].text

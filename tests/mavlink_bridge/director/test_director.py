@@ -140,11 +140,11 @@ def test_a_plan_waits_for_the_fix_but_not_for_ever():
     )
     assert late.run() is State.DONE
     assert late.director.situation.fix.value.error_m == 0.3
-    assert any("0.3 m added to the clearance" in text for text in late.director.plan.warnings)
+    assert any("added 0.3 m for GPS error" in text for text in late.director.plan.warnings)
     never = conductor(rover())
     never.down.push = _without(never.down.push, m.GpsRawInt)
     assert never.run() is State.DONE
-    assert any("did not tell how good its position is" in text for text in never.director.plan.warnings)
+    assert any("GPS accuracy unknown" in text for text in never.director.plan.warnings)
 
 
 def test_learns_how_much_the_vehicle_holds():

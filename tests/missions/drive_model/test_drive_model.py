@@ -643,13 +643,16 @@ def test_vehicles_of_the_measured_kind() -> None:
     [
         ({"autopilot": Autopilot.PX4}, "not on PX4"),
         ({"boat_drift_m": 2.0}, "boat"),
-        ({"speed_mps": 8.0}, "WP_SPEED 1 to 5 m/s, not 8 m/s"),
-        ({"steering": Steering.SKID}, "WP_SPEED 0.2 to 3 m/s, not 5 m/s"),
-        ({"turn_radius_m": 2.5}, "not 2.5 m"),
-        ({"turn_max_g": 0.1}, "not 0.1 g"),
-        ({"accel_max_mps2": 4.0}, "not 4 m/s²"),
-        ({"jerk_mps3": 0.1}, "not 0.1 m/s³"),
-        ({"position_gain_per_s": 1.0}, "not 1"),
+        (
+            {"speed_mps": 8.0},
+            "WP_SPEED 8 m/s was not measured (only 1 to 5, ackermann steering): the drive may differ",
+        ),
+        ({"steering": Steering.SKID}, "WP_SPEED 5 m/s was not measured (only 0.2 to 3, skid"),
+        ({"turn_radius_m": 2.5}, "TURN_RADIUS 2.5 m was not"),
+        ({"turn_max_g": 0.1}, "ATC_TURN_MAX_G 0.1 g was not"),
+        ({"accel_max_mps2": 4.0}, "ATC_ACCEL_MAX 4 m/s² was not"),
+        ({"jerk_mps3": 0.1}, "WP_JERK 0.1 m/s³ was not"),
+        ({"position_gain_per_s": 1.0}, "PSC_POS_P 1 /s was not"),
     ],
 )
 def test_vehicles_beyond_what_was_measured(changes: dict[str, object], words: str) -> None:

@@ -84,7 +84,7 @@ def test_waypoints_round_an_obstacle_stay():
     assert len(found.mission.items) <= 10
     kept = sum(item in found.mission.items for item in items[39:44])
     assert kept >= 3
-    with pytest.raises(MissionTooLongError, match="the vehicle holds 4:") as caught:
+    with pytest.raises(MissionTooLongError, match="the vehicle holds 4;") as caught:
         shortened(Mission(tuple(items), HOME), own, situation, request, most=3)
     assert caught.value.details["limit"] == 4
     assert caught.value.details["items"] > 4
@@ -125,7 +125,7 @@ def test_a_speed_that_the_mission_sets_itself_stays():
         go(60.0, 0.0),
     )
     with pytest.raises(
-        MissionTooLongError, match="needs 7 items with home, and the vehicle holds 5: 0 of 0 items"
+        MissionTooLongError, match="needs 7 items including home, but the vehicle holds 5; 0 of 0 route items"
     ):
         shortened(Mission(items, HOME), (), situation_of(WIDE), Request(clearance_m=2.0), most=4)
 
@@ -159,11 +159,11 @@ def test_a_long_tour_fits_or_says_why_not(monkeypatch):
     assert len(fitted.items) + 1 <= most
     assert fitted.targets == whole.targets
     assert set(fitted.targets) <= set(fitted.path)
-    assert any(f"so that the vehicle can hold it ({most})" in text for text in fitted.warnings)
+    assert any(f"left out to fit the vehicle's limit of {most}" in text for text in fitted.warnings)
     assert fitted.driven_clearance_m >= 1.0 - 0.01
     assert_clear_of_posts(fitted.path, 1.0)
     assert check_mission(Mission(fitted.items), situation, request).holds
-    with pytest.raises(MissionTooLongError, match=f"the vehicle holds {most}: 0 of 0 items"):
+    with pytest.raises(MissionTooLongError, match=f"the vehicle holds {most}; 0 of 0 route items"):
         plan(situation, replace(request, corner_allowance_m=1.0))
 
 
@@ -193,13 +193,13 @@ def test_a_repaired_mission_is_shortened_by_its_routes_only(monkeypatch):
     assert short.check.holds
     assert [item for item in short.mission.items if item in items] == list(items)
     assert len(short.mission.items) == count - 1  # two corners of the barn became one
-    assert short.changes[-1] == "3 items of the routes left out so that the vehicle can hold it (5)"
+    assert short.changes[-1] == "3 route items left out to fit the vehicle's limit of 5"
     barn_at = Polygon(MAP.points([place(*corner) for corner in ((40, 20), (60, 20), (60, 40), (40, 40))]))
     line = LineString(MAP.points([HOME, *(one.position for one in short.mission.items)]))
     assert line.distance(barn_at) >= 2.0
     monkeypatch.setattr("missions.editing.repair.most_items", lambda _parameters: count - 1)
     with pytest.raises(
-        MissionTooLongError, match="needs 5 items with home, and the vehicle holds 4: 1 of 2 items"
+        MissionTooLongError, match="needs 5 items including home, but the vehicle holds 4; 1 of 2 route items"
     ):
         repair_mission(Mission(items, HOME), situation, request)
 
@@ -221,5 +221,5 @@ def test_rtl_at_the_end_needs_an_item_too(monkeypatch):
     monkeypatch.setattr("missions.planning.plan.most_items", lambda _parameters: 4)
     assert len(plan(situation, request).items) == 3
     monkeypatch.setattr("missions.planning.plan.most_items", lambda _parameters: 3)
-    with pytest.raises(MissionTooLongError, match="needs 4 items with home, and the vehicle holds 3"):
+    with pytest.raises(MissionTooLongError, match="needs 4 items including home, but the vehicle holds 3"):
         plan(situation, request)

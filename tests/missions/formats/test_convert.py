@@ -111,7 +111,7 @@ def test_return_points(plan: Path, tmp_path: Path) -> None:
     out = tmp_path / "x.fen"
     result = run(plan, out)
     assert result.exit_code == 3
-    assert "a .fen file begins with the return point, and the fence has none" in result.stderr
+    assert "a .fen file needs a return point, but the fence has none" in result.stderr
     assert run(plan, out, "--return-point", "40.0003,-104.9992").exit_code == 0
     assert read_fence(out).return_point == (40.0003, -104.9992)
     result = run(out, tmp_path / "x.poly")
@@ -131,14 +131,14 @@ def test_parameters(tmp_path: Path) -> None:
     [
         (["all.plan", "all.plan"], 2, "would be written over what it is made of"),
         (["all.plan", "x.geojson", "--only", "fences"], 2, "--only 'fences': expected one of mission, fence, rally, parameters"),
-        (["all.plan", "x.geojson", "--only", "parameters"], 3, "a .geojson file holds no parameters; it holds mission or fence or rally"),
-        (["all.plan", "x.poly", "--only", "mission"], 3, "a .poly file holds no mission"),
+        (["all.plan", "x.geojson", "--only", "parameters"], 3, "a .geojson file contains no parameters; it contains mission or fence or rally"),
+        (["all.plan", "x.poly", "--only", "mission"], 3, "a .poly file contains no mission"),
         (["all.plan", "x.geojson", "--return-point", "north"], 2, "'north' is not a position"),
         (["x.parm", "y.parm", "--return-point", "1,2"], 2, "--return-point belongs to a fence, and IN holds none"),
         (["none.plan", "x.geojson"], 3, "none.plan cannot be read: No such file"),
         (["none.plan", "all.plan"], 3, "none.plan cannot be read: No such file"),
-        (["all.plan", "x.tlog"], 3, "no format to write for the suffix '.tlog'"),
-        (["all.plan", "x"], 3, "no format to write for the suffix ''"),
+        (["all.plan", "x.tlog"], 3, "cannot write files with extension '.tlog'"),
+        (["all.plan", "x"], 3, "cannot write files with extension ''"),
         (["all.plan", "x.parm"], 3, "there is no parameters to write"),
         (["x.gpx", "x.plan"], 3, "x.gpx cannot be read: No such file"),
         (["all.plan", "none/x.plan"], 3, "cannot be written: No such file"),

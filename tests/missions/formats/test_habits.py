@@ -322,7 +322,7 @@ def test_kml_in_the_encoding_that_it_declares(tmp_path: Path) -> None:
     path.write_bytes(text.encode("latin-1"))
     assert len(read_fence(path).zones) == 4
     path.write_bytes(text.replace("ISO-8859-1", "unicode_escape").encode("latin-1"))
-    with pytest.raises(MissionFormatError, match="the encoding 'unicode_escape' is not known"):
+    with pytest.raises(MissionFormatError, match="the encoding 'unicode_escape' is not supported"):
         read_situation(path)
     path.write_bytes(text.replace("ISO-8859-1", "utf-8").encode("latin-1"))
     with pytest.raises(MissionFormatError, match=r"is not a text file .*expected UTF-8"):
@@ -336,7 +336,7 @@ def test_a_pin_in_a_folder_of_drawings_is_left_out() -> None:
     situation = kml.read(text, "f")
     assert situation.fence is not None
     assert len(situation.fence.value.zones) == 1
-    with pytest.raises(MissionFormatError, match="nothing says what point 'Gate' is"):
+    with pytest.raises(MissionFormatError, match="unclear what point 'Gate' is"):
         kml.read(text.replace("Drawings", "Drawings of the gate"), "f")
 
 

@@ -105,7 +105,7 @@ def test_what_no_vehicle_has_is_passed_over_and_said() -> None:
     situation = read(text, "f")
     assert situation.parameters == {"WP_SPEED": 2.0, "WP_RADIUS": -1.0}
     assert situation.remarks == (
-        "f: line 3: A_NAME_OF_MORE_THAN_16 is passed over: a parameter's name has at most 16 letters, and this 22",
+        "f: line 3: A_NAME_OF_MORE_THAN_16 skipped: parameter names have at most 16 characters, this one has 22",
     )
     with pytest.raises(MissionFormatError, match="'1,5' has a decimal comma"):
         read("WP_SPEED 1,5\n", "f")

@@ -256,7 +256,7 @@ def test_numbers_json_has_not_are_null(value: float) -> None:
         (changed("mission.items", {}), "mission.items: expected a list"),
         (changed("mission.items", ...), "mission.items: missing"),
         (changed("mission.items.0", "x"), "mission.items[0].type: missing"),
-        (changed("mission.items.0.type", "ComplexItem"), "mission.items[0].type: a pattern of kind 'ComplexItem', which QGroundControl saves without its items"),
+        (changed("mission.items.0.type", "ComplexItem"), "mission.items[0].type: pattern 'ComplexItem', which QGroundControl saves without its items"),
         (changed("mission.items.0.params", [1, 2]), "mission.items[0].params: 2 params; expected 7"),
         (changed("mission.items.0.params.1", "x"), "mission.items[0].params[1]: expected a number"),
         (changed("mission.items.0.params.4", 91), "mission.items[0].params: latitude 91° is beyond"),

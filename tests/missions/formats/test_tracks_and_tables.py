@@ -59,18 +59,18 @@ def test_a_lone_track_is_taken_for_the_route_and_it_is_said():
     text = gpx_of(f"<trk><name>t</name><trkseg>{points('trkpt', A, B, C)}</trkseg></trk>")
     situation = gpx.read(text, "f")
     assert places_of(situation) == [A, B, C]
-    assert situation.remarks == ("f: the recorded track is taken for the route",)
+    assert situation.remarks == ("f: the recorded track is used as the route",)
 
 
 def test_way_points_alone_are_the_mission_and_it_is_said():
     situation = gpx.read(gpx_of(points("wpt", A, B, name="x")), "f")
     assert places_of(situation) == [A, B]
-    assert situation.remarks == ("f: 2 way points are taken for the mission, in the order of the file",)
+    assert situation.remarks == ("f: 2 waypoints are used as the mission, in file order",)
 
 
 def test_pins_beside_a_route_are_asked_for():
     text = gpx_of(points("wpt", C, name="Gate"), f"<rte>{points('rtept', A, B)}</rte>")
-    with pytest.raises(MissionFormatError, match="nothing says what point 'Gate' is"):
+    with pytest.raises(MissionFormatError, match="unclear what point 'Gate' is"):
         gpx.read(text, "f")
     assert places_of(gpx.read(text, "f", Choices(ignores_points=True))) == [A, B]
 
@@ -78,7 +78,7 @@ def test_pins_beside_a_route_are_asked_for():
 def test_of_several_tracks_one_is_chosen():
     track = "<trk><name>{}</name><trkseg>{}</trkseg></trk>"
     text = gpx_of(track.format("one", points("trkpt", A, B)), track.format("two", points("trkpt", B, C)))
-    with pytest.raises(MissionFormatError, match="track 'one' was recorded, not planned"):
+    with pytest.raises(MissionFormatError, match="track 'one' is a recorded track, not a planned route"):
         gpx.read(text, "f")
     chosen = Choices({"Two": Role.ROUTE, "one": Role.DRAWING})
     assert places_of(gpx.read(text, "f", chosen)) == [B, C]
@@ -88,7 +88,7 @@ def test_of_several_tracks_one_is_chosen():
     ("text", "problem"),
     [
         ("<kml/>", "f: line 1: <kml>; expected <gpx>"),
-        (gpx_of(), "f: there is nothing in it"),
+        (gpx_of(), "f: contains no features"),
         (gpx_of('<wpt lat="north" lon="2"/>'), "f: line 1: 'north' is not a number; expected lat and lon"),
         (gpx_of('<wpt lat="48,1" lon="2"/>'), "f: line 1: '48,1' has a decimal comma"),
         (gpx_of('<wpt lon="2"/>'), "f: line 1: '' is not a number"),
@@ -139,13 +139,13 @@ def test_roles_and_circles_of_a_table(tmp_path):
 @pytest.mark.parametrize(
     ("text", "problem"),
     [
-        ("", "there is nothing in it"),
+        ("", "the file is empty"),
         ("48.1,11.5\n", "line 1: 0 columns named lat or latitude; the first line names the columns"),
         ("lat,lat,lon\n1,2,3\n", "line 1: 2 columns named lat or latitude"),
         ("lat,lon\n1\n", "line 2: 1 columns; expected 2"),
         ("lat;lon\n48,1;11,5\n", "line 2: '48,1' has a decimal comma"),
         ("lat,lon\nx,11\n", "line 2: 'x' is not a number; expected decimal degrees"),
-        ("lat,lon\n149.1,-35.3\n", "line 2: latitude 149.1° is beyond ±90°; the order here is latitude and longitude as the columns say: are they swapped?"),
+        ("lat,lon\n149.1,-35.3\n", "line 2: latitude 149.1° is beyond ±90°; expected latitude and longitude as line 1 names them: are they swapped?"),
         ('lat,lon\n"1,2', "line 2: 1 columns; expected 2"),
     ],
 )  # fmt: skip
@@ -179,7 +179,7 @@ def test_version_100_is_read_as_pymavlink_reads_it(tmp_path):
         assert item.autocontinue == bool(their.autocontinue)
     assert situation.home.value == LatLon(loader.wp(0).x, loader.wp(0).y)
     path.write_text("QGC WPL 100\n0 0 99 0 0 0 0 1 11.5 48.1 0 0 1\n")
-    with pytest.raises(MissionFormatError, match="line 2: action 99 of QGC WPL 100; known are 2, 3, 4"):
+    with pytest.raises(MissionFormatError, match="line 2: action 99 of QGC WPL 100; supported: 2, 3, 4"):
         read_situation(path)
 
 
@@ -215,12 +215,12 @@ def wpl(*rows: tuple[int, int]) -> str:
 def test_gaps_are_said_and_refused_where_a_jump_goes_by_number():
     situation = waypoints.read(wpl((0, 16), (1, 16), (3, 16)), "f")
     assert len(situation.mission.value.items) == 2
-    assert situation.remarks == ("f: line 4: seq 3 follows seq 1: items are taken in the order of the lines",)
+    assert situation.remarks == ("f: line 4: seq 3 follows seq 1: items are read in line order",)
     with pytest.raises(
-        MissionFormatError, match="line 4: seq 3 follows seq 1, and line 5 jumps to an item by its seq"
+        MissionFormatError, match="line 4: seq 3 follows seq 1, but line 5 jumps to an item by its seq"
     ):
         waypoints.read(wpl((0, 16), (1, 16), (3, 16), (4, 177)), "f")
-    with pytest.raises(MissionFormatError, match=r"line 2: seq 7; a list begins with seq 0 \(home\) or 1"):
+    with pytest.raises(MissionFormatError, match=r"line 2: seq 7; expected seq 0 \(home\) or 1"):
         waypoints.read(wpl((7, 16), (8, 16)), "f")
 
 
@@ -331,7 +331,7 @@ def test_polygons_of_any_projection(tmp_path, pyogrio, suffix, driver, crs):
                 if part.suffix != ".zip":
                     archive.write(part, part.name)
         path = tmp_path / "f.zip"
-    with pytest.raises(MissionFormatError, match="nothing says whether polygon 'Field', polygon 'Tree' are"):
+    with pytest.raises(MissionFormatError, match="unclear whether polygon 'Field', polygon 'Tree' are"):
         read_situation(path)
     zones = read_situation(path, Choices(outermost_is_inclusion=True)).fence.value.zones
     assert [zone.kind for zone in zones] == ["inclusion", "exclusion"]
@@ -342,7 +342,7 @@ def test_polygons_of_any_projection(tmp_path, pyogrio, suffix, driver, crs):
 
 def test_a_shapefile_that_does_not_say_its_projection(tmp_path, pyogrio):
     path = made(tmp_path / "f.shp", pyogrio, None, [FIELD], ["Field"], "ESRI Shapefile")
-    with pytest.raises(MissionFormatError, match="does not say its projection"):
+    with pytest.raises(MissionFormatError, match="projection unknown"):
         read_situation(path)
 
 
@@ -350,7 +350,7 @@ def test_a_shapefile_is_named_where_the_extra_is_missing_or_it_is_broken(tmp_pat
     for name in ("f.shp", "f.gpkg"):
         (tmp_path / name).write_bytes(b"junk")
         with pytest.raises(
-            MissionFormatError, match=r"is a (shapefile|GeoPackage), which is read|cannot be read"
+            MissionFormatError, match=r"is a (shapefile|GeoPackage); reading it needs|cannot be read"
         ):
             read_situation(tmp_path / name)
     with zipfile.ZipFile(tmp_path / "x.zip", "w") as archive:
@@ -358,7 +358,7 @@ def test_a_shapefile_is_named_where_the_extra_is_missing_or_it_is_broken(tmp_pat
     with pytest.raises(MissionFormatError, match=r"a zip archive without a shapefile \(\.shp\) in it"):
         read_situation(tmp_path / "x.zip")
     (tmp_path / "y.zip").write_bytes(b"junk")
-    with pytest.raises(MissionFormatError, match="is no zip file that can be read"):
+    with pytest.raises(MissionFormatError, match="is not a readable zip file"):
         read_situation(tmp_path / "y.zip")
     with pytest.raises(MissionFormatError, match=r"none\.shp cannot be read: No such file"):
         read_situation(tmp_path / "none.shp")
@@ -413,7 +413,7 @@ def test_features_of_a_library_are_features_of_ours(tmp_path, monkeypatch):
     assert situation.remarks == (f"{path}: half of it",)
     for name, problem in (
         ("broken.gpkg", "a GeoPackage that cannot be read: no such thing"),
-        ("table.gpkg", "there is nothing in it"),
+        ("table.gpkg", "contains no features"),
     ):
         (tmp_path / name).write_bytes(b"x")
         with pytest.raises(MissionFormatError, match=problem):
@@ -423,7 +423,7 @@ def test_features_of_a_library_are_features_of_ours(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("crs", "shape", "problem"),
     [
-        (None, FIELD, "does not say its projection"),
+        (None, FIELD, "projection unknown"),
         ("EPSG:4326", box(11, 91, 12, 92), "layer layer, feature 1: latitude 91° is beyond"),
         ("EPSG:0", FIELD, "a shapefile that cannot be read"),
     ],
@@ -438,9 +438,7 @@ def test_what_a_library_gives_is_checked(tmp_path, monkeypatch, crs, shape, prob
 def test_where_the_library_is_missing_it_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyogrio", None)
     (tmp_path / "f.shp").write_bytes(b"x")
-    with pytest.raises(
-        MissionFormatError, match="is a shapefile, which is read with the extra gis"
-    ) as caught:
+    with pytest.raises(MissionFormatError, match="is a shapefile; reading it needs the gis extra") as caught:
         read_situation(tmp_path / "f.shp")
     assert "pbpp-rover[gis]" in str(caught.value.details["advice"])
 
@@ -448,10 +446,10 @@ def test_where_the_library_is_missing_it_is_named(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("text", "suffix", "problem"),
     [
-        ('{"type":"Feature","properties":{"role":"waypoint","command":178},"geometry":{"type":"Point","coordinates":[1,2]}}', ".geojson", "a point, and command 178 has no place"),
+        ('{"type":"Feature","properties":{"role":"waypoint","command":178},"geometry":{"type":"Point","coordinates":[1,2]}}', ".geojson", "a point, but command 178 has no position"),
         ("<kml><Placemark><Track><coord>1 2</coord><coord>1 x</coord></Track></Placemark></kml>", ".kml", "line 1: '1 x'; expected longitude latitude altitude"),
         ("<kml><Placemark><Track><coord>1 2</coord><coord>100 -120</coord></Track></Placemark></kml>", ".kml", "latitude -120° is beyond"),
-        ("<kml><Placemark><Point><coordinates>-35.3,149.1</coordinates></Point></Placemark></kml>", ".kml", "latitude 149.1° is beyond ±90°; the order here is longitude, latitude: are they swapped?"),
+        ("<kml><Placemark><Point><coordinates>-35.3,149.1</coordinates></Point></Placemark></kml>", ".kml", "latitude 149.1° is beyond ±90°; expected longitude, latitude: are they swapped?"),
         ('lat,lon\n1,2\n"' + "x" * 140_000 + '",1\n', ".csv", "line 3: field larger than field limit"),
         ('{"fileType":"Plan","version":1,"geoFence":[]}', ".plan", "geoFence: expected an object"),
     ],
@@ -474,6 +472,6 @@ def test_what_is_not_set_is_refused_where_it_means_something(tmp_path):
     assert read_mission(tmp_path / "x.waypoints").items[1].params == (1.0, 2.0, 0.0, 0.0)
     placeless = Situation(mission=Known(Mission(items[1:]), None, ""))
     with pytest.raises(
-        MissionFormatError, match=r"a \.csv file holds places, and no item of the mission has one"
+        MissionFormatError, match=r"a \.csv file contains positions, but no mission item has one"
     ):
         write_situation(placeless, tmp_path / "x.csv")

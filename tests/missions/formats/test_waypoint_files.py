@@ -167,7 +167,7 @@ WAYPOINT = "1\t0\t3\t16\t0\t0\t0\t0\t40.07\t-105.2\t0\t1"
     [
         ("", "line 1: expected 'QGC WPL 110'"),
         ("hello\n", "line 1: expected 'QGC WPL 110'"),
-        (text_of(WAYPOINT, header="QGC WPL 120"), "line 1: QGC WPL 120 is a version that is not known; read are 110 and 100"),
+        (text_of(WAYPOINT, header="QGC WPL 120"), "line 1: unknown version QGC WPL 120; supported: 110 and 100"),
         (text_of(), "no items after the first line"),
         (text_of("# nothing"), "no items after the first line"),
         (text_of(HOME_LINE, WAYPOINT[:-2]), "line 3: 11 columns; expected 12"),
@@ -181,11 +181,11 @@ WAYPOINT = "1\t0\t3\t16\t0\t0\t0\t0\t40.07\t-105.2\t0\t1"
         (text_of(HOME_LINE, WAYPOINT.replace("\t16\t", "\t70000\t")), "line 3: command 70000"),
         (text_of(HOME_LINE, WAYPOINT.replace("\t3\t", "\t-1\t")), "line 3: frame -1"),
         (text_of("0\t0\t3\t20\t0\t0\t0\t0\t0\t0\t0\t1"), "line 2: .*command 20.*home"),
-        (text_of(*FENCE_LINES[:2]), "line 2: fence item 0: an exclusion polygon of 3 vertices has only 2"),
-        (text_of(HOME_LINE, "# x", *FENCE_LINES[:2]), "line 4: fence item 0: .* has only 2"),
-        (text_of(*FENCE_LINES, FENCE_LINES[0].replace("5002\t3", "5004\t0")), "line 5: fence item 3: a circle of radius 0"),
-        (text_of(*FENCE_LINES, WAYPOINT), "line 5: fence item 3: command 16 does not belong in a fence"),
-        (text_of(HOME_LINE, WAYPOINT, *FENCE_LINES), "line 3: fence item 0: command 16 does not belong in a fence"),
+        (text_of(*FENCE_LINES[:2]), "line 2: fence item 0: exclusion polygon with 3 vertices, but only 2 are given"),
+        (text_of(HOME_LINE, "# x", *FENCE_LINES[:2]), "line 4: fence item 0: .* only 2 are given"),
+        (text_of(*FENCE_LINES, FENCE_LINES[0].replace("5002\t3", "5004\t0")), "line 5: fence item 3: circle radius 0"),
+        (text_of(*FENCE_LINES, WAYPOINT), "line 5: fence item 3: command 16 is not a fence item"),
+        (text_of(HOME_LINE, WAYPOINT, *FENCE_LINES), "line 3: fence item 0: command 16 is not a fence item"),
     ],
 )  # fmt: skip
 def test_unusable_files_name_the_line(text: str, problem: str) -> None:
@@ -197,9 +197,9 @@ def test_what_a_file_does_not_hold(tmp_path: Path) -> None:
     mission, fence = tmp_path / "m.waypoints", tmp_path / "f.waypoints"
     mission.write_text(text_of(HOME_LINE, WAYPOINT))
     fence.write_text(text_of(*FENCE_LINES))
-    with pytest.raises(FenceMissingError, match=r"m\.waypoints holds no fence"):
+    with pytest.raises(FenceMissingError, match=r"m\.waypoints contains no fence"):
         read_fence(mission)
-    with pytest.raises(MissionFormatError, match=r"f\.waypoints holds no mission"):
+    with pytest.raises(MissionFormatError, match=r"f\.waypoints contains no mission"):
         read_mission(fence)
 
 
@@ -207,9 +207,11 @@ def test_files_that_cannot_be_read_or_written(tmp_path: Path) -> None:
     situation = Situation(mission=Known(Mission((waypoint(LatLon(1, 2)),)), None, ""))
     with pytest.raises(MissionFormatError, match=r"none\.plan cannot be read: No such file"):
         read_situation(tmp_path / "none.plan")
-    with pytest.raises(MissionFormatError, match=r"is a telemetry log; read are \.plan, \.waypoints, \.txt"):
+    with pytest.raises(
+        MissionFormatError, match=r"is a telemetry log; supported: \.plan, \.waypoints, \.txt"
+    ):
         read_situation(tmp_path / "x.tlog")
-    with pytest.raises(MissionFormatError, match="no format to write for the suffix ''"):
+    with pytest.raises(MissionFormatError, match="cannot write files with extension ''"):
         write_mission(situation, tmp_path / "x")
     with pytest.raises(MissionFormatError, match="cannot be written: No such file"):
         write_mission(situation, tmp_path / "no" / "x.waypoints")

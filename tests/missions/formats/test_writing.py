@@ -116,18 +116,18 @@ def test_parameters(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("situation", "name", "part", "problem"),
     [
-        (ALL, "x.waypoints", None, "a .waypoints file holds one list, and there are mission and fence and rally; choose one"),
-        (ALL, "x.fen", None, "a .fen file holds one inclusion polygon and nothing else; the fence has 1 inclusion polygon, 1 exclusion circle"),
-        (Situation(fence=known(Fence((INCLUSION,)))), "x.fen", None, "a .fen file begins with the return point, and the fence has none"),
-        (Situation(fence=known(Fence((INCLUSION, INCLUSION)))), "x.poly", None, "a .poly file holds one inclusion polygon and nothing else; the fence has 2 inclusion polygons"),
-        (Situation(fence=known(Fence((replace(INCLUSION, kind=ZoneKind.EXCLUSION),)))), "x.poly", None, "a .poly file holds one inclusion polygon and nothing else; the fence has 1 exclusion polygon"),
-        (Situation(fence=known(Fence())), "x.poly", None, "a .poly file holds one inclusion polygon and nothing else; the fence has no zone"),
-        (ALL, "x.fen", Part.MISSION, "a .fen file holds no mission; it holds fence"),
+        (ALL, "x.waypoints", None, "a .waypoints file contains one list, but there are mission and fence and rally; choose one"),
+        (ALL, "x.fen", None, "a .fen file contains exactly one inclusion polygon; the fence has 1 inclusion polygon, 1 exclusion circle"),
+        (Situation(fence=known(Fence((INCLUSION,)))), "x.fen", None, "a .fen file needs a return point, but the fence has none"),
+        (Situation(fence=known(Fence((INCLUSION, INCLUSION)))), "x.poly", None, "a .poly file contains exactly one inclusion polygon; the fence has 2 inclusion polygons"),
+        (Situation(fence=known(Fence((replace(INCLUSION, kind=ZoneKind.EXCLUSION),)))), "x.poly", None, "a .poly file contains exactly one inclusion polygon; the fence has 1 exclusion polygon"),
+        (Situation(fence=known(Fence())), "x.poly", None, "a .poly file contains exactly one inclusion polygon; the fence has no zone"),
+        (ALL, "x.fen", Part.MISSION, "a .fen file contains no mission; it contains fence"),
         (replace(ALL, mission=None), "x.gpx", None, "there is no mission to write"),
         (replace(ALL, mission=None), "x.plan", Part.MISSION, "there is no mission to write"),
-        (Situation(), "x.plan", None, "there is nothing to write: no mission, fence, rally points or parameters"),
-        (replace(ALL, mission=known(Mission((MissionItem(178),)))), "x.gpx", None, "a .gpx file holds a route, and no item of the mission has a place"),
-        (ALL, "x.bin", None, "no format to write for the suffix '.bin'; known are .plan, .waypoints,"),
+        (Situation(), "x.plan", None, "nothing to write: no mission, fence, rally points or parameters"),
+        (replace(ALL, mission=known(Mission((MissionItem(178),)))), "x.gpx", None, "a .gpx file contains a route, but no mission item has a position"),
+        (ALL, "x.bin", None, "cannot write files with extension '.bin'; supported: .plan, .waypoints,"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_written_is_said(
@@ -145,13 +145,13 @@ def test_what_cannot_be_written_is_known_before_any_work() -> None:
             if part in format_.holds:
                 check_writable_format(Path(f"x{suffix}"), part)
             else:
-                reason = f"a {suffix} file holds no {part}; known for it are "
+                reason = f"a {suffix} file contains no {part}; supported: "
                 if format_.write is None:
-                    reason = f"no format to write for the suffix '{suffix}'; known are "
+                    reason = f"cannot write files with extension '{suffix}'; supported: "
                 with pytest.raises(MissionFormatError, match=reason):
                     check_writable_format(Path(f"x{suffix}"), part)
     with pytest.raises(
-        MissionFormatError, match=r"no format to write for the suffix '\.tlog'; known are \.plan"
+        MissionFormatError, match=r"cannot write files with extension '\.tlog'; supported: \.plan"
     ):
         check_writable_format(Path("x.tlog"))
 

@@ -56,14 +56,14 @@ GEOJSON = [
     (collection(feature(POLYGON, role="keep calm")), "features[0]: role 'keep calm'; expected one of inclusion, exclusion"),
     (collection(feature(POLYGON, fence=True)), "features[0]: fence True; expected one of inclusion, exclusion"),
     (collection(feature(POLYGON, inclusion="perhaps")), "features[0]: inclusion 'perhaps'; expected true or false"),
-    (collection(feature(POLYGON, inclusion=True, fence="exclusion")), "features[0]: said to be exclusion and inclusion at once"),
-    (collection(feature(POLYGON), feature(POLYGON, fence="exclusion")), "features[0]: nothing says whether polygon 1 is an inclusion or an exclusion"),
-    (collection(feature(POLYGON, name="keep in, keep out")), "features[0]: the name 'keep in, keep out' tells of exclusion and inclusion"),
+    (collection(feature(POLYGON, inclusion=True, fence="exclusion")), "features[0]: marked as exclusion and inclusion at once"),
+    (collection(feature(POLYGON), feature(POLYGON, fence="exclusion")), "features[0]: unclear whether polygon 1 is an inclusion or an exclusion"),
+    (collection(feature(POLYGON, name="keep in, keep out")), "features[0]: the name 'keep in, keep out' could mean exclusion or inclusion"),
     (collection(feature(POLYGON, role="home")), "features[0]: a polygon cannot be home; expected drawing, exclusion, inclusion"),
     (collection(feature(LINE, fence="exclusion")), "features[0]: a line cannot be exclusion; a line has no inside; expected drawing, route"),
     (collection(feature(LINE, name="exclusion")), "features[0]: a line cannot be exclusion; a line has no inside; expected drawing, route"),
     (collection(feature(LINE), feature(LINE)), "features[1]: a second line, line 2; expected one route"),
-    (collection(feature(POINT)), "features[0]: nothing says what point 1 is"),
+    (collection(feature(POINT)), "features[0]: unclear what point 1 is"),
     (collection(feature(POINT, fence="exclusion")), "features[0]: a point cannot be exclusion; a circle is a point with a radius"),
     (collection(feature(POINT, radius=0, fence="exclusion")), "features[0]: radius 0; a circle's radius must be positive"),
     (collection(feature(POINT, radius_m="wide", fence="exclusion")), "features[0]: radius_m 'wide'; expected a number"),
@@ -71,12 +71,12 @@ GEOJSON = [
     (collection(feature(POINT, role="home"), feature(POINT, role="home")), "features[1]: a second home; expected one at most"),
     (collection(feature(POINT, role="return point"), feature(POINT, role="return point")), "features[1]: a second return point"),
     (collection(feature({"type": "Polygon", "coordinates": [RING, RING]}, role="exclusion")), "features[0]: an exclusion whose rings cross or touch"),
-    (collection(feature(None, role="waypoint")), "features[0]: a waypoint without a place"),
+    (collection(feature(None, role="waypoint")), "features[0]: a waypoint without a position"),
     (collection(feature(None, role="exclusion")), "features[0]: a feature without a geometry cannot be exclusion"),
     (collection(feature(None, role="waypoint", command=16, param5=91)), "features[0]: latitude 91° is beyond"),
     (collection(feature(POINT, role="waypoint", command="go")), "features[0]: command 'go'; expected a number"),
     (collection(feature(POINT, role="waypoint", command=1.5)), "features[0]: command 1.5 is not a whole number"),
-    (collection(feature(POINT, role="waypoint", seq=1), feature(POINT, role="waypoint", seq=1)), "features[1]: a second item of seq 1"),
+    (collection(feature(POINT, role="waypoint", seq=1), feature(POINT, role="waypoint", seq=1)), "features[1]: seq 1 is used twice"),
     (feature(POLYGON) | {"properties": [1]}, "properties: expected an object or null"),
     (collection(feature(POLYGON)) | {"crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::25832"}}}, "crs.properties.name: 'urn:ogc:def:crs:EPSG::25832'; expected longitude and latitude in WGS 84"),
     (collection(feature(POLYGON)) | {"crs": {"type": "link"}}, "crs.properties: missing"),
@@ -105,10 +105,10 @@ KML = [
     ("<kml>\n<Document></kml>", "line 2: not XML: mismatched tag"),
     ("<kml>&lol;</kml>", "line 1: not XML: undefined entity"),
     ("<gpx/>", "line 1: <gpx>; expected <kml>"),
-    ('<!DOCTYPE kml [<!ENTITY lol "lol"><!ENTITY more "&lol;&lol;">]>\n<kml>&more;</kml>', "line 1: a document type (<!DOCTYPE …>) is refused"),
-    ('<?xml version="1.0"?>\n<!DOCTYPE kml SYSTEM "file:///etc/passwd">\n<kml/>', "line 2: a document type (<!DOCTYPE …>) is refused"),
-    ("<kml>" + "<Folder>" * 200 + "</Folder>" * 200 + "</kml>", "line 1: nested more than 100 deep"),
-    ("<kml>\n<NetworkLink><Link><href>http://example.com/x.kml</href></Link></NetworkLink></kml>", "line 2: a NetworkLink; nothing is fetched"),
+    ('<!DOCTYPE kml [<!ENTITY lol "lol"><!ENTITY more "&lol;&lol;">]>\n<kml>&more;</kml>', "line 1: a document type (<!DOCTYPE …>) is not supported"),
+    ('<?xml version="1.0"?>\n<!DOCTYPE kml SYSTEM "file:///etc/passwd">\n<kml/>', "line 2: a document type (<!DOCTYPE …>) is not supported"),
+    ("<kml>" + "<Folder>" * 200 + "</Folder>" * 200 + "</kml>", "line 1: nested more than 100 levels deep"),
+    ("<kml>\n<NetworkLink><Link><href>http://example.com/x.kml</href></Link></NetworkLink></kml>", "line 2: a NetworkLink, which is not followed"),
     (placemark("<Model/>"), "line 4: a Model is not supported; expected one of Point, LineString"),
     (placemark("<Polygon/>"), "line 4: 0 outer rings; expected one <outerBoundaryIs><LinearRing>"),
     (placemark(f"<Polygon><outerBoundaryIs>{KML_RING * 2}</outerBoundaryIs></Polygon>"), "line 4: 2 outer rings"),
@@ -122,10 +122,10 @@ KML = [
     (placemark("<Point><coordinates>-10_5,40</coordinates></Point>"), "line 4: '-10_5,40'; expected longitude,latitude"),
     (placemark("<Point><coordinates>40,-105</coordinates></Point>"), "line 4: latitude -105° is beyond ±90°"),
     (placemark("<Point><coordinates>-105,nan</coordinates></Point>"), "line 4: position nan,-105.0 is not a pair"),
-    (placemark("<Point><coordinates>-105,40</coordinates></Point>"), "line 4: nothing says what point 1 is"),
+    (placemark("<Point><coordinates>-105,40</coordinates></Point>"), "line 4: unclear what point 1 is"),
     (placemark(data("role", "gate") + KML_POLYGON), "line 4: role 'gate'; expected one of inclusion"),
     (placemark("<name>No-go along the road</name><LineString><coordinates>1,2 3,4</coordinates></LineString>"), "line 4: a line cannot be exclusion"),
-    (placemark(KML_POLYGON + KML_POLYGON), "line 4: nothing says whether polygon 1, polygon 2 are inclusions or exclusions"),
+    (placemark(KML_POLYGON + KML_POLYGON), "line 4: unclear whether polygon 1, polygon 2 are inclusions or exclusions"),
     (placemark("<name>Exclusion</name>"), "line 3: a feature without a geometry cannot be exclusion"),
     (placemark("<name>exclusion</name>" + KML_POLYGON.replace("</outerBoundaryIs>", f"</outerBoundaryIs><innerBoundaryIs>{KML_RING}</innerBoundaryIs>")), "line 4: an exclusion whose rings cross or touch"),
 ]  # fmt: skip
@@ -140,7 +140,7 @@ FEN = [
     ("", "0 points; expected the return point, at least 3 vertices"),
     ("# nothing\n", "0 points; expected the return point"),
     ("40 -105\n40 -105\n40.1 -105\n40 -105\n", "4 points; expected the return point"),
-    ("40 -105\n40 -105\n40.1 -105\n40.1 -105.1\n40 -105.1\n", "line 5: the ring is not closed: expected the point of line 2 again"),
+    ("40 -105\n40 -105\n40.1 -105\n40.1 -105.1\n40 -105.1\n", "line 5: the polygon is not closed: expected the point of line 2 again"),
     ("# x\n40;-105\n", "line 2: '40;-105'; expected latitude and longitude in decimal degrees with a space or a comma between"),
     ("40 -105 12\n", "line 1: '40 -105 12'; expected latitude and longitude"),
     ("40\n", "line 1: '40'; expected latitude and longitude"),
@@ -189,11 +189,11 @@ UNKNOWN_PATTERN = {"type": "ComplexItem", "complexItemType": "StructureScan", "v
         (json.dumps({"fileType": "Plan", "version": 2}), "version: version 2; expected 1"),
         (plan(version=1), "mission.version: version 1; expected 2"),
         (json.dumps({"fileType": "Plan", "rallyPoints": {"version": 3, "points": []}}), "rallyPoints.version: rallyPoints version 3; expected 2"),
-        (plan(items=[UNKNOWN_PATTERN]), "mission.items[0].type: a pattern of kind 'StructureScan', which QGroundControl saves without its items"),
+        (plan(items=[UNKNOWN_PATTERN]), "mission.items[0].type: pattern 'StructureScan', which QGroundControl saves without its items"),
         (plan(items=[{"type": "ComplexItem", "TransectStyleComplexItem": {"Items": {}}}]), "mission.items[0].TransectStyleComplexItem.Items: expected a list"),
         (plan(items=[{"type": "ComplexItem", "TransectStyleComplexItem": {"Items": [simple(16, 1, 0)]}}]), "mission.items[0].TransectStyleComplexItem.Items[0].params: 1 params; expected 7"),
-        (plan(items=[WAYPOINT, simple(177, 2, 9, 1, 0, 0, 0, 0, 0)]), "mission.items[1].params[0]: expected the doJumpId of one item; 9 is that of none or several"),
-        (plan(items=[WAYPOINT, WAYPOINT, simple(177, 2, 1, 1, 0, 0, 0, 0, 0)]), "mission.items[2].params[0]: expected the doJumpId of one item; 1 is that of none or several"),
+        (plan(items=[WAYPOINT, simple(177, 2, 9, 1, 0, 0, 0, 0, 0)]), "mission.items[1].params[0]: expected the doJumpId of exactly one item; 9 belongs to none or several"),
+        (plan(items=[WAYPOINT, WAYPOINT, simple(177, 2, 1, 1, 0, 0, 0, 0, 0)]), "mission.items[2].params[0]: expected the doJumpId of exactly one item; 1 belongs to none or several"),
         (plan(items=[WAYPOINT, simple(177, 2, None, 1, 0, 0, 0, 0, 0)]), "mission.items[1].params[0]: expected a number"),
         (plan(items=[simple(16, -1, 0, 0, 0, None, 40.0, -105.0, 0)]), "mission.items[0].doJumpId: doJumpId -1 is not a whole number"),
     ],
@@ -208,7 +208,7 @@ HOME = "0\t1\t0\t16\t0\t0\t0\t0\t40\t-105\t0\t1"
 @pytest.mark.parametrize(
     ("line", "problem"),
     [
-        ("1\t0\t2\t203\t1\t2\t0\t0\tinf\t0\t0\t1", "line 3: param5 is inf; command 203 has no place"),
+        ("1\t0\t2\t203\t1\t2\t0\t0\tinf\t0\t0\t1", "line 3: param5 is inf; command 203 has no position"),
         ("1\t0\t3\t16\t0\t0\t0\t0\t4_0\t-105\t0\t1", "line 3: '4_0' is not a number"),
         ("QGC WPL 110", "line 3: 3 columns; expected 12"),
     ],
@@ -228,8 +228,8 @@ def test_bytes_that_are_no_text(tmp_path: Path, suffix: str) -> None:
 @pytest.mark.parametrize(
     ("content", "problem"),
     [
-        (b"PK no zip", "is no zip file that can be read: File is not a zip file"),
-        (None, "holds no .kml"),
+        (b"PK no zip", "is not a readable zip file: File is not a zip file"),
+        (None, "contains no .kml"),
     ],
 )
 def test_kmz(tmp_path: Path, content: bytes | None, problem: str) -> None:
@@ -242,7 +242,7 @@ def test_kmz(tmp_path: Path, content: bytes | None, problem: str) -> None:
     with pytest.raises(MissionFormatError, match=re.escape(problem)):
         read_situation(path)
     with pytest.raises(
-        MissionFormatError, match=r"no format to write for the suffix '\.kmz'; known are \.plan"
+        MissionFormatError, match=r"cannot write files with extension '\.kmz'; supported: \.plan"
     ):
         write_situation(Situation(), path)
 
@@ -252,7 +252,7 @@ def test_a_kmz_that_holds_too_much_is_not_unpacked(tmp_path: Path, monkeypatch: 
     path = tmp_path / "x.kmz"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("doc.kml", "<kml>" + " " * 1000 + "</kml>", zipfile.ZIP_DEFLATED)
-    with pytest.raises(MissionFormatError, match=r"doc\.kml: more than 0 MB; that is the most that is read"):
+    with pytest.raises(MissionFormatError, match=r"doc\.kml: more than 0 MB, the limit"):
         read_situation(path)
 
 

@@ -131,7 +131,7 @@ def test_a_pentagram_has_a_hole_and_a_warning() -> None:
     assert is_allowed(where, 0, 0)
     assert not is_allowed(where, 0, 90)
     assert where.warnings == (
-        "exclusion polygon 1 crosses or touches itself; it is read by the even-odd rule, as the autopilot tests it",
+        "exclusion polygon 1 crosses or touches itself; its inside is found by the even-odd rule, as on the autopilot",
     )
 
 
@@ -162,7 +162,7 @@ def test_exclusions_without_area_stay_walls(corners: list[tuple[float, float]]) 
 
 def test_an_inclusion_without_area_is_refused() -> None:
     with pytest.raises(
-        FenceError, match="inclusion polygon 2 has no area: the vehicle could be nowhere"
+        FenceError, match="inclusion polygon 2 has no area: there is no allowed area"
     ) as caught:
         ground(square(IN, 0, 0, 50), polygon(IN, (0, 0), (0, 0), (10, 5)))
     assert caught.value.details["zone"] == "inclusion polygon 2"
@@ -293,7 +293,7 @@ def test_the_home_circle_limits_even_the_union() -> None:
 
 
 def test_a_union_that_no_inclusion_brings_within_the_home_circle_is_refused() -> None:
-    with pytest.raises(FenceError, match=r"no inclusion reaches into the home circle \(FENCE_RADIUS 50 m\)"):
+    with pytest.raises(FenceError, match=r"no inclusion overlaps the home circle \(FENCE_RADIUS 50 m\)"):
         ground(square(IN, 500, 500, 50), square(OUT, 0, 0, 10), union=True, home=HOME, home_radius_m=50)
     alone = ground(square(OUT, 0, 0, 10), union=True, home=HOME, home_radius_m=50)
     assert not is_allowed(alone, 60, 0)
@@ -321,17 +321,15 @@ def test_a_fence_that_leaves_no_ground_is_refused() -> None:
     check_ground(ground(square(IN, 0, 0, 10), square(OUT, 0, 0, 9)))
     with pytest.raises(
         FenceError,
-        match=r"^inclusion polygon 1 and inclusion polygon 2 leave no ground in common; the autopilot allows only the intersection",
+        match=r"^inclusion polygon 1 and inclusion polygon 2 have no area in common; the autopilot allows only the intersection",
     ):
         check_ground(ground(square(IN, 0, 0, 10), square(IN, 50, 50, 10)))
-    with pytest.raises(FenceError, match=r"^the exclusions leave no ground of inclusion polygon 1$"):
+    with pytest.raises(FenceError, match=r"^the exclusions cover all of inclusion polygon 1$"):
         check_ground(ground(square(IN, 0, 0, 10), square(OUT, -5, -5, 20)))
 
 
 def test_an_enforced_home_circle_wants_home() -> None:
-    with pytest.raises(
-        SituationError, match=r"FENCE_RADIUS 50 m around home, and home is not known"
-    ) as caught:
+    with pytest.raises(SituationError, match=r"FENCE_RADIUS 50 m around home, but home is unknown") as caught:
         ground(square(IN, -100, -100, 200), home_radius_m=50)
     assert caught.value.details["fence_radius_m"] == 50
 
@@ -380,6 +378,6 @@ def test_an_exclusion_without_area_is_a_wall_to_its_ends(norths_deg: list[float]
 @pytest.mark.parametrize("radius_m", [1e15, 1e38, math.inf, math.nan])
 @pytest.mark.parametrize("kind", [IN, OUT])
 def test_a_circle_wider_than_any_field_is_refused(kind: ZoneKind, radius_m: float) -> None:
-    said = re.escape(f"clusion circle 1 has a radius of {radius_m:g} m; at most 1e+06 m")
+    said = re.escape(f"clusion circle 1 has a radius of {radius_m:g} m; the limit is 1e+06 m")
     with pytest.raises(FenceError, match=said):
         ground(CircleZone(kind, HOME, radius_m))

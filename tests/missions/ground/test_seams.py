@@ -51,10 +51,13 @@ def check(zones, *points, **parameters):
 def test_no_route_crosses_a_seam(zones) -> None:
     with pytest.raises(
         NoRouteError,
-        match=r"the seam at the edge of .*: with AVOID_ENABLE 3 \(bit 0\) the vehicle stops FENCE_MARGIN 2 m before the edge",
+        match=r"the inner edge of .*: with AVOID_ENABLE 3 \(bit 0\) the vehicle stops FENCE_MARGIN 2 m before the edge",
     ) as caught:
         route(zones)
-    assert caught.value.details["advice"] == "set AVOID_ENABLE 2 (without bit 0), or draw the polygons as one"
+    assert (
+        caught.value.details["advice"]
+        == "set AVOID_ENABLE 2 (without bit 0), or draw the inclusions as one polygon"
+    )
 
 
 @pytest.mark.parametrize(
@@ -80,12 +83,15 @@ def test_where_measured_rovers_pass_a_route_crosses_it(parameters) -> None:
 @pytest.mark.parametrize(
     ("parameters", "advice"),
     [
-        ({"OA_TYPE": 2, "AVOID_ENABLE": 0}, "set OA_TYPE 0, or draw the polygons as one"),
-        ({"OA_TYPE": 1}, "set AVOID_ENABLE 2 (without bit 0) and OA_TYPE 0, or draw the polygons as one"),
+        ({"OA_TYPE": 2, "AVOID_ENABLE": 0}, "set OA_TYPE 0, or draw the inclusions as one polygon"),
+        (
+            {"OA_TYPE": 1},
+            "set AVOID_ENABLE 2 (without bit 0) and OA_TYPE 0, or draw the inclusions as one polygon",
+        ),
     ],
 )
 def test_path_planning_does_not_cross_it_either(parameters, advice) -> None:
-    with pytest.raises(NoRouteError, match="does not leave one inclusion of a union for another") as caught:
+    with pytest.raises(NoRouteError, match="does not cross from one inclusion into another") as caught:
         route((WEST, EAST), **parameters)
     assert caught.value.details["advice"] == advice
 
@@ -112,9 +118,12 @@ def test_a_route_within_one_inclusion_is_found_where_the_shorter_one_crosses_a_s
 
 
 def test_a_target_before_a_seam_says_what_would_do() -> None:
-    with pytest.raises(TargetBlockedError, match="the seam at the edge of inclusion polygon 1") as caught:
+    with pytest.raises(TargetBlockedError, match="the inner edge of inclusion polygon 1") as caught:
         route((WEST, EAST), start=(50, 0), target=(11, 0))
-    assert caught.value.details["advice"] == "set AVOID_ENABLE 2 (without bit 0), or draw the polygons as one"
+    assert (
+        caught.value.details["advice"]
+        == "set AVOID_ENABLE 2 (without bit 0), or draw the inclusions as one polygon"
+    )
 
 
 def test_a_check_names_the_seam_and_where_the_vehicle_stops() -> None:
@@ -127,11 +136,11 @@ def test_a_check_names_the_seam_and_where_the_vehicle_stops() -> None:
     east = Polygon(chart.points(EAST.vertices))
     first = LineString(chart.points([place(-50, 0), place(50, 0)])).intersection(east).coords
     first = shapely.Point(first[0])
-    assert broken.crosses == ("the seam at the edge of inclusion polygon 2",)
+    assert broken.crosses == ("the inner edge of inclusion polygon 2",)
     assert chart.points([broken.at])[0] == pytest.approx((first.x, first.y), abs=0.05)
     assert broken.driven_clearance_m == 0.0
     assert any(
-        "for good, although FENCE_OPTIONS bit 1" in warning and "set AVOID_ENABLE 2" in warning
+        "does not resume, although FENCE_OPTIONS bit 1" in warning and "set AVOID_ENABLE 2" in warning
         for warning in found.warnings
     )
 
@@ -139,7 +148,7 @@ def test_a_check_names_the_seam_and_where_the_vehicle_stops() -> None:
 def test_a_check_of_a_drive_that_leaves_its_polygon_stops_the_margin_before_its_edge() -> None:
     corner = box(IN, 8, -60, 100, 60)
     found = check((WEST, corner), START, (40, 0))
-    assert found.legs[0].crosses == ("the seam at the edge of inclusion polygon 1",)
+    assert found.legs[0].crosses == ("the inner edge of inclusion polygon 1",)
     east_m = Chart(HOME).points([found.legs[0].at])[0][0]
     assert east_m == pytest.approx(8.0, abs=0.05)
 
@@ -165,5 +174,5 @@ def test_a_repair_leads_round_the_seam_or_says_that_nothing_does() -> None:
     chart = Chart(HOME)
     line = chart.line((place(-80, 0), *(item.position for item in repaired.mission.items if item.is_placed)))
     assert line.distance(Polygon(chart.points(inside.vertices))) >= 2.0
-    with pytest.raises(NoRouteError, match="the seam at the edge of"):
+    with pytest.raises(NoRouteError, match="the inner edge of"):
         repair_mission(mission, situation_of(WEST, EAST, **UNION), request)

@@ -41,20 +41,20 @@ def said(warnings, word):
 @pytest.mark.parametrize("away_m", [0.5, 1.0, 1.5, 1.7])
 def test_a_steered_rover_is_not_sent_from_there(away_m) -> None:
     reason = (
-        f"the start is {away_m:.2f} m from exclusion polygon 1, nearer than FENCE_MARGIN (2 m) plus 0.05 m to a fence that the vehicle avoids: from there it "
-        "backs up, and measured rovers backed into the fence (29 of 42 starts, whichever way they headed)"
+        f"the start is {away_m:.2f} m from exclusion polygon 1, where fence avoidance acts (within FENCE_MARGIN 2 m plus 0.05 m): "
+        "the vehicle backs up there, and in tests rovers backed into the fence (29 of 42 starts, at any heading)"
     )
     with pytest.raises(StartBlockedError, match=f"^{re.escape(reason)}$") as caught:
         route(10 - away_m)
     assert caught.value.details["advice"] == (
-        "drive it 2.05 m away from the fence by hand, or set AVOID_BACKUP_SPD 0 or AVOID_ENABLE 0 until it is there"
+        "drive it at least 2.05 m away from the fence by hand, or set AVOID_BACKUP_SPD 0 or AVOID_ENABLE 0 until it is there"
     )
     assert caught.value.details["distance_m"] == pytest.approx(away_m, abs=0.01)
 
 
 @pytest.mark.parametrize("away_m", [2.1, 3.0])
 def test_from_the_margin_on_it_leaves_as_usual(away_m) -> None:
-    assert not said(route(10 - away_m).warnings, "that the vehicle avoids")
+    assert not said(route(10 - away_m).warnings, "where fence avoidance acts")
 
 
 @pytest.mark.parametrize(
@@ -69,11 +69,11 @@ def test_from_the_margin_on_it_leaves_as_usual(away_m) -> None:
     ids=str,
 )
 def test_it_leaves_where_its_avoidance_does_not_reach(parameters) -> None:
-    assert not said(route(9.0, **parameters).warnings, "that the vehicle avoids")
+    assert not said(route(9.0, **parameters).warnings, "where fence avoidance acts")
 
 
 def test_the_flat_margin_counts_where_it_is_the_larger() -> None:
-    with pytest.raises(StartBlockedError, match=r"nearer than FENCE_MARGIN_XY \(3 m\)"):
+    with pytest.raises(StartBlockedError, match=r"within FENCE_MARGIN_XY 3 m"):
         route(7.5, FENCE_MARGIN_XY=3.0)
 
 
@@ -97,15 +97,17 @@ def test_the_edge_of_an_inclusion_that_it_is_not_in_does_not_count() -> None:
         situation_of(FIELD, other, **{**AVOIDING, "FENCE_OPTIONS": 2.0}),
         Request(place(11.0, -30.0), (place(60, -30),), 2.2),
     )
-    assert not said(found.warnings, "that the vehicle avoids")
+    assert not said(found.warnings, "where fence avoidance acts")
 
 
 def test_what_else_rovers_do_there_is_said() -> None:
-    (text,) = said(route(9.0, AVOID_BACKUP_SPD=0.0).warnings, "that the vehicle avoids")
-    assert text.endswith("but 1 of 3 that were to drive along it stood still")
-    (text,) = said(route(9.0, **SKID).warnings, "that the vehicle avoids")
-    assert "skid-steered rovers did not move from there (41 of 42 starts); drive it 2.05 m away" in text
-    assert not said(route(9.0, **SKID, AVOID_BACKUP_SPD=0.0).warnings, "that the vehicle avoids")
+    (text,) = said(route(9.0, AVOID_BACKUP_SPD=0.0).warnings, "where fence avoidance acts")
+    assert text.endswith("but 1 of 3 that had to drive along it did not move")
+    (text,) = said(route(9.0, **SKID).warnings, "where fence avoidance acts")
+    assert (
+        "skid-steered rovers did not move from there (41 of 42 starts); drive it at least 2.05 m away" in text
+    )
+    assert not said(route(9.0, **SKID, AVOID_BACKUP_SPD=0.0).warnings, "where fence avoidance acts")
 
 
 def test_a_check_does_not_hold_there() -> None:
@@ -113,7 +115,7 @@ def test_a_check_does_not_hold_there() -> None:
     assert not found.broken
     assert not found.holds
     (danger,) = found.dangers
-    assert "measured rovers backed into the fence" in danger
+    assert "in tests rovers backed into the fence" in danger
     assert danger.endswith("until it is there")
     assert check(7.9).holds
     assert check(9.0, AVOID_BACKUP_SPD=0.0).holds

@@ -191,10 +191,10 @@ class TestClearance:
             assert result.clearance_m == 2.0
             assert result.asked_m == pytest.approx(2.0 + error_m)
             assert result.driven_clearance_m >= 2.0 + error_m
-            assert any("position error of the vehicle's fix" in warning for warning in result.warnings)
+            assert any("m for GPS error" in warning for warning in result.warnings)
         none = plan(replace(situation, fix=Known(Fix(1), 0.0, "test")), request)
         assert none.asked_m == 2.0
-        assert any("no 3D fix" in warning for warning in none.warnings)
+        assert any("no 3D GPS fix" in warning for warning in none.warnings)
         told = plan(
             replace(situation, fix=Known(Fix(3), 0.0, "test")), replace(request, position_error_m=0.2)
         )
@@ -285,7 +285,7 @@ class TestEscape:
         block = box(OUT, -20, -20, 20, 20)
         situation = situation_of(box(IN, -100, -100, 100, 100), block)
         request = Request(place(15, 5), (place(60, 50),), 2.0, corner_allowance_m=allowance_m)
-        with pytest.raises(StartBlockedError, match="free ground is 5"):
+        with pytest.raises(StartBlockedError, match="the allowed area is 5"):
             plan(situation, request)
         result = plan(situation, replace(request, escape=True))
         chart = Chart(HOME)
@@ -303,7 +303,7 @@ class TestEscape:
             box(OUT, -30, -30, 30, -20.1),
         ]
         situation = situation_of(box(IN, -100, -100, 100, 100), box(OUT, -20, -20, 20, 20), *ring)
-        with pytest.raises(StartBlockedError, match="crosses other forbidden ground"):
+        with pytest.raises(StartBlockedError, match="crosses another fence"):
             plan(situation, Request(place(0, 0), (place(60, 50),), 2.0, escape=True))
 
 
@@ -380,7 +380,7 @@ def test_a_gap_that_no_clearance_lets_this_vehicle_through_is_told(monkeypatch: 
 
 def test_a_target_that_no_clearance_frees_has_its_own_advice() -> None:
     situation = facing(situation_of(FIELD, WALL), -50, 0, 90.0)
-    with pytest.raises(TargetBlockedError, match=r"the target .*: exclusion polygon 1;") as caught:
+    with pytest.raises(TargetBlockedError, match=r"the target .* is inside exclusion polygon 1;") as caught:
         plan(situation, Request(targets=(place(0, 0),), widest=True))
     assert "advice" not in caught.value.details
 

@@ -293,10 +293,10 @@ def test_inclusions_without_common_ground_are_refused() -> None:
     zones = (box(IN, -100, -100, -50, -50), box(IN, 50, 50, 100, 100))
     with pytest.raises(
         FenceError,
-        match=r"inclusion polygon 1 and inclusion polygon 2 leave no ground in common; the autopilot allows only the intersection",
+        match=r"inclusion polygon 1 and inclusion polygon 2 have no area in common; the autopilot allows only the intersection",
     ):
         drawn(situation_of(*zones), place(-80, -80), place(80, 80))
-    with pytest.raises(FenceError, match="no ground"):
+    with pytest.raises(FenceError, match="the exclusions cover all of inclusion polygon 1"):
         drawn(situation_of(FIELD, box(OUT, -120, -120, 120, 120)), place(0, 0), place(10, 10))
 
 
@@ -335,13 +335,15 @@ def test_margins_come_from_the_parameters() -> None:
         assert result.driven_clearance_m >= clearance_m
         assert_keeps(result, clearance_m)
     assert "FENCE_MARGIN unknown; assuming 2" in result.warnings
-    assert any("assuming" in warning and "WP_RADIUS 2" in warning for warning in result.warnings)
+    assert any(
+        "ArduPilot defaults used" in warning and "WP_RADIUS 2" in warning for warning in result.warnings
+    )
 
 
 def test_a_clearance_within_the_fence_margin_is_warned_of() -> None:
     parameters = {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 4.0, "FENCE_MARGIN": 2.0, "AVOID_ENABLE": 1.0}
     near = drawn(situation_of(FIELD, WALL, **parameters), place(-50, 0), place(50, 0), clearance_m=1.0)
-    assert any("nearer than FENCE_MARGIN 2 m" in warning for warning in near.warnings)
+    assert any("within FENCE_MARGIN 2 m" in warning for warning in near.warnings)
     wide = drawn(situation_of(FIELD, WALL, **parameters), place(-50, 0), place(50, 0), clearance_m=2.5)
     assert not any("FENCE_MARGIN" in warning for warning in wide.warnings)
 
@@ -352,9 +354,9 @@ def test_a_clearance_within_the_fence_margin_is_warned_of() -> None:
         ({"FENCE_ENABLE": 0.0, "FENCE_TYPE": 6.0}, "FENCE_ENABLE is 0"),
         (
             {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 2.0, "FENCE_RADIUS": 500.0},
-            "FENCE_TYPE has no bit 2 (value 4)",
+            "FENCE_TYPE bit 2 (value 4) is not set",
         ),
-        ({"WP_RADIUS": 1.0}, "FENCE_ENABLE is not known, and 0 by default"),
+        ({"WP_RADIUS": 1.0}, "FENCE_ENABLE unknown, default 0"),
         ({"FENCE_ENABLE": 1.0, "FENCE_TYPE": 4.0}, None),
         ({}, None),
     ],
@@ -366,9 +368,7 @@ def test_a_fence_that_is_not_enforced_is_honoured_with_a_warning(
     assert_keeps(result, 2)
     found = [warning for warning in result.warnings if "does not enforce" in warning]
     assert found == (
-        [f"the autopilot does not enforce this fence ({reason}); the route honours it all the same"]
-        if reason
-        else []
+        [f"the autopilot does not enforce this fence ({reason}); it is used here anyway"] if reason else []
     )
 
 
@@ -435,7 +435,7 @@ class TestBlockedEnds:
     def test_start_in_an_exclusion(self) -> None:
         with pytest.raises(
             StartBlockedError,
-            match=r"exclusion polygon 1; free ground is 1\.0\d m away, bearing 270°",
+            match=r"exclusion polygon 1; the allowed area is 1\.0\d m away, bearing 270°",
         ) as caught:
             drawn(situation_of(FIELD, WALL), place(-4, 0), place(50, 0))
         error = caught.value
@@ -456,7 +456,7 @@ class TestBlockedEnds:
 
     def test_target_in_an_exclusion(self) -> None:
         with pytest.raises(
-            TargetBlockedError, match=r"the target is on forbidden ground .*: exclusion polygon 1;"
+            TargetBlockedError, match=r"the target \(.*\) is inside exclusion polygon 1;"
         ) as caught:
             drawn(situation_of(FIELD, WALL), place(-50, 0), place(4, 0))
         assert caught.value.details["distance_m"] == pytest.approx(3.01, abs=0.05)
@@ -464,19 +464,19 @@ class TestBlockedEnds:
 
     def test_target_too_near_a_fence(self) -> None:
         with pytest.raises(
-            TargetBlockedError, match=r"the target is 1\.2\d m from exclusion polygon 1, nearer than 2\.0\d m"
+            TargetBlockedError, match=r"the target is 1\.2\d m from exclusion polygon 1, closer than 2\.0\d m"
         ):
             drawn(situation_of(FIELD, WALL), place(-50, 0), place(6.25, 0))
 
     def test_a_second_target_that_is_blocked(self) -> None:
         with pytest.raises(
             TargetBlockedError,
-            match=r"the target .*: exclusion polygon 1; the nearest free point is 7\.0",
+            match=r"the target .* is inside exclusion polygon 1; the nearest free point is 7\.0",
         ):
             drawn(situation_of(FIELD, WALL), place(-50, 0), place(50, 0), place(0, 0))
 
     def test_no_ground_keeps_the_clearance(self) -> None:
-        with pytest.raises(RouteError, match=r"nowhere in the field is 150\.0"):
+        with pytest.raises(RouteError, match=r"no place in the field keeps 150\.0"):
             drawn(situation_of(FIELD, WALL), place(-50, 0), place(50, 0), clearance_m=150)
 
     def test_a_target_off_a_sharp_corner_is_free_if_its_true_distance_says_so(self) -> None:
@@ -514,7 +514,7 @@ class TestSnap:
         result = drawn(situation_of(FIELD, WALL), place(50, 0), place(4, 0), snap_m=4.0)
         assert_keeps(result, 2)
         assert length_m([place(4, 0), result.targets[0]]) == pytest.approx(3.01, abs=0.05)
-        assert any(warning.startswith("the target") and "moved 3.0" in warning for warning in result.warnings)
+        assert any(warning.startswith("target ") and "moved 3.0" in warning for warning in result.warnings)
 
     def test_a_free_target_stays(self) -> None:
         result = drawn(situation_of(FIELD, WALL), place(50, 0), place(20, 0), snap_m=4.0)
@@ -542,11 +542,11 @@ class TestUnreachable:
             for sides in [(20, 20, 80, 25), (20, 75, 80, 80), (20, 20, 25, 80), (75, 20, 80, 80)]
         ]
         with pytest.raises(
-            NoRouteError, match=r"no route exists, at any clearance: the target is walled in by"
+            NoRouteError, match=r"no route at any clearance: the target is enclosed by"
         ) as caught:
             drawn(situation_of(FIELD, *court, box(OUT, -50, -50, -40, -40)), place(-50, 0), place(50, 50))
         assert caught.value.details["walled_in"] == "target"
-        assert "no clearance helps: open a way through exclusion polygon 1" in str(
+        assert "less clearance does not help: open a gap in exclusion polygon 1" in str(
             caught.value.details["advice"]
         )
         assert "another target" in str(caught.value.details["advice"])
@@ -555,11 +555,11 @@ class TestUnreachable:
     def test_a_closed_courtyard_around_the_start_and_against_the_edge(self) -> None:
         wall = polygon(OUT, (-100, 0), (-60, 0), (-60, -100), (-50, -100), (-50, 10), (-100, 10))
         with pytest.raises(
-            NoRouteError, match="the start is walled in by inclusion polygon 1 and exclusion polygon 1"
+            NoRouteError, match="the start is enclosed by inclusion polygon 1 and exclusion polygon 1"
         ) as caught:
             drawn(situation_of(FIELD, wall), place(-80, -50), place(50, 50))
         assert caught.value.details["walled_in"] == "start"
-        assert "drive it out by hand" in str(caught.value.details["advice"])
+        assert "drive it out manually" in str(caught.value.details["advice"])
 
     def test_a_gap_too_narrow(self) -> None:
         zones = (box(OUT, -5, -100, 5, -1.5), box(OUT, -5, 1.5, 5, 100))
@@ -597,24 +597,26 @@ class TestWhatIsNotKnown:
 
     @pytest.mark.parametrize("ends", [(HOME, (LatLon(41.1, -105.2),)), (LatLon(41.1, -105.2), (HOME,))])
     def test_nothing_leads_to_where_no_plane_reaches(self, ends):
-        problem = r"no route: 41\.1000000,-105\.2000000 is 114 km from the fence's centre .*; at most 100 km"
+        problem = (
+            r"no route: 41\.1000000,-105\.2000000 is 114 km from the fence's centre .*; the limit is 100 km"
+        )
         with pytest.raises(NoRouteError, match=problem):
             plan(situation_of(FIELD), Request(*ends))
 
     @pytest.mark.parametrize(
         ("situation", "request_", "problem"),
         [
-            (Situation(fence=Known(Fence((FIELD,)), None, "")), Request(), "the start is not known"),
-            (situation_of(FIELD), Request(), r"the target is not known: .* \(--target LAT,LON\)"),
+            (Situation(fence=Known(Fence((FIELD,)), None, "")), Request(), "start unknown"),
+            (situation_of(FIELD), Request(), r"target unknown: .* --target LAT,LON"),
             (
                 Situation(fence=Known(Fence((FIELD,)), None, ""), home=Known(HOME, None, ""), mission=Known(Mission(()), None, "")),
                 Request(),
-                "the target is not known",
+                "target unknown",
             ),
             (
                 Situation(fence=Known(Fence((FIELD,)), None, ""), parameters={"FENCE_ENABLE": 1.0}),
                 Request(HOME, (HOME,)),
-                "FENCE_RADIUS 300 m around home, and home is not known",
+                "FENCE_RADIUS 300 m around home, but home is unknown",
             ),
             (
                 Situation(
@@ -633,12 +635,12 @@ class TestWhatIsNotKnown:
         request = Request(HOME, (place(5, 5),))
         with pytest.raises(
             FenceMissingError,
-            match=r"^no fence was transferred: there is nothing to plan around\. Let .*--fence",
+            match=r"^no fence to plan around: no fence was uploaded or downloaded\. Download .*--fence",
         ):
             plan(Situation(), request)
         with pytest.raises(
             FenceMissingError,
-            match=r"^the vehicle holds a fence of 9 points \(FENCE_TOTAL\), but .*FENCE_POINT",
+            match=r"^no fence to plan around: the vehicle holds a fence of 9 points \(FENCE_TOTAL\), but .*FENCE_POINT",
         ):
             plan(Situation(parameters={"FENCE_TOTAL": 9.0}), request)
         with pytest.raises(FenceMissingError, match="the fence from test is empty"):
@@ -647,9 +649,9 @@ class TestWhatIsNotKnown:
     @pytest.mark.parametrize(
         ("transfers", "problem"),
         [
-            ([ListTransfer(True, 5, {0: MissionItem(5002)})], r"a fence upload was seen only in part \(1 of 5 items\)"),
-            ([ListTransfer(False, None, {3: MissionItem(5002)})], r"a fence read-back was seen only in part \(1 of an unknown number of items\)"),
-            ([ListTransfer(True, 1, {0: MissionItem(5004)})], "a fence upload of 1 items was seen, but not that the vehicle accepted it"),
+            ([ListTransfer(True, 5, {0: MissionItem(5002)})], r"a fence upload is incomplete \(1 of 5 items\)"),
+            ([ListTransfer(False, None, {3: MissionItem(5002)})], r"a fence download is incomplete \(1 of an unknown number of items\)"),
+            ([ListTransfer(True, 1, {0: MissionItem(5004)})], "a fence upload of 1 items was not acknowledged"),
         ],
     )  # fmt: skip
     def test_a_fence_seen_in_part(self, transfers: list[ListTransfer], problem: str) -> None:
@@ -660,15 +662,15 @@ class TestWhatIsNotKnown:
         older = Situation(fence=Known(Fence((FIELD,)), 1.0, "old"), transfers=situation.transfers)
         result = drawn(older, HOME, place(5, 5))
         assert any(
-            "an older one counts" in warning
+            "an older fence is used" in warning
             and problem.split(" (", maxsplit=1)[0].split(r" \(", maxsplit=1)[0] in warning
             for warning in result.warnings
         )
 
     def test_a_fence_that_was_unusable(self) -> None:
-        situation = Situation(fence_trouble="fence upload: fence item 3: a circle of radius 0 m")
+        situation = Situation(fence_trouble="fence upload: fence item 3: circle radius 0 m")
         with pytest.raises(
-            FenceMissingError, match=r"a fence was transferred but is unusable \(fence upload: fence item 3"
+            FenceMissingError, match=r"a fence was sent but cannot be used \(fence upload: fence item 3"
         ):
             plan(situation, Request(HOME, (place(5, 5),)))
         older = Situation(
@@ -677,7 +679,7 @@ class TestWhatIsNotKnown:
             parameters={"FENCE_ENABLE": 0.0},
         )
         warnings = drawn(older, HOME, place(5, 5)).warnings
-        assert any("so an older one counts" in warning for warning in warnings)
+        assert any("an older fence is used" in warning for warning in warnings)
         assert any("does not enforce" in warning for warning in warnings)
 
 
@@ -689,7 +691,7 @@ def test_a_plan_that_is_stopped_ends_with_one_error_wherever_it_is(how: dict[str
     """Also where a search would take the stop for a refusal, and a widest route for its answer."""
     asked = itertools.count(1)
     ends = {"start": place(-50, 0), "targets": (place(50, 0), place(40, 30))}
-    with pytest.raises(PlanStoppedError, match="nobody waits"):
+    with pytest.raises(PlanStoppedError, match="no longer needed"):
         plan(situation_of(FIELD, WALL), Request(**ends, **how), should_stop=lambda: next(asked) >= last)
     assert next(asked) == last + 1  # it was not asked again
 
@@ -710,7 +712,7 @@ def test_outside_what_was_measured_nothing_is_promised_unless_the_model_is_trust
     silent, trusted = (plan(situation, replace(request, trusts_model=trusts)) for trusts in (False, True))
     assert (silent.clearance_m, trusted.clearance_m) == (None, 2.0)
     assert silent.driven_clearance_m == trusted.driven_clearance_m >= 2.0
-    for result, words in ((silent, "nothing is promised"), (trusted, "promised all the same")):
+    for result, words in ((silent, "no clearance is promised"), (trusted, "clearance is promised anyway")):
         assert len(result.extrapolated) == 1
         assert result.extrapolated[0].startswith("OA_TYPE 1: ArduPilot plans its own way")
         assert result.extrapolated[0] in result.warnings

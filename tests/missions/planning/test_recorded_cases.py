@@ -66,7 +66,7 @@ def test_a_start_in_the_barn_tells_the_way_out(logs: Path) -> None:
     out_m = here.distance(area_of(chart, barn).exterior)
     assert area_of(chart, barn).contains(here)
     assert details["distance_m"] == pytest.approx(out_m, abs=0.02)
-    assert f"free ground is {out_m:.2f} m away" in str(caught.value)
+    assert f"the allowed area is {out_m:.2f} m away" in str(caught.value)
     free = point_of(chart, LatLon(*details["nearest_free"]))
     assert here.distance(free) == pytest.approx(out_m, abs=0.02)
     assert free.distance(area_of(chart, barn)) < 0.05
@@ -79,7 +79,7 @@ def test_a_start_in_the_barn_tells_the_way_out(logs: Path) -> None:
 def test_a_walled_target_names_the_wall(logs: Path) -> None:
     situation = situation_from_log(logs / "island-unreachable.tlog")
     chart = chart_of(situation)
-    with pytest.raises(NoRouteError, match="walled in by") as caught:
+    with pytest.raises(NoRouteError, match="enclosed by") as caught:
         plan(situation, Request(clearance_m=1.0))
     named = set(caught.value.details["fences"])
     zones = dict(zip(situation.fence.value.zone_names(), situation.fence.value.zones, strict=True))

@@ -60,7 +60,7 @@ def test_where_there_is_no_other_way_round_it_is_said_so():
     here = routes.find().points.mean(axis=0)
     found = routes.around(Point(here).buffer(6.0)).find()
     assert found.kind is NoRouteKind.NO_OTHER_WAY
-    assert found.text == "no other way round keeps 1.00 m"
+    assert found.text == "no other route keeps 1.00 m"
     assert routes.find().points.tolist()  # the one before stays as it was
 
 
@@ -69,10 +69,10 @@ def test_a_seam_explains_itself_and_leaves_the_reason_as_it_was():
     why = NoRoute(NoRouteKind.WALLED_IN, "no route", {"fences": ["a"]}, ["a"], advice="open it")
     assert explained(why, vehicle) is why
     seam = NoRoute(
-        NoRouteKind.WALLED_IN, "no route", {}, ["the seam at the edge of inclusion polygon 1"], advice="x"
+        NoRouteKind.WALLED_IN, "no route", {}, ["the inner edge of inclusion polygon 1"], advice="x"
     )
     told = explained(seam, vehicle)
     assert told.text.startswith("no route: with AVOID_ENABLE 1 (bit 0) the vehicle stops")
     assert told.error().details["seam"] is True
-    assert "draw the polygons as one" in told.error().details["advice"]
+    assert "draw the inclusions as one polygon" in told.error().details["advice"]
     assert (seam.advice, seam.is_seam, "seam" in seam.error().details) == ("x", False, False)

@@ -147,9 +147,9 @@ def test_no_pivot_angle_no_pivots() -> None:
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        ({"WP_RADIUS": -1.0}, "WP_RADIUS is -1; possible are 0 to 1000"),
+        ({"WP_RADIUS": -1.0}, "WP_RADIUS is -1; allowed: 0 to 1000"),
         ({"WP_SPEED": math.nan}, "WP_SPEED is nan, which is not a number"),
-        ({"PSC_POS_P": 0.0}, "PSC_POS_P is 0; possible are 0.01 to 100"),
+        ({"PSC_POS_P": 0.0}, "PSC_POS_P is 0; allowed: 0.01 to 100"),
         ({"WP_SPEED": 0.0, "CRUISE_SPEED": 0.0}, "would not move"),
         ({"RA_MAX_STR_ANG": 1.6}, "RA_MAX_STR_ANG is 1.6 rad"),
         ({"RA_MAX_STR_ANG": math.inf}, "RA_MAX_STR_ANG is inf"),
@@ -257,7 +257,7 @@ def test_a_footprint_that_is_none(sizes: tuple[float, float]) -> None:
 @pytest.mark.parametrize("value", [1e38, -1.0, 32_768.0, math.nan, math.inf])
 @pytest.mark.parametrize("name", ["FENCE_TYPE", "FENCE_OPTIONS", "FENCE_ACTION", "AVOID_ENABLE", "OA_TYPE"])
 def test_a_bit_mask_or_enumeration_that_is_none_is_refused(name: str, value: float) -> None:
-    with pytest.raises(VehicleError, match=f"{name} is .*(possible are 0 to 32767|not a number)"):
+    with pytest.raises(VehicleError, match=f"{name} is .*(allowed: 0 to 32767|not a number)"):
         vehicle_from_parameters({name: value})
 
 
@@ -270,7 +270,7 @@ def test_a_bit_mask_or_enumeration_that_is_none_is_refused(name: str, value: flo
     ],
 )  # fmt: skip
 def test_a_quantity_that_is_none_is_refused(name: str, value: float) -> None:
-    with pytest.raises(VehicleError, match=f"{name} is .*(possible are|not a number)"):
+    with pytest.raises(VehicleError, match=f"{name} is .*(allowed:|not a number)"):
         vehicle_from_parameters({name: value})
 
 
@@ -312,7 +312,7 @@ def test_what_a_skid_steered_rover_pivots_at_where_nobody_told(
 ) -> None:
     vehicle = vehicle_from_parameters({**SKID, **told}, firmware=firmware)
     assert vehicle.pivot_angle_deg == pivot_angle_deg
-    said = [text for text in assumed_remarks(vehicle) if "WP_PIVOT_ANGLE unknown: taken as 0" in text]
+    said = [text for text in assumed_remarks(vehicle) if "WP_PIVOT_ANGLE unknown; assuming 0" in text]
     assert bool(said) is (pivot_angle_deg == 0)
 
 
@@ -329,7 +329,7 @@ def test_slow_steered_rovers_were_not_measured(
     parameters: dict[str, float], slowest_mps: float | None, said: bool
 ) -> None:
     texts = beyond_measured(vehicle_from_parameters(parameters), slowest_mps)
-    assert any("not measured for steered rovers below 1 m/s" in text for text in texts) is said
+    assert any("steered rovers below 1 m/s were not measured" in text for text in texts) is said
 
 
 @pytest.mark.parametrize(
@@ -355,7 +355,7 @@ def test_which_firmware_has_the_corners_that_were_measured(
     vehicle = vehicle_from_parameters({"WP_SPEED": 2.0, **told}, firmware=firmware)
     assert vehicle.has_measured_corners is has_measured_corners
     said = any(
-        f"not measured for ArduPilot {firmware}: before 4.6" in text for text in beyond_measured(vehicle)
+        f"ArduPilot {firmware} was not measured: before 4.6" in text for text in beyond_measured(vehicle)
     )
     assert said is (has_measured_corners is False)
 
@@ -376,7 +376,7 @@ def test_a_version_reads_back_as_written(text: str, firmware: Firmware) -> None:
 
 @pytest.mark.parametrize("text", ["", "4", "4.x", "ArduRover V4.5", "4.5.6.7", "444.1"])
 def test_what_is_no_version_is_refused(text: str) -> None:
-    with pytest.raises(VehicleError, match="is no version of a firmware"):
+    with pytest.raises(VehicleError, match="is not a firmware version"):
         read_firmware(text)
 
 
@@ -454,14 +454,20 @@ def test_a_vehicle_with_its_defaults_is_of_the_measured_kind(steering: dict[str,
     [
         ({"OA_TYPE": 2.0}, "OA_TYPE 2: ArduPilot plans its own way"),
         ({"FRAME_CLASS": 2.0}, "not on a boat"),
-        ({"ATC_STR_ACC_MAX": 60.0}, "ATC_STR_ACC_MAX 120 or more"),
-        ({"ATC_STR_DEC_MAX": 60.0, "ATC_STR_ACC_MAX": 0.0}, "not 60 °/s²"),
-        ({"WP_RADIUS": 6.0}, "WP_RADIUS 0.9 to 5 m, not 6 m"),
-        ({"TURN_RADIUS": 2.5}, "TURN_RADIUS 0.27 to 2 m, not 2.5 m"),
-        ({"FENCE_MARGIN": 7.0, "FENCE_ENABLE": 1.0}, "FENCE_MARGIN 0.1 to 5 m, not 7 m"),
-        ({"FENCE_MARGIN_XY": 7.0, "FENCE_ENABLE": 1.0}, "FENCE_MARGIN_XY 0.1 to 5 m, not 7 m"),
+        (
+            {"ATC_STR_ACC_MAX": 60.0},
+            "ATC_STR_ACC_MAX 60 °/s² was not measured (only 120 or more, ackermann steering)",
+        ),
+        ({"ATC_STR_DEC_MAX": 60.0, "ATC_STR_ACC_MAX": 0.0}, "ATC_STR_ACC_MAX 60 °/s² was not measured"),
+        ({"WP_RADIUS": 6.0}, "WP_RADIUS 6 m was not measured (only 0.9 to 5, "),
+        ({"TURN_RADIUS": 2.5}, "TURN_RADIUS 2.5 m was not measured (only 0.27 to 2, "),
+        ({"FENCE_MARGIN": 7.0, "FENCE_ENABLE": 1.0}, "FENCE_MARGIN 7 m was not measured (only 0.1 to 5)"),
+        (
+            {"FENCE_MARGIN_XY": 7.0, "FENCE_ENABLE": 1.0},
+            "FENCE_MARGIN_XY 7 m was not measured (only 0.1 to 5)",
+        ),
         ({"FENCE_MARGIN": 0.0, "FENCE_ENABLE": 1.0}, "FENCE_MARGIN 0 m does not switch avoidance off"),
-        ({"WP_SPEED": 0.5}, "ATC_STR_RAT_FF 2.5 (not 0.75), or PSC_VEL_P 3 (not 1)"),
+        ({"WP_SPEED": 0.5}, "ATC_STR_RAT_FF 2.5 (not 0.75) or PSC_VEL_P 3 (not 1)"),
     ],
 )
 def test_what_was_not_measured_is_named(parameters: dict[str, float], said: str) -> None:
@@ -488,7 +494,7 @@ def test_storage_that_is_none_counts_as_none(parameters: dict[str, float], items
     assert most_items(parameters) == items
     said = storage_remarks(parameters)
     assert bool(said) is (parameters.get("BRD_SD_MISSION") in (1e38, -1.0))
-    assert all("taken as 0" in text for text in said)
+    assert all("assuming 0" in text for text in said)
 
 
 @pytest.mark.parametrize(
@@ -496,7 +502,7 @@ def test_storage_that_is_none_counts_as_none(parameters: dict[str, float], items
 )
 @pytest.mark.parametrize("value", [1e-38, 1e-10, 0.001])
 def test_what_nobody_drives_with_is_refused(name: str, value: float) -> None:
-    with pytest.raises(VehicleError, match=f"{name} is {value:g}; possible are 0 and 0.0"):
+    with pytest.raises(VehicleError, match=f"{name} is {value:g}; allowed: 0, or 0.0"):
         vehicle_from_parameters({name: value})
     assert (
         vehicle_from_parameters({name: 0.0, "CRUISE_SPEED": 2.0}).speed_mps == 2.0 or name == "CRUISE_SPEED"
@@ -507,4 +513,4 @@ def test_what_nobody_drives_with_is_refused(name: str, value: float) -> None:
 def test_a_turn_rate_below_the_measured_one_is_told(rate_dps: float | None, is_told: bool) -> None:
     known = {} if rate_dps is None else {"ATC_STR_RAT_MAX": rate_dps}
     told = beyond_measured(vehicle_from_parameters({**KNOWN, "TURN_RADIUS": 0.9, **known}))
-    assert any("ATC_STR_RAT_MAX 120 or more" in text for text in told) is is_told
+    assert any("was not measured (only 120 or more" in text for text in told) is is_told

@@ -25,16 +25,16 @@ if TYPE_CHECKING:
 COMMANDS = {
     "plan": "Plan a mission around fences; write it, draw it, upload it.",
     "check": "Check every leg of a mission against a fence.",
-    "bridge": "Run beside the autopilot: targets in, verified missions out.",
-    "log": "Show what telemetry logs hold.",
-    "replay": "Run the bridge over recorded logs.",
-    "upload": "Upload a file to the vehicle, verified; or put an old list back.",
+    "bridge": "Run alongside the autopilot: plan to each target, upload verified missions.",
+    "log": "Summarise telemetry logs.",
+    "replay": "Replay recorded logs through the bridge.",
+    "upload": "Upload a file to the vehicle and verify it, or restore a backup.",
     "download": "Download a mission, fence, rally points or parameters.",
     "convert": "Convert a file from one format to another.",
     "sim": "Run a simulated rover.",
-    "demo": "Show the whole loop on a simulated rover.",
-    "doctor": "Look at this installation: versions, ports, keys, a test plan.",
-    "config": "Show where options may be kept, and which are set.",
+    "demo": "Plan, upload and drive on a simulated rover, as a demonstration.",
+    "doctor": "Check this installation: versions, ports, keys, a test plan.",
+    "config": "Show where options can be saved, and which are set.",
 }
 """Every command and its line in help; the module of the same name holds it."""
 
@@ -59,8 +59,8 @@ class Commands(TyperGroup):
             self.commands[args[0]] = load(args[0])
         elif not args[0].startswith("-"):
             similar = get_close_matches(args[0], COMMANDS)
-            hint = f"did you mean {' or '.join(similar)}?" if similar else f"there are {', '.join(COMMANDS)}"
-            ctx.fail(f"no command {args[0]!r}; {hint}")
+            hint = f"did you mean {' or '.join(similar)}?" if similar else f"commands are {', '.join(COMMANDS)}"
+            ctx.fail(f"unknown command {args[0]!r}; {hint}")
         return super().resolve_command(ctx, args)
 
     def main(self, args: Sequence[str] | None = None, *rest: Any, **options: Any) -> Any:  # noqa: ANN401 - as above

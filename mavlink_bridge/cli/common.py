@@ -115,5 +115,5 @@ def check_one_stdout(plots: list[Path], *, wants_json: bool) -> None:
     """
     if wants_json and Path("-") in plots:
         raise bridge_errors.UsageError(
-            "--plot - and --json both want the standard output; give a file to --plot"
+            "--plot - and --json both write to standard output; give --plot a file"
         )

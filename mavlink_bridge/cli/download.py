@@ -77,7 +77,7 @@ def _check(what: str, connect: str, outputs: list[Path]) -> None:
     for path in outputs:
         if path.suffix.lower() not in suffixes:
             raise UsageError(
-                f"{path}: {what} cannot be written as {path.suffix!r}; known are {', '.join(suffixes)}"
+                f"{path}: {what} cannot be written as {path.suffix!r}; expected one of {', '.join(suffixes)}"
             )
 
 
@@ -97,7 +97,7 @@ def read_list(session: Session, what: str) -> tuple[MissionItem, ...]:
     if isinstance(items, BridgeError):
         raise items
     if machine.outcome is not None and machine.outcome.is_coarse:
-        warn([f"the vehicle gives positions as 32-bit floats: the {what} is known to about 1 m only"])
+        warn([f"the vehicle sends positions as 32-bit floats: the {what} is accurate to about 1 m only"])
     return items
 
 
@@ -108,13 +108,13 @@ def _read_parameters(session: Session) -> dict[str, float]:
     assert outcome is not None
     if not outcome.is_complete:
         raise LinkError(
-            f"only {len(outcome.values)} parameters came, {len(outcome.missing)} did not; nothing was written",
+            f"only {len(outcome.values)} parameters received, {len(outcome.missing)} missing; nothing was written",
             received=len(outcome.values),
             missing=len(outcome.missing),
         )
     warn(
         [
-            f"{name} came as {came}, which is not a number: ignored"
+            f"{name} was received as {came}, not a number: ignored"
             for name, came in outcome.no_numbers.items()
         ]
     )
@@ -130,7 +130,7 @@ def _write(path: Path, what: str, items: tuple[MissionItem, ...], parameters: Ma
         odd = [name for name in parameters if not is_parameter_name(name)]  # it may hold a line break
         if odd:
             warn(
-                [f"{path}: left out, because no parameter can have such a name: {', '.join(map(repr, odd))}"]
+                [f"{path}: left out, not valid parameter names: {', '.join(map(repr, odd))}"]
             )
         named = ((name, value) for name, value in parameters.items() if name not in odd)
         text = "".join(f"{name}{separator}{value:.9g}\n" for name, value in named)

@@ -114,7 +114,7 @@ def _make_way(path: Path, data: bytes) -> None:
     """
     if path.is_symlink():
         aim = path.readlink()  # what a link leads to is not touched: see `write_file`
-        warn([f"{path} was a link to {aim}, which is left as it is; the link is kept as {keep_aside(path)}"])
+        warn([f"{path} was a link to {aim}(left unchanged); the link is kept as {keep_aside(path)}"])
         return
     if not path.is_file() or path.stat().st_size == 0:
         return

@@ -164,7 +164,7 @@ def conduct(
                 longest_wait_s=run.plans.longest_wait_s,
             )
     if director.trouble is not None or director.plan is None:
-        raise _with_hint(director.trouble or LinkError("the director ended without a plan"))
+        raise _with_hint(director.trouble or LinkError("no plan was made"))
     outcome = director.upload_outcome
     return LiveResult(
         director.plan,
@@ -226,7 +226,7 @@ class _Run:
 def _with_hint(trouble: BridgeError | MissionError) -> BridgeError | MissionError:
     """Return a director's trouble with the option that would help."""
     if trouble.details.get("outcome") == OutcomeKind.ACTIVE:
-        trouble.details["advice"] = "--hold switches it to HOLD first"
+        trouble.details["advice"] = "add --hold to switch it to HOLD first"
     return trouble
 
 

@@ -88,7 +88,7 @@ class IdentityGuard(Part):
 
     def hold_ended(self) -> Sequence[Signal]:
         """Go on from a HOLD that was taken, or was not."""
-        done = "was switched to HOLD" if self._halter.is_hold_granted else "does not go to HOLD"
+        done = "was switched to HOLD" if self._halter.is_hold_granted else "did not switch to HOLD"
         return self.settle(f"the vehicle {done}; the mission is on it")
 
     def settle(self, then: str) -> Sequence[Signal]:

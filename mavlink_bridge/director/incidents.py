@@ -182,7 +182,7 @@ class Incidents:
             mode = self._note(Cause(_BREACH, now_s, _actions(situation.parameters, "FENCE_ACTION")))
         pose = situation.pose
         place = fence_place(situation, self._request, pose.value.position) if pose is not None else None
-        since = "" if is_new else ", since before pbpp listened"
+        since = "" if is_new else ", from before pbpp connected"
         answer = f"; the autopilot answered it with {mode}" if mode is not None else ""
         self._voice.tell(
             now_s,
@@ -234,7 +234,7 @@ def _by(place: FencePlace | None) -> str:
     if place.beyond_m >= -_TOLD_LATE_M:
         return f", at {place.fence} ({-place.beyond_m:.1f} m before its line by its last position)"
     away_m = -place.beyond_m
-    return f"; no fence known here is broken there, the nearest is {place.fence}, {away_m:.1f} m away"
+    return f"; no known fence is breached there, the nearest is {place.fence}, {away_m:.1f} m away"
 
 
 def _at(pose: Known[Pose] | None, now_s: float) -> str:

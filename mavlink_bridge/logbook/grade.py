@@ -289,7 +289,7 @@ class DriveGrader:
             self._notes.append(f"no prediction: the drive model does not know {self.way.odd}")
             return None
         if self._field.vehicle.autopilot is not Autopilot.ARDUPILOT:
-            self._notes.append("the prediction rests on measurements of ArduPilot Rover, which this is not")
+            self._notes.append("the drive model was measured on ArduPilot Rover, which this is not")
         try:
             forecast = envelope(
                 self._points,

@@ -26,5 +26,5 @@ class ConfigOptions(CommonOptions):
     """
 
     template: Annotated[
-        bool, typer.Option("--template", help="Print an example file, to be saved where yours belongs.")
+        bool, typer.Option("--template", help="Print an example options file.")
     ] = False

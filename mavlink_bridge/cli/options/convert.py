@@ -35,7 +35,7 @@ class ConvertOptions(CommonOptions):
     only: Annotated[
         str | None,
         typer.Option(
-            metavar="mission|fence|rally", help="Write this part only, where IN holds more than OUT can."
+            metavar="mission|fence|rally", help="Write only this part, if IN holds more than OUT can."
         ),
     ] = None
     return_point: Annotated[

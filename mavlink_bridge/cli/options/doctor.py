@@ -25,5 +25,5 @@ class DoctorOptions(CommonOptions):
     """
 
     signing_key: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Look at this signing key and who may read it.")
+        Path | None, typer.Option(metavar="FILE", help="Check this signing key and its permissions.")
     ] = None

@@ -12,7 +12,7 @@ from mavlink_bridge.cli.options_file import take_options
 from mavlink_bridge.cli.values import MOST_M, MOST_S, MOST_VEHICLE_M, within
 
 LINK_PANEL, OUTPUT_PANEL, VEHICLE_PANEL = "Link", "Output", "Vehicle"
-_MAP_PANEL = "Maps: what zones are where the file does not say it"
+_MAP_PANEL = "Map files: what each zone is"
 """How help groups what many commands have."""
 
 ConnectOption = Annotated[
@@ -46,7 +46,7 @@ TimeoutOption = Annotated[
 AnyVehicleOption = Annotated[
     bool,
     typer.Option(
-        "--any-vehicle", help="Take vehicles that are neither rover nor boat too.", rich_help_panel=LINK_PANEL
+        "--any-vehicle", help="Accept vehicles other than rovers and boats.", rich_help_panel=LINK_PANEL
     ),
 ]
 RequiredConnectOption = Annotated[
@@ -66,7 +66,7 @@ ReserveOption = Annotated[
     typer.Option(
         metavar="M",
         parser=within(0.0, MOST_M, "metres"),
-        help="Added to the clearance, for wind and slip.",
+        help="Extra clearance, for wind and wheel slip.",
         rich_help_panel=VEHICLE_PANEL,
     ),
 ]
@@ -75,7 +75,7 @@ PositionErrorOption = Annotated[
     typer.Option(
         metavar="M",
         parser=within(0.0, MOST_M, "metres"),
-        help="Error of the vehicle's position, added to the clearance. Default: from its fix type.",
+        help="Position error to add to the clearance. Default: from the GPS fix type.",
         rich_help_panel=VEHICLE_PANEL,
     ),
 ]
@@ -108,7 +108,7 @@ GpsOption = Annotated[
     str,
     typer.Option(
         metavar="FORWARD,RIGHT",
-        help="The GPS antenna from the middle of the vehicle, metres.",
+        help="Offset of the GPS antenna from the vehicle's centre, metres.",
         rich_help_panel=VEHICLE_PANEL,
     ),
 ]
@@ -116,7 +116,7 @@ RoleOption = Annotated[
     list[str],
     typer.Option(
         metavar="NAME=inclusion|exclusion|route|ignore",
-        help="What the feature of that name is, in KML, GeoJSON and other maps. Repeatable.",
+        help="What the named feature is, in KML, GeoJSON and other maps. Repeatable.",
         rich_help_panel=_MAP_PANEL,
     ),
 ]
@@ -131,7 +131,7 @@ OutermostOption = Annotated[
 IgnorePointsOption = Annotated[
     bool,
     typer.Option(
-        "--ignore-points", help="Leave out pins that do not say what they are.", rich_help_panel=_MAP_PANEL
+        "--ignore-points", help="Ignore points whose role the file does not say.", rich_help_panel=_MAP_PANEL
     ),
 ]
 
@@ -151,7 +151,7 @@ class CommonOptions:
             count=True,
             metavar="",
             show_default=False,
-            help="No progress and no report; -qq: no warnings either, only errors.",
+            help="Print only warnings and errors; -qq: only errors.",
             rich_help_panel=OUTPUT_PANEL,
         ),
     ] = 0
@@ -191,13 +191,13 @@ class LinkOptions(CommonOptions):
     source_system: Annotated[
         int,
         typer.Option(
-            metavar="N", min=1, max=255, help="The system id we speak as.", rich_help_panel=LINK_PANEL
+            metavar="N", min=1, max=255, help="System id that pbpp uses.", rich_help_panel=LINK_PANEL
         ),
     ] = 245
     source_component: Annotated[
         int,
         typer.Option(
-            metavar="N", min=1, max=255, help="The component id we speak as.", rich_help_panel=LINK_PANEL
+            metavar="N", min=1, max=255, help="Component id that pbpp uses.", rich_help_panel=LINK_PANEL
         ),
     ] = 190
     signing_key: SigningKeyOption = None

@@ -113,13 +113,13 @@ class TestDoctor:
         monkeypatch.setattr("serial.tools.list_ports.comports", lambda: [port])
         monkeypatch.setattr(os, "access", lambda *_: False)
         found = findings()["serial port /dev/ttyS0"]
-        assert (found["verdict"], found["found"]) == ("note", "present, but you may not use it")
+        assert (found["verdict"], found["found"]) == ("note", "present, but you have no permission to use it")
         assert found["advice"]
 
     @pytest.mark.parametrize(
         ("group", "advice"),
         [
-            ("dialout", "sudo usermod -aG dialout $USER, then log in anew"),
+            ("dialout", "sudo usermod -aG dialout $USER, then log in again"),
             ("root", "ask the administrator for access to /dev/ttyS0"),
         ],
     )

@@ -172,7 +172,7 @@ def test_hold_stops_it_first(config):
         _command(simulator, Command.DO_SET_MODE, 1.0, Mode.AUTO)
         plan = ("plan", "--connect", simulator.connection, "--target", TARGET, "--upload", "--json")
         refused = json.loads(run(*plan).stdout)
-        assert (refused["exit_code"], refused["advice"]) == (6, "--hold switches it to HOLD first")
+        assert (refused["exit_code"], refused["advice"]) == (6, "add --hold to switch it to HOLD first")
         assert json.loads(run(*plan, "--hold").stdout)["verified"] is True
         assert (simulator.vehicle.mode, simulator.vehicle.is_armed) == (Mode.HOLD, True)
 

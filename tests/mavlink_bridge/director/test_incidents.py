@@ -117,7 +117,7 @@ def test_where_the_mode_is_seen_first_nothing_is_claimed_until_the_cause_is_hear
     found = taken_over(run)
     assert (found["by"], found["reason"]) == ("unknown", None)
     assert (
-        f"the vehicle went to {mode_name(mode)} by itself or by somebody unheard, such as a transmitter"
+        f"the vehicle went to {mode_name(mode)} by itself or by somebody not heard on this link, such as an RC transmitter"
         in found["text"]
     )
     told(run, heard)
@@ -147,7 +147,7 @@ def test_what_is_not_certain_is_said_so(parameters, heard, mode):
     unheard(run, m.SetMode(1, 1, mode))
     found = taken_over(run)
     assert (found["by"], found["reason"]) == ("unknown", None)
-    assert "by itself or by somebody unheard, such as a transmitter" in found["text"]
+    assert "by itself or by somebody not heard on this link, such as an RC transmitter" in found["text"]
 
 
 def test_an_old_failsafe_explains_nothing():
@@ -212,7 +212,7 @@ def test_a_breach_of_a_fence_that_is_not_known_names_none_as_broken():
     told(run, BREACHED)
     event = run.last(EventName.BREACH)
     assert event.data["beyond_m"] < -3.0
-    assert "; no fence known here is broken there, the nearest is " in event.text
+    assert "; no known fence is breached there, the nearest is " in event.text
 
 
 def test_a_breach_from_before_is_told_as_that_and_explains_nothing():

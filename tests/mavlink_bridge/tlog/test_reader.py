@@ -226,7 +226,7 @@ class TestErrors:
             TlogReader(log(gzip.compress(b"")))
 
     def test_error_is_one_line_and_tells_the_file(self, log):
-        with pytest.raises(LogError, match=r"\A.*notes\.txt: no MAVLink frame in it\Z") as caught:
+        with pytest.raises(LogError, match=r"\A.*notes\.txt: no MAVLink messages in it\Z") as caught:
             TlogReader(log(b"x" * 99, "notes.txt"))
         assert caught.value.details["path"].endswith("notes.txt")
 

@@ -134,7 +134,7 @@ def test_parameters(tmp_path: Path) -> None:
         (["all.plan", "x.geojson", "--only", "parameters"], 3, "a .geojson file holds no parameters; it holds mission or fence or rally"),
         (["all.plan", "x.poly", "--only", "mission"], 3, "a .poly file holds no mission"),
         (["all.plan", "x.geojson", "--return-point", "north"], 2, "'north' is not a position"),
-        (["x.parm", "y.parm", "--return-point", "1,2"], 2, "--return-point belongs to a fence, and IN holds none"),
+        (["x.parm", "y.parm", "--return-point", "1,2"], 2, "--return-point needs a fence, and IN has none"),
         (["none.plan", "x.geojson"], 3, "none.plan cannot be read: No such file"),
         (["none.plan", "all.plan"], 3, "none.plan cannot be read: No such file"),
         (["all.plan", "x.tlog"], 3, "no format to write for the suffix '.tlog'"),

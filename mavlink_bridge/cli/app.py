@@ -59,7 +59,9 @@ class Commands(TyperGroup):
             self.commands[args[0]] = load(args[0])
         elif not args[0].startswith("-"):
             similar = get_close_matches(args[0], COMMANDS)
-            hint = f"did you mean {' or '.join(similar)}?" if similar else f"commands are {', '.join(COMMANDS)}"
+            hint = (
+                f"did you mean {' or '.join(similar)}?" if similar else f"commands are {', '.join(COMMANDS)}"
+            )
             ctx.fail(f"unknown command {args[0]!r}; {hint}")
         return super().resolve_command(ctx, args)
 
@@ -68,12 +70,12 @@ class Commands(TyperGroup):
         if not options.get("standalone_mode", True):
             return super().main(args, *rest, **options)
         words = list(sys.argv[1:] if args is None else args)
-        sys.exit(
-            _exit_code(
-                lambda: super(Commands, self).main(args, *rest, **{**options, "standalone_mode": False}),
-                words,
-            )
+        code = _exit_code(
+            lambda: super(Commands, self).main(args, *rest, **{**options, "standalone_mode": False}), words
         )
+        if code == ExitCode.USAGE and len(words) == 1 and words[0] in COMMANDS:
+            load(words[0]).main(["--help"], prog_name=f"pbpp {words[0]}", standalone_mode=False)
+        sys.exit(code)
 
 
 def load(name: str) -> Any:  # noqa: ANN401 - a command of the parser library that typer uses

@@ -64,7 +64,9 @@ def config(options: ConfigOptions) -> None:
         return
     if options.quiet:
         return
-    echo(f"Your options: {own}{'' if is_there(own) else ' (does not exist; `pbpp config --template` prints an example)'}")
+    echo(
+        f"Your options: {own}{'' if is_there(own) else ' (does not exist; `pbpp config --template` prints an example)'}"
+    )
     echo(f"Backups of vehicles' missions, fences and rally points: {backups}")
     for setting in settings:
         echo(f"pbpp {setting.command} {setting.option} {setting.value}   (by {setting.source})")
@@ -82,7 +84,9 @@ def settings_of(path: Path, *, is_asked_for: bool) -> list[Setting]:
     """
     tables = read_tables(path)
     if unknown := sorted(set(tables) - {FOR_ALL, *COMMANDS}):
-        raise typer.BadParameter(f"{path}: [{unknown[0]}] is not a command; expected one of {', '.join(COMMANDS)}")
+        raise typer.BadParameter(
+            f"{path}: [{unknown[0]}] is not a command; expected one of {', '.join(COMMANDS)}"
+        )
     settings = []
     nobodys = set(tables.get(FOR_ALL, {}))
     for name in COMMANDS if FOR_ALL in tables else tables:

@@ -120,7 +120,9 @@ def _ports() -> Iterator[_Finding]:
             # Something on USB was plugged in to be used; a computer's own ports are often wired to nothing.
             verdict = _Verdict.NOTE if port.vid is None else _Verdict.WRONG
             advice = _permission_advice(Path(port.device))
-            yield _Finding(verdict, f"serial port {port.device}", f"{told}, but you have no permission to use it", advice)
+            yield _Finding(
+                verdict, f"serial port {port.device}", f"{told}, but you have no permission to use it", advice
+            )
         else:
             yield _Finding(_Verdict.OK, f"serial port {port.device}", told)
 
@@ -143,7 +145,10 @@ def _options() -> Iterator[_Finding]:
         count = len(settings_of(path, is_asked_for=False))
     except typer.BadParameter as error:
         yield _Finding(
-            _Verdict.WRONG, "options file", error.message, "fix it; `pbpp config --template` prints an example"
+            _Verdict.WRONG,
+            "options file",
+            error.message,
+            "fix it; `pbpp config --template` prints an example",
         )
     else:
         yield _Finding(_Verdict.OK, "options file", f"{path} ({count} options set)")

@@ -20,10 +20,7 @@ LISTEN_S = 1.2
 _STILL_THERE_S = 5.0
 """Whoever was silent so long is gone: five missed heartbeats."""
 
-_SILENT_ADVICE = (
-    "is the vehicle on, the wiring right, and nobody else using the port? Do port and baud rate fit the vehicle's SERIALn_BAUD "
-    "(/dev/ttyUSB0,57600), and does it send to this address? `pbpp doctor` lists the serial ports"
-)
+_SILENT_ADVICE = "is the vehicle on, and does its telemetry reach this link?"
 _FORWARD_ADVICE = "MAVLink is received, but from no autopilot: let the ground station or router forward the vehicle's messages to this port too"
 
 
@@ -135,7 +132,7 @@ class FindVehicle(TableMachine[FindState, FindEvent]):
         """Return the error for a vehicle not heard; it notes whether anybody else was heard, which is another trouble than a dead line."""
         within = f"no vehicle's HEARTBEAT was heard within {self._patience_s:g} s"
         if not self._senders:
-            return VehicleNotFoundError(f"{within}, nothing else either", advice=_SILENT_ADVICE)
+            return VehicleNotFoundError(f"{within}, nothing else either", heard=[], advice=_SILENT_ADVICE)
         names = ", ".join(
             f"system {system} component {component}" for system, component in sorted(self._senders)
         )

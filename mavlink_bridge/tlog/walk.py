@@ -143,9 +143,7 @@ def _check_kind(head: bytes, path: Path) -> None:
     kind = kind_of(head)
     if kind is not None:
         what, advice = kind
-        raise LogError(
-            f"{path} is {what}; expected a telemetry log (.tlog)", path=str(path), advice=advice
-        )
+        raise LogError(f"{path} is {what}; expected a telemetry log (.tlog)", path=str(path), advice=advice)
 
 
 def _vote(at: NDArray[np.int64], end: NDArray[np.int64], path: Path) -> int:

@@ -206,6 +206,7 @@ def with_end(planned: Plan, situation: Situation, request: Tour) -> Plan:
             f"RTL at the end would drive straight home, {near} at {last.at}; make the way home part of the mission (--return)",
             fences=list(last.crosses or (last.fence,)),
             driven_clearance_m=round(last.driven_clearance_m, 3),
+            advice="use --return instead, or --end hold",
         )
     return replace(
         planned,

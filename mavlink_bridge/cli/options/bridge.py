@@ -45,7 +45,8 @@ class BridgeOptions(CommonOptions):
         ),
     ] = field(default_factory=list)
     clearance: Annotated[
-        str | None, typer.Option(metavar="M|max", help="Clearance to keep while driving. Default: from FENCE_MARGIN.")
+        str | None,
+        typer.Option(metavar="M|max", help="Clearance to keep while driving. Default: from FENCE_MARGIN."),
     ] = None
     corner_allowance: Annotated[str, typer.Option(metavar="M|auto", help="Extra room for cut corners.")] = (
         "auto"
@@ -53,7 +54,9 @@ class BridgeOptions(CommonOptions):
     snap: Annotated[
         float,
         typer.Option(
-            metavar="M", parser=within(0.0, MOST_M, "metres"), help="Move a blocked target to the nearest free place within M metres."
+            metavar="M",
+            parser=within(0.0, MOST_M, "metres"),
+            help="Move a blocked target to the nearest free place within M metres.",
         ),
     ] = 0.0
     vehicle: Annotated[
@@ -81,10 +84,12 @@ class BridgeOptions(CommonOptions):
     any_vehicle: AnyVehicleOption = False
     source_system: Annotated[
         int | None,
-        typer.Option(metavar="N", min=1, max=255, help="System id that pbpp uses. Default: the vehicle's own."),
+        typer.Option(
+            metavar="N", min=1, max=255, help="System id that pbpp uses. Default: the vehicle's own."
+        ),
     ] = None
-    source_component: Annotated[int, typer.Option(metavar="N", min=1, max=255, help="Component id that pbpp uses.")] = (
-        195
-    )
+    source_component: Annotated[
+        int, typer.Option(metavar="N", min=1, max=255, help="Component id that pbpp uses.")
+    ] = 195
     signing_key: SigningKeyOption = None
     timeout: TimeoutOption = 30.0

@@ -25,6 +25,4 @@ class ConfigOptions(CommonOptions):
     `pbpp config --template`
     """
 
-    template: Annotated[
-        bool, typer.Option("--template", help="Print an example options file.")
-    ] = False
+    template: Annotated[bool, typer.Option("--template", help="Print an example options file.")] = False

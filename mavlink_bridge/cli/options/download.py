@@ -29,6 +29,9 @@ class DownloadOptions(LinkOptions):
     output: Annotated[
         list[Path],
         typer.Option(
-            "-o", "--output", metavar="FILE", help="File to write: .waypoints, .plan; parameters: .parm, .param. Default: list on the terminal."
+            "-o",
+            "--output",
+            metavar="FILE",
+            help="File to write: .waypoints, .plan; parameters: .parm, .param. Default: list on the terminal.",
         ),
     ] = field(default_factory=list)

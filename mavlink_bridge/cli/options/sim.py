@@ -43,31 +43,39 @@ class SimOptions(CommonOptions):
         Path | None,
         typer.Option(help="Mission file stored in the rover; its home, if it has one, is not used."),
     ] = None
-    param: Annotated[
-        list[str], typer.Option(metavar="NAME=VALUE", help="Set a parameter; repeatable.")
-    ] = field(default_factory=list)
+    param: Annotated[list[str], typer.Option(metavar="NAME=VALUE", help="Set a parameter; repeatable.")] = (
+        field(default_factory=list)
+    )
     speedup: Annotated[
-        float, typer.Option(metavar="X", parser=within(0.01, 1000.0), help="How many times faster than real time.")
+        float,
+        typer.Option(metavar="X", parser=within(0.01, 1000.0), help="How many times faster than real time."),
     ] = 1.0
     loss: Annotated[
         float, typer.Option(metavar="P", parser=within(0.0, 1.0), help="Share of frames lost, each way.")
     ] = 0.0
     duplicate: Annotated[
-        float, typer.Option(metavar="P", parser=within(0.0, 1.0), help="Share of frames duplicated, each way.")
+        float,
+        typer.Option(metavar="P", parser=within(0.0, 1.0), help="Share of frames duplicated, each way."),
     ] = 0.0
     latency: Annotated[
         float,
         typer.Option(
-            metavar="S", parser=within(0.0, MOST_S, "seconds"), help="Delay of each frame in seconds, each way."
+            metavar="S",
+            parser=within(0.0, MOST_S, "seconds"),
+            help="Delay of each frame in seconds, each way.",
         ),
     ] = 0.0
     jitter: Annotated[
         float,
         typer.Option(
-            metavar="S", parser=within(0.0, MOST_S, "seconds"), help="Random extra delay, up to so many seconds."
+            metavar="S",
+            parser=within(0.0, MOST_S, "seconds"),
+            help="Random extra delay, up to so many seconds.",
         ),
     ] = 0.0
-    seed: Annotated[int, typer.Option(min=-MOST_SEED, max=MOST_SEED, help="Random seed of the link's faults.")] = 0
+    seed: Annotated[
+        int, typer.Option(min=-MOST_SEED, max=MOST_SEED, help="Random seed of the link's faults.")
+    ] = 0
     system: Annotated[int, typer.Option(min=1, max=255, help="MAVLink system id.")] = 1
     role: RoleOption = field(default_factory=list)
     outermost: OutermostOption = None

@@ -39,8 +39,28 @@ COMMANDS = {
 """Every command and its line in help; the module of the same name holds it."""
 
 
+def _without_types(params: list[Any]) -> list[Any]:
+    """Return parameters whose flags show no type in help: each takes no value."""
+    for param in params:
+        if getattr(param, "is_flag", False) and param.metavar is None:
+            param.metavar = ""
+    return params
+
+
+class SingleCommand(TyperCommand):
+    """A command whose help shows no type for flags."""
+
+    def get_params(self, ctx: Any) -> list[Any]:  # noqa: ANN401 - the parser library is typer's own affair
+        """Return the options, with ``--help``."""
+        return _without_types(super().get_params(ctx))
+
+
 class Commands(TyperGroup):
     """A group that imports a command's module when the command is called: help and usage errors need none of them."""
+
+    def get_params(self, ctx: Any) -> list[Any]:  # noqa: ANN401 - as above
+        """Return the options, with ``--help``."""
+        return _without_types(super().get_params(ctx))
 
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ANN401, ARG002 - the parser library is typer's own affair
         """Return the names, in the order of help."""
@@ -81,7 +101,7 @@ class Commands(TyperGroup):
 def load(name: str) -> Any:  # noqa: ANN401 - a command of the parser library that typer uses
     """Return a command, with its options."""
     single = typer.Typer(add_completion=False, rich_markup_mode="markdown", pretty_exceptions_enable=False)
-    single.command(name)(command_of(name))
+    single.command(name, cls=SingleCommand)(command_of(name))
     return typer.main.get_command(single)
 
 

@@ -71,7 +71,7 @@ class HandOver(Part):
         if core.operator.is_late_click(heartbeat, now_s) and self._halter.stopping is None:
             self._halter.command_hold(now_s)
         elif core.state is State.VERIFIED and not core.orders.drive and core.is_driving_ours:
-            return self._driver.resume("somebody drives the mission")
+            return self._driver.resume("somebody else started the mission")
         return []
 
     def _overhear(self, frame: Frame, now_s: float) -> Iterable[Signal]:

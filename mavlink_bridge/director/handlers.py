@@ -141,7 +141,7 @@ def _on_target(parts: Parts, _now_s: float) -> None:
 def _on_target_while_moving(parts: Parts, now_s: float) -> None:
     parts.writer.is_confirmed = False
     parts.driver.drive = None
-    parts.halter.hold("a new route is wanted", now_s)
+    parts.halter.hold("stopping for a new route", now_s)
 
 
 def _on_planned(parts: Parts, now_s: float) -> Iterable[Signal]:

@@ -84,7 +84,7 @@ class IdentityGuard(Part):
         if core.operator.take_heartbeat(frame.message, now_s) is None:
             return []
         halter.stopping = None
-        return self.settle("somebody has taken the vehicle over; the mission is on it")
+        return self.settle("another station has taken over the vehicle; the mission is on it")
 
     def hold_ended(self) -> Sequence[Signal]:
         """Go on from a HOLD that was taken, or was not."""

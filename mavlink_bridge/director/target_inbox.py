@@ -103,7 +103,7 @@ class TargetInbox(Part):
         core.voice.tell(
             now_s,
             EventName.TARGET,
-            f"target {target.position} by {target.source}",
+            f"target {target.position} from {target.source}",
             list(target.position),
             str(target.source),
         )

@@ -136,7 +136,7 @@ class FindVehicle(TableMachine[FindState, FindEvent]):
         names = ", ".join(
             f"system {system} component {component}" for system, component in sorted(self._senders)
         )
-        return VehicleNotFoundError(f"{within}, only {names}", advice=_FORWARD_ADVICE)
+        return VehicleNotFoundError(f"{within}, heard only {names}", advice=_FORWARD_ADVICE)
 
 
 def identity_taken(identity: tuple[int, int]) -> IdentityTakenError:

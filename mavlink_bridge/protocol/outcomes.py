@@ -68,7 +68,7 @@ def upload_trouble(outcome: VerifiedUploadOutcome) -> BridgeError | None:
         return LinkError(f"{why}; nothing was written", **details)
     differences = "".join(f"; {difference}" for difference in outcome.differences[:3])
     why = "".join(f"; {text}" for text in (_other_writer(outcome), outcome.shortfall) if text)
-    return OutcomeError(f"the upload ended {outcome.kind}: {held}{why}{differences}{texts}", **details)
+    return OutcomeError(f"the upload failed ({outcome.kind}): {held}{why}{differences}{texts}", **details)
 
 
 def _other_writer(outcome: VerifiedUploadOutcome) -> str:

@@ -148,7 +148,7 @@ def test_letters_that_do_not_say_which_is_which(text: str) -> None:
 def test_swapped_numbers_are_recognised() -> None:
     with pytest.raises(InvalidPositionError, match=r"did you mean 40\.0713,-105\.2299\?"):
         parse_lat_lon("-105.2299,40.0713")
-    with pytest.raises(InvalidPositionError, match="latitude 200° is beyond ±90°$"):
+    with pytest.raises(InvalidPositionError, match=r"latitude 200° is beyond ±90°$"):
         parse_lat_lon("200,10")
 
 

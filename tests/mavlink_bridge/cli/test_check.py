@@ -165,9 +165,7 @@ def test_what_a_live_vehicle_does_not_tell_is_said(fields, yard, monkeypatch):
     monkeypatch.setattr("mavlink_bridge.director.learning.stream_requests", lambda _peer: [])
     with Simulator(config, "tcpin:127.0.0.1:0") as simulator:
         document = document_of("check", "--connect", simulator.connection, "--clearance", "2", code=8)
-        assert (
-            "no position from the vehicle; assuming it stands at home" in document["warnings"]
-        )
+        assert "no position from the vehicle; assuming it stands at home" in document["warnings"]
         assert any("did not tell how good its position is" in text for text in document["warnings"])
         assert document["clearance_m"] == pytest.approx(2.1)  # FENCE_MARGIN and a reserve
         monkeypatch.setattr("mavlink_bridge.protocol.parameters.PATIENCE_S", 0.5)

@@ -204,9 +204,7 @@ def test_nothing_is_sent_for_a_no_a_second_interrupt_or_a_closed_input(driven, m
     told = interrupt(at_hand, monkeypatch, keyboard=keyboard)
     assert rover.vehicle.mode == Mode.AUTO
     assert {type(message) for message in sent} <= {m.Heartbeat}
-    assert "nothing was sent; the vehicle continues the mission that pbpp started: AUTO, armed, " in str(
-        told
-    )
+    assert "nothing was sent; the vehicle continues the mission that pbpp started: AUTO, armed, " in str(told)
     assert told.details["drives"] is True
 
 

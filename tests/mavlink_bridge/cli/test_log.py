@@ -118,7 +118,7 @@ def test_a_clock_that_stands_still_is_told(tmp_path):
         log.heartbeat()
     log.rows = [(0.0, sender, message) for _, sender, message in log.rows]
     path = log.write(tmp_path / "still.tlog")
-    told = "the log's clock stands still: 12 heartbeats of one vehicle"
+    told = "the log's clock does not advance: 12 heartbeats of one vehicle"
     assert told in run(str(path)).stdout.replace("\n", " ")
     document = json.loads(run(str(path), "--json").stdout)
     assert document["logs"][0]["clock_trouble"].startswith(told)

@@ -90,8 +90,9 @@ def test_disarmed_between_the_look_and_the_switch_it_is_put_back_to_hold(once, l
     wait(run, 6)
     vehicle = run.vehicles[0]
     assert (vehicle.mode, vehicle.is_armed) == (Mode.HOLD, False)
-    assert "the vehicle was disarmed by itself or by somebody not heard on this link, such as an RC transmitter" in str(
-        run.director.trouble
+    assert (
+        "the vehicle was disarmed by itself or by somebody not heard on this link, such as an RC transmitter"
+        in str(run.director.trouble)
     )
     place = vehicle.position
     unheard(run, ARM)

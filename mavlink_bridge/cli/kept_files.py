@@ -126,7 +126,11 @@ def _make_way(path: Path, data: bytes) -> None:
             ]
         )
     elif lost := _lost_parts(path, data, writer):
-        warn([f"{path} no longer contains its {' and '.join(lost)}; the old file is kept as {keep_aside(path)}"])
+        warn(
+            [
+                f"{path} no longer contains its {' and '.join(lost)}; the old file is kept as {keep_aside(path)}"
+            ]
+        )
 
 
 def _writer_of(path: Path) -> str | None:

@@ -342,5 +342,5 @@ def test_with_a_link_only_this_vehicles_notes_are_put_aside(mission_file):
     with TcpVehicle(Adversary(OLD, uid=b"mine")) as link:
         assert "no interrupted uploads" in run(link, "upload", "--forget")[1]
     with TcpVehicle(Adversary(OLD, uid=b"theirs")) as link:
-        assert "put aside as" in run(link, "upload", "--forget")[1]
+        assert "dismissed, kept as" in run(link, "upload", "--forget")[1]
     assert BackupStore().notes() == []

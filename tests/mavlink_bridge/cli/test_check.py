@@ -150,7 +150,7 @@ def test_a_live_vehicle_is_asked(fields, yard, streams):
         assert any("0.3 m added to the clearance" in text for text in document["warnings"])
         assert document["system"] == 1
         assert document["legs"][0]["start"] == pytest.approx(away, abs=1e-5)
-        assert not any("did not tell its position" in text for text in document["warnings"])
+        assert not any("no position from the vehicle" in text for text in document["warnings"])
 
 
 def test_what_a_live_vehicle_does_not_tell_is_said(fields, yard, monkeypatch):
@@ -173,7 +173,7 @@ def test_what_a_live_vehicle_does_not_tell_is_said(fields, yard, monkeypatch):
             "mavlink_bridge.protocol.parameters.ReadParameters.receive", lambda *_arguments: None
         )
         silent = document_of("check", "--connect", simulator.connection, code=5)
-        assert "does not answer when asked for its parameters" in silent["message"]
+        assert "did not answer the parameter request" in silent["message"]
 
 
 def test_pictures(tmp_path, yard):
@@ -361,7 +361,7 @@ def test_a_fence_that_changes_on_the_way_stops_a_repaired_mission(tmp_path, fiel
         )
         with (
             open_link(simulator.connection) as link,
-            pytest.raises(SituationError, match="not started again"),
+            pytest.raises(SituationError, match="not restarted"),
         ):
             conduct(link, orders, quiet=True, on_frames=meddle)
         assert is_changed

@@ -124,7 +124,10 @@ def test_people_are_told_in_words(rover, tmp_path):
     assert "the list before is kept in" in output
     assert "already on the vehicle" in run(rover, "upload", mission_file(tmp_path))[2]
     assert run(rover, "upload", mission_file(tmp_path), "--quiet")[2] == ""
-    assert "mission: 20 items" in run(rover, "download", "mission")[2]
+    listed = run(rover, "download", "mission")[2].splitlines()
+    assert listed[0] == "mission: 20 items"
+    assert len(listed) == 21
+    assert listed[2].split()[:3] == ["1", "NAV_WAYPOINT", str(NEW[1].position)]
 
 
 @pytest.mark.parametrize(
@@ -388,7 +391,7 @@ def test_an_interrupt_says_what_it_left_behind(rover, tmp_path, monkeypatch, pat
     monkeypatch.setattr(owner, patched, interrupted)
     code, document, _ = run(rover, "upload", mission_file(tmp_path), "--json")
     assert code == 130
-    assert ("part of the old and part of the new" in document["message"]) is left_behind
+    assert ("part of both" in document["message"]) is left_behind
     assert ("was left as it was" in document["message"]) is not left_behind
 
 

@@ -277,7 +277,7 @@ def take_terminal() -> None:
     ("command", "answer", "mode", "said"),
     [
         ("plan", "\n", Mode.HOLD, "switched to HOLD, confirmed by its heartbeat"),
-        ("bridge", "n\n", Mode.AUTO, "nothing was sent; the vehicle goes on"),
+        ("bridge", "n\n", Mode.AUTO, "nothing was sent; the vehicle continues"),
     ],
 )
 def test_at_a_real_terminal(fields, tmp_path, command, answer, mode, said):

@@ -341,7 +341,7 @@ WRONG: list[tuple[tuple[str, ...], int, str]] = [
     (("convert",), USAGE, "IN"),
     (("convert", "yard.waypoints"), USAGE, "OUT"),
     (("convert", "missing.plan", "out.plan"), INPUT, "missing.plan"),
-    (("convert", "yard.waypoints", "yard.waypoints"), USAGE, "written over"),
+    (("convert", "yard.waypoints", "yard.waypoints"), USAGE, "same file as IN"),
     (("convert", "yard.waypoints", "out.xyz"), INPUT, ".xyz"),
     (("convert", "yard.waypoints", "out.gpx"), INPUT, ""),
     (("convert", "yard.waypoints", "out.plan", "--only", "everything"), USAGE, "everything"),

@@ -231,7 +231,7 @@ def test_an_arrival_without_hold_is_an_outcome():
     run.run_until(lambda: run.director.state is State.DRIVING)
     deaf_since.append(run.now_s)
     assert run.run() is State.FAILED
-    assert "it has arrived, but it does not go to HOLD" in str(run.director.trouble)
+    assert "arrived, but the vehicle did not switch to HOLD" in str(run.director.trouble)
     assert isinstance(run.director.trouble, OutcomeError)
 
 
@@ -285,7 +285,7 @@ def test_without_hold_it_is_refused_and_drives_on():
     run.vehicles[0] = first.vehicles[0]
     run.now_s = first.now_s
     assert run.run() is State.FAILED
-    assert "drives its mission in AUTO; nothing was written" in str(run.director.trouble)
+    assert "driving its mission in AUTO; nothing was written" in str(run.director.trouble)
     assert modes_sent(run) == []
 
 

@@ -122,7 +122,7 @@ def test_where_the_mode_is_seen_first_nothing_is_claimed_until_the_cause_is_hear
     )
     told(run, heard)
     assert run.last(event).data["mode"] == mode_name(mode)
-    assert f"the autopilot answered it with {mode_name(mode)}" in run.last(event).text
+    assert f"the autopilot switched to {mode_name(mode)}" in run.last(event).text
 
 
 @pytest.mark.parametrize(
@@ -221,7 +221,7 @@ def test_a_breach_from_before_is_told_as_that_and_explains_nothing():
     run.run_until(run.happened(EventName.BREACH), 5)
     wait(run, 10)
     assert [event.name for event in run.events].count(EventName.BREACH) == 1
-    assert "since before pbpp listened" in run.last(EventName.BREACH).text
+    assert "from before pbpp connected" in run.last(EventName.BREACH).text
 
 
 def test_failsafes_are_told_once_and_not_said_to_ground_stations_again():

@@ -129,7 +129,7 @@ def test_parameters(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "code", "problem"),
     [
-        (["all.plan", "all.plan"], 2, "would be written over what it is made of"),
+        (["all.plan", "all.plan"], 2, "is the same file as IN"),
         (["all.plan", "x.geojson", "--only", "fences"], 2, "--only 'fences': expected one of mission, fence, rally, parameters"),
         (["all.plan", "x.geojson", "--only", "parameters"], 3, "a .geojson file holds no parameters; it holds mission or fence or rally"),
         (["all.plan", "x.poly", "--only", "mission"], 3, "a .poly file holds no mission"),

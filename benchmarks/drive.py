@@ -32,6 +32,7 @@ from mavlink_bridge.simulator.rover import TICK_S
 from mavlink_bridge.simulator.vehicle import SimulatedVehicle
 from missions.errors import MissionError
 from missions.fence import fence_to_items
+from missions.firmware import Firmware
 from missions.geo import distance_m
 from missions.ground.from_situation import ground_for
 from missions.planning.plan import plan
@@ -154,6 +155,7 @@ def _run(field: Field, name: str) -> Run:
         pose=Known(Pose(field.start, field.heading_deg), None, "bench"),
         home=Known(field.start, None, "bench"),
         parameters=parameters,
+        firmware=Firmware(4, 6),
     )
     ground = ground_for(situation, vehicle_from_parameters(parameters), (field.start, field.target))
     widest_m = widest_clearance_m(
@@ -173,12 +175,14 @@ def _run(field: Field, name: str) -> Run:
     except MissionError as error:
         return Run(**known, refusal=str(error), planning_s=time.process_time() - begun_s)  # type: ignore[arg-type]
     planning_s = time.process_time() - begun_s
+    promised_m = planned.clearance_m
+    assert promised_m is not None  # these vehicles are of the measured kind
     shortest = plan(situation, replace(request, corner_allowance_m=0.0))
     driven_s, rover, arrived = _drive(field, planned, parameters)
     return Run(
         **known,  # type: ignore[arg-type]
         planning_s=planning_s,
-        leads_away_m=planned.clearance_m if planned.clearance_m < field.clearance_m else None,
+        leads_away_m=promised_m if promised_m < field.clearance_m else None,
         length_m=planned.length_m,
         shortest_m=shortest.length_m,
         waypoints=len(planned.path) - 1,

@@ -19,10 +19,8 @@ from mavlink_bridge.cli.failing import ExitCode, exit_code_of
 from mavlink_bridge.director import SCHEMA, TRANSITIONS
 from mavlink_bridge.protocol.transitions import TABLES
 from missions import errors as mission_errors
-from missions.vehicle import PARAMETER_NAMES
-from missions.vehicle.ardupilot import ardupilot_vehicle
-from missions.vehicle.px4 import px4_vehicle
-from missions.vehicle.reader import ParameterReader
+from missions.vehicle import Autopilot
+from missions.vehicle.parameters import PARAMETERS, Parameter
 
 DOCS = Path(__file__).parent
 sys.path.insert(0, str(DOCS))
@@ -105,48 +103,33 @@ _CODES = {
 }
 
 
-class _Reading(ParameterReader):
-    """A reader that notes every name it is asked for, and what is taken instead."""
-
-    asked: dict[str, float | None]
-
-    def known(self, name: str, **limits: float) -> float | None:
-        self.asked.setdefault(name, None)
-        return super().known(name, **limits)
-
-    def value(self, name: str, default: float, **limits: float) -> float:
-        if self.asked.get(name) is None:
-            self.asked[name] = default
-        return super().value(name, default, **limits)
-
-
 def parameters() -> str:
-    """Return the vehicle's parameters that count, with what is taken where they are not told."""
-    rows = []
-    vehicles = (
-        ("ArduPilot", ardupilot_vehicle, ({},)),
-        ("PX4", px4_vehicle, ({"CA_AIRFRAME": 5.0}, {"CA_AIRFRAME": 6.0})),
-    )
-    for autopilot, read, airframes in vehicles:
-        asked: dict[str, float | None] = {}
-        for airframe in airframes:
-            reading = _Reading(airframe)
-            reading.asked = asked
-            read(reading, None, None)
-        if autopilot == "ArduPilot":
-            asked = {name: asked.get(name) for name in dict.fromkeys((*PARAMETER_NAMES, *asked))}
-        servos = [name for name in asked if re.fullmatch(r"SERVO\d+_FUNCTION", name)]
-        rows += [
-            f"| {_span(servos) if name in servos else f'`{name}`'} | {autopilot} | {'—' if default is None else f'{default:g}'} |"
-            for name, default in asked.items()
-            if name not in servos[1:]
-        ]
-    return "\n".join(["| parameter | autopilot | default if it is not known |", "|---|---|---|", *rows])
+    """Return the table of parameters that count (`missions.vehicle.parameters`)."""
+    rows = [
+        _parameter_row(
+            row, f"`{row.name}` … `SERVO32_FUNCTION`" if row.name == "SERVO1_FUNCTION" else f"`{row.name}`"
+        )
+        for row in PARAMETERS.values()
+        if not re.fullmatch(r"SERVO[2-9]_FUNCTION", row.name)
+    ]
+    head = "| parameter | default if it is not known | ArduPilot's range | measured | changes |"
+    return "\n".join([head, "|---|---|---|---|---|", *rows])
 
 
-def _span(names: list[str]) -> str:
-    """Return the first and the last of a row of names."""
-    return f"`{names[0]}` … `{names[-1]}`"
+def _parameter_row(row: Parameter, name: str) -> str:
+    taken = "—" if row.default is None else f"{row.default:g}"
+    if row.before is not None:
+        taken += f" ({row.before[1]:g} before {row.before[0].major}.{row.before[0].minor})"
+    since = f" (since {row.since.major}.{row.since.minor})" if row.since is not None else ""
+    measured = str(row.measured or "—")
+    if row.measured_skid != row.measured:
+        measured = (
+            f"{measured}; on skid steer {row.measured_skid}"
+            if row.measured_skid
+            else f"{measured} on steered wheels"
+        )
+    autopilot = "PX4: " if row.autopilot is Autopilot.PX4 else ""
+    return f"| {name}{since} | {taken} | {row.documented or '—'} | {measured} | {autopilot}{row.changes} |"
 
 
 def _planners(case: str) -> str:

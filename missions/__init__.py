@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from missions.editing.repair import Repair, repair_mission
     from missions.errors import MissionError
     from missions.fence import CircleZone, Fence, PolygonZone, ZoneKind
+    from missions.firmware import Firmware, read_firmware
     from missions.formats import (
         read_fence,
         read_mission,
@@ -35,6 +36,7 @@ __all__ = [
     "CircleZone",
     "End",
     "Fence",
+    "Firmware",
     "GoTo",
     "Known",
     "LatLon",
@@ -56,6 +58,7 @@ __all__ = [
     "check_mission",
     "plan",
     "read_fence",
+    "read_firmware",
     "read_mission",
     "read_parameters",
     "read_situation",
@@ -71,6 +74,7 @@ _HOMES = {
     "CircleZone": "fence",
     "End": "request",
     "Fence": "fence",
+    "Firmware": "firmware",
     "GoTo": "request",
     "Known": "situation",
     "LatLon": "geo",
@@ -91,6 +95,7 @@ _HOMES = {
     "ZoneKind": "fence",
     "check_mission": "checking.check",
     "plan": "planning.plan",
+    "read_firmware": "firmware",
     "read_fence": "formats",
     "read_mission": "formats",
     "read_parameters": "formats",

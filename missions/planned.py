@@ -39,7 +39,8 @@ class Plan:
     speeds : tuple of float or None
         The speed asked for on each leg of the path in m/s; None is the vehicle's own.
     clearance_m : float or None
-        Promised for the rover as it drives: what was asked for, or less where the start leaves less; None where only drawn lines were asked for.
+        Promised for the rover as it drives: what was asked for, or less where the start leaves less; None where only drawn lines were asked for,
+        and where the drive is extrapolated.
     asked_m : float
         What the drawn lines have to keep (less where the first ones lead away from a fence nearby); where the route is fitted to the
         drive model, the driven band too: the promise, the position's error and the owner's reserve.
@@ -57,6 +58,8 @@ class Plan:
         The band that the vehicle is predicted to stay in, and its times.
     home : LatLon or None
         For the mission's home item.
+    extrapolated : tuple of str
+        In what the drive lies outside what was measured.
     """
 
     items: tuple[MissionItem, ...]
@@ -80,6 +83,7 @@ class Plan:
     envelope: Envelope
     home: LatLon | None
     warnings: tuple[str, ...]
+    extrapolated: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         promised = "drawn lines only" if self.clearance_m is None else f"{self.clearance_m:g} m promised"

@@ -15,9 +15,6 @@ if TYPE_CHECKING:
 MARGIN_RESERVE_M = 0.1
 """More than FENCE_MARGIN, where coming nearer stops the vehicle for good: so far measured rovers left the drive model's band."""
 
-LEAST_MARGIN_M = 0.1
-"""With less FENCE_MARGIN measured rovers stopped at the fence or past it (0: 0.02 to 0.04 m past, 0.05: 0.02 m before)."""
-
 # Chosen, not measured: what is promised where nothing is asked for, so much beyond FENCE_MARGIN and no less than a metre.
 DEFAULT_BEYOND_MARGIN_M = 0.5
 LEAST_DEFAULT_M = 1.0
@@ -104,7 +101,6 @@ def promise(situation: Situation, request: Request, vehicle: Vehicle) -> Promise
             warnings.append(f"{_stops(vehicle)}; the clearance of {promised_m:g} m is less")
         error_m = request.reserve_m + (request.position_error_m or 0.0)
         return Promise(promised_m, error_m, request.corner_allowance_m, tuple(warnings))
-    warnings += margin_remarks(vehicle)
     error_m, told = _position_error_m(situation, request)
     # Avoidance goes by where the vehicle believes to be: the error of its position counts towards the margin.
     raised_m = vehicle.stops_within_m + MARGIN_RESERVE_M - error_m
@@ -121,19 +117,6 @@ def asked_clearance(situation: Situation, request: Request) -> tuple[Vehicle, fl
     """Return the situation's vehicle and the clearance that a plan would promise."""
     vehicle = known_vehicle(situation, request)
     return vehicle, promise(situation, request, vehicle).promised_m
-
-
-def margin_remarks(vehicle: Vehicle) -> list[str]:
-    """Return remarks on a margin that is less than measured rovers needed."""
-    if not vehicle.avoids_fence or vehicle.stops_within_m >= LEAST_MARGIN_M:
-        return []
-    return [
-        (
-            f"{vehicle.fence.margin_name} {vehicle.stops_within_m:g} m does not switch avoidance off: the vehicle brakes before the fence just the "
-            "same, and measured rovers came to rest as far as 0.04 m past it, a breach; what is promised was not measured there. "
-            f"Set {vehicle.fence.margin_name} {LEAST_MARGIN_M:g} or more, or AVOID_ENABLE {vehicle.avoid_bits & ~1} (without bit 0)"
-        )
-    ]
 
 
 def _stops(vehicle: Vehicle) -> str:

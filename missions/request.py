@@ -89,6 +89,8 @@ class Request(metaclass=_Kinds):
         The rectangle the vehicle covers.
     escape : bool
         Whether a vehicle on forbidden ground may drive out.
+    trusts_model : bool
+        Promise also where the drive lies outside what was measured.
 
     Raises
     ------
@@ -109,6 +111,7 @@ class Request(metaclass=_Kinds):
     speed_mps: float | None = None
     footprint: Footprint = POINT
     escape: bool = False
+    trusts_model: bool = False
 
     def __post_init__(self) -> None:
         if self.start is not None:
@@ -241,9 +244,10 @@ _TOUR_WORDS = ("targets", "order", "comes_back", "end")
 _DEFAULTS: dict[str, Any] = {
     "start": None,
     "targets": (),
-    **{one.name: one.default for one in fields(Tour)},
+    **{one.name: one.default for one in fields(Tour) if one.name != "trusts_model"},
     "via": None,
     "via_own": False,
+    "trusts_model": False,
 }
 """What `request_of` knows, in the order in which `Request` takes it, as it is where it is left out."""
 

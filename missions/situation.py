@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from missions.fence import Fence
+    from missions.firmware import Firmware
     from missions.geo import LatLon
     from missions.items import MissionItem
     from missions.rally import RallyPoint
@@ -113,8 +114,8 @@ class Situation:
         The newest place somebody asked the vehicle to drive to.
     bytewise : bool or None
         Whether the autopilot reports whole-number parameters as the bits of a float (PX4), not as its value.
-    firmware : tuple of int or None
-        The autopilot's version: major, minor, patch.
+    firmware : Firmware or None
+        The autopilot's version.
     parameters : mapping of str to float
         The autopilot's parameters, as far as they are known; each a number.
     no_numbers : mapping of str to str
@@ -131,7 +132,7 @@ class Situation:
     component: int | None = None
     ardupilot: bool | None = None
     bytewise: bool | None = None
-    firmware: tuple[int, int, int] | None = None
+    firmware: Firmware | None = None
     vehicle_type: int | None = None
     mode: int | None = None
     armed: bool | None = None

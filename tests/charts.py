@@ -13,6 +13,7 @@ from shapely import LineString, Point
 from strategies import GEOD, offset
 
 from missions.fence import CircleZone, Fence, PolygonZone, Zone, ZoneKind
+from missions.firmware import Firmware
 from missions.geo import LatLon, rounded, wrap_lon_deg
 from missions.situation import Known, Situation
 
@@ -96,7 +97,10 @@ def place(east_m: float, north_m: float, origin: LatLon = HOME) -> LatLon:
 
 def situation_of(*zones: Zone, **parameters: float) -> Situation:
     return Situation(
-        fence=Known(Fence(zones), None, "test"), parameters=parameters, home=Known(HOME, None, "test")
+        fence=Known(Fence(zones), None, "test"),
+        parameters=parameters,
+        firmware=Firmware(4, 6),
+        home=Known(HOME, None, "test"),
     )
 
 

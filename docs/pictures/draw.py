@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from missions.firmware import Firmware
 from missions.formats import read_situation
 from missions.geo import LatLon
 from missions.picture import draw_plan
@@ -25,4 +26,7 @@ REQUESTS = {
 for name, request in REQUESTS.items():
     situation = read_situation(FIELDS / f"{name}-fence.waypoints")
     parameters = {"WP_RADIUS": 2.0, "WP_SPEED": 4.0, "FENCE_OPTIONS": 2.0 if name == "union" else 0.0}
-    draw_plan(plan(replace(situation, parameters=parameters), request), HERE / f"{name}.png")
+    draw_plan(
+        plan(replace(situation, parameters=parameters, firmware=Firmware(4, 6)), request),
+        HERE / f"{name}.png",
+    )

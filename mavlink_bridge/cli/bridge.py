@@ -15,7 +15,6 @@ import typer
 from mavlink_bridge.cli.bridge_view import LiveView
 from mavlink_bridge.cli.common import warn
 from mavlink_bridge.cli.failing import ERRORS_ONLY, exit_code_of, telling
-from mavlink_bridge.cli.field_files import read_vehicle_file
 from mavlink_bridge.cli.interrupting import AtHand, interruptible, terminable
 from mavlink_bridge.cli.keyboard import Keyboard
 from mavlink_bridge.cli.link_notes import LinkNotes
@@ -28,6 +27,7 @@ from mavlink_bridge.cli.run_log import RunLog, SafeTeller
 from mavlink_bridge.cli.session import signing_of
 from mavlink_bridge.cli.terminal import echo, print_json, say
 from mavlink_bridge.cli.typed import CONFIRM, understood
+from mavlink_bridge.cli.vehicle_options import described_vehicle
 from mavlink_bridge.director import AT_WORK, Director, Orders, Severity
 from mavlink_bridge.director.orders import DEFAULT_SOURCES, TargetSource
 from mavlink_bridge.errors import LinkError, UsageError
@@ -60,10 +60,10 @@ def bridge(options: BridgeOptions) -> None:
     """Run the director on a link until its single job is done, or for ever."""
     check_permissions(upload=options.upload, drive=options.drive, arm=options.arm)
     orders = _orders(options)
-    parameters = read_vehicle_file(options.vehicle) if options.vehicle else {}
+    described = described_vehicle(options.vehicle, options.firmware)
     with contextlib.ExitStack() as stack:
-        recorder, journal = _recorders(stack, options.log, orders, parameters)
-        director = Director(orders, Situation(parameters=parameters))
+        recorder, journal = _recorders(stack, options.log, orders, described)
+        director = Director(orders, described)
         view = _view(stack, director, is_wanted=not options.is_silent)
         tell = view.tell if view else _teller(options)
         log_of_run = RunLog(recorder, journal) if recorder is not None and journal is not None else None
@@ -88,8 +88,11 @@ def _orders(options: BridgeOptions) -> Orders:
         own_component=options.source_component,
         system=options.system,
         any_vehicle=options.any_vehicle,
-        request=request_from_options(
-            None, options.target, options.clearance, options.corner_allowance, options.snap, "optimal"
+        request=replace(
+            request_from_options(
+                None, options.target, options.clearance, options.corner_allowance, options.snap, "optimal"
+            ),
+            trusts_model=options.trust_model,
         ),
         upload=options.upload,
         drive=options.drive,
@@ -345,11 +348,11 @@ def _tell_people(event: Event) -> None:
 
 
 def _recorders(
-    stack: contextlib.ExitStack, log: Path | None, orders: Orders, parameters: Mapping[str, float]
+    stack: contextlib.ExitStack, log: Path | None, orders: Orders, described: Situation
 ) -> tuple[TlogWriter | None, JournalWriter | None]:
     if log is None:
         return None, None
-    part, recorder, journal = open_recording(stack, log, orders, parameters)
+    part, recorder, journal = open_recording(stack, log, orders, described)
     if part != log:
         warn((f"{log} exists; recording this run to {part}",))
     return recorder, journal

@@ -12,11 +12,16 @@ from rich.table import Table
 from mavlink_bridge.cli.common import check_one_stdout, warn
 from mavlink_bridge.cli.drawing import cell, console
 from mavlink_bridge.cli.failing import ExitCode
-from mavlink_bridge.cli.field_files import read_fence_file, read_file, read_vehicle_file, with_mission_home
+from mavlink_bridge.cli.field_files import read_fence_file, read_file, with_mission_home
 from mavlink_bridge.cli.plan_results import draw
 from mavlink_bridge.cli.terminal import echo, print_json
 from mavlink_bridge.cli.values import position_from
-from mavlink_bridge.cli.vehicle_options import with_home_option, with_vehicle
+from mavlink_bridge.cli.vehicle_options import (
+    described_vehicle,
+    with_description,
+    with_home_option,
+    with_vehicle,
+)
 from mavlink_bridge.errors import UsageError
 from missions.checking.check import check_mission, plan_of
 from missions.formats import mission_of
@@ -73,7 +78,9 @@ def _situation(options: CheckOptions) -> tuple[Situation, list[str]]:
         from mavlink_bridge.cli.check_on_link import live_situation  # noqa: PLC0415 - and for links
 
         situation, unknown = live_situation(options)
-    return with_home_option(_with_files(situation, options), options.home), unknown
+    situation = _with_files(situation, options)
+    situation = with_description(situation, described_vehicle(options.vehicle, options.firmware))
+    return with_home_option(situation, options.home), unknown
 
 
 def _check_options(options: CheckOptions) -> None:
@@ -97,7 +104,7 @@ def _storage_warnings(items: Sequence[MissionItem], situation: Situation) -> lis
 
 
 def _with_files(source: Situation | None, options: CheckOptions) -> Situation:
-    """Put what files hold in the place of what the log or the link reported; of parameters the vehicle's own count more."""
+    """Put what files hold in the place of what the log or the link reported."""
     found = source or Situation()
     if options.fence is not None:
         told = read_fence_file(options.fence, options)
@@ -121,8 +128,6 @@ def _with_files(source: Situation | None, options: CheckOptions) -> Situation:
         )
         if source is None:
             found = with_mission_home(found, drawn, str(options.mission))
-    if options.vehicle is not None:
-        found = replace(found, parameters={**read_vehicle_file(options.vehicle), **found.parameters})
     return found
 
 
@@ -134,6 +139,7 @@ def _draw(checked: MissionCheck, situation: Situation, plots: list[Path]) -> Non
         f"{checked.length_m:.1f} m, about {checked.duration_s:.0f} s: "
         + (f"{broken} of {len(checked.legs)} legs break" if broken else f"{len(checked.legs)} legs keep")
         + f" {checked.clearance_m:g} m"
+        + ", extrapolated" * bool(checked.extrapolated)
     )
     draw(plan_of(checked, situation), plots, title=title)
 
@@ -159,7 +165,9 @@ def _report(checked: MissionCheck, plots: list[Path]) -> None:
         echo(f"DANGER: {danger}", typer.colors.RED)
     for leg in checked.broken:
         echo(f"BREAKS: {_sentence(leg)}", typer.colors.RED)
-    if checked.holds:
+    if checked.holds and checked.extrapolated:
+        echo(f"Every leg is predicted to keep {checked.clearance_m:g} m while driving; that was not measured")
+    elif checked.holds:
         echo(f"Every leg keeps {checked.clearance_m:g} m while driving")
 
 
@@ -209,6 +217,7 @@ def _document(
         "legs": [_leg_document(leg) for leg in checked.legs],
         "not_understood": list(checked.troubles),
         "dangers": list(checked.dangers),
+        "extrapolated": list(checked.extrapolated),
         "outputs": [str(path) for path in plots],
         "warnings": warnings,
     }

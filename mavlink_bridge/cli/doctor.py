@@ -21,16 +21,22 @@ from mavlink_bridge.cli.config import settings_of
 from mavlink_bridge.cli.failing import ExitCode
 from mavlink_bridge.cli.options_file import is_there, user_file
 from mavlink_bridge.cli.terminal import echo, echo_labelled, print_json
+from mavlink_bridge.cli.vehicle_options import described_vehicle
 from mavlink_bridge.errors import UsageError
 from mavlink_bridge.mavlink.signing import SigningKey
+from missions.drive_model import beyond_measured
+from missions.errors import MissionError
 from missions.formats import read_situation
 from missions.geo import LatLon
 from missions.request import GoTo
+from missions.vehicle import vehicle_from_parameters
+from missions.vehicle.parameter_remarks import assumed_remarks
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from mavlink_bridge.cli.options.doctor import DoctorOptions
+    from missions.firmware import Firmware
 
 _NEEDED = ("numpy", "shapely", "pyproj", "pymavlink", "pyserial", "typer", "rich", "platformdirs")
 _WANTED = {"matplotlib": "pictures (.png, .svg, .pdf)", "plotly": "interactive pages (.html)"}
@@ -62,6 +68,7 @@ def doctor(options: DoctorOptions) -> None:
     """Look at everything, and report each finding."""
     looks: list[Callable[[], Iterator[_Finding]]] = [
         _python, _packages, _ports, _options, lambda: _key(options.signing_key), _backups, _test_plan,
+        lambda: _vehicle(options.vehicle, options.firmware),
     ]  # fmt: skip
     findings = [finding for look in looks for finding in look()]
     is_well = all(finding.verdict is not _Verdict.WRONG for finding in findings)
@@ -210,3 +217,23 @@ def _test_plan() -> Iterator[_Finding]:
     else:
         wanted = f"{SHORTEST_M} m, or 1 % more, and {_CLEARANCE_M} m were expected"
         yield _Finding(_Verdict.WRONG, "test plan", f"{found}; {wanted}", "do not use this installation")
+
+
+def _vehicle(file: Path | None, firmware: Firmware | None) -> Iterator[_Finding]:
+    """Look at a parameter file: what of it is assumed, and what lies outside the drive model's measurements."""
+    if file is None:
+        return
+
+    try:
+        described = described_vehicle(file, firmware)
+        vehicle = vehicle_from_parameters(described.parameters, firmware=described.firmware)
+    except MissionError as error:
+        yield _Finding(_Verdict.WRONG, "vehicle", str(error))
+        return
+    version = described.firmware or "of an unknown version (--firmware)"
+    verdict = _Verdict.NOTE if vehicle.has_measured_corners is None else _Verdict.OK
+    yield _Finding(verdict, "vehicle", f"{vehicle.autopilot} {version}, {vehicle.steering} steering")
+    for remark in assumed_remarks(vehicle):
+        yield _Finding(_Verdict.NOTE, "vehicle", remark)
+    for reason in beyond_measured(vehicle):
+        yield _Finding(_Verdict.NOTE, "vehicle", reason, "plans for it promise no clearance")

@@ -17,8 +17,6 @@ from missions.formats.parameters import read_path
 from missions.situation import Known
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from mavlink_bridge.cli.options.check import CheckOptions
     from mavlink_bridge.cli.options.convert import ConvertOptions
     from mavlink_bridge.cli.options.plan import PlanOptions
@@ -111,8 +109,8 @@ def read_mission_file(path: Path, options: MapOptions) -> Mission:
     return mission_of(read_file(path, options, by_name=False), path)
 
 
-def read_vehicle_file(path: Path) -> Mapping[str, float]:
-    """Read a file of parameters, whatever its suffix, and tell what was passed over.
+def read_vehicle_file(path: Path) -> Situation:
+    """Read a file of parameters, whatever its suffix, with the firmware's version where it names it, and tell what was passed over.
 
     Raises
     ------
@@ -121,7 +119,7 @@ def read_vehicle_file(path: Path) -> Mapping[str, float]:
     """
     situation = read_path(path)
     warn(situation.remarks)
-    return situation.parameters
+    return situation
 
 
 def with_mission_home(situation: Situation, mission: Mission, source: str) -> Situation:

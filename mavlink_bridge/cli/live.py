@@ -16,7 +16,6 @@ from mavlink_bridge.backup.vehicle_lock import VehicleLock
 from mavlink_bridge.backup.vehicle_mark import VehicleMark
 from mavlink_bridge.cli.common import warn
 from mavlink_bridge.cli.drawing import progress_bar
-from mavlink_bridge.cli.field_files import read_vehicle_file
 from mavlink_bridge.cli.interrupting import AtHand, interruptible, terminable
 from mavlink_bridge.cli.link_notes import LinkNotes
 from mavlink_bridge.cli.restoring import interrupted_warnings
@@ -104,7 +103,7 @@ def plan_live(
     connection: str,
     orders: Orders,
     *,
-    vehicle_file: Path | None,
+    described: Situation,
     key_file: Path | None,
     quiet: bool,
     on_plan: PlanTaker = _take_none,
@@ -116,13 +115,12 @@ def plan_live(
     BridgeError, MissionError
         What went wrong, on the link or in planning.
     """
-    parameters = read_vehicle_file(vehicle_file) if vehicle_file else {}
     identity = orders.identity or ONE_SHOT_IDENTITY
     with terminable(), open_link(connection, identity, signing=signing_of(key_file)) as link:
         return conduct(
             link,
             orders,
-            Situation(parameters=parameters),
+            described,
             connection=str(parse_connection(connection)),
             quiet=quiet,
             on_plan=on_plan,

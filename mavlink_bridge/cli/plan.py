@@ -7,13 +7,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.cli.common import check_one_stdout, is_same_file
-from mavlink_bridge.cli.field_files import read_fence_file, read_vehicle_file, with_mission_home
+from mavlink_bridge.cli.field_files import read_fence_file, with_mission_home
 from mavlink_bridge.cli.permissions import check_permissions
 from mavlink_bridge.cli.plan_request import request_from_options, with_tour
 from mavlink_bridge.cli.plan_results import Told, arrival_document, report_end
 from mavlink_bridge.cli.terminal import print_json
 from mavlink_bridge.cli.timed_plan import timed_plan
-from mavlink_bridge.cli.vehicle_options import with_home_option, with_vehicle
+from mavlink_bridge.cli.vehicle_options import (
+    described_vehicle,
+    with_description,
+    with_home_option,
+    with_vehicle,
+)
 from mavlink_bridge.errors import UsageError
 from missions.errors import MissionFormatError
 from missions.formats import check_writable_format
@@ -66,15 +71,13 @@ def _request(options: PlanOptions) -> Request:
         options.snap,
         options.method,
     )
-    request = replace(with_vehicle(request, options), speed_mps=options.speed, escape=options.escape)
+    request = replace(
+        with_vehicle(request, options),
+        speed_mps=options.speed,
+        escape=options.escape,
+        trusts_model=options.trust_model,
+    )
     return with_tour(request, options)
-
-
-def with_parameter_file(situation: Situation, vehicle: Path | None) -> Situation:
-    """Add the parameters of a file to those that the vehicle itself reported."""
-    if vehicle is None:
-        return situation
-    return replace(situation, parameters={**read_vehicle_file(vehicle), **situation.parameters})
 
 
 def _check_options(options: PlanOptions) -> None:
@@ -112,4 +115,6 @@ def _offline_situation(options: PlanOptions, request: Request) -> Situation:
         situation = read_fence_file(options.fence, options)
         if isinstance(request, RepairMission) and request.mission is not None:
             situation = with_mission_home(situation, request.mission, str(options.via_mission))
-    return with_home_option(with_parameter_file(situation, options.vehicle), options.home)
+    return with_home_option(
+        with_description(situation, described_vehicle(options.vehicle, options.firmware)), options.home
+    )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.cli.live import LiveResult, plan_live
+from mavlink_bridge.cli.vehicle_options import described_vehicle
 from mavlink_bridge.director import Orders
 from mavlink_bridge.director.orders import DEFAULT_SOURCES
 
@@ -32,7 +33,7 @@ def plan_on_link(options: PlanOptions, request: Request, told: Told) -> LiveResu
     return plan_live(
         options.connect,
         orders,
-        vehicle_file=options.vehicle,
+        described=described_vehicle(options.vehicle, options.firmware),
         key_file=options.signing_key,
         quiet=options.is_silent,
         on_plan=told.tell,

@@ -69,6 +69,7 @@ def plan_document(planned: Plan) -> dict[str, object]:
         },
         "blocks": planned.blocks,
         "mission_items": len(planned.items) + 1,
+        "extrapolated": list(planned.extrapolated),
         "warnings": list(planned.warnings),
     }
 
@@ -135,6 +136,8 @@ def report_plan(planned: Plan, written: list[Path]) -> None:
         if planned.clearance_m is not None
         else "nothing promised for the driven track"
     )
+    if planned.extrapolated:
+        promise += ", extrapolated beyond what was measured"
     waypoints = sum(item.is_placed for item in planned.items)
     turns = max(0, waypoints - len(planned.targets))
     echo(

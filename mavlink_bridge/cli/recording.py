@@ -12,13 +12,14 @@ from mavlink_bridge.tlog import TlogWriter
 
 if TYPE_CHECKING:
     import contextlib
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator
 
     from mavlink_bridge.director import Orders
+    from missions.situation import Situation
 
 
 def open_recording(
-    stack: contextlib.ExitStack, log: Path, orders: Orders, parameters: Mapping[str, float]
+    stack: contextlib.ExitStack, log: Path, orders: Orders, described: Situation
 ) -> tuple[Path, TlogWriter, JournalWriter]:
     """Return the log that is written, and what writes it and its journal.
 
@@ -46,7 +47,7 @@ def open_recording(
             part.unlink()
             raise LogError(f"{journal_path(part)}: {error.strerror}", path=str(part)) from error
         recorder = stack.enter_context(TlogWriter(part))
-        return part, recorder, JournalWriter(journal, orders, parameters)
+        return part, recorder, JournalWriter(journal, orders, described)
     raise AssertionError  # pragma: no cover - there is always another number
 
 

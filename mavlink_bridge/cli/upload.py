@@ -114,7 +114,7 @@ def _content(options: UploadOptions, restoration: Restoration | None) -> tuple[L
     if file is None or restoration is not None:
         return [], {}
     if file.suffix.lower() in _PARAMETER_SUFFIXES:
-        parameters = read_vehicle_file(file)
+        parameters = read_vehicle_file(file).parameters
         check_parameters(parameters)
         return [], parameters
     found = _lists_of(file, options)

@@ -5,16 +5,19 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from mavlink_bridge.cli.field_files import read_vehicle_file
 from mavlink_bridge.cli.values import MOST_VEHICLE_M, checked_number, position_from
 from mavlink_bridge.errors import UsageError
-from missions.situation import Known
+from missions.situation import Known, Situation
 from missions.vehicle import Footprint
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from mavlink_bridge.cli.options.check import CheckOptions
     from mavlink_bridge.cli.options.plan import PlanOptions
+    from missions.firmware import Firmware
     from missions.request import Request
-    from missions.situation import Situation
 
 
 def with_vehicle(request: Request, options: PlanOptions | CheckOptions) -> Request:
@@ -53,3 +56,18 @@ def with_home_option(situation: Situation, home: str | None) -> Situation:
     if home is None:
         return situation
     return replace(situation, home=Known(position_from("--home", home), None, "--home"))
+
+
+def described_vehicle(file: Path | None, firmware: Firmware | None) -> Situation:
+    """Return what the user says of the vehicle: a parameter file, and the firmware's version, else the one that the file names."""
+    described = read_vehicle_file(file) if file else Situation()
+    return replace(described, firmware=firmware or described.firmware)
+
+
+def with_description(situation: Situation, described: Situation) -> Situation:
+    """Return the situation with what the user says of its vehicle; what the vehicle itself reported counts more."""
+    return replace(
+        situation,
+        parameters={**described.parameters, **situation.parameters},
+        firmware=situation.firmware or described.firmware,
+    )

@@ -60,7 +60,10 @@ SCHEMA: dict[EventName, tuple[Severity, tuple[str, ...]]] = {
     EventName.HOLDING: (Severity.NOTICE, ("reason",)),
     EventName.PLANNED: (
         Severity.INFO,
-        ("length_m", "drawn_clearance_m", "clearance_m", "duration_s", "waypoints", "path", "warnings"),
+        (
+            *("length_m", "drawn_clearance_m", "clearance_m", "duration_s", "waypoints", "path"),
+            *("extrapolated", "warnings"),
+        ),
     ),
     EventName.NO_PLAN: (Severity.WARNING, ("error", "details")),
     EventName.ROUTE_BROKEN: (Severity.CRITICAL, ("clearance_m", "asked_m", "fence")),

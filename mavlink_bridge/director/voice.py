@@ -80,13 +80,15 @@ class Voice:
         self.tell(
             now_s,
             EventName.PLANNED,
-            f"route {plan.length_m:.0f} m, {plan.drawn_clearance_m:.1f} m drawn clearance",
+            f"route {plan.length_m:.0f} m, {plan.drawn_clearance_m:.1f} m drawn clearance"
+            + ", extrapolated beyond what was measured" * bool(plan.extrapolated),
             round(plan.length_m, 2),
             metres(plan.drawn_clearance_m),
             plan.clearance_m,
             round(plan.duration_s, 1),
             len(plan.items),
             [list(position) for position in plan.path],
+            list(plan.extrapolated),
             list(plan.warnings),
         )
 

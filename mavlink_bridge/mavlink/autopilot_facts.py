@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.mavlink.messages import Autopilot, Capability
+from missions.firmware import firmware_from_banner, firmware_from_number
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from mavlink_bridge.mavlink.messages import AutopilotVersion
     from missions.situation import Situation
-
-_BANNER = re.compile(r"(?:ArduRover|APMrover2|Rover) V(\d{1,2})\.(\d{1,2})(?:\.(\d{1,2}))?")
 
 _MOST_NEWEST = 32  # about the root of a thousand parameters: then both kinds of copy cost the same
 
@@ -100,14 +98,11 @@ def with_version(situation: Situation, message: AutopilotVersion) -> Situation:
     bytewise = situation.bytewise
     if bytewise is None:
         bytewise = bool(message.capabilities & Capability.PARAM_ENCODE_BYTEWISE)
-    version = message.flight_sw_version
-    firmware = (version >> 24 & 255, version >> 16 & 255, version >> 8 & 255) if version else None
+    firmware = firmware_from_number(message.flight_sw_version)
     return replace(situation, bytewise=bytewise, firmware=firmware or situation.firmware)
 
 
 def with_banner(situation: Situation, text: str) -> Situation:
     """Return the situation with the version that ArduPilot's banner reports, "ArduRover V4.5.7 (0358a9c2)"."""
-    found = _BANNER.match(text)
-    if found is None:
-        return situation
-    return replace(situation, firmware=(int(found[1]), int(found[2]), int(found[3] or 0)))
+    firmware = firmware_from_banner(text)
+    return situation if firmware is None else replace(situation, firmware=firmware)

@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING, Any, TextIO
 from mavlink_bridge.director import Event, Orders, TargetSource
 from mavlink_bridge.errors import LogError
 from missions.errors import MissionError
+from missions.firmware import read_firmware
 from missions.geo import LatLon
 from missions.request import request_of
+from missions.situation import Situation
 from missions.vehicle import Footprint
 
 if TYPE_CHECKING:
@@ -54,7 +56,7 @@ class Journal:
     """A journal that was read."""
 
     orders: Orders
-    parameters: Mapping[str, float]
+    described: Situation
     calls: tuple[Call, ...]
     events: tuple[dict[str, Any], ...]
 
@@ -68,8 +70,8 @@ class JournalWriter:
         Open for writing.
     orders : Orders
         What the director may do.
-    parameters : mapping of str to float
-        Parameters that were known beforehand.
+    described : Situation
+        What was known beforehand: parameters, and the firmware's version.
 
     Raises
     ------
@@ -77,9 +79,16 @@ class JournalWriter:
         From every method: it cannot be written.
     """
 
-    def __init__(self, file: TextIO, orders: Orders, parameters: Mapping[str, float]) -> None:
+    def __init__(self, file: TextIO, orders: Orders, described: Situation) -> None:
         self._file = file
-        self._write({"journal": _FORMAT, "orders": _orders_to_json(orders), "parameters": dict(parameters)})
+        self._write(
+            {
+                "journal": _FORMAT,
+                "orders": _orders_to_json(orders),
+                "parameters": dict(described.parameters),
+                "firmware": str(described.firmware) if described.firmware else None,
+            }
+        )
 
     def call(self, call: Call) -> None:
         """Write a call."""
@@ -127,6 +136,8 @@ def read_journal(path: Path) -> Journal:
         if head["journal"] != _FORMAT:
             raise LogError(f"{path}: journal format {head['journal']!r}; expected {_FORMAT}")
         orders = _orders_from_json(head["orders"])
+        firmware = read_firmware(head["firmware"]) if head.get("firmware") else None
+        described = Situation(parameters=head["parameters"], firmware=firmware)
         for line in lines[1:]:
             entry = json.loads(line)
             if "told" in entry:
@@ -141,7 +152,7 @@ def read_journal(path: Path) -> Journal:
     except (ValueError, KeyError, TypeError, IndexError, MissionError) as error:
         line_number = len(calls) + len(events) + 2
         raise LogError(f"{path}: line {line_number} is not a journal's: {error!r}", file=str(path)) from None
-    return Journal(orders, head["parameters"], tuple(calls), tuple(events))
+    return Journal(orders, described, tuple(calls), tuple(events))
 
 
 def _orders_to_json(orders: Orders) -> dict[str, Any]:

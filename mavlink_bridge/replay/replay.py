@@ -15,7 +15,6 @@ from mavlink_bridge.errors import BackupError, LogError, VehicleInUseError
 from mavlink_bridge.logbook.clock import Pulse, SteadyClock
 from mavlink_bridge.replay.journal import journal_path, read_journal
 from mavlink_bridge.tlog import TlogReader
-from missions.situation import Situation
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -65,7 +64,7 @@ def replay_to_json(log: Path, orders: Orders) -> list[dict[str, object]]:
 
 def replay_recorded(entries: Iterable[LogEntry], journal: Journal) -> Iterator[Event]:
     """Repeat a bridge's run from its log and journal; return its events."""
-    director = Director(journal.orders, Situation(parameters=journal.parameters))
+    director = Director(journal.orders, journal.described)
     calls = iter(journal.calls)
     following = next(calls, None)
     count = 0

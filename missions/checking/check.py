@@ -13,7 +13,7 @@ from shapely.ops import nearest_points
 
 from missions.checking.execution import CIRCLE_M, Course, CourseLeg, follow_mission
 from missions.checking.mission_end import crossed_zones, end_warnings, return_place, return_warnings
-from missions.drive_model import Envelope, beyond_measured, envelope
+from missions.drive_model import Envelope, envelope, extrapolated
 from missions.drive_model.avoidance import with_avoidance
 from missions.errors import SituationError, StartBlockedError
 from missions.geo import LatLon, LocalPoint, bearing_deg, distance_m
@@ -28,7 +28,7 @@ from missions.promise import known_vehicle, promise
 from missions.request import GoTo
 from missions.situation import Known
 from missions.vehicle import real_number
-from missions.vehicle.parameter_remarks import parameter_remarks
+from missions.vehicle.parameter_remarks import assumed_remarks, parameter_remarks
 from missions.words import metres
 
 if TYPE_CHECKING:
@@ -123,6 +123,8 @@ class MissionCheck:
         What else a person should know.
     envelope : Envelope
         The band that the vehicle is predicted to stay in.
+    extrapolated : tuple of str
+        In what the drive lies outside what was measured: then it is predicted, not promised, that the mission holds.
     """
 
     mission: Mission
@@ -135,6 +137,7 @@ class MissionCheck:
     ground: Ground
     vehicle: Vehicle
     envelope: Envelope
+    extrapolated: tuple[str, ...] = ()
 
     @property
     def broken(self) -> tuple[CheckedLeg, ...]:
@@ -212,6 +215,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
     forecast = _forecast(course, ground, vehicle, heading_deg)
     legs = _checked_legs(course, ground, forecast, asked.required_m, seams_of(ground, vehicle))
     dangers, hazards = _at_start(ground, start, vehicle)
+    reasons = extrapolated(vehicle, forecast, *(leg.speed_mps for leg in course.legs))
     warnings = [
         *parameter_remarks(situation),
         *fence_warnings(vehicle, situation),
@@ -222,6 +226,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
         *_seam_warnings(vehicle, legs),
         *_start_warnings(start, heading_deg, legs[0], asked.required_m),
         *_drive_warnings(vehicle, forecast, course),
+        *reasons,
         *return_warnings(situation, vehicle, ground, course.path),
         *end_warnings(situation, vehicle, course),
     ]
@@ -236,6 +241,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
         ground=ground,
         vehicle=vehicle,
         envelope=forecast,
+        extrapolated=reasons,
     )
 
 
@@ -283,7 +289,23 @@ def _course(
     )
     if not course.legs:
         raise SituationError("; ".join(["the mission holds no leg to check", *course.troubles]))
-    return course
+    return _with_drift(course, vehicle) if vehicle.boat_drift_m else course
+
+
+def _with_drift(course: Course, vehicle: Vehicle) -> Course:
+    """Return the course of a boat, which drifts LOIT_RADIUS about each place where it stops (ArduPilot Rover's start_loiter)."""
+    drift_m = vehicle.boat_drift_m or 0.0
+    legs = tuple(
+        leg if leg.stop_s is None else replace(leg, circle_m=max(leg.circle_m, drift_m))
+        for leg in course.legs
+    )
+    notes = dict.fromkeys(
+        f"a boat (FRAME_CLASS 2) drifts LOIT_RADIUS {drift_m:g} m about item {leg.last_item}"
+        + (f" for {leg.stop_s:g} s" if leg.stop_s else "")
+        for leg in legs
+        if leg.stop_s is not None
+    )
+    return replace(course, legs=legs, notes=(*course.notes, *notes))
 
 
 def _forecast(course: Course, ground: Ground, vehicle: Vehicle, heading_deg: float | None) -> Envelope:
@@ -470,15 +492,4 @@ def _drive_warnings(vehicle: Vehicle, forecast: Envelope, course: Course) -> lis
         for corner in forecast.corners
         if not corner.bounded
     ]
-    warnings += beyond_measured(
-        vehicle, min((leg.speed_mps for leg in course.legs if leg.speed_mps), default=None)
-    )
-    assumed = [f"{one.parameter} {one.value:g}" for one in vehicle.assumed if one.parameter in _DRIVING]
-    if assumed:
-        warnings.append(f"parameters unknown; assuming {', '.join(assumed)}")
-    return warnings
-
-
-_DRIVING = frozenset(
-    {"WP_RADIUS", "WP_SPEED", "TURN_RADIUS", "FENCE_MARGIN", "SERVO1_FUNCTION", "NAV_ACC_RAD", "RO_SPEED_LIM"}
-)
+    return [*warnings, *assumed_remarks(vehicle)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from missions.drive_model.band import convex
-from missions.drive_model.calibrated_range import beyond_measured
+from missions.drive_model.calibrated_range import beyond_measured, extrapolated
 from missions.drive_model.envelope import Corner, Envelope, Leg
 from missions.drive_model.predict import Drive, corner_forecast, envelope, plan_drive
 
@@ -16,5 +16,6 @@ __all__ = [
     "convex",
     "corner_forecast",
     "envelope",
+    "extrapolated",
     "plan_drive",
 ]

@@ -1,30 +1,38 @@
-"""What the drive model was measured on, and which vehicles lie outside it."""
+"""What the drive model was measured on, and which vehicles and drives lie outside it: there a plan is extrapolated, and promises nothing.
+
+Ranges of parameters stand in their table (`missions.vehicle.parameters`), from the measured rows that docs/drive-model.md describes.
+"""
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from missions.vehicle import Autopilot, Steering
-from missions.vehicle.model import MAV_TYPE_SURFACE_BOAT
+from missions.vehicle.parameters import PARAMETERS
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from missions.drive_model.envelope import Envelope
     from missions.vehicle import Vehicle
-
-TOP_SPEED_MPS = {Steering.ACKERMANN: 5.0, Steering.SKID: 3.0}
-"""The fastest rows of benchmarks/data: the skid-steered model's own top speed was 4 m/s (docs/drive-model.md)."""
-
 
 SLOW_MPS = 1.0
 """Slower steered rovers swing out farther and farther: the firmware turns lateral acceleration into turn rate with at least 1 m/s."""
 
-TURN_RATE_DPS = 120.0
-"""ATC_STR_RAT_MAX as it was measured: ArduPilot's default."""
+LEAST_MARGIN_M = PARAMETERS["FENCE_MARGIN"].measured.least if PARAMETERS["FENCE_MARGIN"].measured else 0.0
+"""With less FENCE_MARGIN measured rovers stopped at the fence or past it (0: 0.02 to 0.04 m past, 0.05: 0.02 m before)."""
 
-OLDEST_FIRMWARE = (4, 6, 0)
-"""The first with the corners that were measured (upstream commit 56b99d4aa5, March 2025)."""
+SAME_TURN_DEG = 20.0
+SAME_MPS = 3.0
+"""Up to such a turn and speed firmware before 4.6 kept within the model's corners too (162 corners on long legs, within 0.04 m); so it did where it pivots."""
+
+_OLD_CORNERS = (
+    "before 4.6 rovers cut corners up to twice as deep, and swing out as far as 5.4 m after sharp ones"
+)
 
 
-def beyond_measured(vehicle: Vehicle, slowest_mps: float | None = None) -> tuple[str, ...]:
+def beyond_measured(vehicle: Vehicle, *speeds_mps: float | None) -> tuple[str, ...]:
     """Return in what a vehicle lies outside the measurements that the drive model rests on.
 
     The formulas go on beyond them (a larger turning radius swings out farther, a weaker position gain strays farther), but nothing was
@@ -34,77 +42,106 @@ def beyond_measured(vehicle: Vehicle, slowest_mps: float | None = None) -> tuple
     ----------
     vehicle : Vehicle
         What drives.
-    slowest_mps : float, optional
-        The least speed that is asked for on its way; default its own.
+    *speeds_mps : float or None
+        The speeds that are asked for on its way besides its own; None is its own.
 
     Returns
     -------
     tuple of str
         One sentence each; empty where the vehicle is of the measured kind.
     """
-    least_mps = vehicle.speed_mps if slowest_mps is None else min(slowest_mps, vehicle.speed_mps)
-    firmware = vehicle.firmware or OLDEST_FIRMWARE
-    top_mps = TOP_SPEED_MPS[vehicle.steering]
-    checks = (
-        (
-            vehicle.autopilot is not Autopilot.ARDUPILOT,
-            f"the drive model was measured on ArduPilot Rover, not on {vehicle.autopilot}",
-        ),
-        (vehicle.mav_type == MAV_TYPE_SURFACE_BOAT, "the drive model was measured on wheels, not on a boat"),
-        (
-            vehicle.speed_mps > top_mps,
-            f"{vehicle.steering} steering was measured up to {top_mps:g} m/s, not at {vehicle.speed_mps:g} m/s",
-        ),
-        (
-            vehicle.autopilot is Autopilot.ARDUPILOT
-            and vehicle.steering is Steering.ACKERMANN
-            and least_mps < SLOW_MPS,
-            (
-                f"the promise was not measured for steered rovers below {SLOW_MPS:g} m/s, and this one drives {least_mps:g} m/s: there they swing out "
-                "farther and farther (after 90° 0.7 m at 1 m/s, 1.8 m at 0.5, 3.2 m at 0.3) and count waypoints as reached that they passed at a "
-                f"distance; drive {SLOW_MPS:g} m/s or more"
-            ),
-        ),
-        (
-            vehicle.autopilot is Autopilot.ARDUPILOT and firmware < OLDEST_FIRMWARE,
-            (
-                f"the promise was not measured for ArduPilot {'.'.join(map(str, firmware))}: before 4.6 rovers cut corners up to twice as deep, and "
-                "swing out as far as 5.4 m after sharp ones"
-            ),
-        ),
-        (
-            vehicle.steering is Steering.SKID
-            and vehicle.firmware is None
-            and any(one.parameter == "WP_PIVOT_ANGLE" for one in vehicle.assumed),
-            (
-                "WP_PIVOT_ANGLE is not known, nor the firmware's version: taken as 0, which needs more room (no turning on the spot; the default from "
-                "ArduPilot 4.7 on, 60 before)"
-            ),
-        ),
-        *_beyond_limits(vehicle),
-    )
-    return tuple(sentence for outside, sentence in checks if outside)
-
-
-def _beyond_limits(vehicle: Vehicle) -> tuple[tuple[bool, str], ...]:
-    """Return which of the vehicle's limits and gains were not measured."""
-    turn_rate_dps = vehicle.turn_rate_max_dps or TURN_RATE_DPS  # 0 is no limit
+    if vehicle.autopilot is not Autopilot.ARDUPILOT:
+        return (f"the drive model was measured on ArduPilot Rover, not on {vehicle.autopilot}",)
+    speeds = {vehicle.speed_mps, *filter(None, speeds_mps)}
     return (
-        (
-            vehicle.autopilot is Autopilot.ARDUPILOT and turn_rate_dps < TURN_RATE_DPS,
-            f"turns were measured with ATC_STR_RAT_MAX {TURN_RATE_DPS:g}°/s, not {turn_rate_dps:g}°/s: slower ones swing out farther",
-        ),
-        (
-            vehicle.steering is Steering.ACKERMANN and vehicle.turn_radius_m > 1.0,
-            f"swings were measured at a turning radius of 0.9 m and are scaled to {vehicle.turn_radius_m:g} m",
-        ),
-        (vehicle.turn_max_g < 0.5, f"turns were measured with 0.6 g allowed, not {vehicle.turn_max_g:g} g"),
-        (
-            not 0.5 <= vehicle.accel_max_mps2 <= 2.0 or not 0.5 <= vehicle.jerk_mps3 <= 2.0,
-            f"corners were measured with 1 m/s² and 1 m/s³, not {vehicle.accel_max_mps2:g} m/s² and {vehicle.jerk_mps3:g} m/s³",
-        ),
-        (
-            not 0.15 <= vehicle.position_gain_per_s <= 0.3,  # chosen around the one measured value
-            f"straying was measured at a position gain (PSC_POS_P) of 0.2, not {vehicle.position_gain_per_s:g}",
-        ),
+        *_beyond_kinds(vehicle, min(speeds)),
+        *_beyond_ranges(vehicle, max(speeds)),
+        *_beyond_margin(vehicle),
     )
+
+
+def extrapolated(vehicle: Vehicle, band: Envelope, *speeds_mps: float | None) -> tuple[str, ...]:
+    """Return in what a drive lies outside the measurements: its vehicle (`beyond_measured`), and corners that its firmware may drive otherwise."""
+    return (*beyond_measured(vehicle, *speeds_mps), *_beyond_corners(vehicle, band))
+
+
+def _beyond_kinds(vehicle: Vehicle, least_mps: float) -> Iterator[str]:
+    if vehicle.boat_drift_m is not None:
+        yield "the drive model was measured on wheels, not on a boat"
+    if vehicle.steering is Steering.ACKERMANN and least_mps < SLOW_MPS:
+        yield (
+            f"the promise was not measured for steered rovers below {SLOW_MPS:g} m/s, and this one drives {least_mps:g} m/s: there they swing out "
+            "farther and farther (after 90° 0.7 m at 1 m/s, 1.8 m at 0.5, 3.2 m at 0.3) and count waypoints as reached that they passed at a "
+            f"distance; drive {SLOW_MPS:g} m/s or more, or tune its steering: at 0.3 m/s ATC_STR_RAT_FF 2.5 (not 0.75), or PSC_VEL_P 3 (not 1), brought "
+            "3.2 m down to 1.2 m"
+        )
+    if vehicle.oa_type:
+        yield f"OA_TYPE {vehicle.oa_type}: ArduPilot plans its own way around fences and may leave the route; set OA_TYPE 0"
+    if vehicle.has_measured_corners is False:
+        yield f"the promise was not measured for ArduPilot {vehicle.firmware}: {_OLD_CORNERS}"
+
+
+def _beyond_corners(vehicle: Vehicle, band: Envelope) -> Iterator[str]:
+    """Yield that the firmware is not known, where that decides how a corner is driven."""
+    if vehicle.has_measured_corners is not None or vehicle.autopilot is not Autopilot.ARDUPILOT:
+        return
+    turns_deg = [
+        abs(corner.turn_deg)
+        for corner in band.corners
+        if not (corner.pivots or corner.stops)
+        and (abs(corner.turn_deg) > SAME_TURN_DEG or vehicle.speed_mps > SAME_MPS)
+    ]
+    if turns_deg:
+        version = (
+            "unknown"
+            if vehicle.firmware is None
+            else f"{vehicle.firmware}, which may be older than April 2025"
+        )
+        yield (
+            f"firmware {version}: {_OLD_CORNERS}; this drive has turns of up to {max(turns_deg):.0f}°. Give the version (--firmware 4.6), "
+            "or let the vehicle report it"
+        )
+
+
+def _beyond_ranges(vehicle: Vehicle, top_mps: float) -> Iterator[str]:
+    """Yield which of the vehicle's limits, gains and distances were not measured."""
+    is_steered = vehicle.steering is Steering.ACKERMANN
+    radius_m = (
+        max(vehicle.waypoint_radius_m, vehicle.turn_radius_m) if is_steered else vehicle.waypoint_radius_m
+    )
+    no_limit = math.inf  # what 0 means, and what a limit that is not told is taken for
+    told = (
+        ("WP_SPEED", top_mps, "m/s", "drives"),
+        ("WP_RADIUS", radius_m, "m", "corners"),
+        ("TURN_RADIUS", vehicle.turn_radius_m, "m", "swings"),
+        ("ATC_TURN_MAX_G", vehicle.turn_max_g, "g", "turns"),
+        ("ATC_STR_RAT_MAX", vehicle.turn_rate_max_dps or no_limit, "°/s", "turns"),
+        ("ATC_STR_ACC_MAX", vehicle.turn_accel_max_dps2 or no_limit, "°/s²", "turns"),
+        ("ATC_ACCEL_MAX", vehicle.accel_max_mps2, "m/s²", "corners"),
+        ("WP_JERK", vehicle.jerk_mps3, "m/s³", "corners"),
+        ("PSC_POS_P", vehicle.position_gain_per_s, "/s", "straying"),
+    )
+    for name, value, unit, what in told:
+        row = PARAMETERS[name]
+        measured = row.measured if is_steered else row.measured_skid
+        is_too_slow = name == "WP_SPEED" and is_steered and value < SLOW_MPS  # has a sentence of its own
+        if measured and value not in measured and not is_too_slow:
+            yield f"{what} of {vehicle.steering} steering were measured with {name} {measured} {unit}, not {value:g} {unit}"
+
+
+def _beyond_margin(vehicle: Vehicle) -> Iterator[str]:
+    if not vehicle.avoids_fence:
+        return
+    margin_m, name, measured = (
+        vehicle.stops_within_m,
+        vehicle.fence.margin_name,
+        PARAMETERS["FENCE_MARGIN"].measured,
+    )
+    if margin_m < LEAST_MARGIN_M:
+        yield (
+            f"{name} {margin_m:g} m does not switch avoidance off: the vehicle brakes before the fence just the "
+            "same, and measured rovers came to rest as far as 0.04 m past it, a breach; what is promised was not measured there. "
+            f"Set {name} {LEAST_MARGIN_M:g} or more, or AVOID_ENABLE {vehicle.avoid_bits & ~1} (without bit 0)"
+        )
+    elif measured and margin_m not in measured:
+        yield f"avoidance was measured with {name} {measured} m, not {margin_m:g} m"

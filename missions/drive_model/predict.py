@@ -16,7 +16,7 @@ from missions.drive_model.from_points import SAME_PLACE_M, drive_plan
 from missions.drive_model.legs_and_corners import Stray
 from missions.drive_model.summary import arrivals_s, told_corner, told_leg
 from missions.errors import InvalidPositionError, VehicleError
-from missions.vehicle.reader import LEAST_MPS
+from missions.vehicle.parameters import LEAST_MPS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

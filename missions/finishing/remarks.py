@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from missions.drive_model import beyond_measured
 from missions.geo import distance_m
 from missions.ground.legs import ROUNDING_RESERVE_M
+from missions.vehicle.parameter_remarks import assumed_remarks
 from missions.words import metres
 
 if TYPE_CHECKING:
@@ -16,23 +16,6 @@ if TYPE_CHECKING:
     from missions.promise import Promise
     from missions.routing.route_search import DrivenRoute
     from missions.vehicle import Vehicle
-
-
-_DRIVEN_BY = frozenset(
-    {
-        "WP_SPEED",
-        "WP_RADIUS",
-        "TURN_RADIUS",
-        "ATC_TURN_MAX_G",
-        "ATC_ACCEL_MAX",
-        "WP_PIVOT_ANGLE",
-        "SERVO1_FUNCTION",
-        "NAV_ACC_RAD",
-        "RO_SPEED_LIM",
-        "CA_AIRFRAME",
-    }
-)
-"""Parameters whose defaults a driver should see when they stand in for the vehicle's own."""
 
 
 def lead_away_remarks(found: DrivenRoute, least_m: float) -> list[str]:
@@ -66,7 +49,6 @@ def moved_target_remarks(targets: Sequence[LatLon], reached: Sequence[LatLon]) -
 
 def drive_remarks(
     vehicle: Vehicle,
-    slowest_mps: float | None,
     heading_deg: float | None,
     asked: Promise,
     driven_m: float,
@@ -75,12 +57,10 @@ def drive_remarks(
     """Return what the drive model's word rests on."""
     if asked.allowance_m == 0:
         return []
-    warnings = list(beyond_measured(vehicle, slowest_mps))
+    warnings = []
     if heading_deg is None:
         warnings.append("heading unknown; assuming the rover faces along the first leg")
-    assumed = [f"{one.parameter} {one.value:g}" for one in vehicle.assumed if one.parameter in _DRIVEN_BY]
-    if assumed:
-        warnings.append(f"parameters unknown; assuming {', '.join(assumed)}")
+    warnings += assumed_remarks(vehicle)
     # Half a centimetre is not worth a warning; chosen, not measured.
     if asked.allowance_m and driven_m < asked.promised_m - 0.005 and not found.lead_away:
         warnings.append(

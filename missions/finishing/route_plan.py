@@ -74,10 +74,9 @@ def plan_route(
     driven_m = max(0.0, band.clearance_m(ground.edge))
     items, seqs = mission_items(lines, vehicle.speed_mps, request.speed_mps)
     reached = tuple(rounded(ground.frame.to_lat_lon(target)) for target in found.targets)
-    slowest_mps = min(filter(None, lines.speeds), default=None)
     warnings += lead_away_remarks(found, asked.drawn_m)
     warnings += moved_target_remarks(targets, reached)
-    warnings += drive_remarks(vehicle, slowest_mps, heading_deg, asked, driven_m, found)
+    warnings += drive_remarks(vehicle, heading_deg, asked, driven_m, found)
     return Plan(
         items=items,
         path=lines.path,

@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 from missions.errors import MissionFormatError
+from missions.firmware import firmware_from_remark
 from missions.formats.bounds import lines_of
 from missions.formats.numbers import number as number_of
 from missions.formats.texts import read_text
@@ -47,7 +48,7 @@ def read_path(path: Path) -> Situation:
 
 
 def read(text: str, source: str) -> Situation:
-    """Read a file's text.
+    """Read a file's text: parameters, and the firmware's version where a remark names it ("# Version: 4.5.7" of QGroundControl).
 
     Raises
     ------
@@ -55,8 +56,9 @@ def read(text: str, source: str) -> Situation:
         With the line and what was expected there.
     """
     parameters = {}
-    remarks = []
+    remarks, firmware = [], None
     for number, line in enumerate(lines_of(text, source), start=1):
+        firmware = firmware or firmware_from_remark(line)
         content = line.partition("#")[0].strip()
         if not content or _NOT_A_PARAMETER in _COLUMNS.split(content)[:3]:
             continue
@@ -67,13 +69,14 @@ def read(text: str, source: str) -> Situation:
             )
         else:
             parameters[name] = value
-    return Situation(parameters=parameters, remarks=tuple(remarks))
+    return Situation(parameters=parameters, firmware=firmware, remarks=tuple(remarks))
 
 
 def write(situation: Situation) -> str:
     """Return the text of a file with the situation's parameters by name, as exact as the 32-bit floats of MAVLink."""
     rows = [f"{name:<16} {value:.9g}\n" for name, value in sorted(situation.parameters.items())]
-    return "".join(rows)
+    remark = f"# Version: {situation.firmware}\n" if situation.firmware else ""
+    return remark + "".join(rows)
 
 
 def is_parameter_name(text: str) -> bool:

@@ -145,7 +145,8 @@ class Scene:
             else ""
         )
         promised = "" if plan.clearance_m is None else f", {plan.clearance_m:g} m promised while driving"
-        return f"{plan.length_m:.1f} m, about {plan.duration_s:.0f} s{drawn}{promised}"
+        extrapolated = ", extrapolated" if plan.extrapolated else ""
+        return f"{plan.length_m:.1f} m, about {plan.duration_s:.0f} s{drawn}{promised}{extrapolated}"
 
     def scale_m(self, share: float = 0.2) -> int:
         """Return a round length of at most a share of the picture's width."""

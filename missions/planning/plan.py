@@ -10,6 +10,7 @@ from missions.editing.repair import repaired_plan
 from missions.editing.shorten import shortened
 from missions.errors import PlanStoppedError
 from missions.finishing.route_plan import plan_route
+from missions.planning.marking import marked
 from missions.request import RepairMission, Tour
 from missions.situation import Mission
 from missions.tour.tour import plan_tour
@@ -55,12 +56,12 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
     """
     should_stop = PlanStoppedError.when(should_stop)
     if isinstance(request, RepairMission):
-        return repaired_plan(situation, request, should_stop=should_stop)
+        return marked(repaired_plan(situation, request, should_stop=should_stop), request)
     if isinstance(request, Tour):
         planned = plan_tour(situation, request, should_stop=should_stop)
     else:
         planned = plan_route(situation, request, should_stop=should_stop)
-    return _with_room(planned, situation, request, should_stop)
+    return marked(_with_room(planned, situation, request, should_stop), request)
 
 
 def _with_room(

@@ -5,8 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import TYPE_CHECKING
 
 from missions.errors import VehicleError
+
+if TYPE_CHECKING:
+    from missions.firmware import Firmware
 
 MAV_TYPE_GROUND_ROVER = 10  # MAV_TYPE of MAVLink's common.xml
 MAV_TYPE_SURFACE_BOAT = 11  # the same
@@ -103,6 +107,8 @@ class Vehicle:
         WP_PIVOT_RATE.
     turn_rate_max_dps : float or None
         ATC_STR_RAT_MAX, 0 for no limit; None where it is not known.
+    turn_accel_max_dps2 : float or None
+        The least of ATC_STR_ACC_MAX and ATC_STR_DEC_MAX that is a limit; None where none is known.
     steering : Steering
         From SERVOn_FUNCTION: throttle left and right (73, 74) is skid steer.
     avoid_bits : int
@@ -111,12 +117,16 @@ class Vehicle:
         OA_TYPE: 0 none, 1 BendyRuler, 2 Dijkstra, 3 both.
     backs_away : bool
         AVOID_BACKUP_SPD above 0: inside the margin its avoidance drives it backwards.
+    boat_drift_m : float or None
+        LOIT_RADIUS of a boat (FRAME_CLASS 2, or MAV_TYPE_SURFACE_BOAT), which drifts so far where it stops; None on wheels.
     assumed : tuple of Assumed
         What was not known, with the value taken.
     mav_type : int or None
         MAV_TYPE of its heartbeat, where one was heard.
-    firmware : tuple of int or None
-        The autopilot's version, major, minor and patch, where it was reported.
+    firmware : Firmware or None
+        The autopilot's version, where it is known.
+    has_measured_corners : bool or None
+        Whether its firmware blends corners as ArduPilot does since 4.6; None where that is not known.
     """
 
     waypoint_radius_m: float = 2.0
@@ -136,8 +146,11 @@ class Vehicle:
     backs_away: bool = True
     assumed: tuple[Assumed, ...] = ()
     mav_type: int | None = None
-    firmware: tuple[int, int, int] | None = None
+    firmware: Firmware | None = None
     turn_rate_max_dps: float | None = None
+    turn_accel_max_dps2: float | None = None
+    boat_drift_m: float | None = None
+    has_measured_corners: bool | None = True
 
     @property
     def is_rover(self) -> bool:

@@ -1,15 +1,18 @@
-"""Remarks on parameters with impossible values."""
+"""Remarks on parameters: impossible values, and defaults that stand in for values that are not known."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from missions.vehicle.item_limit import storage_remarks
+from missions.vehicle.model import Autopilot, Steering
+from missions.vehicle.parameters import row_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from missions.situation import Situation
+    from missions.vehicle import Vehicle
 
 _MOST_NAMED = 5  # chosen: remarks that fit a screen; the rest is counted
 
@@ -31,3 +34,23 @@ def no_number_remarks(no_numbers: Mapping[str, str], parameters: Mapping[str, fl
     ]
     more = len(remarks) - _MOST_NAMED
     return [*remarks[:_MOST_NAMED], f"and {more} more parameters"] if more > 0 else remarks
+
+
+def assumed_remarks(vehicle: Vehicle) -> list[str]:
+    """Return remarks on defaults that stand in for the vehicle's own parameters, and decide how it drives."""
+    assumed = [
+        f"{one.parameter} {one.value:g}"
+        for one in vehicle.assumed
+        if one.parameter == "firmware" or row_of(one.parameter).is_told
+    ]
+    remarks = [f"parameters unknown; assuming {', '.join(assumed)}"] if assumed else []
+    if (
+        vehicle.steering is Steering.SKID
+        and vehicle.autopilot is Autopilot.ARDUPILOT
+        and vehicle.pivot_angle_deg == 0
+        and any(one.parameter == "WP_PIVOT_ANGLE" for one in vehicle.assumed)
+    ):
+        remarks.append(
+            "WP_PIVOT_ANGLE unknown: taken as 0, which needs more room (no turning on the spot; the default from ArduPilot 4.7 on, 60 before)"
+        )
+    return remarks

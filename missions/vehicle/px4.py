@@ -13,41 +13,37 @@ if TYPE_CHECKING:
     from missions.vehicle.reader import ParameterReader
 
 
-def px4_vehicle(
-    read: ParameterReader, mav_type: int | None, firmware: tuple[int, int, int] | None
-) -> Vehicle:
+def px4_vehicle(read: ParameterReader, mav_type: int | None) -> Vehicle:
     """Return the vehicle of PX4's rover parameters; -1 is no limit."""
     steering = _steering(read)
-    nav_acceptance_m = read.value("NAV_ACC_RAD", 10.0)
+    nav_acceptance_m = read.value("NAV_ACC_RAD")
     skid = steering is Steering.SKID
     accel_max_mps2 = _limit(
         read, ("RO_ACCEL_LIM", "RO_DECEL_LIM", "RD_MAX_ACCEL" if skid else "RA_MAX_ACCEL")
     )
     jerk_mps3 = _limit(read, ("RO_JERK_LIM", "RD_MAX_JERK" if skid else "RA_MAX_JERK"))
-    action = read.bits("GF_ACTION", 2)
+    action = read.bits("GF_ACTION")
     return Vehicle(
-        waypoint_radius_m=nav_acceptance_m
-        if skid
-        else max(nav_acceptance_m, read.value("RA_ACC_RAD_MAX", 3.0, least=-1.0)),
+        waypoint_radius_m=nav_acceptance_m if skid else max(nav_acceptance_m, read.value("RA_ACC_RAD_MAX")),
         speed_mps=_speed_mps(read, skid=skid),
         turn_radius_m=0.0 if skid else _turn_radius_m(read),
         accel_max_mps2=accel_max_mps2,
         jerk_mps3=jerk_mps3,
-        pivot_angle_deg=math.degrees(read.value("RD_TRANS_DRV_TRN", math.radians(10.0))) if skid else 0.0,
+        pivot_angle_deg=math.degrees(read.value("RD_TRANS_DRV_TRN")) if skid else 0.0,
         pivot_rate_dps=read.known("RO_YAW_RATE_LIM") or 90.0,
         steering=steering,
         autopilot=Autopilot.PX4,
         fence=FenceParameters(
             enabled=action > 0,
             margin_m=0.0,
-            radius_m=read.value("GF_MAX_HOR_DIST", 0.0),
+            radius_m=read.value("GF_MAX_HOR_DIST"),
             action=action,
         ),
         avoid_bits=0,
         backs_away=False,
         assumed=tuple(read.assumed),
         mav_type=mav_type,
-        firmware=firmware,
+        firmware=read.firmware,
     )
 
 
@@ -79,8 +75,8 @@ def _speed_mps(read: ParameterReader, *, skid: bool) -> float:
 
 
 def _turn_radius_m(read: ParameterReader) -> float:
-    wheel_base_m = read.value("RA_WHEEL_BASE", 0.5)
-    steering_angle_rad = read.value("RA_MAX_STR_ANG", 0.5236)
+    wheel_base_m = read.value("RA_WHEEL_BASE")
+    steering_angle_rad = read.value("RA_MAX_STR_ANG")
     if not 0 < steering_angle_rad < math.pi / 2:
         raise VehicleError(
             f"RA_MAX_STR_ANG is {steering_angle_rad:g} rad; it must lie between 0 and 1.57",

@@ -15,6 +15,7 @@ from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.messages import Frame, Message
 from missions.errors import FenceMissingError
 from missions.fence import CircleZone, Fence, ZoneKind, fence_to_items
+from missions.firmware import Firmware
 from missions.geo import LatLon
 from missions.items import MissionItem, waypoint, with_home
 from missions.planning.plan import plan
@@ -611,16 +612,16 @@ class TestFirmware:
     @pytest.mark.parametrize(
         ("message", "firmware"),
         [
-            (m.AutopilotVersion(0, 0x040507FF), (4, 5, 7)),
-            (m.AutopilotVersion(0, 0x04070000), (4, 7, 0)),
+            (m.AutopilotVersion(0, 0x040507FF), Firmware(4, 5, 7)),
+            (m.AutopilotVersion(0, 0x04070000), Firmware(4, 7, 0, 0)),
             (m.AutopilotVersion(0, 0), None),
-            (m.Statustext(6, "ArduRover V4.5.7 (0358a9c2)"), (4, 5, 7)),
-            (m.Statustext(6, "ArduRover V4.7.0-dev (ee3f6ed6)"), (4, 7, 0)),
-            (m.Statustext(6, "ArduRover V4.6 beta"), (4, 6, 0)),
+            (m.Statustext(6, "ArduRover V4.5.7 (0358a9c2)"), Firmware(4, 5, 7)),
+            (m.Statustext(6, "ArduRover V4.7.0-dev (ee3f6ed6)"), Firmware(4, 7, 0, 0)),
+            (m.Statustext(6, "ArduRover V4.6 beta"), Firmware(4, 6, 0, 128)),
             (m.Statustext(6, "I like ArduRover V4.5.7"), None),
             (m.Statustext(6, "ArduRover V"), None),
         ],
     )
-    def test_it_is_read(self, message: m.Message, firmware: tuple[int, int, int] | None) -> None:
+    def test_it_is_read(self, message: m.Message, firmware: Firmware | None) -> None:
         assert after(NEW, (ROVER, message)).firmware == firmware
         assert after(NEW, (STATION, message)).firmware is None

@@ -125,13 +125,14 @@ def test_the_common_constructor_makes_the_kind_that_its_words_ask_for():
     )
     assert Request(via=MISSION, snap_m=1.0) == RepairMission(mission=MISSION, snap_m=1.0)
     assert Request(via_own=True, order="given", targets=()) == RepairMission()
+    assert Request(via_own=True, trusts_model=True) == RepairMission(trusts_model=True)
     assert all(isinstance(one, Request) for one in (GoTo(), Tour(), RepairMission()))
     with pytest.raises(TypeError, match="clearance_m"):
         Request(HOME, (), 2.0, clearance_m=1.0)
     with pytest.raises(TypeError, match="no_such_word"):
         Request(no_such_word=1)
-    with pytest.raises(TypeError, match="18 were given"):
-        Request(*[None] * 18)
+    with pytest.raises(TypeError, match="19 were given"):
+        Request(*[None] * 19)
 
 
 FAR = place(100, 60)

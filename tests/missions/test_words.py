@@ -10,6 +10,7 @@ import pytest
 from missions.checking.recheck import straight_line
 from missions.errors import FenceError, MissionError
 from missions.fence import fence_from_items
+from missions.firmware import Firmware
 from missions.formats import read_fence
 from missions.geo import LatLon
 from missions.items import Command, MissionItem
@@ -34,7 +35,10 @@ def test_metres(value_m, text):
 def test_a_margin_beyond_all_measure_is_refused_shortly(margin_m):
     parameters = {"FENCE_ENABLE": 1.0, "AVOID_ENABLE": 3.0, "FENCE_MARGIN": margin_m}
     situation = Situation(
-        fence=Known(FENCE, 0.0, "test"), pose=Known(Pose(HOME), 0.0, "test"), parameters=parameters
+        fence=Known(FENCE, 0.0, "test"),
+        pose=Known(Pose(HOME), 0.0, "test"),
+        parameters=parameters,
+        firmware=Firmware(4, 6),
     )
     with pytest.raises(MissionError, match=r"FENCE_MARGIN is \S+; possible are 0 to 1000") as refusal:
         plan(situation, Request(targets=(FAR,)))

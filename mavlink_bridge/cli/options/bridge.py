@@ -11,10 +11,12 @@ import typer
 from mavlink_bridge.cli.options.shared import (
     AnyVehicleOption,
     CommonOptions,
+    FirmwareOption,
     RequiredConnectOption,
     SigningKeyOption,
     SystemOption,
     TimeoutOption,
+    TrustOption,
 )
 from mavlink_bridge.cli.values import MOST_M, within
 
@@ -62,6 +64,8 @@ class BridgeOptions(CommonOptions):
     vehicle: Annotated[
         Path | None, typer.Option(metavar="FILE.parm", help="Parameters that the vehicle does not report.")
     ] = None
+    firmware: FirmwareOption = None
+    trust_model: TrustOption = False
     upload: Annotated[bool, typer.Option("--upload", help="Write missions to the vehicle.")] = False
     drive: Annotated[
         bool,

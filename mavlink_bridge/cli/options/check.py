@@ -12,6 +12,7 @@ from mavlink_bridge.cli.options.shared import (
     OUTPUT_PANEL,
     VEHICLE_PANEL,
     ConnectOption,
+    FirmwareOption,
     GpsOption,
     HomeOption,
     IgnorePointsOption,
@@ -81,6 +82,7 @@ class CheckOptions(LinkOptions):
     role: RoleOption = field(default_factory=list)
     outermost: OutermostOption = None
     ignore_points: IgnorePointsOption = False
+    firmware: FirmwareOption = None
     reserve: ReserveOption = 0.0
     position_error: PositionErrorOption = None
     length: LengthOption = 0.0

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from mavlink_bridge.cli.options.shared import CommonOptions
+from mavlink_bridge.cli.options.shared import CommonOptions, FirmwareOption
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,8 +22,14 @@ class DoctorOptions(CommonOptions):
     `pbpp doctor`
 
     `pbpp doctor --signing-key rover.key --json`
+
+    `pbpp doctor --vehicle rover.parm --firmware 4.6`
     """
 
     signing_key: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Check this signing key and its permissions.")
     ] = None
+    vehicle: Annotated[
+        Path | None, typer.Option(metavar="FILE.parm", help="Check this vehicle's parameters too.")
+    ] = None
+    firmware: FirmwareOption = None

@@ -12,6 +12,7 @@ from mavlink_bridge.cli.options.shared import (
     OUTPUT_PANEL,
     VEHICLE_PANEL,
     ConnectOption,
+    FirmwareOption,
     GpsOption,
     HomeOption,
     IgnorePointsOption,
@@ -21,6 +22,7 @@ from mavlink_bridge.cli.options.shared import (
     PositionErrorOption,
     ReserveOption,
     RoleOption,
+    TrustOption,
     WidthOption,
 )
 from mavlink_bridge.cli.values import LEAST_MPS, MOST_M, MOST_MPS, within
@@ -93,6 +95,8 @@ class PlanOptions(LinkOptions):
             rich_help_panel=VEHICLE_PANEL,
         ),
     ] = None
+    firmware: FirmwareOption = None
+    trust_model: TrustOption = False
     reserve: ReserveOption = 0.0
     position_error: PositionErrorOption = None
     length: LengthOption = 0.0

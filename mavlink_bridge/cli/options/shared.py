@@ -10,6 +10,8 @@ import typer
 
 from mavlink_bridge.cli.options_file import take_options
 from mavlink_bridge.cli.values import MOST_M, MOST_S, MOST_VEHICLE_M, within
+from missions.errors import VehicleError
+from missions.firmware import Firmware, read_firmware
 
 LINK_PANEL, OUTPUT_PANEL, VEHICLE_PANEL = "Link", "Output", "Vehicle"
 _MAP_PANEL = "Map files: what each zone is"
@@ -132,6 +134,32 @@ IgnorePointsOption = Annotated[
     bool,
     typer.Option(
         "--ignore-points", help="Ignore points whose role the file does not say.", rich_help_panel=_MAP_PANEL
+    ),
+]
+
+
+def _firmware(text: str) -> Firmware:
+    try:
+        return read_firmware(text)
+    except VehicleError as error:
+        raise typer.BadParameter(str(error)) from None
+
+
+FirmwareOption = Annotated[
+    Firmware | None,
+    typer.Option(
+        metavar="VERSION",
+        parser=_firmware,
+        help="Firmware version (4.5, 4.6.3), if the source does not report it.",
+        rich_help_panel=VEHICLE_PANEL,
+    ),
+]
+TrustOption = Annotated[
+    bool,
+    typer.Option(
+        "--trust-model",
+        help="Promise a clearance even outside the measured range.",
+        rich_help_panel=VEHICLE_PANEL,
     ),
 ]
 

@@ -464,3 +464,13 @@ def test_a_slow_mission_and_old_firmware_are_said(tmp_path, yard):
         "not measured for steered rovers below 1 m/s, and this one drives 0.5 m/s" in one for one in warnings
     )
     assert any("FENCE_MARGIN 0 m does not switch avoidance off" in one for one in warnings)
+
+
+def test_the_firmware_is_taken_from_the_option_else_from_the_file(tmp_path, yard):
+    vehicle = tmp_path / "rover.parm"
+    vehicle.write_text("# Version: 4.5.7\nWP_SPEED 2\nFENCE_NTF_FREQ 1\n", encoding="utf-8")
+    assert check_yard(yard, "--vehicle", str(vehicle))["extrapolated"] == []
+    vehicle.write_text("# Version: 4.5.7\nWP_SPEED 2\n", encoding="utf-8")
+    (old,) = check_yard(yard, "--vehicle", str(vehicle))["extrapolated"]
+    assert "not measured for ArduPilot 4.5.7" in old
+    assert check_yard(yard, "--vehicle", str(vehicle), "--firmware", "4.6")["extrapolated"] == []

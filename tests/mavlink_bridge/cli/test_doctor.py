@@ -53,6 +53,23 @@ def write_options(text: str) -> Path:
     return path
 
 
+class TestVehicle:
+    def test_what_of_a_vehicle_was_not_measured(self, tmp_path):
+        vehicle = tmp_path / "rover.parm"
+        vehicle.write_text("WP_SPEED 8\n", encoding="utf-8")
+        result = run("doctor", "--vehicle", vehicle, "--firmware", "4.6.3")
+        assert "vehicle: ArduPilot 4.6.3, ackermann steering" in result.stdout
+        assert "WP_SPEED 1 to 5 m/s, not 8 m/s" in result.stdout
+        assert "parameters unknown; assuming" in result.stdout
+        assert "of an unknown version (--firmware)" in run("doctor", "--vehicle", vehicle).stdout
+
+    def test_a_vehicle_that_is_none_is_wrong(self, tmp_path):
+        vehicle = tmp_path / "rover.parm"
+        vehicle.write_text("WP_SPEED -8\n", encoding="utf-8")
+        assert findings("--vehicle", vehicle)["vehicle"]["found"].startswith("WP_SPEED is -8")
+        assert findings("--vehicle", tmp_path / "none.parm")["vehicle"]["verdict"] == "wrong"
+
+
 class TestDoctor:
     def test_a_sound_installation(self, monkeypatch):
         monkeypatch.setattr("serial.tools.list_ports.comports", list)

@@ -287,7 +287,7 @@ class TestFiles:
 
     def test_parameters_from_a_file(self, fields: Path, tmp_path: Path) -> None:
         parameters = tmp_path / "rover.parm"
-        parameters.write_text("FENCE_MARGIN 0.5\nWP_RADIUS 0.7\n")
+        parameters.write_text("# Version: 4.6.3\nFENCE_MARGIN 0.5\nWP_RADIUS 0.7\n")
         source = ("--fence", fields / "yard-fence.waypoints", "--start", START, "--target", TARGET)
         found = document(*source, "--vehicle", parameters)
         assert found["clearance_m"] == 1.0
@@ -295,6 +295,19 @@ class TestFiles:
         assert not any(
             "not known" in warning for warning in found["warnings"] if "FENCE_ENABLE" not in warning
         )
+
+    def test_an_extrapolated_plan_promises_nothing(self, fields: Path, tmp_path: Path) -> None:
+        parameters = tmp_path / "rover.parm"
+        parameters.write_text("WP_SPEED 2\nOA_TYPE 2\n")
+        source = ("--fence", fields / "yard-fence.waypoints", "--start", START, "--target", TARGET)
+        asked = (*source, "--vehicle", parameters, "--firmware", "4.6")
+        found = document(*asked)
+        assert found["clearance_m"] is None
+        assert [text.split(":")[0] for text in found["extrapolated"]] == ["OA_TYPE 2"]
+        trusted = document(*asked, "--trust-model")
+        assert (trusted["clearance_m"], trusted["extrapolated"]) == (2.5, found["extrapolated"])
+        said = run(*asked).stdout
+        assert "nothing promised for the driven track, extrapolated beyond what was measured" in said
 
     def test_several_targets_and_snapping(self, fields: Path, drawn: tuple) -> None:
         source = ("--fence", fields / "yard-fence.waypoints", "--start", START, "--clearance", 1, *drawn)

@@ -15,11 +15,12 @@ from mavlink_bridge.cli.recording import open_recording
 from mavlink_bridge.director import Orders
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.replay.journal import read_journal
+from missions.situation import Situation
 
 
 def record(log, words: bytes = b""):
     with contextlib.ExitStack() as stack:
-        part, _, _ = open_recording(stack, log, Orders(), {})
+        part, _, _ = open_recording(stack, log, Orders(), Situation())
         part.write_bytes(words)
         return part
 
@@ -74,7 +75,7 @@ def test_runs_that_begin_at_once_get_files_of_their_own(tmp_path):
 
 def test_a_folder_that_is_not_there_is_unusable(tmp_path):
     with pytest.raises(LogError, match=r"no/run\.tlog: No such file"), contextlib.ExitStack() as stack:
-        open_recording(stack, tmp_path / "no" / "run.tlog", Orders(), {})
+        open_recording(stack, tmp_path / "no" / "run.tlog", Orders(), Situation())
 
 
 def test_the_bridge_starts_again_with_the_same_name_and_says_where(tmp_path):

@@ -22,6 +22,7 @@ from mavlink_bridge.replay.journal import Call, JournalWriter
 from mavlink_bridge.simulator import Simulator
 from mavlink_bridge.tlog import TlogReader, TlogWriter
 from missions.geo import LatLon, distance_m
+from missions.situation import Situation
 
 FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 FRAME = Codec(1, 1).encode(Heartbeat(10, 3))
@@ -62,7 +63,7 @@ class FullDisk:
 @pytest.fixture
 def writers(tmp_path):
     with TlogWriter(tmp_path / "run.tlog") as recorder, (tmp_path / "run.jsonl").open("w") as file:
-        yield recorder, JournalWriter(file, Orders(), {})
+        yield recorder, JournalWriter(file, Orders(), Situation())
 
 
 @pytest.mark.parametrize("taken", [None, 0, 10])

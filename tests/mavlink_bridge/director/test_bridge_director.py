@@ -112,6 +112,25 @@ def test_a_click_becomes_a_verified_mission_and_a_drive():
     ]  # fmt: skip
 
 
+@pytest.mark.parametrize("trusts", [False, True])
+def test_a_plan_outside_what_was_measured_says_so_and_promises_nothing(trusts):
+    config = SimulatorConfig(
+        home=HOME, fence=fence_to_items(FENCE), parameters={"OA_TYPE": 2.0, "WP_SPEED": 3.0}
+    )
+    asked = Request(clearance_m=2.5, trusts_model=trusts)
+    run = ready(conductor(vehicle=SimulatedVehicle(config), request=asked, upload=False, drive=False))
+    run.ground_station(reposition(FAR))
+    run.run_until(run.happened(EventName.PLANNED), 20)
+    event = run.last(EventName.PLANNED)
+    assert event.data["clearance_m"] == (2.5 if trusts else None)
+    assert [text.split(":")[0] for text in event.data["extrapolated"]] == ["OA_TYPE 2"]
+    assert "extrapolated beyond what was measured" in event.text
+    usual = ready(conductor(upload=False, drive=False))
+    usual.ground_station(reposition(FAR))
+    usual.run_until(usual.happened(EventName.PLANNED), 20)
+    assert usual.last(EventName.PLANNED).data["extrapolated"] == []
+
+
 def test_without_orders_to_drive_it_changes_no_mode_and_warns_of_an_unsafe_straight_line():
     run = ready(conductor(drive=False))
     arm(run)

@@ -207,6 +207,12 @@ def test_breaches_are_told_once_a_second_and_all_are_counted():
     assert breaches == [1, 5, 9]
 
 
+def test_texts_about_the_margin_are_no_breach():
+    run = ready(conductor(upload=False, drive=False))
+    told(run, text("Polygon fence in 1.5m"), text("Polygon fence cleared margin breach"))
+    assert not run.happened(EventName.BREACH)()
+
+
 def test_a_breach_of_a_fence_that_is_not_known_names_none_as_broken():
     run = ready(conductor(upload=False, drive=False))
     told(run, BREACHED)

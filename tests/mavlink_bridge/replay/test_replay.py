@@ -15,8 +15,10 @@ from mavlink_bridge.replay.expectations import differences, read_expectation
 from mavlink_bridge.replay.journal import Call, JournalWriter, journal_path, read_journal
 from mavlink_bridge.replay.replay import replay_foreign
 from mavlink_bridge.tlog import TlogReader
+from missions.firmware import Firmware
 from missions.geo import LatLon
 from missions.request import End, GoTo, Order, RepairMission, Request, Tour
+from missions.situation import Situation
 from missions.vehicle import Footprint
 
 FOLDER = Path(__file__).parents[3] / "sitl_logs"
@@ -105,16 +107,17 @@ CALLS = (Call(0, 10.0, "start"), Call(3, 11.5, "timer"), Call(9, 12.25, "target"
 
 def test_a_journal_reads_back_as_written(tmp_path):
     path = journal_path(tmp_path / "run.tlog")
+    known = Situation(parameters={"WP_RADIUS": 2.0}, firmware=Firmware(4, 7, 0, 0))
     with path.open("w") as file:
-        writer = JournalWriter(file, ORDERS, {"WP_RADIUS": 2.0})
+        writer = JournalWriter(file, ORDERS, known)
         for call in CALLS:
             writer.call(call)
     journal = read_journal(path)
     assert asdict(journal.orders) == asdict(ORDERS)
     assert journal.calls == CALLS
-    assert journal.parameters == {"WP_RADIUS": 2.0}
+    assert journal.described == known
     with path.open("w") as file:
-        JournalWriter(file, replace(ORDERS, identity=None, request=Request()), {})
+        JournalWriter(file, replace(ORDERS, identity=None, request=Request()), Situation())
     assert read_journal(path).orders.identity is None
 
 
@@ -126,10 +129,11 @@ def test_a_journal_keeps_what_a_tour_asks_for_and_refuses_what_makes_no_sense(tm
         comes_back=True,
         end=End.LOITER,
         method="pbpp",
+        trusts_model=True,
     )
     for asked in (tour, GoTo(), RepairMission(footprint=Footprint(1.0, 0.5))):
         with path.open("w") as file:
-            JournalWriter(file, replace(ORDERS, request=asked), {})
+            JournalWriter(file, replace(ORDERS, request=asked), Situation())
         assert read_journal(path).orders.request.words() == asked.words()
     path.write_text(path.read_text().replace('"snap_m": 0.0', '"snap_m": -1.0'))
     with pytest.raises(LogError, match=r"snap_m -1\.0: expected a finite number of at least 0"):
@@ -159,7 +163,7 @@ def test_what_is_no_journal_is_one_clear_error(tmp_path, text):
 def test_a_damaged_line_is_named(tmp_path):
     path = tmp_path / "run.journal.jsonl"
     with path.open("w") as file:
-        JournalWriter(file, ORDERS, {}).call(CALLS[0])
+        JournalWriter(file, ORDERS, Situation()).call(CALLS[0])
         file.write(json.dumps({"frames": 1}) + "\n")
     with pytest.raises(LogError, match="line 3"):
         read_journal(path)

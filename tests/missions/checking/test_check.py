@@ -17,6 +17,7 @@ from strategies import GEOD, offset
 from missions.checking.check import MissionCheck, check_mission, plan_of
 from missions.errors import FenceMissingError, SituationError
 from missions.fence import CircleZone, Fence, PolygonZone, Zone, ZoneKind
+from missions.firmware import Firmware
 from missions.formats import read_fence, read_mission
 from missions.geo import LatLon, rounded
 from missions.items import CoordinateFrame, MissionItem, waypoint
@@ -57,7 +58,7 @@ BARN = box(OUT, 40, 20, 60, 40)
 
 
 def situation_of(*zones: Zone, **parameters: float) -> Situation:
-    return Situation(fence=Known(Fence(zones), None, "test"), parameters=parameters)
+    return Situation(fence=Known(Fence(zones), None, "test"), parameters=parameters, firmware=Firmware(4, 6))
 
 
 def mission_of(*items: MissionItem | tuple[float, float], home: LatLon | None = HOME) -> Mission:
@@ -378,3 +379,34 @@ def test_the_points_of_a_path_are_found_by_items_also_where_they_are_driven_to_t
     assert (planned.path_index(2), planned.path_index(2, 4)) == (2, 5)
     assert planned.path_index(3, 6) == 2  # set back by somebody
     assert planned.path_index(9) == 6
+
+
+def test_a_boat_drifts_about_the_places_where_it_stops() -> None:
+    wait = replace(waypoint(place(20, 0)), params=(60.0, 0.0, 0.0, 0.0))
+    rover, boat = (
+        checked(wait, (-30, 0), clearance_m=2.0, FRAME_CLASS=frame, LOIT_RADIUS=30.0) for frame in (1.0, 2.0)
+    )
+    assert rover.holds
+    assert [leg.breaks for leg in boat.legs] == [True, True]
+    assert boat.legs[0].crosses == ("exclusion polygon 1",)
+    assert "a boat (FRAME_CLASS 2) drifts LOIT_RADIUS 30 m about item 1 for 60 s" in boat.warnings
+    assert "the drive model was measured on wheels, not on a boat" in boat.extrapolated
+
+
+def test_what_was_not_measured_is_said_of_a_check() -> None:
+    usual, dijkstra, unknown = (
+        check_mission(mission_of((20, 0), (20, -40)), situation, Request(clearance_m=2.0))
+        for situation in (
+            situation_of(FIELD, BARN),
+            situation_of(FIELD, BARN, OA_TYPE=2.0),
+            replace(situation_of(FIELD, BARN, WP_SPEED=2.0), firmware=None),
+        )
+    )
+    assert usual.extrapolated == ()
+    assert dijkstra.extrapolated == (
+        "OA_TYPE 2: ArduPilot plans its own way around fences and may leave the route; set OA_TYPE 0",
+    )
+    assert len(unknown.extrapolated) == 1
+    assert "firmware unknown" in unknown.extrapolated[0]
+    assert "turns of up to 90°" in unknown.extrapolated[0]
+    assert set(dijkstra.extrapolated) <= set(dijkstra.warnings)

@@ -14,7 +14,8 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from shapely import LineString, Point, Polygon
 
-from missions.drive_model import Corner, Envelope, beyond_measured, corner_forecast, envelope
+from missions.drive_model import Corner, Envelope, beyond_measured, corner_forecast, envelope, extrapolated
+from missions.drive_model.calibrated_range import SAME_TURN_DEG
 from missions.drive_model.corner import blend
 from missions.drive_model.motion import LegProfile, leg_profile
 from missions.errors import InvalidPositionError, VehicleError
@@ -590,6 +591,49 @@ def test_sharp_turns_on_short_legs_are_named() -> None:
     assert bounded(150, 5, TANK)
 
 
+def test_gentle_turns_and_pivots_are_driven_alike_before_4_6() -> None:
+    with (DATA / "corners_before_4_6.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    for row in rows:
+        vehicle = Vehicle(
+            waypoint_radius_m=float(row["wp_radius_m"]),
+            speed_mps=float(row["wp_speed_mps"]),
+            steering=Steering(row["vehicle"]),
+        )
+        corner = corner_forecast(
+            abs(float(row["turn_deg"])),
+            vehicle,
+            leg_before_m=float(row["leg_before_m"]),
+            leg_after_m=float(row["leg_after_m"]),
+        )
+        assert corner.pivots or abs(corner.turn_deg) <= SAME_TURN_DEG
+        assert float(row["inside_cut_m"]) <= corner.inside_cut_m + 0.05
+        assert float(row["outside_overshoot_m"]) <= corner.outside_overshoot_m + 0.05
+    assert len(rows) > 150
+
+
+@pytest.mark.parametrize(
+    ("turn_deg", "changes", "is_told"),
+    [
+        (90.0, {}, True),
+        (25.0, {}, True),
+        (15.0, {}, False),
+        (15.0, {"speed_mps": 4.0}, True),
+        (90.0, {"steering": Steering.SKID}, False),
+        (50.0, {"steering": Steering.SKID}, True),
+        (90.0, {"has_measured_corners": True}, False),
+    ],
+)
+def test_an_unknown_firmware_counts_where_it_decides_how_a_corner_is_driven(
+    turn_deg: float, changes: dict[str, object], is_told: bool
+) -> None:
+    vehicle = replace(SLOW_ROVER, **{"has_measured_corners": None, **changes})
+    band = envelope(polyline([30.0, 30.0], [turn_deg]), vehicle, heading_deg=0.0)
+    told = extrapolated(vehicle, band)
+    assert any("firmware unknown: before 4.6 rovers cut corners" in text for text in told) is is_told
+    assert len(told) == is_told
+
+
 def test_vehicles_of_the_measured_kind() -> None:
     assert beyond_measured(ROVER) == beyond_measured(SLOW_ROVER) == beyond_measured(TANK) == ()
 
@@ -598,13 +642,13 @@ def test_vehicles_of_the_measured_kind() -> None:
     ("changes", "words"),
     [
         ({"autopilot": Autopilot.PX4}, "not on PX4"),
-        ({"mav_type": 11}, "boat"),
-        ({"speed_mps": 8.0}, "up to 5 m/s, not at 8 m/s"),
-        ({"steering": Steering.SKID}, "up to 3 m/s, not at 5 m/s"),
-        ({"turn_radius_m": 3.0}, "scaled to 3 m"),
-        ({"turn_max_g": 0.2}, "not 0.2 g"),
+        ({"boat_drift_m": 2.0}, "boat"),
+        ({"speed_mps": 8.0}, "WP_SPEED 1 to 5 m/s, not 8 m/s"),
+        ({"steering": Steering.SKID}, "WP_SPEED 0.2 to 3 m/s, not 5 m/s"),
+        ({"turn_radius_m": 2.5}, "not 2.5 m"),
+        ({"turn_max_g": 0.1}, "not 0.1 g"),
         ({"accel_max_mps2": 4.0}, "not 4 m/s²"),
-        ({"jerk_mps3": 0.1}, "and 0.1 m/s³"),
+        ({"jerk_mps3": 0.1}, "not 0.1 m/s³"),
         ({"position_gain_per_s": 1.0}, "not 1"),
     ],
 )

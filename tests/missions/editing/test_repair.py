@@ -16,6 +16,7 @@ from missions.checking.execution import follow_mission
 from missions.editing.repair import MOST_TRACKED_JUMPS, Repair, repair_mission, repaired_plan
 from missions.errors import NoRouteError, PlanStoppedError, RouteError, SituationError, TargetBlockedError
 from missions.fence import Fence, Zone
+from missions.firmware import Firmware
 from missions.formats import read_fence, read_mission
 from missions.items import CoordinateFrame, MissionItem, change_speed, waypoint
 from missions.planning.plan import plan
@@ -33,7 +34,7 @@ BARN = box(OUT, 40, 20, 60, 40)
 
 
 def situation_of(*zones: Zone, **parameters: float) -> Situation:
-    return Situation(fence=Known(Fence(zones), None, "test"), parameters=parameters)
+    return Situation(fence=Known(Fence(zones), None, "test"), parameters=parameters, firmware=Firmware(4, 6))
 
 
 def go(east_m: float, north_m: float, *params: float, command: int = 16) -> MissionItem:

@@ -16,6 +16,7 @@ from missions.editing.shorten import shortened
 from missions.editing.shorter_lines import meeting_place, without
 from missions.errors import MissionTooLongError
 from missions.fence import CircleZone, Fence, Zone, ZoneKind
+from missions.firmware import Firmware
 from missions.geo import distance_m
 from missions.items import Command, CoordinateFrame, MissionItem, change_speed, waypoint
 from missions.planning.plan import plan
@@ -27,7 +28,7 @@ MAP = Chart(HOME)
 
 
 def situation_of(*zones: Zone, **parameters: float) -> Situation:
-    return Situation(fence=Known(Fence(zones), None, "test"), parameters=parameters)
+    return Situation(fence=Known(Fence(zones), None, "test"), parameters=parameters, firmware=Firmware(4, 6))
 
 
 def go(east_m: float, north_m: float) -> MissionItem:

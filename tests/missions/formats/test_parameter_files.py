@@ -5,7 +5,9 @@ from typing import TYPE_CHECKING
 import pytest
 
 from missions.errors import MissionFormatError
+from missions.firmware import Firmware
 from missions.formats import read_parameters
+from missions.formats.parameters import read, read_path, write
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -97,15 +99,32 @@ def test_what_no_32_bit_float_holds_is_no_value(tmp_path: Path, value: str) -> N
 
 
 def test_what_no_vehicle_has_is_passed_over_and_said() -> None:
-    from missions.formats import parameters
-
     text = (
         "_HASH_CHECK,123\n1\t1\t_HASH_CHECK\t5\t6\nA_NAME_OF_MORE_THAN_16 1\nWP_SPEED,0x02\nWP_RADIUS -0x1\n"
     )
-    situation = parameters.read(text, "f")
+    situation = read(text, "f")
     assert situation.parameters == {"WP_SPEED": 2.0, "WP_RADIUS": -1.0}
     assert situation.remarks == (
         "f: line 3: A_NAME_OF_MORE_THAN_16 is passed over: a parameter's name has at most 16 letters, and this 22",
     )
     with pytest.raises(MissionFormatError, match="'1,5' has a decimal comma"):
-        parameters.read("WP_SPEED 1,5\n", "f")
+        read("WP_SPEED 1,5\n", "f")
+
+
+@pytest.mark.parametrize(
+    ("remark", "firmware"),
+    [
+        ("# Version: 4.5.7 ", Firmware(4, 5, 7)),
+        ("# Version: 4.7.0 dev", Firmware(4, 7, 0, 0)),
+        ("#NOTE: 12/2/2025 ArduRover V4.6.3 (3fc7011a)", Firmware(4, 6, 3)),
+        ("# Git Revision: 4.5.7", None),
+        ("#NOTE: 12/2/2025 10:00:00 Frame : rover", None),
+    ],
+)
+def test_a_remark_may_name_the_firmware(tmp_path: Path, remark: str, firmware: Firmware | None) -> None:
+    path = tmp_path / "rover.parm"
+    path.write_text(f"# Onboard parameters for Vehicle 1\n{remark}\nWP_SPEED 2\n", encoding="utf-8")
+    found = read_path(path)
+    assert (dict(found.parameters), found.firmware) == ({"WP_SPEED": 2.0}, firmware)
+    path.write_text(write(found), encoding="utf-8")
+    assert read_path(path) == found

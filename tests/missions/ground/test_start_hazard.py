@@ -128,11 +128,12 @@ def test_a_mission_from_there_is_not_repaired() -> None:
         repair_mission(mission, situation_of(FIELD, WALL, **AVOIDING), Request(place(0, 9), clearance_m=2.2))
 
 
-def test_a_margin_of_nothing_is_said_and_a_tenth_of_a_metre_promised() -> None:
+def test_a_margin_of_nothing_is_said_and_nothing_promised() -> None:
     zones = (FIELD, box(OUT, -20, 30, 20, 40))
     situation = situation_of(*zones, **{**AVOIDING, "FENCE_MARGIN": 0.0})
     found = plan(situation, Request(place(0, 0), (place(*TARGET),), 0.0))
-    assert found.clearance_m == 0.1
+    assert found.clearance_m is None
+    assert said(found.extrapolated, "FENCE_MARGIN 0 m does not switch avoidance off")
     assert said(found.warnings, "FENCE_MARGIN 0 m does not switch avoidance off")
     assert said(found.warnings, "Set FENCE_MARGIN 0.1 or more, or AVOID_ENABLE 2 (without bit 0)")
     for changed in ({"FENCE_MARGIN": 0.1}, {"AVOID_ENABLE": 2.0}, {"FENCE_ENABLE": 0.0}):

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from missions.firmware import Firmware
 from missions.formats import read_situation
 from missions.geo import LatLon
 from missions.picture.scene import Scene
@@ -35,7 +36,7 @@ def plans(fields: Path) -> dict[str, Plan]:
     for name, request in REQUESTS.items():
         situation = read_situation(fields / f"{name}-fence.waypoints")
         parameters = {"WP_RADIUS": 2.0, "WP_SPEED": 4.0, "FENCE_OPTIONS": 2.0 if name == "union" else 0.0}
-        made[name] = plan(replace(situation, parameters=parameters), request)
+        made[name] = plan(replace(situation, parameters=parameters, firmware=Firmware(4, 6)), request)
     return made
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -40,6 +41,7 @@ from missions.errors import (
     TargetBlockedError,
 )
 from missions.fence import CircleZone, Fence, PolygonZone, ZoneKind
+from missions.firmware import Firmware
 from missions.formats import read_fence
 from missions.geo import LatLon, rounded
 from missions.items import MissionItem, waypoint
@@ -686,3 +688,30 @@ def test_the_recorded_fields(fields, name: str, ends: list[tuple[float, float]],
         Situation(fence=Known(fence, None, "")), *(LatLon(*end) for end in ends), clearance_m=clearance_m
     )
     assert_keeps(result, clearance_m)
+
+
+def test_outside_what_was_measured_nothing_is_promised_unless_the_model_is_trusted() -> None:
+    situation = situation_of(FIELD, WALL, WP_SPEED=2.0, OA_TYPE=1.0)
+    request = Request(place(-50, 0), (place(50, 0),), 2.0)
+    silent, trusted = (plan(situation, replace(request, trusts_model=trusts)) for trusts in (False, True))
+    assert (silent.clearance_m, trusted.clearance_m) == (None, 2.0)
+    assert silent.driven_clearance_m == trusted.driven_clearance_m >= 2.0
+    for result, words in ((silent, "nothing is promised"), (trusted, "promised all the same")):
+        assert len(result.extrapolated) == 1
+        assert result.extrapolated[0].startswith("OA_TYPE 1: ArduPilot plans its own way")
+        assert result.extrapolated[0] in result.warnings
+        assert words in result.warnings[-1]
+
+
+@pytest.mark.parametrize("parameters", [{}, {"FENCE_NTF_FREQ": 1.0, "WP_SPEED": 2.0}])
+def test_an_unknown_firmware_is_no_matter_where_all_is_assumed_or_a_name_tells(
+    parameters: dict[str, float],
+) -> None:
+    situation = replace(situation_of(FIELD, WALL, **parameters), firmware=None)
+    request = Request(place(-50, 0), (place(50, 0),), 2.0)
+    assert plan(situation, request).clearance_m == 2.0
+    known = replace(situation, parameters={"WP_SPEED": 2.0, "WP_RADIUS": 2.0})
+    found = plan(known, request)
+    assert found.clearance_m is None
+    assert "firmware unknown" in found.extrapolated[0]
+    assert plan(replace(known, firmware=Firmware(4, 6)), request).extrapolated == ()

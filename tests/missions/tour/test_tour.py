@@ -14,6 +14,7 @@ from shapely import LineString, Polygon
 
 from missions.errors import NoRouteError, SituationError, TargetBlockedError
 from missions.fence import Fence, Zone
+from missions.firmware import Firmware
 from missions.items import Command
 from missions.planning.plan import plan
 from missions.request import Request, Tour
@@ -35,6 +36,7 @@ def situation_of(*zones: Zone, home: LatLon | None = HOME, **parameters: float) 
     return Situation(
         fence=Known(Fence(zones), None, "test"),
         parameters=parameters,
+        firmware=Firmware(4, 6),
         home=Known(home, None, "test") if home else None,
     )
 
@@ -207,3 +209,14 @@ def test_fifteen_targets():
     assert sorted(found.indices) == list(range(15))
     assert found.length_m < found.given_m
     assert found.bound_m == pytest.approx(found.length_m)
+
+
+@pytest.mark.parametrize("end", ["hold", "loiter", "rtl"])
+def test_a_tour_outside_what_was_measured_is_planned_for_its_clearance_and_promises_nothing(end):
+    asked = request(place(-30, 0), place(-30, 30), end=end)
+    usual = plan(situation_of(FIELD, WALL), asked)
+    found = plan(situation_of(FIELD, WALL, OA_TYPE=2.0), asked)
+    assert (usual.clearance_m, usual.extrapolated) == (2.0, ())
+    assert found.clearance_m is None
+    assert found.items == usual.items
+    assert [text.split(":")[0] for text in found.extrapolated] == ["OA_TYPE 2"]

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+import csv
 import math
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -8,6 +10,7 @@ from hypothesis import strategies as st
 
 from missions.drive_model import beyond_measured
 from missions.errors import VehicleError
+from missions.firmware import Firmware, firmware_from_number, read_firmware
 from missions.vehicle import (
     Autopilot,
     FenceParameters,
@@ -18,6 +21,8 @@ from missions.vehicle import (
     whole_number,
 )
 from missions.vehicle.item_limit import most_items, storage_remarks
+from missions.vehicle.parameter_remarks import assumed_remarks
+from missions.vehicle.parameters import PARAMETER_NAMES, PARAMETERS, Range
 
 SKID = {"SERVO1_FUNCTION": 73, "SERVO3_FUNCTION": 74}
 ACKERMANN = {"SERVO1_FUNCTION": 26, "SERVO3_FUNCTION": 70}
@@ -65,6 +70,7 @@ def test_a_vehicle_whose_parameters_are_all_known() -> None:
         backs_away=False,
         assumed=(),
         mav_type=10,
+        has_measured_corners=None,
     )
 
 
@@ -76,15 +82,20 @@ def test_what_is_not_known_is_told_with_the_default_used() -> None:
         "TURN_RADIUS unknown; assuming 0.9",
         "SERVO1_FUNCTION unknown; assuming 26",
         "FENCE_ENABLE unknown; assuming 0",
+        "firmware unknown; assuming 4.6",
     }
-    assert vehicle == Vehicle(assumed=vehicle.assumed)
+    assert vehicle == Vehicle(assumed=vehicle.assumed, pivot_angle_deg=0.0)
 
 
 @given(st.sets(st.sampled_from(sorted(KNOWN))))
 def test_exactly_the_missing_ones_are_assumed(missing: set[str]) -> None:
     parameters = {name: value for name, value in KNOWN.items() if name not in missing}
     assumed = {one.parameter for one in vehicle_from_parameters(parameters).assumed}
-    silent = {"CRUISE_SPEED", *ACKERMANN}  # matter only where WP_SPEED, or the other output, is not there
+    silent = {
+        "CRUISE_SPEED",
+        "firmware",
+        *ACKERMANN,
+    }  # matter only where WP_SPEED, or the other output, is not there
     assert assumed - silent == missing - silent
 
 
@@ -288,20 +299,21 @@ def test_the_margin_of_horizontal_fences(parameters: dict[str, float], margin_m:
     ("told", "firmware", "pivot_angle_deg"),
     [
         ({}, None, 0.0),
-        ({}, (4, 5, 7), 60.0),
-        ({}, (4, 6, 3), 60.0),
-        ({}, (4, 7, 0), 0.0),
+        ({}, Firmware(4, 5, 7), 60.0),
+        ({}, Firmware(4, 6, 3), 60.0),
+        ({}, Firmware(4, 7, 0, 0), 0.0),
+        ({}, Firmware(4, 7), 0.0),
         ({"WP_PIVOT_ANGLE": 45.0}, None, 45.0),
-        ({"WP_PIVOT_ANGLE": 45.0}, (4, 7, 0), 45.0),
+        ({"WP_PIVOT_ANGLE": 45.0}, Firmware(4, 7), 45.0),
     ],
 )
 def test_what_a_skid_steered_rover_pivots_at_where_nobody_told(
-    told: dict[str, float], firmware: tuple[int, int, int] | None, pivot_angle_deg: float
+    told: dict[str, float], firmware: Firmware | None, pivot_angle_deg: float
 ) -> None:
     vehicle = vehicle_from_parameters({**SKID, **told}, firmware=firmware)
     assert vehicle.pivot_angle_deg == pivot_angle_deg
-    said = [text for text in beyond_measured(vehicle) if "WP_PIVOT_ANGLE is not known" in text]
-    assert bool(said) is (not told and firmware is None)
+    said = [text for text in assumed_remarks(vehicle) if "WP_PIVOT_ANGLE unknown: taken as 0" in text]
+    assert bool(said) is (pivot_angle_deg == 0)
 
 
 @pytest.mark.parametrize(
@@ -321,11 +333,146 @@ def test_slow_steered_rovers_were_not_measured(
 
 
 @pytest.mark.parametrize(
-    ("firmware", "said"), [(None, False), ((4, 5, 7), True), ((4, 6, 0), False), ((4, 7, 0), False)]
+    ("firmware", "told", "has_measured_corners"),
+    [
+        (None, {}, None),
+        (None, {"FENCE_NTF_FREQ": 1.0}, True),
+        (Firmware(4, 5, 7), {}, False),
+        (Firmware(4, 6, 0, 0), {}, False),
+        (Firmware(4, 6, 0, 128 + 5), {}, False),
+        (Firmware(4, 6, 0, 128 + 6), {}, True),
+        (Firmware(4, 6), {}, True),
+        (Firmware(4, 7, 0, 0), {}, None),
+        (Firmware(4, 7, 0, 0), {"FENCE_NTF_FREQ": 0.0}, True),
+        (Firmware(4, 7, 0, 128), {}, True),
+        (Firmware(4, 7), {}, True),
+        (Firmware(4, 8, 0, 0), {}, True),
+    ],
 )
-def test_firmware_before_4_6_was_not_measured(firmware: tuple[int, int, int] | None, said: bool) -> None:
-    texts = beyond_measured(vehicle_from_parameters({}, firmware=firmware))
-    assert any("not measured for ArduPilot 4.5.7: before 4.6" in text for text in texts) is said
+def test_which_firmware_has_the_corners_that_were_measured(
+    firmware: Firmware | None, told: dict[str, float], has_measured_corners: bool | None
+) -> None:
+    vehicle = vehicle_from_parameters({"WP_SPEED": 2.0, **told}, firmware=firmware)
+    assert vehicle.has_measured_corners is has_measured_corners
+    said = any(
+        f"not measured for ArduPilot {firmware}: before 4.6" in text for text in beyond_measured(vehicle)
+    )
+    assert said is (has_measured_corners is False)
+
+
+@pytest.mark.parametrize(
+    ("text", "firmware"),
+    [
+        ("4.5", Firmware(4, 5)),
+        ("4.5.7", Firmware(4, 5, 7)),
+        ("V4.6.0-beta6", Firmware(4, 6, 0, 134)),
+        (" 4.7.0-dev ", Firmware(4, 7, 0, 0)),
+        ("4.6.1-rc1", Firmware(4, 6, 1, 193)),
+    ],
+)
+def test_a_version_reads_back_as_written(text: str, firmware: Firmware) -> None:
+    assert read_firmware(text) == firmware == read_firmware(str(firmware))
+
+
+@pytest.mark.parametrize("text", ["", "4", "4.x", "ArduRover V4.5", "4.5.6.7", "444.1"])
+def test_what_is_no_version_is_refused(text: str) -> None:
+    with pytest.raises(VehicleError, match="is no version of a firmware"):
+        read_firmware(text)
+
+
+@given(*(st.integers(0, 255) for _ in range(4)))
+def test_versions_are_in_the_order_of_their_numbers(major: int, minor: int, patch: int, stage: int) -> None:
+    number = (major << 24) + (minor << 16) + (patch << 8) + stage
+    firmware, next_one = firmware_from_number(number), firmware_from_number(number + 1)
+    assert (firmware is None) is (number == 0)
+    assert firmware is None or (next_one or Firmware(256, 0)) > firmware or number == 2**32 - 1
+
+
+def published() -> list[dict[str, str]]:
+    text = (Path(__file__).parent / "data" / "ardupilot_parameters.csv").read_text(encoding="utf-8")
+    return list(csv.DictReader(line for line in text.splitlines() if not line.startswith("#")))
+
+
+@pytest.mark.parametrize("row", published(), ids=lambda row: row["name"])
+def test_the_table_is_as_ardupilot_published_it(row: dict[str, str]) -> None:
+    found = PARAMETERS[row["name"]]
+    assert found.autopilot is Autopilot.ARDUPILOT
+    assert found.since == (None if row["since"] == "4.4" else Firmware(4, 7, 0, 0))
+    if found.documented is not None or row["least"]:
+        assert found.documented == Range(float(row["least"]), float(row["most"]))
+    for version in ("4.5", "4.6", "4.7"):
+        default = row[f"default_{version.replace('.', '_')}"]
+        taken = found.default_of(read_firmware(version))
+        assert taken is None or not default or taken == float(default)
+
+
+def test_every_parameter_that_is_asked_for_is_published_and_what_is_read_is_asked_for() -> None:
+    assert {row["name"] for row in published()} == set(PARAMETER_NAMES)
+    read = {one.parameter for one in vehicle_from_parameters({"SERVO1_FUNCTION": 26.0}).assumed}
+    assert read <= set(PARAMETER_NAMES)
+
+
+def measured_cells() -> list[dict[str, str]]:
+    path = Path(__file__).parent / "data" / "measured_cells.csv"
+    with path.open(newline="", encoding="utf-8") as file:
+        return [row for row in csv.DictReader(file) if row["firmware"] != "before 4.6"]
+
+
+@pytest.mark.parametrize(
+    ("name", "column"),
+    [("WP_SPEED", "wp_speed_mps"), ("WP_RADIUS", "wp_radius_m"), ("TURN_RADIUS", "turn_radius_m")],
+)
+@pytest.mark.parametrize("steering", Steering)
+def test_no_range_is_wider_than_what_was_measured(name: str, column: str, steering: Steering) -> None:
+    row = PARAMETERS[name]
+    claimed = row.measured_skid if steering is Steering.SKID else row.measured
+    values = [float(cell[column]) for cell in measured_cells() if cell["steering"] == steering]
+    assert claimed is None or min(values) <= claimed.least <= claimed.most <= max(values)
+
+
+@pytest.mark.parametrize(("name", "ends"), [("ATC_ACCEL_MAX", (0.5, 2.0)), ("ATC_TURN_MAX_G", (0.2,))])
+@pytest.mark.parametrize("steering", Steering)
+def test_limits_were_measured_at_the_ends_of_their_ranges(
+    name: str, ends: tuple[float, ...], steering: Steering
+) -> None:
+    claimed = PARAMETERS[name].measured_skid if steering is Steering.SKID else PARAMETERS[name].measured
+    assert claimed is not None
+    told = {cell["parameters"] for cell in measured_cells() if cell["steering"] == steering}
+    assert {f"{name} {end:g}" for end in ends} <= told
+    assert claimed.least == ends[0]
+    assert claimed.most in {math.inf, ends[-1]}
+
+
+@pytest.mark.parametrize("steering", [{}, SKID])
+def test_a_vehicle_with_its_defaults_is_of_the_measured_kind(steering: dict[str, float]) -> None:
+    for version in ("4.6", "4.7"):
+        assert beyond_measured(vehicle_from_parameters(steering, firmware=read_firmware(version))) == ()
+
+
+@pytest.mark.parametrize(
+    ("parameters", "said"),
+    [
+        ({"OA_TYPE": 2.0}, "OA_TYPE 2: ArduPilot plans its own way"),
+        ({"FRAME_CLASS": 2.0}, "not on a boat"),
+        ({"ATC_STR_ACC_MAX": 60.0}, "ATC_STR_ACC_MAX 120 or more"),
+        ({"ATC_STR_DEC_MAX": 60.0, "ATC_STR_ACC_MAX": 0.0}, "not 60 °/s²"),
+        ({"WP_RADIUS": 6.0}, "WP_RADIUS 0.9 to 5 m, not 6 m"),
+        ({"TURN_RADIUS": 2.5}, "TURN_RADIUS 0.27 to 2 m, not 2.5 m"),
+        ({"FENCE_MARGIN": 7.0, "FENCE_ENABLE": 1.0}, "FENCE_MARGIN 0.1 to 5 m, not 7 m"),
+        ({"FENCE_MARGIN_XY": 7.0, "FENCE_ENABLE": 1.0}, "FENCE_MARGIN_XY 0.1 to 5 m, not 7 m"),
+        ({"FENCE_MARGIN": 0.0, "FENCE_ENABLE": 1.0}, "FENCE_MARGIN 0 m does not switch avoidance off"),
+        ({"WP_SPEED": 0.5}, "ATC_STR_RAT_FF 2.5 (not 0.75), or PSC_VEL_P 3 (not 1)"),
+    ],
+)
+def test_what_was_not_measured_is_named(parameters: dict[str, float], said: str) -> None:
+    (sentence,) = beyond_measured(vehicle_from_parameters(parameters, firmware=Firmware(4, 7)))
+    assert said in sentence
+
+
+def test_a_boat_drifts_where_it_stops() -> None:
+    assert vehicle_from_parameters({}, mav_type=11).boat_drift_m == 2.0
+    assert vehicle_from_parameters({"FRAME_CLASS": 2.0, "LOIT_RADIUS": 10.0}).boat_drift_m == 10.0
+    assert vehicle_from_parameters({"FRAME_CLASS": 1.0, "LOIT_RADIUS": 10.0}).boat_drift_m is None
 
 
 @pytest.mark.parametrize(
@@ -360,4 +507,4 @@ def test_what_nobody_drives_with_is_refused(name: str, value: float) -> None:
 def test_a_turn_rate_below_the_measured_one_is_told(rate_dps: float | None, is_told: bool) -> None:
     known = {} if rate_dps is None else {"ATC_STR_RAT_MAX": rate_dps}
     told = beyond_measured(vehicle_from_parameters({**KNOWN, "TURN_RADIUS": 0.9, **known}))
-    assert any("ATC_STR_RAT_MAX 120°/s" in text for text in told) is is_told
+    assert any("ATC_STR_RAT_MAX 120 or more" in text for text in told) is is_told

@@ -1,0 +1,29 @@
+"""The mark of a plan whose drive lies outside what was measured: it promises nothing, unless the drive model is to be trusted there too."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from missions.drive_model import extrapolated
+
+if TYPE_CHECKING:
+    from missions.planned import Plan
+    from missions.request import Request
+
+_NOTHING = "the drive is extrapolated beyond what was measured: nothing is promised for it (--trust-model promises all the same)"
+_TRUSTED = "the drive is extrapolated beyond what was measured, and promised all the same (--trust-model)"
+
+
+def marked(plan: Plan, request: Request) -> Plan:
+    """Return a plan with what lies outside the measurements, and without its promise where something does."""
+    reasons = extrapolated(plan.vehicle, plan.envelope, *plan.speeds)
+    if not reasons or plan.clearance_m is None:
+        return plan
+    said = _TRUSTED if request.trusts_model else _NOTHING
+    return replace(
+        plan,
+        clearance_m=plan.clearance_m if request.trusts_model else None,
+        extrapolated=reasons,
+        warnings=(*dict.fromkeys((*plan.warnings, *reasons)), said),
+    )

@@ -23,7 +23,7 @@ from mavlink_bridge.cli.values import MOST_M, within
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BridgeOptions(CommonOptions):
-    """Run beside the autopilot: read fences, state and targets from the stream, keep a plan, upload it verified, watch the drive.
+    """Run alongside the autopilot: read fence, state and targets from the link, plan, upload and verify missions, watch the drive.
 
     Type targets as `LAT,LON`; `yes` confirms a plan. Without `--upload` it only reports.
 

@@ -13,7 +13,7 @@ from mavlink_bridge.cli.options.shared import CommonOptions, IgnorePointsOption,
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConvertOptions(CommonOptions):
-    """Convert a file with a fence, a mission, rally points or parameters; the suffixes choose the formats.
+    """Convert a file with a fence, a mission, rally points or parameters; the file extensions choose the formats.
 
     For example:
 

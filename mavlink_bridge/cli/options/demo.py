@@ -14,7 +14,7 @@ from mavlink_bridge.cli.values import within
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DemoOptions(CommonOptions):
-    """Show the whole loop: simulated rover, fence, target, plan, upload, verify, drive, picture, report."""
+    """Run a demonstration: simulated rover, fence, target, plan, upload, verify, drive, picture, report."""
 
     out: Annotated[
         Path, typer.Option(metavar="DIR", help="Folder for the picture, the mission and the log.")

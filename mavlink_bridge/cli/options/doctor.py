@@ -13,7 +13,7 @@ from mavlink_bridge.cli.options.shared import CommonOptions, FirmwareOption
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DoctorOptions(CommonOptions):
-    """Look at this installation: versions, serial ports, options file, signing key, backups, and a plan with a known answer.
+    """Check this installation: versions, serial ports, options file, signing key, backups, and a plan with a known answer.
 
     Nothing is opened and nothing is sent. Exit 8 if something is wrong.
 

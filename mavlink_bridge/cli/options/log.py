@@ -13,7 +13,7 @@ from mavlink_bridge.cli.options.shared import CommonOptions, SystemOption
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LogOptions(CommonOptions):
-    """Show what telemetry logs hold: who speaks, fences and missions transferred, targets, modes, the drive and its clearance.
+    """Summarise telemetry logs: who speaks, fences and missions transferred, targets, modes, the drive and its clearance.
 
     Drives of a mission (AUTO) are graded: least clearance, deviation and time against the drive model's prediction.
 

@@ -61,7 +61,11 @@ RequiredConnectOption = Annotated[
 ]
 SigningKeyOption = Annotated[
     Path | None,
-    typer.Option(metavar="FILE", help="Sign with this key: 32 bytes, hex, base64, or a passphrase."),
+    typer.Option(
+        metavar="FILE",
+        help="Sign with this key: 32 bytes, hex, base64, or a passphrase.",
+        rich_help_panel=LINK_PANEL,
+    ),
 ]
 ReserveOption = Annotated[
     float,

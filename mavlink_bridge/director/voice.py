@@ -80,7 +80,7 @@ class Voice:
         self.tell(
             now_s,
             EventName.PLANNED,
-            f"route {plan.length_m:.0f} m, {plan.drawn_clearance_m:.1f} m drawn clearance"
+            f"route {plan.length_m:.0f} m, fence clearance {plan.drawn_clearance_m:.1f} m along straight legs"
             + ", extrapolated beyond what was measured" * bool(plan.extrapolated),
             round(plan.length_m, 2),
             metres(plan.drawn_clearance_m),

@@ -371,7 +371,7 @@ def test_a_fence_that_changes_on_the_way_stops_a_repaired_mission(tmp_path, fiel
 @pytest.mark.parametrize(
     ("item", "word"),
     [
-        (MissionItem(Command.DO_JUMP, CoordinateFrame.MISSION, (1.0, -1.0, 0.0, 0.0)), "round without end"),
+        (MissionItem(Command.DO_JUMP, CoordinateFrame.MISSION, (1.0, -1.0, 0.0, 0.0)), "repeats forever"),
         (MissionItem(Command.DO_SET_REVERSE, CoordinateFrame.MISSION, (1.0, 0.0, 0.0, 0.0)), "in reverse"),
     ],
 )

@@ -173,7 +173,7 @@ def _is_as_expected(expected: dict[Path | None, list[_Told]], results: _Results)
     for line in found:
         say(line)
     if found:
-        say("- expected, did not come; + came, not expected; ~ came otherwise")
+        say("- expected but missing; + not expected; ~ different")
     return not found
 
 

@@ -80,8 +80,7 @@ def test_a_person_sees_a_table(yard):
     assert re.search(r"start → 1 +10\.3 m", result.stdout)
     assert re.search(r"1 → 2 +134\.3 m +\d+ s +crosses +crosses", result.stdout)
     assert (
-        "BREAKS: leg 1 → 2 crosses exclusion polygon 1, exclusion polygon 2, first at 40.07156"
-        in result.stdout
+        "FAIL: leg 1 → 2 crosses exclusion polygon 1, exclusion polygon 2, first at 40.07156" in result.stdout
     )
     assert run("check", "--mission", yard["mission"], "--fence", yard["fence"], "-q").stdout == ""
 
@@ -93,7 +92,7 @@ def test_a_leg_that_is_only_near_says_how_near(tmp_path, yard):
     result = run("check", "--mission", made, "--clearance", "3")
     assert result.exit_code == 8
     said = re.search(
-        r"BREAKS: leg . → . comes within (\d\.\d\d) m of exclusion polygon \d while driving", result.stdout
+        r"FAIL: leg . → . comes within (\d\.\d\d) m of exclusion polygon \d while driving", result.stdout
     )
     assert 2 <= float(said[1]) < 3
     worst = min(float(near) for near in re.findall(r"comes within (\d\.\d\d) m of", result.stdout))
@@ -108,7 +107,10 @@ def test_what_was_planned_passes(tmp_path, yard):
     assert document["broken"] == 0
     assert document["driven_clearance_m"] == pytest.approx(planned["driven_clearance_m"], abs=0.01)
     assert document["length_m"] == pytest.approx(planned["length_m"], abs=0.01)
-    assert "Every leg keeps 2 m while driving" in run("check", "--mission", made, "--clearance", "2").stdout
+    assert (
+        "PASS: every leg keeps 2 m while driving"
+        in run("check", "--mission", made, "--clearance", "2").stdout
+    )
 
 
 def test_the_recorded_log_tells_it_all(logs):
@@ -422,7 +424,7 @@ def test_a_seam_before_which_the_vehicle_stops_is_named_with_its_place(tmp_path)
     result = run(*asked)
     assert result.exit_code == 8
     assert re.search(
-        r"BREAKS: leg start → 1 crosses the seam at the edge of inclusion polygon 2: the vehicle stops at 40\.07137\d+,-105\.22970\d+",
+        r"FAIL: leg start → 1 crosses the seam at the edge of inclusion polygon 2: the vehicle stops at 40\.07137\d+,-105\.22970\d+",
         result.output,
     )
     assert "set AVOID_ENABLE 2 (without bit 0), or draw the polygons as one" in result.output

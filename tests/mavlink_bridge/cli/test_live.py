@@ -161,7 +161,7 @@ def test_people_see_the_plan_before_anything_is_written(config, tmp_path, monkey
     assert is_shown
     assert all(is_shown)
     lines = [line.split(" ")[0] for line in result.stdout.splitlines()]
-    assert lines == ["Route:", "Clearance:", "Wrote", "Uploaded", "The", "Arrived"]
+    assert lines == ["Route:", "Fence", "Wrote", "Uploaded", "The", "Arrived"]
     assert re.search(r"Arrived after [0-9.]+ m in \d+ s; least clearance [0-9.]+ m while driving, breaches 0", result.stdout)  # fmt: skip
 
 

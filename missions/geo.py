@@ -69,7 +69,7 @@ _POSITION = re.compile(
 )
 """Two angles; the letter stands before or behind each."""
 
-_POSITION_FORMS = "LAT,LON such as 40.0713,-105.2299, 40.0713N 105.2299W or 40°04'16.7\"N 105°13'47.6\"W"
+_POSITION_FORMS = "LAT,LON such as 40.0713,-105.2299 or 40.0713N 105.2299W"
 
 
 def parse_lat_lon(text: str) -> LatLon:

@@ -201,7 +201,7 @@ class TestConfig:
     def test_without_a_file(self):
         result = run("config")
         assert result.exit_code == 0
-        assert "not there" in result.stdout
+        assert "does not exist" in result.stdout
 
     def test_the_template_is_a_file_of_options(self, tmp_path):
         text = run("config", "--template").stdout
@@ -249,7 +249,7 @@ class TestConfig:
     @pytest.mark.parametrize(
         ("text", "said"),
         [
-            ("[paln]\n", "no command"),
+            ("[paln]\n", "is not a command"),
             ("[all]\nnonsense = 1\n", "nonsense"),
             ("clearance = 2\n", "outside a table"),
             ("[plan\n", "not TOML"),

@@ -241,7 +241,7 @@ def test_links_are_kept_and_what_they_lead_to_is_left_alone(tmp_path):
     output.symlink_to(precious)
     result = run("plan", "--fence", MAZE, *WHERE, "-o", output)
     assert (
-        f"{output} was a link to {precious}(left unchanged); the link is kept as {output}.bak"
+        f"{output} was a link to {precious} (left unchanged); the link is kept as {output}.bak"
         in result.stderr
     )
     assert precious.read_text() == "precious"

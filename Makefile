@@ -62,6 +62,7 @@ check: lint types walls test
 
 docs: .venv/dev.stamp
 	$(BIN)/python docs/generated.py
+	$(BIN)/python docs/pictures/draw.py
 	$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_build
 
 locks: .venv/dev.stamp

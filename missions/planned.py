@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from importlib import import_module
-from typing import TYPE_CHECKING
+from itertools import pairwise
+from typing import TYPE_CHECKING, Final
 
 from missions.formats import write_mission
 from missions.formats.files import write_file
+from missions.geo import bearing_deg
 from missions.situation import Known, Mission, Situation
 
 if TYPE_CHECKING:
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
     from missions.items import MissionItem
     from missions.vehicle import Vehicle
 
+_TURN_DEG: Final = 1.0  # a smaller change of direction is a long line in pieces; chosen
 _NOTHING_ELSE = Situation()
 
 
@@ -58,6 +61,8 @@ class Plan:
         The band that the vehicle is predicted to stay in, and its times.
     home : LatLon or None
         For the mission's home item.
+    asked_targets : tuple of LatLon
+        The targets as they were asked for, before blocked ones were moved; empty where nobody asked for targets.
     extrapolated : tuple of str
         In what the drive lies outside what was measured.
     """
@@ -83,7 +88,17 @@ class Plan:
     envelope: Envelope
     home: LatLon | None
     warnings: tuple[str, ...]
+    asked_targets: tuple[LatLon, ...] = ()
     extrapolated: tuple[str, ...] = ()
+
+    @property
+    def turn_count(self) -> int:
+        """How often the drawn lines change their direction, at targets too."""
+        places = [
+            place for place, before in zip(self.path, (None, *self.path), strict=False) if place != before
+        ]
+        courses_deg = [bearing_deg(a, b) for a, b in pairwise(places)]
+        return sum(abs((b - a + 180) % 360 - 180) > _TURN_DEG for a, b in pairwise(courses_deg))
 
     def __repr__(self) -> str:
         promised = "drawn lines only" if self.clearance_m is None else f"{self.clearance_m:g} m promised"

@@ -35,6 +35,10 @@ class Mission:
     items: tuple[MissionItem, ...]
     home: LatLon | None = None
 
+    def item_count(self, *, has_home: bool = True) -> int:
+        """Return how many items the list on a vehicle has: ArduPilot's begins with home, PX4's does not."""
+        return len(self.items) + int(has_home and bool(self.items))
+
 
 @dataclass(frozen=True, slots=True)
 class Pose:

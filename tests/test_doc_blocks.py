@@ -7,6 +7,7 @@ to. ``# exit N`` behind a command is the exit code it must have. Blocks that can
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import os
 import re
@@ -17,7 +18,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 from typer.testing import CliRunner
 
 from mavlink_bridge.cli.app import app
@@ -27,6 +30,9 @@ from missions.formats import read_fence, read_parameters, read_situation
 from missions.geo import LatLon
 
 ROOT = Path(__file__).parents[1]
+_SPEC = importlib.util.spec_from_file_location("drawing", ROOT / "docs" / "pictures" / "draw.py")
+drawing = importlib.util.module_from_spec(_SPEC)
+_SPEC.loader.exec_module(drawing)
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 RUN = ("sh", "console", "python")
 _BLOCK = re.compile(
@@ -70,16 +76,9 @@ NOT_RUN = [
 @pytest.fixture
 def place(tmp_path, monkeypatch) -> Path:
     """A folder as the pages take it for granted."""
-    fields = ROOT / "tests" / "fields"
-    shutil.copytree(fields, tmp_path / "tests" / "fields")
-    shutil.copytree(ROOT / "sitl_logs", tmp_path / "sitl_logs")
+    drawing.practice_folder(tmp_path)
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
-    for path in (ROOT / "examples" / "yard").iterdir():  # where pages send those who have no field at hand
-        shutil.copy(path, tmp_path)
-    shutil.copy(fields / "maze-fence.waypoints", tmp_path / "maze.waypoints")
-    shutil.copy(fields / "yard-mission.waypoints", tmp_path / "mission.waypoints")
-    for name in ("field.tlog", "flight.tlog"):
-        shutil.copy(ROOT / "sitl_logs" / "guided-maze.tlog", tmp_path / name)
+    shutil.copy(ROOT / "tests" / "fields" / "maze-fence.waypoints", tmp_path / "maze.waypoints")
     (tmp_path / "paddock.geojson").write_text(PADDOCK)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
@@ -215,6 +214,23 @@ def test_what_a_page_says_can_be_done(page, place):
                 reader.read(block["language"], block["text"])
     finally:
         reader.close()
+    for picture in drawing.pictures_made_by(page) if page.is_relative_to(ROOT / "docs") else ():
+        assert difference(place / picture, ROOT / "docs" / "pictures" / picture) < 3, f"make docs: {picture}"
+
+
+def difference(made: Path, shown: Path) -> float:
+    """Return by how much pictures differ in the mean, of 255: other versions of the library draw letters a little differently."""
+    images = [Image.open(path).convert("L") for path in (made, shown)]
+    assert images[0].size == images[1].size, f"make docs: {shown.name}"
+    return float(np.abs(np.subtract(*(np.asarray(image, dtype=float) for image in images))).mean())
+
+
+def test_every_picture_is_made_by_a_command_and_shown():
+    made = [name for page in PAGES[1:] for name in drawing.pictures_made_by(page)]
+    shown = {name for page in PAGES[1:] for name in drawing.pictures_of(page)}
+    there = {path.name for path in (ROOT / "docs" / "pictures").glob("*.png")}
+    assert len(made) == len(set(made)) > 5
+    assert set(made) == shown == there
 
 
 @pytest.mark.parametrize("reason", NOT_RUN)

@@ -1,32 +1,73 @@
-"""Draw the pictures of this folder from the fields of the tests: ``python docs/pictures/draw.py``."""
+"""Draw the pictures of this folder, each by the command on the page that shows it: ``python docs/pictures/draw.py``."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
-from missions.firmware import Firmware
-from missions.formats import read_situation
-from missions.geo import LatLon
-from missions.picture import draw_plan
-from missions.planning.plan import plan
-from missions.request import GoTo, Tour
+from PIL import Image
 
 HERE = Path(__file__).parent
-FIELDS = HERE.parents[1] / "tests" / "fields"
-START = LatLon(40.071374, -105.22993)
-REQUESTS = {
-    "maze": GoTo(start=START, target=LatLon(40.0726316, -105.2290497), clearance_m=2.0),
-    "yard": Tour(
-        start=START, targets=(LatLon(40.07209265, -105.22861524), LatLon(40.0720, -105.2300)), clearance_m=2.0
-    ),
-    "union": GoTo(start=START, target=LatLon(40.0721, -105.2285), clearance_m=1.0),
-}
+ROOT = HERE.parents[1]
+_BLOCK = re.compile(r"^```sh\n(.*?)^```", re.DOTALL | re.MULTILINE)
+_PICTURE = re.compile(r"\]\((?:\.\./)?pictures/([\w-]+\.png)\)")
 
-for name, request in REQUESTS.items():
-    situation = read_situation(FIELDS / f"{name}-fence.waypoints")
-    parameters = {"WP_RADIUS": 2.0, "WP_SPEED": 4.0, "FENCE_OPTIONS": 2.0 if name == "union" else 0.0}
-    draw_plan(
-        plan(replace(situation, parameters=parameters, firmware=Firmware(4, 6)), request),
-        HERE / f"{name}.png",
-    )
+
+def practice_folder(folder: Path) -> None:
+    """Fill a folder with what the pages take for granted: a yard, its mission, logs, the fields of the tests."""
+    fields, logs = ROOT / "tests" / "fields", ROOT / "sitl_logs"
+    shutil.copytree(ROOT / "examples" / "yard", folder, dirs_exist_ok=True)
+    shutil.copytree(fields, folder / "tests" / "fields")
+    shutil.copytree(logs, folder / "sitl_logs")
+    shutil.copy(fields / "yard-mission.waypoints", folder / "mission.waypoints")
+    for name in ("field.tlog", "flight.tlog"):
+        shutil.copy(logs / "guided-maze.tlog", folder / name)
+
+
+def pictures_of(page: Path) -> list[str]:
+    """Return the names of the pictures of this folder that a page shows."""
+    return list(dict.fromkeys(_PICTURE.findall(page.read_text(encoding="utf-8"))))
+
+
+def commands_of(page: Path) -> list[list[str]]:
+    """Return a page's commands that need no vehicle."""
+    lines = "".join(_BLOCK.findall(page.read_text(encoding="utf-8"))).splitlines()
+    found = (shlex.split(line, comments=True) for line in lines if line.startswith("pbpp "))
+    return [words for words in found if "--connect" not in words]
+
+
+def pictures_made_by(page: Path) -> list[str]:
+    """Return those of a page's pictures that a command on it draws."""
+    words = {word for command in commands_of(page) for word in command}
+    return [picture for picture in pictures_of(page) if picture in words]
+
+
+def draw(page: Path) -> None:
+    """Do what a page says, and take over the pictures that it shows."""
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        practice_folder(folder)
+        for words in commands_of(page):
+            if words[1] in ("plan", "check", "log"):  # some of them end with an error, as the page says
+                subprocess.run(
+                    [sys.executable, "-m", "mavlink_bridge.cli", *words[1:], "-q"],
+                    cwd=folder,
+                    env={**os.environ, "XDG_STATE_HOME": name},
+                    check=False,
+                    stderr=subprocess.DEVNULL,
+                )
+        for picture in pictures_made_by(page):
+            few_colours = Image.open(folder / picture).convert("RGB").quantize(128, dither=Image.Dither.NONE)
+            few_colours.save(HERE / picture, optimize=True)  # a third of the bytes
+
+
+if __name__ == "__main__":
+    for page in sorted((ROOT / "docs").rglob("*.md")):
+        if pictures_made_by(page):
+            draw(page)

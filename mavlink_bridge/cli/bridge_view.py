@@ -141,7 +141,7 @@ class LiveView:
             rows.append(("left", f"{drive.distance_left_m:.0f} m, about {drive.time_left_s:.0f} s"))
             rows.append(("clearance", f"{drive.least_clearance_m:.1f} m, the least so far"))
         elif director.plan is not None:
-            rows.append(("route", f"{director.plan.length_m:.0f} m, {len(director.plan.items)} items"))
+            rows.append(("route", f"{director.plan.length_m:.0f} m, {len(director.plan.items) + 1} items"))
         if director.awaits_confirmation:
             rows.append(("plan", cell(CONFIRM, "bold")))
         if self._answer is not None:

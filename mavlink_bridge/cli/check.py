@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 from rich.table import Table
 
-from mavlink_bridge.cli.common import check_one_stdout, warn
+from mavlink_bridge.cli.common import warn
 from mavlink_bridge.cli.drawing import cell, console
 from mavlink_bridge.cli.failing import ExitCode
 from mavlink_bridge.cli.field_files import read_fence_file, read_file, with_mission_home
-from mavlink_bridge.cli.plan_results import draw
+from mavlink_bridge.cli.pictures import check_plots, draw
 from mavlink_bridge.cli.terminal import echo, print_json
 from mavlink_bridge.cli.values import position_from
 from mavlink_bridge.cli.vehicle_options import (
@@ -25,7 +26,7 @@ from mavlink_bridge.cli.vehicle_options import (
 from mavlink_bridge.errors import UsageError
 from missions.checking.check import check_mission, plan_of
 from missions.formats import mission_of
-from missions.picture import check_picture_format
+from missions.picture.plans import plan_scene
 from missions.request import GoTo
 from missions.situation import Situation
 from missions.vehicle.item_limit import most_items
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.cli.options.check import CheckOptions
     from missions.checking.check import CheckedLeg, MissionCheck
     from missions.items import MissionItem
+    from missions.picture.scene import PictureScene
 
 
 def check(options: CheckOptions) -> None:
@@ -57,7 +59,7 @@ def check(options: CheckOptions) -> None:
         *_storage_warnings(checked.mission.items, situation),
     ]
     warn(warnings)
-    _draw(checked, situation, options.plot)
+    draw(partial(_scene, checked, situation), options.plot)
     if options.json_output:
         print_json(_document(checked, warnings, situation.system, options.plot))
     elif not options.quiet:
@@ -91,9 +93,7 @@ def _check_options(options: CheckOptions) -> None:
         raise UsageError("give one of --log and --connect")
     if options.home is not None and options.connect is not None:
         raise UsageError("--home goes with files and logs: a live vehicle reports its own home")
-    for path in options.plot:
-        check_picture_format(path)
-    check_one_stdout(options.plot, wants_json=options.json_output)
+    check_plots(options.plot, json_output=options.json_output)
 
 
 def _storage_warnings(items: Sequence[MissionItem], situation: Situation) -> list[str]:
@@ -131,17 +131,17 @@ def _with_files(source: Situation | None, options: CheckOptions) -> Situation:
     return found
 
 
-def _draw(checked: MissionCheck, situation: Situation, plots: list[Path]) -> None:
-    if not plots:
-        return
-    broken = len(checked.broken)
-    title = (
-        f"{checked.length_m:.1f} m, about {checked.duration_s:.0f} s: "
-        + (f"{broken} of {len(checked.legs)} legs break" if broken else f"{len(checked.legs)} legs keep")
-        + f" {checked.clearance_m:g} m"
-        + ", extrapolated" * bool(checked.extrapolated)
+def _scene(checked: MissionCheck, situation: Situation) -> PictureScene:
+    count, broken = len(checked.legs), len(checked.broken)
+    verdict = (
+        f"FAIL: {broken} of {count} legs {'does' if broken == 1 else 'do'} not keep"
+        if broken
+        else f"all {count} legs keep"
     )
-    draw(plan_of(checked, situation), plots, title=title)
+    extrapolated = ", extrapolated" if checked.extrapolated else ""
+    title = f"{checked.length_m:.1f} m, about {checked.duration_s:.0f} s\n{verdict} {checked.clearance_m:g} m while driving{extrapolated}"
+    unsafe = {number: leg.at for number, leg in enumerate(checked.legs) if leg.breaks}
+    return plan_scene(plan_of(checked, situation), title=title, unsafe=unsafe)
 
 
 def _report(checked: MissionCheck, plots: list[Path]) -> None:

@@ -103,17 +103,3 @@ def warn(texts: Iterable[str]) -> None:
 def is_same_file(one: Path, other: Path) -> bool:
     """Return whether two paths lead to one existing file, however they are written: Windows and macOS ignore capitals."""
     return one.exists() and other.exists() and one.samefile(other)
-
-
-def check_one_stdout(plots: list[Path], *, wants_json: bool) -> None:
-    """Refuse a sketch and a JSON document on one standard output.
-
-    Raises
-    ------
-    UsageError
-        Both are asked for.
-    """
-    if wants_json and Path("-") in plots:
-        raise bridge_errors.UsageError(
-            "--plot - and --json both write to standard output; give --plot a file"
-        )

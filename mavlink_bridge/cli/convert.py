@@ -97,7 +97,7 @@ def _count(situation: Situation, part: Part) -> str:
     """Return how much of a part there is, in words."""
     mission, fence, rally = situation.mission, situation.fence, situation.rally
     counts = {
-        "mission": (len(mission.value.items) if mission else 0, "mission item"),
+        "mission": (mission.value.item_count() if mission else 0, "mission item"),
         "fence": (len(fence.value.zones) if fence else 0, "fence zone"),
         "rally": (len(rally.value) if rally else 0, "rally point"),
         "parameters": (len(situation.parameters), "parameter"),

@@ -131,7 +131,7 @@ def _driven(plan: Plan, track: list[LatLon]) -> tuple[float, float]:
 
 def _report(document: dict[str, object], plan: Plan) -> None:
     echo(
-        f"Arrived after {document['driven_length_m']} m (planned route {document['length_m']} m, {len(plan.items)} waypoints)"
+        f"Arrived after {document['driven_length_m']} m (planned route {document['length_m']} m, {sum(item.is_placed for item in plan.items)} waypoints)"
     )
     echo(
         f"Fence clearance: at least {document['clearance_m']} m promised, {document['driven_clearance_m']} m kept; "

@@ -19,12 +19,15 @@ from missions.situation import Known
 if TYPE_CHECKING:
     from mavlink_bridge.cli.options.check import CheckOptions
     from mavlink_bridge.cli.options.convert import ConvertOptions
+    from mavlink_bridge.cli.options.fence import FenceOptions
     from mavlink_bridge.cli.options.plan import PlanOptions
     from mavlink_bridge.cli.options.sim import SimOptions
     from mavlink_bridge.cli.options.upload import UploadOptions
     from missions.situation import Mission, Situation
 
-    MapOptions: TypeAlias = PlanOptions | CheckOptions | ConvertOptions | UploadOptions | SimOptions
+    MapOptions: TypeAlias = (
+        PlanOptions | CheckOptions | ConvertOptions | FenceOptions | UploadOptions | SimOptions
+    )
 
 _WORDS = ("inclusion", "exclusion", "route", "ignore", "waypoint", "home", "rally point", "return point")
 

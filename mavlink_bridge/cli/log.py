@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import groupby
-from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 import typer
@@ -12,15 +12,15 @@ from rich.table import Table
 
 from mavlink_bridge.cli.drawing import cell, console, progress_bar
 from mavlink_bridge.cli.failing import ExitCode
-from mavlink_bridge.cli.kept_files import write_kept
 from mavlink_bridge.cli.log_times import date_text
+from mavlink_bridge.cli.log_verdict import findings, names_of_stretches, verdict
+from mavlink_bridge.cli.pictures import check_plots, draw
 from mavlink_bridge.cli.terminal import echo, print_json, say
 from mavlink_bridge.errors import LogError, UsageError
 from mavlink_bridge.logbook import read_logbook
 from mavlink_bridge.logbook.document import as_document
 from missions.errors import VehicleError
-from missions.picture import check_picture_format
-from missions.picture.track import TrackPicture, draw_track
+from missions.picture.drives import drive_scene
 from missions.vehicle import bits
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from mavlink_bridge.cli.options.log import LogOptions
     from mavlink_bridge.logbook import Logbook, VehicleLog
-    from mavlink_bridge.logbook.grade import Grade
+    from missions.picture.scene import PictureScene
 
 Row = TypeVar("Row")
 _MOST_ROWS = 40  # of a table, so that it fits a terminal's screen; chosen
@@ -41,8 +41,7 @@ def log(options: LogOptions) -> None:
     plots = options.plot
     if plots and len(options.files) > 1:
         raise UsageError("--plot draws one log: give one FILE")
-    for path in plots:
-        check_picture_format(path)
+    check_plots(plots, json_output=options.json_output)
     documents: list[dict[str, object]] = []
     is_unusable = False
     with progress_bar(quiet=options.is_silent or len(options.files) == 1) as show:
@@ -57,24 +56,22 @@ def log(options: LogOptions) -> None:
                 documents.append({"log": path.name, "error": "LogError", "message": str(error)})
                 say(f"error: {error}", typer.colors.RED)
                 continue
+            drawn = draw(partial(_scene, book), plots)
             if options.json_output:
                 documents.append(as_document(book))
             elif not options.quiet:
-                _print(book)
-            for picture in plots:
-                _draw(book, picture)
+                for picture in drawn:
+                    echo(f"Wrote {picture}")
+                _print(book, messages=options.messages)
     if options.json_output:
         status = "error" if is_unusable else "ok"
         code = {"exit_code": int(ExitCode.INPUT)} if is_unusable else {}
         print_json({"status": status, "command": "log", **code, "logs": documents})
-    elif not options.quiet:
-        for picture in plots:
-            echo(f"Wrote {picture}")
     if is_unusable:
         raise typer.Exit(ExitCode.INPUT)
 
 
-def _draw(book: Logbook, path: Path) -> None:
+def _scene(book: Logbook) -> PictureScene:
     if not book.vehicles:
         raise LogError(f"{book.name}: no vehicle was heard: there is nothing to draw")
     vehicle = book.vehicles[0]
@@ -82,16 +79,19 @@ def _draw(book: Logbook, path: Path) -> None:
         names = ", ".join(str(other.system) for other in book.vehicles)
         raise UsageError(f"{book.name} holds vehicles {names}; choose one to draw with --system N")
     mission = vehicle.situation.mission
-    waypoints = [item.position for item in mission.value.items if item.is_placed] if mission else []
-    picture = TrackPicture(
-        fence=vehicle.fences[-1][1] if vehicle.fences else None,
-        parts=tuple((part.mode, part.positions) for part in vehicle.track),
-        mission=tuple(waypoints),
-        targets=tuple(target.position for target in vehicle.targets),
-        title=f"{book.name}: {_driven(vehicle)}",
+    first = int(vehicle.situation.ardupilot is not False)  # ArduPilot's item 0 is home
+    items = enumerate(mission.value.items if mission else (), start=first)
+    return drive_scene(
+        (f"{book.name}: {vehicle.driven_m:.1f} m driven", verdict(vehicle)[0]),
+        vehicle.fences[-1][1] if vehicle.fences else None,
+        list(zip(names_of_stretches(vehicle), (part.positions for part in vehicle.track), strict=True)),
         union=_is_union(vehicle),
+        mission=[(number, item.position) for number, item in items if item.is_placed],
+        targets=[target.position for target in vehicle.targets],
+        breaches=[
+            (f"breach {number}", one.begun_at) for number, one in enumerate(vehicle.intrusions, start=1)
+        ],
     )
-    draw_track(picture, path, write=write_kept)
 
 
 def _is_union(vehicle: VehicleLog) -> bool:
@@ -105,11 +105,11 @@ def _is_union(vehicle: VehicleLog) -> bool:
 # Tables for people
 
 
-def _print(book: Logbook) -> None:
+def _print(book: Logbook, *, messages: bool) -> None:
     out = console()
 
-    def show(line: str, title: str = "") -> None:
-        out.print(cell("").append_text(cell(title, "bold")).append_text(cell(line)), soft_wrap=True)
+    def show(line: str, title: str = "", style: str = "bold") -> None:
+        out.print(cell("").append_text(cell(title, style)).append_text(cell(line)), soft_wrap=True)
 
     show(f": {_length(book)}", title=book.name)
     if not book.damage.is_clean:
@@ -119,14 +119,19 @@ def _print(book: Logbook) -> None:
     if book.clock_trouble:
         show(f"{book.clock_trouble}: no time, rate or speed below means anything")
     out.print(_senders(book))
+    if messages:
+        out.print(_messages(book))
     for vehicle in book.vehicles:
         out.print()
-        show(f": {_driven(vehicle)}", title=f"Vehicle {vehicle.system}")
-        for line in _findings(vehicle):
-            show(line)
+        show(f": {vehicle.driven_m:.1f} m driven", title=f"Vehicle {vehicle.system}")
         for table in _vehicle_tables(vehicle):
             out.print(table)
-    out.print(_messages(book))
+        for line in findings(vehicle):
+            show(line)
+        told, is_good = verdict(vehicle)
+        show(
+            f": {told}", title=f"Verdict on vehicle {vehicle.system}", style="bold" if is_good else "bold red"
+        )
 
 
 def _length(book: Logbook) -> str:
@@ -157,57 +162,6 @@ def _messages(book: Logbook) -> Table:
             f"{traffic.rate_hz:.2f}" if traffic.rate_hz else "",
         )
     return table
-
-
-def _driven(vehicle: VehicleLog) -> str:
-    near = vehicle.nearest
-    clearance = "" if near is None else f", nearest to the fence {near.clearance_m:.2f} m"
-    return f"{vehicle.driven_m:.1f} m driven{clearance}"
-
-
-def _findings(vehicle: VehicleLog) -> Iterable[str]:
-    near = vehicle.nearest
-    if near is not None:
-        yield f"Least clearance: {near.clearance_m:.2f} m at {near.time_s:.1f} s, {near.position}, {near.zone}"
-    for intrusion in vehicle.intrusions[:_MOST_ROWS]:
-        yield (
-            f"On forbidden ground: {intrusion.begun_s:.1f} to {intrusion.ended_s:.1f} s, {intrusion.deepest_m:.2f} m deep, "
-            f"{intrusion.zone}"
-        )
-    if vehicle.reported_breaches:
-        last = vehicle.reported_breaches[-1]
-        yield f"Breaches reported by the autopilot: {len(vehicle.reported_breaches)}, the last at {last.time_s:.1f} s"
-    for grade in vehicle.grades[:_MOST_ROWS]:
-        yield from _graded(grade)
-    yield from (f"Note: {note}" for note in vehicle.notes)
-
-
-def _graded(grade: Grade) -> Iterable[str]:
-    foreseen = grade.foreseen
-    ending = "arrived" if grade.arrived else f"{grade.reached} of {grade.items} waypoints reached"
-    yield f"Drive from {grade.begun_s:.1f} s: items {grade.first_item} to {grade.last_item}, {grade.driven_m:.1f} m, {ending}"
-
-    def compared(name: str, found: float | None, told: float | None, unit: str) -> Iterable[str]:
-        if found is not None:
-            beside = "" if told is None else f", {told:.2f} {unit} predicted"
-            yield f"  {name}: {found:.2f} {unit}{beside}"
-
-    told = (
-        (None, None, None)
-        if foreseen is None
-        else (foreseen.least_clearance_m, foreseen.deviation_m, foreseen.took_s)
-    )
-    yield from compared("least clearance", grade.least_clearance_m, told[0], "m")
-    yield from compared("farthest off the lines", grade.deviation_m, told[1], "m")
-    yield from compared("time to the last waypoint reached", grade.took_s, told[2], "s")
-    if grade.outside_m is not None:
-        verdict = (
-            "within the predicted corridor"
-            if grade.is_as_foreseen
-            else f"{grade.outside_m:.2f} m outside the predicted corridor"
-        )
-        yield f"  {verdict}"
-    yield from (f"  {note}" for note in grade.notes)
 
 
 def _vehicle_tables(vehicle: VehicleLog) -> Iterable[Table]:

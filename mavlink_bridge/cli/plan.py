@@ -6,9 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.cli.common import check_one_stdout, is_same_file
+from mavlink_bridge.cli.common import is_same_file
 from mavlink_bridge.cli.field_files import read_fence_file, with_mission_home
 from mavlink_bridge.cli.permissions import check_permissions
+from mavlink_bridge.cli.pictures import check_plots
 from mavlink_bridge.cli.plan_request import request_from_options, with_tour
 from mavlink_bridge.cli.plan_results import Told, arrival_document, report_end
 from mavlink_bridge.cli.terminal import print_json
@@ -22,7 +23,6 @@ from mavlink_bridge.cli.vehicle_options import (
 from mavlink_bridge.errors import UsageError
 from missions.errors import MissionFormatError
 from missions.formats import check_writable_format
-from missions.picture import check_picture_format
 from missions.request import RepairMission
 
 if TYPE_CHECKING:
@@ -97,11 +97,9 @@ def _check_options(options: PlanOptions) -> None:
                 f"{path} cannot be written: there is no folder {path.parent}",
                 advice=f"create {path.parent} first, or choose another folder",
             )
-    for path in plots:
-        check_picture_format(path)
     if options.home is not None and options.connect is not None:
         raise UsageError("--home goes with --fence and --log: a live vehicle reports its own home")
-    check_one_stdout(plots, wants_json=options.json_output)
+    check_plots(plots, json_output=options.json_output)
 
 
 def _offline_situation(options: PlanOptions, request: Request) -> Situation:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import shutil
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.cli.common import warn
 from mavlink_bridge.cli.kept_files import write_kept
-from mavlink_bridge.cli.terminal import echo, echo_lines
+from mavlink_bridge.cli.pictures import draw
+from mavlink_bridge.cli.terminal import echo
 from missions.fence import CircleZone, PolygonZone, ZoneKind
-from missions.picture import TERMINAL, draw_plan, sketch_plan
+from missions.picture.plans import plan_scene
 from missions.words import counted
 
 if TYPE_CHECKING:
@@ -27,20 +28,7 @@ def write_outputs(
     """Write the mission and draw the plan; return the files."""
     for path in outputs:
         planned.write(path, situation, write=write_kept)
-    return [*outputs, *draw(planned, plots, blocks=blocks)]
-
-
-def draw(planned: Plan, plots: list[Path], *, title: str | None = None, blocks: bool = False) -> list[Path]:
-    """Draw the plan to files, and to the terminal where ``-`` is among them; return the files."""
-    if not plots:
-        return []
-    for path in plots:
-        if str(path) == TERMINAL:
-            columns = min(80, shutil.get_terminal_size().columns)
-            echo_lines(sketch_plan(planned, columns=columns, encoding=sys.stdout.encoding).splitlines())
-        else:
-            draw_plan(planned, path, title=title, blocks=blocks, write=write_kept)
-    return [path for path in plots if str(path) != TERMINAL]
+    return [*outputs, *draw(partial(plan_scene, planned, blocks=blocks), plots)]
 
 
 def plan_document(planned: Plan) -> dict[str, object]:
@@ -139,7 +127,7 @@ def report_plan(planned: Plan, written: list[Path]) -> None:
     if planned.extrapolated:
         promise += ", extrapolated beyond what was measured"
     waypoints = sum(item.is_placed for item in planned.items)
-    turns = max(0, waypoints - len(planned.targets))
+    turns = planned.turn_count
     echo(
         f"Route: {planned.length_m:.1f} m ({planned.straight_line_m:.1f} m in a straight line), "
         f"about {planned.duration_s:.0f} s, {counted(waypoints, 'waypoint')} ({counted(turns, 'turn')})"

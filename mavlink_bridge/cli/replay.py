@@ -53,7 +53,7 @@ def replay(options: ReplayOptions) -> None:
     results = _replayed(options.logs, orders, options.speed, options.jobs, teller)
     if options.record:
         _record(results, quiet=options.is_silent)
-    if not _is_as_expected(expected, results):
+    if not _is_as_expected(expected, results, quiet=options.is_silent):
         raise typer.Exit(ExitCode.CHECK)
     if any(isinstance(result, LogError) for result in results.values()):
         raise typer.Exit(ExitCode.INPUT)
@@ -164,7 +164,7 @@ def _expected(logs: list[Path], expect: Path | None) -> dict[Path | None, list[_
     return {None: read_expectation(expect)}
 
 
-def _is_as_expected(expected: dict[Path | None, list[_Told]], results: _Results) -> bool:
+def _is_as_expected(expected: dict[Path | None, list[_Told]], results: _Results, *, quiet: bool) -> bool:
     found = []
     for log, events in expected.items():
         chosen = results.values() if log is None else [results[log]]
@@ -174,6 +174,9 @@ def _is_as_expected(expected: dict[Path | None, list[_Told]], results: _Results)
         say(line)
     if found:
         say("- expected but missing; + not expected; ~ different")
+    elif expected and not quiet:
+        count = sum(map(len, expected.values()))
+        echo(f"As expected: all {count} events came" if count != 1 else "As expected: the one event came")
     return not found
 
 

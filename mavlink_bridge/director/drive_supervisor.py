@@ -107,7 +107,7 @@ class DriveSupervisor(Part):
         core = self.core
         assert core.plan is not None
         self.drive = DriveWatch(core.plan, core.voice, now_s)
-        core.voice.tell(now_s, EventName.DRIVING, text, len(core.plan.items))
+        core.voice.tell(now_s, EventName.DRIVING, text, len(core.plan.items) + 1)
         return self.drive
 
     # Ends

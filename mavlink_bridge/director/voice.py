@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.director.announcer import Announcer
 from mavlink_bridge.director.events import Event, EventName
+from missions.words import counted
 from missions.words import metres as metres_text
 
 if TYPE_CHECKING:
@@ -63,11 +64,15 @@ class Voice:
         """Report what is known of the vehicle."""
         fence, mission, pose = situation.fence, situation.mission, situation.pose
         zones = len(fence.value.zones) if fence else 0
-        items = len(mission.value.items) if mission else 0
+        items = mission.value.item_count() if mission else 0
+        seen = (
+            f"fence of {counted(zones, 'zone')}" if fence else "no fence seen",
+            f"mission of {counted(items, 'item')}" if mission else "no mission seen",
+        )
         self.tell(
             now_s,
             EventName.LEARNT,
-            f"fence of {zones} zones, mission of {items} items",
+            ", ".join(seen),
             zones,
             fence.value.vertex_count if fence else 0,
             items,

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from mavlink_bridge.logbook.grade import Grade
     from missions.fence import Fence
 
+_POSITIONS = ("position", "begun_at")
+
 
 def as_document(book: Logbook) -> dict[str, Any]:
     """Return the document of ``pbpp log --json``: numbers rounded to what they are worth, times in seconds since the log's beginning."""
@@ -60,7 +62,9 @@ def _vehicle(vehicle: VehicleLog) -> dict[str, Any]:
         "mav_type": vehicle.mav_type,
         "home": list(home.value) if home else None,
         "position": list(situation.pose.value.position) if situation.pose else None,
-        "mission_items": len(mission.value.items) if mission else None,
+        "mission_items": mission.value.item_count(has_home=situation.ardupilot is not False)
+        if mission
+        else None,
         "rally_points": len(situation.rally.value) if situation.rally else None,
         "fences": [{"time_s": round(time_s, 3), **_fence(fence)} for time_s, fence in vehicle.fences],
         "fence_trouble": situation.fence_trouble,
@@ -100,5 +104,5 @@ def _plain(value: Any, name: str = "") -> Any:  # noqa: ANN401 - any value of a 
     if isinstance(value, float):
         if not math.isfinite(value):
             return None
-        return value if name == "position" or name.isupper() else round(value, 3)
+        return value if name in _POSITIONS or name.isupper() else round(value, 3)
     return value

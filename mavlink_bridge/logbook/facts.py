@@ -136,6 +136,8 @@ class Intrusion:
         Where that was.
     zone : str
         The zone that forbids it there.
+    begun_at : LatLon
+        Where it began.
     """
 
     begun_s: float
@@ -143,6 +145,7 @@ class Intrusion:
     deepest_m: float
     position: LatLon
     zone: str
+    begun_at: LatLon
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,9 +159,10 @@ class ReportedBreach:
 
 @dataclass(frozen=True, slots=True)
 class TrackPart:
-    """A stretch of the track driven in one mode, thinned: fit for drawing."""
+    """A stretch of the track driven in one mode, thinned: fit for drawing. Each drive of a mission is one."""
 
     mode: str
+    begun_s: float
     positions: tuple[LatLon, ...]
 
 

@@ -138,7 +138,11 @@ class VehicleRecorder:
             nearest=self._nearest,
             intrusions=tuple(self._intrusions),
             reported_breaches=tuple(self._breaches),
-            track=tuple(TrackPart(mode, tuple(part)) for mode, part in self._odometer.parts if len(part) > 1),
+            track=tuple(
+                TrackPart(mode, begun_s, tuple(part))
+                for mode, begun_s, part in self._odometer.parts
+                if len(part) > 1
+            ),
             grades=tuple(self._drives.grades),
             notes=tuple(self._notes),
         )
@@ -153,6 +157,8 @@ class VehicleRecorder:
         is_other_ground = fence_changed or _is_other_ground(before, after)
         if mode_changed or mission_changed or is_other_ground:
             self._flush()
+        if mode_changed or mission_changed:
+            self._odometer.begin_part()
         if is_other_ground:
             self._has_meter = False
         if mission_changed:
@@ -220,6 +226,7 @@ class VehicleRecorder:
         if 0 < item < self._item:  # begun anew, or jumped back: another drive
             self._flush()
             self._drives.end()
+            self._odometer.begin_part()
         self._item = item
 
     def _take_fence_status(self, message: m.FenceStatus, now_s: float) -> None:
@@ -338,7 +345,9 @@ class VehicleRecorder:
                 continue
             if not self._is_inside:
                 zone = self._meter.zone_near(piece, point)
-                self._intrusions.append(Intrusion(fix.time_s, fix.time_s, depth_m, fix.position, zone))
+                self._intrusions.append(
+                    Intrusion(fix.time_s, fix.time_s, depth_m, fix.position, zone, fix.position)
+                )
                 self._is_inside = True
                 continue
             known = self._intrusions[-1]

@@ -154,25 +154,32 @@ def _as_points(points: NDArray[np.float64]) -> NDArray[np.object_]:
 
 
 class Odometer:
-    """Adds up how far a vehicle drove, and keeps a thinned track in parts, one a mode.
+    """Adds up how far a vehicle drove, and keeps a thinned track in parts: one a mode, and a new one where a drive begins.
 
     The parts hold `_MOST_POINTS` at the most: beyond, every other point goes and the spacing doubles.
     """
 
     def __init__(self) -> None:
-        self.parts: list[tuple[str, list[LatLon]]] = []
+        self.parts: list[tuple[str, float, list[LatLon]]] = []
+        """Mode, time of the first position, positions."""
+        self._begins_part = True
         self._last: tuple[float, float] | None = None
         self._count = 0
         self._spacing_m = MOVED_M
         self._kept: tuple[float, float] | None = None
 
+    def begin_part(self) -> None:
+        """Note that what follows is another drive."""
+        self._begins_part = True
+
     def drive(self, mode: str, fixes: list[TrackFix], points: NDArray[np.float64]) -> float:
         """Take positions driven in a mode; return how far that was, in metres."""
-        if not self.parts or self.parts[-1][0] != mode:
-            joint = [self.parts[-1][1][-1]] if self.parts else []
-            self.parts.append((mode, joint))
+        if self._begins_part or self.parts[-1][0] != mode:
+            self._begins_part = False
+            joint = self.parts[-1][2][-1:] if self.parts else []
+            self.parts.append((mode, fixes[0].time_s, joint))
             self._kept = None
-        kept = self.parts[-1][1]
+        kept = self.parts[-1][2]
         driven_m = 0.0
         for fix, (east_m, north_m) in zip(fixes, points.tolist(), strict=True):
             here = (east_m, north_m)
@@ -190,6 +197,8 @@ class Odometer:
         return driven_m
 
     def _thin(self) -> None:
-        self.parts = [(mode, [*positions[:-1:2], *positions[-1:]]) for mode, positions in self.parts]
-        self._count = sum(len(positions) for _, positions in self.parts)
+        self.parts = [
+            (mode, begun_s, [*positions[:-1:2], *positions[-1:]]) for mode, begun_s, positions in self.parts
+        ]
+        self._count = sum(len(positions) for _, _, positions in self.parts)
         self._spacing_m *= 2

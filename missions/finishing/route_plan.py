@@ -84,6 +84,7 @@ def plan_route(
         speeds=lines.speeds,
         start=start,
         targets=reached,
+        asked_targets=targets,
         method=request.method,
         length_m=path_length_m(lines.path),
         straight_line_m=path_length_m((start, *targets)),

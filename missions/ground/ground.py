@@ -39,6 +39,7 @@ CIRCLE_TOLERANCE_M = 0.05
 EDGE_BOW_M = 1e-3
 """How far a fence's line may stand off the autopilot's."""
 
+_COMMON_GROUND = "the autopilot allows only the intersection of all inclusions: draw the area as one inclusion polygon (pbpp fence merge makes it)"
 _WALL_M = 1e-3  # thickness of a line made an area: a millimetre, below degE7's 11 mm
 _CIRCLE_PAD_M = 1e-4  # what the autopilot's flat metres lose on a circle of kilometres
 _OPEN_GROUND_M = 500.0  # of ground around everything where no inclusion bounds it; chosen, not measured
@@ -137,6 +138,12 @@ class Ground:
             outside = []
         return [b for b in self.barriers if b.kind is ZoneKind.EXCLUSION and b.area.covers(point)] + outside
 
+    def common_ground_advice(self, point: Point) -> str:
+        """Return why a point is forbidden although an inclusion covers it, after a semicolon; empty where that is not so."""
+        inclusions = [b for b in self.barriers if b.kind is ZoneKind.INCLUSION]
+        covered = sum(barrier.area.covers(point) for barrier in inclusions)
+        return f"; {_COMMON_GROUND}" if not self.union and 0 < covered < len(inclusions) else ""
+
     def nearest_point(self, area: BaseGeometry, point: Point) -> Point:
         """Return the point of an area nearest to a point."""
         return nearest_points(area, point)[0]
@@ -180,6 +187,9 @@ def lay_out(
         Barrier(name, zone.kind, _area(zone, name, frame, warnings))
         for name, zone in zip(fence.zone_names(), fence.zones, strict=True)
     ]
+    inclusions = sum(zone.kind is ZoneKind.INCLUSION for zone in fence.zones)
+    if inclusions > 1 and not union:
+        warnings.append(f"the fence has {inclusions} inclusions; {_COMMON_GROUND}")
     if home_radius_m is not None:
         circle = _home_circle(home, home_radius_m)
         name = f"home circle (FENCE_RADIUS {home_radius_m:g} m)"
@@ -208,8 +218,7 @@ def check_ground(ground: Ground) -> None:
     names = " and ".join(inclusions)
     if not ground.keep_in.is_empty:
         raise FenceError(f"the exclusions leave no ground of {names}", zones=inclusions)
-    advice = "" if ground.union else "; with FENCE_OPTIONS 2 (union) one of them would be enough"
-    raise FenceError(f"{names} leave no ground in common{advice}", zones=inclusions)
+    raise FenceError(f"{names} leave no ground in common; {_COMMON_GROUND}", zones=inclusions)
 
 
 def _within(barriers: list[Barrier], circle: Area, name: str) -> list[Barrier]:

@@ -1,4 +1,4 @@
-"""Pictures of plans: images (matplotlib), interactive HTML (plotly), a sketch for the terminal; the suffix chooses.
+"""Pictures of plans, checks and drives: images (matplotlib), interactive HTML (plotly), a sketch for the terminal; the suffix chooses.
 
 Images and HTML need the extra ``plot``.
 """
@@ -11,17 +11,18 @@ from typing import TYPE_CHECKING
 
 from missions.errors import MissionFormatError
 from missions.formats.files import write_file
-from missions.picture.scene import Scene
+from missions.picture.plans import plan_scene
 from missions.picture.sketch import sketch
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from missions.formats.files import Writer
     from missions.geo import LatLon
+    from missions.picture.scene import PictureScene
     from missions.planned import Plan
 
-__all__ = ["PICTURE_SUFFIXES", "TERMINAL", "check_picture_format", "draw_plan", "sketch_plan"]
+__all__ = ["PICTURE_SUFFIXES", "TERMINAL", "check_picture_format", "draw_plan", "draw_scene", "sketch_plan"]
 
 _LIBRARIES = {".png": "matplotlib", ".svg": "matplotlib", ".pdf": "matplotlib", ".html": "plotly"}
 
@@ -65,6 +66,7 @@ def draw_plan(
     *,
     track: Sequence[LatLon] = (),
     title: str | None = None,
+    unsafe: Mapping[int, LatLon | None] | None = None,
     blocks: bool = False,
     write: Writer = write_file,
 ) -> None:
@@ -80,6 +82,8 @@ def draw_plan(
         Where the vehicle drove, if it did.
     title : str, optional
         Default: length, time and clearance.
+    unsafe : mapping of int to LatLon or None, optional
+        The legs that a check found unsafe, counted from 0, each with the place. Default: the legs that cross the fence.
     blocks : bool
         Whether to draw the blocks of the free space's partition too.
     write : callable
@@ -90,21 +94,37 @@ def draw_plan(
     MissionFormatError
         The suffix is unknown, a library is not installed, or the file cannot be written.
     """
+    check_picture_format(path)
+    draw_scene(plan_scene(plan, track=track, title=title, unsafe=unsafe, blocks=blocks), path, write=write)
+
+
+def draw_scene(scene: PictureScene, path: Path | str, *, write: Writer = write_file) -> None:
+    """Draw a scene to a file.
+
+    Raises
+    ------
+    MissionFormatError
+        The suffix is unknown, a library is not installed, or the file cannot be written.
+    """
     path = Path(path)
     check_picture_format(path)
-    scene = Scene(plan, track)
     if path.suffix.lower() == ".html":
-        from missions.picture.html import html_page  # noqa: PLC0415 - slow to come, an extra
+        from missions.picture.html import scene_page  # noqa: PLC0415 - slow to come, an extra
 
-        write(path, html_page(scene, title=title, blocks=blocks))
+        write(path, scene_page(scene))
     else:
-        from missions.picture.figure import figure_image  # noqa: PLC0415 - slow to come, an extra
+        from missions.picture.figure import scene_image  # noqa: PLC0415 - slow to come, an extra
 
-        write(path, figure_image(scene, path.suffix, title=title, blocks=blocks))
+        write(path, scene_image(scene, path.suffix))
 
 
 def sketch_plan(
-    plan: Plan, *, track: Sequence[LatLon] = (), columns: int = 80, encoding: str = "utf-8"
+    plan: Plan,
+    *,
+    track: Sequence[LatLon] = (),
+    unsafe: Mapping[int, LatLon | None] | None = None,
+    columns: int = 80,
+    encoding: str = "utf-8",
 ) -> str:
     """Return a sketch of a plan for the terminal: plain text, no colours.
 
@@ -114,6 +134,8 @@ def sketch_plan(
         What was planned.
     track : sequence of LatLon
         Where the vehicle drove, if it did.
+    unsafe : mapping of int to LatLon or None, optional
+        As for `draw_plan`.
     columns : int
         The terminal's width.
     encoding : str
@@ -124,4 +146,4 @@ def sketch_plan(
     str
         Lines of at most that width.
     """
-    return sketch(Scene(plan, track), columns=columns, encoding=encoding)
+    return sketch(plan_scene(plan, track=track, unsafe=unsafe), columns=columns, encoding=encoding)

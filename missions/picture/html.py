@@ -1,4 +1,4 @@
-"""Interactive pages of plans, drawn with plotly: one file that needs no network."""
+"""Interactive pages of scenes, drawn with plotly: one file that needs no network."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ import plotly.graph_objects as go
 from missions.fence import ZoneKind
 from missions.harmless import harmless
 from missions.picture import style
-from missions.picture.labels import short_name
 from missions.picture.scene import polygons
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
     from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
 
-    from missions.picture.scene import Scene
+    from missions.picture.scene import PictureScene
 
 _HOVERS_PER_LEG = 25  # so that any place of a leg answers the pointer
+_DASHES = {"-": "solid", "--": "dash", "-.": "dashdot", ":": "dot"}
 _HATCH = {
     "shape": "/",
     "fgcolor": style.EXCLUSION,
@@ -31,7 +31,6 @@ _HATCH = {
     "size": 8,
     "solidity": 0.25,
 }
-_BODY = '<body style="margin: 0; overflow: hidden">'
 _CONFIG = {
     "displaylogo": False,
     "scrollZoom": True,
@@ -40,7 +39,39 @@ _CONFIG = {
     "showSendToCloud": False,
     "modeBarButtonsToRemove": ["sendChartToCloud", "sendDataToCloud", "select2d", "lasso2d"],
 }
-
+_PAGE = """<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title>
+<style>
+html, body {{ height: 100%; margin: 0; }}
+body {{ display: flex; flex-direction: column; overflow: hidden; font: 16px/1.35 "Open Sans", verdana, arial, sans-serif; color: #222; }}
+h1 {{ font-size: 1rem; font-weight: normal; margin: 0.6rem 1rem 0; }}
+#picture {{ flex: 1; min-height: 0; }}
+#picture > div {{ height: 100%; }}
+</style>
+</head>
+<body>
+<h1>{heading}</h1>
+<div id="picture">{plot}</div>
+</body>
+</html>
+"""
+_RESCALE = """
+const plot = document.getElementById("plan"), bar = %d;
+plot.on("plotly_relayout", () => {
+  const [west, east] = plot._fullLayout.xaxis.range, [south, north] = plot._fullLayout.yaxis.range;
+  const most = Math.abs(east - west) / 5, power = 10 ** Math.floor(Math.log10(most));
+  const length = [5, 2, 1].map((step) => step * power).find((metres) => metres <= most);
+  const x = west + (east - west) / 50, y = south + (north - south) / 50;
+  if (plot.data[bar].x[0] === x && plot.data[bar].y[0] === y && plot.data[bar].x[1] === x + length) return;
+  const text = " " + Number(length.toPrecision(1)) + " m";
+  Plotly.restyle(plot, {x: [[x, x + length]], y: [[y, y]], text: [["", text]]}, [bar]);
+});
+"""
+"""Keeps the scale bar in the corner, and of a round length, wherever the page is moved and zoomed to."""
 
 # The picture's size and place in pixels and shares of it: by eye.
 _NORTH = {
@@ -51,80 +82,66 @@ _NORTH = {
     "x": 1,
     "y": 1,
     "xanchor": "right",
-    "yanchor": "bottom",
+    "yanchor": "top",
     "font": {"size": 14, "color": "black"},
 }
 
 
-def html_page(scene: Scene, *, title: str | None = None, blocks: bool = False) -> bytes:
+def scene_page(scene: PictureScene) -> bytes:
     """Return a scene as a page."""
-    figure = html_figure(scene, title=title, blocks=blocks)
-    page = figure.to_html(
+    figure = scene_html_figure(scene)
+    bar = next(number for number, trace in enumerate(figure.data) if trace.name == "scale")
+    plot = figure.to_html(
         include_plotlyjs=True,
-        full_html=True,
+        full_html=False,
         div_id="plan",
-        default_height="100vh",
+        default_height="100%",
         config=_CONFIG,
-    ).replace("<body>", _BODY, 1)
+        post_script=_RESCALE % bar,
+    )
+    lines = [plain_text(line) for line in scene.title]
+    page = _PAGE.format(title=f"{lines[0]} – PBPP Rover", heading="<br>".join(lines), plot=plot)
     return bytes(page, "utf-8")
 
 
 def plain_text(text: str) -> str:
-    """Return a text as plotly shows it as it stands: no tags, no links, no control characters."""
+    """Return a text as a page shows it as it stands: no tags, no links, no control characters."""
     return escape(harmless(text), quote=False)
 
 
-def html_figure(scene: Scene, *, title: str | None = None, blocks: bool = False) -> go.Figure:
-    """Draw a scene.
-
-    Parameters
-    ----------
-    scene : Scene
-        What is shown.
-    title : str, optional
-        Default: length, time and clearance.
-    blocks : bool
-        Whether to draw the blocks of the free space's partition too.
-
-    Returns
-    -------
-    plotly.graph_objects.Figure
-        In local metres.
-    """
+def scene_html_figure(scene: PictureScene) -> go.Figure:
+    """Draw a scene as a plotly figure, in local metres."""
     west, south, east, north = scene.bounds_m
-    traces = [*_ground(scene, blocks=blocks), *_lines(scene), _names(scene), _scale(scene)]
+    traces = [*_ground(scene), *_route(scene), *_tracks(scene), *_ends(scene), _names(scene), _scale(scene)]
+    axis = {"constrain": "domain", "zeroline": False, "automargin": True}
     layout = go.Layout(
-        title={"text": plain_text(title or scene.title())},
-        xaxis={
-            "title": {"text": "east (m)"},
-            "range": [west, east],
-            "constrain": "domain",
-            "zeroline": False,
-        },
+        xaxis={"title": {"text": "east (m)", "standoff": 5}, "range": [west, east], **axis},
         yaxis={
-            "title": {"text": "north (m)"},
+            "title": {"text": "north (m)", "standoff": 5},
             "range": [south, north],
             "scaleanchor": "x",
-            "constrain": "domain",
-            "zeroline": False,
+            **axis,
         },
         plot_bgcolor="white",
         hovermode="closest",
         dragmode="pan",
-        margin={"l": 70, "r": 30, "t": 70, "b": 20},
-        legend={"orientation": "h", "yanchor": "top", "y": -0.09, "xanchor": "center", "x": 0.5},
+        margin={"l": 10, "r": 10, "t": 30, "b": 10},
+        legend={"orientation": "h", "yanchor": "top", "y": -0.12, "xanchor": "center", "x": 0.5},
         annotations=[_NORTH],
     )
     return go.Figure(traces, layout)
 
 
-def _ground(scene: Scene, *, blocks: bool) -> Iterator[go.Scatter]:
-    yield _area(scene.outside, "outside", fillcolor=style.OUTSIDE)
-    yield _area(scene.margin, "nearer to a fence than the route", fillcolor=style.MARGIN)
-    if blocks:
-        rings = [np.vstack((ring, ring[:1])) for ring in scene.blocks()]
+def _ground(scene: PictureScene) -> Iterator[go.Scatter]:
+    if scene.has_inclusion:
+        yield _area(scene.outside, "outside the fence", fillcolor=style.OUTSIDE)
+    if not (margin := scene.margin).is_empty:
+        line = {"color": style.MARGIN_EDGE, "width": 0.8, "dash": "dash"}
+        yield _area(margin, f"safety margin, {scene.margin_m:.4g} m", fillcolor=style.MARGIN, line=line)
+    if scene.blocks:
+        rings = [np.vstack((ring, ring[:1])) for ring in scene.blocks]
         yield _line(_joined(rings), "block", color=style.BLOCK, width=0.5)
-    exclusions = [zone for zone in scene.plan.ground.barriers if zone.kind is ZoneKind.EXCLUSION]
+    exclusions = [zone for zone in scene.ground.barriers if zone.kind is ZoneKind.EXCLUSION]
     for number, zone in enumerate(exclusions):
         yield _area(
             zone.area.intersection(scene.frame),
@@ -139,80 +156,134 @@ def _ground(scene: Scene, *, blocks: bool) -> Iterator[go.Scatter]:
         edges = _coordinates(scene.inner_edges)
         yield _line(edges, "inclusion", color=style.INCLUSION, width=1.5, dash="dot", showlegend=False)
         yield _area(
-            scene.plan.ground.keep_in.intersection(scene.frame),
+            scene.ground.keep_in.intersection(scene.frame),
             "inclusion",
             line={"color": style.INCLUSION, "width": 3},
             fill="none",
         )
 
 
-def _lines(scene: Scene) -> Iterator[go.Scatter]:
-    yield _area(
-        scene.envelope,
-        "predicted track",
-        fillcolor=_transparent(style.ENVELOPE, 0.45),
-        line={"color": style.ROUTE, "width": 0.5},
-    )
-    yield _line(scene.route, "route", color=style.ROUTE, width=2.5)
-    yield _leg_hovers(scene)
-    if len(scene.track):
-        yield _line(scene.track, "driven", color=style.TRACK, width=1.5, dash="dash")
-    arrivals_s = scene.plan.envelope.arrivals_s
-    texts = [
-        f"waypoint {number}<br>{position}<br>after {arrivals_s[number]:.0f} s"
-        for number, position in enumerate(scene.plan.path)
-    ]
-    yield _points(scene.route[1:-1], "waypoint", texts[1:-1], "circle", "white", 8)
-    yield _points(scene.route[:1], "start", [f"start<br>{scene.plan.start}"], "square", style.ROUTE, 12)
-    targets = [f"target {number}<br>{at}" for number, at in enumerate(scene.plan.targets, start=1)]
-    numbers = [f"<b>{number}</b>" for number in range(1, len(targets) + 1)]
-    if len(targets) > 1:
-        yield _points(scene.targets, "target", targets, "circle", style.TARGET, 22, numbers)
-    else:
-        yield _points(scene.targets, "target", targets, "star", style.TARGET, 16)
+def _route(scene: PictureScene) -> Iterator[go.Scatter]:
+    if not scene.band.is_empty:
+        yield _area(
+            scene.band.intersection(scene.frame),
+            "predicted corridor",
+            fillcolor=_transparent(style.BAND, 0.45),
+            line={"color": style.ROUTE, "width": 0.5},
+        )
+    route = scene.route
+    if not len(route):
+        return
+    yield _line(route, scene.route_name, color=style.ROUTE, width=2.5)
+    if scene.unsafe_legs:
+        unsafe = _joined([route[leg : leg + 2] for leg in scene.unsafe_legs])
+        yield _line(unsafe, "unsafe leg", color=style.UNSAFE, width=4.5)
+    yield from _legs(scene)
+    if waypoints := scene.waypoints:
+        points, numbers = (
+            np.array([point for _, point, _ in waypoints]),
+            [str(number) for number, _, _ in waypoints],
+        )
+        yield _points(
+            points, "waypoint", [_lines(text) for _, _, text in waypoints], _marker("circle", "white", 8)
+        )
+        look: dict[str, Any] = {
+            "mode": "text",
+            "textposition": "top right",
+            "hoverinfo": "skip",
+            "showlegend": False,
+        }
+        yield go.Scatter(**_east_north(points), name="number", text=numbers, textfont={"size": 11}, **look)
+    if (place := scene.narrowest) is not None:
+        line = {"color": "black", "width": 1.5}
+        text = ["", f" {place.width_m:.1f} m"]
+        marker = {"symbol": "line-ns-open", "size": 8, "color": "black"}
+        look = {"mode": "lines+markers+text", "textposition": "middle right", "hoverinfo": "skip"}
+        yield go.Scatter(
+            **_east_north(place.ends), name="narrowest place", line=line, marker=marker, text=text, **look
+        )
 
 
-def _leg_hovers(scene: Scene) -> go.Scatter:
-    """Return invisible points along the legs that show the legs' figures on hovering."""
-    arrivals_s = scene.plan.envelope.arrivals_s
-    points, texts = [], []
-    for leg, clearance_m in enumerate(scene.leg_clearances_m):
-        a, b = scene.route[leg], scene.route[leg + 1]
-        clearance = f"{clearance_m:.2f} m from any fence" if math.isfinite(clearance_m) else "no fence near"
-        points.append(np.linspace(a, b, _HOVERS_PER_LEG + 2)[1:-1])
-        passing = f"from {arrivals_s[leg]:.0f} s to {arrivals_s[leg + 1]:.0f} s"
-        text = f"leg {leg + 1}: {math.dist(a, b):.1f} m<br>{clearance}<br>{passing}"
-        texts += [text] * _HOVERS_PER_LEG
-    return go.Scatter(
-        **_east_north(np.concatenate(points)),
-        mode="markers",
-        marker={"size": 9, "color": style.ROUTE, "opacity": 0},
-        name="leg",
-        text=texts,
-        hoverinfo="text",
-        showlegend=False,
-    )
+def _legs(scene: PictureScene) -> Iterator[go.Scatter]:
+    """Return arrows that show the way, and invisible points along the legs that show the legs' figures on hovering."""
+    if len(scene.route) < 2:
+        return
+    a, b = scene.route[:-1], scene.route[1:]
+    colors = [style.UNSAFE if leg in scene.unsafe_legs else style.ROUTE for leg in range(len(a))]
+    headings_deg = np.degrees(np.arctan2(*(b - a).T)).round(1).tolist()
+    marker = {"symbol": "arrow", "angle": headings_deg, "size": 11, "color": colors}
+    look: dict[str, Any] = {"mode": "markers", "showlegend": False}
+    yield go.Scatter(**_east_north((a + b) / 2), name="direction", marker=marker, hoverinfo="skip", **look)
+    shares = np.linspace(0, 1, _HOVERS_PER_LEG + 2)[1:-1, None]
+    points = np.concatenate([begin + shares * (end - begin) for begin, end in zip(a, b, strict=True)])
+    texts = [_lines(text) for text in scene.leg_texts for _ in range(_HOVERS_PER_LEG)]
+    marker = {"size": 9, "color": style.ROUTE, "opacity": 0}
+    yield go.Scatter(**_east_north(points), name="leg", marker=marker, text=texts, hoverinfo="text", **look)
 
 
-def _names(scene: Scene) -> go.Scatter:
-    """Return the exclusions' short names; hovering shows the full ones."""
+def _tracks(scene: PictureScene) -> Iterator[go.Scatter]:
+    looks = style.track_looks(track.name for track in scene.tracks)
+    drawn: set[str] = set()
+    for track in scene.tracks:
+        color, dashes = looks[track.name]
+        line = {"color": color, "width": 2, "dash": _DASHES[dashes]}
+        name = plain_text(track.name)
+        look = {"legendgroup": name, "showlegend": track.name not in drawn}
+        yield go.Scatter(
+            **_east_north(track.points), mode="lines", name=name, line=line, hoverinfo="skip", **look
+        )
+        drawn.add(track.name)
+    if scene.marks:
+        marker = {"symbol": "x", "size": 11, "color": style.UNSAFE, "line": {"color": "white", "width": 1.5}}
+        names = [f"  {plain_text(mark.name)}" for mark in scene.marks]
+        yield go.Scatter(
+            **_east_north(np.array([mark.point for mark in scene.marks])),
+            mode="markers+text",
+            name=scene.marks_name,
+            marker=marker,
+            text=names,
+            textposition="middle right",
+            hoverinfo="skip",
+        )
+
+
+def _ends(scene: PictureScene) -> Iterator[go.Scatter]:
+    """Return start and targets with their signs; a start that lies under a target is the larger one."""
+    moved = ~np.isnan(scene.asked).any(axis=1)
+    if moved.any():
+        asked, reached = scene.asked[moved], scene.targets[moved]
+        lines = _joined(list(np.stack((asked, reached), axis=1)))
+        yield _line(lines, "moved", color="black", width=1.5, dash="dot", showlegend=False)
+        hovers, signs = ["target as asked"] * len(asked), ["?"] * len(asked)
+        yield _points(asked, "target as asked", hovers, _marker("circle", "white", 18, "black"), signs)
+    if scene.start is not None:
+        text = [_lines(scene.point_texts[0]) if scene.numbers and scene.numbers[0] is None else "start"]
+        marker = _marker("square", style.ROUTE, 24, "black")
+        yield _points(scene.start[None], "start", text, marker, ["S"], ink="white")
+    if len(scene.targets):
+        signs = [scene.target_sign(number) for number in range(len(scene.targets))]
+        texts = [f"target {sign[1:]}<br>{text}" for sign, text in zip(signs, scene.target_texts, strict=True)]
+        yield _points(scene.targets, "target", texts, _marker("circle", style.TARGET, 20, "black"), signs)
+
+
+def _names(scene: PictureScene) -> go.Scatter:
+    """Return the zones' names."""
     shown = [
-        (zone.area.intersection(scene.frame).representative_point(), short_name(zone.name))
-        for zone in scene.plan.ground.barriers
-        if zone.kind is ZoneKind.EXCLUSION and zone.area.intersects(scene.frame)
+        (seen.representative_point(), zone.name.replace(" ", "<br>", 1)) for zone, seen in scene.named_zones
     ]
     return go.Scatter(
         **_east_north(np.array([(point.x, point.y) for point, _ in shown]).reshape(-1, 2)),
         mode="text",
         name="name",
-        text=[f"<b>{name}</b>" for _, name in shown],
+        text=[name for _, name in shown],
+        textfont={"size": 11},
         hoverinfo="skip",
         showlegend=False,
     )
 
 
-def _scale(scene: Scene) -> go.Scatter:
-    """Return a scale bar that grows with the picture, in its lower left corner."""
+def _scale(scene: PictureScene) -> go.Scatter:
+    """Return a scale bar in the lower left corner; a script keeps it there."""
     west, south, east, north = scene.bounds_m
     length_m = scene.scale_m()
     begin_m, height_m = west + (east - west) / 50, south + (north - south) / 50
@@ -226,7 +297,12 @@ def _scale(scene: Scene) -> go.Scatter:
         line={"color": "black", "width": 4},
         hoverinfo="skip",
         showlegend=False,
+        cliponaxis=False,
     )
+
+
+def _lines(text: str) -> str:
+    return "<br>".join(map(plain_text, text.split("\n")))
 
 
 def _area(area: BaseGeometry, name: str, *, text: str | None = None, **look: Any) -> go.Scatter:  # noqa: ANN401
@@ -249,24 +325,28 @@ def _line(points: NDArray[np.float64], name: str, *, showlegend: bool = True, **
     )
 
 
+def _marker(symbol: str, color: str, size: int, edge: str = style.ROUTE) -> dict[str, Any]:
+    return {"symbol": symbol, "color": color, "size": size, "line": {"color": edge, "width": 1.5}}
+
+
 def _points(
     points: NDArray[np.float64],
     name: str,
     hovers: list[str],
-    symbol: str,
-    color: str,
-    size: int,
-    texts: list[str] | None = None,
+    marker: dict[str, Any],
+    signs: list[str] | None = None,
+    *,
+    ink: str = "black",
 ) -> go.Scatter:
-    edge = style.ROUTE if color == "white" else "black"
     return go.Scatter(
         **_east_north(points),
-        mode="markers+text" if texts else "markers",
+        mode="markers+text" if signs else "markers",
         name=name,
-        text=texts,
+        text=[f"<b>{sign}</b>" for sign in signs] if signs else None,
+        textfont={"size": 11, "color": ink},
         hovertext=hovers,
         hoverinfo="text",
-        marker={"symbol": symbol, "color": color, "size": size, "line": {"color": edge, "width": 1.5}},
+        marker=marker,
     )
 
 
@@ -279,7 +359,7 @@ def _east_north(points: NDArray[np.float64]) -> dict[str, list[float | None]]:
     }
 
 
-def _joined(rings: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+def _joined(rings: Iterable[NDArray[np.float64]]) -> NDArray[np.float64]:
     """Put rings into one array with a gap after each."""
     gap = np.full((1, 2), np.nan)
     return np.concatenate([np.empty((0, 2)), *(part for ring in rings for part in (ring, gap))])

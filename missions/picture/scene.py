@@ -1,57 +1,138 @@
-"""What every picture of a plan shows, in local metres, east then north: the same for images, HTML and the terminal."""
+"""What every picture shows, in local metres, east then north: the same for images, pages and the terminal."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
-from shapely import LineString, Polygon
+from shapely import LineString, Point, Polygon
 
-import pbpp
 from missions.fence import ZoneKind
-from missions.geo import LocalPoint
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator
 
     from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
 
-    from missions.geo import LatLon
-    from missions.planned import Plan
+    from missions.ground.ground import Barrier, Ground
 
 _BORDER_SHARE = 0.06  # white around the drawing
-_MOST_BLOCKS = 5000  # more cannot be told apart
 _SCALE_STEPS_M = tuple(step * 10**power for power in range(5) for step in (1, 2, 5))
+_MOST_SECTIONS = 400  # across the route, to find its narrowest place; chosen: a picture shows no more
+_NARROW_SHARE = 0.25  # of the picture: what is wider is no narrow place
+_AWAY_M = 1e-3  # a ray across begins so far from the fence that it starts at
+
+
+def no_points() -> NDArray[np.float64]:
+    """Return an empty array of points, (0, 2)."""
+    return np.empty((0, 2))
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class TrackLine:
+    """A driven line: its name in the legend, and its points (n, 2)."""
+
+    name: str
+    points: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Mark:
+    """A place that a person must not miss, with its name; empty where the legend says enough."""
+
+    point: NDArray[np.float64]
+    name: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class NarrowSection:
+    """Where the fences on both sides of a route are nearest to each other: two points on them, and how wide it is."""
+
+    ends: NDArray[np.float64]
+    width_m: float
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PictureScene:
     """What a picture shows.
 
     Parameters
     ----------
-    plan : Plan
-        What was planned.
-    driven : sequence of LatLon
-        Where the vehicle drove, if it did.
+    title : tuple of str
+        The lines above the picture.
+    ground : Ground
+        The fence.
+    zone_count : int
+        How many of the ground's barriers are shown whole: the fence's own. The home circle, which may be vast, is seen as far as it
+        reaches into the picture.
+    margin_m : float
+        The safety margin: what the route keeps to the fence; 0 draws none.
+    route_name : str
+        What the legend calls the drawn lines.
+    route : ndarray of float, shape (n, 2)
+        The drawn lines.
+    point_texts : tuple of str
+        What is known of each point of the route, a line each.
+    numbers : tuple of int or None
+        The mission item of each point of the route; None where it is none, as at the start.
+    leg_texts : tuple of str
+        What is known of each leg.
+    unsafe_legs : tuple of int
+        The legs that are not safe to drive, counted from 0.
+    marks_name : str
+        What the legend calls the marks.
+    marks : tuple of Mark
+        Where the fence is crossed, or what else must not be missed.
+    band : shapely geometry
+        The predicted corridor.
+    start : ndarray of float, shape (2,), or None
+    targets, asked : ndarray of float, shape (t, 2)
+        Where the route leads to, and what was asked for where that is somewhere else: as many rows, NaN where it is the same.
+    target_texts : tuple of str
+        What is known of each target.
+    tracks : tuple of TrackLine
+        What was driven.
+    blocks : tuple of ndarray
+        Corners of the blocks of the free space.
+    marks_narrowest : bool
+        Whether the narrowest place of the route is marked.
     """
 
-    plan: Plan
-    driven: Sequence[LatLon] = ()
+    title: tuple[str, ...]
+    ground: Ground
+    zone_count: int
+    margin_m: float = 0.0
+    route_name: str = "route"
+    route: NDArray[np.float64] = field(default_factory=no_points)
+    point_texts: tuple[str, ...] = ()
+    numbers: tuple[int | None, ...] = ()
+    leg_texts: tuple[str, ...] = ()
+    unsafe_legs: tuple[int, ...] = ()
+    marks_name: str = "crossed or too near"
+    marks: tuple[Mark, ...] = ()
+    band: BaseGeometry = field(default_factory=Polygon)
+    start: NDArray[np.float64] | None = None
+    targets: NDArray[np.float64] = field(default_factory=no_points)
+    asked: NDArray[np.float64] = field(default_factory=no_points)
+    target_texts: tuple[str, ...] = ()
+    tracks: tuple[TrackLine, ...] = ()
+    blocks: tuple[NDArray[np.float64], ...] = ()
+    marks_narrowest: bool = False
 
     @cached_property
     def bounds_m(self) -> tuple[float, float, float, float]:
-        """West, south, east, north: the fence's zones and the lines, with a border.
-
-        The home circle, which may be vast, is seen as far as it reaches into that.
-        """
-        shapes = [zone.area for zone in self.plan.ground.barriers[: len(self.plan.fence.zones)]]
-        points = shapely.MultiPoint(np.concatenate((self.route, self.track)))
+        """West, south, east, north: the fence's zones and the lines, with a border."""
+        shapes = [zone.area.envelope for zone in self.ground.barriers[: self.zone_count]]
+        start = no_points() if self.start is None else self.start[None]
+        places = np.concatenate(
+            (self.route, self.targets, self.asked, start, *(track.points for track in self.tracks))
+        )
+        points = shapely.MultiPoint(places[~np.isnan(places).any(axis=1)])
         west, south, east, north = shapely.union_all([*shapes, points]).bounds
         border_m = max(1.0, _BORDER_SHARE * max(east - west, north - south))
         return west - border_m, south - border_m, east + border_m, north + border_m
@@ -61,97 +142,117 @@ class Scene:
         """The picture's rectangle."""
         return shapely.box(*self.bounds_m)
 
-    @cached_property
-    def route(self) -> NDArray[np.float64]:
-        """The drawn lines, (n, 2)."""
-        return self.plan.ground.frame.to_local_array(self.plan.path)
-
-    @cached_property
-    def targets(self) -> NDArray[np.float64]:
-        """The targets in order, (t, 2)."""
-        return self.plan.ground.frame.to_local_array(self.plan.targets)
-
-    @cached_property
-    def track(self) -> NDArray[np.float64]:
-        """Where the vehicle drove, (d, 2)."""
-        return self.plan.ground.frame.to_local_array(self.driven)
-
     @property
     def outside(self) -> BaseGeometry:
         """What lies outside the inclusions."""
-        return self.frame.difference(self.plan.ground.keep_in)
+        return self.frame.difference(self.ground.keep_in)
 
     @property
     def has_inclusion(self) -> bool:
         """Whether the fence keeps the vehicle in."""
-        return any(zone.kind is ZoneKind.INCLUSION for zone in self.plan.ground.barriers)
+        return any(zone.kind is ZoneKind.INCLUSION for zone in self.ground.barriers)
 
     @property
     def inner_edges(self) -> BaseGeometry:
         """The edges of inclusions that are no edge of what is allowed: inside the union, or beyond another inclusion."""
-        ground = self.plan.ground
-        edges = [zone.area.boundary for zone in ground.barriers if zone.kind is ZoneKind.INCLUSION]
-        return (
-            shapely.union_all(edges).difference(ground.keep_in.boundary.buffer(0.01)).intersection(self.frame)
-        )
+        edges = [zone.area.boundary for zone in self.ground.barriers if zone.kind is ZoneKind.INCLUSION]
+        kept = self.ground.keep_in.boundary.buffer(0.01)
+        return shapely.union_all(edges).difference(kept).intersection(self.frame)
 
     @property
     def margin(self) -> BaseGeometry:
-        """The allowed ground that is nearer to a fence than the drawn lines ever come."""
-        margin_m = self.plan.drawn_clearance_m
-        if not (math.isfinite(margin_m) and margin_m > 0):
+        """The allowed ground within the safety margin of a fence."""
+        if not (math.isfinite(self.margin_m) and self.margin_m > 0):
             return Polygon()
-        return self.plan.ground.edge.buffer(margin_m).intersection(self.plan.ground.allowed)
+        return self.ground.edge.buffer(self.margin_m).intersection(self.ground.allowed)
 
     @property
     def exclusions(self) -> BaseGeometry:
         """The ground that is kept out of."""
-        return shapely.union_all(self.plan.ground.areas(ZoneKind.EXCLUSION))
+        return shapely.union_all(self.ground.areas(ZoneKind.EXCLUSION))
 
     @property
-    def envelope(self) -> BaseGeometry:
-        """The band that the vehicle is predicted to stay in."""
-        return self.plan.envelope.area.intersection(self.frame)
+    def named_zones(self) -> Iterator[tuple[Barrier, BaseGeometry]]:
+        """The zones whose names belong into the picture, each with what is seen of it: exclusions, and inclusions where there are several.
+
+        An inclusion whose edge is not in the picture has no name in it.
+        """
+        zones = self.ground.barriers
+        inclusions = [zone for zone in zones if zone.kind is ZoneKind.INCLUSION]
+        for zone in zones:
+            seen = zone.area.intersection(self.frame)
+            if zone.kind is ZoneKind.INCLUSION:
+                if len(inclusions) == 1 or not zone.area.boundary.intersects(self.frame):
+                    continue
+                seen = seen.difference(
+                    shapely.union_all([other.area for other in zones if other is not zone])
+                )
+            if not seen.is_empty:
+                yield zone, seen
 
     @property
-    def leg_clearances_m(self) -> list[float]:
-        """The least distance of each drawn leg to a fence, infinite without a fence."""
-        legs = zip(self.route[:-1], self.route[1:], strict=True)
-        return [self.plan.ground.clearance_m(LineString(leg)) for leg in legs]
+    def waypoints(self) -> list[tuple[int, NDArray[np.float64], str]]:
+        """The waypoints of the route: number, place, and what is known of each."""
+        points = zip(self.numbers, self.route, self.point_texts, strict=True)
+        return [(number, point, text) for number, point, text in points if number is not None]
 
-    def blocks(self) -> list[NDArray[np.float64]]:
-        """Return the corners of the blocks of the free space at the drawn clearance; none where there are too many to see."""
-        ground, plan = self.plan.ground, self.plan
-        clearance_m = 0.99 * plan.drawn_clearance_m if math.isfinite(plan.drawn_clearance_m) else 0.0
-        areas = ground.areas(ZoneKind.INCLUSION), ground.areas(ZoneKind.EXCLUSION)
-        target = LocalPoint(*self.targets[-1].tolist())
-        try:
-            planner = pbpp.Planner(*areas, clearance_m=clearance_m, union=ground.union)
-            drawing = planner.plan(target, target, method=plan.method).drawing
-        except pbpp.PlanningError:  # a picture without blocks is better than none
-            return []
-        partition = drawing.field.slabs if drawing.partition == "slabs" else drawing.field.blocks
-        if len(partition) > _MOST_BLOCKS:
-            return []
-        origin_m = drawing.field.scene.origin_m
-        return [partition.outline(block) + origin_m for block in range(len(partition))]
+    @property
+    def legs(self) -> list[LineString]:
+        """The drawn lines, leg by leg."""
+        return [LineString(leg) for leg in zip(self.route[:-1], self.route[1:], strict=True)]
 
-    def title(self) -> str:
-        """Return the title: how long the route is and what it keeps."""
-        plan = self.plan
-        drawn = (
-            f", clearance {plan.drawn_clearance_m:.2f} m drawn"
-            if math.isfinite(plan.drawn_clearance_m)
-            else ""
-        )
-        promised = "" if plan.clearance_m is None else f", {plan.clearance_m:g} m promised while driving"
-        extrapolated = ", extrapolated" if plan.extrapolated else ""
-        return f"{plan.length_m:.1f} m, about {plan.duration_s:.0f} s{drawn}{promised}{extrapolated}"
+    @cached_property
+    def narrowest(self) -> NarrowSection | None:
+        """The narrowest place of the route; None without a fence on both sides, or where it is wide.
+
+        Sections are laid across the route through the fence that is nearest, up to the fence on the other side.
+        """
+        if not self.marks_narrowest or self.unsafe_legs or self.ground.edge.is_empty:
+            return None
+        edge, line = self.ground.edge, LineString(self.route)
+        reach_m = _NARROW_SHARE * (self.bounds_m[2] - self.bounds_m[0])
+        count = min(_MOST_SECTIONS, math.ceil(line.length / 0.1) + 1)
+        steps = shapely.line_interpolate_point(line, np.linspace(0, line.length, count))
+        along = shapely.points(np.concatenate((shapely.get_coordinates(steps), self.route)))
+        near = shapely.get_coordinates(shapely.shortest_line(along, edge)).reshape(-1, 2, 2)
+        found: NarrowSection | None = None
+        for place, fence in near:
+            distance_m = math.dist(place, fence)
+            if not _AWAY_M < distance_m < (found.width_m if found else reach_m):
+                continue
+            across = (place - fence) / distance_m
+            ray = LineString(
+                (fence + across * _AWAY_M, fence + across * (found.width_m if found else reach_m))
+            )
+            hit = ray.intersection(edge)
+            if hit.is_empty:
+                continue
+            width_m = float(Point(fence).distance(hit))
+            if width_m > distance_m:  # the fence on the other side of the route
+                found = NarrowSection(np.array((fence, fence + across * width_m)), width_m)
+        return found
 
     def scale_m(self, share: float = 0.2) -> int:
         """Return a round length of at most a share of the picture's width."""
         width_m = self.bounds_m[2] - self.bounds_m[0]
         return max((step for step in _SCALE_STEPS_M if step <= share * width_m), default=1)
+
+    def target_sign(self, number: int) -> str:
+        """Return the sign of a target, counted from 0."""
+        return f"T{number + 1}" if len(self.targets) > 1 else "T"
+
+
+def crossings(
+    legs: list[LineString], unsafe: tuple[int, ...], allowed: BaseGeometry
+) -> list[NDArray[np.float64]]:
+    """Return where unsafe legs cross the fence, in or out."""
+    found: list[NDArray[np.float64]] = []
+    for number in unsafe:
+        for part in shapely.get_parts(legs[number].difference(allowed)):
+            ends = shapely.get_coordinates(part)[[0, -1]]
+            own = shapely.get_coordinates(legs[number])
+            found += [end for end in ends if np.hypot(*(own - end).T).min() > _AWAY_M]
+    return found
 
 
 def polygons(area: BaseGeometry) -> list[Polygon]:

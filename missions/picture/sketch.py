@@ -1,4 +1,4 @@
-"""A plan in the terminal: shades for forbidden ground, braille dots for the route, plain text."""
+"""A scene in the terminal: shades for forbidden ground, braille dots for the route, plain text."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
 
-    from missions.picture.scene import Scene
+    from missions.picture.scene import PictureScene
 
 _MOST_ROWS = 40  # so that a sketch fits a terminal's screen
 _FEWEST_COLUMNS = 40  # narrower terminals wrap
@@ -31,14 +31,16 @@ class _Signs(NamedTuple):
     outside: str
     route: str
     track: str
+    unsafe: str
+    mark: str
     bar: str
 
 
-_BLOCKS = _Signs("▓", "░", "⠤⠒", "·", "├─┤")
-_PLAIN = _Signs("#", ".", "*", "o", "|-|")
+_BLOCKS = _Signs("▓", "░", "⠤⠒", "·", "▪", "✗", "├─┤")
+_PLAIN = _Signs("#", ".", "*", "o", "!", "X", "|-|")
 
 
-def sketch(scene: Scene, *, columns: int = 80, encoding: str = "utf-8") -> str:
+def sketch(scene: PictureScene, *, columns: int = 80, encoding: str = "utf-8") -> str:
     """Return the sketch of a scene.
 
     Parameters
@@ -61,12 +63,24 @@ def sketch(scene: Scene, *, columns: int = 80, encoding: str = "utf-8") -> str:
     forbidden = shapely.union_all([scene.outside, scene.exclusions])
     cells[grid.covered(forbidden)] = signs.outside if scene.has_inclusion else signs.exclusion
     cells[grid.covered(scene.exclusions)] = signs.exclusion
-    if len(scene.track):
-        _draw(cells, grid, scene.track, signs.track)
-    _draw(cells, grid, scene.route, "" if signs is _BLOCKS else signs.route)
+    if len(scene.route) > 1:
+        _draw(cells, grid, scene.route, "" if signs is _BLOCKS else signs.route)
+    for track in scene.tracks:
+        _draw(cells, grid, track.points, signs.track)
+    for leg in scene.unsafe_legs:
+        _draw(cells, grid, scene.route[leg : leg + 2], signs.unsafe)
+    for mark in scene.marks:
+        cells[grid.cell(mark.point)] = signs.mark
+    for asked in scene.asked[~np.isnan(scene.asked).any(axis=1)]:
+        cells[grid.cell(asked)] = "?"
+    start = None if scene.start is None else grid.cell(scene.start)
     for number, target in enumerate(scene.targets, start=1):
-        cells[grid.cell(target)] = "T" if len(scene.targets) == 1 else str(number)[-1]
-    cells[grid.cell(scene.route[0])] = "S"
+        row, column = grid.cell(target)
+        if (row, column) == start:  # which is seen too, beside it
+            column += 1 if column + 1 < grid.columns else -1
+        cells[row, column] = "T" if len(scene.targets) == 1 else str(number)[-1]
+    if start is not None:
+        cells[start] = "S"
     picture = ["".join(row).rstrip() for row in cells]
     return "\n".join([*picture, *_legend(scene, grid, signs, max(columns, _FEWEST_COLUMNS)), ""])
 
@@ -81,7 +95,7 @@ class _Grid(NamedTuple):
     rows: int
 
     @classmethod
-    def of(cls, scene: Scene, columns: int) -> _Grid:
+    def of(cls, scene: PictureScene, columns: int) -> _Grid:
         west, south, east, north = scene.bounds_m
         cell_m = max((east - west) / columns, (north - south) / (_CELL_SHAPE * _MOST_ROWS))
         wide, high = math.ceil((east - west) / cell_m), math.ceil((north - south) / (_CELL_SHAPE * cell_m))
@@ -136,25 +150,25 @@ def _draw(cells: NDArray[np.str_], grid: _Grid, line: NDArray[np.float64], sign:
         cells[row, column] = chr(_BRAILLE + int(bits[row, column]))
 
 
-def _legend(scene: Scene, grid: _Grid, signs: _Signs, columns: int) -> list[str]:
+def _legend(scene: PictureScene, grid: _Grid, signs: _Signs, columns: int) -> list[str]:
     """Return the scale, the north and the meaning of the signs, wrapped to the width."""
     length_m = scene.scale_m()
     left, line, right = tuple(signs.bar)
     bar = f"{left}{line * max(0, round(length_m / grid.cell_m) - 2)}{right} {length_m} m, north up"
+    more = "..." if signs is _PLAIN else "…"
+    several = len(scene.targets) > 1
     words = [
         bar,
-        "S start",
-        "T target" if len(scene.targets) == 1 else "1, 2 … targets",
-        f"{signs.route} route",
+        *(["S start"] if scene.start is not None else []),
+        *([f"1, 2 {more} targets" if several else "T target"] if len(scene.targets) else []),
+        *(["? target as asked"] if not np.isnan(scene.asked).all() else []),
+        *([f"{signs.route} {scene.route_name}"] if len(scene.route) else []),
+        *([f"{signs.unsafe} unsafe leg"] if scene.unsafe_legs else []),
+        *([f"{signs.mark} {scene.marks_name}"] if scene.marks else []),
+        *([f"{signs.track} driven"] if scene.tracks else []),
+        *([f"{signs.exclusion} exclusion"] if not scene.exclusions.is_empty else []),
+        *([f"{signs.outside} outside the fence"] if scene.has_inclusion else []),
     ]
-    if signs is _PLAIN:
-        words[2] = words[2].replace("…", "...")
-    if len(scene.track):
-        words.append(f"{signs.track} driven")
-    if not scene.exclusions.is_empty:
-        words.append(f"{signs.exclusion} exclusion")
-    if scene.has_inclusion:
-        words.append(f"{signs.outside} outside")
     lines = [words[0]]
     for word in words[1:]:
         if len(lines[-1]) + len(word) + 2 <= columns:
@@ -166,7 +180,7 @@ def _legend(scene: Scene, grid: _Grid, signs: _Signs, columns: int) -> list[str]
 
 def _understands(encoding: str) -> bool:
     try:
-        "▓░⣿─…".encode(encoding)
+        "▓░⣿─…▪✗".encode(encoding)
     except (UnicodeEncodeError, LookupError):
         return False
     return True

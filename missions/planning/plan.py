@@ -87,6 +87,7 @@ def _with_room(
     return replace(
         plan_of(checked, situation, method=planned.method),
         targets=planned.targets,
+        asked_targets=planned.asked_targets,
         straight_line_m=planned.straight_line_m,
         clearance_m=planned.clearance_m,
         asked_m=planned.asked_m,

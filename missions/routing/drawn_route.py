@@ -275,7 +275,8 @@ class DrawnRoutes:
         raise _blocked(
             NoRouteKind.START_BLOCKED,
             f"the start is on forbidden ground ({self._position(start)}): {_names(names)}; "
-            f"free ground is {distance:.2f} m away, bearing {round(bearing) % 360}°, at {position}",
+            f"free ground is {distance:.2f} m away, bearing {round(bearing) % 360}°, at {position}"
+            f"{self.ground.common_ground_advice(point)}",
             names,
             distance_m=round(distance, 3),
             bearing_deg=round(bearing, 1),
@@ -310,7 +311,8 @@ class DrawnRoutes:
             problem = f"the target is {metres(gap_m)} from {_names(names)}, nearer than {self.asked}"
         raise _blocked(
             NoRouteKind.TARGET_BLOCKED,
-            f"{problem}; the nearest free point is {distance:.2f} m away, bearing {round(bearing) % 360}°, at {position}",
+            f"{problem}; the nearest free point is {distance:.2f} m away, bearing {round(bearing) % 360}°, at {position}"
+            f"{self.ground.common_ground_advice(point)}",
             names,
             clearance_m=round(self.clearance_m, 3),
             distance_m=round(distance, 3),

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from charts import FIELD, HOME, WALL, place, situation_of
 
 from missions import GoTo, plan, read_fence, read_mission, read_situation
 from missions.errors import MissionFormatError
 from missions.fence import Fence
+from missions.geo import LatLon
 from missions.rally import RallyPoint
 from missions.situation import Known, Situation
 
@@ -63,3 +66,22 @@ def test_it_draws_itself(made, tmp_path, name, begin):
     assert (tmp_path / name).read_bytes().lstrip()[: len(begin)] == begin
     with pytest.raises(MissionFormatError, match="no picture format"):
         made.plot(tmp_path / "a.jpeg")
+
+
+@pytest.mark.parametrize(
+    ("metres_north_east", "turns"),
+    [
+        ([(0, 0), (10, 0)], 0),
+        ([(0, 0), (10, 0), (20, 0)], 0),  # a long line in pieces
+        ([(0, 0), (10, 0), (10, 10)], 1),
+        ([(0, 0), (10, 0), (10, 0), (10, 10), (0, 10)], 2),  # one place twice
+        ([(0, 0), (10, 0), (0, 0)], 1),
+        ([(0, 0), (10, 5), (20, 0), (30, 5)], 2),
+    ],
+)
+def test_turns_are_counted_where_the_lines_bend(made, metres_north_east, turns):
+    path = tuple(
+        LatLon(WEST.lat_deg + north_m / 111_000, WEST.lon_deg + east_m / 85_000)
+        for north_m, east_m in metres_north_east
+    )
+    assert replace(made, path=path).turn_count == turns

@@ -15,7 +15,7 @@ from mavlink_bridge.cli.options.shared import CommonOptions, SystemOption
 class LogOptions(CommonOptions):
     """Summarise telemetry logs: who speaks, fences and missions transferred, targets, modes, the drive and its clearance.
 
-    Drives of a mission (AUTO) are graded: least clearance, deviation and time against the drive model's prediction.
+    Drives of a mission (AUTO) are graded: least clearance, deviation and time against the drive model's prediction. The verdict stands last.
 
     For example:
 
@@ -27,6 +27,12 @@ class LogOptions(CommonOptions):
     files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Telemetry logs: .tlog, .raw, .gz.")]
     plot: Annotated[
         list[Path],
-        typer.Option(metavar="FILE", help="Draw fence, track, mission and targets: .png, .svg, .pdf, .html."),
+        typer.Option(
+            metavar="FILE",
+            help="Draw fence, drives, mission and targets: .png, .svg, .pdf, .html; - in the terminal.",
+        ),
     ] = field(default_factory=list)
+    messages: Annotated[
+        bool, typer.Option("--messages", help="Tell how many messages of each type came, and how often.")
+    ] = False
     system: SystemOption = None

@@ -182,7 +182,7 @@ def test_pictures(tmp_path, yard):
     picture = tmp_path / "check.svg"
     document = check_yard(yard, "--plot", str(picture))
     assert document["outputs"] == [str(picture)]
-    assert "1 of 2 legs break" in picture.read_text()
+    assert "1 of 2 legs does not keep" in picture.read_text()
     sketch = run("check", "--mission", yard["mission"], "--fence", yard["fence"], "--plot", "-")
     assert len(sketch.stdout.splitlines()) > 20
 
@@ -473,6 +473,8 @@ def test_the_firmware_is_taken_from_the_option_else_from_the_file(tmp_path, yard
     vehicle.write_text("# Version: 4.5.7\nWP_SPEED 2\nFENCE_NTF_FREQ 1\n", encoding="utf-8")
     assert check_yard(yard, "--vehicle", str(vehicle))["extrapolated"] == []
     vehicle.write_text("# Version: 4.5.7\nWP_SPEED 2\n", encoding="utf-8")
-    (old,) = check_yard(yard, "--vehicle", str(vehicle))["extrapolated"]
+    picture = tmp_path / "check.html"
+    (old,) = check_yard(yard, "--vehicle", str(vehicle), "--plot", str(picture))["extrapolated"]
     assert "not measured for ArduPilot 4.5.7" in old
+    assert "while driving, extrapolated" in picture.read_text(encoding="utf-8")
     assert check_yard(yard, "--vehicle", str(vehicle), "--firmware", "4.6")["extrapolated"] == []

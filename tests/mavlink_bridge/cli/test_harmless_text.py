@@ -30,7 +30,8 @@ from mavlink_bridge.director.announcer import Announcer
 from mavlink_bridge.mavlink import messages as m
 from missions.geo import LatLon
 from missions.harmless import harmless
-from missions.picture.track import TrackPicture, draw_track
+from missions.picture import draw_scene
+from missions.picture.drives import drive_scene
 
 FOLDER = Path(mavlink_bridge.cli.__file__).parent
 TITLE = "\x1b]0;PWNED\x07"
@@ -165,7 +166,7 @@ def printing(tree):
         is_echo = re.fullmatch(r"(typer|click)\.(echo|secho|style|echo_via_pager)", called)
         is_stream = re.fullmatch(r"sys\.(stdout|stderr)(\.buffer)?\.write(lines)?", called)
         is_raw_row = called.endswith(".add_row") and not all(is_cell(one) for one in node.args)
-        writes = called in ("write_mission", "write_situation", "write_fence", "draw_plan", "draw_track")
+        writes = called in ("write_mission", "write_situation", "write_fence", "draw_plan", "draw_scene")
         is_unkept = writes and not any(one.arg == "write" for one in node.keywords)
         if is_print or is_echo or is_stream or is_raw_row or is_unkept:
             yield ast.unparse(node)
@@ -280,24 +281,30 @@ class TestFiles:
 
 class TestPictures:
     NAME = f"{TITLE}<b>a</b> <a href='javascript:1'>$x_{{$ & [red].tlog"
-    PICTURE = TrackPicture(None, (("AUTO", (LatLon(0.0, 0.0), LatLon(0.0, 0.001))),), title=NAME)
+    SCENE = drive_scene(
+        (NAME,),
+        None,
+        [(NAME, (LatLon(0.0, 0.0), LatLon(0.0, 0.001)))],
+        breaches=[(NAME, LatLon(0.0, 0.0005))],
+    )
 
     def test_svg(self, tmp_path):
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            draw_track(self.PICTURE, tmp_path / "x.svg")
+            draw_scene(self.SCENE, tmp_path / "x.svg")
         text = (tmp_path / "x.svg").read_text(encoding="utf-8")
         ET.fromstring(text)
         assert is_plain(text)
 
     def test_html(self, tmp_path):
-        draw_track(self.PICTURE, tmp_path / "x.html")
+        draw_scene(self.SCENE, tmp_path / "x.html")
         page = (tmp_path / "x.html").read_text(encoding="utf-8")
         assert "javascript:1'>" not in page
-        (title,) = re.findall(r'"text":("[^"]*PWNED[^"]*")', page)
-        assert json.loads(title) == (
-            r"\x1b]0;PWNED\x07&lt;b&gt;a&lt;/b&gt; &lt;a href='javascript:1'&gt;$x_{$ &amp; [red].tlog"
-        )
+        shown = r"\x1b]0;PWNED\x07&lt;b&gt;a&lt;/b&gt; &lt;a href='javascript:1'&gt;$x_{$ &amp; [red].tlog"
+        found = re.findall(r'"name":("[^"]*PWNED[^"]*")', page)
+        assert {json.loads(name) for name in found} == {shown}
+        assert f"<h1>{shown}</h1>" in page
+        assert is_plain(re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL))
 
 
 def test_what_the_bridge_says_to_ground_stations():

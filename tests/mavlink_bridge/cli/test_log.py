@@ -12,7 +12,9 @@ from mavlink_bridge.cli.app import app
 from missions.errors import MissionFormatError
 from missions.fence import Fence
 from missions.geo import LatLon
-from missions.picture.track import TrackPicture, draw_track, track_figure
+from missions.picture import draw_scene
+from missions.picture.drives import drive_scene
+from missions.picture.figure import scene_figure
 
 
 def run(*arguments: str):
@@ -24,20 +26,99 @@ def test_tells_people_what_happened(logs):
     assert result.exit_code == 0
     for text in (
         "57.7 s from 2026-11-22 02:17:42 UTC, 6120 messages",
-        "38.1 m driven, nearest to the fence 0.00 m",
-        "exclusion polygon 1",
-        "Drive from 43.4 s: items 1 to 2",
+        "Vehicle 1: 38.1 m driven\n",
+        "Breach 1: left the fence at 55.5 s, 40.0715683,-105.2297445; 5.41 m inside exclusion polygon 1",
+        "Drive 1 from 43.4 s: items 1 to 2",
+        "least clearance: 0.32 m; predicted to leave the fence",
         "1 of 2 waypoints reached",
         "predicted",
         "within the predicted corridor",
         "read-back",
         "16 of 16",
         "255/230",
-        "GLOBAL_POSITION_INT",
         "INITIALISING",
         "WP_RADIUS",
     ):
         assert text in result.stdout
+    assert "nearest" not in result.stdout
+    last = result.stdout.splitlines()[-1]
+    assert last == "Verdict on vehicle 1: left the fence once: 5.41 m inside exclusion polygon 1"
+
+
+def test_the_messages_are_told_on_request(logs):
+    yard = str(logs / "mission-yard.tlog")
+    assert "GLOBAL_POSITION_INT" not in run(yard).stdout
+    assert "GLOBAL_POSITION_INT" in run(yard, "--messages").stdout
+    assert run(yard, "--json").stdout == run(yard, "--json", "--messages").stdout
+
+
+def test_a_drive_within_the_fence_ends_with_its_least_clearance(logs):
+    told = run(str(logs / "guided-maze.tlog")).stdout
+    assert "Least clearance: 5.13 m at 70.5 s" in told
+    assert told.splitlines()[-1] == (
+        "Verdict on vehicle 1: stayed inside the fence, at the nearest 5.13 m from inclusion polygon 1"
+    )
+    assert run(str(logs / "no-fence.tlog")).stdout.splitlines()[-1].endswith("no fence known, not measured")
+
+
+@pytest.fixture
+def two_drives(tmp_path):
+    """Two drives of a mission, the second off its lines; between them one by hand out of the fence."""
+    log = Log()
+    log.heartbeat()
+    log.parameters()
+    log.fence()
+    log.mission([(0, 40), (30, 40), (30, 0), (-20, -30)])
+    log.drive([(0, 0), (0, 40), (30, 40), (30, 0), (-20, -30)])
+    log.drive([(-20, -30), (-60, -30), (-20, 0)], mode=0)
+    log.drive([(-20, 0), (0, 40), (15, 15), (30, 0), (-20, -30)])
+    log.heartbeat(4, armed=True)
+    return log.write(tmp_path / "two.tlog")
+
+
+def test_the_side_of_the_fence_and_the_tolerance_are_named(two_drives):
+    told = run(str(two_drives)).stdout
+    assert "10.00 m outside inclusion polygon 1" in told
+    assert "5.00 m inside exclusion polygon 1" in told
+    assert (
+        "within the predicted corridor: 0.23 m beyond it, and 0.25 m are allowed for the error of the position"
+        in told
+    )
+    assert "m outside the predicted corridor (0.25 m are allowed for the error of the position)" in told
+    assert told.splitlines()[-1] == (
+        "Verdict on vehicle 1: left the fence 2 times, at most 10.00 m outside inclusion polygon 1; "
+        "drive 2 left the predicted corridor"
+    )
+
+
+def test_a_picture_tells_drives_apart_and_names_start_and_breaches(two_drives, tmp_path):
+    path = tmp_path / "two.svg"
+    assert run(str(two_drives), "--plot", str(path)).exit_code == 0
+    text = path.read_text()
+    for words in (
+        "drive 1 (AUTO)",
+        "MANUAL",
+        "drive 2 (AUTO)",
+        "breach 1",
+        "breach 2",
+        "left the fence",
+        "start",
+    ):
+        assert f"<!-- {words} -->" in text
+    sketch = run(str(two_drives), "--plot", "-").stdout
+    assert sketch.count("✗") == 3  # two breaches, and the legend
+    assert "S start" in sketch
+    assert run(str(two_drives), "--plot", "-", "--json").exit_code == 2
+
+
+def test_a_mission_has_as_many_items_everywhere(logs, tmp_path, monkeypatch):
+    """With home, as on the vehicle: in the log, its transfers, a check of it, a replay."""
+    yard = str(logs / "mission-yard.tlog")
+    (vehicle,) = json.loads(run(yard, "--json").stdout)["logs"][0]["vehicles"]
+    counts = {vehicle["mission_items"], *(t["seen"] for t in vehicle["transfers"] if t["kind"] == "mission")}
+    checked = CliRunner().invoke(app, ["check", "--log", yard, "--json"])
+    counts.add(json.loads(checked.stdout)["mission_items"])
+    assert counts == {3}
 
 
 def test_one_document_with_everything(logs):
@@ -49,11 +130,12 @@ def test_one_document_with_everything(logs):
     assert {(row["system"], row["component"]) for row in yard["messages"]} == {(1, 1), (1, 190), (255, 230)}
     (vehicle,) = yard["vehicles"]
     assert vehicle["fences"][0]["exclusion_polygons"] == 2
-    assert vehicle["mission_items"] == 2
+    assert vehicle["mission_items"] == 3
     assert vehicle["home"] == [40.071374, -105.22993]
     assert [transfer["kind"] for transfer in vehicle["transfers"]] == ["fence", "fence", "mission", "mission"]
     assert vehicle["nearest"]["clearance_m"] == 0.0
     assert vehicle["intrusions"][0]["zone"] == "exclusion polygon 1"
+    assert vehicle["intrusions"][0]["begun_at"] == [40.0715683, -105.2297445]
     (drive,) = vehicle["drives"]
     assert drive["is_as_foreseen"] is True
     assert drive["took_s"] == 6.5
@@ -170,32 +252,29 @@ def log_heartbeat(mav_type=6, autopilot=8):
     return Heartbeat(mav_type, autopilot)
 
 
-def test_the_picture_shows_each_mode_once_and_the_track_in_place():
+def test_the_picture_shows_each_mode_once_and_the_track_in_place(tmp_path):
     places = [LatLon(40.0, -105.0), LatLon(40.0001, -105.0), LatLon(40.0002, -105.0)]
-    picture = TrackPicture(
-        fence=Fence(FIELD.zones),
-        parts=(
-            ("AUTO", tuple(places[:2])),
-            ("HOLD", tuple(places[1:])),
-            ("AUTO", tuple(places[1:])),
-        ),
-        targets=(places[2],),
-    )
-    axes = track_figure(picture).axes[0]
+    parts = [("AUTO", places[:2]), ("HOLD", places[1:]), ("AUTO", places[1:])]
+    scene = drive_scene(("A drive",), Fence(FIELD.zones), parts, targets=(places[2],))
+    axes = scene_figure(scene).axes[0]
     labels = [line.get_label() for line in axes.get_lines() if not line.get_label().startswith("_")]
-    assert labels == ["inclusion", "AUTO", "HOLD", "target"]
+    assert labels == ["AUTO", "HOLD", "start", "target"]
     auto = next(line for line in axes.get_lines() if line.get_label() == "AUTO")
     north_m = auto.get_ydata()
     assert north_m[1] - north_m[0] == pytest.approx(11.1, abs=0.05)
-    west, south, east, north = picture.bounds_m
+    assert scene.start == pytest.approx(auto.get_xydata()[0])
+    west, south, east, north = scene.bounds_m
     assert (east - west, north - south) == pytest.approx((112.0, 112.0), abs=1.0)
     with pytest.raises(MissionFormatError, match="nothing to draw"):
-        TrackPicture(fence=None, parts=())
+        drive_scene((), None, ())
     with pytest.raises(MissionFormatError, match=r"drive\.bmp: no picture format"):
-        draw_track(picture, places_path())
+        draw_scene(scene, tmp_path / "drive.bmp")
 
 
-def places_path():
-    from pathlib import Path
-
-    return Path("drive.bmp")
+def test_more_drives_than_can_be_told_apart_share_a_name():
+    places = [LatLon(40.0, -105.0), LatLon(40.0001, -105.0)]
+    for count, names in ((24, 24), (25, 24), (40, 24)):
+        scene = drive_scene((), None, [(f"drive {number}", places) for number in range(count)])
+        found = [track.name for track in scene.tracks]
+        assert len(set(found)) == names
+        assert found.count("other drives") == (count - 23 if count > 24 else 0)

@@ -40,7 +40,12 @@ def test_recorded_then_expected(copies, tmp_path):
     files = sorted(path.name for path in tmp_path.glob("*.events.jsonl"))
     assert files == sorted(f"{name}.events.jsonl" for name in NAMES)
     assert all(f"Wrote {tmp_path / name}" in recorded.stdout for name in files)
-    assert run(*copies, "--expect", str(tmp_path), "--quiet", "--jobs", "1").exit_code == 0
+    same = run(*copies, "--expect", str(tmp_path), "--jobs", "1")
+    count = sum(len(file.read_text().splitlines()) for file in tmp_path.glob("*.events.jsonl"))
+    assert (same.exit_code, same.stdout.splitlines()[-1]) == (0, f"As expected: all {count} events came")
+    quiet = run(*copies, "--expect", str(tmp_path), "--quiet", "--jobs", "1")
+    assert (quiet.exit_code, quiet.stdout) == (0, "")
+    assert "As expected" not in run(*copies, "--expect", str(tmp_path), "--json", "--jobs", "1").stdout
     path = tmp_path / "no-fence.events.jsonl"
     path.write_text(path.read_text().replace("FenceMissingError", "FenceError"))
     different = run(*copies, "--expect", str(tmp_path), "--quiet", "--jobs", "1")
@@ -83,6 +88,34 @@ def test_an_unusable_log_stops_no_other(copies, tmp_path, jobs):
     (tmp_path / "none.events.jsonl").write_text('{"event": "target"}\n')
     missing = run(str(tmp_path / "none.tlog"), copies[1], "--expect", str(tmp_path), "--jobs", "1")
     assert missing.exit_code == 8
+
+
+def test_what_a_log_does_not_hold_is_not_learnt(logs):
+    told = run(str(logs / "no-fence.tlog")).stdout
+    assert "learnt: no fence seen, no mission seen" in told
+    assert "learnt: fence of 4 zones, no mission seen" in run(str(logs / "mission-yard.tlog")).stdout
+    assert "of 0" not in told
+
+
+@pytest.mark.parametrize("zeros", [b"", bytes(5000), b"\xff" * 65536])
+def test_a_log_with_times_of_1970_and_nothing_in_it_is_read(tmp_path, zeros):
+    """As ground stations write them before the clock is right, into files that are longer than what was written."""
+    codec = Codec(1, 1)
+    with TlogWriter(tmp_path / "odd.tlog") as log:
+        for second in range(60):
+            time_s = second if second < 20 else 1_790_000_000 + second
+            log.write(time_s, codec.encode(Heartbeat(10, 3, 81, 4)))
+            log.write(
+                time_s, codec.encode(GlobalPositionInt(second * 1000, 481005000, 115005000 + second * 100))
+            )
+    path = tmp_path / "odd.tlog"
+    path.write_bytes(path.read_bytes() + zeros)
+    told = run(str(path))
+    assert told.exit_code == 0
+    assert "learnt: no fence seen, no mission seen" in told.stdout
+    summary = CliRunner().invoke(app, ["log", str(path)])
+    assert summary.exit_code == 0
+    assert summary.stdout.splitlines()[-1] == "Verdict on vehicle 1: no fence known, not measured"
 
 
 def test_all_together_against_one_file(copies, tmp_path):

@@ -15,6 +15,7 @@ from rich.console import Console
 
 from mavlink_bridge.cli.bridge_view import LiveView
 from mavlink_bridge.cli.failing import begin_telling
+from mavlink_bridge.cli.interrupting import terminable
 from mavlink_bridge.cli.opening import Opening
 from mavlink_bridge.cli.typed import CONFIRM, understood
 from mavlink_bridge.director import Director, Orders, State
@@ -159,7 +160,7 @@ class Watcher:
 def test_the_view_goes_on_while_the_link_is_opened_again():
     watcher = Watcher(3)
     shell = bridge._Shell(Director(Orders()), "tcp:127.0.0.1:1", lambda _event: None, watcher, None)
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(KeyboardInterrupt), terminable():  # which puts back what SIGINT does
         shell.run(None, 30.0)
     assert "tcp:127.0.0.1:1 cannot be opened" in watcher.link_trouble
     assert watcher.notes[-1] == f"link: {watcher.link_trouble}"

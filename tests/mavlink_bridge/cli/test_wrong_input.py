@@ -339,6 +339,8 @@ WRONG: list[tuple[tuple[str, ...], int, str]] = [
     (("check", "--log", "nofence.tlog", "--connect", "tcp:127.0.0.1:1"), USAGE, "--connect"),
     # conversions
     (("convert",), USAGE, "IN"),
+    (("fence", "merge"), USAGE, "FILE"),
+    (("fence", "split", "x.plan", "-o", "y.plan"), USAGE, "expected merge"),
     (("convert", "yard.waypoints"), USAGE, "OUT"),
     (("convert", "missing.plan", "out.plan"), INPUT, "missing.plan"),
     (("convert", "yard.waypoints", "yard.waypoints"), USAGE, "same file as IN"),

@@ -190,7 +190,7 @@ def test_the_drawn_track_stays_small(monkeypatch):
         fixes = [TrackFix(0.0, 0.0, place(*point), 1.0, 0, None) for point in points]
         array = FRAME.to_local_array([fix.position for fix in fixes])
         total_m += odometer.drive("AUTO", fixes, array)
-    ((_, positions),) = odometer.parts
+    ((_, _, positions),) = odometer.parts
     assert total_m == pytest.approx(4999.0, abs=1.0)
     assert 20 < len(positions) <= 151
     assert FRAME.to_local(positions[0]).east_m == pytest.approx(0.0, abs=0.1)

@@ -300,11 +300,28 @@ def test_a_union_that_no_inclusion_brings_within_the_home_circle_is_refused() ->
     assert is_allowed(alone, -40, 0)
 
 
+def test_inclusions_that_overlap_leave_their_intersection_and_that_is_said() -> None:
+    """As two areas drawn over one another in a ground station, for one to drive in."""
+    areas = square(IN, 0, 0, 10), square(IN, 8, 0, 10)
+    both = ground(*areas)
+    told = (
+        "the autopilot allows only the intersection of all inclusions: draw the area as one inclusion polygon "
+        "(pbpp fence merge makes it)"
+    )
+    assert both.warnings == (f"the fence has 2 inclusions; {told}",)
+    common, first, outside = (Point(both.frame.to_local(offset(HOME, east_m, 5))) for east_m in (9, 4, 40))
+    assert both.common_ground_advice(first) == f"; {told}"
+    assert both.common_ground_advice(common) == both.common_ground_advice(outside) == ""
+    union = ground(*areas, union=True)
+    assert (union.warnings, union.common_ground_advice(first)) == ((), "")
+    assert ground(areas[0], home=HOME, home_radius_m=50).warnings == ()
+
+
 def test_a_fence_that_leaves_no_ground_is_refused() -> None:
     check_ground(ground(square(IN, 0, 0, 10), square(OUT, 0, 0, 9)))
     with pytest.raises(
         FenceError,
-        match=r"^inclusion polygon 1 and inclusion polygon 2 leave no ground in common; with FENCE_OPTIONS 2",
+        match=r"^inclusion polygon 1 and inclusion polygon 2 leave no ground in common; the autopilot allows only the intersection",
     ):
         check_ground(ground(square(IN, 0, 0, 10), square(IN, 50, 50, 10)))
     with pytest.raises(FenceError, match=r"^the exclusions leave no ground of inclusion polygon 1$"):

@@ -8,13 +8,14 @@ import pytest
 from missions.firmware import Firmware
 from missions.formats import read_situation
 from missions.geo import LatLon
-from missions.picture.scene import Scene
+from missions.picture.plans import plan_scene
 from missions.planning.plan import plan
 from missions.request import Request
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from missions.picture.scene import PictureScene
     from missions.planned import Plan
 
 START = LatLon(40.071374, -105.22993)
@@ -41,5 +42,10 @@ def plans(fields: Path) -> dict[str, Plan]:
 
 
 @pytest.fixture(params=REQUESTS)
-def scene(request: pytest.FixtureRequest, plans: dict[str, Plan]) -> Scene:
-    return Scene(plans[request.param])
+def any_plan(request: pytest.FixtureRequest, plans: dict[str, Plan]) -> Plan:
+    return plans[request.param]
+
+
+@pytest.fixture
+def scene(any_plan: Plan) -> PictureScene:
+    return plan_scene(any_plan)

@@ -13,9 +13,11 @@ from missions.fence import Fence, PolygonZone, ZoneKind
 from missions.geo import LocalPoint
 from missions.ground.ground import lay_out
 from missions.picture import sketch_plan
-from missions.picture.scene import Scene
+from missions.picture.plans import plan_scene
+from missions.picture.sketch import sketch
 
 if TYPE_CHECKING:
+    from missions.picture.scene import PictureScene
     from missions.planned import Plan
 
 
@@ -26,7 +28,7 @@ def cells_of(text: str) -> list[str]:
     return lines[:legend]
 
 
-def cell_boxes(scene: Scene, rows: list[str]) -> tuple[float, dict[tuple[int, int], box]]:
+def cell_boxes(scene: PictureScene, rows: list[str]) -> tuple[float, dict[tuple[int, int], box]]:
     """Lay the picture over the field: cells twice as high as wide, from the upper left corner."""
     west, south, east, north = scene.bounds_m
     wide = max(map(len, rows))
@@ -45,16 +47,16 @@ def cell_boxes(scene: Scene, rows: list[str]) -> tuple[float, dict[tuple[int, in
 
 
 @pytest.mark.parametrize("columns", [40, 80, 120])
-def test_it_fits(scene: Scene, columns: int) -> None:
-    text = sketch_plan(scene.plan, columns=columns, track=scene.plan.path)
+def test_it_fits(any_plan: Plan, columns: int) -> None:
+    text = sketch_plan(any_plan, columns=columns, track=any_plan.path, unsafe={0: any_plan.path[0]})
     assert max(map(len, text.splitlines())) <= columns
     assert len(text.splitlines()) <= 46
     assert text.endswith("\n")
     assert not text.endswith("\n\n")
 
 
-def test_every_sign_stands_where_it_belongs(scene: Scene) -> None:
-    rows = cells_of(sketch_plan(scene.plan))
+def test_every_sign_stands_where_it_belongs(any_plan: Plan, scene: PictureScene) -> None:
+    rows = cells_of(sketch_plan(any_plan))
     cell_m, boxes = cell_boxes(scene, rows)
     route = LineString(scene.route)
     slack_m = 0.1 * cell_m
@@ -71,10 +73,10 @@ def test_every_sign_stands_where_it_belongs(scene: Scene) -> None:
         elif sign == "▓":
             assert cell.intersection(scene.exclusions).area > 0.03 * cell.area
         elif sign == "░":
-            assert cell.difference(scene.plan.ground.keep_in).area > 0.03 * cell.area
+            assert cell.difference(scene.ground.keep_in).area > 0.03 * cell.area
         else:
             assert sign == " "
-            assert cell.intersection(scene.plan.ground.allowed).area > 0.55 * cell.area
+            assert cell.intersection(scene.ground.allowed).area > 0.55 * cell.area
     assert {"▓", "░", " ", "S"} <= seen
     dotted = [
         cell
@@ -86,7 +88,7 @@ def test_every_sign_stands_where_it_belongs(scene: Scene) -> None:
 
 def test_a_terminal_without_blocks_gets_plain_signs(plans: dict[str, Plan]) -> None:
     for encoding in ("ascii", "cp1252", "no-such-encoding"):
-        text = sketch_plan(plans["yard"], track=plans["yard"].path, encoding=encoding)
+        text = sketch_plan(plans["yard"], track=plans["yard"].path[:2], encoding=encoding)
         assert text.isascii()
         assert {"#", ".", "*", "S", "1", "2"} <= set("".join(cells_of(text)))
         assert "# exclusion" in text
@@ -104,16 +106,16 @@ def test_a_thin_wall_is_seen(plans: dict[str, Plan]) -> None:
             ZoneKind.EXCLUSION, tuple(frame.to_lat_lon(LocalPoint(*corner)) for corner in corners)
         )
         fence = Fence((plan.fence.zones[0], wall))
-        scene = Scene(replace(plan, fence=fence, ground=lay_out(fence, frame)))
-        rows = cells_of(sketch_plan(scene.plan))
+        scene = plan_scene(replace(plan, fence=fence, ground=lay_out(fence, frame)))
+        rows = cells_of(sketch(scene))
         length_m = max(np.ptp(np.array(corners), axis=0))
         cell_m, _ = cell_boxes(scene, rows)
         signs = sum(row.count("▓") for row in rows)
         assert signs >= length_m / (2 * cell_m) - 3
 
 
-def test_the_scale_bar_is_as_long_as_it_says(scene: Scene) -> None:
-    text = sketch_plan(scene.plan)
+def test_the_scale_bar_is_as_long_as_it_says(scene: PictureScene) -> None:
+    text = sketch(scene)
     (legend,) = (line for line in text.splitlines() if "north up" in line)
     bar, length = legend.split("┤")[0] + "┤", int(legend.split("┤")[1].split()[0])
     cell_m, _ = cell_boxes(scene, cells_of(text))
@@ -130,3 +132,27 @@ def test_the_legend_names_what_is_there(plans: dict[str, Plan]) -> None:
     only_exclusions = Fence(plans["yard"].fence.zones[1:])
     ground = lay_out(only_exclusions, plans["yard"].ground.frame)
     assert "outside" not in sketch_plan(replace(plans["yard"], fence=only_exclusions, ground=ground))
+
+
+def test_unsafe_legs_and_crossings_are_seen(plans: dict[str, Plan]) -> None:
+    plan = plans["yard"]
+    text = sketch_plan(plan, unsafe={1: plan.path[2]})
+    rows = cells_of(text)
+    assert sum(row.count("▪") for row in rows) > 10
+    assert sum(row.count("✗") for row in rows) == 1
+    assert "▪ unsafe leg" in text
+    assert "✗ crossed or too near" in text
+    plain = sketch_plan(plan, unsafe={1: plan.path[2]}, encoding="ascii")
+    assert "! unsafe leg" in plain
+    assert "X crossed or too near" in plain
+    assert "▪" not in sketch_plan(plan)
+
+
+def test_start_target_and_what_was_asked_are_all_seen(plans: dict[str, Plan]) -> None:
+    plan = plans["yard"]
+    home = replace(plan, targets=(plan.targets[0], plan.path[0]), asked_targets=(plan.path[2], plan.path[0]))
+    text = sketch_plan(home)
+    (row,) = (row for row in cells_of(text) if "S" in row)
+    assert "S2" in row
+    assert sum(row.count("?") for row in cells_of(text)) == 1
+    assert "? target as asked" in text

@@ -275,11 +275,25 @@ def test_union_drives_through_the_overlap() -> None:
         drawn(situation_of(*zones), start, target)
 
 
+def test_ends_in_one_of_two_inclusions_hear_of_the_intersection() -> None:
+    zones = (box(IN, -100, -100, 20, 100), box(IN, -20, -100, 100, 100))
+    for start, target in ((place(-80, 0), place(0, 0)), (place(0, 0), place(80, 0))):
+        with pytest.raises(
+            (StartBlockedError, TargetBlockedError), match="only the intersection of all inclusions: draw"
+        ) as caught:
+            drawn(situation_of(*zones), start, target)
+        assert "FENCE_OPTIONS" not in str(caught.value)
+    outside = place(0, 300)
+    with pytest.raises(TargetBlockedError, match=r"inclusion polygon 1") as caught:
+        drawn(situation_of(*zones), place(0, 0), outside)
+    assert "intersection" not in str(caught.value)
+
+
 def test_inclusions_without_common_ground_are_refused() -> None:
     zones = (box(IN, -100, -100, -50, -50), box(IN, 50, 50, 100, 100))
     with pytest.raises(
         FenceError,
-        match=r"inclusion polygon 1 and inclusion polygon 2 leave no ground in common; with FENCE_OPTIONS 2",
+        match=r"inclusion polygon 1 and inclusion polygon 2 leave no ground in common; the autopilot allows only the intersection",
     ):
         drawn(situation_of(*zones), place(-80, -80), place(80, 80))
     with pytest.raises(FenceError, match="no ground"):

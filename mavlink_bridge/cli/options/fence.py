@@ -1,0 +1,34 @@
+"""The options of ``pbpp fence``, and its help."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mavlink_bridge.cli.options.shared import CommonOptions, IgnorePointsOption, OutermostOption, RoleOption
+
+ACTIONS = ("merge",)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FenceOptions(CommonOptions):
+    """Make a fence fit for the vehicle. `merge`: one inclusion polygon in the place of several that overlap.
+
+    The autopilot allows only the intersection of all inclusions; who draws an area in several pieces means all of them together.
+
+    For example:
+
+    `pbpp fence merge pieces.plan -o field.plan`
+    """
+
+    action: Annotated[str, typer.Argument(metavar="|".join(ACTIONS), help="What to do.")]
+    source: Annotated[Path, typer.Argument(metavar="FILE", help="A fence: .plan, .waypoints, .kml, …")]
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FILE", help="Where to: .plan, .waypoints, .geojson, …")
+    ]
+    role: RoleOption = field(default_factory=list)
+    outermost: OutermostOption = None
+    ignore_points: IgnorePointsOption = False

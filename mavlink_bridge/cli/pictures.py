@@ -1,0 +1,51 @@
+"""Pictures that a command draws: to files, and to the terminal."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mavlink_bridge.cli.kept_files import write_kept
+from mavlink_bridge.cli.terminal import echo_lines
+from mavlink_bridge.errors import UsageError
+from missions.picture import TERMINAL, check_picture_format, draw_scene
+from missions.picture.sketch import sketch
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from missions.picture.scene import PictureScene
+
+_COLUMNS = 80  # of a sketch, at most
+
+
+def check_plots(plots: list[Path], *, json_output: bool) -> None:
+    """Check what `--plot` asks for, before any work is done.
+
+    Raises
+    ------
+    UsageError
+        A sketch and a JSON document both want the standard output.
+    MissionFormatError
+        A suffix is unknown, or what draws it is not installed.
+    """
+    if json_output and Path(TERMINAL) in plots:
+        raise UsageError("--plot - and --json both want the standard output; give a file to --plot")
+    for path in plots:
+        check_picture_format(path)
+
+
+def draw(make_scene: Callable[[], PictureScene], plots: list[Path]) -> list[Path]:
+    """Draw a scene, if that is asked for, to files and to the terminal where ``-`` is among them; return the files."""
+    if not plots:
+        return []
+    scene = make_scene()
+    for path in plots:
+        if str(path) == TERMINAL:
+            columns = min(_COLUMNS, shutil.get_terminal_size().columns)
+            echo_lines(sketch(scene, columns=columns, encoding=sys.stdout.encoding).splitlines())
+        else:
+            draw_scene(scene, path, write=write_kept)
+    return [path for path in plots if str(path) != TERMINAL]

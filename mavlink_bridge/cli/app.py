@@ -31,7 +31,7 @@ COMMANDS = {
     "upload": "Upload a file to the vehicle and verify it, or restore a backup.",
     "download": "Download a mission, fence, rally points or parameters.",
     "convert": "Convert a file from one format to another.",
-    "fence": "Make a fence fit for the vehicle: overlapping inclusions one polygon.",
+    "fence": "Make a fence fit for the vehicle: merge overlapping inclusions.",
     "sim": "Run a simulated rover.",
     "demo": "Plan, upload and drive on a simulated rover, as a demonstration.",
     "doctor": "Check this installation: versions, ports, keys, a test plan.",

@@ -33,6 +33,6 @@ class LogOptions(CommonOptions):
         ),
     ] = field(default_factory=list)
     messages: Annotated[
-        bool, typer.Option("--messages", help="Tell how many messages of each type came, and how often.")
+        bool, typer.Option("--messages", help="List the messages by type, with count and rate.")
     ] = False
     system: SystemOption = None

@@ -133,7 +133,7 @@ class TargetInbox(Part):
             return
         self.answers.refuse(frame, m.MavResult.DENIED)
         is_heeded = TargetSource.REPOSITION in self.core.orders.target_sources
-        why = "it contains no position" if is_heeded else "reposition targets are not enabled (--target-from)"
+        why = "it has no position" if is_heeded else "not in --target-from"
         error = RefusedError(f"DO_REPOSITION denied: {why}")
         self.core.voice.error(now_s, EventName.TROUBLE, error, {})
 

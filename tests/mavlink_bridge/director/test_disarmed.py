@@ -147,7 +147,7 @@ def test_disarmed_while_the_link_was_lost_it_is_put_back_too(unheard_s):
     run.is_cut = False
     wait(run, 15)
     assert (run.vehicles[0].mode, run.vehicles[0].is_armed) == (Mode.HOLD, False)
-    assert "disarmed while it was not heard; it was switched back from AUTO" in str(run.director.trouble)
+    assert "disarmed while the link was lost; it was switched back from AUTO" in str(run.director.trouble)
 
 
 def test_what_drives_on_while_the_link_was_lost_is_not_touched():

@@ -463,9 +463,7 @@ def test_commands_to_our_component_are_all_answered():
         (Command.DO_REPOSITION, m.MavResult.ACCEPTED),
     ]
     run.run_until(
-        lambda: any(
-            "contains no position" in text.text for text in run.sent if isinstance(text, m.Statustext)
-        ),
+        lambda: any("has no position" in text.text for text in run.sent if isinstance(text, m.Statustext)),
         5,
     )
 

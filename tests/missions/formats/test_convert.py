@@ -86,7 +86,9 @@ def test_a_choice_is_asked_for_where_one_list_fits(plan: Path, tmp_path: Path) -
     out = tmp_path / "x.waypoints"
     result = run(plan, out)
     assert result.exit_code == 2
-    assert "holds mission and fence and rally, and a .waypoints file one of them" in result.stderr
+    assert (
+        "holds mission and fence and rally, and a .waypoints file can hold only one of them" in result.stderr
+    )
     assert "--only mission or --only fence or --only rally" in result.stderr
     assert not out.exists()
     assert run(plan, out, "--only", "fence").exit_code == 0

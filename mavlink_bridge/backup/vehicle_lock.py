@@ -50,7 +50,7 @@ class Holder:
     def error(self, vehicle: VehicleMark) -> VehicleInUseError:
         """Return the error of who wanted to write meanwhile."""
         return VehicleInUseError(
-            f"{self} on this computer is writing to {vehicle}; this command wrote nothing",
+            f"{self} on this computer is writing to {vehicle}; nothing was written by this command",
             process=self.process,
             since=self.since,
             advice="wait for it to finish, or stop it",

@@ -71,7 +71,7 @@ def _fitted(line: str, stream: TextIO) -> str:
     """Return a line broken between words where a terminal is narrower; what follows is indented, so that it passes for no line of its own."""
     if not stream.isatty() or len(line) <= (columns := shutil.get_terminal_size().columns):
         return line
-    return textwrap.fill(
+    shown = textwrap.fill(
         line,
         columns,
         subsequent_indent="  ",
@@ -79,6 +79,7 @@ def _fitted(line: str, stream: TextIO) -> str:
         break_long_words=False,
         break_on_hyphens=False,
     )
+    return shown + line[len(line.rstrip()) :]  # a question ends with a blank before its answer
 
 
 def _colour_wanted() -> bool | None:

@@ -73,7 +73,7 @@ def test_answers(answer, step):
     ("doing", "text"),
     [
         (DRIVING, "AUTO, armed, 5.0 m/s"),
-        (Doing(Mode.HOLD, False, None, age_s=0.2), "HOLD, not armed, speed not known"),
+        (Doing(Mode.HOLD, False, None, age_s=0.2), "HOLD, not armed, speed unknown"),
         (Doing(), "its mode is unknown, no heartbeat was received"),
         (Doing(Mode.AUTO, True, 0.0, has_completed=True, age_s=0, speed_age_s=0), "AUTO, armed, 0.0 m/s, mission complete"),
         (Doing(99, True, 1.0, age_s=12.4, speed_age_s=0.1), "mode 99, armed, 1.0 m/s (12 s ago)"),
@@ -312,7 +312,7 @@ def test_at_a_real_terminal(fields, tmp_path, command, answer, mode, said):
         os.close(ours)
         assert process.wait(60) == 130
         text = " ".join(heard.decode(errors="replace").split())
-        assert "the vehicle drives: AUTO, armed, " in text
+        assert "the vehicle is driving: AUTO, armed, " in text
         assert said in text
         assert "the mission on it is the planned one (" in text
         assert simulator.vehicle.mode == mode

@@ -302,7 +302,7 @@ class Link:
             if machine.is_done:
                 return
             if timeout_s is not None and self.now_s() - begun_s > timeout_s:
-                raise LinkError(f"no outcome within {timeout_s:g} s")
+                raise LinkError(f"no result within {timeout_s:g} s")
             deadline_s = machine.deadline_s
             wait_s = longest_wait_s()
             if deadline_s is not None:
@@ -348,7 +348,7 @@ class _Listen:
         return []
 
 
-_NETWORK_ADVICE = "are address and port right, does the other side run (tcp), and does nobody else listen on this port (udpin, tcpin)?"
+_NETWORK_ADVICE = "check the address and port; is the other side running (tcp)? Is another program using this port (udpin, tcpin)?"
 
 
 def open_link(
@@ -430,7 +430,7 @@ class _Udp:
             pass
         except OSError as error:
             if not received:
-                raise LinkError(f"the link broke: {error.strerror or error}") from None
+                raise LinkError(f"the link failed: {error.strerror or error}") from None
         return received
 
     def heard(self, source: Hashable) -> None:
@@ -461,7 +461,7 @@ class _Tcp:
         try:
             self._socket.sendall(data)
         except OSError as error:
-            raise LinkError(f"the link broke while sending: {error.strerror or error}") from None
+            raise LinkError(f"the link failed while sending: {error.strerror or error}") from None
 
     def receive(self, timeout_s: float) -> list[tuple[Hashable, bytes]]:
         if not select.select([self._socket], [], [], timeout_s)[0]:
@@ -469,7 +469,7 @@ class _Tcp:
         try:
             data = self._socket.recv(_STREAM_BYTES)
         except OSError as error:
-            raise LinkError(f"the link broke: {error.strerror or error}") from None
+            raise LinkError(f"the link failed: {error.strerror or error}") from None
         if not data:
             raise LinkError("the other end closed the link")
         return [(None, data)]
@@ -544,7 +544,7 @@ class _Serial:
         try:
             self._port.write(data)
         except OSError as error:
-            raise LinkError(f"the serial port broke: {error}") from None
+            raise LinkError(f"the serial port failed: {error}") from None
 
     def receive(self, timeout_s: float) -> list[tuple[Hashable, bytes]]:
         try:
@@ -554,7 +554,7 @@ class _Serial:
                     return []
             return [(None, bytes(first + self._port.read(min(self._port.in_waiting, _STREAM_BYTES))))]
         except OSError as error:
-            raise LinkError(f"the serial port broke: {error}") from None
+            raise LinkError(f"the serial port failed: {error}") from None
 
     def heard(self, source: Hashable) -> None:
         """Do nothing: there is one other end."""

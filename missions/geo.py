@@ -7,12 +7,15 @@ On Earth a place is a `LatLon`; in the plane it is a `LocalPoint`, and many of t
 from __future__ import annotations
 
 import math
+import re
 from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
 from missions.errors import InvalidPositionError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from pyproj import Geod
 
 
@@ -54,22 +57,63 @@ def checked_lat_lon(lat_deg: float, lon_deg: float) -> LatLon:
     return LatLon(lat_deg, lon_deg)
 
 
+_ANGLE = (
+    r"([NSEW])?\s*([+-]?)(\d+(?:\.\d*)?|\.\d+)(?:\s*°)?"
+    r"(?:(?:(?<=°)\s*|\s+)(\d+(?:\.\d*)?)\s*['′’](?:\s*(\d+(?:\.\d*)?)\s*(?:\"|″|”|''))?)?"
+)
+"""Letter, sign, degrees, minutes, seconds."""
+
+_POSITION = re.compile(
+    rf"{_ANGLE}(?(1)|(?:\s*([NSEW]))?)(?:\s*,\s*|\s+|(?<=[NSEW])){_ANGLE}(?(7)|(?:\s*([NSEW]))?)",
+    re.IGNORECASE | re.ASCII,
+)
+"""Two angles; the letter stands before or behind each."""
+
+_POSITION_FORMS = "LAT,LON such as 40.0713,-105.2299 or 40.0713N 105.2299W"
+
+
 def parse_lat_lon(text: str) -> LatLon:
-    """Read ``LAT,LON`` in decimal degrees.
+    """Read a position: ``LAT,LON`` or ``LAT LON`` in decimal degrees, or degrees, minutes and seconds, both with N, S, E or W or neither.
+
+    With letters either may come first; without them it is the latitude.
 
     Raises
     ------
     InvalidPositionError
-        The text is not two numbers with a comma between them, or they are out of range.
+        The text is no position, or its numbers are out of range; where they seem to be swapped the message says so.
     """
-    parts = text.split(",")
-    try:
-        lat_deg, lon_deg = (float(part.replace("_", "?")) for part in parts)  # 4_0 is 40 to Python
-    except ValueError:
+    found = _POSITION.fullmatch(text.strip())
+    first, second = map(_angle, (found.groups()[:6], found.groups()[6:])) if found else (None, None)
+    if first is None or second is None:
+        raise InvalidPositionError(f"{text!r} is not a position: expected {_POSITION_FORMS}")
+    (lat_deg, lat_axis), (lon_deg, lon_axis) = first, second
+    if (lat_axis, lon_axis) == ("longitude", "latitude"):
+        lat_deg, lon_deg = lon_deg, lat_deg
+    elif lat_axis == lon_axis != "" or (lat_axis == "") != (lon_axis == ""):
+        raise InvalidPositionError(f"{text!r} is not a position: expected N or S and E or W, or no letters")
+    elif not lat_axis and abs(lon_deg) <= 90 < abs(lat_deg) <= 180:
         raise InvalidPositionError(
-            f"{text!r} is not a position: expected LAT,LON in decimal degrees, like 40.0713,-105.2299"
-        ) from None
+            f"latitude {lat_deg:g}° is beyond ±90°; latitude comes first: did you mean {lon_deg},{lat_deg}?",
+            lat_deg=lat_deg,
+        )
     return checked_lat_lon(lat_deg, lon_deg)
+
+
+def _angle(parts: Sequence[str | None]) -> tuple[float, str] | None:
+    """Return an angle in degrees, and which it is by its letter; None where its parts do not fit together."""
+    before, sign, degrees, minutes, seconds, after = (part or "" for part in parts)
+    letter = (before or after).upper()
+    is_odd = (
+        (before and after)
+        or (letter and sign)
+        or ("." in degrees and minutes)
+        or ("." in minutes and seconds)
+    )
+    if is_odd or float(minutes or 0) >= 60 or float(seconds or 0) >= 60:
+        return None
+    angle_deg = float(degrees) + float(minutes or 0) / 60 + float(seconds or 0) / 3600
+    axis = ("latitude" if letter in "NS" else "longitude") if letter else ""
+    return (-angle_deg if sign == "-" or letter in ("S", "W") else angle_deg), axis
 
 
 def from_e7(lat_e7: int, lon_e7: int) -> LatLon:

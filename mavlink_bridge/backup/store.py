@@ -198,7 +198,7 @@ class BackupStore:
             try:
                 note.path.replace(path)
             except OSError as error:
-                raise BackupError(f"{note.path} cannot be put aside: {error.strerror or error}") from None
+                raise BackupError(f"{note.path} cannot be dismissed: {error.strerror or error}") from None
             put_aside.append(path)
         return put_aside
 
@@ -279,7 +279,7 @@ class BackupStore:
             raise BackupError(
                 f"the backup cannot be written to {path}: {error.strerror or error}; nothing was written to the vehicle",
                 path=str(path),
-                advice="make room on the disk, or let XDG_STATE_HOME name a folder that can be written",
+                advice="free some disk space, or set XDG_STATE_HOME to a writable folder",
             ) from None
 
 

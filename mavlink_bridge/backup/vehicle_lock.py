@@ -50,10 +50,10 @@ class Holder:
     def error(self, vehicle: VehicleMark) -> VehicleInUseError:
         """Return the error of who wanted to write meanwhile."""
         return VehicleInUseError(
-            f"{self} on this computer is writing to {vehicle}; nothing was written by this one",
+            f"{self} on this computer is writing to {vehicle}; nothing was written by this command",
             process=self.process,
             since=self.since,
-            advice="wait until it has ended, or end it",
+            advice="wait for it to finish, or stop it",
         )
 
 
@@ -103,9 +103,9 @@ class VehicleLock:
         except OSError as error:
             _close(files)
             raise BackupError(
-                f"{self._folder}: the vehicle cannot be locked there: {error.strerror or error}; nothing was written to the vehicle",
+                f"{self._folder}: cannot write the vehicle's lock file there: {error.strerror or error}; nothing was written to the vehicle",
                 path=str(self._folder),
-                advice="make room on the disk, or let XDG_STATE_HOME name a folder that can be written",
+                advice="free some disk space, or set XDG_STATE_HOME to a writable folder",
             ) from None
         for file in files:
             with contextlib.suppress(OSError):  # only the name for others

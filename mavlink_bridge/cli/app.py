@@ -25,23 +25,43 @@ if TYPE_CHECKING:
 COMMANDS = {
     "plan": "Plan a mission around fences; write it, draw it, upload it.",
     "check": "Check every leg of a mission against a fence.",
-    "bridge": "Run beside the autopilot: targets in, verified missions out.",
-    "log": "Show what telemetry logs hold.",
-    "replay": "Run the bridge over recorded logs.",
-    "upload": "Upload a file to the vehicle, verified; or put an old list back.",
+    "bridge": "Run alongside the autopilot: plan to each target, upload verified missions.",
+    "log": "Summarise telemetry logs.",
+    "replay": "Replay recorded logs through the bridge.",
+    "upload": "Upload a file to the vehicle and verify it, or restore a backup.",
     "download": "Download a mission, fence, rally points or parameters.",
     "convert": "Convert a file from one format to another.",
-    "fence": "Make a fence fit for the vehicle: overlapping inclusions one polygon.",
+    "fence": "Make a fence fit for the vehicle: merge overlapping inclusions.",
     "sim": "Run a simulated rover.",
-    "demo": "Show the whole loop on a simulated rover.",
-    "doctor": "Look at this installation: versions, ports, keys, a test plan.",
-    "config": "Show where options may be kept, and which are set.",
+    "demo": "Plan, upload and drive on a simulated rover, as a demonstration.",
+    "doctor": "Check this installation: versions, ports, keys, a test plan.",
+    "config": "Show where options can be saved, and which are set.",
 }
 """Every command and its line in help; the module of the same name holds it."""
 
 
+def _without_types(params: list[Any]) -> list[Any]:
+    """Return parameters whose flags show no type in help: each takes no value."""
+    for param in params:
+        if getattr(param, "is_flag", False) and param.metavar is None:
+            param.metavar = ""
+    return params
+
+
+class SingleCommand(TyperCommand):
+    """A command whose help shows no type for flags."""
+
+    def get_params(self, ctx: Any) -> list[Any]:  # noqa: ANN401 - the parser library is typer's own affair
+        """Return the options, with ``--help``."""
+        return _without_types(super().get_params(ctx))
+
+
 class Commands(TyperGroup):
     """A group that imports a command's module when the command is called: help and usage errors need none of them."""
+
+    def get_params(self, ctx: Any) -> list[Any]:  # noqa: ANN401 - as above
+        """Return the options, with ``--help``."""
+        return _without_types(super().get_params(ctx))
 
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ANN401, ARG002 - the parser library is typer's own affair
         """Return the names, in the order of help."""
@@ -60,8 +80,10 @@ class Commands(TyperGroup):
             self.commands[args[0]] = load(args[0])
         elif not args[0].startswith("-"):
             similar = get_close_matches(args[0], COMMANDS)
-            hint = f"did you mean {' or '.join(similar)}?" if similar else f"there are {', '.join(COMMANDS)}"
-            ctx.fail(f"no command {args[0]!r}; {hint}")
+            hint = (
+                f"did you mean {' or '.join(similar)}?" if similar else f"commands are {', '.join(COMMANDS)}"
+            )
+            ctx.fail(f"unknown command {args[0]!r}; {hint}")
         return super().resolve_command(ctx, args)
 
     def main(self, args: Sequence[str] | None = None, *rest: Any, **options: Any) -> Any:  # noqa: ANN401 - as above
@@ -69,18 +91,18 @@ class Commands(TyperGroup):
         if not options.get("standalone_mode", True):
             return super().main(args, *rest, **options)
         words = list(sys.argv[1:] if args is None else args)
-        sys.exit(
-            _exit_code(
-                lambda: super(Commands, self).main(args, *rest, **{**options, "standalone_mode": False}),
-                words,
-            )
+        code = _exit_code(
+            lambda: super(Commands, self).main(args, *rest, **{**options, "standalone_mode": False}), words
         )
+        if code == ExitCode.USAGE and len(words) == 1 and words[0] in COMMANDS:
+            load(words[0]).main(["--help"], prog_name=f"pbpp {words[0]}", standalone_mode=False)
+        sys.exit(code)
 
 
 def load(name: str) -> Any:  # noqa: ANN401 - a command of the parser library that typer uses
     """Return a command, with its options."""
     single = typer.Typer(add_completion=False, rich_markup_mode="markdown", pretty_exceptions_enable=False)
-    single.command(name)(command_of(name))
+    single.command(name, cls=SingleCommand)(command_of(name))
     return typer.main.get_command(single)
 
 

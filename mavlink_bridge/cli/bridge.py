@@ -82,7 +82,7 @@ def _orders(options: BridgeOptions) -> Orders:
     try:
         sources = frozenset(map(TargetSource, options.target_from)) or DEFAULT_SOURCES
     except ValueError as error:
-        raise UsageError(f"--target-from: {error}; known are {', '.join(TargetSource)}") from None
+        raise UsageError(f"--target-from: {error}; expected one of {', '.join(TargetSource)}") from None
     return Orders(
         identity=(options.source_system, options.source_component) if options.source_system else None,
         own_component=options.source_component,
@@ -354,5 +354,5 @@ def _recorders(
         return None, None
     part, recorder, journal = open_recording(stack, log, orders, described)
     if part != log:
-        warn((f"{log} exists already; this run is recorded to {part}",))
+        warn((f"{log} exists; recording this run to {part}",))
     return recorder, journal

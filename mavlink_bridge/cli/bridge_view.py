@@ -139,7 +139,7 @@ class LiveView:
             rows.append(("position", _of_then(str(pose.value.position), pose.time_s, now_s)))
         if (drive := director.drive) is not None and director.plan is not None:
             rows.append(("left", f"{drive.distance_left_m:.0f} m, about {drive.time_left_s:.0f} s"))
-            rows.append(("clearance", f"{drive.least_clearance_m:.1f} m at the nearest so far"))
+            rows.append(("clearance", f"{drive.least_clearance_m:.1f} m, the least so far"))
         elif director.plan is not None:
             rows.append(("route", f"{director.plan.length_m:.0f} m, {len(director.plan.items) + 1} items"))
         if director.awaits_confirmation:

@@ -48,7 +48,7 @@ def check(options: CheckOptions) -> None:
     begin = position_from("--start", options.start) if options.start is not None else None
     situation, unknown = _situation(options)
     if situation.mission is None:
-        raise UsageError(f"{options.log or options.connect} tells of no mission; give one (--mission FILE)")
+        raise UsageError(f"{options.log or options.connect} contains no mission; give one (--mission FILE)")
     if begin is None and options.log is not None and situation.home is not None:
         begin = situation.home.value  # at a log's end the vehicle may stand anywhere on its way
     checked = check_mission(situation.mission.value, situation, replace(request, start=begin))
@@ -92,7 +92,7 @@ def _check_options(options: CheckOptions) -> None:
     if options.log is not None and options.connect is not None:
         raise UsageError("give one of --log and --connect")
     if options.home is not None and options.connect is not None:
-        raise UsageError("--home goes with files and logs: a live vehicle tells its own home")
+        raise UsageError("--home goes with files and logs: a live vehicle reports its own home")
     check_plots(options.plot, json_output=options.json_output)
 
 
@@ -164,11 +164,13 @@ def _report(checked: MissionCheck, plots: list[Path]) -> None:
     for danger in checked.dangers:
         echo(f"DANGER: {danger}", typer.colors.RED)
     for leg in checked.broken:
-        echo(f"BREAKS: {_sentence(leg)}", typer.colors.RED)
+        echo(f"FAIL: {_sentence(leg)}", typer.colors.RED)
     if checked.holds and checked.extrapolated:
-        echo(f"Every leg is predicted to keep {checked.clearance_m:g} m while driving; that was not measured")
+        echo(
+            f"Every leg is predicted to keep {checked.clearance_m:g} m while driving; not confirmed by measurements"
+        )
     elif checked.holds:
-        echo(f"Every leg keeps {checked.clearance_m:g} m while driving")
+        echo(f"PASS: every leg keeps {checked.clearance_m:g} m while driving")
 
 
 def _row(leg: CheckedLeg) -> tuple[str, ...]:
@@ -194,7 +196,7 @@ def _sentence(leg: CheckedLeg) -> str:
         return f"leg {leg.name} crosses {', '.join(leg.crosses)}, first at {leg.at}"
     return (
         f"leg {leg.name} comes within {leg.driven_clearance_m:.2f} m of {leg.fence} while driving "
-        f"({metres(leg.drawn_clearance_m)} drawn, at {leg.at}); {metres(leg.asked_m)} is required"
+        f"({metres(leg.drawn_clearance_m)} along the straight leg, at {leg.at}); {metres(leg.asked_m)} is required"
     )
 
 

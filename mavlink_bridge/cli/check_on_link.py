@@ -46,10 +46,10 @@ def live_situation(options: CheckOptions) -> tuple[Situation, list[str]]:
             raise learning.trouble
         found = learning.merged(heard, link.now_s())
     unknown = [
-        f"the vehicle gives positions as 32-bit floats: the {kind} is known to about 1 m only"
+        f"the vehicle sends positions as 32-bit floats: the {kind} is accurate to about 1 m only"
         for kind in learning.coarse
     ]
     if found.pose is None:
-        unknown.append("the vehicle did not tell its position: it is taken to stand at its home")
+        unknown.append("no position from the vehicle; assuming it stands at home")
     has_fence = found.fence is not None and found.fence.value.zones
     return found if has_fence else replace(found, fence=None), unknown

@@ -42,7 +42,7 @@ def command_of(name: str) -> Callable[..., None]:
 
     def run(**given: Any) -> None:  # noqa: ANN401 - any command's options
         options = kind(**{option: value for option, value in given.items() if value is not None})
-        begin_telling(name, verbose=options.verbose, quiet=options.quiet)
+        begin_telling(name, verbose=options.verbose, quiet=options.quiet, options=options)
         try:
             getattr(import_module(f"mavlink_bridge.cli.{name}"), name)(options)
         except (mission_errors.MissionError, bridge_errors.BridgeError) as error:

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 _VARIABLES = {
     "NO_COLOR": "no colour",
-    "PBPP_TRACEBACK": "internal errors with their traceback",
-    "XDG_CONFIG_HOME": "folder above the options file",
-    "XDG_STATE_HOME": "folder above the backups",
+    "PBPP_TRACEBACK": "show tracebacks of internal errors",
+    "XDG_CONFIG_HOME": "base folder of the options file",
+    "XDG_STATE_HOME": "base folder of the backups",
 }
 
 
@@ -64,8 +64,10 @@ def config(options: ConfigOptions) -> None:
         return
     if options.quiet:
         return
-    echo(f"Your options: {own}{'' if is_there(own) else ' (not there; `pbpp config --template` shows one)'}")
-    echo(f"Backups of what was on vehicles: {backups}")
+    echo(
+        f"Your options: {own}{'' if is_there(own) else ' (does not exist; `pbpp config --template` prints an example)'}"
+    )
+    echo(f"Backups of vehicles' missions, fences and rally points: {backups}")
     for setting in settings:
         echo(f"pbpp {setting.command} {setting.option} {setting.value}   (by {setting.source})")
     for name, value in variables.items():
@@ -82,7 +84,9 @@ def settings_of(path: Path, *, is_asked_for: bool) -> list[Setting]:
     """
     tables = read_tables(path)
     if unknown := sorted(set(tables) - {FOR_ALL, *COMMANDS}):
-        raise typer.BadParameter(f"{path}: [{unknown[0]}] is no command; there are {', '.join(COMMANDS)}")
+        raise typer.BadParameter(
+            f"{path}: [{unknown[0]}] is not a command; expected one of {', '.join(COMMANDS)}"
+        )
     settings = []
     nobodys = set(tables.get(FOR_ALL, {}))
     for name in COMMANDS if FOR_ALL in tables else tables:
@@ -99,8 +103,8 @@ def settings_of(path: Path, *, is_asked_for: bool) -> list[Setting]:
 
 
 _TEMPLATE = f"""\
-# Options for pbpp. A table has a command's name and holds its options by their long names.
-# What changes a vehicle ({", ".join(DARING).replace("_", "-")}) does not belong here: it is refused.
+# Options for pbpp: one table per command, options by their long names.
+# What changes a vehicle ({", ".join(DARING).replace("_", "-")}) is refused here: give it on the command line.
 
 [{FOR_ALL}]
 # connect = "udpin:0.0.0.0:14550"

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 def convert(options: ConvertOptions) -> None:
     """Write OUT, with a word of what it could not hold."""
     if is_same_file(options.source, options.output):
-        raise UsageError(f"{options.output} would be written over what it is made of; give another OUT")
+        raise UsageError(f"{options.output} is the same file as IN; choose another OUT")
     part = _part(options.only)
     situation = _with_return_point(read_file(options.source, options), options.return_point)
     _check_choice(situation, options.source, options.output, part)
@@ -58,7 +58,7 @@ def _with_return_point(situation: Situation, return_point: str | None) -> Situat
         return situation
     position = position_from("--return-point", return_point)
     if situation.fence is None:
-        raise UsageError("--return-point belongs to a fence, and IN holds none")
+        raise UsageError("--return-point needs a fence, and IN has none")
     fence = replace(situation.fence.value, return_point=position)
     return replace(situation, fence=replace(situation.fence, value=fence))
 
@@ -70,7 +70,7 @@ def _check_choice(situation: Situation, source: Path, output: Path, part: Part |
     if part is None and len(there) > 1 and not format_.together:
         options = " or ".join(f"--only {one}" for one in there)
         raise UsageError(
-            f"{source} holds {' and '.join(there)}, and a {output.suffix} file one of them: choose with {options}"
+            f"{source} holds {' and '.join(there)}, and a {output.suffix} file can hold only one of them: choose with {options}"
         )
 
 

@@ -131,13 +131,13 @@ def _driven(plan: Plan, track: list[LatLon]) -> tuple[float, float]:
 
 def _report(document: dict[str, object], plan: Plan) -> None:
     echo(
-        f"Arrived after {document['driven_length_m']} m (drawn {document['length_m']} m, {sum(item.is_placed for item in plan.items)} waypoints)"
+        f"Arrived after {document['driven_length_m']} m (planned route {document['length_m']} m, {sum(item.is_placed for item in plan.items)} waypoints)"
     )
     echo(
-        f"Clearance: {document['clearance_m']} m promised, {document['driven_clearance_m']} m driven; "
+        f"Fence clearance: at least {document['clearance_m']} m promised, {document['driven_clearance_m']} m kept; "
         f"breaches {document['breaches']}"
     )
-    echo(f"The mission was verified on the vehicle; all of it took {document['time_s']} s")
+    echo(f"The mission was verified on the vehicle; total time {document['time_s']} s")
     outputs = document["outputs"]
     assert isinstance(outputs, list)
     for path in outputs:

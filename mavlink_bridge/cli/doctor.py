@@ -120,14 +120,16 @@ def _ports() -> Iterator[_Finding]:
 
     ports = sorted(comports(), key=lambda port: port.device)
     if not ports:
-        yield _Finding(_Verdict.NOTE, "serial ports", "none: radios and autopilots on USB would show here")
+        yield _Finding(_Verdict.NOTE, "serial ports", "none found (radios and autopilots on USB appear here)")
     for port in ports:
         told = f"{port.description}" if port.description not in (None, "n/a", port.device) else "present"
         if os.name == "posix" and not os.access(port.device, os.R_OK | os.W_OK):
             # Something on USB was plugged in to be used; a computer's own ports are often wired to nothing.
             verdict = _Verdict.NOTE if port.vid is None else _Verdict.WRONG
             advice = _permission_advice(Path(port.device))
-            yield _Finding(verdict, f"serial port {port.device}", f"{told}, but you may not use it", advice)
+            yield _Finding(
+                verdict, f"serial port {port.device}", f"{told}, but you have no permission to use it", advice
+            )
         else:
             yield _Finding(_Verdict.OK, f"serial port {port.device}", told)
 
@@ -137,7 +139,7 @@ def _permission_advice(device: Path) -> str:
         with suppress(KeyError, OSError):
             group = device.group()
             if group != "root":  # nobody should be in that one for the sake of a port
-                return f"sudo usermod -aG {group} $USER, then log in anew"
+                return f"sudo usermod -aG {group} $USER, then log in again"
     return f"ask the administrator for access to {device}"
 
 
@@ -150,7 +152,10 @@ def _options() -> Iterator[_Finding]:
         count = len(settings_of(path, is_asked_for=False))
     except typer.BadParameter as error:
         yield _Finding(
-            _Verdict.WRONG, "options file", error.message, "mend it; `pbpp config --template` shows one"
+            _Verdict.WRONG,
+            "options file",
+            error.message,
+            "fix it; `pbpp config --template` prints an example",
         )
     else:
         yield _Finding(_Verdict.OK, "options file", f"{path} ({count} options set)")
@@ -167,7 +172,7 @@ def _key(path: Path | None) -> Iterator[_Finding]:
         yield _Finding(
             _Verdict.OK,
             "signing key",
-            f"{path} is one; only you may read it" if os.name == "posix" else f"{path} is one",
+            f"{path} is a signing key; only you can read it" if os.name == "posix" else f"{path} is one",
         )
 
 
@@ -178,7 +183,7 @@ def _backups() -> Iterator[_Finding]:
         with tempfile.TemporaryFile(dir=above):
             pass
     except OSError as error:
-        advice = "uploads need it: make it writable, or set XDG_STATE_HOME"
+        advice = "uploads need this folder: make it writable, or set XDG_STATE_HOME"
         yield _Finding(_Verdict.WRONG, "backups", f"{above} cannot be written: {error.strerror}", advice)
         return
     kept = len(list(folder.glob("system-*Z.json"))) if folder.is_dir() else 0
@@ -211,7 +216,7 @@ def _test_plan() -> Iterator[_Finding]:
         yield _Finding(_Verdict.OK, "test plan", found)
     else:
         wanted = f"{SHORTEST_M} m, or 1 % more, and {_CLEARANCE_M} m were expected"
-        yield _Finding(_Verdict.WRONG, "test plan", f"{found}; {wanted}", "do not trust this installation")
+        yield _Finding(_Verdict.WRONG, "test plan", f"{found}; {wanted}", "do not use this installation")
 
 
 def _vehicle(file: Path | None, firmware: Firmware | None) -> Iterator[_Finding]:
@@ -231,4 +236,4 @@ def _vehicle(file: Path | None, firmware: Firmware | None) -> Iterator[_Finding]
     for remark in assumed_remarks(vehicle):
         yield _Finding(_Verdict.NOTE, "vehicle", remark)
     for reason in beyond_measured(vehicle):
-        yield _Finding(_Verdict.NOTE, "vehicle", reason, "plans for it promise nothing")
+        yield _Finding(_Verdict.NOTE, "vehicle", reason, "plans for it promise no clearance")

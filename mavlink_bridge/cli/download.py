@@ -11,7 +11,7 @@ from mavlink_bridge.cli.kept_files import write_kept
 from mavlink_bridge.cli.options.download import KINDS
 from mavlink_bridge.cli.options_session import session_for
 from mavlink_bridge.cli.restoring import reader_warnings
-from mavlink_bridge.cli.terminal import echo, print_json
+from mavlink_bridge.cli.terminal import echo, echo_lines, print_json
 from mavlink_bridge.errors import BridgeError, LinkError, UsageError
 from mavlink_bridge.mavlink.messages import MissionType
 from mavlink_bridge.protocol.outcomes import list_read
@@ -19,15 +19,15 @@ from mavlink_bridge.protocol.parameters import ReadParameters
 from mavlink_bridge.protocol.undisturbed_read import UndisturbedRead
 from missions.fence import fence_from_items
 from missions.formats import write_mission
-from missions.formats.numbers import xy_for_file
+from missions.formats.numbers import has_place, xy_for_file
 from missions.formats.parameters import is_parameter_name
 from missions.formats.waypoints import format_items
-from missions.items import without_home
+from missions.items import Command, without_home
 from missions.rally import rally_from_items
 from missions.situation import Known, Mission, Situation
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping, Sequence
     from pathlib import Path
 
     from mavlink_bridge.cli.options.download import DownloadOptions
@@ -66,6 +66,21 @@ def download(options: DownloadOptions) -> None:
     elif not options.quiet:
         number = f"{len(parameters)} parameters" if what == "parameters" else f"{what}: {len(items)} items"
         echo(number + "".join(f"; written to {path}" for path in options.output))
+        if not options.output:
+            echo_lines(_lines(items, parameters))
+
+
+def _lines(items: Sequence[MissionItem], parameters: Mapping[str, float]) -> Iterator[str]:
+    """Return what was read, a line an item or parameter, in 80 columns as far as its parameters allow."""
+    for seq, item in enumerate(items):
+        known = item.command in list(Command)
+        name = Command(item.command).name if known else f"MAV_CMD {item.command}"
+        lat, lon = xy_for_file(item)
+        place = str(item.position) if has_place(item.command, item.frame) else f"{lat:g}, {lon:g}"
+        params = " ".join(f"p{i}={value:g}" for i, value in enumerate(item.params, 1) if value)
+        yield f"{seq:>4}  {name:<30}  {place:<23}  {params}".rstrip()
+    for name, value in parameters.items():
+        yield f"{name:<16}  {value:.9g}"
 
 
 def _check(what: str, connect: str, outputs: list[Path]) -> None:
@@ -77,7 +92,7 @@ def _check(what: str, connect: str, outputs: list[Path]) -> None:
     for path in outputs:
         if path.suffix.lower() not in suffixes:
             raise UsageError(
-                f"{path}: {what} cannot be written as {path.suffix!r}; known are {', '.join(suffixes)}"
+                f"{path}: {what} cannot be written as {path.suffix!r}; expected one of {', '.join(suffixes)}"
             )
 
 
@@ -97,7 +112,7 @@ def read_list(session: Session, what: str) -> tuple[MissionItem, ...]:
     if isinstance(items, BridgeError):
         raise items
     if machine.outcome is not None and machine.outcome.is_coarse:
-        warn([f"the vehicle gives positions as 32-bit floats: the {what} is known to about 1 m only"])
+        warn([f"the vehicle sends positions as 32-bit floats: the {what} is accurate to about 1 m only"])
     return items
 
 
@@ -108,15 +123,12 @@ def _read_parameters(session: Session) -> dict[str, float]:
     assert outcome is not None
     if not outcome.is_complete:
         raise LinkError(
-            f"only {len(outcome.values)} parameters came, {len(outcome.missing)} did not; nothing was written",
+            f"only {len(outcome.values)} parameters received, {len(outcome.missing)} missing; nothing was written",
             received=len(outcome.values),
             missing=len(outcome.missing),
         )
     warn(
-        [
-            f"{name} came as {came}, which is not a number: ignored"
-            for name, came in outcome.no_numbers.items()
-        ]
+        [f"{name} was received as {came}, not a number: ignored" for name, came in outcome.no_numbers.items()]
     )
     return dict(sorted(outcome.values.items()))
 
@@ -129,9 +141,7 @@ def _write(path: Path, what: str, items: tuple[MissionItem, ...], parameters: Ma
         separator = " " if path.suffix.lower() == ".parm" else ","
         odd = [name for name in parameters if not is_parameter_name(name)]  # it may hold a line break
         if odd:
-            warn(
-                [f"{path}: left out, because no parameter can have such a name: {', '.join(map(repr, odd))}"]
-            )
+            warn([f"{path}: left out, not valid parameter names: {', '.join(map(repr, odd))}"])
         named = ((name, value) for name, value in parameters.items() if name not in odd)
         text = "".join(f"{name}{separator}{value:.9g}\n" for name, value in named)
     else:

@@ -7,7 +7,7 @@ import os
 import re
 import sys
 import traceback
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from enum import IntEnum
@@ -17,6 +17,7 @@ import typer
 
 from mavlink_bridge import errors as bridge_errors
 from mavlink_bridge.cli.terminal import print_json, say
+from mavlink_bridge.protocol.verified_outcome import OutcomeKind
 from missions import errors as mission_errors
 
 _IS_WINDOWS = os.name == "nt"
@@ -51,23 +52,67 @@ _EXIT_CODES: tuple[tuple[type[Exception], ExitCode], ...] = (
 
 _DEFECTS = (bridge_errors.DefectError, mission_errors.PlanCheckError)
 
-_ADVICE: Mapping[type[Exception], str] = {
-    mission_errors.InvalidPositionError: "latitude comes first: LAT,LON in decimal degrees, such as 40.0713,-105.2299",
-    mission_errors.FenceMissingError: "upload a fence to the vehicle, or give a file that holds one",
-    mission_errors.FenceError: "mend the fence where it was drawn, and save or upload it again",
-    mission_errors.MissionFormatError: "mend the file there, or save it anew with the program it comes from",
-    mission_errors.VehicleError: "correct the parameter on the vehicle or in the file",
-    mission_errors.StartBlockedError: "drive it to free ground by hand, or ask for less with --clearance",
-    mission_errors.TargetBlockedError: "choose another target, or let --snap M move it to free ground",
-    mission_errors.MissionTooLongError: "give fewer targets, or drive in parts; --vehicle FILE tells of more storage (BRD_SD_MISSION)",
-    mission_errors.NoRouteError: "ask for less with --clearance; --clearance max looks for the widest way",
-    mission_errors.PlanCheckError: "nothing was written; please report this with the command and its input files",
-    bridge_errors.IdentityTakenError: "speak as somebody else: --source-component",
-    bridge_errors.VehicleNotFoundError: "choose another vehicle with --system N",
-    bridge_errors.LinkError: "is the vehicle on, and nobody else using the port? `pbpp doctor` lists the serial ports",
-    bridge_errors.RefusedError: "the vehicle's own messages in the ground station may say more",
-    bridge_errors.OutcomeError: "look at what the vehicle holds (`pbpp download`) before it drives",
+_ADVICE: Mapping[type[Exception], tuple[str, ...]] = {
+    mission_errors.InvalidPositionError: (
+        "write the latitude first: LAT,LON in decimal degrees, such as 40.0713,-105.2299",
+    ),
+    mission_errors.FenceMissingError: ("upload a fence to the vehicle", "use a file that contains one"),
+    mission_errors.FenceError: ("correct the fence where it was drawn, and save or upload it again",),
+    mission_errors.MissionFormatError: ("fix the file, or export it again from the program that made it",),
+    mission_errors.VehicleError: ("correct the parameter on the vehicle or in the file",),
+    mission_errors.RequestError: (),
+    mission_errors.SituationError: (),
+    mission_errors.PlanStoppedError: (),
+    mission_errors.RouteError: (),
+    mission_errors.StartBlockedError: (
+        "drive the vehicle into the allowed area by hand",
+        "add --escape to plan the way out",
+    ),
+    mission_errors.TargetBlockedError: (
+        "choose another target",
+        "add --snap M to move it to the nearest free place within M metres",
+    ),
+    mission_errors.MissionTooLongError: (
+        "use fewer targets, or drive in parts",
+        "give --vehicle FILE if the vehicle has more storage (BRD_SD_MISSION)",
+    ),
+    mission_errors.NoRouteError: ("ask for less with --clearance (--clearance max finds the widest route)",),
+    mission_errors.PlanCheckError: (
+        "nothing was written; please report this with the command and its input files",
+    ),
+    mission_errors.MissionError: (),
+    bridge_errors.LogError: (),
+    bridge_errors.IdentityTakenError: ("use another component id: --source-component",),
+    bridge_errors.VehicleNotFoundError: ("choose another vehicle with --system N",),
+    bridge_errors.LinkError: (
+        "is the vehicle on, and is another program using the port? `pbpp doctor` lists the serial ports",
+    ),
+    bridge_errors.RefusedError: ("see the vehicle's own messages in the ground station",),
+    bridge_errors.VehicleInUseError: ("wait for the other pbpp to finish, or stop it",),
+    bridge_errors.OutcomeError: ("check what the vehicle holds (`pbpp download`) before it drives",),
+    bridge_errors.DefectError: ("check what the vehicle holds (`pbpp download`) before it drives",),
+    bridge_errors.BackupError: ("nothing was written; check the file that the message names",),
+    bridge_errors.OtherVehicleError: ("give --other-vehicle if the backup belongs on this vehicle",),
+    bridge_errors.BridgeError: (),
 }
+"""What helps with each kind of error where the error does not say it itself; several are alternatives. A test looks that every kind is here."""
+
+_ACTIVE_ADVICE = (
+    "add --hold to switch it to HOLD first",
+    "add --replace-active to write while it drives",
+)
+_SILENT_ADVICE: Mapping[str, str] = {
+    "serial": "is the vehicle on, and is another program using the port? The baud rate must match the vehicle's SERIALn_BAUD "
+    "(/dev/ttyUSB0,57600); `pbpp doctor` lists the serial ports",
+    "udpin": "is the vehicle on, and is its telemetry sent to this computer's address and port? A firewall or another ground station "
+    "on the same port may take it",
+    "udpout": "is the vehicle on, and does it (or its router) listen on this address and port?",
+    "tcp": "is the vehicle on, and does the other side send its MAVLink on this port?",
+    "tcpin": "is the vehicle on, and does it (or its router) connect to this address and port?",
+}
+"""What to look at where nothing at all came over a link, by the link's kind."""
+
+_OPTION = re.compile(r"--[a-z-]+")
 _REPORT = (
     "please report this line with the command and its input files; PBPP_TRACEBACK=1 or -v shows the traceback"
 )
@@ -82,6 +127,8 @@ class Telling:
     quiet: int = 0
     """How often ``-q`` was given: once leaves warnings and errors, `ERRORS_ONLY` times only errors."""
     warned: set[str] = field(default_factory=set)
+    options: object = None
+    """The command's options, as they were given."""
 
 
 ERRORS_ONLY = 2  # -qq
@@ -95,9 +142,9 @@ def telling() -> Telling:
     return _telling.get() or begin_telling("")
 
 
-def begin_telling(command: str, *, verbose: bool = False, quiet: int = 0) -> Telling:
+def begin_telling(command: str, *, verbose: bool = False, quiet: int = 0, options: object = None) -> Telling:
     """Begin a command."""
-    now = Telling(command, verbose, quiet)
+    now = Telling(command, verbose, quiet, options=options)
     _telling.set(now)
     return now
 
@@ -130,7 +177,7 @@ def report_error(command: str, error: Exception, *, wants_json: bool) -> ExitCod
     """Report an error of ours; return its exit code."""
     code = exit_code_of(error)
     details = dict(getattr(error, "details", {}))
-    if "advice" not in details and (advice := _advice(command, error)):
+    if advice := advice_for(command, error):
         details["advice"] = advice
     message = str(error)
     if isinstance(error, _DEFECTS) and error.__cause__ is not None:
@@ -196,11 +243,41 @@ def report(
         say(f"advice: {advice}", typer.colors.CYAN)
 
 
-def _advice(command: str, error: Exception) -> str | None:
-    """Return advice, where the message itself has none."""
+def advice_for(command: str, error: Exception) -> str | None:
+    """Return what would help, as far as the command that runs has the options for it; None where the message says all there is to say."""
+    details = getattr(error, "details", {})
+    if (silent := _silent_advice(details)) is not None:
+        return silent
+    if details.get("outcome") == OutcomeKind.ACTIVE:
+        return _alternatives(_ACTIVE_ADVICE, str(error))
+    if "advice" in details:
+        return str(details["advice"]) if details["advice"] else None
     if isinstance(error, bridge_errors.UsageError):
         return f"see `pbpp {command} --help`"
-    found = next((_ADVICE[kind] for kind in type(error).__mro__ if kind in _ADVICE), None)
-    if found is None or any(option in str(error) for option in re.findall(r"--[a-z-]+", found)):
+    return _alternatives(
+        next((_ADVICE[kind] for kind in type(error).__mro__ if kind in _ADVICE), ()), str(error)
+    )
+
+
+def _alternatives(advice: Iterable[str], message: str) -> str | None:
+    """Return those that need no option, or one that the command has and that was neither switched on nor named in the message already."""
+    helps = [one for one in advice if all(_is_of_use(option, message) for option in _OPTION.findall(one))]
+    return ", or ".join(helps) or None
+
+
+def _is_of_use(option: str, message: str) -> bool:
+    if option in message:
+        return False
+    options = telling().options
+    name = option.removeprefix("--").replace("-", "_")
+    return options is None or getattr(options, name, True) is not True
+
+
+def _silent_advice(details: Mapping[str, object]) -> str | None:
+    """Return what to look at where nothing was heard on the link of the command that runs."""
+    connect = getattr(telling().options, "connect", None)
+    if details.get("heard") != [] or not connect:
         return None
-    return found
+    from mavlink_bridge.link import parse_connection  # noqa: PLC0415 - the link is there already, if it was silent
+
+    return _SILENT_ADVICE[parse_connection(connect).kind]

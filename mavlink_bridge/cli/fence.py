@@ -25,7 +25,7 @@ def fence(options: FenceOptions) -> None:
     if options.action not in ACTIONS:
         raise UsageError(f"{options.action!r}: expected {' or '.join(ACTIONS)}")
     if is_same_file(options.source, options.output):
-        raise UsageError(f"{options.output} would be written over what it is made of; give another -o FILE")
+        raise UsageError(f"{options.output} is the same file as FILE; choose another -o FILE")
     check_writable_format(options.output, Part.FENCE)
     situation = read_fence_file(options.source, options)
     known = situation.fence

@@ -89,9 +89,9 @@ def read_fence_file(path: Path, options: MapOptions) -> Situation:
     fence, left_out, cut = within_reach(situation.fence.value)
     if fence.zones and is_wide(*fence.zones) and all(zone.kind is ZoneKind.EXCLUSION for zone in fence.zones):
         raise FenceError(
-            f"{path}: its exclusions reach over more than can be planned, and no inclusion tells which of them matter",
+            f"{path}: its exclusions cover a larger area than can be planned, and no inclusion limits it",
             file=str(path),
-            advice="draw an inclusion around the field; exclusions far from it are left out then",
+            advice="draw an inclusion around the field; exclusions far outside it are then left out",
         )
     far = f"more than {REACH_M / 1000:g} km from every inclusion"
     counts = {f"exclusions {far} left out": left_out, f"exclusions whose parts {far} are left out": cut}

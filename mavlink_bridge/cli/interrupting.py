@@ -140,7 +140,7 @@ class InterruptReport:
         if self.is_held is False:
             return f"HOLD was sent, but no heartbeat confirms it: {now}"
         if self.drives:
-            return f"nothing was sent; the vehicle goes on with the mission that pbpp started: {now}"
+            return f"nothing was sent; the vehicle continues the mission that pbpp started: {now}"
         if self.said or self.changed:
             return f"the vehicle now: {now}"
         return f"the vehicle was left as it was: {now}"
@@ -149,12 +149,12 @@ class InterruptReport:
 def doing_text(doing: Doing) -> str:
     """Return what a vehicle does, for people: mode, armed or not, speed, and how old that is where it is old."""
     if doing.mode is None:
-        return "its mode is not known, no heartbeat was heard"
+        return "its mode is unknown, no heartbeat was received"
     armed = "armed" if doing.is_armed else "not armed"
-    speed = "speed not known" if doing.speed_mps is None else f"{doing.speed_mps:.1f} m/s"
+    speed = "speed unknown" if doing.speed_mps is None else f"{doing.speed_mps:.1f} m/s"
     age_s = max(doing.age_s, 0.0 if doing.speed_mps is None else doing.speed_age_s)
     old = f" ({age_s:.0f} s ago)" if age_s > _OLD_S else ""
-    complete = ", its mission complete" if doing.has_completed and doing.mode == Mode.AUTO else ""
+    complete = ", mission complete" if doing.has_completed and doing.mode == Mode.AUTO else ""
     return f"{plain_mode_name(doing.mode)}, {armed}, {speed}{complete}{old}"
 
 
@@ -250,7 +250,7 @@ def _ask(at_hand: AtHand) -> Reaction:
     keyboard.forget()
     reaction = Reaction.ASK
     say("")  # behind the terminal's ^C
-    say(f"the vehicle drives: {_doing_text_now(at_hand)}")
+    say(f"the vehicle is driving: {_doing_text_now(at_hand)}")
     while reaction is Reaction.ASK:
         say("HOLD? [Y/n] ", nl=False)
         while (answer := keyboard.line()) is None and not keyboard.is_closed:

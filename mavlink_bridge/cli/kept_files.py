@@ -114,7 +114,7 @@ def _make_way(path: Path, data: bytes) -> None:
     """
     if path.is_symlink():
         aim = path.readlink()  # what a link leads to is not touched: see `write_file`
-        warn([f"{path} was a link to {aim}, which is left as it is; the link is kept as {keep_aside(path)}"])
+        warn([f"{path} was a link to {aim} (left unchanged); the link is kept as {keep_aside(path)}"])
         return
     if not path.is_file() or path.stat().st_size == 0:
         return
@@ -126,7 +126,11 @@ def _make_way(path: Path, data: bytes) -> None:
             ]
         )
     elif lost := _lost_parts(path, data, writer):
-        warn([f"{path} loses its {' and '.join(lost)}; the old file is kept as {keep_aside(path)}"])
+        warn(
+            [
+                f"{path} no longer contains its {' and '.join(lost)}; the old file is kept as {keep_aside(path)}"
+            ]
+        )
 
 
 def _writer_of(path: Path) -> str | None:

@@ -23,4 +23,4 @@ class LinkNotes:
         """Report what there is to note about a link and was not reported yet."""
         if link.echoes and not self._was_told:
             self._was_told = True
-            say("note: our own messages come back on this link; they are left out", typer.colors.BRIGHT_BLACK)
+            say("note: this link echoes our own messages; they are ignored", typer.colors.BRIGHT_BLACK)

@@ -27,7 +27,7 @@ from mavlink_bridge.link import ONE_SHOT_IDENTITY, open_link, parse_connection
 from mavlink_bridge.mavlink.messages import Autopilot, MissionType
 from mavlink_bridge.protocol.outcomes import Writing, ends_in_words, held_text
 from mavlink_bridge.protocol.vehicle_watch import Doing
-from mavlink_bridge.protocol.verified_upload import Held, OutcomeKind
+from mavlink_bridge.protocol.verified_upload import Held
 from missions.checking.execution import follow_mission
 from missions.errors import SituationError
 from missions.items import Command
@@ -162,7 +162,7 @@ def conduct(
                 longest_wait_s=run.plans.longest_wait_s,
             )
     if director.trouble is not None or director.plan is None:
-        raise _with_hint(director.trouble or LinkError("the director ended without a plan"))
+        raise director.trouble or LinkError("no plan was made")
     outcome = director.upload_outcome
     return LiveResult(
         director.plan,
@@ -212,20 +212,13 @@ class _Run:
         """Make a plan, and note how long it took; a mission that is driven in part is not begun anew."""
         if request.repairs and self._has_driven:
             raise SituationError(
-                "the rest of the mission would no longer keep its clearance, and the vehicle was switched to HOLD: part of the mission "
-                "is driven already, so it is not started again"
+                "the rest of the mission would no longer keep its clearance, so the vehicle was switched to HOLD; "
+                "a partly driven mission is not restarted"
             )
         planned, self.planning_s = timed_plan(situation, request, should_stop=should_stop)
         if request.repairs and self.director.orders.drive:
             _check_drivable(planned)
         return planned
-
-
-def _with_hint(trouble: BridgeError | MissionError) -> BridgeError | MissionError:
-    """Return a director's trouble with the option that would help."""
-    if trouble.details.get("outcome") == OutcomeKind.ACTIVE:
-        trouble.details["advice"] = "--hold switches it to HOLD first"
-    return trouble
 
 
 def director_at_hand(director: Director, link: Link | None) -> AtHand:
@@ -267,14 +260,14 @@ def _check_drivable(planned: Plan) -> None:
     course = follow_mission(Mission(planned.items), planned.start, home=planned.home)
     if course.is_endless:
         raise SituationError(
-            "the mission goes round without end, so that --drive would never see it arrive; nothing was written: "
-            "upload it (--upload), and start it yourself"
+            "the mission repeats forever, so --drive would never see it arrive; nothing was written: "
+            "upload it without --drive, and start it yourself"
         )
     for seq, item in enumerate(planned.items, 1):
         if item.command == Command.DO_SET_REVERSE and item.params[0] == 1:
             raise SituationError(
-                f"item {seq} has the vehicle drive in reverse, of which the drive model says nothing; nothing was written: "
-                "upload it (--upload), and start it yourself",
+                f"item {seq} makes the vehicle drive in reverse, which the drive model does not cover; nothing was written: "
+                "upload it without --drive, and start it yourself",
                 item=seq,
             )
 

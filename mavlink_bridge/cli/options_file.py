@@ -48,12 +48,12 @@ def read_tables(path: Path) -> dict[str, dict[str, Any]]:
         raise typer.BadParameter(f"{path} cannot be read: {error.strerror}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         is_escape = "'\\'" in str(error) or "hex" in str(error)
-        hint = "; in TOML a path with \\ stands in 'single quotes'" if is_escape else ""
+        hint = "; in TOML write a path with \\ in 'single quotes'" if is_escape else ""
         raise typer.BadParameter(f"{path}: not TOML: {error}{hint}") from None
     for name, table in document.items():
         if not isinstance(table, dict):
             raise typer.BadParameter(
-                f"{path}: {name!r} stands outside a table; write it under [{FOR_ALL}] or a command such as [plan]"
+                f"{path}: {name!r} is outside a table; write it under [{FOR_ALL}] or a command such as [plan]"
             )
     return {
         name: {option.replace("-", "_"): _as_typed(value) for option, value in table.items()}

@@ -32,7 +32,7 @@ def check_plots(plots: list[Path], *, json_output: bool) -> None:
         A suffix is unknown, or what draws it is not installed.
     """
     if json_output and Path(TERMINAL) in plots:
-        raise UsageError("--plot - and --json both want the standard output; give a file to --plot")
+        raise UsageError("--plot - and --json both write to standard output; give --plot a file")
     for path in plots:
         check_picture_format(path)
 

@@ -95,10 +95,10 @@ def _check_options(options: PlanOptions) -> None:
         if not path.parent.is_dir():
             raise MissionFormatError(
                 f"{path} cannot be written: there is no folder {path.parent}",
-                advice=f"make {path.parent} first, or choose another place",
+                advice=f"create {path.parent} first, or choose another folder",
             )
     if options.home is not None and options.connect is not None:
-        raise UsageError("--home goes with --fence and --log: a live vehicle tells its own home")
+        raise UsageError("--home goes with --fence and --log: a live vehicle reports its own home")
     check_plots(plots, json_output=options.json_output)
 
 

@@ -120,19 +120,19 @@ def arrival_document(arrival: Mapping[str, object] | None) -> dict[str, object]:
 def report_plan(planned: Plan, written: list[Path]) -> None:
     """Print a plan for people, and where it was written."""
     promise = (
-        f"{planned.clearance_m:g} m promised while driving"
+        f"at least {planned.clearance_m:g} m while driving ({planned.drawn_clearance_m:.2f} m along straight legs)"
         if planned.clearance_m is not None
-        else "nothing promised for the driven track"
+        else f"{planned.drawn_clearance_m:.2f} m along straight legs, nothing promised while driving"
     )
     if planned.extrapolated:
         promise += ", extrapolated beyond what was measured"
     waypoints = sum(item.is_placed for item in planned.items)
     turns = planned.turn_count
     echo(
-        f"Route: {planned.length_m:.1f} m ({planned.straight_line_m:.1f} m as the crow flies), "
+        f"Route: {planned.length_m:.1f} m ({planned.straight_line_m:.1f} m in a straight line), "
         f"about {planned.duration_s:.0f} s, {counted(waypoints, 'waypoint')} ({counted(turns, 'turn')})"
     )
-    echo(f"Clearance: {planned.drawn_clearance_m:.2f} m drawn, {promise}")
+    echo(f"Fence clearance: {promise}")
     for path in written:
         echo(f"Wrote {path}")
 
@@ -142,7 +142,7 @@ def report_end(arrival: Mapping[str, object] | None, backup: Path | None, *, ver
     if verified:
         echo("Uploaded and verified")
     if backup is not None:
-        echo(f"The mission before is kept in {backup}")
+        echo(f"The previous mission is saved in {backup}")
     if arrival is not None:
         least = arrival["least_clearance_m"]
         kept = f"least clearance {least:.2f} m" if isinstance(least, float) else "no fence near"

@@ -173,7 +173,7 @@ def _is_as_expected(expected: dict[Path | None, list[_Told]], results: _Results,
     for line in found:
         say(line)
     if found:
-        say("- expected, did not come; + came, not expected; ~ came otherwise")
+        say("- expected but missing; + not expected; ~ different")
     elif expected and not quiet:
         count = sum(map(len, expected.values()))
         echo(f"As expected: all {count} events came" if count != 1 else "As expected: the one event came")

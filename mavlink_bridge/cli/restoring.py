@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.backup.store import Backup, BackupStore, Note
     from mavlink_bridge.backup.vehicle_mark import VehicleMark
 
-_FORGET = "`pbpp upload --forget` puts the note aside"
+_FORGET = "`pbpp upload --forget` dismisses this note"
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ def _warning(note: Note, vehicle: VehicleMark) -> str:
     if note.backup is None:
         return (
             f"an upload of the {name} {to} was interrupted: the list may be part old, part new; what was there before is not known "
-            f"({note.trouble}). Look at what the vehicle holds (`pbpp download {name}`); {_FORGET}"
+            f"({note.trouble}). Check what the vehicle holds (`pbpp download {name}`); {_FORGET}"
         )
     backup = note.backup
     kept = f"({len(backup.items)} items, read {backup.time:%Y-%m-%d %H:%M:%S} UTC, {backup.path})"

@@ -63,7 +63,7 @@ class RunLog:
             for writer in (self._recorder, self._journal):
                 with contextlib.suppress(OSError):  # what still waits to be written cannot be either
                     writer.close()
-            self._tell(f"{error}; recording stops, the bridge goes on")
+            self._tell(f"{error}; recording stopped; the bridge continues")
 
 
 class SafeTeller:
@@ -96,4 +96,4 @@ class SafeTeller:
                 raise
             drop_stdout()
             with contextlib.suppress(OSError):
-                warn([f"events cannot be written any more ({error.strerror}); the bridge goes on"])
+                warn([f"events can no longer be written ({error.strerror}); the bridge continues"])

@@ -164,7 +164,7 @@ class Session:
     def which_vehicle(self) -> VehicleMark:
         """Ask the vehicle which one it is; return by what it is known again."""
         asking = AskVersion(self.vehicle)
-        self.run(asking, "asking which vehicle it is")
+        self.run(asking, "identifying the vehicle")
         return VehicleMark(
             self.vehicle.system,
             uid_of(asking.version),
@@ -206,7 +206,7 @@ class Session:
         name = mode.name
         if mode == Mode.AUTO and self._has_clashed:
             raise identity_shared(
-                self.link.identity, "the vehicle is not switched to AUTO; what was uploaded is on it"
+                self.link.identity, "the vehicle was not switched to AUTO; the upload is on it"
             )
         switch = ModeSwitch(self.vehicle, mode)
         self._has_changed_mode = True
@@ -215,7 +215,7 @@ class Session:
             result, texts = switch.result_name, "".join(f"; {text}" for text in switch.texts)
             raise RefusedError(f"the vehicle refused mode {name}: {result}{texts}", result=result)
         if not self.listen_until(lambda: self._is_in(mode), _MODE_PATIENCE_S):
-            raise OutcomeError(f"the vehicle does not show mode {name}", mode=name)
+            raise OutcomeError(f"the vehicle did not confirm mode {name}", mode=name)
 
     def ask_telemetry(self) -> None:
         """Ask for the position, its quality and the mission's state, which not every link gets unasked."""
@@ -259,7 +259,7 @@ class Session:
         if not self.link.untrusted_frames:
             return trouble
         return type(trouble)(
-            f"{trouble}; {self.link.untrusted_frames} frames were left out: not signed with this key",
+            f"{trouble}; {self.link.untrusted_frames} frames were ignored: not signed with this key",
             **trouble.details,
             untrusted_frames=self.link.untrusted_frames,
         )

@@ -40,8 +40,8 @@ def make_ready(session: Session, *, hold: bool, replace_active: bool) -> None:
         session.change_mode(Mode.HOLD)
     elif not replace_active:
         raise RefusedError(
-            "the vehicle is armed and drives its mission in AUTO; nothing was written",
-            advice="--hold switches it to HOLD first; --replace-active writes while it drives",
+            "the vehicle is armed and driving its mission in AUTO; nothing was written",
+            advice="add --hold to switch it to HOLD first, or --replace-active to write while it drives",
         )
 
 
@@ -62,13 +62,13 @@ def start_driving(session: Session) -> None:
     Raises
     ------
     OutcomeError
-        It is not armed, or reports nothing: its mode was left alone. Or it was disarmed meanwhile.
+        It is not armed, or reports nothing: its mode was not changed. Or it was disarmed meanwhile.
     RefusedError
         It refused AUTO.
     """
     if not session.hear_anew():
         raise OutcomeError(
-            "all is verified on the vehicle, but no heartbeat says whether it is armed: its mode was left alone",
+            "everything is verified on the vehicle, but no heartbeat says whether it is armed: its mode was not changed",
             advice=_ADVICE,
         )
     doing = session.doing
@@ -76,7 +76,7 @@ def start_driving(session: Session) -> None:
         mode = plain_mode_name(doing.mode or Mode.MANUAL)
         drives_off = ": arming it makes it drive" if doing.mode == Mode.AUTO else ""
         raise OutcomeError(
-            f"all is verified on the vehicle, which is not armed and does not drive: its mode was left alone ({mode}{drives_off})",
+            f"everything is verified on the vehicle, which is not armed and does not drive: its mode was not changed ({mode}{drives_off})",
             advice=_ADVICE,
             mode=mode,
         )
@@ -95,7 +95,7 @@ def start_driving(session: Session) -> None:
 
 def _put_back(session: Session) -> OutcomeError:
     """Take a vehicle that is disarmed out of AUTO, and return what came of it."""
-    what = "all is verified on the vehicle, but it was disarmed when it went to AUTO"
+    what = "everything is verified on the vehicle, but it was disarmed when it went to AUTO"
     try:
         session.change_mode(Mode.HOLD)
     except BridgeError as error:

@@ -10,9 +10,11 @@ from __future__ import annotations
 import json
 import math
 import os
+import shutil
 import sys
+import textwrap
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
 import typer
 
@@ -61,7 +63,23 @@ def print_json(document: Mapping[str, object]) -> None:
 
 
 def _put(line: str, colour: str | None, *, is_error: bool, nl: bool = True) -> None:
-    typer.secho(harmless(line), err=is_error, nl=nl, fg=colour, color=_colour_wanted())
+    shown = _fitted(harmless(line), sys.stderr if is_error else sys.stdout)
+    typer.secho(shown, err=is_error, nl=nl, fg=colour, color=_colour_wanted())
+
+
+def _fitted(line: str, stream: TextIO) -> str:
+    """Return a line broken between words where a terminal is narrower; what follows is indented, so that it passes for no line of its own."""
+    if not stream.isatty() or len(line) <= (columns := shutil.get_terminal_size().columns):
+        return line
+    shown = textwrap.fill(
+        line,
+        columns,
+        subsequent_indent="  ",
+        replace_whitespace=False,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return shown + line[len(line.rstrip()) :]  # a question ends with a blank before its answer
 
 
 def _colour_wanted() -> bool | None:

@@ -64,9 +64,9 @@ def understood(line: str, director: Director) -> Typed:
             return Typed(
                 f"not understood: {shown!r}; {HELP}; to stop the vehicle use the transmitter or ground station"
             )
-        return Typed(f"not taken: {_shown(str(error), 3 * _MOST_SHOWN)}; {HELP}")
+        return Typed(f"not accepted: {_shown(str(error), 3 * _MOST_SHOWN)}; {HELP}")
     later = _LATER.get(director.state)
-    return Typed(f"target {target} taken" + (f": planned {later}" if later else ""), target=target)
+    return Typed(f"target {target} accepted" + (f": planned {later}" if later else ""), target=target)
 
 
 def _why_nothing(director: Director) -> str:

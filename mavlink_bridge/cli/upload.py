@@ -68,7 +68,7 @@ def _check(options: UploadOptions) -> None:
     if options.other_vehicle and not (options.restore and options.file):
         raise UsageError("--other-vehicle goes with --restore FILE: name the backup that is to be written")
     if options.forget and (options.file is not None or options.restore or options.drive):
-        raise UsageError("--forget only puts notes aside; upload or restore in another run")
+        raise UsageError("--forget only dismisses notes; upload or restore in a separate run")
     if not options.connect and not options.forget:
         raise UsageError("upload needs --connect CONNECTION")
     if options.file is None and not options.restore and not options.forget:
@@ -98,10 +98,10 @@ def _forget(store: BackupStore, options: UploadOptions) -> None:
         for entry in document:
             backup = entry["backup"] or "not known"
             echo(
-                f"{entry['list']} of {entry['vehicle']}: put aside as {entry['note']}; the backup is {backup}"
+                f"{entry['list']} of {entry['vehicle']}: dismissed, kept as {entry['note']}; the backup is {backup}"
             )
         if not document:
-            echo("no interrupted upload is noted")
+            echo("no interrupted uploads")
 
 
 def _content(options: UploadOptions, restoration: Restoration | None) -> tuple[Lists, Mapping[str, float]]:
@@ -162,7 +162,7 @@ def _report(
     if options.quiet:
         return
     for entry in done:
-        how = "was there already" if entry.outcome.pushes == 0 else f"uploaded in {entry.took_s:.1f} s"
+        how = "already on the vehicle" if entry.outcome.pushes == 0 else f"uploaded in {entry.took_s:.1f} s"
         coarse = " (positions read back to about 1 m only)" if entry.outcome.is_coarse else ""
         name = entry.mission_type.name.lower()
         echo(f"{name}: {len(entry.outcome.found or ())} items, {how}, read back and verified{coarse}")
@@ -171,4 +171,4 @@ def _report(
     for name, (old, new) in changed.items():
         echo(f"{name}: {'no number' if old is None else f'{old:g}'} -> {new:g}, confirmed")
     if not done and not changed:
-        echo("all parameters have these values already")
+        echo("all parameters already have these values")

@@ -115,7 +115,7 @@ class Uploads:
         ]
         parameters = [f"parameters {', '.join(self.changed)}"] if self.changed else []
         put = ", ".join((*lists, *parameters))
-        return f"put on it and verified: {put}" if put else ""
+        return f"uploaded and verified: {put}" if put else ""
 
     def write_lists(self, lists: Lists, restored: Path | None = None) -> None:
         """Upload lists one after the other, each verified.
@@ -186,7 +186,7 @@ class Uploads:
         read = reading.outcome
         assert read is not None
         if read.is_silent:
-            raise LinkError("the vehicle does not answer when asked for its parameters; none was set")
+            raise LinkError("the vehicle did not answer the parameter request; none was set")
         if read.missing:
             raise RefusedError(
                 f"the vehicle has no parameter {', '.join(read.missing)}; none was set",

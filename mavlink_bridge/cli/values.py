@@ -31,7 +31,7 @@ LEAST_MPS = 0.05
 MOST_S = 86_400.0
 """No patience and no link's latency is longer than a day."""
 
-_POSITION_ADVICE = "latitude comes first: LAT,LON in decimal degrees, such as 40.0713,-105.2299"
+_POSITION_ADVICE = "write the latitude first: LAT,LON in decimal degrees, such as 40.0713,-105.2299"
 
 MOST_FLOAT32 = 3.402_823e38
 """What a parameter's 32-bit float on the wire can hold."""

@@ -87,5 +87,5 @@ def account(identity: tuple[int, int], answer: Answer, state: State, *, is_singl
     elif state is State.CLASHING:
         parts.append("the upload is finished first")
     if not is_single_job:
-        parts.append("nothing more is done until a target is typed; clicks are ignored")
+        parts.append("waiting for a typed target; map clicks are ignored")
     return "; ".join(parts)

@@ -128,7 +128,7 @@ class DriveSupervisor(Part):
         """Return the end of a drive after its arrival, once HOLD was taken or was not."""
         if self._halter.is_hold_granted:
             return [Notice.DRIVE_ENDED]
-        trouble = OutcomeError("it has arrived, but it does not go to HOLD: it is still in AUTO")
+        trouble = OutcomeError("arrived, but the vehicle did not switch to HOLD: it is still in AUTO")
         return [*self.core.give_up(trouble), Notice.DRIVE_ENDED]
 
     def stand_by(self) -> None:

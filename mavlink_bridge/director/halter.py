@@ -140,7 +140,7 @@ class Halter(Part):
         core = self.core
         is_heard = core.peer is not None and core.state is not State.LOST
         if core.orders.drive and is_heard and self._may_move(target) and not core.orders.once:
-            reason = "a target came; it is gone into in a moment"
+            reason = "a target was received; it is handled next"
             core.voice.tell(now_s, EventName.HOLDING, f"HOLD: {reason}", reason)
             self.command_hold(now_s)
 
@@ -185,7 +185,7 @@ class Halter(Part):
         self._stopped_s = now_s
         core.operator.settle(now_s)
         if not stopping.is_granted:
-            text = "the vehicle does not go to HOLD"
+            text = "the vehicle did not switch to HOLD"
             core.voice.tell(now_s, EventName.COMMAND_FAILED, text, "DO_SET_MODE", stopping.result_name)
         return [Notice.HOLD_ENDED]
 

@@ -71,7 +71,7 @@ class HandOver(Part):
         if core.operator.is_late_click(heartbeat, now_s) and self._halter.stopping is None:
             self._halter.command_hold(now_s)
         elif core.state is State.VERIFIED and not core.orders.drive and core.is_driving_ours:
-            return self._driver.resume("somebody drives the mission")
+            return self._driver.resume("somebody else started the mission")
         return []
 
     def _overhear(self, frame: Frame, now_s: float) -> Iterable[Signal]:
@@ -141,7 +141,7 @@ class HandOver(Part):
         was_in_auto_by_us, self.was_in_auto_by_us = self.was_in_auto_by_us, False
         situation = self.core.situation
         if was_in_auto_by_us and situation.mode == Mode.AUTO and not situation.armed:
-            self._put_back("the vehicle was disarmed while it was not heard", now_s)
+            self._put_back("the vehicle was disarmed while the link was lost", now_s)
 
     def _put_back(self, what: str, now_s: float) -> None:
         """Take the vehicle, disarmed now, out of the AUTO that we switched it to."""
@@ -150,7 +150,7 @@ class HandOver(Part):
 
     def _was_put_back(self, what: str, machine: PutBack, now_s: float) -> Sequence[Signal]:
         if machine.is_left_in_auto:
-            text = f"{what}, and it does not go to HOLD: it is in AUTO, where arming it makes it drive"
+            text = f"{what}, and it did not switch to HOLD: it is in AUTO, where arming it makes it drive"
         elif machine.was_needed:
             text = f"{what}; it was switched back from AUTO to HOLD, so that arming it does not make it drive"
         else:

@@ -54,7 +54,7 @@ def _on_learnt(parts: Parts, now_s: float) -> Iterable[Signal]:
     targets = core.orders.request.targets
     if not is_first_time:
         if core.orders.once:
-            return core.give_up(OutcomeError("the vehicle was switched off and on meanwhile"))
+            return core.give_up(OutcomeError("the vehicle rebooted meanwhile"))
         inbox.note_lists()
         parts.hand_over.put_back_after_silence(now_s)
         return [*_take_up_again(parts), Notice.TARGET_IS_DUE]
@@ -85,7 +85,7 @@ def _on_still_there(parts: Parts, now_s: float) -> Iterable[Signal]:
 
 
 def _on_heard_again(parts: Parts, now_s: float) -> None:
-    text = "the vehicle is heard again; all is read anew"
+    text = "the vehicle is heard again; reading everything again"
     parts.core.voice.tell(now_s, EventName.LINK_BACK, text)
     _learn(parts, now_s)
 
@@ -99,7 +99,7 @@ def _on_silence(parts: Parts, now_s: float) -> Iterable[Signal]:
 
 
 def _on_rebooted(parts: Parts, now_s: float) -> None:
-    text = "the vehicle was switched off and on; all is read anew"
+    text = "the vehicle rebooted; reading everything again"
     parts.core.voice.tell(now_s, EventName.REBOOTED, text)
     _let_loose(parts)
     parts.hand_over.was_in_auto_by_us = False  # it starts in another mode
@@ -141,7 +141,7 @@ def _on_target(parts: Parts, _now_s: float) -> None:
 def _on_target_while_moving(parts: Parts, now_s: float) -> None:
     parts.writer.is_confirmed = False
     parts.driver.drive = None
-    parts.halter.hold("a new route is wanted", now_s)
+    parts.halter.hold("stopping for a new route", now_s)
 
 
 def _on_planned(parts: Parts, now_s: float) -> Iterable[Signal]:
@@ -186,7 +186,7 @@ def _after_upload(parts: Parts, now_s: float) -> Iterable[Signal]:
 
 def _on_hold_ended(parts: Parts, _now_s: float) -> Iterable[Signal]:
     if parts.core.state is State.HOLDING and not parts.halter.is_hold_granted:
-        trouble = OutcomeError("the vehicle does not go to HOLD; nothing was written")
+        trouble = OutcomeError("the vehicle did not switch to HOLD; nothing was written")
         return parts.core.fail_step(trouble)
     if parts.core.state is State.CLASHED:
         return parts.guard.hold_ended()

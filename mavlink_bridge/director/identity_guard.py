@@ -84,11 +84,11 @@ class IdentityGuard(Part):
         if core.operator.take_heartbeat(frame.message, now_s) is None:
             return []
         halter.stopping = None
-        return self.settle("somebody has taken the vehicle over; the mission is on it")
+        return self.settle("another station has taken over the vehicle; the mission is on it")
 
     def hold_ended(self) -> Sequence[Signal]:
         """Go on from a HOLD that was taken, or was not."""
-        done = "was switched to HOLD" if self._halter.is_hold_granted else "does not go to HOLD"
+        done = "was switched to HOLD" if self._halter.is_hold_granted else "did not switch to HOLD"
         return self.settle(f"the vehicle {done}; the mission is on it")
 
     def settle(self, then: str) -> Sequence[Signal]:

@@ -182,8 +182,8 @@ class Incidents:
             mode = self._note(Cause(_BREACH, now_s, _actions(situation.parameters, "FENCE_ACTION")))
         pose = situation.pose
         place = fence_place(situation, self._request, pose.value.position) if pose is not None else None
-        since = "" if is_new else ", since before pbpp listened"
-        answer = f"; the autopilot answered it with {mode}" if mode is not None else ""
+        since = "" if is_new else ", from before pbpp connected"
+        answer = f"; the autopilot switched to {mode}" if mode is not None else ""
         self._voice.tell(
             now_s,
             EventName.BREACH,
@@ -221,7 +221,7 @@ class Incidents:
         self._told_s[reason] = now_s
         if is_told and mode is None:
             return
-        answer = f"; the autopilot answered it with {mode}" if mode is not None else ""
+        answer = f"; the autopilot switched to {mode}" if mode is not None else ""
         self._voice.tell(now_s, EventName.FAILSAFE, f"{reason}: {text}{answer}", reason, mode)
 
 
@@ -232,9 +232,9 @@ def _by(place: FencePlace | None) -> str:
     if place.beyond_m > 0:
         return f", {place.beyond_m:.1f} m beyond {place.fence}"
     if place.beyond_m >= -_TOLD_LATE_M:
-        return f", at {place.fence} ({-place.beyond_m:.1f} m before its line by its last position)"
+        return f", at {place.fence} ({-place.beyond_m:.1f} m from its edge by its last position)"
     away_m = -place.beyond_m
-    return f"; no fence known here is broken there, the nearest is {place.fence}, {away_m:.1f} m away"
+    return f"; no known fence is breached there, the nearest is {place.fence}, {away_m:.1f} m away"
 
 
 def _at(pose: Known[Pose] | None, now_s: float) -> str:
@@ -242,7 +242,7 @@ def _at(pose: Known[Pose] | None, now_s: float) -> str:
     if pose is None:
         return ""
     age_s = 0.0 if pose.time_s is None else now_s - pose.time_s
-    return f", at {pose.value.position}" + (f" ({age_s:.0f} s before)" if age_s > _OLD_S else "")
+    return f", at {pose.value.position}" + (f" ({age_s:.0f} s earlier)" if age_s > _OLD_S else "")
 
 
 def _actions(parameters: Mapping[str, float], name: str) -> frozenset[int]:

@@ -171,4 +171,4 @@ class Learner(Part):
         self.core.voice.tell(
             now_s, EventName.LINK_LOST, f"link lost: no heartbeat for {_SILENCE_S:g} s", _SILENCE_S
         )
-        return self.core.give_up(LinkError(f"the vehicle fell silent: no heartbeat for {_SILENCE_S:g} s"))
+        return self.core.give_up(LinkError(f"the vehicle is not heard: no heartbeat for {_SILENCE_S:g} s"))

@@ -160,7 +160,7 @@ class Learning(Outbox):
             if not self._steps and now_s >= self._position_until_s:
                 self._awaits_position = False
                 if self._needs_position:
-                    why = f"the vehicle told no position within {self._patience_s:g} s (no GPS fix?)"
+                    why = f"no position from the vehicle within {self._patience_s:g} s (no GPS fix?)"
                     self._fail(LinkError(why))
 
     def messages_to_send(self) -> list[Message]:
@@ -182,7 +182,7 @@ class Learning(Outbox):
     def _take_parameters(self, machine: ReadParameters, _now_s: float) -> None:
         outcome = machine.outcome
         if outcome is None or outcome.is_silent:
-            self._fail(LinkError("the vehicle does not answer when asked for its parameters"))
+            self._fail(LinkError("the vehicle did not answer the parameter request"))
             return
         self._parameters = dict(outcome.values)
 

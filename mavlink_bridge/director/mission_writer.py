@@ -178,7 +178,7 @@ class MissionWriter(Part):
         """Leave a mission alone that somebody else put in the place of ours."""
         core, count = self.core, self._others_items
         core.ours = None
-        text = f"somebody changed the mission: {count} items"
+        text = f"another station changed the mission: {count} items"
         core.voice.tell(now_s, EventName.MISSION_CHANGED, text, count)
         if core.state is State.READY:
             core.target = None

@@ -43,6 +43,8 @@ class PlanTask:
         except MissionError as error:
             return error
         except Exception as error:  # noqa: BLE001 - whatever it is, the vehicle must not lose its bridge by it
-            defect = PlanCheckError(f"planning broke down: {type(error).__name__}: {error}. This is a defect")
+            defect = PlanCheckError(
+                f"planning failed: {type(error).__name__}: {error}. This is a bug in pbpp"
+            )
             defect.__cause__ = error
             return defect

@@ -118,7 +118,7 @@ class RouteDesk(Part):
         try:
             return recheck(replace(core.plan, vehicle=vehicle), core.situation, item)
         except Exception as error:  # noqa: BLE001 - a defect of ours: what cannot be checked does not hold
-            why = f"not known: checking it broke down ({type(error).__name__}: {error}), a defect"
+            why = f"unknown: the check failed ({type(error).__name__}: {error}), a bug in pbpp"
             return Recheck(0.0, core.plan.asked_m, why)
 
     def fence_changed(self, now_s: float) -> Sequence[Signal]:

@@ -76,7 +76,7 @@ class Starter(Part):
         mode = mode_name(situation.mode)
         drives_off = ": arming it makes it drive" if situation.mode == Mode.AUTO else ""
         trouble = OutcomeError(
-            f"the mission is verified on the vehicle, which is not armed and does not drive: its mode was left alone ({mode}{drives_off})",
+            f"the mission is verified on the vehicle, which is not armed and does not drive: its mode was not changed ({mode}{drives_off})",
             advice=START_YOURSELF,
             mode=mode,
         )

@@ -25,7 +25,7 @@ class State(StrEnum):
     STARTING = auto()  # looking once more, arming where asked, switching to AUTO, to the first item
     DRIVING = auto()
     ARRIVED = auto()
-    LET_GO = auto()  # the operator took over, or somebody changed the mission: waits for a new target
+    LET_GO = auto()  # the operator took over, or another station changed the mission: waits for a new target
     CLASHING = (
         auto()
     )  # somebody spoke with our ids in mid-upload: no half mission is left behind, nothing more is done

@@ -103,7 +103,7 @@ def account_of(takeover: Takeover, cause: Cause | None, heard: Cause | None) -> 
     what = "was disarmed" if takeover.mode is None else f"went to {mode_name(takeover.mode)}"
     before = f" ({heard.reason} was heard just before)" if heard is not None else ""
     return Account(
-        f"the vehicle {what} by itself or by somebody unheard, such as a transmitter{before}",
+        f"the vehicle {what} by itself or by somebody not heard on this link, such as an RC transmitter{before}",
         Doer.UNKNOWN,
         None,
     )

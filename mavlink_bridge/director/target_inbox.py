@@ -103,7 +103,7 @@ class TargetInbox(Part):
         core.voice.tell(
             now_s,
             EventName.TARGET,
-            f"target {target.position} by {target.source}",
+            f"target {target.position} from {target.source}",
             list(target.position),
             str(target.source),
         )
@@ -133,7 +133,7 @@ class TargetInbox(Part):
             return
         self.answers.refuse(frame, m.MavResult.DENIED)
         is_heeded = TargetSource.REPOSITION in self.core.orders.target_sources
-        why = "it names no place" if is_heeded else "targets by reposition are not heeded"
+        why = "it has no position" if is_heeded else "not in --target-from"
         error = RefusedError(f"DO_REPOSITION denied: {why}")
         self.core.voice.error(now_s, EventName.TROUBLE, error, {})
 

@@ -85,7 +85,7 @@ class Voice:
         self.tell(
             now_s,
             EventName.PLANNED,
-            f"route {plan.length_m:.0f} m, {plan.drawn_clearance_m:.1f} m drawn clearance"
+            f"route {plan.length_m:.0f} m, fence clearance {plan.drawn_clearance_m:.1f} m along straight legs"
             + ", extrapolated beyond what was measured" * bool(plan.extrapolated),
             round(plan.length_m, 2),
             metres(plan.drawn_clearance_m),
@@ -103,9 +103,7 @@ class Voice:
 
     def rechecked(self, now_s: float, name: EventName, what: str, found: Recheck) -> None:
         """Report that lines do not keep what they have to."""
-        text = (
-            f"{what} keeps {metres_text(found.clearance_m)} of {metres_text(found.asked_m)} ({found.fence})"
-        )
+        text = f"{what} keeps only {metres_text(found.clearance_m)} of the required {metres_text(found.asked_m)} ({found.fence})"
         self.tell(now_s, name, text, metres(found.clearance_m), round(found.asked_m, 3), found.fence)
 
 

@@ -55,7 +55,7 @@ class Pulse:
         if self.beats < LEAST_BEATS or self._elapsed_s >= LEAST_BEAT_S * self.beats:
             return None
         return (
-            f"the log's clock stands still: {self.beats} heartbeats of one vehicle, which sends about one a second, "
+            f"the log's clock does not advance: {self.beats} heartbeats of one vehicle, which sends about one a second, "
             f"within {self._elapsed_s:.2f} s"
         )
 

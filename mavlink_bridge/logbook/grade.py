@@ -219,7 +219,7 @@ class DriveGrader:
         self._notes: list[str] = []
         if start.speed_mps > STANDING_MPS:
             self._notes.append(
-                f"it began at {start.speed_mps:.1f} m/s; the prediction is for a start from rest"
+                f"the drive began at {start.speed_mps:.1f} m/s; the prediction is for a start from rest"
             )
         self._forecast = self._foresee(start.heading_deg if start.speed_mps <= STANDING_MPS else None)
         self._windows = np.array(
@@ -289,7 +289,7 @@ class DriveGrader:
             self._notes.append(f"no prediction: the drive model does not know {self.way.odd}")
             return None
         if self._field.vehicle.autopilot is not Autopilot.ARDUPILOT:
-            self._notes.append("the prediction rests on measurements of ArduPilot Rover, which this is not")
+            self._notes.append("the drive model was measured on ArduPilot Rover, which this is not")
         try:
             forecast = envelope(
                 self._points,

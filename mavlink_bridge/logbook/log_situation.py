@@ -70,7 +70,7 @@ def situation_from_log(
     system : int, optional
         Which vehicle, by MAVLink system id; needed where several were heard.
     any_vehicle : bool
-        Take vehicles that are neither rover nor boat too.
+        Accept vehicles other than rovers and boats.
     on_damage : callable, optional
         Told what of the log could not be read, if anything.
 

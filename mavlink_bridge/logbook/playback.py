@@ -31,7 +31,7 @@ def vehicle_frames(
     system : int, optional
         Which vehicle; needed where several were heard.
     any_vehicle : bool
-        Take vehicles that are neither rover nor boat too.
+        Accept vehicles other than rovers and boats.
 
     Raises
     ------

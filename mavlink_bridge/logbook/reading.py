@@ -134,7 +134,7 @@ class _Head:
         if system is None:
             return list(chosen.values())
         if system not in chosen:
-            names = ", ".join(f"system {number}" for number in chosen) or "no vehicle at all"
+            names = ", ".join(f"system {number}" for number in chosen) or "no vehicle"
             raise LogError(f"{self._path}: system {system} was not heard, only {names}", file=str(self._path))
         return [chosen[system]]
 

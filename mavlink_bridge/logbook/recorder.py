@@ -116,7 +116,7 @@ class VehicleRecorder:
         for text in no_number_remarks(situation.no_numbers, situation.parameters):
             self._note(text)
         if self._nearest is None and not self._fences:
-            self._note("no clearance: no fence was transferred")
+            self._note("no clearance: the log contains no fence")
         return VehicleLog(
             system=situation.system or 0,
             component=situation.component or 0,
@@ -241,7 +241,7 @@ class VehicleRecorder:
             self._without_fix += 1
             return
         if abs(pose.value.position.lat_deg) > MAX_LATITUDE_DEG:
-            self._note("positions near a pole were not measured")
+            self._note("positions near a pole were skipped")
             return
         speed_mps = math.hypot(message.vx, message.vy) / 100
         fix = TrackFix(

@@ -84,7 +84,7 @@ class DownloadOutcome:
     def shortfall(self) -> str:
         """How far a download came that the vehicle did not finish, in words."""
         if self.state is not DownloadState.TOO_SLOW:
-            return "the vehicle fell silent"
+            return "the vehicle stopped answering"
         return (
             f"the vehicle announced {self.count} items and sent {self.received} in {self.took_s:.0f} s; "
             f"a list may take {bound_s(self.count):.0f} s"

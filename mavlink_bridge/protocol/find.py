@@ -20,11 +20,8 @@ LISTEN_S = 1.2
 _STILL_THERE_S = 5.0
 """Whoever was silent so long is gone: five missed heartbeats."""
 
-_SILENT_ADVICE = (
-    "is the vehicle on, the wiring right, and nobody else using the port? Do port and baud rate fit the vehicle's SERIALn_BAUD "
-    "(/dev/ttyUSB0,57600), and does it send to this address? `pbpp doctor` lists the serial ports"
-)
-_FORWARD_ADVICE = "MAVLink comes, but from no autopilot: let the ground station or router forward the vehicle's messages to this port too"
+_SILENT_ADVICE = "is the vehicle on, and does its telemetry reach this link?"
+_FORWARD_ADVICE = "MAVLink is received, but from no autopilot: let the ground station or router forward the vehicle's messages to this port too"
 
 
 class FindVehicle(TableMachine[FindState, FindEvent]):
@@ -135,11 +132,11 @@ class FindVehicle(TableMachine[FindState, FindEvent]):
         """Return the error for a vehicle not heard; it notes whether anybody else was heard, which is another trouble than a dead line."""
         within = f"no vehicle's HEARTBEAT was heard within {self._patience_s:g} s"
         if not self._senders:
-            return VehicleNotFoundError(f"{within}, nor anything else", advice=_SILENT_ADVICE)
+            return VehicleNotFoundError(f"{within}, nothing else either", heard=[], advice=_SILENT_ADVICE)
         names = ", ".join(
             f"system {system} component {component}" for system, component in sorted(self._senders)
         )
-        return VehicleNotFoundError(f"{within}, only {names}", advice=_FORWARD_ADVICE)
+        return VehicleNotFoundError(f"{within}, heard only {names}", advice=_FORWARD_ADVICE)
 
 
 def identity_taken(identity: tuple[int, int]) -> IdentityTakenError:

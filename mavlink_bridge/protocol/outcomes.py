@@ -31,9 +31,9 @@ _HELD = {
     Held.OLD: "the list that was there before is on the vehicle, unchanged",
     Held.UNFINISHED: "a mix of the old and the new list is on the vehicle: do not drive it",
     Held.FOREIGN: "a list that is neither ours nor the old one is on the vehicle",
-    Held.UNKNOWN: "what is on the vehicle now is not known: do not drive before it is read back",
+    Held.UNKNOWN: "what is on the vehicle now is unknown: read it back before driving",
 }
-_BROKEN_OFF = "the vehicle may hold the old list, the new one, or part of the old and part of the new: do not drive before it is read back"
+_BROKEN_OFF = "the vehicle may hold the old list, the new one, or part of both: read it back before driving"
 _INTERRUPTED = "interrupted"
 
 
@@ -56,11 +56,11 @@ def upload_trouble(outcome: VerifiedUploadOutcome) -> BridgeError | None:
             f"the vehicle refused the upload{item}: {result}{texts}; {held}", result=result, **details
         )
     if outcome.kind is OutcomeKind.BUSY:
-        why = "" if outcome.writer else "another ground station keeps the list busy (DENIED)"
+        why = "" if outcome.writer else "another ground station is transferring the list (DENIED)"
         return RefusedError(f"{why or _other_writer(outcome)}; {held}", **details)
     if outcome.kind is OutcomeKind.ACTIVE:
         return RefusedError(
-            "the vehicle is armed and drives its mission in AUTO; nothing was written. Switch it to HOLD first",
+            "the vehicle is armed and driving its mission in AUTO; nothing was written. Switch it to HOLD first",
             **details,
         )
     if outcome.kind is OutcomeKind.NO_ANSWER:
@@ -68,14 +68,14 @@ def upload_trouble(outcome: VerifiedUploadOutcome) -> BridgeError | None:
         return LinkError(f"{why}; nothing was written", **details)
     differences = "".join(f"; {difference}" for difference in outcome.differences[:3])
     why = "".join(f"; {text}" for text in (_other_writer(outcome), outcome.shortfall) if text)
-    return OutcomeError(f"the upload ended {outcome.kind}: {held}{why}{differences}{texts}", **details)
+    return OutcomeError(f"the upload failed ({outcome.kind}): {held}{why}{differences}{texts}", **details)
 
 
 def _other_writer(outcome: VerifiedUploadOutcome) -> str:
     if outcome.writer is None:
         return ""
     system, component = outcome.writer
-    return f"system {system} component {component} was heard to write the list meanwhile"
+    return f"system {system} component {component} wrote to the list meanwhile"
 
 
 @dataclass(frozen=True, slots=True)
@@ -259,11 +259,11 @@ def list_read(machine: Download | UndisturbedRead, what: str) -> tuple[MissionIt
     outcome = machine.outcome
     assert outcome is not None
     if isinstance(machine, UndisturbedRead) and machine.is_disturbed:
-        return RefusedError(f"another station keeps writing the {what}: it was another one while it was read")
+        return RefusedError(f"another station keeps writing the {what}: it changed while it was read")
     if outcome.is_complete:
         return outcome.items
     if outcome.state is DownloadState.BUSY:
-        return RefusedError(f"another ground station keeps the {what} busy (DENIED)", result="DENIED")
+        return RefusedError(f"another ground station is transferring the {what} (DENIED)", result="DENIED")
     if outcome.result is not None:
         return _download_refusal(what, outcome.result)
     return LinkError(f"the {what} could not be read: {outcome.shortfall}")
@@ -273,6 +273,6 @@ def _download_refusal(what: str, result: MissionResult) -> RefusedError:
     """Return the error that a refused download of a list is; an autopilot that does not know such lists may hold one all the same."""
     why = ""
     if what != "mission" and result is MissionResult.UNSUPPORTED:
-        older = "; one that it has by the older FENCE_POINT messages is not read" if what == "fence" else ""
+        older = "; a fence stored with the older FENCE_POINT messages is not read" if what == "fence" else ""
         why = f" (this autopilot transfers no {what} as mission items{older})"
-    return RefusedError(f"the vehicle refused to give its {what}: {result.name}{why}", result=result.name)
+    return RefusedError(f"the vehicle refused to send its {what}: {result.name}{why}", result=result.name)

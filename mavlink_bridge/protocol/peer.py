@@ -33,7 +33,9 @@ class Peer:
 
     def __post_init__(self) -> None:
         if (self.system, self.component) == (self.own_system, self.own_component):
-            raise ValueError(f"we cannot talk to ourselves ({self.system}/{self.component})")
+            raise ValueError(
+                f"the vehicle and pbpp cannot have the same ids ({self.system}/{self.component})"
+            )
 
     def accepts(self, frame: Frame, mission_type: MissionType | None = None) -> bool:
         """Return whether a frame comes from the peer, is meant for us or for everyone, and has the mission type asked for.

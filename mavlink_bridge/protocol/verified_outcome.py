@@ -67,7 +67,7 @@ class VerifiedUploadOutcome:
     is_coarse : bool
         The vehicle gives positions as 32-bit floats only: what is there is known to about 1 m.
     writer : tuple of int, optional
-        System and component of another station that was heard to write the list meanwhile; our own ids if somebody else speaks with these.
+        System and component of another station that wrote to the list meanwhile; our own ids if somebody else speaks with these.
     shortfall : str
         How a read that took too long fell short, in words; empty if none did.
     """

@@ -92,9 +92,9 @@ def differences(expected: Sequence[Mapping[str, Any]], told: Sequence[Mapping[st
 def _changes(expected: Mapping[str, Any], told: Mapping[str, Any]) -> Iterator[str]:
     for key, value in expected.items():
         if key not in told:
-            yield f"~ {_head(told)}: {key} {_short(value)} expected, none told"
+            yield f"~ {_head(told)}: {key} expected {_short(value)}, missing"
         elif not _is_same(value, told[key], _tolerance(key, value)):
-            yield f"~ {_head(told)}: {key} {_short(value)} expected, {_short(told[key])} told"
+            yield f"~ {_head(told)}: {key} expected {_short(value)}, got {_short(told[key])}"
 
 
 def _tolerance(key: str, value: Any) -> float:  # noqa: ANN401 - any JSON value

@@ -28,7 +28,7 @@ SENT_LINK = 3
 
 _NO_BACKUP = {"backup_failed": BackupError, "in_use": VehicleInUseError}
 """Calls that report why nothing can be uploaded."""
-_STILL_ADVICE = "fence, mission and targets are in it all the same: `pbpp log FILE`, `pbpp plan --log FILE`"
+_STILL_ADVICE = "its fence, mission and targets can still be used: `pbpp log FILE`, `pbpp plan --log FILE`"
 
 
 def replay_log(log: Path, orders: Orders, wait: Callable[[float], None] | None = None) -> Iterator[Event]:

@@ -324,6 +324,6 @@ def _parse(listen: str) -> tuple[str, SocketAddress]:
     kind = {"udp": "udpin"}.get(kind, kind)
     if kind not in ("tcpin", "udpin", "udpout") or not port.isdecimal() or int(port) > 65_535:
         raise LinkError(
-            f"{listen!r} is not something to listen on: expected tcpin:HOST:PORT, udpin:HOST:PORT or udpout:HOST:PORT"
+            f"{listen!r} cannot be listened on: expected tcpin:HOST:PORT, udpin:HOST:PORT or udpout:HOST:PORT"
         )
     return kind, (host, int(port))

@@ -135,7 +135,7 @@ def find_gap_bytes(file: LogFile) -> int:
             if ((scan.step >= 0) & (scan.step[scan.step] >= 0)).any():
                 return TIMESTAMP_BYTES  # ids foreign to us, but three records in a row that fit
             begin += len(data) - MAX_FRAME_BYTES
-    raise LogError(f"{file.path}: no MAVLink frame in it", path=str(file.path))
+    raise LogError(f"{file.path}: no MAVLink messages in it", path=str(file.path))
 
 
 def _check_kind(head: bytes, path: Path) -> None:
@@ -144,9 +144,7 @@ def _check_kind(head: bytes, path: Path) -> None:
     kind = kind_of(head)
     if kind is not None:
         what, advice = kind
-        raise LogError(
-            f"{path} is {what}; a telemetry log (.tlog) is what is read", path=str(path), advice=advice
-        )
+        raise LogError(f"{path} is {what}; expected a telemetry log (.tlog)", path=str(path), advice=advice)
 
 
 def _vote(at: NDArray[np.int64], end: NDArray[np.int64], path: Path) -> int:

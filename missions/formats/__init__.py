@@ -175,6 +175,7 @@ def fence_of(situation: Situation, path: Path | str) -> Fence:
     return fence.value
 
 
+_OTHER_FORMAT_ADVICE = "write a .plan instead: it holds missions, fences and rally points"
 _SUFFIX_ADVICE = "the file extension sets the format; use one of these"
 
 
@@ -254,12 +255,14 @@ def write_situation(
         raise MissionFormatError(
             f"{path}: a {path.suffix} file contains one list, but there are {' and '.join(wanted)}; choose one",
             file=str(path),
+            advice=_OTHER_FORMAT_ADVICE,
         )
     assert format_.write is not None
     try:
         text = format_.write(only(situation, part) if part else situation)
     except MissionFormatError as error:
-        raise MissionFormatError(f"{path}: {error}", file=str(path), **error.details) from None
+        details = {"advice": _OTHER_FORMAT_ADVICE, **error.details}
+        raise MissionFormatError(f"{path}: {error}", file=str(path), **details) from None
     write(path, text.encode())
     return tuple(wanted)
 

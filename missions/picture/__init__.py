@@ -50,10 +50,13 @@ def check_picture_format(path: Path | str) -> None:
             f"{path}: no picture format for the suffix {path.suffix!r}; known are {', '.join(PICTURE_SUFFIXES)}, "
             f"and {TERMINAL} for a sketch in the terminal",
             file=str(path),
+            advice="choose one of these",
         )
     if find_spec(library) is None:
         raise MissionFormatError(
-            f"{path.suffix} pictures need {library}: pip install 'pbpp-rover[plot]'", file=str(path)
+            f"{path.suffix} pictures need {library}: pip install 'pbpp-rover[plot]'",
+            file=str(path),
+            advice="install it, or use - for a sketch in the terminal",
         )
 
 

@@ -204,6 +204,7 @@ def with_end(planned: Plan, situation: Situation, request: Tour) -> Plan:
             f"RTL at the end would drive straight home, {near} at {last.at}; plan the way home with --return",
             fences=list(last.crosses or (last.fence,)),
             driven_clearance_m=round(last.driven_clearance_m, 3),
+            advice="use --return instead, or --end hold",
         )
     return replace(
         planned,

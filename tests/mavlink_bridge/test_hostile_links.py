@@ -278,7 +278,7 @@ def test_a_datagram_socket_that_fails_is_a_broken_link_but_what_came_before_is_h
             filling.send(b"x")
             kept, transport._socket = transport._socket, Failing()
             assert transport.receive(0.0) == [(("10.0.0.1", 1), b"x")]
-            with pytest.raises(LinkError, match="the link broke: Network is down"):
+            with pytest.raises(LinkError, match="the link failed: Network is down"):
                 transport.receive(0.0)
             transport._socket = kept
 

@@ -127,7 +127,7 @@ def test_tcp_both_ways_and_its_end() -> None:
         rover.send(Statustext(4, "hello"))
         assert heard(station, Statustext).message == Statustext(4, "hello")
         rover.close()
-        with pytest.raises(LinkError, match=r"the other end closed the link|the link broke"):
+        with pytest.raises(LinkError, match=r"the other end closed the link|the link failed"):
             talk_on(station)
 
 
@@ -200,6 +200,6 @@ def test_a_machine_runs_to_its_end() -> None:
 
 def test_a_machine_that_comes_to_no_end() -> None:
     with open_link(f"udpout:127.0.0.1:{free_port(socket.SOCK_DGRAM)}") as link:
-        with pytest.raises(LinkError, match=r"no outcome within 0\.2 s"):
+        with pytest.raises(LinkError, match=r"no result within 0\.2 s"):
             link.run(OneAnswer(), timeout_s=0.2)
         link.run(OneAnswer(), until=lambda: True)

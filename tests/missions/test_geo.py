@@ -74,10 +74,82 @@ def test_positions_are_read() -> None:
     assert str(parse_lat_lon("-1,2")) == "-1.0000000,2.0000000"
 
 
-@pytest.mark.parametrize("text", ["", "40", "40,", "40,5,6", "north,east", "40;5", "4_0,5", "0x28,5"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "40.0713 -105.2299",
+        "40.0713\t-105.2299",
+        "40.0713° -105.2299°",
+        "40.0713N 105.2299W",
+        "40.0713n,105.2299w",
+        "40.0713N105.2299W",
+        "N40.0713 W105.2299",
+        "N 40.0713, W 105.2299",
+        "105.2299W 40.0713N",
+        "W105.2299, N40.0713",
+        "40°4.278'N 105°13.794'W",
+        "40°04'16.68\"N 105°13'47.64\"W",
+        "40° 04′ 16.68″ N, 105° 13′ 47.64″ W",
+        "N40 04' 16.68'' W105 13' 47.64''",
+        "40°04'16.68\" -105°13'47.64\"",
+    ],
+)
+def test_positions_as_people_write_them(text: str) -> None:
+    assert parse_lat_lon(text) == pytest.approx((40.0713, -105.2299), abs=1e-9)
+
+
+@given(st.integers(-89, 89), st.integers(0, 59), st.floats(0, 59.9), st.floats(-180, 180))
+def test_degrees_minutes_and_seconds(degrees: int, minutes: int, seconds: float, lon_deg: float) -> None:
+    text = (
+        f"{abs(degrees)}°{minutes}'{seconds:.9f}\"{'NS'[degrees < 0]} {abs(lon_deg):.12f}{'EW'[lon_deg < 0]}"
+    )
+    size_deg = (abs(degrees) * 3600 + minutes * 60 + seconds) / 3600
+    wanted = (-size_deg if degrees < 0 else size_deg, lon_deg)
+    assert parse_lat_lon(text) == pytest.approx(wanted, abs=1e-9)
+
+
+NO_POSITIONS = [
+    "",
+    "40",
+    "40,",
+    "40,5,6",
+    "north,east",
+    "40;5",
+    "4_0,5",
+    "0x28,5",
+    "nan,1",
+    "1e2,3",
+    "40.0713-105.2299",
+]
+ODD_ANGLES = [
+    "-40N,5E",
+    "40N,-5E",
+    "404' 5",
+    "40.5°30'N 5E",
+    "40°60'N 5E",
+    "40°1.5'10\"N 5E",
+    "40,0713 -105,2299",
+    "N40S E5",
+]
+
+
+@pytest.mark.parametrize("text", [*NO_POSITIONS, *ODD_ANGLES])
 def test_text_that_is_no_position(text: str) -> None:
     with pytest.raises(InvalidPositionError, match=r"is not a position: expected LAT,LON"):
         parse_lat_lon(text)
+
+
+@pytest.mark.parametrize("text", ["40N 41N", "40E 41W", "40N 105", "40 105W"])
+def test_letters_that_do_not_say_which_is_which(text: str) -> None:
+    with pytest.raises(InvalidPositionError, match="N or S and E or W"):
+        parse_lat_lon(text)
+
+
+def test_swapped_numbers_are_recognised() -> None:
+    with pytest.raises(InvalidPositionError, match=r"did you mean 40\.0713,-105\.2299\?"):
+        parse_lat_lon("-105.2299,40.0713")
+    with pytest.raises(InvalidPositionError, match=r"latitude 200° is beyond ±90°$"):
+        parse_lat_lon("200,10")
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ from mavlink_bridge.cli.values import MOST_M, within
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BridgeOptions(CommonOptions):
-    """Run beside the autopilot: read fences, state and targets from the stream, keep a plan, upload it verified, watch the drive.
+    """Run alongside the autopilot: read fence, state and targets from the link, plan, upload and verify missions, watch the drive.
 
     Type targets as `LAT,LON`; `yes` confirms a plan. Without `--upload` it only reports.
 
@@ -47,15 +47,18 @@ class BridgeOptions(CommonOptions):
         ),
     ] = field(default_factory=list)
     clearance: Annotated[
-        str | None, typer.Option(metavar="M|max", help="Promised while driving. Default: from FENCE_MARGIN.")
+        str | None,
+        typer.Option(metavar="M|max", help="Clearance to keep while driving. Default: from FENCE_MARGIN."),
     ] = None
-    corner_allowance: Annotated[str, typer.Option(metavar="M|auto", help="Room for cut corners on top.")] = (
+    corner_allowance: Annotated[str, typer.Option(metavar="M|auto", help="Extra room for cut corners.")] = (
         "auto"
     )
     snap: Annotated[
         float,
         typer.Option(
-            metavar="M", parser=within(0.0, MOST_M, "metres"), help="Move blocked targets to free ground."
+            metavar="M",
+            parser=within(0.0, MOST_M, "metres"),
+            help="Move a blocked target to the nearest free place within M metres.",
         ),
     ] = 0.0
     vehicle: Annotated[
@@ -68,27 +71,29 @@ class BridgeOptions(CommonOptions):
         bool,
         typer.Option(
             "--drive",
-            help="With --upload: switch modes, HOLD before a new route and after arrival, AUTO for a verified one.",
+            help="With --upload: switch modes (HOLD before a new route and after arrival, AUTO for a verified route).",
         ),
     ] = False
     arm: Annotated[bool, typer.Option("--arm", help="With --drive: arm before AUTO.")] = False
-    confirm: Annotated[bool, typer.Option("--confirm", help="Upload a plan only after a typed yes.")] = False
-    once: Annotated[bool, typer.Option("--once", help="End after one job.")] = False
+    confirm: Annotated[bool, typer.Option("--confirm", help="Upload a plan only after you type yes.")] = False
+    once: Annotated[bool, typer.Option("--once", help="Exit after one job.")] = False
     log: Annotated[
         Path | None,
         typer.Option(
             metavar="FILE.tlog",
-            help="Record both directions, and a journal beside it; a restart goes on in run.2.tlog, run.3.tlog …",
+            help="Record both directions, with a journal next to it; a restart continues in run.2.tlog, run.3.tlog …",
         ),
     ] = None
     system: SystemOption = None
     any_vehicle: AnyVehicleOption = False
     source_system: Annotated[
         int | None,
-        typer.Option(metavar="N", min=1, max=255, help="Our system id. Default: the vehicle's own."),
+        typer.Option(
+            metavar="N", min=1, max=255, help="System id that pbpp uses. Default: the vehicle's own."
+        ),
     ] = None
-    source_component: Annotated[int, typer.Option(metavar="N", min=1, max=255, help="Our component id.")] = (
-        195
-    )
+    source_component: Annotated[
+        int, typer.Option(metavar="N", min=1, max=255, help="Component id that pbpp uses.")
+    ] = 195
     signing_key: SigningKeyOption = None
     timeout: TimeoutOption = 30.0

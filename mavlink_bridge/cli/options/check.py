@@ -29,7 +29,7 @@ from mavlink_bridge.cli.values import MOST_M, within
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckOptions(LinkOptions):
-    """Check every leg of a mission, whoever wrote it: what it keeps to the fence drawn and driven. Exit 8 if one breaks the promise.
+    """Check every leg of a mission against a fence: the clearance of its straight line and of the predicted track. Exit 8 if a leg fails.
 
     For example:
 
@@ -44,22 +44,26 @@ class CheckOptions(LinkOptions):
         Path | None, typer.Option(metavar="FILE", help="Mission file: .plan, .waypoints, …")
     ] = None
     fence: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Fence file; not needed where --mission holds one.")
+        Path | None,
+        typer.Option(metavar="FILE", help="Fence file; not needed if the --mission file holds one."),
     ] = None
     log: Annotated[
-        Path | None, typer.Option(metavar="FILE.tlog", help="Recorded log, for what no file is given for.")
+        Path | None, typer.Option(metavar="FILE.tlog", help="Recorded log, for what is not given as a file.")
     ] = None
     connect: ConnectOption = None
     start: Annotated[
         str | None,
-        typer.Option(metavar="LAT,LON", help="Default: the vehicle's position; of files and logs home."),
+        typer.Option(
+            metavar="LAT,LON",
+            help="Start position. Default: the vehicle's position; for files and logs, home.",
+        ),
     ] = None
     home: HomeOption = None
     vehicle: Annotated[
         Path | None,
         typer.Option(
             metavar="FILE.parm",
-            help="Parameters that the log or link does not have.",
+            help="Parameter file, for what the log or link does not report.",
             rich_help_panel=VEHICLE_PANEL,
         ),
     ] = None
@@ -68,14 +72,14 @@ class CheckOptions(LinkOptions):
         typer.Option(
             metavar="M",
             parser=within(0.0, MOST_M, "metres"),
-            help="To be kept by each leg while driving. Default: from FENCE_MARGIN.",
+            help="Fence clearance each leg must keep while driving. Default: from FENCE_MARGIN.",
         ),
     ] = None
     plot: Annotated[
         list[Path],
         typer.Option(
             metavar="FILE",
-            help="Draw it: .png, .svg, .pdf, .html; - in the terminal.",
+            help="Draw the check: .png, .svg, .pdf, .html; - in the terminal.",
             rich_help_panel=OUTPUT_PANEL,
         ),
     ] = field(default_factory=list)

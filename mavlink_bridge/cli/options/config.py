@@ -12,9 +12,9 @@ from mavlink_bridge.cli.options.shared import CommonOptions
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConfigOptions(CommonOptions):
-    """Show where the file of your options lies, what it sets, and which environment variables count.
+    """Show where your options file is, what it sets, and which environment variables apply.
 
-    The command line counts most, then `--config FILE`, then your own file, then the defaults in `--help`.
+    In order of precedence: the command line, `--config FILE`, your own file, the defaults in `--help`.
 
     For example:
 
@@ -25,6 +25,4 @@ class ConfigOptions(CommonOptions):
     `pbpp config --template`
     """
 
-    template: Annotated[
-        bool, typer.Option("--template", help="Print an example file, to be saved where yours belongs.")
-    ] = False
+    template: Annotated[bool, typer.Option("--template", help="Print an example options file.")] = False

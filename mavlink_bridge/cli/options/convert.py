@@ -13,7 +13,7 @@ from mavlink_bridge.cli.options.shared import CommonOptions, IgnorePointsOption,
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConvertOptions(CommonOptions):
-    """Convert a file with a fence, a mission, rally points or parameters; the suffixes choose the formats.
+    """Convert a file with a fence, a mission, rally points or parameters; the file extensions choose the formats.
 
     For example:
 
@@ -35,7 +35,7 @@ class ConvertOptions(CommonOptions):
     only: Annotated[
         str | None,
         typer.Option(
-            metavar="mission|fence|rally", help="Write this part only, where IN holds more than OUT can."
+            metavar="mission|fence|rally", help="Write only this part, if IN holds more than OUT can."
         ),
     ] = None
     return_point: Annotated[

@@ -14,16 +14,16 @@ from mavlink_bridge.cli.values import within
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DemoOptions(CommonOptions):
-    """Show the whole loop: simulated rover, fence, target, plan, upload, verify, drive, picture, report."""
+    """Run a demonstration: simulated rover, fence, target, plan, upload, verify, drive, picture, report."""
 
     out: Annotated[
-        Path, typer.Option(metavar="DIR", help="Where the picture, the mission and the log go.")
+        Path, typer.Option(metavar="DIR", help="Folder for the picture, the mission and the log.")
     ] = Path("demo-out")
     speedup: Annotated[
         float,
         typer.Option(
             metavar="X",
             parser=within(1.0, 20.0),
-            help="Simulated time runs so much faster, where the computer keeps up.",
+            help="How many times faster than real time, if the computer keeps up.",
         ),
     ] = 4.0

@@ -13,7 +13,7 @@ from mavlink_bridge.cli.options.shared import CommonOptions, FirmwareOption
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DoctorOptions(CommonOptions):
-    """Look at this installation: versions, serial ports, options file, signing key, backups, and a plan with a known answer.
+    """Check this installation: versions, serial ports, options file, signing key, backups, and a plan with a known answer.
 
     Nothing is opened and nothing is sent. Exit 8 if something is wrong.
 
@@ -27,9 +27,9 @@ class DoctorOptions(CommonOptions):
     """
 
     signing_key: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Look at this signing key and who may read it.")
+        Path | None, typer.Option(metavar="FILE", help="Check this signing key and its permissions.")
     ] = None
     vehicle: Annotated[
-        Path | None, typer.Option(metavar="FILE.parm", help="Look at the parameters of this vehicle too.")
+        Path | None, typer.Option(metavar="FILE.parm", help="Check this vehicle's parameters too.")
     ] = None
     firmware: FirmwareOption = None

@@ -24,11 +24,14 @@ class DownloadOptions(LinkOptions):
     `pbpp download parameters --connect /dev/ttyACM0 -o rover.parm`
     """
 
-    what: Annotated[str, typer.Argument(metavar="|".join(KINDS), help="What to read.")]
+    what: Annotated[str, typer.Argument(metavar="|".join(KINDS), help="What to download.")]
     connect: RequiredConnectOption = ""
     output: Annotated[
         list[Path],
         typer.Option(
-            "-o", "--output", metavar="FILE", help="Where to: .waypoints, .plan; parameters .parm, .param."
+            "-o",
+            "--output",
+            metavar="FILE",
+            help="File to write: .waypoints, .plan; parameters: .parm, .param. Default: list on the terminal.",
         ),
     ] = field(default_factory=list)

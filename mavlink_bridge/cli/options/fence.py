@@ -15,9 +15,9 @@ ACTIONS = ("merge",)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FenceOptions(CommonOptions):
-    """Make a fence fit for the vehicle. `merge`: one inclusion polygon in the place of several that overlap.
+    """Make a fence fit for the vehicle. `merge`: one inclusion polygon in place of several that overlap.
 
-    The autopilot allows only the intersection of all inclusions; who draws an area in several pieces means all of them together.
+    The autopilot allows only the intersection of all inclusions; an area drawn in several pieces is meant as their union.
 
     For example:
 
@@ -27,7 +27,8 @@ class FenceOptions(CommonOptions):
     action: Annotated[str, typer.Argument(metavar="|".join(ACTIONS), help="What to do.")]
     source: Annotated[Path, typer.Argument(metavar="FILE", help="A fence: .plan, .waypoints, .kml, …")]
     output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="FILE", help="Where to: .plan, .waypoints, .geojson, …")
+        Path,
+        typer.Option("-o", "--output", metavar="FILE", help="File to write: .plan, .waypoints, .geojson, …"),
     ]
     role: RoleOption = field(default_factory=list)
     outermost: OutermostOption = None

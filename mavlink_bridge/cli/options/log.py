@@ -13,7 +13,7 @@ from mavlink_bridge.cli.options.shared import CommonOptions, SystemOption
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LogOptions(CommonOptions):
-    """Show what telemetry logs hold: who speaks, fences and missions transferred, targets, modes, the drive and its clearance.
+    """Summarise telemetry logs: who speaks, fences and missions transferred, targets, modes, the drive and its clearance.
 
     Drives of a mission (AUTO) are graded: least clearance, deviation and time against the drive model's prediction. The verdict stands last.
 
@@ -33,6 +33,6 @@ class LogOptions(CommonOptions):
         ),
     ] = field(default_factory=list)
     messages: Annotated[
-        bool, typer.Option("--messages", help="Tell how many messages of each type came, and how often.")
+        bool, typer.Option("--messages", help="List the messages by type, with count and rate.")
     ] = False
     system: SystemOption = None

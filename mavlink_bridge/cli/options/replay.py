@@ -19,7 +19,7 @@ MOST_JOBS = 1024  # chosen: more processes than any computer has cores are a mis
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplayOptions(CommonOptions):
-    """Run the bridge's director over recorded logs, in their own time: what it saw, what it would have planned.
+    """Replay recorded logs through the bridge, in their own time: what it saw, what it would have planned.
 
     A log that `pbpp bridge --log` recorded is replayed with its journal: the same decisions come again. Over other logs the director only listens.
 
@@ -37,11 +37,11 @@ class ReplayOptions(CommonOptions):
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="JSON lines of the events that are expected, or a folder with each log's .events.jsonl; exit 8 if others come.",
+            help="Expected events (JSON lines), or a folder with each log's .events.jsonl; exit 8 if they differ.",
         ),
     ] = None
     record: Annotated[
-        bool, typer.Option("--record", help="Write the events beside each log, as its .events.jsonl.")
+        bool, typer.Option("--record", help="Write the events next to each log, as its .events.jsonl.")
     ] = False
     send: Annotated[
         str | None,
@@ -52,7 +52,7 @@ class ReplayOptions(CommonOptions):
         typer.Option(
             metavar="X",
             parser=within(0.0, MOST_SPEED, above=True),
-            help="Times the log's own speed. Default: as fast as it goes; 1 with --send.",
+            help="Replay speed as a multiple of the log's own. Default: as fast as possible; 1 with --send.",
         ),
     ] = None
     jobs: Annotated[
@@ -61,10 +61,10 @@ class ReplayOptions(CommonOptions):
             metavar="N",
             min=1,
             max=MOST_JOBS,
-            help="Logs replayed side by side. Default: as many as there are processors.",
+            help="Logs replayed in parallel. Default: one per processor.",
         ),
     ] = None
-    clearance: Annotated[str | None, typer.Option(metavar="M|max", help="As for plan.")] = None
-    corner_allowance: Annotated[str, typer.Option(metavar="M|auto", help="As for plan.")] = "auto"
+    clearance: Annotated[str | None, typer.Option(metavar="M|max", help="As in pbpp plan.")] = None
+    corner_allowance: Annotated[str, typer.Option(metavar="M|auto", help="As in pbpp plan.")] = "auto"
     system: SystemOption = None
     any_vehicle: AnyVehicleOption = False

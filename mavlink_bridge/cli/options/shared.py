@@ -14,7 +14,7 @@ from missions.errors import VehicleError
 from missions.firmware import Firmware, read_firmware
 
 LINK_PANEL, OUTPUT_PANEL, VEHICLE_PANEL = "Link", "Output", "Vehicle"
-_MAP_PANEL = "Maps: what zones are where the file does not say it"
+_MAP_PANEL = "Map files: what each zone is"
 """How help groups what many commands have."""
 
 ConnectOption = Annotated[
@@ -48,7 +48,7 @@ TimeoutOption = Annotated[
 AnyVehicleOption = Annotated[
     bool,
     typer.Option(
-        "--any-vehicle", help="Take vehicles that are neither rover nor boat too.", rich_help_panel=LINK_PANEL
+        "--any-vehicle", help="Accept vehicles other than rovers and boats.", rich_help_panel=LINK_PANEL
     ),
 ]
 RequiredConnectOption = Annotated[
@@ -61,14 +61,18 @@ RequiredConnectOption = Annotated[
 ]
 SigningKeyOption = Annotated[
     Path | None,
-    typer.Option(metavar="FILE", help="Sign with this key: 32 bytes, hex, base64, or a passphrase."),
+    typer.Option(
+        metavar="FILE",
+        help="Sign with this key: 32 bytes, hex, base64, or a passphrase.",
+        rich_help_panel=LINK_PANEL,
+    ),
 ]
 ReserveOption = Annotated[
     float,
     typer.Option(
         metavar="M",
         parser=within(0.0, MOST_M, "metres"),
-        help="Added to the clearance, for wind and slip.",
+        help="Extra clearance, for wind and wheel slip.",
         rich_help_panel=VEHICLE_PANEL,
     ),
 ]
@@ -77,7 +81,7 @@ PositionErrorOption = Annotated[
     typer.Option(
         metavar="M",
         parser=within(0.0, MOST_M, "metres"),
-        help="Error of the vehicle's position, added to the clearance. Default: from its fix type.",
+        help="Position error to add to the clearance. Default: from the GPS fix type.",
         rich_help_panel=VEHICLE_PANEL,
     ),
 ]
@@ -110,7 +114,7 @@ GpsOption = Annotated[
     str,
     typer.Option(
         metavar="FORWARD,RIGHT",
-        help="The GPS antenna from the middle of the vehicle, metres.",
+        help="Offset of the GPS antenna from the vehicle's centre, metres.",
         rich_help_panel=VEHICLE_PANEL,
     ),
 ]
@@ -118,7 +122,7 @@ RoleOption = Annotated[
     list[str],
     typer.Option(
         metavar="NAME=inclusion|exclusion|route|ignore",
-        help="What the feature of that name is, in KML, GeoJSON and other maps. Repeatable.",
+        help="What the named feature is, in KML, GeoJSON and other maps. Repeatable.",
         rich_help_panel=_MAP_PANEL,
     ),
 ]
@@ -133,7 +137,7 @@ OutermostOption = Annotated[
 IgnorePointsOption = Annotated[
     bool,
     typer.Option(
-        "--ignore-points", help="Leave out pins that do not say what they are.", rich_help_panel=_MAP_PANEL
+        "--ignore-points", help="Ignore points whose role the file does not say.", rich_help_panel=_MAP_PANEL
     ),
 ]
 
@@ -150,7 +154,7 @@ FirmwareOption = Annotated[
     typer.Option(
         metavar="VERSION",
         parser=_firmware,
-        help="The autopilot's version (4.5, 4.6.3), where the source does not report it.",
+        help="Firmware version (4.5, 4.6.3), if the source does not report it.",
         rich_help_panel=VEHICLE_PANEL,
     ),
 ]
@@ -158,7 +162,7 @@ TrustOption = Annotated[
     bool,
     typer.Option(
         "--trust-model",
-        help="Promise also where the drive lies outside what was measured.",
+        help="Promise a clearance even outside the measured range.",
         rich_help_panel=VEHICLE_PANEL,
     ),
 ]
@@ -179,7 +183,7 @@ class CommonOptions:
             count=True,
             metavar="",
             show_default=False,
-            help="No progress and no report; -qq: no warnings either, only errors.",
+            help="Print only warnings and errors; -qq: only errors.",
             rich_help_panel=OUTPUT_PANEL,
         ),
     ] = 0
@@ -219,13 +223,13 @@ class LinkOptions(CommonOptions):
     source_system: Annotated[
         int,
         typer.Option(
-            metavar="N", min=1, max=255, help="The system id we speak as.", rich_help_panel=LINK_PANEL
+            metavar="N", min=1, max=255, help="System id that pbpp uses.", rich_help_panel=LINK_PANEL
         ),
     ] = 245
     source_component: Annotated[
         int,
         typer.Option(
-            metavar="N", min=1, max=255, help="The component id we speak as.", rich_help_panel=LINK_PANEL
+            metavar="N", min=1, max=255, help="Component id that pbpp uses.", rich_help_panel=LINK_PANEL
         ),
     ] = 190
     signing_key: SigningKeyOption = None

@@ -36,38 +36,46 @@ class SimOptions(CommonOptions):
         ),
     ] = "tcpin:127.0.0.1:5760"
     home: Annotated[
-        str, typer.Option(metavar="LAT,LON[,HEADING]", help="Where the rover stands and looks at first.")
+        str, typer.Option(metavar="LAT,LON[,HEADING]", help="Position and heading at the start.")
     ] = "40.071374,-105.229930,0"
     fence: Annotated[Path | None, typer.Option(help="Fence file stored in the rover.")] = None
     mission: Annotated[
         Path | None,
         typer.Option(help="Mission file stored in the rover; its home, if it has one, is not used."),
     ] = None
-    param: Annotated[
-        list[str], typer.Option(metavar="NAME=VALUE", help="A parameter that differs; repeatable.")
-    ] = field(default_factory=list)
+    param: Annotated[list[str], typer.Option(metavar="NAME=VALUE", help="Set a parameter; repeatable.")] = (
+        field(default_factory=list)
+    )
     speedup: Annotated[
-        float, typer.Option(metavar="X", parser=within(0.01, 1000.0), help="How many times faster than real.")
+        float,
+        typer.Option(metavar="X", parser=within(0.01, 1000.0), help="How many times faster than real time."),
     ] = 1.0
     loss: Annotated[
         float, typer.Option(metavar="P", parser=within(0.0, 1.0), help="Share of frames lost, each way.")
     ] = 0.0
     duplicate: Annotated[
-        float, typer.Option(metavar="P", parser=within(0.0, 1.0), help="Share of frames that come twice.")
+        float,
+        typer.Option(metavar="P", parser=within(0.0, 1.0), help="Share of frames duplicated, each way."),
     ] = 0.0
     latency: Annotated[
         float,
         typer.Option(
-            metavar="S", parser=within(0.0, MOST_S, "seconds"), help="Seconds each frame is late, each way."
+            metavar="S",
+            parser=within(0.0, MOST_S, "seconds"),
+            help="Delay of each frame in seconds, each way.",
         ),
     ] = 0.0
     jitter: Annotated[
         float,
         typer.Option(
-            metavar="S", parser=within(0.0, MOST_S, "seconds"), help="Up to so many seconds more, at random."
+            metavar="S",
+            parser=within(0.0, MOST_S, "seconds"),
+            help="Random extra delay, up to so many seconds.",
         ),
     ] = 0.0
-    seed: Annotated[int, typer.Option(min=-MOST_SEED, max=MOST_SEED, help="Seed of the link's faults.")] = 0
+    seed: Annotated[
+        int, typer.Option(min=-MOST_SEED, max=MOST_SEED, help="Random seed of the link's faults.")
+    ] = 0
     system: Annotated[int, typer.Option(min=1, max=255, help="MAVLink system id.")] = 1
     role: RoleOption = field(default_factory=list)
     outermost: OutermostOption = None

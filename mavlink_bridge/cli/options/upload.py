@@ -41,11 +41,11 @@ class UploadOptions(LinkOptions):
     connect: RequiredConnectOption = ""
     only: Annotated[
         list[str],
-        typer.Option(metavar="|".join(LISTS), help="Of a file with several lists only these."),
+        typer.Option(metavar="|".join(LISTS), help="Upload only these lists of the file."),
     ] = field(default_factory=list)
     restore: Annotated[
         bool,
-        typer.Option("--restore", help="Put back what an interrupted upload replaced, or the backup FILE."),
+        typer.Option("--restore", help="Restore what an interrupted upload replaced, or the backup FILE."),
     ] = False
     hold: Annotated[
         bool, typer.Option("--hold", help="A vehicle that drives in AUTO is switched to HOLD first.")
@@ -58,11 +58,11 @@ class UploadOptions(LinkOptions):
     ] = False
     other_vehicle: Annotated[
         bool,
-        typer.Option("--other-vehicle", help="With --restore FILE: the backup may be another vehicle's."),
+        typer.Option("--other-vehicle", help="With --restore FILE: accept a backup of another vehicle."),
     ] = False
     forget: Annotated[
         bool,
-        typer.Option("--forget", help="Put the notes of interrupted uploads aside; the backups stay."),
+        typer.Option("--forget", help="Dismiss the notes of interrupted uploads; backups stay."),
     ] = False
     role: RoleOption = field(default_factory=list)
     outermost: OutermostOption = None

@@ -333,14 +333,14 @@ def test_notes_are_put_aside_without_a_link(mission_file):
         assert [entry["backup"] for entry in json.loads(result.stdout)["forgotten"]] == [
             str(backup.path)
         ] * count
-    assert "no interrupted upload is noted" in CliRunner().invoke(app, ["upload", "--forget"]).stdout
+    assert "no interrupted uploads" in CliRunner().invoke(app, ["upload", "--forget"]).stdout
     assert backup.path.exists()
 
 
 def test_with_a_link_only_this_vehicles_notes_are_put_aside(mission_file):
     interrupted_on(RebootsMidway(OLD, uid=b"theirs"), mission_file)
     with TcpVehicle(Adversary(OLD, uid=b"mine")) as link:
-        assert "no interrupted upload is noted" in run(link, "upload", "--forget")[1]
+        assert "no interrupted uploads" in run(link, "upload", "--forget")[1]
     with TcpVehicle(Adversary(OLD, uid=b"theirs")) as link:
-        assert "put aside as" in run(link, "upload", "--forget")[1]
+        assert "dismissed, kept as" in run(link, "upload", "--forget")[1]
     assert BackupStore().notes() == []

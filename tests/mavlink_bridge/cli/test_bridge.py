@@ -179,7 +179,7 @@ def test_ends_cleanly_when_asked(config):
 def test_replay_of_a_recording_for_people(logs):
     result = run("replay", str(logs / "mission-yard.tlog"))
     assert result.exit_code == 0
-    assert "by mission" in result.stdout
+    assert "from mission" in result.stdout
 
 
 def test_replay_against_what_is_no_expectation(logs, tmp_path):

@@ -26,7 +26,7 @@ def test_shows_state_vehicle_route_and_map():
     for part in (
         "driving",
         "system 1, AUTO, armed",
-        "m at the nearest so far",
+        "m, the least so far",
         "target 40.07",
         "heard again",
         "▓",

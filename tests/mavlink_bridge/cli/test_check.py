@@ -80,8 +80,7 @@ def test_a_person_sees_a_table(yard):
     assert re.search(r"start → 1 +10\.3 m", result.stdout)
     assert re.search(r"1 → 2 +134\.3 m +\d+ s +crosses +crosses", result.stdout)
     assert (
-        "BREAKS: leg 1 → 2 crosses exclusion polygon 1, exclusion polygon 2, first at 40.07156"
-        in result.stdout
+        "FAIL: leg 1 → 2 crosses exclusion polygon 1, exclusion polygon 2, first at 40.07156" in result.stdout
     )
     assert run("check", "--mission", yard["mission"], "--fence", yard["fence"], "-q").stdout == ""
 
@@ -93,7 +92,7 @@ def test_a_leg_that_is_only_near_says_how_near(tmp_path, yard):
     result = run("check", "--mission", made, "--clearance", "3")
     assert result.exit_code == 8
     said = re.search(
-        r"BREAKS: leg . → . comes within (\d\.\d\d) m of exclusion polygon \d while driving", result.stdout
+        r"FAIL: leg . → . comes within (\d\.\d\d) m of exclusion polygon \d while driving", result.stdout
     )
     assert 2 <= float(said[1]) < 3
     worst = min(float(near) for near in re.findall(r"comes within (\d\.\d\d) m of", result.stdout))
@@ -108,7 +107,10 @@ def test_what_was_planned_passes(tmp_path, yard):
     assert document["broken"] == 0
     assert document["driven_clearance_m"] == pytest.approx(planned["driven_clearance_m"], abs=0.01)
     assert document["length_m"] == pytest.approx(planned["length_m"], abs=0.01)
-    assert "Every leg keeps 2 m while driving" in run("check", "--mission", made, "--clearance", "2").stdout
+    assert (
+        "PASS: every leg keeps 2 m while driving"
+        in run("check", "--mission", made, "--clearance", "2").stdout
+    )
 
 
 def test_the_recorded_log_tells_it_all(logs):
@@ -150,7 +152,7 @@ def test_a_live_vehicle_is_asked(fields, yard, streams):
         assert any("added 0.3 m for GPS error" in text for text in document["warnings"])
         assert document["system"] == 1
         assert document["legs"][0]["start"] == pytest.approx(away, abs=1e-5)
-        assert not any("did not tell its position" in text for text in document["warnings"])
+        assert not any("no position from the vehicle" in text for text in document["warnings"])
 
 
 def test_what_a_live_vehicle_does_not_tell_is_said(fields, yard, monkeypatch):
@@ -165,9 +167,7 @@ def test_what_a_live_vehicle_does_not_tell_is_said(fields, yard, monkeypatch):
     monkeypatch.setattr("mavlink_bridge.director.learning.stream_requests", lambda _peer: [])
     with Simulator(config, "tcpin:127.0.0.1:0") as simulator:
         document = document_of("check", "--connect", simulator.connection, "--clearance", "2", code=8)
-        assert (
-            "the vehicle did not tell its position: it is taken to stand at its home" in document["warnings"]
-        )
+        assert "no position from the vehicle; assuming it stands at home" in document["warnings"]
         assert any("GPS accuracy unknown" in text for text in document["warnings"])
         assert document["clearance_m"] == pytest.approx(2.1)  # FENCE_MARGIN and a reserve
         monkeypatch.setattr("mavlink_bridge.protocol.parameters.PATIENCE_S", 0.5)
@@ -175,7 +175,7 @@ def test_what_a_live_vehicle_does_not_tell_is_said(fields, yard, monkeypatch):
             "mavlink_bridge.protocol.parameters.ReadParameters.receive", lambda *_arguments: None
         )
         silent = document_of("check", "--connect", simulator.connection, code=5)
-        assert "does not answer when asked for its parameters" in silent["message"]
+        assert "did not answer the parameter request" in silent["message"]
 
 
 def test_pictures(tmp_path, yard):
@@ -363,7 +363,7 @@ def test_a_fence_that_changes_on_the_way_stops_a_repaired_mission(tmp_path, fiel
         )
         with (
             open_link(simulator.connection) as link,
-            pytest.raises(SituationError, match="not started again"),
+            pytest.raises(SituationError, match="not restarted"),
         ):
             conduct(link, orders, quiet=True, on_frames=meddle)
         assert is_changed
@@ -373,7 +373,7 @@ def test_a_fence_that_changes_on_the_way_stops_a_repaired_mission(tmp_path, fiel
 @pytest.mark.parametrize(
     ("item", "word"),
     [
-        (MissionItem(Command.DO_JUMP, CoordinateFrame.MISSION, (1.0, -1.0, 0.0, 0.0)), "round without end"),
+        (MissionItem(Command.DO_JUMP, CoordinateFrame.MISSION, (1.0, -1.0, 0.0, 0.0)), "repeats forever"),
         (MissionItem(Command.DO_SET_REVERSE, CoordinateFrame.MISSION, (1.0, 0.0, 0.0, 0.0)), "in reverse"),
     ],
 )
@@ -424,7 +424,7 @@ def test_a_seam_before_which_the_vehicle_stops_is_named_with_its_place(tmp_path)
     result = run(*asked)
     assert result.exit_code == 8
     assert re.search(
-        r"BREAKS: leg start → 1 crosses the inner edge of inclusion polygon 2: the vehicle stops at 40\.07137\d+,-105\.22970\d+",
+        r"FAIL: leg start → 1 crosses the inner edge of inclusion polygon 2: the vehicle stops at 40\.07137\d+,-105\.22970\d+",
         result.output,
     )
     assert "set AVOID_ENABLE 2 (without bit 0), or draw the inclusions as one polygon" in result.output

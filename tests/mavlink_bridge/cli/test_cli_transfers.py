@@ -122,9 +122,12 @@ def test_people_are_told_in_words(rover, tmp_path):
     assert code == 0
     assert "mission: 20 items, uploaded in" in output
     assert "the list before is kept in" in output
-    assert "was there already" in run(rover, "upload", mission_file(tmp_path))[2]
+    assert "already on the vehicle" in run(rover, "upload", mission_file(tmp_path))[2]
     assert run(rover, "upload", mission_file(tmp_path), "--quiet")[2] == ""
-    assert "mission: 20 items" in run(rover, "download", "mission")[2]
+    listed = run(rover, "download", "mission")[2].splitlines()
+    assert listed[0] == "mission: 20 items"
+    assert len(listed) == 21
+    assert listed[2].split()[:3] == ["1", "NAV_WAYPOINT", str(NEW[1].position)]
 
 
 @pytest.mark.parametrize(
@@ -168,7 +171,7 @@ def test_parameters(rover, tmp_path):
     assert code == 0
     assert "parameters; written to" in output
     assert "WP_SPEED 5\n" in down.read_text()
-    assert "all parameters have these values already" in run(rover, "upload", down)[2]
+    assert "all parameters already have these values" in run(rover, "upload", down)[2]
     changed = tmp_path / "changed.param"
     changed.write_text("WP_SPEED,3.5\nWP_RADIUS,3\n")
     code, document, _ = run(rover, "upload", changed, "--json")
@@ -230,7 +233,7 @@ def test_a_disarmed_vehicle_is_not_left_in_auto(rover, tmp_path):
         rover.vehicle.rover.is_armed = False
         code, document, _ = run(rover, "upload", mission_file(tmp_path), "--drive", "--json")
         assert (code, document["error"]) == (7, "OutcomeError")
-        assert "not armed and does not drive: its mode was left alone" in document["message"]
+        assert "not armed and does not drive: its mode was not changed" in document["message"]
         assert rover.vehicle.mode == mode
     assert places(rover.vehicle.mission[1:]) == places(NEW[1:])
 
@@ -388,7 +391,7 @@ def test_an_interrupt_says_what_it_left_behind(rover, tmp_path, monkeypatch, pat
     monkeypatch.setattr(owner, patched, interrupted)
     code, document, _ = run(rover, "upload", mission_file(tmp_path), "--json")
     assert code == 130
-    assert ("part of the old and part of the new" in document["message"]) is left_behind
+    assert ("part of both" in document["message"]) is left_behind
     assert ("was left as it was" in document["message"]) is not left_behind
 
 

@@ -130,13 +130,13 @@ class TestDoctor:
         monkeypatch.setattr("serial.tools.list_ports.comports", lambda: [port])
         monkeypatch.setattr(os, "access", lambda *_: False)
         found = findings()["serial port /dev/ttyS0"]
-        assert (found["verdict"], found["found"]) == ("note", "present, but you may not use it")
+        assert (found["verdict"], found["found"]) == ("note", "present, but you have no permission to use it")
         assert found["advice"]
 
     @pytest.mark.parametrize(
         ("group", "advice"),
         [
-            ("dialout", "sudo usermod -aG dialout $USER, then log in anew"),
+            ("dialout", "sudo usermod -aG dialout $USER, then log in again"),
             ("root", "ask the administrator for access to /dev/ttyS0"),
         ],
     )
@@ -201,7 +201,7 @@ class TestConfig:
     def test_without_a_file(self):
         result = run("config")
         assert result.exit_code == 0
-        assert "not there" in result.stdout
+        assert "does not exist" in result.stdout
 
     def test_the_template_is_a_file_of_options(self, tmp_path):
         text = run("config", "--template").stdout
@@ -249,7 +249,7 @@ class TestConfig:
     @pytest.mark.parametrize(
         ("text", "said"),
         [
-            ("[paln]\n", "no command"),
+            ("[paln]\n", "is not a command"),
             ("[all]\nnonsense = 1\n", "nonsense"),
             ("clearance = 2\n", "outside a table"),
             ("[plan\n", "not TOML"),

@@ -43,7 +43,7 @@ from mavlink_bridge.protocol.outcomes import end_of_upload
 from missions.formats.waypoints import format_items
 
 OLD, NEW = mission(3, 900), mission(6, 500)
-MIXED = "part of the old and part of the new"
+MIXED = "part of both"
 
 
 pytestmark = pytest.mark.usefixtures("state_folder")
@@ -86,7 +86,7 @@ def assert_said(document, code, wanted=7):
         :1
     ]
     assert places(read_backup(Path(path)).items) == places(OLD)
-    assert "before it is read back" in document["message"] or "do not drive" in document["message"]
+    assert "read it back before driving" in document["message"] or "do not drive" in document["message"]
     if wanted == 7:
         assert document["details"]["backup"] == path
         assert document["details"]["list"] == "mission"

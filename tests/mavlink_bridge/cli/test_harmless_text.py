@@ -276,7 +276,7 @@ class TestFiles:
         assert (tmp_path / "rover.parm").read_text() == "WP_SPEED 2\n"
         told = capsys.readouterr().err
         assert is_plain(told)
-        assert "left out, because no parameter can have such a name: 'A\\nFENCE_ENABLE 0', " in told
+        assert "left out, not valid parameter names: 'A\\nFENCE_ENABLE 0', " in told
 
 
 class TestPictures:

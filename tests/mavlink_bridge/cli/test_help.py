@@ -73,6 +73,21 @@ def test_no_words_at_all_give_help():
     assert "Usage" in result.stdout
 
 
+@pytest.mark.parametrize(
+    "name", ["plan", "check", "bridge", "log", "replay", "upload", "download", "convert"]
+)
+def test_a_command_without_words_prints_its_usage(name):
+    result = CliRunner().invoke(app, [name])
+    assert result.exit_code == 2
+    assert f"Usage: pbpp {name}" in result.stdout
+    assert result.stderr.startswith("error: ")
+
+
+@pytest.mark.parametrize("name", ["", *COMMANDS])
+def test_flags_show_no_type(name):
+    assert "<bool>" not in CliRunner().invoke(app, [*filter(None, [name]), "--help"]).stdout
+
+
 def test_the_version():
     result = CliRunner().invoke(app, ["--version"])
     assert result.exit_code == 0

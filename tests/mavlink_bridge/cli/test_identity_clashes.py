@@ -113,7 +113,7 @@ def test_an_upload_is_not_driven_then(rover, forge, mission_file):
     document = json.loads(result.stdout)
     assert (result.exit_code, document["error"]) == (7, "OutcomeError")
     assert document["message"] == (
-        "another program on the link uses our ids (system 245 component 190): the vehicle is not switched to AUTO; what was uploaded is on it"
+        "another program on the link uses our ids (system 245 component 190): the vehicle was not switched to AUTO; the upload is on it"
         "; written and verified before: mission"
     )
     assert is_held(rover, NEW)
@@ -134,7 +134,7 @@ def test_what_comes_back_of_ours_is_noted_once(rover, forge, mission_file, after
     assert result.exit_code == 0
     assert is_held(rover, NEW)
     assert WARNING not in result.stderr
-    assert result.stderr.count("note: our own messages come back on this link; they are left out") == 1
+    assert result.stderr.count("note: this link echoes our own messages; they are ignored") == 1
 
 
 def test_a_note_is_left_out_where_little_is_to_be_told(rover, forge, mission_file):

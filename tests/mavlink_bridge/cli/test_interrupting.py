@@ -73,9 +73,9 @@ def test_answers(answer, step):
     ("doing", "text"),
     [
         (DRIVING, "AUTO, armed, 5.0 m/s"),
-        (Doing(Mode.HOLD, False, None, age_s=0.2), "HOLD, not armed, speed not known"),
-        (Doing(), "its mode is not known, no heartbeat was heard"),
-        (Doing(Mode.AUTO, True, 0.0, has_completed=True, age_s=0, speed_age_s=0), "AUTO, armed, 0.0 m/s, its mission complete"),
+        (Doing(Mode.HOLD, False, None, age_s=0.2), "HOLD, not armed, speed unknown"),
+        (Doing(), "its mode is unknown, no heartbeat was received"),
+        (Doing(Mode.AUTO, True, 0.0, has_completed=True, age_s=0, speed_age_s=0), "AUTO, armed, 0.0 m/s, mission complete"),
         (Doing(99, True, 1.0, age_s=12.4, speed_age_s=0.1), "mode 99, armed, 1.0 m/s (12 s ago)"),
         (Doing(Mode.AUTO, True, 1.0, age_s=0.1, speed_age_s=30.0), "AUTO, armed, 1.0 m/s (30 s ago)"),
     ],
@@ -90,14 +90,14 @@ def test_what_a_vehicle_does_in_words(doing, text):
         (InterruptReport("", Doing(Mode.HOLD, False, 0.0, age_s=0, speed_age_s=0), ""),
          "interrupted; the vehicle was left as it was: HOLD, not armed, 0.0 m/s; nothing was written to it"),
         (InterruptReport("", DRIVING, "the mission on it is ours", drives=True),
-         "interrupted; nothing was sent; the vehicle goes on with the mission that pbpp started: AUTO, armed, 5.0 m/s; the mission on it is ours"),
+         "interrupted; nothing was sent; the vehicle continues the mission that pbpp started: AUTO, armed, 5.0 m/s; the mission on it is ours"),
         (InterruptReport("", Doing(Mode.HOLD, True, 0.1, age_s=0, speed_age_s=0), "x", drives=True, was_asked=True, is_held=True),
          "interrupted; the vehicle was switched to HOLD, confirmed by its heartbeat: HOLD, armed, 0.1 m/s; x"),
         (InterruptReport("", DRIVING, "x", drives=True, is_held=False),
          "interrupted; HOLD was sent, but no heartbeat confirms it: AUTO, armed, 5.0 m/s; x"),
         (InterruptReport("part old, part new", DRIVING, ""), "part old, part new; the vehicle now: AUTO, armed, 5.0 m/s"),
         (InterruptReport("", DRIVING, "x", drives=True, is_link_lost=True),
-         "interrupted; nothing was sent; the vehicle goes on with the mission that pbpp started: AUTO, armed, 5.0 m/s, when it was last heard (the link is lost); x"),
+         "interrupted; nothing was sent; the vehicle continues the mission that pbpp started: AUTO, armed, 5.0 m/s, when it was last heard (the link is lost); x"),
     ],
 )  # fmt: skip
 def test_what_is_said_at_the_end(ending, message):
@@ -204,9 +204,7 @@ def test_nothing_is_sent_for_a_no_a_second_interrupt_or_a_closed_input(driven, m
     told = interrupt(at_hand, monkeypatch, keyboard=keyboard)
     assert rover.vehicle.mode == Mode.AUTO
     assert {type(message) for message in sent} <= {m.Heartbeat}
-    assert "nothing was sent; the vehicle goes on with the mission that pbpp started: AUTO, armed, " in str(
-        told
-    )
+    assert "nothing was sent; the vehicle continues the mission that pbpp started: AUTO, armed, " in str(told)
     assert told.details["drives"] is True
 
 
@@ -279,7 +277,7 @@ def take_terminal() -> None:
     ("command", "answer", "mode", "said"),
     [
         ("plan", "\n", Mode.HOLD, "switched to HOLD, confirmed by its heartbeat"),
-        ("bridge", "n\n", Mode.AUTO, "nothing was sent; the vehicle goes on"),
+        ("bridge", "n\n", Mode.AUTO, "nothing was sent; the vehicle continues"),
     ],
 )
 def test_at_a_real_terminal(fields, tmp_path, command, answer, mode, said):
@@ -314,7 +312,7 @@ def test_at_a_real_terminal(fields, tmp_path, command, answer, mode, said):
         os.close(ours)
         assert process.wait(60) == 130
         text = " ".join(heard.decode(errors="replace").split())
-        assert "the vehicle drives: AUTO, armed, " in text
+        assert "the vehicle is driving: AUTO, armed, " in text
         assert said in text
         assert "the mission on it is the planned one (" in text
         assert simulator.vehicle.mode == mode
@@ -324,7 +322,7 @@ def test_at_a_real_terminal(fields, tmp_path, command, answer, mode, said):
     ("owner", "method", "said", "not_said"),
     [
         (BackupStore, "begin", "was left as it was: MANUAL, not armed, 0.0 m/s; nothing was written to it", "part of"),
-        (VerifiedUpload, "backup_stored", "part of the old and part of the new: do not drive before it is read back; the old list is kept in ", "nothing was"),
+        (VerifiedUpload, "backup_stored", "part of both: read it back before driving; the old list is kept in ", "nothing was"),
     ],
 )  # fmt: skip
 def test_an_interrupted_plan_says_what_is_on_the_vehicle(
@@ -362,7 +360,7 @@ def test_a_service_that_is_ended_sends_nothing_and_tells_the_state(fields, tmp_p
         _, errors = process.communicate(timeout=60)
         assert process.returncode == 130
         assert simulator.vehicle.mode == Mode.AUTO
-    assert "nothing was sent; the vehicle goes on with the mission that pbpp started: AUTO, armed, " in errors
+    assert "nothing was sent; the vehicle continues the mission that pbpp started: AUTO, armed, " in errors
     assert "left as it was" not in errors
     assert json.dumps(errors).count("error: ") == 1
 

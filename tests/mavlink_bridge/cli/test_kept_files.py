@@ -177,7 +177,10 @@ class TestDownloads:
         path = tmp_path / "field.plan"
         for what in ("mission", "fence"):
             result = run("download", what, "--connect", rover.connection, "--timeout", 10, "-o", path)
-        assert f"warning: {path} loses its mission; the old file is kept as {path}.bak\n" in result.stderr
+        assert (
+            f"warning: {path} no longer contains its mission; the old file is kept as {path}.bak\n"
+            in result.stderr
+        )
         kept = tmp_path / "mission.plan"
         shutil.copy(tmp_path / "field.plan.bak", kept)
         assert read_situation(kept).mission.value.items == HAND_MADE.mission.value.items
@@ -190,7 +193,10 @@ def test_a_mission_that_was_only_converted_is_kept_from_a_planned_one(tmp_path):
     run(*converting)
     assert "kept as" not in run(*converting).stderr
     planning = ("plan", "--fence", output, *WHERE, "-o", output)
-    assert f"{output} loses its mission; the old file is kept as {output}.bak" in run(*planning).stderr
+    assert (
+        f"{output} no longer contains its mission; the old file is kept as {output}.bak"
+        in run(*planning).stderr
+    )
     assert "kept as" not in run(*planning).stderr
 
 
@@ -205,7 +211,9 @@ def test_rally_points_of_a_plan_of_ours_are_kept_from_one_without(tmp_path, hand
     output = tmp_path / "out.plan"
     run("plan", "--fence", hand_made, *WHERE, "-o", output)
     result = run("plan", "--fence", MAZE, *WHERE, "-o", output)
-    assert f"{output} loses its rally points; the old file is kept as {output}.bak" in result.stderr
+    assert (
+        f"{output} no longer contains its rally points; the old file is kept as {output}.bak" in result.stderr
+    )
 
 
 def test_an_empty_file_is_nobodys(tmp_path):
@@ -233,7 +241,7 @@ def test_links_are_kept_and_what_they_lead_to_is_left_alone(tmp_path):
     output.symlink_to(precious)
     result = run("plan", "--fence", MAZE, *WHERE, "-o", output)
     assert (
-        f"{output} was a link to {precious}, which is left as it is; the link is kept as {output}.bak"
+        f"{output} was a link to {precious} (left unchanged); the link is kept as {output}.bak"
         in result.stderr
     )
     assert precious.read_text() == "precious"

@@ -161,7 +161,7 @@ def test_people_see_the_plan_before_anything_is_written(config, tmp_path, monkey
     assert is_shown
     assert all(is_shown)
     lines = [line.split(" ")[0] for line in result.stdout.splitlines()]
-    assert lines == ["Route:", "Clearance:", "Wrote", "Uploaded", "The", "Arrived"]
+    assert lines == ["Route:", "Fence", "Wrote", "Uploaded", "The", "Arrived"]
     assert re.search(r"Arrived after [0-9.]+ m in \d+ s; least clearance [0-9.]+ m while driving, breaches 0", result.stdout)  # fmt: skip
 
 
@@ -172,7 +172,7 @@ def test_hold_stops_it_first(config):
         _command(simulator, Command.DO_SET_MODE, 1.0, Mode.AUTO)
         plan = ("plan", "--connect", simulator.connection, "--target", TARGET, "--upload", "--json")
         refused = json.loads(run(*plan).stdout)
-        assert (refused["exit_code"], refused["advice"]) == (6, "--hold switches it to HOLD first")
+        assert (refused["exit_code"], refused["advice"]) == (6, "add --hold to switch it to HOLD first")
         assert json.loads(run(*plan, "--hold").stdout)["verified"] is True
         assert (simulator.vehicle.mode, simulator.vehicle.is_armed) == (Mode.HOLD, True)
 

@@ -178,7 +178,7 @@ def test_many_rows_are_cut_and_said(tmp_path):
     result = run(str(log.write(tmp_path / "busy.tlog")))
     assert "the last 40 of 121" in result.stdout
     assert "2 h 13 min 21 s" in result.stdout
-    assert "no fence was transferred" in result.stdout
+    assert "the log contains no fence" in result.stdout
 
 
 def test_strange_names_and_clocks_are_told_plainly(tmp_path):
@@ -200,7 +200,7 @@ def test_a_clock_that_stands_still_is_told(tmp_path):
         log.heartbeat()
     log.rows = [(0.0, sender, message) for _, sender, message in log.rows]
     path = log.write(tmp_path / "still.tlog")
-    told = "the log's clock stands still: 12 heartbeats of one vehicle"
+    told = "the log's clock does not advance: 12 heartbeats of one vehicle"
     assert told in run(str(path)).stdout.replace("\n", " ")
     document = json.loads(run(str(path), "--json").stdout)
     assert document["logs"][0]["clock_trouble"].startswith(told)

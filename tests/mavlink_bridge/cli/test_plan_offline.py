@@ -232,8 +232,8 @@ class TestFiles:
         assert result.exit_code == 0
         lines = result.stdout.splitlines()
         assert lines[0].startswith("Route: ")
-        assert "m as the crow flies" in lines[0]
-        assert "m drawn, 2.5 m promised while driving" in lines[1]
+        assert "m in a straight line" in lines[0]
+        assert "at least 2.5 m while driving" in lines[1]
         assert lines[2] == f"Wrote {mission}"
         assert all(line.startswith("warning: ") for line in result.stderr.splitlines())
         quiet = run("--fence", fields / "yard-fence.waypoints", "--start", START, "--target", TARGET, "-q")
@@ -307,7 +307,7 @@ class TestFiles:
         trusted = document(*asked, "--trust-model")
         assert (trusted["clearance_m"], trusted["extrapolated"]) == (2.5, found["extrapolated"])
         said = run(*asked).stdout
-        assert "nothing promised for the driven track, extrapolated beyond what was measured" in said
+        assert "nothing promised while driving, extrapolated beyond what was measured" in said
 
     def test_several_targets_and_snapping(self, fields: Path, drawn: tuple) -> None:
         source = ("--fence", fields / "yard-fence.waypoints", "--start", START, "--clearance", 1, *drawn)
@@ -455,7 +455,7 @@ WRONG_OPTIONS: list[tuple[tuple[str, ...], int, str]] = [
     (("--fence", "F", *ENDS, "--plot", "no/where/x.png"), 3, "cannot be written"),
     (("--fence", "F", "--start", "here", "--target", "40,5"), 2, "'here' is not a position"),
     (("--fence", "F", "--start", "", "--target", "40,5"), 2, "'' is not a position"),
-    (("--fence", "F", "--start", "40,-105", "--target", "nan,5"), 2, "is not a pair of numbers"),
+    (("--fence", "F", "--start", "40,-105", "--target", "nan,5"), 2, "is not a position"),
     (("--fence", "F", "--start", "91,-105", "--target", "40,5"), 2, "latitude 91° is beyond"),
     (("--fence", "F", "--start", "40,-105", "--target", "40,181"), 2, "longitude 181° is beyond"),
     (("--fence", "F", "--target", "40.0750,-105.2205"), 3, "start unknown"),

@@ -85,8 +85,6 @@ def test_the_bridge_starts_again_with_the_same_name_and_says_where(tmp_path):
     assert first.exit_code == 5
     again = CliRunner().invoke(app, [*arguments, "--json"])
     assert again.exit_code == 5
-    assert f"{log} exists already; this run is recorded to {tmp_path / 'run.2.tlog'}" in again.output.replace(
-        "\n", ""
-    )
+    assert f"{log} exists; recording this run to {tmp_path / 'run.2.tlog'}" in again.output.replace("\n", "")
     head = (tmp_path / "run.2.journal.jsonl").read_text().splitlines()[0]
     assert json.loads(head)["journal"] == 2

@@ -52,7 +52,7 @@ def test_recorded_then_expected(copies, tmp_path):
     assert different.exit_code == 8
     assert different.stdout == ""
     assert "~ no-fence.tlog" in different.stderr
-    assert '"FenceError" expected, "FenceMissingError" told' in different.stderr
+    assert 'expected "FenceError", got "FenceMissingError"' in different.stderr
 
 
 def test_side_by_side_gives_the_same_in_the_same_order(copies):

@@ -79,7 +79,7 @@ def test_a_log_that_cannot_be_written_is_told_once_and_ends_with_its_journal(wri
     recorder._file = disk._file
     assert len(told) == 1
     assert told[0].startswith(f"{tmp_path / 'run.tlog'}: ")
-    assert told[0].endswith("; recording stops, the bridge goes on")
+    assert told[0].endswith("; recording stopped; the bridge continues")
     assert disk.is_closed
     assert len(list(TlogReader(tmp_path / "run.tlog"))) == 2
     lines = [json.loads(line) for line in (tmp_path / "run.jsonl").read_text().splitlines()]
@@ -94,7 +94,7 @@ def test_a_journal_that_cannot_be_written_ends_the_log_too(writers, tmp_path):
     for number in range(4):
         log.write(float(number), FRAME)
         log.call(Call(number, float(number), "timer"))
-    assert told == [f"run.file: {FULL.strerror}; recording stops, the bridge goes on"]
+    assert told == [f"run.file: {FULL.strerror}; recording stopped; the bridge continues"]
     assert disk.is_closed
     assert len(list(TlogReader(tmp_path / "run.tlog"))) == 2
 
@@ -128,7 +128,7 @@ def test_an_output_that_cannot_be_written_is_told_once(monkeypatch, capsys):
     teller(EVENT)
     assert (len(dropped), len(heard)) == (1, 1)
     assert (
-        f"events cannot be written any more ({FULL.strerror}); the bridge goes on" in capsys.readouterr().err
+        f"events can no longer be written ({FULL.strerror}); the bridge continues" in capsys.readouterr().err
     )
 
 
@@ -163,7 +163,7 @@ def test_a_drive_goes_on_where_log_and_output_are_full(config, tmp_path):  # noq
         _, errors = process.communicate(timeout=120)
         assert process.returncode == 0, errors
         assert distance_m(simulator.vehicle.position, LatLon(40.0720926, -105.2286152)) < 4.0
-    assert errors.count("recording stops, the bridge goes on") == 1
-    assert errors.count("events cannot be written any more (No space left on device)") == 1
+    assert errors.count("recording stopped; the bridge continues") == 1
+    assert errors.count("events can no longer be written (No space left on device)") == 1
     assert "Traceback" not in errors
     assert log.stat().st_size <= 20 * 1024

@@ -56,9 +56,9 @@ def test_a_yes_to_nothing(orders, why):
 def test_targets_are_taken_also_before_a_vehicle_is_heard():
     typed = understood("40.0720926, -105.2286152", Director(Orders()))
     assert typed.target == FAR
-    assert typed.answer == f"target {FAR} taken: planned as soon as a vehicle is heard"
+    assert typed.answer == f"target {FAR} accepted: planned as soon as a vehicle is heard"
     run = ready(conductor(drive=False))
-    assert understood(str(FAR), run.director).answer == f"target {FAR} taken"
+    assert understood(str(FAR), run.director).answer == f"target {FAR} accepted"
 
 
 @pytest.mark.parametrize("line", ["hold", "foo bar", "no", "?", "help", "\x1b[mJ", "x" * 500])
@@ -75,7 +75,7 @@ def test_other_words_are_told_what_can_be_typed(line):
 def test_what_is_no_position_is_said_why(line):
     typed = understood(line, Director(Orders()))
     assert not typed.is_taken
-    assert typed.answer.startswith("not taken: ")
+    assert typed.answer.startswith("not accepted: ")
 
 
 @given(st.text())

@@ -171,7 +171,9 @@ def test_somebody_else_takes_the_vehicle_out_of_auto():
     run.meddle = hold
     assert run.run() is State.FAILED
     assert isinstance(run.director.trouble, OutcomeError)
-    assert "went to HOLD by itself or by somebody unheard, such as a transmitter" in str(run.director.trouble)
+    assert "went to HOLD by itself or by somebody not heard on this link, such as an RC transmitter" in str(
+        run.director.trouble
+    )
     assert vehicle.mode == Mode.HOLD
 
 

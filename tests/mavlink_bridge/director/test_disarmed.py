@@ -90,8 +90,9 @@ def test_disarmed_between_the_look_and_the_switch_it_is_put_back_to_hold(once, l
     wait(run, 6)
     vehicle = run.vehicles[0]
     assert (vehicle.mode, vehicle.is_armed) == (Mode.HOLD, False)
-    assert "the vehicle was disarmed by itself or by somebody unheard, such as a transmitter" in str(
-        run.director.trouble
+    assert (
+        "the vehicle was disarmed by itself or by somebody not heard on this link, such as an RC transmitter"
+        in str(run.director.trouble)
     )
     place = vehicle.position
     unheard(run, ARM)
@@ -146,7 +147,7 @@ def test_disarmed_while_the_link_was_lost_it_is_put_back_too(unheard_s):
     run.is_cut = False
     wait(run, 15)
     assert (run.vehicles[0].mode, run.vehicles[0].is_armed) == (Mode.HOLD, False)
-    assert "disarmed while it was not heard; it was switched back from AUTO" in str(run.director.trouble)
+    assert "disarmed while the link was lost; it was switched back from AUTO" in str(run.director.trouble)
 
 
 def test_what_drives_on_while_the_link_was_lost_is_not_touched():
@@ -230,7 +231,7 @@ def test_an_arrival_without_hold_is_an_outcome():
     run.run_until(lambda: run.director.state is State.DRIVING)
     deaf_since.append(run.now_s)
     assert run.run() is State.FAILED
-    assert "it has arrived, but it does not go to HOLD" in str(run.director.trouble)
+    assert "arrived, but the vehicle did not switch to HOLD" in str(run.director.trouble)
     assert isinstance(run.director.trouble, OutcomeError)
 
 
@@ -284,7 +285,7 @@ def test_without_hold_it_is_refused_and_drives_on():
     run.vehicles[0] = first.vehicles[0]
     run.now_s = first.now_s
     assert run.run() is State.FAILED
-    assert "drives its mission in AUTO; nothing was written" in str(run.director.trouble)
+    assert "driving its mission in AUTO; nothing was written" in str(run.director.trouble)
     assert modes_sent(run) == []
 
 

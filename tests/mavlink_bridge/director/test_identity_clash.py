@@ -65,7 +65,7 @@ def test_a_flood_while_it_drives_is_one_event_and_one_hold():
     (told,) = clashes(run)
     assert told.severity is Severity.CRITICAL
     assert told.data == {"system": 1, "component": 195, "held": True}
-    assert told.text == f"{TOLD}; HOLD; nothing more is done until a target is typed; clicks are ignored"
+    assert told.text == f"{TOLD}; HOLD; waiting for a typed target; map clicks are ignored"
     assert [message.param2 for message in asked_of_vehicle(run, since)] == [Mode.HOLD]
     assert run.director.state is State.CLASHED
     assert run.director.drive is None
@@ -221,7 +221,7 @@ def test_a_hold_that_is_refused_is_told():
     deaf_to(run, m.CommandAck, m.Heartbeat)
     spoof(run)
     run.run_until(run.happened(EventName.COMMAND_FAILED), 20)
-    assert run.last(EventName.COMMAND_FAILED).text == "the vehicle does not go to HOLD"
+    assert run.last(EventName.COMMAND_FAILED).text == "the vehicle did not switch to HOLD"
     assert run.director.state is State.CLASHED
 
 

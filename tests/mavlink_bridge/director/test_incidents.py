@@ -117,12 +117,12 @@ def test_where_the_mode_is_seen_first_nothing_is_claimed_until_the_cause_is_hear
     found = taken_over(run)
     assert (found["by"], found["reason"]) == ("unknown", None)
     assert (
-        f"the vehicle went to {mode_name(mode)} by itself or by somebody unheard, such as a transmitter"
+        f"the vehicle went to {mode_name(mode)} by itself or by somebody not heard on this link, such as an RC transmitter"
         in found["text"]
     )
     told(run, heard)
     assert run.last(event).data["mode"] == mode_name(mode)
-    assert f"the autopilot answered it with {mode_name(mode)}" in run.last(event).text
+    assert f"the autopilot switched to {mode_name(mode)}" in run.last(event).text
 
 
 @pytest.mark.parametrize(
@@ -147,7 +147,7 @@ def test_what_is_not_certain_is_said_so(parameters, heard, mode):
     unheard(run, m.SetMode(1, 1, mode))
     found = taken_over(run)
     assert (found["by"], found["reason"]) == ("unknown", None)
-    assert "by itself or by somebody unheard, such as a transmitter" in found["text"]
+    assert "by itself or by somebody not heard on this link, such as an RC transmitter" in found["text"]
 
 
 def test_an_old_failsafe_explains_nothing():
@@ -218,7 +218,7 @@ def test_a_breach_of_a_fence_that_is_not_known_names_none_as_broken():
     told(run, BREACHED)
     event = run.last(EventName.BREACH)
     assert event.data["beyond_m"] < -3.0
-    assert "; no fence known here is broken there, the nearest is " in event.text
+    assert "; no known fence is breached there, the nearest is " in event.text
 
 
 def test_a_breach_from_before_is_told_as_that_and_explains_nothing():
@@ -227,7 +227,7 @@ def test_a_breach_from_before_is_told_as_that_and_explains_nothing():
     run.run_until(run.happened(EventName.BREACH), 5)
     wait(run, 10)
     assert [event.name for event in run.events].count(EventName.BREACH) == 1
-    assert "since before pbpp listened" in run.last(EventName.BREACH).text
+    assert "from before pbpp connected" in run.last(EventName.BREACH).text
 
 
 def test_failsafes_are_told_once_and_not_said_to_ground_stations_again():

@@ -463,7 +463,8 @@ def test_commands_to_our_component_are_all_answered():
         (Command.DO_REPOSITION, m.MavResult.ACCEPTED),
     ]
     run.run_until(
-        lambda: any("names no place" in text.text for text in run.sent if isinstance(text, m.Statustext)), 5
+        lambda: any("has no position" in text.text for text in run.sent if isinstance(text, m.Statustext)),
+        5,
     )
 
 

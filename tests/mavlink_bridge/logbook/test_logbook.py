@@ -132,7 +132,7 @@ def test_a_log_without_a_vehicle(tmp_path):
     book = book_of(log, tmp_path)
     assert book.vehicles == ()
     assert book.traffic[0].count == 1
-    with pytest.raises(LogError, match="no vehicle at all"):
+    with pytest.raises(LogError, match="no vehicle"):
         book_of(log, tmp_path, system=1)
 
 

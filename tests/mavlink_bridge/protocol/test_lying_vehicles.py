@@ -472,7 +472,7 @@ def test_a_list_that_cannot_come_in_time_is_refused_early_with_its_numbers(items
 def test_a_rival_at_each_read_back_is_named():
     outcome = upload(RivalDuringReadBack()).machine.outcome
     assert (outcome.kind, outcome.held, outcome.writer) == (OutcomeKind.UNKNOWN, Held.UNKNOWN, (255, 190))
-    assert "system 255 component 190 was heard to write the list meanwhile" in str(upload_trouble(outcome))
+    assert "system 255 component 190 wrote to the list meanwhile" in str(upload_trouble(outcome))
 
 
 def test_a_rival_while_the_old_list_is_read_makes_it_read_again():

@@ -211,22 +211,22 @@ class TestErrors:
     @pytest.mark.parametrize("seed", range(5))
     @pytest.mark.parametrize("size", [1, 7, 8, 20, 700_000])
     def test_random_bytes(self, log, seed, size):
-        with pytest.raises(LogError, match="no MAVLink frame in it"):
+        with pytest.raises(LogError, match="no MAVLink messages in it"):
             TlogReader(log(random.Random(seed).randbytes(size)))
 
     @pytest.mark.parametrize(
         "data", [b"\xfd" * 5000, b"\xfe" * 5000, bytes(5000), b"time,lat,lon\n1,2,3\n" * 300]
     )
     def test_other_files(self, log, data):
-        with pytest.raises(LogError, match="no MAVLink frame in it"):
+        with pytest.raises(LogError, match="no MAVLink messages in it"):
             TlogReader(log(data))
 
     def test_gzip_of_nothing(self, log):
-        with pytest.raises(LogError, match="no MAVLink frame in it"):
+        with pytest.raises(LogError, match="no MAVLink messages in it"):
             TlogReader(log(gzip.compress(b"")))
 
     def test_error_is_one_line_and_tells_the_file(self, log):
-        with pytest.raises(LogError, match=r"\A.*notes\.txt: no MAVLink frame in it\Z") as caught:
+        with pytest.raises(LogError, match=r"\A.*notes\.txt: no MAVLink messages in it\Z") as caught:
             TlogReader(log(b"x" * 99, "notes.txt"))
         assert caught.value.details["path"].endswith("notes.txt")
 

@@ -86,7 +86,9 @@ def test_a_choice_is_asked_for_where_one_list_fits(plan: Path, tmp_path: Path) -
     out = tmp_path / "x.waypoints"
     result = run(plan, out)
     assert result.exit_code == 2
-    assert "holds mission and fence and rally, and a .waypoints file one of them" in result.stderr
+    assert (
+        "holds mission and fence and rally, and a .waypoints file can hold only one of them" in result.stderr
+    )
     assert "--only mission or --only fence or --only rally" in result.stderr
     assert not out.exists()
     assert run(plan, out, "--only", "fence").exit_code == 0
@@ -129,12 +131,12 @@ def test_parameters(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "code", "problem"),
     [
-        (["all.plan", "all.plan"], 2, "would be written over what it is made of"),
+        (["all.plan", "all.plan"], 2, "is the same file as IN"),
         (["all.plan", "x.geojson", "--only", "fences"], 2, "--only 'fences': expected one of mission, fence, rally, parameters"),
         (["all.plan", "x.geojson", "--only", "parameters"], 3, "a .geojson file contains no parameters; it contains mission or fence or rally"),
         (["all.plan", "x.poly", "--only", "mission"], 3, "a .poly file contains no mission"),
         (["all.plan", "x.geojson", "--return-point", "north"], 2, "'north' is not a position"),
-        (["x.parm", "y.parm", "--return-point", "1,2"], 2, "--return-point belongs to a fence, and IN holds none"),
+        (["x.parm", "y.parm", "--return-point", "1,2"], 2, "--return-point needs a fence, and IN has none"),
         (["none.plan", "x.geojson"], 3, "none.plan cannot be read: No such file"),
         (["none.plan", "all.plan"], 3, "none.plan cannot be read: No such file"),
         (["all.plan", "x.tlog"], 3, "cannot write files with extension '.tlog'"),

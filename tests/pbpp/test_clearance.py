@@ -83,7 +83,7 @@ def test_an_offset_that_stays_too_near_is_put_together_from_strips(monkeypatch, 
 def test_an_offset_that_stays_too_near_even_so_is_refused(monkeypatch):
     monkeypatch.setattr(clearance, "_offset", too_near)
     monkeypatch.setattr(clearance, "_in_strips", lambda geometry, *_: geometry)
-    with pytest.raises(pbpp.InvalidGeometryError, match="grown by 1 m"):
+    with pytest.raises(pbpp.InvalidGeometryError, match="expanded by 1 m"):
         grow(np.array([shapely.box(0, 0, 1, 1)], dtype=object), 1.0)
     with pytest.raises(pbpp.InvalidGeometryError, match="shrunk by 1 m"):
         shrink(shapely.box(0, 0, 9, 9), 1.0)

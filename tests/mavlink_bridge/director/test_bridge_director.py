@@ -197,7 +197,9 @@ def test_a_command_to_our_own_component_is_answered():
     assert answers[-1].result == m.MavResult.DENIED
     assert (answers[-1].target_system, answers[-1].target_component) == (255, 190)
     run.run_until(
-        lambda: any("forbidden" in message.text for message in run.sent if isinstance(message, m.Statustext)),
+        lambda: any(
+            "inside exclusion" in message.text for message in run.sent if isinstance(message, m.Statustext)
+        ),
         15,
     )
 

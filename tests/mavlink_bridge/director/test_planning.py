@@ -333,5 +333,5 @@ def test_a_defect_while_a_drive_is_checked_holds_the_vehicle(monkeypatch):
     changed = len(run.events)
     upload(run, m.MissionType.FENCE, fence_to_items(wall_across_the_route()))
     run.run_until(run.happened(EventName.HOLDING, changed), 20)
-    assert "a defect" in run.last(EventName.ROUTE_BROKEN).text
+    assert "a bug in pbpp" in run.last(EventName.ROUTE_BROKEN).text
     assert not run.director.is_done

@@ -274,7 +274,7 @@ def test_progress_counts_the_items_asked_for():
 
 
 def test_nobody_talks_to_himself():
-    with pytest.raises(ValueError, match="ourselves"):
+    with pytest.raises(ValueError, match="cannot have the same ids"):
         Peer(1, 1, 1, 1)
 
 

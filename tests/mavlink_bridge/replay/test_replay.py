@@ -172,6 +172,8 @@ def test_a_damaged_line_is_named(tmp_path):
 @pytest.mark.parametrize("name", ["guided-maze", "no-fence"])
 def test_a_log_whose_clock_stands_still_is_an_error_and_no_quiet_log(name):
     entries = [replace(entry, time_s=1.7e9) for entry in TlogReader(FOLDER / f"{name}.tlog")]
-    with pytest.raises(LogError, match=r"clock does not advance: \d+ heartbeats .* cannot be replayed") as caught:
+    with pytest.raises(
+        LogError, match=r"clock does not advance: \d+ heartbeats .* cannot be replayed"
+    ) as caught:
         list(replay_foreign(entries, Orders()))
     assert "pbpp plan --log" in str(caught.value.details["advice"])

@@ -196,9 +196,11 @@ def test_a_command_to_our_own_component_is_answered():
     answers = [message for message in run.sent if isinstance(message, m.CommandAck)]
     assert answers[-1].result == m.MavResult.DENIED
     assert (answers[-1].target_system, answers[-1].target_component) == (255, 190)
+    # It is sent in pieces of 50 letters.
     run.run_until(
-        lambda: any(
-            "inside exclusion" in message.text for message in run.sent if isinstance(message, m.Statustext)
+        lambda: (
+            "inside exclusion polygon"
+            in "".join(one.text for one in run.sent if isinstance(one, m.Statustext))
         ),
         15,
     )

@@ -274,7 +274,7 @@ class DrawnRoutes:
         names = [barrier.name for barrier in forbidding]
         raise _blocked(
             NoRouteKind.START_BLOCKED,
-            f"the start ({self._position(start)}) is {_standing(forbidding)}; "
+            f"the start is {_standing(forbidding)} ({self._position(start)}); "
             f"the allowed area is {distance:.2f} m away, bearing {round(bearing) % 360}°, at {position}"
             f"{self.ground.common_ground_advice(point)}",
             names,
@@ -305,7 +305,8 @@ class DrawnRoutes:
         nearest, gap_m = self.ground.nearest(point)
         if forbidding:
             names = [barrier.name for barrier in forbidding]
-            problem = f"the target ({self._position(target)}) is {_standing(forbidding)}"
+            # A ground station shows 50 letters: what stands in the way comes first.
+            problem = f"the target is {_standing(forbidding)} ({self._position(target)})"
         else:
             names = [nearest.name] if nearest else []
             problem = f"the target is {metres(gap_m)} from {_names(names)}, closer than {self.asked}"

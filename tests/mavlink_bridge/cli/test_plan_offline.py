@@ -468,8 +468,8 @@ WRONG_OPTIONS: list[tuple[tuple[str, ...], int, str]] = [
     (("--fence", "F", *ENDS, "--vehicle", "none.parm"), 3, "none.parm cannot be read"),
     (("--fence", "F", *ENDS, "--vehicle", "P"), 3, "line 1: expected a parameter's name and a number"),
     (("--fence", "F", *ENDS, "--vehicle", "N"), 3, "FENCE_MARGIN is -1; allowed: 0 to 1000"),
-    (("--fence", "F", "--start", "40.0705,-105.2210", "--target", "40.0790,-105.2299"), 4, "the target (40.0790000,-105.2299000) is outside"),
-    (("--fence", "F", "--start", "40.0790,-105.2299", "--target", "40.0705,-105.2210"), 4, "the start (40.0790000,-105.2299000) is outside"),
+    (("--fence", "F", "--start", "40.0705,-105.2210", "--target", "40.0790,-105.2299"), 4, "the target is outside"),
+    (("--fence", "F", "--start", "40.0790,-105.2299", "--target", "40.0705,-105.2210"), 4, "the start is outside"),
     (("--fence", "F", *ENDS, "--clearance", "1e6"), 4, "no place in the field keeps"),
     (("--fence", "F", *ENDS, "--clearance", "1e300"), 2, "expected metres (0 to 1000000) or max"),
 ]  # fmt: skip

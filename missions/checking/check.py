@@ -12,11 +12,11 @@ from shapely import LineString, Point
 from shapely.ops import nearest_points
 
 from missions.checking.execution import CIRCLE_M, Course, CourseLeg, follow_mission
+from missions.checking.forecast import forecast_drive
 from missions.checking.mission_end import crossed_zones, end_warnings, return_place, return_warnings
-from missions.drive_model import Envelope, envelope, extrapolated
-from missions.drive_model.avoidance import with_avoidance
+from missions.drive_model import Envelope, extrapolated
 from missions.errors import SituationError, StartBlockedError
-from missions.geo import LatLon, LocalPoint, bearing_deg, distance_m
+from missions.geo import LatLon, LocalPoint, distance_m
 from missions.ground.from_situation import ground_for, heading_at
 from missions.ground.ground import EDGE_BOW_M, Ground
 from missions.ground.known_fence import fence_warnings, known_fence
@@ -309,16 +309,9 @@ def _with_drift(course: Course, vehicle: Vehicle) -> Course:
 
 
 def _forecast(course: Course, ground: Ground, vehicle: Vehicle, heading_deg: float | None) -> Envelope:
-    if heading_deg is None:  # as plans do
-        heading_deg = bearing_deg(*course.path[:2])
-    forecast = envelope(
-        ground.frame.to_local_array(course.path),
-        vehicle,
-        heading_deg=heading_deg,
-        speeds=[leg.speed_mps for leg in course.legs],
-        stops={number: leg.stop_s for number, leg in enumerate(course.legs, 1) if leg.stop_s is not None},
-    )
-    return with_avoidance(forecast, vehicle, ground.edge)
+    speeds = [leg.speed_mps for leg in course.legs]
+    stops = {number: leg.stop_s for number, leg in enumerate(course.legs, 1) if leg.stop_s is not None}
+    return forecast_drive(ground, course.path, vehicle, heading_deg, speeds=speeds, stops=stops)
 
 
 def _checked_legs(

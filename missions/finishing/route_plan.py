@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from missions.drive_model import envelope
-from missions.drive_model.avoidance import with_avoidance
+from missions.checking.forecast import forecast_drive
 from missions.errors import PlanCheckError, StartBlockedError
 from missions.finishing.mission_lines import Lines, check_lines, finished, mission_items
 from missions.finishing.remarks import drive_remarks, lead_away_remarks, moved_target_remarks
-from missions.geo import bearing_deg, rounded
+from missions.geo import rounded
 from missions.ground.from_situation import ground_for, heading_at, route_ends
 from missions.ground.known_fence import fence_warnings, known_fence
 from missions.ground.legs import path_length_m
@@ -135,7 +134,7 @@ def _finished(
     """
     lines = finished(ground, found.drawing, found.lead_away)
     drawn_clearance_m = check_lines(ground, lines, found.start_clearance_m, asked.drawn_m)
-    band = _band(ground, lines, vehicle, heading_deg)
+    band = forecast_drive(ground, lines.path, vehicle, heading_deg, speeds=lines.speeds, stops=lines.stops)
     if asked.allowance_m is None:
         _check_band(ground, lines, band, found, asked)
     return lines, drawn_clearance_m, band
@@ -161,20 +160,6 @@ def _promised_m(asked: Promise, driven_m: float) -> float | None:
         return asked.promised_m if asked.allowance_m else None
     kept_m = math.floor(100 * max(driven_m - asked.error_m, 0.0)) / 100
     return asked.promised_m if driven_m >= asked.required_m - _ROUNDING_M else min(asked.promised_m, kept_m)
-
-
-def _band(ground: Ground, lines: Lines, vehicle: Vehicle, heading_deg: float | None) -> Envelope:
-    """Predict the drive; a heading that is not known is taken along the first leg."""
-    if heading_deg is None:
-        heading_deg = bearing_deg(*lines.path[:2])
-    band = envelope(
-        ground.frame.to_local_array(lines.path),
-        vehicle,
-        heading_deg=heading_deg,
-        speeds=lines.speeds,
-        stops=lines.stops,
-    )
-    return with_avoidance(band, vehicle, ground.edge)
 
 
 def _check_band(ground: Ground, lines: Lines, band: Envelope, found: DrivenRoute, asked: Promise) -> None:

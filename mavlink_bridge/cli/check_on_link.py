@@ -10,6 +10,7 @@ from mavlink_bridge.director.learning import Learning
 from mavlink_bridge.fold import fold
 from mavlink_bridge.protocol.undisturbed_read import UndisturbedRead
 from missions.situation import ListKind, Situation
+from missions.vehicle.asked_parameters import CHECKED_NAMES
 
 if TYPE_CHECKING:
     from mavlink_bridge.cli.options.check import CheckOptions
@@ -39,7 +40,12 @@ def live_situation(options: CheckOptions) -> tuple[Situation, list[str]]:
 
         session.listeners.append(listen)
         learning = Learning(
-            peer, _TELEMETRY_PATIENCE_S, tuple(ListKind), UndisturbedRead, needs_position=False
+            peer,
+            _TELEMETRY_PATIENCE_S,
+            tuple(ListKind),
+            UndisturbedRead,
+            needs_position=False,
+            names=CHECKED_NAMES,
         )
         session.run(learning, "reading parameters, mission, fence and rally points")
         if learning.trouble is not None:

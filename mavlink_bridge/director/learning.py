@@ -55,6 +55,8 @@ class Learning(Outbox):
         Returns the machine that reads one.
     needs_position : bool
         Whether it is a trouble where the vehicle tells no position.
+    names : sequence of str
+        The parameters that are asked for.
 
     Attributes
     ----------
@@ -74,6 +76,7 @@ class Learning(Outbox):
         read: Callable[[Peer, m.MissionType], Download | UndisturbedRead] = Download,
         *,
         needs_position: bool = True,
+        names: Sequence[str] = ASKED_NAMES,
     ) -> None:
         super().__init__()
         self.trouble: BridgeError | None = None
@@ -83,6 +86,7 @@ class Learning(Outbox):
         self._kinds = tuple(kinds)
         self._read = read
         self._needs_position = needs_position
+        self._names = tuple(names)
         self.coarse: list[ListKind] = []
         self._steps = Steps()
         self._parameters: dict[str, float] = {}
@@ -129,7 +133,7 @@ class Learning(Outbox):
         home = m.CommandLong(peer.system, peer.component, Command.GET_HOME_POSITION)
         self._steps.run(
             [
-                step(ReadParameters(peer, ASKED_NAMES), self._take_parameters),
+                step(ReadParameters(peer, self._names), self._take_parameters),
                 *(
                     step(self._read(peer, MISSION_TYPES[kind]), partial(self._take_list, kind))
                     for kind in self._kinds

@@ -22,7 +22,6 @@ from mavlink_bridge.errors import BackupError
 from mavlink_bridge.mavlink.messages import MissionType
 from mavlink_bridge.simulator.parameters import DEFAULTS
 from missions.formats.waypoints import format_items
-from missions.vehicle.asked_parameters import ASKED_NAMES
 
 OLD, NEW = mission(3, 900), mission(6, 500)
 THEIRS = mission(9, 100)
@@ -204,7 +203,7 @@ def test_a_replay_tells_the_same_of_an_upload_that_was_not_begun_and_of_one_that
     ):
         vehicle.lists[MissionType.FENCE] = fence
         # It has all that it is asked for: patience would run out at another time in the replay.
-        vehicle.parameters = {**dict.fromkeys(ASKED_NAMES, 0.0), **DEFAULTS, **vehicle.parameters}
+        vehicle.parameters = {**DEFAULTS, **vehicle.parameters}
         log = tmp_path / f"{name}.tlog"
         with TcpVehicle(vehicle) as link:
             lock = VehicleLock(VehicleMark(1, b"one".hex(), link.connection, 3))

@@ -61,6 +61,10 @@ class Plan:
         The band that the vehicle is predicted to stay in, and its times.
     home : LatLon or None
         For the mission's home item.
+    warnings : tuple of str
+        What a person should know before it is driven.
+    info : tuple of str
+        What was done because it was asked for, or added to be safe.
     asked_targets : tuple of LatLon
         The targets as they were asked for, before blocked ones were moved; empty where nobody asked for targets.
     extrapolated : tuple of str
@@ -88,6 +92,7 @@ class Plan:
     envelope: Envelope
     home: LatLon | None
     warnings: tuple[str, ...]
+    info: tuple[str, ...] = ()
     asked_targets: tuple[LatLon, ...] = ()
     extrapolated: tuple[str, ...] = ()
 

@@ -7,7 +7,7 @@ from difflib import get_close_matches
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from typer.core import TyperCommand, TyperGroup
+from typer.core import TyperArgument, TyperCommand, TyperGroup
 
 from mavlink_bridge.cli.common import command_of
 from mavlink_bridge.cli.failing import (
@@ -41,15 +41,18 @@ COMMANDS = {
 
 
 def _without_types(params: list[Any]) -> list[Any]:
-    """Return parameters whose flags show no type in help: each takes no value."""
+    """Return parameters that show no type and no range in help beside what is written for people: ``<bool>``, ``<path>``, ``1<=x<=255``."""
     for param in params:
         if getattr(param, "is_flag", False) and param.metavar is None:
             param.metavar = ""
+        if isinstance(param, TyperArgument):
+            param.display_type_rich = lambda ctx: None  # type: ignore[method-assign] # noqa: ARG005
+        param._get_number_range_help_str = lambda: None  # noqa: SLF001
     return params
 
 
 class SingleCommand(TyperCommand):
-    """A command whose help shows no type for flags."""
+    """A command whose help shows no types but those written for people."""
 
     def get_params(self, ctx: Any) -> list[Any]:  # noqa: ANN401 - the parser library is typer's own affair
         """Return the options, with ``--help``."""

@@ -121,6 +121,8 @@ class MissionCheck:
         What is known to end in the fence, whatever the legs keep; with any of these the mission does not hold.
     warnings : tuple of str
         What else a person should know.
+    info : tuple of str
+        What was added to be safe.
     envelope : Envelope
         The band that the vehicle is predicted to stay in.
     extrapolated : tuple of str
@@ -138,6 +140,7 @@ class MissionCheck:
     vehicle: Vehicle
     envelope: Envelope
     extrapolated: tuple[str, ...] = ()
+    info: tuple[str, ...] = ()
 
     @property
     def broken(self) -> tuple[CheckedLeg, ...]:
@@ -242,6 +245,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
         vehicle=vehicle,
         envelope=forecast,
         extrapolated=reasons,
+        info=asked.info,
     )
 
 
@@ -271,6 +275,7 @@ def plan_of(check: MissionCheck, situation: Situation, *, method: str = "optimal
         envelope=check.envelope,
         home=home,
         warnings=check.warnings,
+        info=check.info,
     )
 
 

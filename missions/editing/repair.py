@@ -141,7 +141,7 @@ def repaired_plan(
         raise SituationError("no mission to repair; use --via-mission FILE")
     repair = repair_mission(mission, situation, request, should_stop=should_stop)
     made = plan_of(repair.check, situation, method=request.method)
-    return replace(made, warnings=(*repair.changes, *made.warnings))
+    return replace(made, info=(*repair.changes, *made.info))
 
 
 def repair_mission(

@@ -43,7 +43,7 @@ class BridgeOptions(CommonOptions):
         list[str],
         typer.Option(
             metavar="SOURCE",
-            help="typed, reposition, position-target, guided-item, mission, rally or echo; repeatable.",
+            help="Where targets may come from: typed, reposition, position-target, guided-item, mission, rally, echo; repeatable.",
         ),
     ] = field(default_factory=list)
     clearance: Annotated[
@@ -62,7 +62,8 @@ class BridgeOptions(CommonOptions):
         ),
     ] = 0.0
     vehicle: Annotated[
-        Path | None, typer.Option(metavar="FILE.parm", help="Parameters that the vehicle does not report.")
+        Path | None,
+        typer.Option(metavar="FILE.parm", help="Parameter file, for what the vehicle does not report."),
     ] = None
     firmware: FirmwareOption = None
     trust_model: TrustOption = False
@@ -76,7 +77,7 @@ class BridgeOptions(CommonOptions):
     ] = False
     arm: Annotated[bool, typer.Option("--arm", help="With --drive: arm before AUTO.")] = False
     confirm: Annotated[bool, typer.Option("--confirm", help="Upload a plan only after you type yes.")] = False
-    once: Annotated[bool, typer.Option("--once", help="Exit after one job.")] = False
+    once: Annotated[bool, typer.Option("--once", help="Exit after the first target.")] = False
     log: Annotated[
         Path | None,
         typer.Option(

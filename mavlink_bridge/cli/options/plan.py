@@ -177,7 +177,7 @@ class PlanOptions(LinkOptions):
         str,
         typer.Option(
             metavar="|".join(ENDS),
-            help="What to do at the end; rtl only if its straight line is free.",
+            help="What to do at the end; rtl only if the straight line home is free.",
             rich_help_panel=_TOURS,
         ),
     ] = "hold"

@@ -38,10 +38,12 @@ class SimOptions(CommonOptions):
     home: Annotated[
         str, typer.Option(metavar="LAT,LON[,HEADING]", help="Position and heading at the start.")
     ] = "40.071374,-105.229930,0"
-    fence: Annotated[Path | None, typer.Option(help="Fence file stored in the rover.")] = None
+    fence: Annotated[Path | None, typer.Option(metavar="FILE", help="Fence file stored in the rover.")] = None
     mission: Annotated[
         Path | None,
-        typer.Option(help="Mission file stored in the rover; its home, if it has one, is not used."),
+        typer.Option(
+            metavar="FILE", help="Mission file stored in the rover; its home, if it has one, is not used."
+        ),
     ] = None
     param: Annotated[list[str], typer.Option(metavar="NAME=VALUE", help="Set a parameter; repeatable.")] = (
         field(default_factory=list)
@@ -74,9 +76,10 @@ class SimOptions(CommonOptions):
         ),
     ] = 0.0
     seed: Annotated[
-        int, typer.Option(min=-MOST_SEED, max=MOST_SEED, help="Random seed of the link's faults.")
+        int,
+        typer.Option(metavar="N", min=-MOST_SEED, max=MOST_SEED, help="Random seed of the link's faults."),
     ] = 0
-    system: Annotated[int, typer.Option(min=1, max=255, help="MAVLink system id.")] = 1
+    system: Annotated[int, typer.Option(metavar="N", min=1, max=255, help="MAVLink system id.")] = 1
     role: RoleOption = field(default_factory=list)
     outermost: OutermostOption = None
     ignore_points: IgnorePointsOption = False

@@ -25,19 +25,19 @@ if TYPE_CHECKING:
 COMMANDS = {
     "plan": "Plan a mission around fences; write it, draw it, upload it.",
     "check": "Check every leg of a mission against a fence.",
+    "fence": "Make a fence fit for the vehicle: merge overlapping inclusions.",
+    "convert": "Convert a file from one format to another.",
+    "upload": "Upload a file to the vehicle and verify it, or restore a backup.",
+    "download": "Download a mission, fence, rally points or parameters.",
     "bridge": "Run alongside the autopilot: plan to each target, upload verified missions.",
     "log": "Summarise telemetry logs.",
     "replay": "Replay recorded logs through the bridge.",
-    "upload": "Upload a file to the vehicle and verify it, or restore a backup.",
-    "download": "Download a mission, fence, rally points or parameters.",
-    "convert": "Convert a file from one format to another.",
-    "fence": "Make a fence fit for the vehicle: merge overlapping inclusions.",
     "sim": "Run a simulated rover.",
     "demo": "Plan, upload and drive on a simulated rover, as a demonstration.",
     "doctor": "Check this installation: versions, ports, keys, a test plan.",
     "config": "Show where options can be saved, and which are set.",
 }
-"""Every command and its line in help; the module of the same name holds it."""
+"""Every command and its line in help, in the order of use; the module of the same name holds it."""
 
 
 def _without_types(params: list[Any]) -> list[Any]:

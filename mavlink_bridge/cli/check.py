@@ -188,9 +188,14 @@ def _row(leg: CheckedLeg) -> tuple[str, ...]:
         f"{leg.time_s:.0f} s",
         "crosses" if leg.crosses else _metres(leg.drawn_clearance_m),
         "crosses" if leg.crosses else _metres(leg.driven_clearance_m),
-        ", ".join(leg.crosses) or leg.fence or "none",
+        ", ".join(map(_short, leg.crosses)) or _short(leg.fence or "none"),
         str(leg.at or ""),
     )
+
+
+def _short(fence: str) -> str:
+    """Return a zone's name so that the table fits 80 columns."""
+    return fence.replace("exclusion", "excl.").replace("inclusion", "incl.")
 
 
 def _metres(value_m: float) -> str:

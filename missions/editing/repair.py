@@ -153,8 +153,8 @@ def repair_mission(
 ) -> Repair:
     """Replace the legs of a mission that break the clearance by routes around the fences.
 
-    A route's corners bear upon the legs beside it, so that what was repaired is checked again as a whole, and legs that break then, or
-    stand beside one that still does, are routed too.
+    A route's corners affect the legs beside it, so the repaired mission is checked again as a whole; legs that fail then, or stand
+    beside one that still does, are replaced too.
 
     Parameters
     ----------

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 from mavlink_bridge.cli.common import warn
 from mavlink_bridge.errors import UsageError
@@ -17,17 +17,8 @@ from missions.ground.fence_reach import REACH_M, is_wide, within_reach
 from missions.situation import Known
 
 if TYPE_CHECKING:
-    from mavlink_bridge.cli.options.check import CheckOptions
-    from mavlink_bridge.cli.options.convert import ConvertOptions
-    from mavlink_bridge.cli.options.fence import FenceOptions
-    from mavlink_bridge.cli.options.plan import PlanOptions
-    from mavlink_bridge.cli.options.sim import SimOptions
-    from mavlink_bridge.cli.options.upload import UploadOptions
+    from mavlink_bridge.cli.options.shared import MapOptions
     from missions.situation import Mission, Situation
-
-    MapOptions: TypeAlias = (
-        PlanOptions | CheckOptions | ConvertOptions | FenceOptions | UploadOptions | SimOptions
-    )
 
 _WORDS = ("inclusion", "exclusion", "route", "ignore", "waypoint", "home", "rally point", "return point")
 

@@ -22,7 +22,7 @@ from missions.ground.ground import EDGE_BOW_M, Ground
 from missions.ground.known_fence import fence_warnings, known_fence
 from missions.ground.legs import drawn_leg
 from missions.ground.seams import Seam, first_stop, is_seam, seam_advice, seam_reason, seams_of
-from missions.ground.start_hazard import start_hazard
+from missions.ground.start_hazard import pivot_remarks, start_hazard
 from missions.planned import Plan
 from missions.promise import known_vehicle, promise
 from missions.request import GoTo
@@ -226,6 +226,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
         *_seam_warnings(vehicle, legs),
         *_start_warnings(start, heading_deg, legs[0], asked.required_m),
         *_drive_warnings(vehicle, forecast, course),
+        *pivot_remarks(ground, vehicle, forecast, _items_of(course)),
         *reasons,
         *return_warnings(situation, vehicle, ground, course.path),
         *end_warnings(situation, vehicle, course),
@@ -476,9 +477,14 @@ def _start_warnings(
     return warnings
 
 
+def _items_of(course: Course) -> list[int]:
+    """Return the mission items of its places."""
+    return [course.legs[0].first_item, *(leg.last_item for leg in course.legs)]
+
+
 def _drive_warnings(vehicle: Vehicle, forecast: Envelope, course: Course) -> list[str]:
     """Return warnings of where the drive model does not hold, and of parameters that were not known."""
-    items = [course.legs[0].first_item, *(leg.last_item for leg in course.legs)]
+    items = _items_of(course)
     warnings = [
         f"item {items[corner.waypoint]}: {abs(corner.turn_deg):.0f}° turn between short legs; "
         "in tests rovers swung wider there than predicted"

@@ -16,7 +16,7 @@ from missions.ground.from_situation import ground_for, heading_at, route_ends
 from missions.ground.known_fence import fence_warnings, known_fence
 from missions.ground.legs import path_length_m
 from missions.ground.seams import with_seams
-from missions.ground.start_hazard import start_hazard
+from missions.ground.start_hazard import pivot_remarks, start_hazard
 from missions.planned import Plan
 from missions.promise import known_vehicle, promise
 from missions.routing.drawn_route import Sought
@@ -76,6 +76,7 @@ def plan_route(
     warnings += lead_away_remarks(found, asked.drawn_m)
     warnings += moved_target_remarks(targets, reached)
     warnings += drive_remarks(vehicle, heading_deg, asked, driven_m, found)
+    warnings += pivot_remarks(plain, vehicle, band, seqs)
     return Plan(
         items=items,
         path=lines.path,

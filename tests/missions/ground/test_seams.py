@@ -10,10 +10,11 @@ from shapely import LineString, Polygon
 from missions.checking.check import check_mission
 from missions.editing.repair import repair_mission
 from missions.errors import NoRouteError, TargetBlockedError
-from missions.fence import CircleZone
+from missions.fence import CircleZone, Fence
+from missions.ground.merged_fence import merged_fence
 from missions.items import waypoint
 from missions.planning.plan import plan
-from missions.request import Request
+from missions.request import GoTo, Request, Tour
 from missions.situation import Mission
 
 UNION = {
@@ -171,3 +172,22 @@ def test_a_repair_leads_round_the_seam_or_says_that_nothing_does() -> None:
     assert line.distance(Polygon(chart.points(inside.vertices))) >= 2.0
     with pytest.raises(NoRouteError, match="the inner edge of"):
         repair_mission(mission, situation_of(WEST, EAST, **UNION), request)
+
+
+def test_no_tour_and_no_widest_route_crosses_a_seam() -> None:
+    situation = situation_of(WEST, EAST, **UNION)
+    targets = (place(-40, 0), place(*TARGET))
+    for request in (
+        Tour(start=place(*START), targets=targets, clearance_m=2.5),
+        GoTo(start=place(*START), target=targets[1], widest=True),
+    ):
+        with pytest.raises(NoRouteError, match="the inner edge of inclusion polygon") as caught:
+            plan(situation, request)
+        assert "`pbpp fence merge FILE -o merged.plan`" in caught.value.details["advice"]
+
+
+def test_a_merged_fence_is_crossed_with_avoidance_on() -> None:
+    merged = merged_fence(Fence((WEST, EAST)))
+    found = route(merged.zones)
+    assert Chart(HOME).line(found.path).length == pytest.approx(160.0, abs=1.0)
+    assert not [warning for warning in found.warnings if "inner edge" in warning]

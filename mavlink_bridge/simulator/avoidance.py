@@ -99,6 +99,7 @@ class _Wall:
     def __init__(self, corners_m: list[complex], *, keep_in: bool) -> None:
         self.keep_in = keep_in
         corners = np.array([(corner.real * 100, corner.imag * 100) for corner in corners_m], dtype=np.float32)
+        self._known = 0j, 0.0, False
         self._ends = corners
         self._starts = np.roll(corners, -1, axis=0)
         self._steps = self._ends - self._starts
@@ -112,13 +113,19 @@ class _Wall:
         """Return the ways to the nearest point of each edge, north and east."""
         place = np.array((place_m.real * 100, place_m.imag * 100), dtype=np.float32)
         share = ((place - self._starts) * self._steps).sum(axis=1) / self._squares
-        share = np.clip(share, np.float32(0), np.float32(1))[:, None]
-        nearest = self._starts + self._steps * share
-        nearest[share[:, 0] >= 1] = self._ends[share[:, 0] >= 1]
-        return np.asarray(nearest - place)
+        share = np.minimum(np.maximum(share, np.float32(0)), np.float32(1))
+        return np.asarray(self._starts + self._steps * share[:, None] - place)
 
-    def holds(self, place_m: complex) -> bool:
-        """Whether a place lies inside (even-odd)."""
+    def holds(self, place_m: complex, edge_m: float) -> bool:
+        """Whether a place lies inside, given how far the nearest edge is: nearer than that to a place once looked at nothing changes."""
+        looked_at_m, free_m, is_inside = self._known
+        if abs(place_m - looked_at_m) >= free_m:
+            is_inside = self._is_inside(place_m)
+            self._known = place_m, edge_m, is_inside
+        return is_inside
+
+    def _is_inside(self, place_m: complex) -> bool:
+        """By even and odd."""
         north, east = place_m.real * 100, place_m.imag * 100
         low, high = self._starts[:, 1] > east, self._ends[:, 1] > east
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -205,10 +212,11 @@ class Avoidance:
         for wall in self._walls:
             ways_cm = wall.to_edges_cm(place_m)
             away_cm = np.sqrt((ways_cm**2).sum(axis=1))
-            nearest_m = min(nearest_m, float(away_cm.min()) / 100)
-            near = np.flatnonzero(away_cm <= reach_m * 100)
-            if not len(near) or wall.holds(place_m) is not wall.keep_in:
+            edge_m = float(away_cm.min()) / 100
+            nearest_m = min(nearest_m, edge_m)
+            if edge_m > reach_m or wall.holds(place_m, edge_m) is not wall.keep_in:
                 continue
+            near = np.flatnonzero(away_cm <= reach_m * 100)
             back.add(self._back_from(ways_cm, away_cm))
             ahead_m = place_m, reach_m * velocity_mps / (abs(velocity_mps) or 1.0)
             for edge in near.tolist():

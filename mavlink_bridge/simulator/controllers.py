@@ -5,10 +5,9 @@ from __future__ import annotations
 import cmath
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 if TYPE_CHECKING:
-    from mavlink_bridge.simulator.avoidance import Avoidance
     from mavlink_bridge.simulator.body import Body
     from mavlink_bridge.simulator.parameters import ParameterStore
 
@@ -80,6 +79,14 @@ class Settings:
             slew_per_s=p["MOT_SLEWRATE"] / 100.0 or math.inf,
             is_skid=(p["SERVO1_FUNCTION"], p["SERVO3_FUNCTION"]) == (73.0, 74.0),
         )
+
+
+class KeepsOff(Protocol):
+    """What keeps a rover off a fence."""
+
+    def keep_off(self, place_m: complex, velocity_mps: complex, dt_s: float) -> tuple[complex, bool]:
+        """Return the velocity that does, and whether the rover is to back away."""
+        ...
 
 
 class _Pid:
@@ -198,7 +205,7 @@ class Position:
         self.target_velocity_mps = 0j
         self._velocity_error = None
 
-    def update(self, accel_mps2: complex, avoidance: Avoidance | None, dt_s: float) -> tuple[float, float]:
+    def update(self, accel_mps2: complex, avoidance: KeepsOff | None, dt_s: float) -> tuple[float, float]:
         """Return turn rate and speed for the target point, its velocity and its acceleration."""
         limits, body = self.settings, self._body
         most_accel = min(limits.accel_mps2, limits.lateral_accel_mps2)

@@ -12,7 +12,7 @@ from shapely import LineString, Point
 from shapely.ops import nearest_points
 
 from missions.checking.execution import CIRCLE_M, Course, CourseLeg, follow_mission
-from missions.checking.forecast import forecast_drive
+from missions.checking.forecast import forecast_drive, pivot_remarks
 from missions.checking.mission_end import crossed_zones, end_warnings, return_place, return_warnings
 from missions.drive_model import Envelope, extrapolated
 from missions.errors import SituationError, StartBlockedError
@@ -22,7 +22,7 @@ from missions.ground.ground import EDGE_BOW_M, Ground
 from missions.ground.known_fence import fence_warnings, known_fence
 from missions.ground.legs import drawn_leg
 from missions.ground.seams import Seam, first_stop, is_seam, seam_advice, seam_reason, seams_of
-from missions.ground.start_hazard import pivot_remarks, start_hazard
+from missions.ground.start_hazard import start_hazard
 from missions.planned import Plan
 from missions.promise import known_vehicle, promise
 from missions.request import GoTo

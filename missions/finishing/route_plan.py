@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from missions.checking.forecast import forecast_drive
+from missions.checking.forecast import forecast_drive, pivot_remarks
 from missions.errors import PlanCheckError, StartBlockedError
 from missions.finishing.mission_lines import Lines, check_lines, finished, mission_items
 from missions.finishing.remarks import drive_remarks, lead_away_remarks, moved_target_remarks
@@ -16,7 +16,7 @@ from missions.ground.from_situation import ground_for, heading_at, route_ends
 from missions.ground.known_fence import fence_warnings, known_fence
 from missions.ground.legs import path_length_m
 from missions.ground.seams import with_seams
-from missions.ground.start_hazard import pivot_remarks, start_hazard
+from missions.ground.start_hazard import start_hazard
 from missions.planned import Plan
 from missions.promise import known_vehicle, promise
 from missions.routing.drawn_route import Sought

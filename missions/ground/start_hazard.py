@@ -1,4 +1,4 @@
-"""A start inside the margin of a fence that the vehicle avoids, or a turn on the spot near it: where measured rovers backed into it, or stood for good.
+"""A start inside the margin of a fence that the vehicle avoids: where measured rovers backed into it, or never moved.
 
 Measured (docs/drive-model.md), 42 starts each 0.5 to 1.5 m from a fence of 2 m margin: of steered rovers 29 breached it backwards, 9 wandered
 to the end, 4 arrived; of skid-steered ones 41 stood. With AVOID_BACKUP_SPD 0 all skid-steered and 5 of 6 steered ones left along it, all away
@@ -16,18 +16,12 @@ from missions.fence import ZoneKind
 from missions.vehicle import Steering
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from missions.drive_model import Envelope
     from missions.geo import LocalPoint
     from missions.ground.ground import Ground
     from missions.vehicle import Vehicle
 
 _LEAVES_FROM_M = 0.05
 """So much more than the margin, and measured rovers left as usual."""
-
-_PIVOTS_FREELY_M = 0.5
-"""So much more than the margin, and no error of an estimate of those measured (up to 0.2 m) has it turn within; chosen, not measured."""
 
 
 def start_hazard(ground: Ground, start: LocalPoint, vehicle: Vehicle) -> StartBlockedError | str | None:
@@ -49,7 +43,7 @@ def start_hazard(ground: Ground, start: LocalPoint, vehicle: Vehicle) -> StartBl
     """
     if not vehicle.avoids_fence or not ground.allowed.covers(Point(start)):
         return None
-    away_m, fence = _nearest_avoided(ground, Point(start))
+    away_m, fence = nearest_avoided(ground, Point(start))
     leaves_from_m = vehicle.stops_within_m + _LEAVES_FROM_M
     if away_m >= leaves_from_m:
         return None
@@ -72,38 +66,7 @@ def start_hazard(ground: Ground, start: LocalPoint, vehicle: Vehicle) -> StartBl
     return None
 
 
-def pivot_remarks(ground: Ground, vehicle: Vehicle, forecast: Envelope, items: Sequence[int]) -> list[str]:
-    """Return where a skid-steered vehicle may stand before it turns on the spot.
-
-    Parameters
-    ----------
-    ground : Ground
-        The fence, without seams.
-    vehicle : Vehicle
-        What drives.
-    forecast : Envelope
-        The drive.
-    items : sequence of int
-        The mission items of its points.
-    """
-    if not (vehicle.avoids_fence and vehicle.backs_away):
-        return []
-    freely_m = vehicle.stops_within_m + _PIVOTS_FREELY_M
-    pivots = {
-        corner.waypoint: _nearest_avoided(ground, Point(forecast.points[corner.waypoint]))
-        for corner in forecast.corners
-        if corner.pivots
-    }
-    return [
-        f"item {items[waypoint]}: it turns on the spot {away_m:.2f} m from {fence}; within {vehicle.fence.margin_name} {vehicle.stops_within_m:g} m "
-        f"plus {_PIVOTS_FREELY_M:g} m a skid-steered rover in tests stood before such a turn and did not resume (1 to 3 of 8 runs); "
-        f"ask for a clearance of {freely_m:g} m, or set AVOID_ENABLE {vehicle.avoid_bits & ~1}"
-        for waypoint, (away_m, fence) in pivots.items()
-        if away_m < freely_m
-    ]
-
-
-def _nearest_avoided(ground: Ground, point: Point) -> tuple[float, str]:
+def nearest_avoided(ground: Ground, point: Point) -> tuple[float, str]:
     """Return the distance to what avoidance sees from a place, and its name: exclusions, and edges of inclusions around the place."""
     distances = [
         (

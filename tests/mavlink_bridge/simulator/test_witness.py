@@ -157,10 +157,10 @@ def test_a_start_within_the_margin(row):
 
 
 def test_steered_rovers_that_start_within_the_margin_mostly_back_into_the_fence():
-    """It is chaotic in each row: one drives to and fro in ever other places. Of all, as many end in each way within a sixth."""
+    """It is chaotic in each row: one drives to and fro in ever other places. Of all, about as many end in each way."""
     measured = Counter(measured_kind(row) for row in CHAOTIC)
     simulated = Counter(simulated_kind(driven(drive_of(row))) for row in CHAOTIC)
-    assert measured == {BREACHES: 19, STAYS: 5, ARRIVES: 4}
+    assert measured == {BREACHES: 10, STAYS: 2, ARRIVES: 2}
     assert simulated[BREACHES] == pytest.approx(measured[BREACHES], abs=len(CHAOTIC) / 6)
     assert simulated[STAYS] == pytest.approx(measured[STAYS], abs=len(CHAOTIC) / 4)
     assert simulated[ARRIVES] == pytest.approx(measured[ARRIVES], abs=len(CHAOTIC) / 6)

@@ -12,7 +12,7 @@ from shapely import LineString, Point
 from shapely.ops import nearest_points
 
 from missions.checking.execution import CIRCLE_M, Course, CourseLeg, follow_mission
-from missions.checking.forecast import forecast_drive
+from missions.checking.forecast import forecast_drive, pivot_remarks
 from missions.checking.mission_end import crossed_zones, end_warnings, return_place, return_warnings
 from missions.drive_model import Envelope, extrapolated
 from missions.errors import SituationError, StartBlockedError
@@ -230,6 +230,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
         *_seam_warnings(vehicle, legs),
         *_start_warnings(start, heading_deg, legs[0], asked.required_m),
         *_drive_warnings(vehicle, forecast, course),
+        *pivot_remarks(ground, vehicle, forecast, _items_of(course)),
         *reasons,
         *return_warnings(situation, vehicle, ground, course.path),
         *end_warnings(situation, vehicle, course),
@@ -482,9 +483,14 @@ def _start_warnings(
     return warnings
 
 
+def _items_of(course: Course) -> list[int]:
+    """Return the mission items of its places."""
+    return [course.legs[0].first_item, *(leg.last_item for leg in course.legs)]
+
+
 def _drive_warnings(vehicle: Vehicle, forecast: Envelope, course: Course) -> list[str]:
     """Return warnings of where the drive model does not hold, and of parameters that were not known."""
-    items = [course.legs[0].first_item, *(leg.last_item for leg in course.legs)]
+    items = _items_of(course)
     warnings = [
         f"item {items[corner.waypoint]}: {abs(corner.turn_deg):.0f}° turn between short legs; "
         "in tests rovers swung wider there than predicted"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from missions.checking.forecast import forecast_drive
+from missions.checking.forecast import forecast_drive, pivot_remarks
 from missions.errors import PlanCheckError, StartBlockedError
 from missions.finishing.mission_lines import Lines, check_lines, finished, mission_items
 from missions.finishing.remarks import drive_remarks, escape_info, lead_away_remarks, moved_target_info
@@ -75,6 +75,7 @@ def plan_route(
     reached = tuple(rounded(ground.frame.to_lat_lon(target)) for target in found.targets)
     warnings += lead_away_remarks(found, asked.drawn_m)
     warnings += drive_remarks(vehicle, heading_deg, asked, driven_m, found)
+    warnings += pivot_remarks(plain, vehicle, band, seqs)
     return Plan(
         items=items,
         path=lines.path,

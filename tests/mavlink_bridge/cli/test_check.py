@@ -442,7 +442,8 @@ def test_a_seam_before_which_the_vehicle_stops_is_named_with_its_place(tmp_path)
         r"FAIL: leg start → 1 crosses the inner edge of inclusion polygon 2: the vehicle stops at 40\.07137\d+,-105\.22970\d+",
         result.output,
     )
-    assert "set AVOID_ENABLE 2 (without bit 0), or draw the inclusions as one polygon" in result.output
+    assert "`pbpp fence merge FILE -o merged.plan`" in result.output
+    assert "or set AVOID_ENABLE 2 (without bit 0)" in result.output
     document = document_of(*asked, code=8)
     assert document["legs"][0]["crosses"][0].startswith("the inner edge of inclusion polygon")
     vehicle.write_text(UNION.replace("AVOID_ENABLE 3", "AVOID_ENABLE 2"), encoding="utf-8")

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from missions.drive_model import before_4_6
 from missions.drive_model import corner as at_corner
 
 if TYPE_CHECKING:
@@ -59,6 +60,14 @@ class Stray:
         """Return the stray with more to either side."""
         return Stray(self.left_m + more_m, self.right_m + more_m)
 
+    def wider(self, other: Stray) -> Stray:
+        """Return to each side the larger of two strays."""
+        return Stray(max(self.left_m, other.left_m), max(self.right_m, other.right_m))
+
+    def plus(self, other: Stray) -> Stray:
+        """Return the sum of two strays."""
+        return Stray(self.left_m + other.left_m, self.right_m + other.right_m)
+
     def swung(self, turn_deg: float, swing_m: float) -> Stray:
         """Return the stray with a swing to the outside of a turn added."""
         if turn_deg >= 0:
@@ -107,6 +116,8 @@ class CornerPlan:
         How far beyond its band it gets off the next leg to the outside, and behind the waypoint.
     stray_m : float
         How far beyond its band it may be to either side.
+    tail : Stray
+        How far beyond that it may be long after, as at the turn it is; only before ArduPilot 4.6.
     time_lost_s : float
         Against driving on at full speed.
     """
@@ -122,6 +133,7 @@ class CornerPlan:
     swing_m: float
     behind_m: float
     stray_m: float
+    tail: Stray
     time_lost_s: float
 
 
@@ -137,6 +149,8 @@ class Bend:
         That of the corners close before it included.
     shorter_run_m : float
         How far the route goes nearly straight on before the corner or after it, whichever is less.
+    speed_mps : float
+        The larger of the speeds asked for before and after it.
     changes_speed : bool
         Whether another speed is asked for after it, which was measured on straight lines only.
     """
@@ -144,6 +158,7 @@ class Bend:
     turn_deg: float
     whole_deg: float
     shorter_run_m: float
+    speed_mps: float
     changes_speed: bool = False
 
     @property
@@ -155,12 +170,13 @@ class Bend:
 
 @dataclass(frozen=True, slots=True)
 class DrivePlan:
-    """A drive: n legs, the n - 1 corners between them, and the errors that each leg begins with."""
+    """A drive: n legs, the n - 1 corners between them, and the errors that each leg begins with (`tails`: before 4.6, those that hardly die away)."""
 
     vehicle: Vehicle
     legs: tuple[LegPlan, ...]
     corners: tuple[CornerPlan, ...]
     strays: tuple[Stray, ...]
+    tails: tuple[Stray, ...]
 
     def span_s(self, leg: int) -> tuple[float, float]:
         """Return the time (since the leg's own start) when only this leg's motion runs: from one blend to the next."""
@@ -173,4 +189,12 @@ class DrivePlan:
     def stray_at(self, leg: int, time_s: float) -> Stray:
         """Return what is left of earlier swings at a time since the leg's own start."""
         middle_s = self.corners[leg - 1].blend.duration_s / 2 if leg else at_corner.START_HOLD_S
-        return self.strays[leg].after(time_s - middle_s, self.vehicle.position_gain_per_s)
+        stray = self.strays[leg].after(time_s - middle_s, self.vehicle.position_gain_per_s)
+        if not self.tails:
+            return stray
+        return stray.wider(before_4_6.left_of(self.tails[leg], time_s - self.span_s(leg)[0]))
+
+    def stray_after(self, corner: int) -> Stray:
+        """Return the stray that the leg after a corner begins with."""
+        stray = self.strays[corner + 1]
+        return stray.wider(self.tails[corner + 1]) if self.tails else stray

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 def check(options: CheckOptions) -> None:
     """Check each leg, and report, draw or print as JSON what was found."""
     _check_options(options)
-    request = with_vehicle(GoTo(clearance_m=options.clearance), options)
+    request = with_vehicle(GoTo(clearance_m=options.clearance, trusts_model=options.trust_model), options)
     begin = position_from("--start", options.start) if options.start is not None else None
     situation, unknown = _situation(options)
     if situation.mission is None:
@@ -64,7 +64,7 @@ def check(options: CheckOptions) -> None:
         print_json(_document(checked, warnings, situation.system, options.plot))
     elif not options.quiet:
         _report(checked, options.plot)
-    if not checked.holds:
+    if not checked.is_promised:
         raise typer.Exit(ExitCode.CHECK)
 
 
@@ -165,12 +165,15 @@ def _report(checked: MissionCheck, plots: list[Path]) -> None:
         echo(f"DANGER: {danger}", typer.colors.RED)
     for leg in checked.broken:
         echo(f"FAIL: {_sentence(leg)}", typer.colors.RED)
-    if checked.holds and checked.extrapolated:
-        echo(
-            f"Every leg is predicted to keep {checked.clearance_m:g} m while driving; not confirmed by measurements"
-        )
+    if checked.is_promised:
+        trusted = "; the drive model is trusted beyond what was measured" if checked.extrapolated else ""
+        echo(f"PASS: every leg keeps {checked.clearance_m:g} m while driving{trusted}")
     elif checked.holds:
-        echo(f"PASS: every leg keeps {checked.clearance_m:g} m while driving")
+        echo(
+            f"NOT CONFIRMED: every leg is predicted to keep {checked.clearance_m:g} m while driving, "
+            "but the drive is extrapolated beyond what was measured (--trust-model takes the prediction)",
+            typer.colors.RED,
+        )
 
 
 def _row(leg: CheckedLeg) -> tuple[str, ...]:
@@ -204,9 +207,9 @@ def _document(
     checked: MissionCheck, warnings: list[str], system: int | None, plots: list[Path]
 ) -> dict[str, object]:
     return {
-        "status": "ok" if checked.holds else "failed",
+        "status": "ok" if checked.is_promised else "failed",
         "command": "check",
-        "exit_code": int(ExitCode.DONE if checked.holds else ExitCode.CHECK),
+        "exit_code": int(ExitCode.DONE if checked.is_promised else ExitCode.CHECK),
         "system": system,
         "clearance_m": checked.clearance_m,
         "length_m": round(checked.length_m, 3),

@@ -125,6 +125,8 @@ class MissionCheck:
         The band that the vehicle is predicted to stay in.
     extrapolated : tuple of str
         In what the drive lies outside what was measured: then it is predicted, not promised, that the mission holds.
+    trusts_model : bool
+        Whether that is promised all the same.
     """
 
     mission: Mission
@@ -138,6 +140,7 @@ class MissionCheck:
     vehicle: Vehicle
     envelope: Envelope
     extrapolated: tuple[str, ...] = ()
+    trusts_model: bool = False
 
     @property
     def broken(self) -> tuple[CheckedLeg, ...]:
@@ -148,6 +151,11 @@ class MissionCheck:
     def holds(self) -> bool:
         """Whether every leg keeps its clearance, everything was understood, and nothing is known to end in the fence."""
         return not self.broken and not self.troubles and not self.dangers
+
+    @property
+    def is_promised(self) -> bool:
+        """Whether it holds, and that was measured or the drive model is trusted."""
+        return self.holds and (self.trusts_model or not self.extrapolated)
 
     @property
     def troubles(self) -> tuple[str, ...]:
@@ -242,6 +250,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
         vehicle=vehicle,
         envelope=forecast,
         extrapolated=reasons,
+        trusts_model=request.trusts_model,
     )
 
 

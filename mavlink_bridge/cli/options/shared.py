@@ -162,7 +162,7 @@ TrustOption = Annotated[
     bool,
     typer.Option(
         "--trust-model",
-        help="Promise a clearance even outside the measured range.",
+        help="Promise a clearance even outside the measured range; without it no such plan is uploaded.",
         rich_help_panel=VEHICLE_PANEL,
     ),
 ]

@@ -142,7 +142,8 @@ IgnorePointsOption = Annotated[
 ]
 
 
-def _firmware(text: str) -> Firmware:
+def firmware_option(text: str) -> Firmware:
+    """Return the version that an option names; another text is wrong usage."""
     try:
         return read_firmware(text)
     except VehicleError as error:
@@ -153,7 +154,7 @@ FirmwareOption = Annotated[
     Firmware | None,
     typer.Option(
         metavar="VERSION",
-        parser=_firmware,
+        parser=firmware_option,
         help="Firmware version (4.5, 4.6.3), if the source does not report it.",
         rich_help_panel=VEHICLE_PANEL,
     ),

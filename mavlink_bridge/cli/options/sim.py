@@ -8,8 +8,15 @@ from typing import Annotated
 
 import typer
 
-from mavlink_bridge.cli.options.shared import CommonOptions, IgnorePointsOption, OutermostOption, RoleOption
+from mavlink_bridge.cli.options.shared import (
+    CommonOptions,
+    IgnorePointsOption,
+    OutermostOption,
+    RoleOption,
+    firmware_option,
+)
 from mavlink_bridge.cli.values import MOST_S, within
+from missions.firmware import Firmware
 
 MOST_SEED = 2**63 - 1
 """What fits everywhere a seed is kept."""
@@ -42,6 +49,14 @@ class SimOptions(CommonOptions):
     mission: Annotated[
         Path | None,
         typer.Option(help="Mission file stored in the rover; its home, if it has one, is not used."),
+    ] = None
+    firmware: Annotated[
+        Firmware | None,
+        typer.Option(
+            metavar="VERSION",
+            parser=firmware_option,
+            help="Firmware version (4.5, 4.6.3) that it reports, and drives like. Default: 4.7.0-dev of October 2025.",
+        ),
     ] = None
     param: Annotated[list[str], typer.Option(metavar="NAME=VALUE", help="Set a parameter; repeatable.")] = (
         field(default_factory=list)

@@ -23,7 +23,7 @@ from missions.errors import SituationError
 from missions.fence import Fence, PolygonZone, ZoneKind, fence_to_items
 from missions.formats import read_fence, read_mission, read_situation, write_situation
 from missions.geo import LatLon
-from missions.items import Command, CoordinateFrame, MissionItem, with_home
+from missions.items import Command, CoordinateFrame, MissionItem, waypoint, with_home
 from missions.request import Request
 from missions.situation import Known, Mission, Situation
 
@@ -471,7 +471,11 @@ def test_a_slow_mission_and_old_firmware_are_said(tmp_path, yard):
 def test_an_extrapolated_mission_passes_only_where_the_model_is_trusted(tmp_path, yard):
     vehicle = tmp_path / "rover.parm"
     vehicle.write_text("WP_SPEED 2\nOA_TYPE 2\n", encoding="utf-8")
-    asked = ("check", "--mission", yard["mission"], "--fence", yard["fence"], "--clearance", "0.5")
+    corner = (LatLon(40.071374, -105.229930), LatLon(40.0714396, -105.2299785))
+    mission = tmp_path / "short.waypoints"
+    items = tuple(map(waypoint, corner))
+    write_situation(Situation(mission=Known(Mission(items, corner[0]), None, "test")), mission)
+    asked = ("check", "--mission", mission, "--fence", yard["fence"], "--clearance", "0.5")
     options = (*asked, "--vehicle", vehicle, "--firmware", "4.6")
     usual, untrusted, trusted = run(*asked), run(*options), run(*options, "--trust-model")
     assert [result.exit_code for result in (usual, untrusted, trusted)] == [0, 8, 0]

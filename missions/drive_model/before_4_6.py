@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from missions.drive_model.legs_and_corners import Stray
     from missions.drive_model.motion import LegProfile, Ramp
+    from missions.drive_model.stray import Stray
 
 TURNS_DEG = (45.0, 75.0, 90.0, 105.0, 120.0, 150.0, 170.0)
 """Measured turns: up to the first it hardly leaves its band; those between two of them count as the sharper one."""

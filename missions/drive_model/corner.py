@@ -16,8 +16,8 @@ from missions.drive_model import before_4_6
 from missions.vehicle import Autopilot, Steering
 
 if TYPE_CHECKING:
-    from missions.drive_model.legs_and_corners import Bend, LegPlan
     from missions.drive_model.motion import LegProfile
+    from missions.drive_model.stray import Bend
     from missions.vehicle import Vehicle
 
 GRAVITY_MPS2 = 9.80665  # standard gravity; ArduPilot's GRAVITY_MSS
@@ -106,11 +106,9 @@ def band_m(vehicle: Vehicle, speed_mps: float) -> float:
     return BAND_AT_REST_M + BAND_HEADING_ERROR * speed_mps / vehicle.position_gain_per_s
 
 
-def inside_band_m(vehicle: Vehicle, before: LegPlan, after: LegPlan) -> float:
+def inside_band_m(vehicle: Vehicle, speed_mps: float, band_m: float) -> float:
     """Return how far a rover strays to the inside of a cut, of the path that its autopilot aims for."""
-    if is_early(vehicle):
-        return before_4_6.inside_band_m(max(before.profile.top_speed_mps, after.profile.top_speed_mps))
-    return min(max(before.band_m, after.band_m), INSIDE_BAND_M)
+    return before_4_6.inside_band_m(speed_mps) if is_early(vehicle) else min(band_m, INSIDE_BAND_M)
 
 
 def is_early(vehicle: Vehicle) -> bool:

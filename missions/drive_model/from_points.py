@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 from missions.drive_model import before_4_6
 from missions.drive_model import corner as at_corner
-from missions.drive_model.legs_and_corners import Bend, CornerPlan, DrivePlan, LegPlan, Stray
+from missions.drive_model.legs_and_corners import CornerPlan, DrivePlan, LegPlan
 from missions.drive_model.motion import leg_profile
+from missions.drive_model.stray import Bend, Stray
 from missions.geo import change_deg
 
 if TYPE_CHECKING:

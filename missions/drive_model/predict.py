@@ -13,7 +13,7 @@ from missions.drive_model import corner as at_corner
 from missions.drive_model.band import Pieces, add_corner, add_end, add_leg, add_start, convex
 from missions.drive_model.envelope import Envelope
 from missions.drive_model.from_points import SAME_PLACE_M, drive_plan
-from missions.drive_model.legs_and_corners import Stray
+from missions.drive_model.stray import Stray
 from missions.drive_model.summary import arrivals_s, told_corner, told_leg
 from missions.errors import InvalidPositionError, VehicleError
 from missions.vehicle.parameters import LEAST_MPS

@@ -52,7 +52,11 @@ def _corner(drive: DrivePlan, number: int) -> Corner:
         stops=plan.stops,
         pivots=plan.pivots,
         inside_cut_m=max(
-            _cut_m(drive, number) + coming_m + at_corner.inside_band_m(drive.vehicle, before, after),
+            _cut_m(drive, number)
+            + coming_m
+            + at_corner.inside_band_m(
+                drive.vehicle, max(before.profile.top_speed_mps, after.profile.top_speed_mps), band_m
+            ),
             max(going.right_m, midway.right_m) + band_m,
         ),
         outside_overshoot_m=max(coming_m, going.left_m, midway.left_m) + band_m,

@@ -25,6 +25,8 @@ from missions.errors import VehicleError
 from missions.vehicle import Steering
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
 
@@ -74,9 +76,14 @@ def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry) -> Env
     """
     if not vehicle.avoids_fence or fence.is_empty or not band.legs:
         return band
-    target = _TargetPoint(band, vehicle)
-    lags = target.lags(vehicle, FenceAhead(fence, _plane(target.places), vehicle))
-    pieces = target.pieces(lags)
+    middles_m = {
+        tuple(corner.middle_m for corner in band.corners),
+        tuple(corner.least_middle_m for corner in band.corners),
+    }
+    pieces = []
+    for either_m in sorted(middles_m):
+        target = _TargetPoint(band, vehicle, either_m)
+        pieces += target.pieces(target.lags(vehicle, FenceAhead(fence, _plane(target.places), vehicle)))
     if not pieces:
         return band
     cores, bands_m, waypoints = zip(*pieces, strict=True)
@@ -97,17 +104,19 @@ class _TargetPoint:
         The drive.
     vehicle : Vehicle
         Its limits.
+    middles_m : sequence of float
+        How far from each corner the middle of its cut lies along the legs.
     """
 
-    def __init__(self, band: Envelope, vehicle: Vehicle) -> None:
+    def __init__(self, band: Envelope, vehicle: Vehicle, middles_m: Sequence[float]) -> None:
         self.band = band
         profiles = [_profile(leg, vehicle) for leg in band.legs]
         begins_s = [0.0]
         self._passed_s = []
         """When it passes each corner."""
-        for number, corner in enumerate(band.corners):
+        for number, middle_m in enumerate(middles_m):
             ramps = (profiles[number].ramp, profiles[number + 1].ramp)
-            half_s = min(ramps, key=lambda ramp: ramp.duration_s).time_s(corner.middle_m)
+            half_s = min(ramps, key=lambda ramp: ramp.duration_s).time_s(middle_m)
             self._passed_s.append(begins_s[-1] + profiles[number].duration_s - half_s)
             begins_s.append(self._passed_s[-1] - half_s)
         whole_s = begins_s[-1] + profiles[-1].duration_s

@@ -24,6 +24,7 @@ def marked(plan: Plan, request: Request) -> Plan:
     return replace(
         plan,
         clearance_m=plan.clearance_m if request.trusts_model else None,
+        start_clearance_m=plan.start_clearance_m if request.trusts_model else None,
         extrapolated=reasons,
         warnings=(*dict.fromkeys((*plan.warnings, *reasons)), said),
     )

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from mavlink_bridge.cli.options.shared import (
+    AcceptLessOption,
     AnyVehicleOption,
     CommonOptions,
     FirmwareOption,
@@ -50,6 +51,7 @@ class BridgeOptions(CommonOptions):
         str | None,
         typer.Option(metavar="M|max", help="Clearance to keep while driving. Default: from FENCE_MARGIN."),
     ] = None
+    accept_less: AcceptLessOption = False
     corner_allowance: Annotated[str, typer.Option(metavar="M|auto", help="Extra room for cut corners.")] = (
         "auto"
     )

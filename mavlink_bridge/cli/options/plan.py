@@ -11,6 +11,7 @@ import typer
 from mavlink_bridge.cli.options.shared import (
     OUTPUT_PANEL,
     VEHICLE_PANEL,
+    AcceptLessOption,
     ConnectOption,
     FirmwareOption,
     GpsOption,
@@ -71,6 +72,7 @@ class PlanOptions(LinkOptions):
             help="Fence clearance to keep while driving; max: the widest route. Default: from FENCE_MARGIN.",
         ),
     ] = None
+    accept_less: AcceptLessOption = False
     output: Annotated[
         list[Path],
         typer.Option(

@@ -166,6 +166,13 @@ TrustOption = Annotated[
         rich_help_panel=VEHICLE_PANEL,
     ),
 ]
+AcceptLessOption = Annotated[
+    bool,
+    typer.Option(
+        "--accept-less",
+        help="If no route keeps the clearance, take the widest; without it, there is no plan then.",
+    ),
+]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

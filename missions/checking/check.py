@@ -60,7 +60,7 @@ class CheckedLeg:
     length_m : float
         Its drawn length.
     drawn_clearance_m : float
-        The least distance of its straight line to forbidden ground; 0 where it crosses it, infinite without a fence.
+        The least distance of its straight line to any fence; 0 where it crosses one, infinite without a fence.
     driven_clearance_m : float
         The least distance predicted for the driven track, the corner at its end included.
     asked_m : float
@@ -68,9 +68,9 @@ class CheckedLeg:
     fence : str or None
         The zone that is nearest.
     at : LatLon or None
-        Where on the leg it is nearest; where it crosses forbidden ground, the first place of that.
+        Where on the leg it is nearest; where it crosses a fence, the first place where it does.
     crosses : tuple of str
-        The zones whose forbidden ground the straight line crosses, and seams of a union before which the vehicle stops.
+        The zones that the straight line crosses, and seams of a union before which the vehicle stops.
     time_s : float
         Time from the place before to this leg's end.
     """
@@ -112,7 +112,7 @@ class MissionCheck:
     mission : Mission
         What was checked.
     course : Course
-        What it has the vehicle drive.
+        The legs that it makes the vehicle drive.
     legs : tuple of CheckedLeg
         Each as often as it is driven.
     clearance_m : float
@@ -121,10 +121,12 @@ class MissionCheck:
         What is known to end in the fence, whatever the legs keep; with any of these the mission does not hold.
     warnings : tuple of str
         What else a person should know.
+    info : tuple of str
+        What was added to be safe.
     envelope : Envelope
-        The band that the vehicle is predicted to stay in.
+        The predicted corridor.
     extrapolated : tuple of str
-        In what the drive lies outside what was measured: then it is predicted, not promised, that the mission holds.
+        Why the drive lies outside the measured range: then it is predicted, not promised, that the mission holds.
     """
 
     mission: Mission
@@ -138,6 +140,7 @@ class MissionCheck:
     vehicle: Vehicle
     envelope: Envelope
     extrapolated: tuple[str, ...] = ()
+    info: tuple[str, ...] = ()
 
     @property
     def broken(self) -> tuple[CheckedLeg, ...]:
@@ -156,7 +159,7 @@ class MissionCheck:
 
     @property
     def duration_s(self) -> float:
-        """The time for all of it; of a mission without end for one time round."""
+        """The time for all of it; for one round of a mission that repeats without end."""
         return self.envelope.duration_s
 
     @property
@@ -202,6 +205,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
     FenceError, VehicleError, InvalidPositionError
         The fence, a parameter or a position cannot be used.
     """
+    # Long by its docstring and by the warnings, which stand in the order in which they are told.
     fence = known_fence(situation)
     request = replace(request, widest=False, speed_mps=None, corner_allowance_m=None)
     vehicle = known_vehicle(situation, request)
@@ -242,6 +246,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
         vehicle=vehicle,
         envelope=forecast,
         extrapolated=reasons,
+        info=asked.info,
     )
 
 
@@ -271,6 +276,7 @@ def plan_of(check: MissionCheck, situation: Situation, *, method: str = "optimal
         envelope=check.envelope,
         home=home,
         warnings=check.warnings,
+        info=check.info,
     )
 
 

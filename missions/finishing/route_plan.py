@@ -11,7 +11,7 @@ import numpy as np
 from missions.checking.forecast import forecast_drive
 from missions.errors import PlanCheckError, StartBlockedError
 from missions.finishing.mission_lines import Lines, check_lines, finished, mission_items
-from missions.finishing.remarks import drive_remarks, lead_away_remarks, moved_target_remarks
+from missions.finishing.remarks import drive_remarks, escape_info, lead_away_remarks, moved_target_info
 from missions.geo import rounded
 from missions.ground.from_situation import ground_for, heading_at, route_ends
 from missions.ground.known_fence import fence_warnings, known_fence
@@ -91,7 +91,6 @@ def plan_route(
     reached = tuple(rounded(ground.frame.to_lat_lon(target)) for target in found.targets)
     start_m = None if asked.allowance_m is not None else _start_m(band, lines, ground, asked)
     warnings += lead_away_remarks(found, asked)
-    warnings += moved_target_remarks(targets, reached)
     warnings += drive_remarks(vehicle, heading_deg, asked, driven_m, found)
     return Plan(
         items=items,
@@ -117,6 +116,7 @@ def plan_route(
         vehicle=vehicle,
         home=situation.home.value if situation.home else None,
         warnings=tuple(dict.fromkeys(warnings)),
+        info=(*asked.info, *escape_info(found), *moved_target_info(targets, reached)),
     )
 
 

@@ -248,7 +248,7 @@ class DrawnRoutes:
             raise _NoWayError(
                 NoRoute(
                     NoRouteKind.NOWHERE_FREE,
-                    f"no place in the field keeps {metres(self.clearance_m)} from every fence",
+                    f"no place in the field keeps {self.asked} from every fence",
                     {"clearance_m": self.clearance_m},
                 )
             )

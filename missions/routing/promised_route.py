@@ -144,7 +144,7 @@ class PromisedRoute:
 
     def _compared(self, why: NoRoute, asked: Promise) -> NoRoute:
         """Return why there is no route, with what the widest one keeps while this vehicle drives it."""
-        if why.kind not in (NoRouteKind.TOO_NARROW, NoRouteKind.NOWHERE_FREE):
+        if why.kind is not NoRouteKind.TOO_NARROW:
             return why
         widest = self.widest(asked)
         if isinstance(widest, NoRoute):

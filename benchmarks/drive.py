@@ -150,15 +150,25 @@ def runs_of(seed: int, kinds: str = "usual", firmware: Firmware = Firmware(4, 6)
     return [_run(field, name, firmware) for name in VEHICLES]
 
 
-def _run(field: Field, name: str, firmware: Firmware) -> Run:
-    parameters = {**_KNOWN, **VEHICLES[name], "FENCE_MARGIN": field.clearance_m - 0.1}
-    situation = Situation(
+def situation_of(
+    field: Field,
+    vehicle: str,
+    margin_m: float,
+    firmware: Firmware = Firmware(4, 6),  # noqa: B008 - frozen
+) -> Situation:
+    """Return what is known of a vehicle at a field's start."""
+    return Situation(
         fence=Known(field.fence, None, "bench"),
         pose=Known(Pose(field.start, field.heading_deg), None, "bench"),
         home=Known(field.start, None, "bench"),
-        parameters=parameters,
+        parameters={**_KNOWN, **VEHICLES[vehicle], "FENCE_MARGIN": margin_m},
         firmware=firmware,
     )
+
+
+def _run(field: Field, name: str, firmware: Firmware) -> Run:
+    situation = situation_of(field, name, field.clearance_m - 0.1, firmware)
+    parameters = dict(situation.parameters)
     ground = ground_for(situation, vehicle_from_parameters(parameters), (field.start, field.target))
     widest_m = widest_clearance_m(
         ground, [ground.frame.to_local(field.start), ground.frame.to_local(field.target)]
@@ -185,7 +195,7 @@ def _run(field: Field, name: str, firmware: Firmware) -> Run:
     return Run(
         **known,  # type: ignore[arg-type]
         planning_s=planning_s,
-        leads_away_m=promised_m if promised_m < field.clearance_m else None,
+        leads_away_m=planned.start_clearance_m,
         length_m=planned.length_m,
         shortest_m=shortest.length_m,
         waypoints=len(planned.path) - 1,

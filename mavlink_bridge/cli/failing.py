@@ -93,7 +93,10 @@ _ADVICE: Mapping[type[Exception], tuple[str, ...]] = {
         "change what the message names",
         "add --trust-model to promise, and upload, all the same",
     ),
-    mission_errors.NoRouteError: ("ask for less with --clearance (--clearance max finds the widest route)",),
+    mission_errors.NoRouteError: (
+        "ask for less with --clearance (--clearance max finds the widest route)",
+        "add --accept-less to take the widest route there is",
+    ),
     mission_errors.PlanCheckError: (
         "nothing was written; please report this with the command and its input files",
     ),

@@ -94,6 +94,10 @@ TrustOption = Annotated[
         VEHICLE_PANEL,
     ),
 ]
+AcceptLessOption = Annotated[
+    bool,
+    flag("--accept-less", "If no route keeps the clearance, take the widest; else there is no plan then."),
+]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -424,7 +424,7 @@ class TestStartNearAFence:
         below = box(OUT, -60, -20, 60, 0)
         with pytest.raises(
             NoRouteError,
-            match=r"no route keeps 20\.01 m; the widest keeps 1\.50 m, narrowest at exclusion polygon 2",
+            match=r"no route keeps 20 m \(20\.01 m along straight legs\); the widest keeps 1\.50 m, narrowest at exclusion polygon 2",
         ) as caught:
             drawn(situation_of(FIELD, ring, below), place(-30, 1.5), place(50, 50), clearance_m=20)
         assert caught.value.details["fences"]
@@ -566,7 +566,7 @@ class TestUnreachable:
         zones = (box(OUT, -5, -100, 5, -1.5), box(OUT, -5, 1.5, 5, 100))
         with pytest.raises(
             NoRouteError,
-            match=r"no route keeps 2\.0\d m; the widest keeps 1\.(49|50) m, narrowest between exclusion polygon [12] and exclusion polygon [12]",
+            match=r"no route keeps 2 m \(2\.0\d m along straight legs\); the widest keeps 1\.(49|50) m, narrowest between exclusion polygon [12] and exclusion polygon [12]",
         ) as caught:
             drawn(situation_of(FIELD, *zones), place(-50, 0), place(50, 0))
         assert caught.value.details["widest_m"] == pytest.approx(1.5, abs=0.02)

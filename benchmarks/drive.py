@@ -42,6 +42,8 @@ from missions.situation import Known, Pose, Situation
 from missions.vehicle import vehicle_from_parameters
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from missions.planned import Plan
 
 TOLERANCE_M = 0.10
@@ -64,6 +66,7 @@ VEHICLES: dict[str, dict[str, float]] = {
         "CRUISE_THROTTLE": 75.0,
     },
 }
+KINDS: dict[str, Callable[[int], Field]] = {"usual": make_field, "more": make_more}
 _KNOWN = {
     "TURN_RADIUS": 0.9,
     "ATC_TURN_MAX_G": 0.6,
@@ -122,7 +125,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--fields", type=int, default=200)
     parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--kinds", choices=("usual", "more"), default="usual")
+    parser.add_argument("--kinds", choices=tuple(KINDS), default="usual")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--progress", action="store_true")
     parser.add_argument("-o", "--output", type=Path)
@@ -144,19 +147,29 @@ def main() -> None:
 
 def runs_of(seed: int, kinds: str = "usual") -> list[Run]:
     """Plan and drive one field with each vehicle."""
-    field = make_field(seed) if kinds == "usual" else make_more(seed)
+    field = KINDS[kinds](seed)
     return [_run(field, name) for name in VEHICLES]
 
 
-def _run(field: Field, name: str) -> Run:
-    parameters = {**_KNOWN, **VEHICLES[name], "FENCE_MARGIN": field.clearance_m - 0.1}
-    situation = Situation(
+def parameters_of(field: Field, name: str) -> dict[str, float]:
+    """Return a vehicle's parameters on a field."""
+    return {**_KNOWN, **VEHICLES[name], "FENCE_MARGIN": field.clearance_m - 0.1}
+
+
+def situation_of(field: Field, parameters: dict[str, float]) -> Situation:
+    """Return what a plan on a field has to go by."""
+    return Situation(
         fence=Known(field.fence, None, "bench"),
         pose=Known(Pose(field.start, field.heading_deg), None, "bench"),
         home=Known(field.start, None, "bench"),
         parameters=parameters,
         firmware=Firmware(4, 6),
     )
+
+
+def _run(field: Field, name: str) -> Run:
+    parameters = parameters_of(field, name)
+    situation = situation_of(field, parameters)
     ground = ground_for(situation, vehicle_from_parameters(parameters), (field.start, field.target))
     widest_m = widest_clearance_m(
         ground, [ground.frame.to_local(field.start), ground.frame.to_local(field.target)]

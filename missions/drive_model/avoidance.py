@@ -76,15 +76,16 @@ def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry) -> Env
         return band
     target = _TargetPoint(band, vehicle)
     lags = target.lags(vehicle, FenceAhead(fence, _plane(target.places), vehicle))
-    pieces = target.pieces(lags)
-    if not pieces:
+    if not lags:
         return band
-    cores, bands_m, waypoints = zip(*pieces, strict=True)
+    cores, bands_m, waypoints = target.pieces(lags)
+    if not len(cores):
+        return band
     return replace(
         band,
-        cores=np.concatenate([band.cores, np.array(cores, dtype=np.object_)]),
-        bands_m=np.concatenate([band.bands_m, np.array(bands_m)]),
-        waypoints=np.concatenate([band.waypoints, np.array(waypoints, dtype=np.int64)]),
+        cores=np.concatenate([band.cores, cores]),
+        bands_m=np.concatenate([band.bands_m, bands_m]),
+        waypoints=np.concatenate([band.waypoints, waypoints]),
     )
 
 
@@ -121,7 +122,9 @@ class _TargetPoint:
         self.places: NDArray[np.complex128] = np.full(len(self.times_s), points[0])
         for leg, profile, begin_s in zip(band.legs, profiles, begins_s, strict=True):
             step = points[leg.first + 1] - points[leg.first]
-            self.places += np.interp(self.times_s - begin_s, *_shares(profile)) * step
+            leg_s = np.append(np.arange(0.0, profile.duration_s, _STEP_S), profile.duration_s)
+            shares = profile.all_travelled_m(leg_s) / profile.length_m
+            self.places += np.interp(self.times_s - begin_s, leg_s, shares) * step
 
     def lags(self, vehicle: Vehicle, fence: FenceAhead) -> list[complex]:
         """Return at each time how far the rover is behind, east and north; an empty list where it never is."""
@@ -146,33 +149,25 @@ class _TargetPoint:
                 near |= np.abs(self.times_s - passed_s) <= _ABOUT_CORNER_S
         return near
 
-    def pieces(self, lags: list[complex]) -> list[tuple[BaseGeometry, float, int]]:
-        """Return the ground between target point and rover where the rover is behind, piece by piece."""
+    def pieces(
+        self, lags: list[complex]
+    ) -> tuple[NDArray[np.object_], NDArray[np.float64], NDArray[np.int64]]:
+        """Return the ground between target point and rover where the rover is behind, piece by piece, with its band and waypoint."""
         behind = np.array(lags)
         far = np.flatnonzero(np.abs(behind) >= NEGLIGIBLE_M)
         # A piece holds the first sample of the next one too.
         whole, ends = far - far % _SAMPLES_A_PIECE, far[far % _SAMPLES_A_PIECE == 0] - _SAMPLES_A_PIECE
         begins = np.union1d(whole, ends[ends >= 0])
-        return [self._piece(behind, begin) for begin in begins.tolist()]
-
-    def _piece(self, behind: NDArray[np.complex128], begin: int) -> tuple[BaseGeometry, float, int]:
-        span = slice(begin, min(begin + _SAMPLES_A_PIECE + 1, len(behind)))
-        targets = self.places[span]
-        ground = np.concatenate([targets, targets - LAG_RESERVE * behind[span]])
-        core = shapely.MultiPoint(_plane(ground)).convex_hull
-        leg = int(np.searchsorted(self._passed_s, self.times_s[begin]))
-        return (
-            core,
-            min(self.band.legs[leg].half_width_m, INSIDE_BAND_M),
-            self._waypoint(float(self.times_s[begin])),
-        )
-
-    def _waypoint(self, time_s: float) -> int:
-        """Return the waypoint nearest to a time."""
-        if not self._passed_s:
-            return self.band.legs[-1].first + 1
-        nearest = min(range(len(self._passed_s)), key=lambda number: abs(self._passed_s[number] - time_s))
-        return self.band.corners[nearest].waypoint
+        samples = np.minimum(begins[:, None] + np.arange(_SAMPLES_A_PIECE + 1), len(behind) - 1)
+        targets = self.places[samples]
+        ground = np.concatenate([targets, targets - LAG_RESERVE * behind[samples]], axis=1)
+        # Lines take far less to make than as many points, and their hulls are the same.
+        cores = shapely.convex_hull(shapely.linestrings(_plane(ground).reshape(*ground.shape, 2)))
+        passed_s, begins_s = np.array(self._passed_s), self.times_s[begins]
+        half_widths_m = np.array([leg.half_width_m for leg in self.band.legs])
+        bands_m = np.minimum(half_widths_m[np.searchsorted(passed_s, begins_s)], INSIDE_BAND_M)
+        nearest = np.abs(passed_s - begins_s[:, None]).argmin(axis=1)
+        return cores, bands_m, np.array([corner.waypoint for corner in self.band.corners])[nearest]
 
 
 def _plane(numbers: NDArray[np.complex128]) -> NDArray[np.float64]:
@@ -182,12 +177,6 @@ def _plane(numbers: NDArray[np.complex128]) -> NDArray[np.float64]:
 
 def _profile(leg: Leg, vehicle: Vehicle) -> LegProfile:
     return LegProfile(leg.length_m, Ramp(leg.top_speed_mps, vehicle.accel_max_mps2, vehicle.jerk_mps3))
-
-
-def _shares(profile: LegProfile) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return times since a leg's start, and the share of the leg that is driven by each."""
-    leg_s = np.append(np.arange(0.0, profile.duration_s, _STEP_S), profile.duration_s)
-    return leg_s, np.array([profile.travelled_m(time_s) / profile.length_m for time_s in leg_s.tolist()])
 
 
 def _followed(

@@ -33,12 +33,12 @@ import shapely
 
 from missions.fitting import moves
 from missions.fitting import polyline as drawn
-from missions.fitting.cost import ENOUGH_M, Gauge
+from missions.fitting.cost import ENOUGH_M, MISSING_COST_S_PER_M, Gauge
 from missions.fitting.gap import find_gap, straight_through
 from missions.geo import rounded
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Generator, Iterable, Iterator
 
     from missions.fitting.cost import Measured, Trial
     from missions.fitting.polyline import Drawing
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from missions.vehicle import Vehicle
 
 
-FIT_MEASUREMENTS, CRAWL_MEASUREMENTS, MOST_MEASUREMENTS = 500, 350, 1500
+FIT_MEASUREMENTS, CRAWL_MEASUREMENTS, QUICKEN_MEASUREMENTS, MOST_MEASUREMENTS = 500, 350, 300, 1500
 """Taken for one route, for a slow one, and for all that are tried: a search that is not done by then is given up.
 
 Chosen, not measured: they bound the planning time, which docs/drive-bench.md reports.
@@ -59,11 +59,16 @@ _LEAST_GAIN_S = 0.05  # what a change must gain to be kept: it ends the descent
 # Points before and after a change that are measured with it; the whole lines are measured afterwards
 _CONTEXT = 3
 _MORE_TRIES = 12  # candidates still looked at after the first that suffices: the gentle ones come first
+_SOME, _GOOD_SHARE = 28, 0.5  # moves tried together, as many as `moves.moved` offers; the rest only where none takes away half of what is missing
 _TRIED_WHOLE = 3  # candidates that gained in part and are measured whole
 _EASING_STEPS_M = (6.0, 1.6, 0.5)  # coarse to fine; what is left over is at most the last
 _TINY_LEG_M = 2.5  # shorter legs within gentle turns become one corner before the search
 _JOINED_TURN_DEG = 80.0  # both corners together; sharper ones stay two
 _GRID_TRIES, _GRID_MEASUREMENTS = 4, 150  # to mend what rounding to degE7 (at most 5.6 mm) broke
+
+
+Lines = tuple["Drawing", "Measured"]
+"""Lines, and how they measure."""
 
 
 @dataclass(eq=False)
@@ -92,11 +97,16 @@ class Fitting:
     measurements: int = field(default=0, init=False)
     _until: int = field(default=0, init=False)
 
-    def fit(self, drawing: Drawing) -> tuple[Drawing, Measured]:
+    def fit(self, drawing: Drawing) -> Lines:
         """Return lines improved until their band keeps what is required or nothing helps, and how they measure."""
+        *_, found = self.steps(drawing)
+        return found
+
+    def steps(self, drawing: Drawing) -> Iterator[Lines]:
+        """Do the same step by step: return the lines after each change, or after each place where nothing helped; last the result."""
         drawn_first = _joined(drawing)
         self._allow(FIT_MEASUREMENTS)
-        drawing, measured = self._fitted(self._fewer(drawn_first))
+        drawing, measured = yield from self._fitted(self._fewer(drawn_first))
         if not measured.is_enough:
             # Many small corners in little room: begin again, slowly all about them.
             spots = [
@@ -108,12 +118,12 @@ class Fitting:
             ]
             slow = moves.crawling(drawn_first, spots, self.vehicle.speed_mps)
             self._allow(CRAWL_MEASUREMENTS)
-            other, found = self._fitted(slow)
+            other, found = yield from self._fitted(slow)
             if sum(found.missing_m) < sum(measured.missing_m):
                 drawing, measured = other, found
-        return self._on_grid(drawing, measured)
+        yield from self._on_grid(drawing, measured)
 
-    def _on_grid(self, drawing: Drawing, measured: Measured) -> tuple[Drawing, Measured]:
+    def _on_grid(self, drawing: Drawing, measured: Measured) -> Iterator[Lines]:
         """Round lines as the mission's items will be: the model has steps, and a millimetre may be one too many."""
         for _ in range(_GRID_TRIES):
             if not measured.is_enough:
@@ -123,9 +133,9 @@ class Fitting:
             if measured.is_enough:
                 break
             self._allow(_GRID_MEASUREMENTS)
-            drawing = self._descend(drawing, self._all)
+            drawing = yield from self._descend(drawing, self._all)
             measured = self.measure(drawing)
-        return drawing, measured
+        yield drawing, measured
 
     def _rounded(self, place: LocalPoint) -> LocalPoint:
         frame = self.ground.frame
@@ -134,11 +144,11 @@ class Fitting:
     def _allow(self, measurements: int) -> None:
         self._until = min(self.measurements + measurements, self.most_measurements)
 
-    def _fitted(self, drawing: Drawing) -> tuple[Drawing, Measured]:
+    def _fitted(self, drawing: Drawing) -> Generator[Lines, None, Lines]:
         for propose in (self._gentle, self._all):
-            drawing = self._descend(drawing, propose)
+            drawing = yield from self._descend(drawing, propose)
             if self.measure(drawing).is_enough:
-                drawing = self._eased(self._fewer(drawing))
+                drawing = self._eased(self._quickened(self._fewer(drawing)))
                 break
         return drawing, self.measure(drawing)
 
@@ -193,16 +203,19 @@ class Fitting:
 
     def _descend(
         self, drawing: Drawing, propose: Callable[[Drawing, int, Measured], Iterable[Drawing]]
-    ) -> Drawing:
-        """Return the lines after moves at the worst points, until nothing is missing or nothing helps."""
+    ) -> Generator[Lines, None, Drawing]:
+        """Move the worst points until nothing is missing or nothing helps; return the lines that come of it."""
         measured = self.measure(drawing)
         while not measured.is_enough and not self._is_over():
             for index in sorted(range(len(drawing)), key=lambda number: -measured.missing_m[number]):
                 if measured.missing_m[index] <= ENOUGH_M:
                     return drawing
-                better = self._best(drawing, measured, propose(drawing, index, measured))
+                good_s = _GOOD_SHARE * MISSING_COST_S_PER_M * measured.missing_m[index]
+                better = self._best(drawing, measured, propose(drawing, index, measured), good_s)
                 if better is not None:
                     drawing, measured = better
+                yield drawing, measured
+                if better is not None:
                     break
         return drawing
 
@@ -222,6 +235,25 @@ class Fitting:
                 index = max(index - 1, 1)
         return drawing
 
+    def _quickened(self, drawing: Drawing) -> Drawing:
+        """Return the lines with slow stretches driven faster, and several corners made one, as far as clearance allows."""
+        measured = self.measure(drawing)
+        self._allow(QUICKEN_MEASUREMENTS)
+        index = left = 1
+        while left < len(drawing) and not self._is_over():
+            candidates = (
+                *moves.quickened(drawing, index, self.vehicle.speed_mps),
+                *moves.rejoined(drawing, index),
+            )
+            better = self._best(drawing, measured, candidates)
+            left += 1
+            if better is not None:
+                drawing, measured = better
+                left = 1
+            else:
+                index = index % (len(drawing) - 1) + 1
+        return drawing
+
     def _eased(self, drawing: Drawing) -> Drawing:
         """Return the lines with their moves taken back, step by step, as far as clearance and time allow."""
         measured = self.measure(drawing)
@@ -235,27 +267,36 @@ class Fitting:
         return drawing
 
     def _best(
-        self, drawing: Drawing, measured: Measured, candidates: Iterable[Drawing]
-    ) -> tuple[Drawing, Measured] | None:
-        """Return the lines that gain most, if any do, judged by the part that changes and then on the whole."""
+        self, drawing: Drawing, measured: Measured, candidates: Iterable[Drawing], good_s: float = math.inf
+    ) -> Lines | None:
+        """Return the lines that gain most, if any do, judged by the part that changes and then on the whole.
+
+        Candidates come some at a time; once one gains ``good_s``, those left are not tried.
+        """
         trials: list[_Tried] = []
         known_s: dict[tuple[int, int], float] = {}
-        solved_at = None
-        for number, candidate in enumerate(candidates):
-            begin, kept = _changed(drawing, candidate)
-            span = (begin, len(drawing) - kept)
-            if span not in known_s:
+        waiting = iter(enumerate(candidates))
+        is_solved = False
+        while not is_solved and (some := list(itertools.islice(waiting, _SOME))):
+            solved_at = None
+            for number, candidate in some:
+                begin, kept = _changed(drawing, candidate)
+                span = (begin, len(drawing) - kept)
+                if span not in known_s:
+                    self.measurements += 1
+                    known_s[span] = self._gauge.trial(drawing, *span).finish().cost_s
                 self.measurements += 1
-                known_s[span] = self._gauge.trial(drawing, *span).finish().cost_s
-            self.measurements += 1
-            trial = self._gauge.trial(candidate, begin, len(candidate) - kept)
-            tried = _Tried(known_s[span], number, trial, candidate)
-            if tried.is_enough() and solved_at is None:
-                solved_at = number
-            trials.append(tried)
-            # The moves come with the cheapest first: once one suffices, a few more are looked at.
-            if self._is_over() or (solved_at is not None and number >= solved_at + _MORE_TRIES):
-                break
+                trial = self._gauge.trial(candidate, begin, len(candidate) - kept)
+                tried = _Tried(known_s[span], number, trial, candidate)
+                if tried.is_enough() and solved_at is None:
+                    solved_at = number
+                trials.append(tried)
+                # The moves come with the cheapest first: once one suffices, a few more are looked at.
+                if self._is_over() or (solved_at is not None and number >= solved_at + _MORE_TRIES):
+                    break
+            is_solved = solved_at is not None or self._is_over()
+            best = next(_best_first(trials), None)
+            is_solved |= best is not None and best.gain_s >= good_s
         for tried in itertools.islice(_best_first(trials), _TRIED_WHOLE):
             found = self.measure(tried.drawing)
             more_m = sum(found.missing_m) - sum(measured.missing_m)

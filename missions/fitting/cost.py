@@ -50,7 +50,7 @@ TURN_BACK_DEG, TURN_BACK_EXTRA_M = 165.0, 4.0
 
 # Chosen, not measured: prices that order the candidates of a search.
 # A slow stretch costs 8 to 18 s when measured: worth it for some 0.1 m that would else be missing
-MISSING_COST_S_PER_M = 100.0
+_MISSING_COST_S_PER_M = 100.0
 _CROSSING_COST_S = 10_000.0  # more than any drive takes or misses: a leg through a fence is never worth it
 _POINT_COST_S = 0.3  # between equal lines the one with fewer waypoints
 _NEAR_TURNS_COST_S = 3.0  # two turns within `moves.APART_M`: driven as one, and less surely predicted
@@ -301,7 +301,7 @@ class Trial:
             self._duration_s
             + _POINT_COST_S * len(self._part)
             + _NEAR_TURNS_COST_S * self._near_turns
-            + MISSING_COST_S_PER_M * float(self.missing_m.sum())
+            + _MISSING_COST_S_PER_M * float(self.missing_m.sum())
             + self._other_cost_s
         )
 

@@ -6,8 +6,8 @@ with missing clearance priced as time). Where no move gains at that point, the n
 missing, when no move gains anywhere, or when the measurements allowed are used up.
 
 Moves that cost little time come first (`_gentle`); slower stretches and stops (`_all`) only where those do not suffice. What has become
-enough is then made cheaper: points are left out (`_fewer`), and corners taken back towards the straight line (`_eased`). What has not is
-begun again from the first lines, driven slowly around each place where clearance was missing. At the end the points are rounded to degE7, as
+enough is then made cheaper: points are left out (`_fewer`), slow stretches driven faster and several corners made one (`_quickened`), and
+corners taken back towards the straight line (`_eased`). What has not is begun again from the first lines, driven slowly around each place where clearance was missing. At the end the points are rounded to degE7, as
 the mission will hold them, and measured and mended once more.
 
 **Why.** The band is no smooth function of the points: a corner pivots or blends, a leg is too short for two ramps, a rounded coordinate
@@ -33,12 +33,12 @@ import shapely
 
 from missions.fitting import moves
 from missions.fitting import polyline as drawn
-from missions.fitting.cost import ENOUGH_M, MISSING_COST_S_PER_M, Gauge
+from missions.fitting.cost import ENOUGH_M, Gauge
 from missions.fitting.gap import find_gap, straight_through
 from missions.geo import rounded
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
 
     from missions.fitting.cost import Measured, Trial
     from missions.fitting.polyline import Drawing
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 
 FIT_MEASUREMENTS, CRAWL_MEASUREMENTS, QUICKEN_MEASUREMENTS, MOST_MEASUREMENTS = 500, 350, 300, 1500
-"""Taken for one route, for a slow one, and for all that are tried: a search that is not done by then is given up.
+"""Taken for one route, for a slow one, to make one quicker that was found, and for all that are tried: a search that is not done by then is given up.
 
 Chosen, not measured: they bound the planning time, which docs/drive-bench.md reports.
 """
@@ -59,16 +59,11 @@ _LEAST_GAIN_S = 0.05  # what a change must gain to be kept: it ends the descent
 # Points before and after a change that are measured with it; the whole lines are measured afterwards
 _CONTEXT = 3
 _MORE_TRIES = 12  # candidates still looked at after the first that suffices: the gentle ones come first
-_SOME, _GOOD_SHARE = 28, 0.5  # moves tried together, as many as `moves.moved` offers; the rest only where none takes away half of what is missing
 _TRIED_WHOLE = 3  # candidates that gained in part and are measured whole
 _EASING_STEPS_M = (6.0, 1.6, 0.5)  # coarse to fine; what is left over is at most the last
 _TINY_LEG_M = 2.5  # shorter legs within gentle turns become one corner before the search
 _JOINED_TURN_DEG = 80.0  # both corners together; sharper ones stay two
 _GRID_TRIES, _GRID_MEASUREMENTS = 4, 150  # to mend what rounding to degE7 (at most 5.6 mm) broke
-
-
-Lines = tuple["Drawing", "Measured"]
-"""Lines, and how they measure."""
 
 
 @dataclass(eq=False)
@@ -97,16 +92,11 @@ class Fitting:
     measurements: int = field(default=0, init=False)
     _until: int = field(default=0, init=False)
 
-    def fit(self, drawing: Drawing) -> Lines:
+    def fit(self, drawing: Drawing) -> tuple[Drawing, Measured]:
         """Return lines improved until their band keeps what is required or nothing helps, and how they measure."""
-        *_, found = self.steps(drawing)
-        return found
-
-    def steps(self, drawing: Drawing) -> Iterator[Lines]:
-        """Do the same step by step: return the lines after each change, or after each place where nothing helped; last the result."""
         drawn_first = _joined(drawing)
         self._allow(FIT_MEASUREMENTS)
-        drawing, measured = yield from self._fitted(self._fewer(drawn_first))
+        drawing, measured = self._fitted(self._fewer(drawn_first))
         if not measured.is_enough:
             # Many small corners in little room: begin again, slowly all about them.
             spots = [
@@ -118,13 +108,18 @@ class Fitting:
             ]
             slow = moves.crawling(drawn_first, spots, self.vehicle.speed_mps)
             self._allow(CRAWL_MEASUREMENTS)
-            other, found = yield from self._fitted(slow)
+            other, found = self._fitted(slow)
             if sum(found.missing_m) < sum(measured.missing_m):
                 drawing, measured = other, found
-        yield from self._on_grid(drawing, measured)
+        if not measured.is_enough:
+            return drawing, measured
+        found = self._on_grid(self._eased(self._quickened(drawing)))
+        # What is made quicker keeps no more than it must, and rounding may break what cannot be mended.
+        return found if found[1].is_enough else self._on_grid(self._eased(drawing))
 
-    def _on_grid(self, drawing: Drawing, measured: Measured) -> Iterator[Lines]:
+    def _on_grid(self, drawing: Drawing) -> tuple[Drawing, Measured]:
         """Round lines as the mission's items will be: the model has steps, and a millimetre may be one too many."""
+        measured = self.measure(drawing)
         for _ in range(_GRID_TRIES):
             if not measured.is_enough:
                 break
@@ -132,10 +127,10 @@ class Fitting:
             measured = self.measure(drawing)
             if measured.is_enough:
                 break
-            self._allow(_GRID_MEASUREMENTS)
-            drawing = yield from self._descend(drawing, self._all)
+            self._until = self.measurements + _GRID_MEASUREMENTS
+            drawing = self._descend(drawing, self._all)
             measured = self.measure(drawing)
-        yield drawing, measured
+        return drawing, measured
 
     def _rounded(self, place: LocalPoint) -> LocalPoint:
         frame = self.ground.frame
@@ -144,11 +139,11 @@ class Fitting:
     def _allow(self, measurements: int) -> None:
         self._until = min(self.measurements + measurements, self.most_measurements)
 
-    def _fitted(self, drawing: Drawing) -> Generator[Lines, None, Lines]:
+    def _fitted(self, drawing: Drawing) -> tuple[Drawing, Measured]:
         for propose in (self._gentle, self._all):
-            drawing = yield from self._descend(drawing, propose)
+            drawing = self._descend(drawing, propose)
             if self.measure(drawing).is_enough:
-                drawing = self._eased(self._quickened(self._fewer(drawing)))
+                drawing = self._fewer(drawing)
                 break
         return drawing, self.measure(drawing)
 
@@ -203,19 +198,16 @@ class Fitting:
 
     def _descend(
         self, drawing: Drawing, propose: Callable[[Drawing, int, Measured], Iterable[Drawing]]
-    ) -> Generator[Lines, None, Drawing]:
-        """Move the worst points until nothing is missing or nothing helps; return the lines that come of it."""
+    ) -> Drawing:
+        """Return the lines after moves at the worst points, until nothing is missing or nothing helps."""
         measured = self.measure(drawing)
         while not measured.is_enough and not self._is_over():
             for index in sorted(range(len(drawing)), key=lambda number: -measured.missing_m[number]):
                 if measured.missing_m[index] <= ENOUGH_M:
                     return drawing
-                good_s = _GOOD_SHARE * MISSING_COST_S_PER_M * measured.missing_m[index]
-                better = self._best(drawing, measured, propose(drawing, index, measured), good_s)
+                better = self._best(drawing, measured, propose(drawing, index, measured))
                 if better is not None:
                     drawing, measured = better
-                yield drawing, measured
-                if better is not None:
                     break
         return drawing
 
@@ -236,22 +228,24 @@ class Fitting:
         return drawing
 
     def _quickened(self, drawing: Drawing) -> Drawing:
-        """Return the lines with slow stretches driven faster, and several corners made one, as far as clearance allows."""
+        """Return the lines with slow stretches driven faster, and several corners made one, as far as clearance allows.
+
+        Round and round, until no point of them helps.
+        """
         measured = self.measure(drawing)
-        self._allow(QUICKEN_MEASUREMENTS)
-        index = left = 1
-        while left < len(drawing) and not self._is_over():
+        self._until += QUICKEN_MEASUREMENTS
+        index, without = 1, 0
+        while without < len(drawing) - 1 and not self._is_over():
             candidates = (
                 *moves.quickened(drawing, index, self.vehicle.speed_mps),
                 *moves.rejoined(drawing, index),
             )
             better = self._best(drawing, measured, candidates)
-            left += 1
             if better is not None:
                 drawing, measured = better
-                left = 1
+                index, without = min(index, len(drawing) - 1), 0
             else:
-                index = index % (len(drawing) - 1) + 1
+                index, without = index % (len(drawing) - 1) + 1, without + 1
         return drawing
 
     def _eased(self, drawing: Drawing) -> Drawing:
@@ -267,36 +261,27 @@ class Fitting:
         return drawing
 
     def _best(
-        self, drawing: Drawing, measured: Measured, candidates: Iterable[Drawing], good_s: float = math.inf
-    ) -> Lines | None:
-        """Return the lines that gain most, if any do, judged by the part that changes and then on the whole.
-
-        Candidates come some at a time; once one gains ``good_s``, those left are not tried.
-        """
+        self, drawing: Drawing, measured: Measured, candidates: Iterable[Drawing]
+    ) -> tuple[Drawing, Measured] | None:
+        """Return the lines that gain most, if any do, judged by the part that changes and then on the whole."""
         trials: list[_Tried] = []
         known_s: dict[tuple[int, int], float] = {}
-        waiting = iter(enumerate(candidates))
-        is_solved = False
-        while not is_solved and (some := list(itertools.islice(waiting, _SOME))):
-            solved_at = None
-            for number, candidate in some:
-                begin, kept = _changed(drawing, candidate)
-                span = (begin, len(drawing) - kept)
-                if span not in known_s:
-                    self.measurements += 1
-                    known_s[span] = self._gauge.trial(drawing, *span).finish().cost_s
+        solved_at = None
+        for number, candidate in enumerate(candidates):
+            begin, kept = _changed(drawing, candidate)
+            span = (begin, len(drawing) - kept)
+            if span not in known_s:
                 self.measurements += 1
-                trial = self._gauge.trial(candidate, begin, len(candidate) - kept)
-                tried = _Tried(known_s[span], number, trial, candidate)
-                if tried.is_enough() and solved_at is None:
-                    solved_at = number
-                trials.append(tried)
-                # The moves come with the cheapest first: once one suffices, a few more are looked at.
-                if self._is_over() or (solved_at is not None and number >= solved_at + _MORE_TRIES):
-                    break
-            is_solved = solved_at is not None or self._is_over()
-            best = next(_best_first(trials), None)
-            is_solved |= best is not None and best.gain_s >= good_s
+                known_s[span] = self._gauge.trial(drawing, *span).finish().cost_s
+            self.measurements += 1
+            trial = self._gauge.trial(candidate, begin, len(candidate) - kept)
+            tried = _Tried(known_s[span], number, trial, candidate)
+            if tried.is_enough() and solved_at is None:
+                solved_at = number
+            trials.append(tried)
+            # The moves come with the cheapest first: once one suffices, a few more are looked at.
+            if self._is_over() or (solved_at is not None and number >= solved_at + _MORE_TRIES):
+                break
         for tried in itertools.islice(_best_first(trials), _TRIED_WHOLE):
             found = self.measure(tried.drawing)
             more_m = sum(found.missing_m) - sum(measured.missing_m)

@@ -43,7 +43,13 @@ is as good as 10 or 15 (rows ``slow`` of benchmarks/data). 3 m/s was not measure
 APART_M = 3.0
 """Turns nearer to one another are one turn to a rover, as for `drive_model.corner.NEAR_M`."""
 
-REJOINED_M = (0.3, 0.7, 1.2, 2.0, 3.0)  # how far out one corner in the place of several may lie; as coarse as `MOVES`
+REJOINED_M = (
+    0.3,
+    0.7,
+    1.2,
+    2.0,
+    3.0,
+)  # how far out one corner in the place of several may lie; as coarse as `MOVES`
 QUICK_AFTER_M, QUICK_BEFORE_M = (0.0, 6.0, 15.0), (0.0, 5.0, 10.0)
 """What of a slow leg stays slow behind its first corner and before its last: as `SLOW_AFTER_M` and `SLOW_BEFORE_M`."""
 
@@ -207,7 +213,12 @@ def quickened(drawing: Drawing, index: int, speed_mps: float) -> Iterator[Drawin
             if after_m and before_m:
                 yield (*drawing[:index], points[0], middle, *drawing[index:])
             elif after_m:
-                yield (*drawing[:index], points[0], replace(drawing[index], speed_mps=quick_mps), *drawing[index + 1 :])
+                yield (
+                    *drawing[:index],
+                    points[0],
+                    replace(drawing[index], speed_mps=quick_mps),
+                    *drawing[index + 1 :],
+                )
             elif before_m:
                 yield (*drawing[:index], middle, *drawing[index:])
 

@@ -175,7 +175,7 @@ def test_two_corners_become_one_farther_out_each_time() -> None:
     assert found[0][1].place == pytest.approx((0.0, 46.0))
     out_m = [math.dist(one[1].place, found[0][1].place) for one in found]
     assert out_m == pytest.approx([0.0, *moves.REJOINED_M])
-    assert all(one[1].place[0] <= 0.0 <= 46.0 <= one[1].place[1] for one in found)
+    assert all(one[1].place[0] <= 0.0 and one[1].place[1] >= 46.0 for one in found)
 
 
 def test_fixed_points_are_not_rejoined() -> None:

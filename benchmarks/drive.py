@@ -42,6 +42,8 @@ from missions.situation import Known, Pose, Situation
 from missions.vehicle import vehicle_from_parameters
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from missions.planned import Plan
 
 TOLERANCE_M = 0.10
@@ -64,6 +66,7 @@ VEHICLES: dict[str, dict[str, float]] = {
         "CRUISE_THROTTLE": 75.0,
     },
 }
+KINDS: dict[str, Callable[[int], Field]] = {"usual": make_field, "more": make_more}
 _KNOWN = {
     "TURN_RADIUS": 0.9,
     "ATC_TURN_MAX_G": 0.6,
@@ -123,7 +126,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--fields", type=int, default=200)
     parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--kinds", choices=("usual", "more"), default="usual")
+    parser.add_argument("--kinds", choices=tuple(KINDS), default="usual")
     parser.add_argument("--firmware", type=read_firmware, default=Firmware(4, 6))
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--progress", action="store_true")
@@ -146,29 +149,33 @@ def main() -> None:
 
 def runs_of(seed: int, kinds: str = "usual", firmware: Firmware = Firmware(4, 6)) -> list[Run]:  # noqa: B008 - frozen
     """Plan and drive one field with each vehicle."""
-    field = make_field(seed) if kinds == "usual" else make_more(seed)
+    field = KINDS[kinds](seed)
     return [_run(field, name, firmware) for name in VEHICLES]
+
+
+def parameters_of(field: Field, name: str) -> dict[str, float]:
+    """Return a vehicle's parameters on a field."""
+    return {**_KNOWN, **VEHICLES[name], "FENCE_MARGIN": field.clearance_m - 0.1}
 
 
 def situation_of(
     field: Field,
-    vehicle: str,
-    margin_m: float,
+    parameters: dict[str, float],
     firmware: Firmware = Firmware(4, 6),  # noqa: B008 - frozen
 ) -> Situation:
-    """Return what is known of a vehicle at a field's start."""
+    """Return what a plan on a field has to go by."""
     return Situation(
         fence=Known(field.fence, None, "bench"),
         pose=Known(Pose(field.start, field.heading_deg), None, "bench"),
         home=Known(field.start, None, "bench"),
-        parameters={**_KNOWN, **VEHICLES[vehicle], "FENCE_MARGIN": margin_m},
+        parameters=parameters,
         firmware=firmware,
     )
 
 
 def _run(field: Field, name: str, firmware: Firmware) -> Run:
-    situation = situation_of(field, name, field.clearance_m - 0.1, firmware)
-    parameters = dict(situation.parameters)
+    parameters = parameters_of(field, name)
+    situation = situation_of(field, parameters, firmware)
     ground = ground_for(situation, vehicle_from_parameters(parameters), (field.start, field.target))
     widest_m = widest_clearance_m(
         ground, [ground.frame.to_local(field.start), ground.frame.to_local(field.target)]

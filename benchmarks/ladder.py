@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from drive import VEHICLES, situation_of
+from drive import VEHICLES, parameters_of, situation_of
 from drive_fields import make_field
 
 from mavlink_bridge.logbook.log_situation import situation_from_log
@@ -103,7 +103,8 @@ def _asked(place: str) -> tuple[Situation, dict[str, object]]:
     seed = int(place.removeprefix("field "))
     field = make_field(seed)
     vehicle = list(VEHICLES)[seed % len(VEHICLES)]
-    return situation_of(field, vehicle, MARGIN_M), {"target": field.target}
+    parameters = {**parameters_of(field, vehicle), "FENCE_MARGIN": MARGIN_M}
+    return situation_of(field, parameters), {"target": field.target}
 
 
 def _rung(situation: Situation, request: GoTo, asked_m: float | None) -> Rung:

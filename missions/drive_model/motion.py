@@ -9,6 +9,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 _NEWTON_STEPS = 8  # each doubles the digits that are right; 8 leave no more than rounding
 
@@ -123,6 +129,19 @@ class LegProfile:
         if time_s > self.duration_s / 2:
             return self.length_m - self.ramp.travelled_m(self.duration_s - time_s)
         return self.ramp.travelled_m(time_s)
+
+    def all_travelled_m(self, times_s: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the same for many times within the leg at once."""
+        ramp = self.ramp
+        is_late = times_s > self.duration_s / 2
+        from_rest_s = np.where(is_late, self.duration_s - times_s, times_s)
+        half_s = ramp.duration_s / 2
+        rising_s = np.where(from_rest_s > half_s, np.maximum(ramp.duration_s - from_rest_s, 0.0), from_rest_s)
+        jerking_s = np.minimum(rising_s, ramp.jerk_s)
+        more_s = rising_s - jerking_s
+        away_m = ramp.jerk_mps3 * (jerking_s**3 / 6 + ramp.jerk_s * more_s * (ramp.jerk_s + more_s) / 2)
+        away_m += ramp.speed_mps * np.maximum(from_rest_s - half_s, 0.0)
+        return np.asarray(np.where(is_late, self.length_m - away_m, away_m))
 
 
 def leg_profile(length_m: float, speed_mps: float, accel_mps2: float, jerk_mps3: float) -> LegProfile:

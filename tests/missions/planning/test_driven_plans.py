@@ -330,6 +330,17 @@ def test_few_waypoints_round_a_circle() -> None:
     assert np.isfinite(result.duration_s)
 
 
+@pytest.mark.parametrize("radius_m", [12.0, 20.0])
+def test_a_circle_beside_the_way_is_passed_at_speed(radius_m: float) -> None:
+    """Two corners close together took 4 to 5 s more than one a little farther out: a short leg is driven slowly."""
+    tree = CircleZone(OUT, place(0, 4 - radius_m if radius_m < 15 else 5 - radius_m), radius_m)
+    situation = facing(situation_of(FIELD, tree, WP_SPEED=5.0, WP_RADIUS=3.0), -60, 0, 90.0)
+    result = plan(situation, Request(targets=(place(60, 0),), clearance_m=2.0))
+    assert_driven(result, 90.0)
+    # At full speed all the way: ramps of 1 m/s² and 1 m/s³, and a second each at start and end.
+    assert result.duration_s < 1.02 * (result.length_m / 5.0 + 6.0 + 2.0)
+
+
 def test_a_start_that_nothing_mends_is_refused_without_trying_it_slowly(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -85,8 +85,10 @@ def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry) -> Env
     for either_m in sorted(middles_m):
         target = _TargetPoint(band, vehicle, either_m)
         lags = target.lags(vehicle, FenceAhead(fence, _plane(target.places), vehicle))
-        if lags:
-            found.append(target.pieces(lags))
+        if lags and len((pieces := target.pieces(lags))[0]):
+            found.append(pieces)
+    if len(found) == 1:
+        return band
     cores, bands_m, waypoints = (np.concatenate(columns) for columns in zip(*found, strict=True))
     return replace(band, cores=cores, bands_m=bands_m, waypoints=waypoints)
 

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from .clearance import Geometries
     from .errors import GoalBlockedError, StartBlockedError
     from .geometry import Point
+    from .partition.flat import Engine
 
 __all__ = ["BOUNDARY_TOLERANCE_M", "Field"]
 
@@ -48,6 +49,8 @@ class Field:
         Points that the bounded part of the open plane must hold, metres from the scene's origin.
     grown : (n,) array of shapely geometry, optional
         The exclusions grown by the clearance, if they are known already.
+    engine : Engine, optional
+        The compiled sweep and search.
     """
 
     def __init__(
@@ -58,8 +61,10 @@ class Field:
         rounded: bool = False,
         reach: Sequence[Point] = (),
         grown: Geometries | None = None,
+        engine: Engine | None = None,
     ) -> None:
         self.scene = scene
+        self.engine = engine
         self.free = build_free_space(scene, clearance_m, rounded=rounded, reach=reach, grown=grown)
         self._graphs: dict[str, BlockGraph] = {}
 
@@ -81,7 +86,7 @@ class Field:
 
     def _checked_slabs(self) -> Slabs:
         try:
-            slabs = Slabs(self.free.polygons)
+            slabs = Slabs(self.free.polygons, self.engine)
         except (IndexError, ValueError) as error:
             raise InvalidGeometryError("the rings of free space do not fit together") from error
         area_m2 = float(shapely.area(self.free.geometry))

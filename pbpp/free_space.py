@@ -18,6 +18,7 @@ from shapely.geometry.base import BaseGeometry
 from .clearance import Geometries, grow, shrink
 from .errors import InvalidGeometryError
 from .geometry import Floats, Point, Ring, parse_rings, polygons_only
+from .subtract import subtracted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -212,7 +213,7 @@ def build_free_space(
     if clearance_m > 0.0:
         lines = np.array(_loose_lines(scene.inclusions), dtype=object)
         obstacles += list(grow(lines, clearance_m, rounded=rounded)) if len(lines) else []
-    free = shapely.difference(ground, shapely.disjoint_subset_union_all(obstacles)) if obstacles else ground
+    free = subtracted(ground, obstacles) if obstacles else ground
     # Overlays leave vertices some 1e-10 m apart, which say nothing and make edges without direction.
     try:
         tidy = shapely.remove_repeated_points(free, _TINY_EDGE_M)

@@ -10,7 +10,7 @@ import shapely
 
 from .block_search import BlockGraph
 from .errors import InvalidGeometryError
-from .free_space import Scene, build_free_space, snapped
+from .free_space import FreeSpace, Scene, build_free_space, snapped
 from .partition.blocks import Blocks
 from .partition.slabs import Slabs
 
@@ -49,6 +49,8 @@ class Field:
         Points that the bounded part of the open plane must hold, metres from the scene's origin.
     grown : (n,) array of shapely geometry, optional
         The exclusions grown by the clearance, if they are known already.
+    free : FreeSpace, optional
+        The free space, if it is known already.
     engine : Engine, optional
         The compiled sweep and search.
     """
@@ -61,11 +63,14 @@ class Field:
         rounded: bool = False,
         reach: Sequence[Point] = (),
         grown: Geometries | None = None,
+        free: FreeSpace | None = None,
         engine: Engine | None = None,
     ) -> None:
         self.scene = scene
         self.engine = engine
-        self.free = build_free_space(scene, clearance_m, rounded=rounded, reach=reach, grown=grown)
+        if free is None:
+            free = build_free_space(scene, clearance_m, rounded=rounded, reach=reach, grown=grown)
+        self.free = free
         self._graphs: dict[str, BlockGraph] = {}
 
     @cached_property

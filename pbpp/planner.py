@@ -27,7 +27,7 @@ from .errors import (
     StartBlockedError,
 )
 from .field import Field
-from .free_space import Scene, grow_exclusions, parse_scene
+from .free_space import FreeSpace, Scene, grow_exclusions, parse_scene, with_obstacles
 from .funnel import taut_path
 from .geometry import Floats, Point, Ring, parse_point, parse_points
 from .planned_path import PlannedPath, length_of, straightened
@@ -108,9 +108,9 @@ class Planner:
         What the block methods search: the paper's blocks if left out, or their merged form, which is much smaller. The exact search
         uses slabs whatever is said here; its answer depends on neither.
     compiled : bool, default False
-        Whether the exact search runs in its compiled form: the same paths, many times faster once numba has compiled it, which takes some
-        seconds the first time and a good part of one in each later process. It pays for some hundred queries and more. Needs the
-        extra ``fast``. Where a query brings a ``should_stop``, the plain search answers.
+        Whether the partition is swept and the exact search runs in compiled form: the same paths, many times faster once numba has compiled it,
+        which takes some seconds the first time and a good part of one in each later process. It pays for some hundred queries and more. Needs the extra
+        ``fast``.
 
     Raises
     ------
@@ -137,7 +137,7 @@ class Planner:
         engine = load_engine() if compiled else None
         self._partition = partition
         scene = parse_scene(inclusions, exclusions, union=union)
-        self._space = _Space.swept(scene, float(clearance_m), engine=engine)
+        self._space = _Space.swept(scene, float(clearance_m), engine)
 
     def with_exclusion(self, ring: Ring) -> Planner:
         """Return a planner for the same fence with one exclusion more, faster than from scratch.
@@ -157,9 +157,11 @@ class Planner:
         InvalidGeometryError
             If the ring cannot be used.
         """
-        scene, grown = self._space.scene.with_exclusion(ring), self._space.mitred.free.grown
+        scene, before = self._space.scene.with_exclusion(ring), self._space.mitred
         added = grow_exclusions(replace(scene, exclusions=scene.exclusions[-1:]), self.clearance_m)
-        return self._changed(scene, np.concatenate((grown, added)))
+        if not len(scene.inclusions):  # the bounded part of the plane grows with what is drawn
+            return self._changed(scene, grown=np.concatenate((before.free.grown, added)))
+        return self._changed(scene, free=with_obstacles(before.free, added))
 
     def without_exclusion(self, index: int) -> Planner:
         """Return a planner for the same fence without one of its exclusions, faster than from scratch.
@@ -180,13 +182,14 @@ class Planner:
             If there is no such exclusion.
         """
         grown = np.delete(self._space.mitred.free.grown, index)
-        return self._changed(self._space.scene.without_exclusion(index), grown)
+        return self._changed(self._space.scene.without_exclusion(index), grown=grown)
 
-    def _changed(self, scene: Scene, grown: Geometries) -> Planner:
+    def _changed(
+        self, scene: Scene, *, grown: Geometries | None = None, free: FreeSpace | None = None
+    ) -> Planner:
         changed = copy(self)
-        changed._space = _Space.swept(  # noqa: SLF001 - one of our own
-            scene, self.clearance_m, grown, engine=self._space.mitred.engine
-        )
+        engine = self._space.mitred.engine
+        changed._space = _Space.swept(scene, self.clearance_m, engine, grown=grown, free=free)  # noqa: SLF001 - one of our own
         return changed
 
     @property
@@ -405,11 +408,17 @@ class _Space:
 
     @classmethod
     def swept(
-        cls, scene: Scene, clearance_m: float, grown: Geometries | None = None, *, engine: Engine | None
+        cls,
+        scene: Scene,
+        clearance_m: float,
+        engine: Engine | None,
+        *,
+        grown: Geometries | None = None,
+        free: FreeSpace | None = None,
     ) -> _Space:
         """Return the space with its slabs made: searches need them, and better now than in the first query."""
         with uncollected():
-            field = Field(scene, clearance_m, grown=grown, engine=engine)
+            field = Field(scene, clearance_m, grown=grown, free=free, engine=engine)
             _ = field.slabs
         return cls(field)
 

@@ -47,7 +47,7 @@ __all__ = ["Planner", "plan_path"]
 ShouldStop = Callable[[], bool]
 
 
-def plan_path(
+def plan_path(  # noqa: PLR0913 - a fence, two ends, and options by name
     inclusions: Sequence[Ring],
     exclusions: Sequence[Ring],
     start: npt.ArrayLike,
@@ -56,6 +56,7 @@ def plan_path(
     clearance_m: float = 0.0,
     union: bool = False,
     method: str = "optimal",
+    cost: str = "metric",
     should_stop: ShouldStop | None = None,
 ) -> PlannedPath:
     """Return a path from start to goal that keeps clear of the fence.
@@ -72,6 +73,8 @@ def plan_path(
         True: the path may lie in any inclusion. False: it lies in all of them.
     method : {"optimal", "pbpp-taut", "pbpp"}
         The search.
+    cost : {"metric", "literal"}
+        How the block methods read the paper's g: metres so far, or 1 and 1.4 for each step as printed.
     should_stop : callable, optional
         Asked now and then; when it returns True, the best path so far is returned with the bound reached.
 
@@ -90,7 +93,7 @@ def plan_path(
         If no path joins them.
     """
     planner = Planner(inclusions, exclusions, clearance_m=clearance_m, union=union)
-    return planner.plan(start, goal, method=method, should_stop=should_stop)
+    return planner.plan(start, goal, method=method, cost=cost, should_stop=should_stop)
 
 
 class Planner:
@@ -208,6 +211,7 @@ class Planner:
         goal: npt.ArrayLike,
         *,
         method: str = "optimal",
+        cost: str = "metric",
         should_stop: ShouldStop | None = None,
     ) -> PlannedPath:
         """Return a path from start to goal.
@@ -218,6 +222,8 @@ class Planner:
             (east, north) in metres.
         method : {"optimal", "pbpp-taut", "pbpp"}
             The search.
+        cost : {"metric", "literal"}
+            As for `plan_path`.
         should_stop : callable, optional
             Asked now and then; when it returns True, the best path so far is returned with the bound reached.
 
@@ -239,12 +245,15 @@ class Planner:
         self._space = self._space.holding(ends)
         if method not in {"optimal", "pbpp-taut", "pbpp"}:
             raise ValueError(f'method must be "optimal", "pbpp-taut" or "pbpp", not {method!r}')
+        if cost not in {"metric", "literal"}:
+            raise ValueError(f'cost must be "metric" or "literal", not {cost!r}')
+        plan = partial(self._plan_in, ends=ends, method=method, cost=cost, should_stop=should_stop)
         try:
-            return self._plan_in(self._space.mitred, ends, method, should_stop)
+            return plan(self._space.mitred)
         except (NoPathError, StartBlockedError, GoalBlockedError):
             if self.clearance_m == 0.0:
                 raise
-        return self._plan_in(self._space.rounded, ends, method, should_stop)
+        return plan(self._space.rounded)
 
     def lengths(
         self,
@@ -329,7 +338,9 @@ class Planner:
         found: list[PlannedPath | PlanningError] = []
         for pair, answer in zip(points, answers, strict=True):
             try:
-                found.append(self.plan(*pair) if answer is None else _direct_path(field, answer))
+                found.append(
+                    self.plan(*pair) if answer is None else _direct_path(field, answer, self._partition)
+                )
             except PlanningError as error:
                 found.append(error)
         return found
@@ -367,13 +378,13 @@ class Planner:
         return widest_in(self._space.scene, ends, tolerance_m, should_stop)
 
     def _plan_in(
-        self, field: Field, ends: tuple[Point, Point], method: str, should_stop: ShouldStop | None
+        self, field: Field, ends: tuple[Point, Point], method: str, cost: str, should_stop: ShouldStop | None
     ) -> PlannedPath:
         searcher = field.slabs.searcher
         if method == "optimal" and searcher is not None and should_stop is None:
             answer = searcher.direct(*ends, field.scene.origin_m)
             if answer is not None:
-                return _direct_path(field, answer)
+                return _direct_path(field, answer, self._partition)
         common = field.require(ends[0], StartBlockedError) & field.require(ends[1], GoalBlockedError)
         if not common:
             raise NoPathError(self.clearance_m)
@@ -382,7 +393,8 @@ class Planner:
             found = _optimal(field, start, goal, should_stop)
         else:
             graph = field.graph(self._partition or "blocks")
-            found = _over_blocks(graph, start, goal, taut=method == "pbpp-taut", should_stop=should_stop)
+            taut = method == "pbpp-taut"
+            found = _over_blocks(graph, start, goal, taut=taut, cost=cost, should_stop=should_stop)
         if found is None:
             raise NoPathError(self.clearance_m)
         inner = np.array(found.turns, dtype=np.float64).reshape(-1, 2) + field.scene.origin_m
@@ -460,7 +472,7 @@ class _Found:
     sequence: Sequence[int] = ()
 
 
-def _direct_path(field: Field, answer: Answer) -> PlannedPath:
+def _direct_path(field: Field, answer: Answer, partition: str | None) -> PlannedPath:
     return PlannedPath(
         points=answer.points,
         length_m=answer.length_m,
@@ -468,7 +480,7 @@ def _direct_path(field: Field, answer: Answer) -> PlannedPath:
         method="optimal",
         blocks=len(field.slabs),
         expanded=answer.expanded,
-        drawing=Drawing(field, "slabs", answer.turns[1:-1]),
+        drawing=Drawing(field, partition or "slabs", answer.turns[1:-1]),
     )
 
 
@@ -482,14 +494,20 @@ def _optimal(field: Field, start: Point, goal: Point, should_stop: ShouldStop | 
     if not result.stopped:
         return None
     # Stopped before the goal was reached: the taut path through the best sequence of slabs is there in little time.
-    quick = _over_blocks(field.graph("slabs"), start, goal, taut=True, should_stop=None)
+    quick = _over_blocks(field.graph("slabs"), start, goal, taut=True)
     return None if quick is None else replace(quick, lower_bound_m=result.lower_bound_m)
 
 
 def _over_blocks(
-    graph: BlockGraph, start: Point, goal: Point, *, taut: bool, should_stop: ShouldStop | None
+    graph: BlockGraph,
+    start: Point,
+    goal: Point,
+    *,
+    taut: bool,
+    cost: str = "metric",
+    should_stop: ShouldStop | None = None,
 ) -> _Found | None:
-    found = block_sequence(graph, start, goal, should_stop=should_stop)
+    found = block_sequence(graph, start, goal, cost=cost, should_stop=should_stop)
     if found is None:
         return None
     sequence, crossings, expanded = found

@@ -202,6 +202,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
     FenceError, VehicleError, InvalidPositionError
         The fence, a parameter or a position cannot be used.
     """
+    # Long by its docstring and by the warnings, which stand in the order in which they are told.
     fence = known_fence(situation)
     request = replace(request, widest=False, speed_mps=None, corner_allowance_m=None)
     vehicle = known_vehicle(situation, request)

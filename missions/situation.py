@@ -129,7 +129,7 @@ class Situation:
     fence_trouble : str or None
         Why the newest fence that was seen could not be used.
     remarks : tuple of str
-        What reading a file passed over or took for something: to be told.
+        Warnings from reading a file: what was skipped, and what was assumed.
     """
 
     system: int | None = None

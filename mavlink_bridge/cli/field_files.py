@@ -84,7 +84,7 @@ def read_fence_file(path: Path, options: MapOptions) -> Situation:
             advice="draw an inclusion around the field; exclusions far outside it are then left out",
         )
     far = f"more than {REACH_M / 1000:g} km from every inclusion"
-    counts = {f"exclusions {far} left out": left_out, f"exclusions whose parts {far} are left out": cut}
+    counts = {f"exclusions left out, {far}": left_out, f"exclusions cut, parts of them {far}": cut}
     more = [f"{path}: {what}: {count}" for what, count in counts.items() if count]
     warn(more)
     known = Known(fence, None, str(path))

@@ -12,7 +12,7 @@ from shapely import LineString, Point
 from shapely.ops import nearest_points
 
 from missions.checking.execution import CIRCLE_M, Course, CourseLeg, follow_mission
-from missions.checking.forecast import forecast_drive
+from missions.checking.forecast import forecast_drive, pivot_remarks
 from missions.checking.mission_end import crossed_zones, end_warnings, return_place, return_warnings
 from missions.drive_model import Envelope, extrapolated
 from missions.errors import SituationError, StartBlockedError
@@ -60,7 +60,7 @@ class CheckedLeg:
     length_m : float
         Its drawn length.
     drawn_clearance_m : float
-        The least distance of its straight line to forbidden ground; 0 where it crosses it, infinite without a fence.
+        The least distance of its straight line to any fence; 0 where it crosses one, infinite without a fence.
     driven_clearance_m : float
         The least distance predicted for the driven track, the corner at its end included.
     asked_m : float
@@ -68,9 +68,9 @@ class CheckedLeg:
     fence : str or None
         The zone that is nearest.
     at : LatLon or None
-        Where on the leg it is nearest; where it crosses forbidden ground, the first place of that.
+        Where on the leg it is nearest; where it crosses a fence, the first place where it does.
     crosses : tuple of str
-        The zones whose forbidden ground the straight line crosses, and seams of a union before which the vehicle stops.
+        The zones that the straight line crosses, and seams of a union before which the vehicle stops.
     time_s : float
         Time from the place before to this leg's end.
     """
@@ -112,7 +112,7 @@ class MissionCheck:
     mission : Mission
         What was checked.
     course : Course
-        What it has the vehicle drive.
+        The legs that it makes the vehicle drive.
     legs : tuple of CheckedLeg
         Each as often as it is driven.
     clearance_m : float
@@ -121,10 +121,12 @@ class MissionCheck:
         What is known to end in the fence, whatever the legs keep; with any of these the mission does not hold.
     warnings : tuple of str
         What else a person should know.
+    info : tuple of str
+        What was added to be safe.
     envelope : Envelope
-        The band that the vehicle is predicted to stay in.
+        The predicted corridor.
     extrapolated : tuple of str
-        In what the drive lies outside what was measured: then it is predicted, not promised, that the mission holds.
+        Why the drive lies outside the measured range: then it is predicted, not promised, that the mission holds.
     """
 
     mission: Mission
@@ -138,6 +140,7 @@ class MissionCheck:
     vehicle: Vehicle
     envelope: Envelope
     extrapolated: tuple[str, ...] = ()
+    info: tuple[str, ...] = ()
 
     @property
     def broken(self) -> tuple[CheckedLeg, ...]:
@@ -156,7 +159,7 @@ class MissionCheck:
 
     @property
     def duration_s(self) -> float:
-        """The time for all of it; of a mission without end for one time round."""
+        """The time for all of it; for one round of a mission that repeats without end."""
         return self.envelope.duration_s
 
     @property
@@ -227,6 +230,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
         *_seam_warnings(vehicle, legs),
         *_start_warnings(start, heading_deg, legs[0], asked.required_m),
         *_drive_warnings(vehicle, forecast, course),
+        *pivot_remarks(ground, vehicle, forecast, _items_of(course)),
         *reasons,
         *return_warnings(situation, vehicle, ground, course.path),
         *end_warnings(situation, vehicle, course),
@@ -243,6 +247,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
         vehicle=vehicle,
         envelope=forecast,
         extrapolated=reasons,
+        info=asked.info,
     )
 
 
@@ -272,6 +277,7 @@ def plan_of(check: MissionCheck, situation: Situation, *, method: str = "optimal
         envelope=check.envelope,
         home=home,
         warnings=check.warnings,
+        info=check.info,
     )
 
 
@@ -477,9 +483,14 @@ def _start_warnings(
     return warnings
 
 
+def _items_of(course: Course) -> list[int]:
+    """Return the mission items of its places."""
+    return [course.legs[0].first_item, *(leg.last_item for leg in course.legs)]
+
+
 def _drive_warnings(vehicle: Vehicle, forecast: Envelope, course: Course) -> list[str]:
     """Return warnings of where the drive model does not hold, and of parameters that were not known."""
-    items = [course.legs[0].first_item, *(leg.last_item for leg in course.legs)]
+    items = _items_of(course)
     warnings = [
         f"item {items[corner.waypoint]}: {abs(corner.turn_deg):.0f}° turn between short legs; "
         "in tests rovers swung wider there than predicted"

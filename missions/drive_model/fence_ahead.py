@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 _MOVED_M = 5.0
 """So far a place may move until the edges near it are looked for again."""
 
+_MOST_ACCEL_MPS2 = 1.0
+"""ArduPilot's avoidance reckons with no more braking, whatever the vehicle can (AC_Avoid.h, AC_AVOID_ACCEL_CMSS_MAX)."""
+
 _SPARE_M = 0.1  # beyond the farthest edge that counts: chosen, so that rounding loses none
 _TOUCHING_M2 = 1e-9  # a ray through the end of an edge meets it, rounding or not
 _FEW = 24  # more edges than this are quicker in numpy than one by one; chosen, it changes no answer
@@ -41,7 +44,8 @@ class FenceAhead:
 
     def __init__(self, fence: BaseGeometry, places: NDArray[np.float64], vehicle: Vehicle) -> None:
         self._stops_within_m = vehicle.stops_within_m
-        self._gain_per_s, self._accel_mps2 = vehicle.position_gain_per_s, vehicle.accel_max_mps2
+        self._gain_per_s = vehicle.position_gain_per_s
+        self._accel_mps2 = min(vehicle.accel_max_mps2, _MOST_ACCEL_MPS2)
         self._linear_m = self._accel_mps2 / self._gain_per_s**2
         points, lines = shapely.get_coordinates(shapely.get_parts(fence), return_index=True)
         self._edges = np.stack((points[:-1], points[1:]), axis=1)[lines[1:] == lines[:-1]]

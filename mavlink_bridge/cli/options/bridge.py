@@ -41,7 +41,8 @@ class BridgeOptions(CommonOptions):
     target_from: Annotated[
         list[str],
         option(
-            "typed, reposition, position-target, guided-item, mission, rally or echo; repeatable.", "SOURCE"
+            "Where targets may come from: typed, reposition, position-target, guided-item, mission, rally, echo; repeatable.",
+            "SOURCE",
         ),
     ] = field(default_factory=list)
     clearance: Annotated[
@@ -49,9 +50,9 @@ class BridgeOptions(CommonOptions):
     ] = None
     corner_allowance: Annotated[str, option("Extra room for cut corners.", "M|auto")] = "auto"
     snap: Annotated[float, metres("Move a blocked target to the nearest free place within M metres.")] = 0.0
-    vehicle: Annotated[Path | None, option("Parameters that the vehicle does not report.", "FILE.parm")] = (
-        None
-    )
+    vehicle: Annotated[
+        Path | None, option("Parameter file, for what the vehicle does not report.", "FILE.parm")
+    ] = None
     firmware: FirmwareOption = None
     trust_model: TrustOption = False
     upload: Annotated[bool, flag("--upload", "Write missions to the vehicle.")] = False
@@ -64,7 +65,7 @@ class BridgeOptions(CommonOptions):
     ] = False
     arm: Annotated[bool, flag("--arm", "With --drive: arm before AUTO.")] = False
     confirm: Annotated[bool, flag("--confirm", "Upload a plan only after you type yes.")] = False
-    once: Annotated[bool, flag("--once", "Exit after one job.")] = False
+    once: Annotated[bool, flag("--once", "Exit after the first target.")] = False
     log: Annotated[
         Path | None,
         option(

@@ -24,6 +24,9 @@ class FenceOptions(MapOptions, CommonOptions):
     `pbpp fence merge pieces.plan -o field.plan`
     """
 
-    action: Annotated[str, typer.Argument(metavar="|".join(ACTIONS), help="What to do.")]
+    action: Annotated[
+        str,
+        typer.Argument(metavar="|".join(ACTIONS), help="merge: make one inclusion of several that overlap."),
+    ]
     source: Annotated[Path, typer.Argument(metavar="FILE", help="A fence: .plan, .waypoints, .kml, …")]
     output: Annotated[Path, option("File to write: .plan, .waypoints, .geojson, …", "FILE", "-o", "--output")]

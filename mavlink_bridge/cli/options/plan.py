@@ -125,7 +125,9 @@ class PlanOptions(MapOptions, ClearanceOptions, LinkOptions):
     ] = False
     end: Annotated[
         str,
-        option("What to do at the end; rtl only if its straight line is free.", "|".join(ENDS), panel=_TOURS),
+        option(
+            "What to do at the end; rtl only if the straight line home is free.", "|".join(ENDS), panel=_TOURS
+        ),
     ] = "hold"
     via_mission: Annotated[
         str | None,

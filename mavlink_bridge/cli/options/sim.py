@@ -33,9 +33,9 @@ class SimOptions(MapOptions, CommonOptions):
     home: Annotated[str, option("Position and heading at the start.", "LAT,LON[,HEADING]")] = (
         "40.071374,-105.229930,0"
     )
-    fence: Annotated[Path | None, option("Fence file stored in the rover.")] = None
+    fence: Annotated[Path | None, option("Fence file stored in the rover.", "FILE")] = None
     mission: Annotated[
-        Path | None, option("Mission file stored in the rover; its home, if it has one, is not used.")
+        Path | None, option("Mission file stored in the rover; its home, if it has one, is not used.", "FILE")
     ] = None
     param: Annotated[list[str], option("Set a parameter; repeatable.", "NAME=VALUE")] = field(
         default_factory=list
@@ -54,5 +54,5 @@ class SimOptions(MapOptions, CommonOptions):
         float,
         option("Random extra delay, up to so many seconds.", "S", parser=within(0.0, MOST_S, "seconds")),
     ] = 0.0
-    seed: Annotated[int, option("Random seed of the link's faults.", min=-MOST_SEED, max=MOST_SEED)] = 0
-    system: Annotated[int, option("MAVLink system id.", min=1, max=255)] = 1
+    seed: Annotated[int, option("Random seed of the link's faults.", "N", min=-MOST_SEED, max=MOST_SEED)] = 0
+    system: Annotated[int, option("MAVLink system id.", "N", min=1, max=255)] = 1

@@ -142,7 +142,9 @@ def route_lengths_m(
         band_m = corner_forecast(0.0, vehicle).inside_cut_m  # what a straight leg needs beside it
         clearance_m = asked.required_m + (band_m if asked.allowance_m is None else asked.allowance_m)
     areas = ground.areas(ZoneKind.INCLUSION), ground.areas(ZoneKind.EXCLUSION)
-    work = len(places) * (len(places) - 1) // 2 * int(shapely.get_num_coordinates([*areas[0], *areas[1]]).sum())
+    work = (
+        len(places) * (len(places) - 1) // 2 * int(shapely.get_num_coordinates([*areas[0], *areas[1]]).sum())
+    )
     compiled = work >= _COMPILED_FROM and find_spec("numba") is not None
     planner = pbpp.Planner(*areas, clearance_m=clearance_m, union=ground.union, compiled=compiled)
     return planner.lengths([_anchor(ground, planner, place) for place in local], should_stop=should_stop)

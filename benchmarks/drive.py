@@ -1,6 +1,6 @@
 """Whether planned missions are driven as promised: seeded fields, three vehicles, the simulator's drive law in stepped time.
 
-``python benchmarks/drive.py [--fields N] [--first SEED] [--kinds usual|more] [--jobs N] [--progress] [-o FILE]``. Each run plans a mission, hands
+``python benchmarks/drive.py [--fields N] [--first SEED] [--kinds usual|more] [--firmware VERSION] [--jobs N] [--progress] [-o FILE]``. Each run plans a mission, hands
 its items to the simulated rover, drives it in AUTO with the fence enabled, and measures the true track against the fence.
 """
 
@@ -32,7 +32,7 @@ from mavlink_bridge.simulator.rover import TICK_S
 from mavlink_bridge.simulator.vehicle import SimulatedVehicle
 from missions.errors import MissionError
 from missions.fence import fence_to_items
-from missions.firmware import Firmware
+from missions.firmware import Firmware, read_firmware
 from missions.geo import distance_m
 from missions.ground.from_situation import ground_for
 from missions.planning.plan import plan
@@ -42,6 +42,8 @@ from missions.situation import Known, Pose, Situation
 from missions.vehicle import vehicle_from_parameters
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from missions.planned import Plan
 
 TOLERANCE_M = 0.10
@@ -64,6 +66,7 @@ VEHICLES: dict[str, dict[str, float]] = {
         "CRUISE_THROTTLE": 75.0,
     },
 }
+KINDS: dict[str, Callable[[int], Field]] = {"usual": make_field, "more": make_more}
 _KNOWN = {
     "TURN_RADIUS": 0.9,
     "ATC_TURN_MAX_G": 0.6,
@@ -87,6 +90,7 @@ class Run:
     promised_m: float
     widest_m: float
     refusal: str | None = None
+    extrapolated: tuple[str, ...] = ()
     planning_s: float = 0.0
     leads_away_m: float | None = None
     length_m: float = 0.0
@@ -122,7 +126,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--fields", type=int, default=200)
     parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--kinds", choices=("usual", "more"), default="usual")
+    parser.add_argument("--kinds", choices=tuple(KINDS), default="usual")
+    parser.add_argument("--firmware", type=read_firmware, default=Firmware(4, 6))
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--progress", action="store_true")
     parser.add_argument("-o", "--output", type=Path)
@@ -131,7 +136,7 @@ def main() -> None:
     begun_s = time.perf_counter()
     with ProcessPoolExecutor(options.jobs) as pool:
         runs = []
-        for found in pool.map(partial(runs_of, kinds=options.kinds), seeds):
+        for found in pool.map(partial(runs_of, kinds=options.kinds, firmware=options.firmware), seeds):
             runs += found
             if options.progress:
                 for run in found:
@@ -142,21 +147,35 @@ def main() -> None:
         options.output.write_text(f"{HEAD}\n{_made()}\n\n{text}\n", encoding="utf-8")
 
 
-def runs_of(seed: int, kinds: str = "usual") -> list[Run]:
+def runs_of(seed: int, kinds: str = "usual", firmware: Firmware = Firmware(4, 6)) -> list[Run]:  # noqa: B008 - frozen
     """Plan and drive one field with each vehicle."""
-    field = make_field(seed) if kinds == "usual" else make_more(seed)
-    return [_run(field, name) for name in VEHICLES]
+    field = KINDS[kinds](seed)
+    return [_run(field, name, firmware) for name in VEHICLES]
 
 
-def _run(field: Field, name: str) -> Run:
-    parameters = {**_KNOWN, **VEHICLES[name], "FENCE_MARGIN": field.clearance_m - 0.1}
-    situation = Situation(
+def parameters_of(field: Field, name: str) -> dict[str, float]:
+    """Return a vehicle's parameters on a field."""
+    return {**_KNOWN, **VEHICLES[name], "FENCE_MARGIN": field.clearance_m - 0.1}
+
+
+def situation_of(
+    field: Field,
+    parameters: dict[str, float],
+    firmware: Firmware = Firmware(4, 6),  # noqa: B008 - frozen
+) -> Situation:
+    """Return what a plan on a field has to go by."""
+    return Situation(
         fence=Known(field.fence, None, "bench"),
         pose=Known(Pose(field.start, field.heading_deg), None, "bench"),
         home=Known(field.start, None, "bench"),
         parameters=parameters,
-        firmware=Firmware(4, 6),
+        firmware=firmware,
     )
+
+
+def _run(field: Field, name: str, firmware: Firmware) -> Run:
+    parameters = parameters_of(field, name)
+    situation = situation_of(field, parameters, firmware)
     ground = ground_for(situation, vehicle_from_parameters(parameters), (field.start, field.target))
     widest_m = widest_clearance_m(
         ground, [ground.frame.to_local(field.start), ground.frame.to_local(field.target)]
@@ -176,13 +195,14 @@ def _run(field: Field, name: str) -> Run:
         return Run(**known, refusal=str(error), planning_s=time.process_time() - begun_s)  # type: ignore[arg-type]
     planning_s = time.process_time() - begun_s
     promised_m = planned.clearance_m
-    assert promised_m is not None  # these vehicles are of the measured kind
+    if promised_m is None:
+        return Run(**known, extrapolated=planned.extrapolated, planning_s=planning_s)  # type: ignore[arg-type]
     shortest = plan(situation, replace(request, corner_allowance_m=0.0))
-    driven_s, rover, arrived = _drive(field, planned, parameters)
+    driven_s, rover, arrived = _drive(field, planned, parameters, firmware)
     return Run(
         **known,  # type: ignore[arg-type]
         planning_s=planning_s,
-        leads_away_m=promised_m if promised_m < field.clearance_m else None,
+        leads_away_m=planned.start_clearance_m,
         length_m=planned.length_m,
         shortest_m=shortest.length_m,
         waypoints=len(planned.path) - 1,
@@ -196,7 +216,9 @@ def _run(field: Field, name: str) -> Run:
     )
 
 
-def _drive(field: Field, planned: Plan, parameters: dict[str, float]) -> tuple[float, SimulatedVehicle, bool]:
+def _drive(
+    field: Field, planned: Plan, parameters: dict[str, float], firmware: Firmware
+) -> tuple[float, SimulatedVehicle, bool]:
     """Drive a plan in AUTO until it is complete, or much longer than foreseen."""
     vehicle = SimulatedVehicle(
         SimulatorConfig(
@@ -205,6 +227,7 @@ def _drive(field: Field, planned: Plan, parameters: dict[str, float]) -> tuple[f
             mission=planned.items,
             fence=fence_to_items(field.fence),
             parameters=parameters,
+            firmware=firmware,
             streams=False,
         )
     )
@@ -239,7 +262,7 @@ def report(runs: list[Run], took_s: float) -> str:
     ]
     for name in VEHICLES:
         mine = [run for run in runs if run.vehicle == name]
-        routes = [run for run in mine if run.refusal is None]
+        routes = [run for run in mine if run.refusal is None and not run.extrapolated]
         wide = [run for run in mine if run.widest_m >= run.promised_m + SPARE_M]
         refused = [run for run in wide if run.refusal is not None]
         longer = sorted(run.length_m / run.shortest_m - 1 for run in routes)
@@ -263,12 +286,20 @@ def report(runs: list[Run], took_s: float) -> str:
         for run in runs
         if run.refusal is not None and run.widest_m >= run.promised_m + SPARE_M
     ] or ["- none"]
+    lines += ["", "Extrapolated: nothing promised, not driven:", ""]
+    lines += [
+        f"- {run.kind} {run.seed}, {run.vehicle}: {'; '.join(run.extrapolated)}"
+        for run in runs
+        if run.extrapolated
+    ] or ["- none"]
     lines += ["", "Short of the promise, or not arrived:", ""]
     lines += [
         f"- {run.kind} {run.seed}, {run.vehicle}: promised {run.promised_m:g} m, foreseen {run.foreseen_m:.2f} m, driven {run.driven_m:.2f} m, "
         f"{'arrived' if run.arrived else 'not arrived'}, {run.breaches} breaches"
         for run in runs
-        if run.refusal is None and (run.short_m > TOLERANCE_M or not run.arrived or run.breaches)
+        if run.refusal is None
+        and not run.extrapolated
+        and (run.short_m > TOLERANCE_M or not run.arrived or run.breaches)
     ] or ["- none"]
     return "\n".join(lines)
 

@@ -31,10 +31,13 @@ class Driver:
         Limits and gains.
     body : Body
         What is moved.
+    turns_early : bool
+        Whether it begins turns as ArduPilot did before 4.6.
     """
 
-    def __init__(self, settings: Settings, body: Body) -> None:
+    def __init__(self, settings: Settings, body: Body, *, turns_early: bool = False) -> None:
         self.body = body
+        self._turns_early = turns_early
         self._attitude = Attitude(settings, body)
         self._position = Position(settings, body, self._attitude)
         self._speed_mps = settings.speed_mps
@@ -239,7 +242,10 @@ class Driver:
     def _may_turn(self) -> bool:
         """Whether the next leg may begin: the middle of the turn lies within the waypoint's radius (SCurve.cpp)."""
         leg, after = self._leg, self._next_leg
-        if leg.elapsed_s < leg.slowing_from_s or leg.left_s >= after.duration_s / 2:
+        from_s = leg.slowing_from_s - (after.turn_in_s if self._turns_early else 0.0)
+        if leg.elapsed_s < from_s or leg.left_s >= after.duration_s / 2:
+            return False
+        if self._turns_early and abs(leg.at(leg.elapsed_s)[0]) < leg.length_m / 2:
             return False
         half_s = leg.left_s / 2
         before = leg.at(leg.elapsed_s + half_s)

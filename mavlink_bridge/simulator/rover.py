@@ -57,6 +57,8 @@ class Rover:
         Where it looks, clockwise from north.
     mission, fence : callable
         Give the lists as they are stored.
+    turns_early : bool
+        Whether it begins turns as ArduPilot did before 4.6.
 
     Attributes
     ----------
@@ -77,8 +79,11 @@ class Rover:
         heading_deg: float,
         mission: Callable[[], Sequence[MissionItem]],
         fence: Callable[[], Sequence[MissionItem]],
+        *,
+        turns_early: bool = False,
     ) -> None:
         self.parameters = parameters
+        self._turns_early = turns_early
         self._fence = fence
         self._mission = mission
         self.least_clearance_m = math.inf
@@ -98,7 +103,7 @@ class Rover:
         self.breach_time_s = 0.0
         settings = Settings.from_parameters(self.parameters)
         self.body = Body(0j, math.radians(heading_deg), settings.is_skid)
-        self.drive = Driver(settings, self.body)
+        self.drive = Driver(settings, self.body, turns_early=self._turns_early)
         self.mission_run = MissionRun(self._mission, self.drive, self.frame)
         self._current_before_auto = False
         self.renew_fence()

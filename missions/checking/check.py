@@ -127,6 +127,8 @@ class MissionCheck:
         The predicted corridor.
     extrapolated : tuple of str
         Why the drive lies outside the measured range: then it is predicted, not promised, that the mission holds.
+    trusts_model : bool
+        Whether that is promised all the same.
     """
 
     mission: Mission
@@ -140,6 +142,7 @@ class MissionCheck:
     vehicle: Vehicle
     envelope: Envelope
     extrapolated: tuple[str, ...] = ()
+    trusts_model: bool = False
     info: tuple[str, ...] = ()
 
     @property
@@ -151,6 +154,11 @@ class MissionCheck:
     def holds(self) -> bool:
         """Whether every leg keeps its clearance, everything was understood, and nothing is known to end in the fence."""
         return not self.broken and not self.troubles and not self.dangers
+
+    @property
+    def is_promised(self) -> bool:
+        """Whether it holds, and that was measured or the drive model is trusted."""
+        return self.holds and (self.trusts_model or not self.extrapolated)
 
     @property
     def troubles(self) -> tuple[str, ...]:
@@ -247,6 +255,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
         vehicle=vehicle,
         envelope=forecast,
         extrapolated=reasons,
+        trusts_model=request.trusts_model,
         info=asked.info,
     )
 

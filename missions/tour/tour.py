@@ -77,13 +77,24 @@ def plan_tour(situation: Situation, request: Tour, *, should_stop: Callable[[], 
     start, targets = route_ends(situation, request)
     found: TargetOrder | None = None
     if request.order is Order.BEST and len(targets) > 1:
-        found = target_order(situation, request, should_stop=should_stop)
+        found = _order(situation, request, should_stop)
         targets = tuple(targets[index] for index in found.indices)
     if request.comes_back:
         targets = (*targets, situation.home.value if situation.home else start)
     planned = plan_route(situation, replace(request, targets=targets), should_stop=should_stop)
     planned = with_end(planned, situation, request)
     return planned if found is None else _with_order(planned, found)
+
+
+def _order(situation: Situation, request: Tour, should_stop: Callable[[], bool] | None) -> TargetOrder:
+    """Return the order of visits; where less clearance is accepted and need be, along the widest routes."""
+    try:
+        return target_order(situation, request, should_stop=should_stop)
+    except NoRouteError:
+        if not request.accepts_less:
+            raise
+        widest = replace(request, widest=True, clearance_m=None)
+        return target_order(situation, widest, should_stop=should_stop)
 
 
 def target_order(

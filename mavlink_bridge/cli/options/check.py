@@ -15,6 +15,7 @@ from mavlink_bridge.cli.options.shared import (
     HomeOption,
     LinkOptions,
     MapOptions,
+    TrustOption,
     metres,
     option,
 )
@@ -49,6 +50,7 @@ class CheckOptions(MapOptions, ClearanceOptions, LinkOptions):
         option("Parameter file, for what the log or link does not report.", "FILE.parm", panel=VEHICLE_PANEL),
     ] = None
     firmware: FirmwareOption = None
+    trust_model: TrustOption = False
     clearance: Annotated[
         float | None, metres("Fence clearance each leg must keep while driving. Default: from FENCE_MARGIN.")
     ] = None

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from missions.drive_model import Envelope
+    from missions.drive_model.stopping import HoldCheck
     from missions.fence import Fence
     from missions.formats.files import Writer
     from missions.geo import LatLon
@@ -65,6 +66,8 @@ class Plan:
         The targets as they were asked for, before blocked ones were moved; empty where nobody asked for targets.
     extrapolated : tuple of str
         In what the drive lies outside what was measured.
+    hold : HoldCheck or None
+        What HOLD does on the route.
     """
 
     items: tuple[MissionItem, ...]
@@ -90,6 +93,7 @@ class Plan:
     warnings: tuple[str, ...]
     asked_targets: tuple[LatLon, ...] = ()
     extrapolated: tuple[str, ...] = ()
+    hold: HoldCheck | None = None
 
     @property
     def turn_count(self) -> int:

@@ -15,6 +15,7 @@ from mavlink_bridge.cli.drawing import cell, console
 from mavlink_bridge.cli.failing import ExitCode
 from mavlink_bridge.cli.field_files import read_fence_file, read_file, with_mission_home
 from mavlink_bridge.cli.pictures import check_plots, draw
+from mavlink_bridge.cli.plan_results import hold_document, report_hold
 from mavlink_bridge.cli.terminal import echo, print_json
 from mavlink_bridge.cli.values import position_from
 from mavlink_bridge.cli.vehicle_options import (
@@ -81,7 +82,9 @@ def _situation(options: CheckOptions) -> tuple[Situation, list[str]]:
 
         situation, unknown = live_situation(options)
     situation = _with_files(situation, options)
-    situation = with_description(situation, described_vehicle(options.vehicle, options.firmware))
+    situation = with_description(
+        situation, described_vehicle(options.vehicle, options.firmware, options.stopping)
+    )
     return with_home_option(situation, options.home), unknown
 
 
@@ -156,6 +159,7 @@ def _report(checked: MissionCheck, plots: list[Path]) -> None:
         f"{len(checked.legs)} legs, {checked.length_m:.1f} m, about {checked.duration_s:.0f} s"
         f"{' for one time round' if checked.course.is_endless else ''}; {len(checked.mission.items) + 1} mission items with home"
     )
+    report_hold(checked.hold)
     for path in plots:
         if str(path) != "-":
             echo(f"Wrote {path}")
@@ -216,6 +220,7 @@ def _document(
         "mission_items": len(checked.mission.items) + 1,
         "endless": checked.course.is_endless,
         "broken": len(checked.broken),
+        "stopping": hold_document(checked.hold),
         "legs": [_leg_document(leg) for leg in checked.legs],
         "not_understood": list(checked.troubles),
         "dangers": list(checked.dangers),

@@ -13,6 +13,7 @@ from shapely.ops import nearest_points
 
 from missions.checking.execution import CIRCLE_M, Course, CourseLeg, follow_mission
 from missions.checking.forecast import forecast_drive
+from missions.checking.holding import hold_check, hold_warnings
 from missions.checking.mission_end import crossed_zones, end_warnings, return_place, return_warnings
 from missions.drive_model import Envelope, extrapolated
 from missions.errors import SituationError, StartBlockedError
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
 
+    from missions.drive_model.stopping import HoldCheck
     from missions.fence import Fence
     from missions.request import Request
     from missions.situation import Mission, Situation
@@ -125,6 +127,8 @@ class MissionCheck:
         The band that the vehicle is predicted to stay in.
     extrapolated : tuple of str
         In what the drive lies outside what was measured: then it is predicted, not promised, that the mission holds.
+    hold : HoldCheck or None
+        What HOLD does on the way.
     """
 
     mission: Mission
@@ -138,6 +142,7 @@ class MissionCheck:
     vehicle: Vehicle
     envelope: Envelope
     extrapolated: tuple[str, ...] = ()
+    hold: HoldCheck | None = None
 
     @property
     def broken(self) -> tuple[CheckedLeg, ...]:
@@ -215,6 +220,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
     forecast = _forecast(course, ground, vehicle, heading_deg)
     legs = _checked_legs(course, ground, forecast, asked.required_m, seams_of(ground, vehicle))
     dangers, hazards = _at_start(ground, start, vehicle)
+    hold = hold_check(forecast, vehicle, ground, situation.stops)
     reasons = extrapolated(vehicle, forecast, *(leg.speed_mps for leg in course.legs))
     warnings = [
         *parameter_remarks(situation),
@@ -227,6 +233,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
         *_start_warnings(start, heading_deg, legs[0], asked.required_m),
         *_drive_warnings(vehicle, forecast, course),
         *reasons,
+        *hold_warnings(hold),
         *return_warnings(situation, vehicle, ground, course.path),
         *end_warnings(situation, vehicle, course),
     ]
@@ -242,6 +249,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
         vehicle=vehicle,
         envelope=forecast,
         extrapolated=reasons,
+        hold=hold,
     )
 
 

@@ -41,7 +41,7 @@ ASIDE_DEG = 5.0
 """It may look so far to either side of the way that it is meant to go."""
 
 # Steps of the pursuit: chosen, not measured; how well the whole holds against driven tracks stands in docs/drive-model.md, 4.
-_STEP_S = 0.3
+STEP_S = 0.3
 _LONGEST_S = 7 * 86400.0
 """No rover drives a mission for longer, and a drive is followed step by step; chosen, not measured."""
 _SETTLE_S = 1.0  # of the target's time scale: acceleration over jerk in AR_WPNav, 1 s with the measured 1 m/s² and 1 m/s³
@@ -74,7 +74,7 @@ def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry) -> Env
     """
     if not vehicle.avoids_fence or fence.is_empty or not band.legs:
         return band
-    target = _TargetPoint(band, vehicle)
+    target = TargetPoint(band, vehicle)
     lags = target.lags(vehicle, FenceAhead(fence, _plane(target.places), vehicle))
     pieces = target.pieces(lags)
     if not pieces:
@@ -88,7 +88,7 @@ def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry) -> Env
     )
 
 
-class _TargetPoint:
+class TargetPoint:
     """How the target point moves along all legs: each leg's motion begins while the one before still ends.
 
     Parameters
@@ -116,7 +116,7 @@ class _TargetPoint:
                 f"at its speeds the drive takes {whole_s / 86400:.3g} days; at most {_LONGEST_S / 86400:g} days can be predicted",
                 duration_s=whole_s,
             )
-        self.times_s = np.arange(0.0, whole_s + _STEP_S, _STEP_S)
+        self.times_s = np.arange(0.0, whole_s + STEP_S, STEP_S)
         points = band.points[:, 0] + 1j * band.points[:, 1]
         self.places: NDArray[np.complex128] = np.full(len(self.times_s), points[0])
         for leg, profile, begin_s in zip(band.legs, profiles, begins_s, strict=True):
@@ -126,14 +126,14 @@ class _TargetPoint:
     def lags(self, vehicle: Vehicle, fence: FenceAhead) -> list[complex]:
         """Return at each time how far the rover is behind, east and north; an empty list where it never is."""
         steps = np.diff(self.places)
-        moved_m = np.maximum(np.abs(steps), _LEAST_MPS * _STEP_S)
+        moved_m = np.maximum(np.abs(steps), _LEAST_MPS * STEP_S)
         is_slowed = np.zeros(len(steps), dtype=np.bool_)
         near = self._near_corners()[:-1]
         for side in _SIDES:
             allowed_mps = fence.speeds_mps(
                 _plane(self.places[:-1][near]), _plane(side * (steps / moved_m)[near])
             )
-            is_slowed[near] |= allowed_mps < _SLOWED_SHARE * moved_m[near] / _STEP_S
+            is_slowed[near] |= allowed_mps < _SLOWED_SHARE * moved_m[near] / STEP_S
         if not is_slowed.any():
             return []
         return _followed(self.places.tolist(), is_slowed.tolist(), vehicle, fence)
@@ -186,7 +186,7 @@ def _profile(leg: Leg, vehicle: Vehicle) -> LegProfile:
 
 def _shares(profile: LegProfile) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return times since a leg's start, and the share of the leg that is driven by each."""
-    leg_s = np.append(np.arange(0.0, profile.duration_s, _STEP_S), profile.duration_s)
+    leg_s = np.append(np.arange(0.0, profile.duration_s, STEP_S), profile.duration_s)
     return leg_s, np.array([profile.travelled_m(time_s) / profile.length_m for time_s in leg_s.tolist()])
 
 
@@ -198,7 +198,7 @@ def _followed(
     The target's acceleration is passed on as it is. A rover that is slowed turns too fast by it, and drives to the inside of the turn.
     """
     lags = [0j] * len(is_slowed)
-    velocities = [(after - before) / _STEP_S for before, after in pairwise(places)]
+    velocities = [(after - before) / STEP_S for before, after in pairwise(places)]
     velocities.append(velocities[-1])
     top_mps = max(map(abs, velocities))
     behind, scale, at = 0j, 1.0, 0.0
@@ -209,15 +209,15 @@ def _followed(
             behind, scale, at = 0j, 1.0, sample + 1.0
             rover.velocity = velocity
             continue
-        here = places[sample] + (at - sample) * _STEP_S * velocity - behind
+        here = places[sample] + (at - sample) * STEP_S * velocity - behind
         wanted = velocity + vehicle.position_gain_per_s * behind
         wanted_mps = abs(wanted) or 1.0
         way = wanted / wanted_mps
         allowed_mps = fence.speed_mps((here.real, here.imag), (way.real, way.imag), top_mps)
         wanted *= min(1.0, top_mps / wanted_mps, allowed_mps / wanted_mps)
-        rover.follow(wanted, (velocities[sample + 1] - velocity) / _STEP_S)
-        scale += (_scale(velocity, behind, rover.velocity, vehicle) - scale) * _STEP_S / _SETTLE_S
-        behind += (scale * velocity - rover.velocity) * _STEP_S
+        rover.follow(wanted, (velocities[sample + 1] - velocity) / STEP_S)
+        scale += (_scale(velocity, behind, rover.velocity, vehicle) - scale) * STEP_S / _SETTLE_S
+        behind += (scale * velocity - rover.velocity) * STEP_S
         lags[sample] = max(lags[sample], behind, key=abs)
         at += scale
     return lags
@@ -242,7 +242,7 @@ class _FollowingRover:
         if self._is_steered:
             most_radps = now_mps / self._turn_radius_m
             turn_radps = min(max(turn_radps, -most_radps), most_radps)
-        heading *= cmath.rect(1.0, turn_radps * _STEP_S)
+        heading *= cmath.rect(1.0, turn_radps * STEP_S)
         self.velocity = heading * max(
             min(wanted_mps, self._turn_mps), (wanted * heading.conjugate()).real, 0.0
         )

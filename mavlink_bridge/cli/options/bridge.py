@@ -14,6 +14,7 @@ from mavlink_bridge.cli.options.shared import (
     FirmwareOption,
     RequiredConnectOption,
     SigningKeyOption,
+    StoppingOption,
     SystemOption,
     TimeoutOption,
     TrustOption,
@@ -65,6 +66,7 @@ class BridgeOptions(CommonOptions):
         Path | None, typer.Option(metavar="FILE.parm", help="Parameters that the vehicle does not report.")
     ] = None
     firmware: FirmwareOption = None
+    stopping: StoppingOption = field(default_factory=list)
     trust_model: TrustOption = False
     upload: Annotated[bool, typer.Option("--upload", help="Write missions to the vehicle.")] = False
     drive: Annotated[

@@ -22,6 +22,7 @@ from mavlink_bridge.cli.options.shared import (
     PositionErrorOption,
     ReserveOption,
     RoleOption,
+    StoppingOption,
     WidthOption,
 )
 from mavlink_bridge.cli.values import MOST_M, within
@@ -87,6 +88,7 @@ class CheckOptions(LinkOptions):
     outermost: OutermostOption = None
     ignore_points: IgnorePointsOption = False
     firmware: FirmwareOption = None
+    stopping: StoppingOption = field(default_factory=list)
     reserve: ReserveOption = 0.0
     position_error: PositionErrorOption = None
     length: LengthOption = 0.0

@@ -22,6 +22,7 @@ from mavlink_bridge.cli.options.shared import (
     PositionErrorOption,
     ReserveOption,
     RoleOption,
+    StoppingOption,
     TrustOption,
     WidthOption,
 )
@@ -151,6 +152,7 @@ class PlanOptions(LinkOptions):
         ),
     ] = None
     firmware: FirmwareOption = None
+    stopping: StoppingOption = field(default_factory=list)
     trust_model: TrustOption = False
     reserve: ReserveOption = 0.0
     position_error: PositionErrorOption = None

@@ -9,9 +9,10 @@ from typing import Annotated
 import typer
 
 from mavlink_bridge.cli.options_file import take_options
-from mavlink_bridge.cli.values import MOST_M, MOST_S, MOST_VEHICLE_M, within
+from mavlink_bridge.cli.values import MOST_M, MOST_S, MOST_VEHICLE_M, stop_from, within
 from missions.errors import VehicleError
 from missions.firmware import Firmware, read_firmware
+from missions.stops import Stop
 
 LINK_PANEL, OUTPUT_PANEL, VEHICLE_PANEL = "Link", "Output", "Vehicle"
 _MAP_PANEL = "Map files: what each zone is"
@@ -155,6 +156,16 @@ FirmwareOption = Annotated[
         metavar="VERSION",
         parser=_firmware,
         help="Firmware version (4.5, 4.6.3), if the source does not report it.",
+        rich_help_panel=VEHICLE_PANEL,
+    ),
+]
+StoppingOption = Annotated[
+    list[Stop],
+    typer.Option(
+        metavar="M@MPS",
+        parser=stop_from,
+        help="How far your rover rolls on after HOLD: 6@3 is 6 m from 3 m/s. Repeatable. Default: its own stops, where it was seen to stop; else those of "
+        "ArduPilot's simulation.",
         rich_help_panel=VEHICLE_PANEL,
     ),
 ]

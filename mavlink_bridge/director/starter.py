@@ -87,7 +87,10 @@ class Starter(Part):
     def _armed(self, machine: SendCommand, now_s: float) -> Sequence[Signal]:
         if not _is_accepted(machine):
             return self._refused(machine, now_s)
-        self._switch_to_auto(now_s)
+        if self.core.situation.mode == Mode.HOLD:
+            self._switch_to_auto(now_s)
+        else:  # a heartbeat from before our HOLD, overtaken on the way, or an operator: the next one tells which
+            self.look_once_more(now_s)
         return []
 
     def _switch_to_auto(self, now_s: float) -> None:

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import pytest
+from director.promises import Promises
 from director.test_bridge_director import (
     FAR,
     FENCE,
@@ -589,3 +590,25 @@ def test_a_fence_whose_writing_is_never_confirmed_is_read_again_all_the_same():
     run.director.receive = receive
     written_s = run.now_s
     assert run.run_until(run.happened(EventName.FENCE_CHANGED), 10) - written_s <= 2.0
+
+
+@pytest.mark.parametrize("is_operator", [False, True], ids=["overtaken", "operator"])
+def test_after_arming_auto_waits_for_a_heartbeat_that_shows_hold(is_operator):
+    run = ready(conductor(arm=True))
+    run.vehicles[0].rover.mode = type(run.vehicles[0].mode)(MANUAL)
+    told, push = [], run.down.push
+    run.down.push = lambda frame, now_s: (told.append(frame), push(frame, now_s))
+    wait(run, 1.5)
+    before = next(frame for frame in reversed(told) if isinstance(frame.message, m.Heartbeat))
+    assert before.message.custom_mode == MANUAL
+    run.director.take_target(FAR, run.now_s)
+    run.run_until(lambda: armings_sent(run) > 0, 20)
+    if is_operator:
+        unheard(run, m.SetMode(1, 1, MANUAL))
+    run.director.receive(before, run.now_s)
+    promises = Promises(run)
+    promises._mode = MANUAL
+    wait(run, 4)
+    assert promises.broken == []
+    assert (Mode.AUTO in modes_sent(run)) is not is_operator
+    assert run.vehicles[0].mode == (MANUAL if is_operator else Mode.AUTO)

@@ -144,7 +144,8 @@ def motion(band: Envelope, vehicle: Vehicle, fence: BaseGeometry | None = None) 
     moved_m = np.hypot(*steps.T)
     moves = moved_m > 0
     places, ways = places[:-1][::every][moves], steps[moves] / moved_m[moves, None]
-    speeds_mps = moved_m[moves] / STEP_S
+    # Where two motions overlap their sum may be a little faster than the rover lets itself be.
+    speeds_mps = np.minimum(moved_m[moves] / STEP_S, max(leg.top_speed_mps for leg in band.legs))
     if len(places) and vehicle.avoids_fence and fence is not None and not fence.is_empty:
         allowed_mps = FenceAhead(fence, places, vehicle).speeds_mps(places, ways)
         speeds_mps = np.minimum(speeds_mps, allowed_mps)

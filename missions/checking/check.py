@@ -233,7 +233,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
         *_start_warnings(start, heading_deg, legs[0], asked.required_m),
         *_drive_warnings(vehicle, forecast, course),
         *reasons,
-        *hold_warnings(hold),
+        *([] if any(leg.crosses for leg in legs) else hold_warnings(hold)),
         *return_warnings(situation, vehicle, ground, course.path),
         *end_warnings(situation, vehicle, course),
     ]

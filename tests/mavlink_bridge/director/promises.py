@@ -152,6 +152,11 @@ class Promises:
             self._break(f"{self._owes_announcement} was not announced")
         self._owes_announcement = ""
 
+    @property
+    def _fence(self) -> object:
+        fence = self._run.director.situation.fence
+        return fence.value if fence is not None else None
+
     def _check_breach(self) -> None:
         """Look whether a HOLD of ours has led into a fence that was known, without a word."""
         run, vehicle = self._run, self._run.vehicles[0]
@@ -165,7 +170,7 @@ class Promises:
             and is_rolling
             and vehicle.is_armed
             and vehicle.rover.body.speed_mps > 0
-            and run.director.situation.fence is self._held_fence
+            and self._fence == self._held_fence
             and self._announced_s < self._hold_s - 2.0
         ):
             self._break("a breach by our HOLD that was not announced")
@@ -211,7 +216,7 @@ class Promises:
         if mode not in (Mode.HOLD, Mode.AUTO):
             self._break(f"mode {mode} is none of ours")
         if mode == Mode.HOLD and self._mode_before != Mode.HOLD:
-            self._hold_s, self._held_fence = self._run.now_s, self._run.director.situation.fence
+            self._hold_s, self._held_fence = self._run.now_s, self._fence
         if mode != Mode.AUTO:
             return
         self._hold_s = None

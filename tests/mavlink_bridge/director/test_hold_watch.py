@@ -6,9 +6,11 @@ import math
 
 import pytest
 from director.conducting import Conductor
+from director.promises import Promises
 from director.test_bridge_director import FAR, FENCE, HOME, NEAR, driving, reposition, upload
 
 from mavlink_bridge.director import Director, EventName, Orders, State
+from mavlink_bridge.director.hold_watch import HoldWatch
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig
@@ -221,3 +223,19 @@ def test_an_operators_word_ends_the_going_on():
     before = holds(run)
     run.run_until(lambda: run.now_s > run.last(EventName.TAKEN_OVER).time_s + 15)
     assert (holds(run), run.director.state) == (before, State.LET_GO)
+
+
+@pytest.mark.parametrize("is_announced", [True, False])
+def test_the_soaks_promise_notices_a_breach_without_a_word(is_announced, monkeypatch):
+    if not is_announced:
+        monkeypatch.setattr(HoldWatch, "_tell", lambda *_: None)
+    run = conductor()
+    promises = Promises(run)
+    at_speed(driving(run))
+    put_circle(run, edge_ahead_m=1.5)
+    run.run_until(lambda: run.vehicles[0].breaches > 0, 5)
+    run.step()
+    said = {text.partition(": ")[2] for text in promises.broken}
+    assert bool(said) is not is_announced
+    assert is_announced or "a breach by our HOLD that was not announced" in said
+    assert is_announced or any("m/s was not announced" in text for text in said)

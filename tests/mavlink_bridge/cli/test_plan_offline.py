@@ -234,7 +234,8 @@ class TestFiles:
         assert lines[0].startswith("Route: ")
         assert "m in a straight line" in lines[0]
         assert "at least 2.5 m while driving" in lines[1]
-        assert lines[2] == f"Wrote {mission}"
+        assert lines[2].startswith("HOLD does not brake: from 2 m/s the vehicle rolls on 4.1 m")
+        assert lines[3] == f"Wrote {mission}"
         assert all(line.startswith("warning: ") for line in result.stderr.splitlines())
         quiet = run("--fence", fields / "yard-fence.waypoints", "--start", START, "--target", TARGET, "-q")
         assert (quiet.exit_code, quiet.stdout) == (0, "")

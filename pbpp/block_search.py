@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from heapq import heappop, heappush
 from math import inf, sqrt
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from .errors import SearchStoppedError
 from .geometry import Point
@@ -56,7 +56,7 @@ def block_sequence(
     start: Point,
     goal: Point,
     *,
-    cost: Literal["metric", "literal"] = "metric",
+    cost: str = "metric",
     should_stop: Callable[[], bool] | None = None,
 ) -> tuple[list[int], list[Crossing], int] | None:
     """Return the blocks from start to goal, the paper's Queue.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from math import dist, isfinite
 from typing import TYPE_CHECKING
 
@@ -36,7 +36,7 @@ __all__ = ["Planner", "plan_path"]
 ShouldStop = Callable[[], bool]
 
 
-def plan_path(
+def plan_path(  # noqa: PLR0913 - a fence, two ends, and options by name
     inclusions: Sequence[Ring],
     exclusions: Sequence[Ring],
     start: npt.ArrayLike,
@@ -45,6 +45,7 @@ def plan_path(
     clearance_m: float = 0.0,
     union: bool = False,
     method: str = "optimal",
+    cost: str = "metric",
     should_stop: ShouldStop | None = None,
 ) -> PlannedPath:
     """Return a path from start to goal that keeps clear of the fence.
@@ -61,6 +62,8 @@ def plan_path(
         True: the path may lie in any inclusion. False: it lies in all of them.
     method : {"optimal", "pbpp-taut", "pbpp"}
         The search.
+    cost : {"metric", "literal"}
+        How the block methods read the paper's g: metres so far, or 1 and 1.4 for each step as printed.
     should_stop : callable, optional
         Asked now and then; when it returns True, the best path so far is returned with the bound reached.
 
@@ -79,7 +82,7 @@ def plan_path(
         If no path joins them.
     """
     planner = Planner(inclusions, exclusions, clearance_m=clearance_m, union=union)
-    return planner.plan(start, goal, method=method, should_stop=should_stop)
+    return planner.plan(start, goal, method=method, cost=cost, should_stop=should_stop)
 
 
 class Planner:
@@ -192,6 +195,7 @@ class Planner:
         goal: npt.ArrayLike,
         *,
         method: str = "optimal",
+        cost: str = "metric",
         should_stop: ShouldStop | None = None,
     ) -> PlannedPath:
         """Return a path from start to goal.
@@ -202,6 +206,8 @@ class Planner:
             (east, north) in metres.
         method : {"optimal", "pbpp-taut", "pbpp"}
             The search.
+        cost : {"metric", "literal"}
+            As for `plan_path`.
         should_stop : callable, optional
             Asked now and then; when it returns True, the best path so far is returned with the bound reached.
 
@@ -223,12 +229,15 @@ class Planner:
         self._space = self._space.holding(ends)
         if method not in {"optimal", "pbpp-taut", "pbpp"}:
             raise ValueError(f'method must be "optimal", "pbpp-taut" or "pbpp", not {method!r}')
+        if cost not in {"metric", "literal"}:
+            raise ValueError(f'cost must be "metric" or "literal", not {cost!r}')
+        plan = partial(self._plan_in, ends=ends, method=method, cost=cost, should_stop=should_stop)
         try:
-            return self._plan_in(self._space.mitred, ends, method, should_stop)
+            return plan(self._space.mitred)
         except (NoPathError, StartBlockedError, GoalBlockedError):
             if self.clearance_m == 0.0:
                 raise
-        return self._plan_in(self._space.rounded, ends, method, should_stop)
+        return plan(self._space.rounded)
 
     def widest(
         self,
@@ -263,7 +272,7 @@ class Planner:
         return widest_in(self._space.scene, ends, tolerance_m, should_stop)
 
     def _plan_in(
-        self, field: Field, ends: tuple[Point, Point], method: str, should_stop: ShouldStop | None
+        self, field: Field, ends: tuple[Point, Point], method: str, cost: str, should_stop: ShouldStop | None
     ) -> PlannedPath:
         common = field.require(ends[0], StartBlockedError) & field.require(ends[1], GoalBlockedError)
         if not common:
@@ -273,7 +282,8 @@ class Planner:
             found = _optimal(field, start, goal, should_stop, compiled=self._compiled)
         else:
             graph = field.graph(self._partition or "blocks")
-            found = _over_blocks(graph, start, goal, taut=method == "pbpp-taut", should_stop=should_stop)
+            taut = method == "pbpp-taut"
+            found = _over_blocks(graph, start, goal, taut=taut, cost=cost, should_stop=should_stop)
         if found is None:
             raise NoPathError(self.clearance_m)
         inner = np.array(found.turns, dtype=np.float64).reshape(-1, 2) + field.scene.origin_m
@@ -351,14 +361,20 @@ def _optimal(
     if not result.stopped:
         return None
     # Stopped before the goal was reached: the taut path through the best sequence of slabs is there in little time.
-    quick = _over_blocks(field.graph("slabs"), start, goal, taut=True, should_stop=None)
+    quick = _over_blocks(field.graph("slabs"), start, goal, taut=True)
     return None if quick is None else replace(quick, lower_bound_m=result.lower_bound_m)
 
 
 def _over_blocks(
-    graph: BlockGraph, start: Point, goal: Point, *, taut: bool, should_stop: ShouldStop | None
+    graph: BlockGraph,
+    start: Point,
+    goal: Point,
+    *,
+    taut: bool,
+    cost: str = "metric",
+    should_stop: ShouldStop | None = None,
 ) -> _Found | None:
-    found = block_sequence(graph, start, goal, should_stop=should_stop)
+    found = block_sequence(graph, start, goal, cost=cost, should_stop=should_stop)
     if found is None:
         return None
     sequence, crossings, expanded = found

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import sys
 from pathlib import Path
 
 import matplotlib as mpl
@@ -11,6 +13,11 @@ from matplotlib.collections import LineCollection, PolyCollection
 
 import pbpp
 from pbpp.three_cases import crossing_point
+
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+sys.path.insert(0, str(BENCHMARKS))
+
+from table1 import grid_a_star, rrt  # noqa: E402 - the paper's peers, which are no package
 
 mpl.use("Agg")
 mpl.rcParams["svg.hashsalt"] = "pbpp"
@@ -73,6 +80,33 @@ def cases_picture() -> None:
     save(figure, "cases")
 
 
+def sequence_picture() -> None:
+    """Draw a sequence of blocks, numbered as in the paper's figure 2."""
+    path = pbpp.plan_path([SQUARE], BOXES, START, GOAL, method="pbpp")
+    figure, ax = plt.subplots(figsize=(5, 5))
+    path.plot(ax)
+    centers = path.drawing.field.blocks.centers
+    for number, block in enumerate(path.sequence, start=1):
+        ax.annotate(str(number), centers[block], ha="center", va="center", fontsize=9)
+    ax.set_title(f"the sequence of {len(path.sequence)} blocks, and the path through them", fontsize=10)
+    save(figure, "sequence")
+
+
+def scenarios_picture() -> None:
+    """Draw PBPP beside grid A* and RRT on the three scenarios, as in the paper's figures 7 to 9."""
+    figure, axes = plt.subplots(1, 3, figsize=(13, 4.8))
+    for number, ax in enumerate(axes, start=1):
+        case = json.loads((BENCHMARKS / "data" / f"paper_{number}.json").read_text())
+        query = case["queries"][0]
+        path = pbpp.plan_path([case["inclusion"]], case["exclusions"], query[:2], query[2:], method="pbpp")
+        path.plot(ax, show_blocks=False)
+        other, (length, points) = ("RRT", rrt(case, 1)) if number == 3 else ("A*", grid_a_star(case))
+        ax.plot(*zip(*points, strict=True), ":", color="#6c3483", linewidth=1.8, label=other)
+        ax.set_title(f"scenario {number}: PBPP {path.length_m:.0f}, {other} {length:.0f}", fontsize=10)
+        ax.legend(loc="lower right", fontsize=8)
+    save(figure, "scenarios")
+
+
 def methods_picture() -> None:
     """Draw the three methods on a map with slanted edges."""
     figure, axes = plt.subplots(1, 3, figsize=(13, 4.6))
@@ -120,5 +154,13 @@ def widest_picture() -> None:
 
 
 if __name__ == "__main__":
-    for make in (partition_picture, cases_picture, slanted_picture, methods_picture, widest_picture):
+    for make in (
+        partition_picture,
+        cases_picture,
+        slanted_picture,
+        sequence_picture,
+        methods_picture,
+        widest_picture,
+        scenarios_picture,
+    ):
         make()

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_fields import random_field
@@ -117,6 +118,40 @@ def test_literal_cost_counts_steps():
     four.centers[1] = (8.0, 7.0)
     four.centers[2] = (1.0, 9.0)
     assert block_sequence(four, (0.0, 0.0), (10.0, 10.0), cost="literal")[0] == [0, 1, 3]
+
+
+@pytest.mark.parametrize("method", ["pbpp", "pbpp-taut"])
+@pytest.mark.parametrize("cost", ["metric", "literal"])
+def test_a_path_is_planned_by_either_cost(load_case, graph, method, cost):
+    case = load_case("paper_3")
+    start, goal = (160.0, 180.0), (30.0, 30.0)
+    path = pbpp.plan_path([case["inclusion"]], case["exclusions"], start, goal, method=method, cost=cost)
+    assert list(path.sequence) == block_sequence(graph, start, goal, cost=cost)[0]
+
+
+def test_the_two_costs_look_at_blocks_in_another_order():
+    square = [(0, 0), (200, 0), (200, 200), (0, 200)]
+    posts = [[(x, 95), (x + 1, 95), (x + 1, 105), (x, 105)] for x in range(60, 144, 7)]
+    planner = pbpp.Planner([square], posts)
+    looked_at = {
+        cost: planner.plan((5, 97), (195, 103), method="pbpp", cost=cost).expanded
+        for cost in ("metric", "literal")
+    }
+    assert looked_at["metric"] > 2 * looked_at["literal"]  # a step counts for 1, however long it is
+
+
+def test_a_cost_that_is_none():
+    with pytest.raises(ValueError, match="cost must be"):
+        pbpp.plan_path([], [], (0, 0), (1, 1), cost="steps")
+
+
+def test_range_alone_keeps_less_than_the_radius():
+    """A corner between two edges that are both crossed at the radius from it is passed at radius / √2: the reason for shrinking free space."""
+    corner, radius_m = (10.0, 10.0), 2.0
+    below = crossing_point((corner, (10.0, 30.0)), (0.0, 10.0), radius_m)
+    beside = crossing_point((corner, (30.0, 10.0)), (10.0, 0.0), radius_m)
+    leg = shapely.LineString([below, beside])
+    assert leg.distance(shapely.Point(corner)) == pytest.approx(radius_m / 2**0.5)
 
 
 def test_a_block_search_can_be_stopped(graph):

@@ -126,6 +126,8 @@ and the vehicle's avoidance on (`FENCE_MARGIN` is the promise less 0.1 m), and m
 or 3 m, the start faces any way. The rover's drive law ([simulator](simulator.md)) was written apart from the [drive model](drive-model.md)
 that the plans rest on. `--first SEED` gives other fields of these kinds, `--kinds more` other kinds (starts near a fence, targets
 behind the vehicle, short routes, corridors, zigzag walls, mazes, woods of small circles, gates hardly wider than need be).
+`--kinds table` draws a vehicle for each field over the whole table of parameters (`benchmarks/drive_table.py`: 0.2 to 8 m/s, both steerings, radii, pivots,
+margins, avoidance, S-curves, one inclusion, two or a union). What lies outside the measured range is driven too, with `--trust-model`, and counted apart.
 """
 
 

@@ -4,6 +4,7 @@ import importlib.metadata
 
 project = "PBPP Rover"
 author = "the PBPP Rover maintainers"
+project_copyright = f"2026, {author}. Apache-2.0"
 release = importlib.metadata.version("pbpp-rover")
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 source_suffix = {".md": "markdown"}

@@ -35,4 +35,6 @@ def main(connection: str, target: str) -> int:
 # end
 
 if __name__ == "__main__":
-    sys.exit(main(*sys.argv[1:3]))
+    if len(sys.argv) != 3:
+        sys.exit("usage: follow_the_bridge.py CONNECTION LAT,LON")
+    sys.exit(main(*sys.argv[1:]))

@@ -20,6 +20,8 @@ def main(fence: Path, start: str, target: str, mission: Path) -> None:
 # end
 
 if __name__ == "__main__":
+    if len(sys.argv) != 5:
+        sys.exit("usage: plan_a_file.py FENCE START TARGET MISSION (positions are LAT,LON)")
     try:
         main(Path(sys.argv[1]), sys.argv[2], sys.argv[3], Path(sys.argv[4]))
     except MissionError as error:

@@ -28,7 +28,9 @@ def plan_to(connection: str, target: str) -> Plan:
 # end
 
 if __name__ == "__main__":
-    plan = plan_to(*sys.argv[1:3])
+    if len(sys.argv) != 3:
+        sys.exit("usage: plan_on_a_vehicle.py CONNECTION LAT,LON")
+    plan = plan_to(*sys.argv[1:])
     print(f"{plan.length_m:.1f} m, {len(plan.items)} waypoints")
     for warning in plan.warnings:
         print(f"warning: {warning}")

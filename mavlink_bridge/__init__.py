@@ -32,17 +32,17 @@ __all__ = [
 ]
 
 _HOMES = {
-    "BridgeError": "errors",
-    "Director": "director",
-    "Frame": "mavlink.messages",
-    "Link": "link",
-    "Orders": "director",
-    "Simulator": "simulator",
-    "SimulatorConfig": "simulator",
-    "TlogReader": "tlog",
-    "TlogWriter": "tlog",
-    "open_link": "link",
-    "situation_from_log": "logbook.log_situation",
+    name: home
+    for home, names in {
+        "director": ("Director", "Orders"),
+        "errors": ("BridgeError",),
+        "link": ("Link", "open_link"),
+        "logbook.log_situation": ("situation_from_log",),
+        "mavlink.messages": ("Frame",),
+        "simulator": ("Simulator", "SimulatorConfig"),
+        "tlog": ("TlogReader", "TlogWriter"),
+    }.items()
+    for name in names
 }
 
 

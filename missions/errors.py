@@ -92,15 +92,15 @@ class RouteError(MissionError):
 
 
 class StartBlockedError(RouteError):
-    """The vehicle stands on forbidden ground; the message says in which fence, how far in, and where free ground is."""
+    """The vehicle stands inside an exclusion or outside the fence; the message says in which fence, how far in, and where free ground is."""
 
 
 class TargetBlockedError(RouteError):
-    """The target lies on forbidden ground or too near a fence; the message says which, and the nearest free point."""
+    """The target lies inside an exclusion, outside the fence or too near a fence; the message says which, and the nearest free point."""
 
 
 class NoRouteError(RouteError):
-    """Start and target are not connected; the message says which fences part them."""
+    """Start and target are not connected; the message says which fences separate them."""
 
 
 class MissionTooLongError(RouteError):

@@ -29,6 +29,11 @@ class PolygonZone:
     kind: ZoneKind
     vertices: tuple[LatLon, ...]
 
+    @property
+    def places(self) -> tuple[LatLon, ...]:
+        """The positions by which it is drawn: its vertices."""
+        return self.vertices
+
 
 @dataclass(frozen=True, slots=True)
 class CircleZone:
@@ -37,6 +42,11 @@ class CircleZone:
     kind: ZoneKind
     centre: LatLon
     radius_m: float
+
+    @property
+    def places(self) -> tuple[LatLon, ...]:
+        """The positions by which it is drawn: its centre."""
+        return (self.centre,)
 
 
 Zone = PolygonZone | CircleZone
@@ -48,6 +58,11 @@ class Fence:
 
     zones: tuple[Zone, ...] = ()
     return_point: LatLon | None = None
+
+    @property
+    def places(self) -> list[LatLon]:
+        """The positions by which its zones are drawn: vertices and centres."""
+        return [place for zone in self.zones for place in zone.places]
 
     @property
     def vertex_count(self) -> int:

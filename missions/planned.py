@@ -47,11 +47,11 @@ class Plan:
         and where the drive is extrapolated.
     asked_m : float
         What the drawn lines have to keep (less where the first ones lead away from a fence nearby); where the route is fitted to the
-        drive model, the driven band too: the promise, the position's error and the owner's reserve.
+        drive model, the predicted corridor too: the promise, the position's error and the owner's reserve.
     drawn_clearance_m : float
         The least distance of the drawn lines, as rounded and as the autopilot draws them, to any fence (infinite without a fence near).
     driven_clearance_m : float
-        The least distance of the band that the vehicle is predicted to drive in.
+        The least distance of the predicted corridor to any fence.
     blocks : int
         Blocks of the partition that was searched.
     fence, ground : Fence, Ground
@@ -59,13 +59,17 @@ class Plan:
     vehicle : Vehicle
         What was known of the vehicle.
     envelope : Envelope
-        The band that the vehicle is predicted to stay in, and its times.
+        The predicted corridor, and its times.
     home : LatLon or None
         For the mission's home item.
+    warnings : tuple of str
+        What a person should know before it is driven.
+    info : tuple of str
+        What was done because it was asked for, or added to be safe.
     asked_targets : tuple of LatLon
         The targets as they were asked for, before blocked ones were moved; empty where nobody asked for targets.
     extrapolated : tuple of str
-        In what the drive lies outside what was measured.
+        Why the drive lies outside the measured range; empty where it does not.
     hold : HoldCheck or None
         What HOLD does on the route.
     """
@@ -91,6 +95,7 @@ class Plan:
     envelope: Envelope
     home: LatLon | None
     warnings: tuple[str, ...]
+    info: tuple[str, ...] = ()
     asked_targets: tuple[LatLon, ...] = ()
     extrapolated: tuple[str, ...] = ()
     hold: HoldCheck | None = None

@@ -41,13 +41,16 @@ class Promise:
     allowance_m : float or None
         Room asked for everywhere on top of the promise; None where the route is fitted to the drive model.
     warnings : tuple of str
-        Remarks about both.
+        What differs from what was asked for, and what is unknown.
+    info : tuple of str
+        What else was added.
     """
 
     promised_m: float
     error_m: float
     allowance_m: float | None
     warnings: tuple[str, ...]
+    info: tuple[str, ...] = ()
 
     @property
     def required_m(self) -> float:
@@ -99,7 +102,9 @@ def promise(situation: Situation, request: Request, vehicle: Vehicle) -> Promise
             warnings.append(f"{_stops(vehicle)}; the clearance of {promised_m:g} m is less")
         error_m = request.reserve_m + (request.position_error_m or 0.0)
         return Promise(promised_m, error_m, request.corner_allowance_m, tuple(warnings))
-    error_m, told = _position_error_m(situation, request)
+    error_m, trouble = _position_error_m(situation, request)
+    is_ours = bool(error_m) and request.position_error_m is None
+    info = (f"added {error_m:g} m for GPS error (--position-error)",) if is_ours else ()
     # Avoidance goes by where the vehicle believes to be: the error of its position counts towards the margin.
     raised_m = vehicle.stops_within_m + MARGIN_RESERVE_M - error_m
     if vehicle.avoids_fence and promised_m < raised_m:
@@ -108,7 +113,7 @@ def promise(situation: Situation, request: Request, vehicle: Vehicle) -> Promise
                 f"{_stops(vehicle)}; the clearance of {promised_m:g} m is raised to {raised_m:g} m"
             )
         promised_m = raised_m
-    return Promise(promised_m, error_m + request.reserve_m, None, (*warnings, *told))
+    return Promise(promised_m, error_m + request.reserve_m, None, (*warnings, *trouble), info)
 
 
 def asked_clearance(situation: Situation, request: Request) -> tuple[Vehicle, float]:
@@ -125,15 +130,14 @@ def _stops(vehicle: Vehicle) -> str:
 
 
 def _position_error_m(situation: Situation, request: Request) -> tuple[float, tuple[str, ...]]:
+    """Return what is kept for the position's error, and a warning where it is unknown."""
     if request.position_error_m is not None:
         return request.position_error_m, ()
     if situation.fix is None:
         return 0.0, (_FIX_NOT_TOLD,) if situation.system is not None else ()
     fix = situation.fix.value
     if fix.error_m is not None:
-        error_m = fix.error_m
-    elif fix.kind in FIX_ERRORS_M:
-        error_m = FIX_ERRORS_M[fix.kind]
-    else:
-        return 0.0, ("no 3D GPS fix: nothing added for GPS error (use --position-error M)",)
-    return error_m, (f"added {error_m:g} m for GPS error (--position-error)",)
+        return fix.error_m, ()
+    if fix.kind in FIX_ERRORS_M:
+        return FIX_ERRORS_M[fix.kind], ()
+    return 0.0, ("no 3D GPS fix: nothing added for GPS error (use --position-error M)",)

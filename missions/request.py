@@ -71,7 +71,7 @@ class Request(metaclass=_Kinds):
     clearance_m : float, optional
         Promised for the rover as it drives. Default: from FENCE_MARGIN.
     widest : bool
-        Take the widest route there is, whose clearance then comes of itself.
+        Take the widest route there is; its clearance is the largest possible.
     corner_allowance_m : float, optional
         Room for cut corners and tracking error everywhere on top of the clearance; 0 plans the drawn lines only. Default: the route is
         fitted to the drive model, with no more room than each corner needs.
@@ -80,15 +80,15 @@ class Request(metaclass=_Kinds):
     method : Method
         ``optimal``, ``pbpp-taut`` or ``pbpp``.
     position_error_m : float, optional
-        How far the vehicle may be from where it believes to be. Default: from the kind of its fix.
+        How far off the vehicle's position may be. Default: from the GPS fix type.
     reserve_m : float
-        The owner's own, for wind and slip.
+        Extra clearance of your own, for wind and slip.
     speed_mps : float, optional
         Driven with this speed (DO_CHANGE_SPEED). Default: the vehicle's own.
     footprint : Footprint
         The rectangle the vehicle covers.
     escape : bool
-        Whether a vehicle on forbidden ground may drive out.
+        Whether a vehicle inside an exclusion or outside the fence may drive out.
     trusts_model : bool
         Promise also where the drive lies outside what was measured.
 
@@ -176,7 +176,7 @@ class GoTo(Request):
 
 @dataclass(frozen=True, kw_only=True)
 class Tour(Request):
-    """Visit several places, come back, or end otherwise than by standing still.
+    """Visit several places, return home, or end with loiter or RTL.
 
     Parameters
     ----------

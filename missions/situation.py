@@ -140,7 +140,7 @@ class Situation:
     stops : Stops
         How far it rolls on after HOLD or disarming, as far as that was said or seen.
     remarks : tuple of str
-        What reading a file passed over or took for something: to be told.
+        Warnings from reading a file: what was skipped, and what was assumed.
     """
 
     system: int | None = None

@@ -14,7 +14,7 @@ import math
 import os
 import re
 import secrets
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -334,16 +334,8 @@ def _checksum(content: dict[str, Any]) -> str:
 
 
 def _item_to_json(item: MissionItem) -> dict[str, Any]:
-    return {
-        "command": int(item.command),
-        "frame": int(item.frame),
-        "params": [_number_to_json(value) for value in item.params],
-        "lat_e7": item.lat_e7,
-        "lon_e7": item.lon_e7,
-        "alt_m": _number_to_json(item.alt_m),
-        "current": item.current,
-        "autocontinue": item.autocontinue,
-    }
+    params = [_number_to_json(value) for value in item.params]
+    return {**asdict(item), "params": params, "alt_m": _number_to_json(item.alt_m)}
 
 
 def _item_from_json(item: dict[str, Any]) -> MissionItem:

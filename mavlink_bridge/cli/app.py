@@ -7,7 +7,7 @@ from difflib import get_close_matches
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from typer.core import TyperCommand, TyperGroup
+from typer.core import TyperArgument, TyperCommand, TyperGroup
 
 from mavlink_bridge.cli.common import command_of
 from mavlink_bridge.cli.failing import (
@@ -25,31 +25,34 @@ if TYPE_CHECKING:
 COMMANDS = {
     "plan": "Plan a mission around fences; write it, draw it, upload it.",
     "check": "Check every leg of a mission against a fence.",
+    "fence": "Make a fence fit for the vehicle: merge overlapping inclusions.",
+    "convert": "Convert a file from one format to another.",
+    "upload": "Upload a file to the vehicle and verify it, or restore a backup.",
+    "download": "Download a mission, fence, rally points or parameters.",
     "bridge": "Run alongside the autopilot: plan to each target, upload verified missions.",
     "log": "Summarise telemetry logs.",
     "replay": "Replay recorded logs through the bridge.",
-    "upload": "Upload a file to the vehicle and verify it, or restore a backup.",
-    "download": "Download a mission, fence, rally points or parameters.",
-    "convert": "Convert a file from one format to another.",
-    "fence": "Make a fence fit for the vehicle: merge overlapping inclusions.",
     "sim": "Run a simulated rover.",
     "demo": "Plan, upload and drive on a simulated rover, as a demonstration.",
     "doctor": "Check this installation: versions, ports, keys, a test plan.",
     "config": "Show where options can be saved, and which are set.",
 }
-"""Every command and its line in help; the module of the same name holds it."""
+"""Every command and its line in help, in the order of use; the module of the same name holds it."""
 
 
 def _without_types(params: list[Any]) -> list[Any]:
-    """Return parameters whose flags show no type in help: each takes no value."""
+    """Return parameters that show no type and no range in help beside what is written for people: ``<bool>``, ``<path>``, ``1<=x<=255``."""
     for param in params:
         if getattr(param, "is_flag", False) and param.metavar is None:
             param.metavar = ""
+        if isinstance(param, TyperArgument):
+            param.display_type_rich = lambda ctx: None  # type: ignore[method-assign] # noqa: ARG005
+        param._get_number_range_help_str = lambda: None  # noqa: SLF001
     return params
 
 
 class SingleCommand(TyperCommand):
-    """A command whose help shows no type for flags."""
+    """A command whose help shows no types but those written for people."""
 
     def get_params(self, ctx: Any) -> list[Any]:  # noqa: ANN401 - the parser library is typer's own affair
         """Return the options, with ``--help``."""

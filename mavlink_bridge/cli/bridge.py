@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 import typer
 
 from mavlink_bridge.cli.bridge_view import LiveView
-from mavlink_bridge.cli.common import warn
-from mavlink_bridge.cli.failing import ERRORS_ONLY, exit_code_of, telling
+from mavlink_bridge.cli.common import inform, warn
+from mavlink_bridge.cli.failing import Level, exit_code_of, telling
 from mavlink_bridge.cli.interrupting import AtHand, interruptible, terminable
 from mavlink_bridge.cli.keyboard import Keyboard
-from mavlink_bridge.cli.link_notes import LinkNotes
+from mavlink_bridge.cli.link_notes import tell_echoes
 from mavlink_bridge.cli.live import BackupKeeper, PlanMaker, director_at_hand
 from mavlink_bridge.cli.opening import Opening
 from mavlink_bridge.cli.permissions import check_permissions
@@ -28,7 +28,7 @@ from mavlink_bridge.cli.session import signing_of
 from mavlink_bridge.cli.terminal import echo, print_json, say
 from mavlink_bridge.cli.typed import CONFIRM, understood
 from mavlink_bridge.cli.vehicle_options import described_vehicle
-from mavlink_bridge.director import AT_WORK, Director, Orders, Severity
+from mavlink_bridge.director import AT_WORK, Director, EventName, Orders, Severity
 from mavlink_bridge.director.orders import DEFAULT_SOURCES, TargetSource
 from mavlink_bridge.errors import LinkError, UsageError
 from mavlink_bridge.link import ONE_SHOT_IDENTITY, now_s, open_link, parse_connection
@@ -39,7 +39,7 @@ from missions.geo import LatLon
 from missions.situation import Situation
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable
 
     from mavlink_bridge.cli.options.bridge import BridgeOptions
     from mavlink_bridge.director import Event
@@ -164,7 +164,6 @@ class _Shell:
         self._written = _Journaled(self.director, log)
         self._tell = tell
         self._log = log
-        self._notes = LinkNotes()
         self._backups = BackupKeeper(
             self.director,
             str(parse_connection(connection)),
@@ -239,7 +238,7 @@ class _Shell:
     def _run_link(self, link: Link) -> None:
         def step() -> None:
             now = link.now_s()
-            self._notes.tell(link)
+            tell_echoes(link)
             if not self.director.is_done:
                 self._listen_to_keyboard(now)
                 self._hand_over_plan(now)
@@ -298,7 +297,7 @@ class _Shell:
         """Print a note that is not an event, where it does not disturb: above the view, else on stderr."""
         if self._view is not None:
             self._view.note(text, is_warning=is_warning)
-        elif telling().quiet < (ERRORS_ONLY if is_warning else 1):
+        elif telling().prints(Level.WARNING if is_warning else Level.INFO):
             say(text, typer.colors.YELLOW if is_warning else None)
 
     def _ask_for_yes(self) -> None:
@@ -313,6 +312,10 @@ class _Shell:
             if self._log is not None:
                 self._log.event(event)
             self._tell(event)
+            if event.name is EventName.PLANNED:
+                with self._view.aside() if self._view is not None else contextlib.nullcontext():
+                    inform(event.data["info"])  # type: ignore[arg-type]
+                    warn(event.data["warnings"])  # type: ignore[arg-type]
         self._ask_for_yes()
 
 
@@ -324,16 +327,18 @@ def _view(stack: contextlib.ExitStack, director: Director, *, is_wanted: bool) -
 
 
 def _teller(options: BridgeOptions) -> Callable[[Event], None]:
-    """Return what prints events: JSON lines, or lines for people."""
-    if options.json_output:
-        return lambda event: _flushed_json(event.as_json())
-    if options.quiet:
-        return lambda _event: None
-    return _tell_people
+    """Return what prints events, those of the levels that are wanted: JSON lines, or lines for people."""
+    put = _tell_scripts if options.json_output else _tell_people
+
+    def tell(event: Event) -> None:
+        if telling().prints(Level.of_severity(event.severity.name.lower())):
+            put(event)
+
+    return tell
 
 
-def _flushed_json(document: Mapping[str, object]) -> None:
-    print_json(document)
+def _tell_scripts(event: Event) -> None:
+    print_json(event.as_json())
     sys.stdout.flush()
 
 

@@ -167,7 +167,7 @@ def _of_then(text: str, time_s: float | None, now_s: float) -> Text:
     """Return a text, with its age where it is not current."""
     if time_s is None or now_s - time_s < _OLD_S:
         return cell(text)
-    return cell(f"{text} (old: {_age(now_s - time_s)} ago)", "yellow")
+    return cell(f"{text} ({_age(now_s - time_s)} old)", "yellow")
 
 
 def _styled(text: str, *, is_warning: bool) -> Text:

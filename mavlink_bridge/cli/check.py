@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 import typer
 from rich.table import Table
 
-from mavlink_bridge.cli.common import warn
+from mavlink_bridge.cli.common import inform, remarks_document, warn
 from mavlink_bridge.cli.drawing import cell, console
 from mavlink_bridge.cli.failing import ExitCode
 from mavlink_bridge.cli.field_files import read_fence_file, read_file, with_mission_home
 from mavlink_bridge.cli.pictures import check_plots, draw
-from mavlink_bridge.cli.plan_results import hold_document, report_hold
+from mavlink_bridge.cli.plan_results import hold_document
 from mavlink_bridge.cli.terminal import echo, print_json
 from mavlink_bridge.cli.values import position_from
 from mavlink_bridge.cli.vehicle_options import (
@@ -59,12 +59,13 @@ def check(options: CheckOptions) -> None:
         *checked.warnings,
         *_storage_warnings(checked.mission.items, situation),
     ]
+    inform(checked.info)
     warn(warnings)
     draw(partial(_scene, checked, situation), options.plot)
     if options.json_output:
         print_json(_document(checked, warnings, situation.system, options.plot))
-    elif not options.quiet:
-        _report(checked, options.plot)
+    else:
+        _report(checked, options.plot, is_quiet=options.quiet > 0)
     if not checked.holds:
         raise typer.Exit(ExitCode.CHECK)
 
@@ -147,34 +148,40 @@ def _scene(checked: MissionCheck, situation: Situation) -> PictureScene:
     return plan_scene(plan_of(checked, situation), title=title, unsafe=unsafe)
 
 
-def _report(checked: MissionCheck, plots: list[Path]) -> None:
-    table = Table(box=None, pad_edge=False)
-    for name in ("leg", "length", "time", "drawn", "driven", "nearest fence", "where"):
-        right = name in {"length", "time", "drawn", "driven"}
-        table.add_column(name, justify="right" if right else "left", no_wrap=name != "nearest fence")
-    for leg in checked.legs:
-        table.add_row(*map(cell, _row(leg)), style="red" if leg.breaks else None)
-    console().print(table)
-    echo(
-        f"{len(checked.legs)} legs, {checked.length_m:.1f} m, about {checked.duration_s:.0f} s"
-        f"{' for one time round' if checked.course.is_endless else ''}; {len(checked.mission.items) + 1} mission items with home"
-    )
-    report_hold(checked.hold)
-    for path in plots:
-        if str(path) != "-":
-            echo(f"Wrote {path}")
+def _report(checked: MissionCheck, plots: list[Path], *, is_quiet: bool) -> None:
+    if not is_quiet:
+        _report_legs(checked, plots)
     for trouble in checked.troubles:
         echo(f"not understood: {trouble}", typer.colors.RED)
     for danger in checked.dangers:
         echo(f"DANGER: {danger}", typer.colors.RED)
     for leg in checked.broken:
         echo(f"FAIL: {_sentence(leg)}", typer.colors.RED)
-    if checked.holds and checked.extrapolated:
-        echo(
-            f"Every leg is predicted to keep {checked.clearance_m:g} m while driving; not confirmed by measurements"
-        )
-    elif checked.holds:
-        echo(f"PASS: every leg keeps {checked.clearance_m:g} m while driving")
+    if not checked.holds or is_quiet:
+        return
+    kept = f"{checked.clearance_m:g} m while driving"
+    if checked.extrapolated:
+        echo(f"Every leg is predicted to keep {kept}; not confirmed by measurements")
+    else:
+        echo(f"PASS: every leg keeps {kept}")
+
+
+def _report_legs(checked: MissionCheck, plots: list[Path]) -> None:
+    table = Table(box=None, pad_edge=False, collapse_padding=True)
+    wrapped = {"leg", "nearest fence"}
+    for name in ("leg", "length", "time", "drawn", "driven", "nearest fence", "where"):
+        right = name in {"length", "time", "drawn", "driven"}
+        table.add_column(name, justify="right" if right else "left", no_wrap=name not in wrapped)
+    for leg in checked.legs:
+        table.add_row(*map(cell, _row(leg)), style="red" if leg.breaks else None)
+    console().print(table)
+    echo(
+        f"{len(checked.legs)} legs, {checked.length_m:.1f} m, about {checked.duration_s:.0f} s"
+        f"{' for each round' if checked.course.is_endless else ''}; {len(checked.mission.items) + 1} mission items with home"
+    )
+    for path in plots:
+        if str(path) != "-":
+            echo(f"Wrote {path}")
 
 
 def _row(leg: CheckedLeg) -> tuple[str, ...]:
@@ -184,9 +191,14 @@ def _row(leg: CheckedLeg) -> tuple[str, ...]:
         f"{leg.time_s:.0f} s",
         "crosses" if leg.crosses else _metres(leg.drawn_clearance_m),
         "crosses" if leg.crosses else _metres(leg.driven_clearance_m),
-        ", ".join(leg.crosses) or leg.fence or "none",
+        ", ".join(map(_short, leg.crosses)) or _short(leg.fence or "none"),
         str(leg.at or ""),
     )
+
+
+def _short(fence: str) -> str:
+    """Return a zone's name so that the table fits 80 columns."""
+    return fence.replace("exclusion", "excl.").replace("inclusion", "incl.")
 
 
 def _metres(value_m: float) -> str:
@@ -226,7 +238,7 @@ def _document(
         "dangers": list(checked.dangers),
         "extrapolated": list(checked.extrapolated),
         "outputs": [str(path) for path in plots],
-        "warnings": warnings,
+        **remarks_document(checked.info, warnings),
     }
 
 

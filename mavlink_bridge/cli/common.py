@@ -12,8 +12,8 @@ import typer
 
 from mavlink_bridge import errors as bridge_errors
 from mavlink_bridge.cli.failing import (
-    ERRORS_ONLY,
     ExitCode,
+    Level,
     begin_telling,
     drop_stdout,
     is_reader_gone,
@@ -93,11 +93,28 @@ def _default(field: dataclasses.Field[Any]) -> object:
 
 def warn(texts: Iterable[str]) -> None:
     """Put warnings on stderr, one a line and each once; none with ``-qq``."""
-    told = telling().warned
+    _say_once(Level.WARNING, texts, typer.colors.YELLOW)
+
+
+def inform(texts: Iterable[str]) -> None:
+    """Put what is only good to know on stderr, one a line and each once; none with ``-q``."""
+    _say_once(Level.INFO, texts, typer.colors.BRIGHT_BLACK)
+
+
+def _say_once(level: Level, texts: Iterable[str], colour: str) -> None:
+    told = telling().told
     for text in texts:
-        if text not in told and telling().quiet < ERRORS_ONLY:
+        if text not in told and telling().prints(level):
             told.add(text)
-            say(f"warning: {text}", typer.colors.YELLOW)
+            say(f"{level.name.lower()}: {text}", colour)
+
+
+def remarks_document(info: Iterable[str], warnings: Iterable[str]) -> dict[str, list[str]]:
+    """Return for a JSON document what is told at each level."""
+    return {
+        "info": list(info) if telling().prints(Level.INFO) else [],
+        "warnings": list(warnings) if telling().prints(Level.WARNING) else [],
+    }
 
 
 def is_same_file(one: Path, other: Path) -> bool:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.cli.common import is_same_file, warn
+from mavlink_bridge.cli.common import is_same_file, remarks_document, warn
 from mavlink_bridge.cli.field_files import read_file
 from mavlink_bridge.cli.kept_files import write_kept
 from mavlink_bridge.cli.terminal import echo, print_json
@@ -29,7 +29,6 @@ def convert(options: ConvertOptions) -> None:
     written = write_situation(situation, options.output, part, write=write_kept)
     left_out = _left_out(situation, written, options.output) if part is None else []
     warn(left_out)
-    warnings = [*situation.remarks, *left_out]
     document = {
         "status": "ok",
         "command": "convert",
@@ -37,7 +36,7 @@ def convert(options: ConvertOptions) -> None:
         "outputs": [str(options.output)],
         "parts": [str(one) for one in written],
         "left_out": [str(one) for one in parts_of(situation) if one not in written],
-        "warnings": warnings,
+        **remarks_document((), (*situation.remarks, *left_out)),
     }
     if options.json_output:
         print_json(document)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import typer
 from shapely import LineString
 
-from mavlink_bridge.cli.common import warn
+from mavlink_bridge.cli.common import inform, warn
 from mavlink_bridge.cli.failing import ExitCode
 from mavlink_bridge.cli.kept_files import make_room, remember, write_kept
 from mavlink_bridge.cli.live import conduct
@@ -71,6 +71,7 @@ def demo(options: DemoOptions) -> None:
             is_real=False,
         )
     remember(out / "demo.tlog")
+    inform(result.plan.info)
     warn(result.plan.warnings)
     written = write_outputs(
         result.plan, result.situation, [out / "mission.waypoints", out / "mission.plan"], []
@@ -135,7 +136,7 @@ def _report(document: dict[str, object], plan: Plan) -> None:
     )
     echo(
         f"Fence clearance: at least {document['clearance_m']} m promised, {document['driven_clearance_m']} m kept; "
-        f"breaches {document['breaches']}"
+        f"fence breaches: {document['breaches']}"
     )
     echo(f"The mission was verified on the vehicle; total time {document['time_s']} s")
     outputs = document["outputs"]

@@ -18,7 +18,7 @@ import typer
 
 from mavlink_bridge.backup.store import BackupStore
 from mavlink_bridge.cli.config import settings_of
-from mavlink_bridge.cli.failing import ExitCode
+from mavlink_bridge.cli.failing import ExitCode, Level, telling
 from mavlink_bridge.cli.options_file import is_there, user_file
 from mavlink_bridge.cli.terminal import echo, echo_labelled, print_json
 from mavlink_bridge.cli.vehicle_options import described_vehicle
@@ -50,8 +50,14 @@ class _Verdict(StrEnum):
     """How a look turned out."""
 
     OK = "ok"
-    NOTE = "note"
-    WRONG = "wrong"
+    INFO = "info"
+    WARNING = "warning"
+    ERROR = "error"
+
+    @property
+    def level(self) -> Level:
+        """How grave it is, as other messages are."""
+        return Level.INFO if self is _Verdict.OK else Level[self.name]
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,13 +77,13 @@ def doctor(options: DoctorOptions) -> None:
         lambda: _vehicle(options.vehicle, options.firmware),
     ]  # fmt: skip
     findings = [finding for look in looks for finding in look()]
-    is_well = all(finding.verdict is not _Verdict.WRONG for finding in findings)
+    is_well = all(finding.verdict is not _Verdict.ERROR for finding in findings)
     if options.json_output:
         status = {"status": "ok"} if is_well else {"status": "error", "exit_code": int(ExitCode.CHECK)}
         print_json({**status, "command": "doctor", "findings": [asdict(finding) for finding in findings]})
     else:
         for finding in findings:
-            if not options.quiet or finding.verdict is _Verdict.WRONG:
+            if telling().prints(finding.verdict.level):
                 _tell(finding)
     if not is_well:
         raise typer.Exit(ExitCode.CHECK)
@@ -86,12 +92,13 @@ def doctor(options: DoctorOptions) -> None:
 def _tell(finding: _Finding) -> None:
     colour = {
         _Verdict.OK: typer.colors.GREEN,
-        _Verdict.NOTE: typer.colors.YELLOW,
-        _Verdict.WRONG: typer.colors.RED,
+        _Verdict.INFO: typer.colors.BRIGHT_BLACK,
+        _Verdict.WARNING: typer.colors.YELLOW,
+        _Verdict.ERROR: typer.colors.RED,
     }
-    echo_labelled(f"{finding.verdict:<5}", colour[finding.verdict], f"{finding.what}: {finding.found}")
+    echo_labelled(f"{finding.verdict:<7}", colour[finding.verdict], f"{finding.what}: {finding.found}")
     if finding.advice:
-        echo(f"       advice: {finding.advice}")
+        echo(f"         advice: {finding.advice}")
 
 
 def _python() -> Iterator[_Finding]:
@@ -106,13 +113,13 @@ def _packages() -> Iterator[_Finding]:
         try:
             yield _Finding(_Verdict.OK, name, metadata.version(name))
         except metadata.PackageNotFoundError:
-            yield _Finding(_Verdict.WRONG, name, "not installed", f"python -m pip install {name}")
+            yield _Finding(_Verdict.ERROR, name, "not installed", f"python -m pip install {name}")
     for name, use in _WANTED.items():
         try:
             yield _Finding(_Verdict.OK, name, metadata.version(name))
         except metadata.PackageNotFoundError:
             advice = "python -m pip install 'pbpp-rover[plot]'"
-            yield _Finding(_Verdict.NOTE, name, f"not installed: no {use}", advice)
+            yield _Finding(_Verdict.INFO, name, f"not installed: no {use}", advice)
 
 
 def _ports() -> Iterator[_Finding]:
@@ -120,12 +127,12 @@ def _ports() -> Iterator[_Finding]:
 
     ports = sorted(comports(), key=lambda port: port.device)
     if not ports:
-        yield _Finding(_Verdict.NOTE, "serial ports", "none found (radios and autopilots on USB appear here)")
+        yield _Finding(_Verdict.INFO, "serial ports", "none found (radios and autopilots on USB appear here)")
     for port in ports:
         told = f"{port.description}" if port.description not in (None, "n/a", port.device) else "present"
         if os.name == "posix" and not os.access(port.device, os.R_OK | os.W_OK):
             # Something on USB was plugged in to be used; a computer's own ports are often wired to nothing.
-            verdict = _Verdict.NOTE if port.vid is None else _Verdict.WRONG
+            verdict = _Verdict.INFO if port.vid is None else _Verdict.ERROR
             advice = _permission_advice(Path(port.device))
             yield _Finding(
                 verdict, f"serial port {port.device}", f"{told}, but you have no permission to use it", advice
@@ -152,7 +159,7 @@ def _options() -> Iterator[_Finding]:
         count = len(settings_of(path, is_asked_for=False))
     except typer.BadParameter as error:
         yield _Finding(
-            _Verdict.WRONG,
+            _Verdict.ERROR,
             "options file",
             error.message,
             "fix it; `pbpp config --template` prints an example",
@@ -167,12 +174,14 @@ def _key(path: Path | None) -> Iterator[_Finding]:
     try:
         SigningKey.read(path)
     except UsageError as error:
-        yield _Finding(_Verdict.WRONG, "signing key", str(error))
+        yield _Finding(_Verdict.ERROR, "signing key", str(error))
     else:
         yield _Finding(
             _Verdict.OK,
             "signing key",
-            f"{path} is a signing key; only you can read it" if os.name == "posix" else f"{path} is one",
+            f"{path} is a signing key; only you can read it"
+            if os.name == "posix"
+            else f"{path} is a signing key",
         )
 
 
@@ -184,7 +193,7 @@ def _backups() -> Iterator[_Finding]:
             pass
     except OSError as error:
         advice = "uploads need this folder: make it writable, or set XDG_STATE_HOME"
-        yield _Finding(_Verdict.WRONG, "backups", f"{above} cannot be written: {error.strerror}", advice)
+        yield _Finding(_Verdict.ERROR, "backups", f"{above} cannot be written: {error.strerror}", advice)
         return
     kept = len(list(folder.glob("system-*Z.json"))) if folder.is_dir() else 0
     yield _Finding(_Verdict.OK, "backups", f"{folder} ({kept} kept)")
@@ -207,7 +216,7 @@ def _test_plan() -> Iterator[_Finding]:
         clearance_m = planned.ground.clearance_m(line)
     except Exception as error:  # noqa: BLE001 - whatever is broken here is what is looked for
         yield _Finding(
-            _Verdict.WRONG, "test plan", f"{type(error).__name__}: {error}", "reinstall, or report this"
+            _Verdict.ERROR, "test plan", f"{type(error).__name__}: {error}", "reinstall, or report this"
         )
         return
     found = f"{planned.length_m:.2f} m, {clearance_m:.3f} m from every fence"
@@ -215,8 +224,13 @@ def _test_plan() -> Iterator[_Finding]:
     if is_right:
         yield _Finding(_Verdict.OK, "test plan", found)
     else:
-        wanted = f"{SHORTEST_M} m, or 1 % more, and {_CLEARANCE_M} m were expected"
-        yield _Finding(_Verdict.WRONG, "test plan", f"{found}; {wanted}", "do not use this installation")
+        wanted = f"expected {SHORTEST_M} m (at most 1 % more) and {_CLEARANCE_M} m"
+        yield _Finding(
+            _Verdict.ERROR,
+            "test plan",
+            f"{found}; {wanted}",
+            "do not drive plans of this installation; install it again",
+        )
 
 
 def _vehicle(file: Path | None, firmware: Firmware | None) -> Iterator[_Finding]:
@@ -228,12 +242,17 @@ def _vehicle(file: Path | None, firmware: Firmware | None) -> Iterator[_Finding]
         described = described_vehicle(file, firmware)
         vehicle = vehicle_from_parameters(described.parameters, firmware=described.firmware)
     except MissionError as error:
-        yield _Finding(_Verdict.WRONG, "vehicle", str(error))
+        yield _Finding(_Verdict.ERROR, "vehicle", str(error))
         return
     version = described.firmware or "of an unknown version (--firmware)"
-    verdict = _Verdict.NOTE if vehicle.has_measured_corners is None else _Verdict.OK
+    verdict = _Verdict.WARNING if vehicle.has_measured_corners is None else _Verdict.OK
     yield _Finding(verdict, "vehicle", f"{vehicle.autopilot} {version}, {vehicle.steering} steering")
     for remark in assumed_remarks(vehicle):
-        yield _Finding(_Verdict.NOTE, "vehicle", remark)
+        yield _Finding(_Verdict.WARNING, "vehicle", remark)
     for reason in beyond_measured(vehicle):
-        yield _Finding(_Verdict.NOTE, "vehicle", reason, "plans for it promise no clearance")
+        yield _Finding(
+            _Verdict.WARNING,
+            "vehicle",
+            reason,
+            "plans promise no clearance for it, unless --trust-model is given",
+        )

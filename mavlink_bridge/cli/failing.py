@@ -38,6 +38,19 @@ class ExitCode(IntEnum):
     INTERRUPTED = 130
 
 
+class Level(IntEnum):
+    """How grave a message is; ``-q`` leaves out the lowest level, ``-qq`` the two lowest."""
+
+    INFO = 0
+    WARNING = 1
+    ERROR = 2
+
+    @classmethod
+    def of_severity(cls, name: str) -> Level:
+        """Return the level of an event by the name of its severity."""
+        return {"critical": cls.ERROR, "error": cls.ERROR, "warning": cls.WARNING}.get(name, cls.INFO)
+
+
 _EXIT_CODES: tuple[tuple[type[Exception], ExitCode], ...] = (
     (mission_errors.PlanCheckError, ExitCode.INTERNAL),
     (mission_errors.RouteError, ExitCode.NO_ROUTE),
@@ -104,10 +117,10 @@ _ACTIVE_ADVICE = (
 _SILENT_ADVICE: Mapping[str, str] = {
     "serial": "is the vehicle on, and is another program using the port? The baud rate must match the vehicle's SERIALn_BAUD "
     "(/dev/ttyUSB0,57600); `pbpp doctor` lists the serial ports",
-    "udpin": "is the vehicle on, and is its telemetry sent to this computer's address and port? A firewall or another ground station "
-    "on the same port may take it",
+    "udpin": "is the vehicle on, and is its telemetry sent to this computer's address and port? A firewall may block it, or "
+    "another ground station may hold the same port",
     "udpout": "is the vehicle on, and does it (or its router) listen on this address and port?",
-    "tcp": "is the vehicle on, and does the other side send its MAVLink on this port?",
+    "tcp": "is the vehicle on, and does the other end send MAVLink on this port?",
     "tcpin": "is the vehicle on, and does it (or its router) connect to this address and port?",
 }
 """What to look at where nothing at all came over a link, by the link's kind."""
@@ -120,18 +133,19 @@ _REPORT = (
 
 @dataclass(slots=True)
 class Telling:
-    """Which command runs, how much it prints, and which warnings it has printed."""
+    """Which command runs, how much it prints, and which info and warnings it has printed."""
 
     command: str = ""
     verbose: bool = False
     quiet: int = 0
-    """How often ``-q`` was given: once leaves warnings and errors, `ERRORS_ONLY` times only errors."""
-    warned: set[str] = field(default_factory=set)
+    """How often ``-q`` was given."""
+    told: set[str] = field(default_factory=set)
     options: object = None
     """The command's options, as they were given."""
 
-
-ERRORS_ONLY = 2  # -qq
+    def prints(self, level: Level) -> bool:
+        """Return whether messages of a level are printed, as text and in JSON."""
+        return level >= min(self.quiet, Level.ERROR)
 
 
 _telling: ContextVar[Telling | None] = ContextVar("telling", default=None)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.cli.common import is_same_file
+from mavlink_bridge.cli.common import is_same_file, remarks_document
 from mavlink_bridge.cli.field_files import read_fence_file
 from mavlink_bridge.cli.kept_files import write_kept
 from mavlink_bridge.cli.options.fence import ACTIONS
@@ -46,12 +46,12 @@ def fence(options: FenceOptions) -> None:
                 "merged_inclusions": before if before > 1 else 0,
                 "zones": len(merged.zones),
                 "vertices": merged.vertex_count,
-                "warnings": list(situation.remarks),
+                **remarks_document((), situation.remarks),
             }
         )
     elif not options.quiet:
         told = (
-            f"{before} inclusions are one"
+            f"{before} inclusions merged into one"
             if before > 1
             else f"{counted(before, 'inclusion')}, nothing to merge"
         )

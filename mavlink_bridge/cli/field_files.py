@@ -4,30 +4,20 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 from mavlink_bridge.cli.common import warn
 from mavlink_bridge.errors import UsageError
-from missions.errors import FenceError, FenceMissingError
+from missions.errors import FenceError
 from missions.fence import ZoneKind
-from missions.formats import Choices, mission_of, read_situation
+from missions.formats import Choices, fence_of, mission_of, read_situation
 from missions.formats.features import Role
 from missions.formats.parameters import read_path
-from missions.ground.fence_reach import REACH_M, is_wide, within_reach
 from missions.situation import Known
 
 if TYPE_CHECKING:
-    from mavlink_bridge.cli.options.check import CheckOptions
-    from mavlink_bridge.cli.options.convert import ConvertOptions
-    from mavlink_bridge.cli.options.fence import FenceOptions
-    from mavlink_bridge.cli.options.plan import PlanOptions
-    from mavlink_bridge.cli.options.sim import SimOptions
-    from mavlink_bridge.cli.options.upload import UploadOptions
+    from mavlink_bridge.cli.options.shared import MapOptions
     from missions.situation import Mission, Situation
-
-    MapOptions: TypeAlias = (
-        PlanOptions | CheckOptions | ConvertOptions | FenceOptions | UploadOptions | SimOptions
-    )
 
 _WORDS = ("inclusion", "exclusion", "route", "ignore", "waypoint", "home", "rally point", "return point")
 
@@ -83,10 +73,10 @@ def read_fence_file(path: Path, options: MapOptions) -> Situation:
     FenceMissingError
         It holds no fence.
     """
+    from missions.ground.fence_reach import REACH_M, is_wide, within_reach  # noqa: PLC0415 - shapely, which files alone do without
+
     situation = read_file(path, options)
-    if situation.fence is None:
-        raise FenceMissingError(f"{path} contains no fence", file=str(path))
-    fence, left_out, cut = within_reach(situation.fence.value)
+    fence, left_out, cut = within_reach(fence_of(situation, path))
     if fence.zones and is_wide(*fence.zones) and all(zone.kind is ZoneKind.EXCLUSION for zone in fence.zones):
         raise FenceError(
             f"{path}: its exclusions cover a larger area than can be planned, and no inclusion limits it",
@@ -94,10 +84,10 @@ def read_fence_file(path: Path, options: MapOptions) -> Situation:
             advice="draw an inclusion around the field; exclusions far outside it are then left out",
         )
     far = f"more than {REACH_M / 1000:g} km from every inclusion"
-    counts = {f"exclusions {far} left out": left_out, f"exclusions whose parts {far} are left out": cut}
+    counts = {f"exclusions left out, {far}": left_out, f"exclusions cut, parts of them {far}": cut}
     more = [f"{path}: {what}: {count}" for what, count in counts.items() if count]
     warn(more)
-    known = replace(situation.fence, value=fence)
+    known = Known(fence, None, str(path))
     return replace(situation, fence=known, remarks=(*situation.remarks, *more))
 
 

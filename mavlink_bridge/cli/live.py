@@ -17,7 +17,7 @@ from mavlink_bridge.backup.vehicle_mark import VehicleMark
 from mavlink_bridge.cli.common import warn
 from mavlink_bridge.cli.drawing import progress_bar
 from mavlink_bridge.cli.interrupting import AtHand, interruptible, terminable
-from mavlink_bridge.cli.link_notes import LinkNotes
+from mavlink_bridge.cli.link_notes import tell_echoes
 from mavlink_bridge.cli.restoring import interrupted_warnings
 from mavlink_bridge.cli.session import signing_of
 from mavlink_bridge.cli.timed_plan import timed_plan
@@ -185,7 +185,6 @@ class _Run:
         self.planning_s = 0.0
         self.arrival: Mapping[str, object] | None = None
         self._link = link
-        self._notes = LinkNotes()
         self._on_plan = on_plan
         self._taken: Plan | None = None
         self._has_driven = False
@@ -206,7 +205,7 @@ class _Run:
             self.arrival = event.data if event.name is EventName.ARRIVED else self.arrival
             if event.name is EventName.IDENTITY_CLASH:
                 warn([event.text])
-        self._notes.tell(link)
+        tell_echoes(link)
 
     def _plan(self, situation: Situation, request: Request, *, should_stop: Callable[[], bool]) -> Plan:
         """Make a plan, and note how long it took; a mission that is driven in part is not begun anew."""

@@ -73,7 +73,7 @@ def log(options: LogOptions) -> None:
 
 def _scene(book: Logbook) -> PictureScene:
     if not book.vehicles:
-        raise LogError(f"{book.name}: no vehicle was heard: there is nothing to draw")
+        raise LogError(f"{book.name}: no vehicle was heard, so there is nothing to draw")
     vehicle = book.vehicles[0]
     if len(book.vehicles) > 1:
         names = ", ".join(str(other.system) for other in book.vehicles)
@@ -113,11 +113,11 @@ def _print(book: Logbook, *, messages: bool) -> None:
 
     show(f": {_length(book)}", title=book.name)
     if not book.damage.is_clean:
-        show(f"Damage passed over: {book.damage}")
+        show(f"Damage skipped: {book.damage}")
     if book.clock_jumps:
         show(f"The log's clock was set {book.clock_jumps} times while it was written: rates are off")
     if book.clock_trouble:
-        show(f"{book.clock_trouble}: no time, rate or speed below means anything")
+        show(f"{book.clock_trouble}: times, rates and speeds below cannot be trusted")
     out.print(_senders(book))
     if messages:
         out.print(_messages(book))
@@ -135,7 +135,7 @@ def _print(book: Logbook, *, messages: bool) -> None:
 
 
 def _length(book: Logbook) -> str:
-    begin = f" from {date_text(book.begins_s)}" if book.has_timestamps else ", raw: without times of its own"
+    begin = f" from {date_text(book.begins_s)}" if book.has_timestamps else ", raw (no timestamps)"
     return f"{_duration(book.duration_s)}{begin}, {book.damage.frames} messages"
 
 
@@ -202,7 +202,9 @@ def _vehicle_tables(vehicle: VehicleLog) -> Iterable[Table]:
             )
         yield table
     if vehicle.parameters:
-        table = _table(f"Parameters that matter, of {vehicle.parameters_seen}", "name", "value", "was")
+        table = _table(
+            f"Parameters that affect the drive (of {vehicle.parameters_seen})", "name", "value", "was"
+        )
         before: dict[str, list[str]] = {}
         for change in vehicle.parameter_changes:
             before.setdefault(change.name, []).append(f"{change.before:g} until {change.time_s:.1f} s")

@@ -30,7 +30,7 @@ class LogBegin:
     is_dated: bool
 
     def __str__(self) -> str:
-        return f"from {date_text(self.time_s)}" if self.is_dated else "raw: without times of its own"
+        return f"from {date_text(self.time_s)}" if self.is_dated else "raw (no timestamps)"
 
 
 def log_begin(log: Path) -> LogBegin:
@@ -57,4 +57,4 @@ def date_text(time_s: float) -> str:
     try:
         return f"{_EPOCH + dt.timedelta(seconds=time_s):%Y-%m-%d %H:%M:%S} UTC"
     except OverflowError:
-        return f"{time_s:.4g} s after 1970, by a clock that was wrong"
+        return f"{time_s:.4g} s after 1970 (the clock was not set)"

@@ -52,11 +52,11 @@ def verdict(vehicle: VehicleLog) -> tuple[str, bool]:
         times = "once:" if len(intrusions) == 1 else f"{len(intrusions)} times, at most"
         told = f"left the fence {times} {place_in_words(deepest)}"
     elif near is not None:
-        told = f"stayed inside the fence, at the nearest {near.clearance_m:.2f} m from {near.zone}"
+        told = f"stayed inside the fence; least clearance {near.clearance_m:.2f} m, from {near.zone}"
     elif vehicle.fences:
-        told = "not measured against the fence"
+        told = "the track was not compared with the fence"
     else:
-        told = "no fence known, not measured"
+        told = "no fence in the log, so no clearance was measured"
     reported = len(vehicle.reported_breaches)
     parts = [told]
     if reported:
@@ -107,7 +107,7 @@ def _graded(number: int, grade: Grade) -> Iterable[str]:
         yield f"  least clearance: left the fence{'' if told[0] is None else f'; {told[0]:.2f} m predicted'}"
     else:
         yield from compared("least clearance", grade.least_clearance_m, told[0], "m")
-    yield from compared("farthest off the lines", grade.deviation_m, told[1], "m")
+    yield from compared("farthest from the straight legs", grade.deviation_m, told[1], "m")
     yield from compared("time to the last waypoint reached", grade.took_s, told[2], "s")
     if grade.outside_m is not None:
         yield f"  {_corridor(grade.outside_m)}"
@@ -118,8 +118,5 @@ def _corridor(outside_m: float) -> str:
     if outside_m < 0.005:
         return "within the predicted corridor"
     if outside_m <= OUTSIDE_M:
-        return (
-            f"within the predicted corridor: {outside_m:.2f} m beyond it, and {OUTSIDE_M:g} m are allowed for "
-            "the error of the position"
-        )
-    return f"{outside_m:.2f} m outside the predicted corridor ({OUTSIDE_M:g} m are allowed for the error of the position)"
+        return f"within the predicted corridor and the {OUTSIDE_M:g} m allowed for position error ({outside_m:.2f} m outside it)"
+    return f"{outside_m:.2f} m outside the predicted corridor ({OUTSIDE_M:g} m is allowed for position error)"

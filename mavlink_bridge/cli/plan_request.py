@@ -56,13 +56,13 @@ def with_tour(request: Request, options: PlanOptions) -> Request:
         return request_of(**{**request.words(), "order": order, "comes_back": comes_back, "end": end})
     if request.targets or comes_back or (order, end) != ("given", "hold"):
         raise UsageError(
-            "--via-mission keeps the mission's own places, order and end; it does not go with --target, --order, --return, --end"
+            "--via-mission keeps the mission's own places, order and end; it cannot be combined with --target, --order, --return, --end"
         )
     if request.widest:
         raise UsageError("--via-mission needs a clearance in metres, not max")
     if request.speed_mps is not None or request.corner_allowance_m is not None or request.escape:
         raise UsageError(
-            "--via-mission keeps the mission's own speeds and goes by the drive model; it does not go with --speed, "
+            "--via-mission keeps the mission's own speeds and relies on the drive model; it cannot be combined with --speed, "
             "--corner-allowance, --escape"
         )
     mission = None if via == _OWN else read_mission_file(Path(via), options)

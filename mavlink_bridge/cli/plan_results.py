@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.cli.common import warn
+from mavlink_bridge.cli.common import inform, remarks_document, warn
 from mavlink_bridge.cli.kept_files import write_kept
 from mavlink_bridge.cli.pictures import draw
 from mavlink_bridge.cli.terminal import echo
@@ -60,7 +60,7 @@ def plan_document(planned: Plan) -> dict[str, object]:
         "blocks": planned.blocks,
         "mission_items": len(planned.items) + 1,
         "extrapolated": list(planned.extrapolated),
-        "warnings": list(planned.warnings),
+        **remarks_document(planned.info, planned.warnings),
     }
 
 
@@ -83,12 +83,6 @@ def hold_document(hold: HoldCheck | None) -> dict[str, object] | None:
             "fence": worst.fence,
         },
     }
-
-
-def report_hold(hold: HoldCheck | None) -> None:
-    """Print for people that every HOLD ends within the fence; another one is a warning."""
-    if hold is not None and hold.worst is None:
-        echo(hold.sentence)
 
 
 def _finite(value_m: float | None) -> float | None:
@@ -120,6 +114,7 @@ class Told:
 
     def tell(self, planned: Plan, planning_s: float, situation: Situation) -> None:
         """Report a plan; a later one is the route made anew."""
+        inform(planned.info)
         warn(planned.warnings)
         self._written = write_outputs(planned, situation, self._outputs, self._plots, blocks=self._blocks)
         if not self._is_silent:
@@ -134,7 +129,7 @@ class Told:
         assert self._plan is not None
         return {
             **plan_document(self._plan),
-            "warnings": [*self._remarks, *self._plan.warnings],
+            **remarks_document(self._plan.info, (*self._remarks, *self._plan.warnings)),
             "planning_s": round(self._planning_s, 6),
             "outputs": [str(path) for path in self._written],
         }
@@ -162,7 +157,6 @@ def report_plan(planned: Plan, written: list[Path]) -> None:
         f"about {planned.duration_s:.0f} s, {counted(waypoints, 'waypoint')} ({counted(turns, 'turn')})"
     )
     echo(f"Fence clearance: {promise}")
-    report_hold(planned.hold)
     for path in written:
         echo(f"Wrote {path}")
 
@@ -178,5 +172,5 @@ def report_end(arrival: Mapping[str, object] | None, backup: Path | None, *, ver
         kept = f"least clearance {least:.2f} m" if isinstance(least, float) else "no fence near"
         echo(
             f"Arrived after {arrival['driven_m']:.1f} m in {arrival['took_s']:.0f} s; {kept} while driving, "
-            f"breaches {arrival['breaches']}"
+            f"fence breaches: {arrival['breaches']}"
         )

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from mavlink_bridge.cli.drawing import progress_bar
-from mavlink_bridge.cli.failing import ExitCode
+from mavlink_bridge.cli.failing import ExitCode, Level, telling
 from mavlink_bridge.cli.kept_files import write_kept
 from mavlink_bridge.cli.log_times import log_begin
 from mavlink_bridge.cli.plan_request import request_from_options
@@ -39,7 +39,7 @@ def replay(options: ReplayOptions) -> None:
     """Replay, record or compare logs; or play one to a client."""
     if options.send is not None:
         if len(options.logs) > 1 or options.record or options.expect is not None:
-            raise UsageError("--send plays one LOG and compares nothing")
+            raise UsageError("--send plays one LOG; it cannot be combined with --record or --expect")
         _send(options, options.send)
         return
     orders = Orders(
@@ -65,22 +65,24 @@ class _Teller:
     def __init__(self, options: ReplayOptions) -> None:
         self.is_quiet = options.is_silent
         self._wants_json = options.json_output
-        self._is_silent = options.is_silent and not options.json_output
         self._names_logs = len(options.logs) > 1
         self._begin_s = 0.0
 
     def begin(self, log: Path) -> None:
         """Note that a log begins; events that follow belong to it."""
-        if self._wants_json or self._is_silent:
+        if self._wants_json:
             return
         begin = log_begin(log)
         self._begin_s = begin.time_s
-        echo(f"{log.name}: {begin}")
+        if not self.is_quiet:
+            echo(f"{log.name}: {begin}")
 
     def tell(self, event: _Told) -> None:
+        if not telling().prints(Level.of_severity(event["severity"])):
+            return
         if self._wants_json:
             print_json(event)
-        elif not self._is_silent:
+        else:
             prefix = f"{event['log']}: " if self._names_logs else ""
             echo(f"{prefix}{event['time_s'] - self._begin_s:8.2f} s  {event['event']}: {event['text']}")
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from mavlink_bridge.backup.vehicle_mark import VehicleMark, uid_of
 from mavlink_bridge.cli.common import warn
 from mavlink_bridge.cli.interrupting import AtHand
-from mavlink_bridge.cli.link_notes import LinkNotes
+from mavlink_bridge.cli.link_notes import tell_echoes
 from mavlink_bridge.errors import LinkError, OutcomeError, RefusedError
 from mavlink_bridge.link import open_link, parse_connection
 from mavlink_bridge.mavlink.messages import (
@@ -104,7 +104,6 @@ class Session:
         self.link = link
         self._connection = contact.connection
         self._show = show
-        self._notes = LinkNotes()
         self._machine: Machine | None = None
         self._has_written = self._is_refused = self._has_clashed = False
         finder = FindVehicle(
@@ -183,7 +182,7 @@ class Session:
 
         def step() -> None:
             self._show(text, *machine.progress)
-            self._notes.tell(self.link)
+            tell_echoes(self.link)
             if on_step:
                 on_step()
 

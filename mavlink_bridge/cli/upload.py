@@ -169,6 +169,6 @@ def _report(
         if entry.backup:
             echo(f"  the list before is kept in {entry.backup}")
     for name, (old, new) in changed.items():
-        echo(f"{name}: {'no number' if old is None else f'{old:g}'} -> {new:g}, confirmed")
+        echo(f"{name}: {'not a number' if old is None else f'{old:g}'} -> {new:g}, confirmed")
     if not done and not changed:
         echo("all parameters already have these values")

@@ -16,14 +16,13 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from mavlink_bridge.cli.options.check import CheckOptions
-    from mavlink_bridge.cli.options.plan import PlanOptions
+    from mavlink_bridge.cli.options.shared import ClearanceOptions
     from missions.firmware import Firmware
     from missions.request import Request
     from missions.stops import Stop
 
 
-def with_vehicle(request: Request, options: PlanOptions | CheckOptions) -> Request:
+def with_vehicle(request: Request, options: ClearanceOptions) -> Request:
     """Add to what is asked of a plan what the vehicle needs: its size, how well its position is known, a reserve.
 
     Raises

@@ -81,7 +81,7 @@ if TYPE_CHECKING:
 
 
 class Director:
-    """Takes targets to verified missions, and missions to arrival.
+    """Turns targets into verified missions, and watches missions until arrival.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ class Director:
 
     @property
     def trouble(self) -> BridgeError | MissionError | None:
-        """Why the newest thing that could not be done could not be; a single job ends with it."""
+        """Why the newest action failed; a single job ends with it."""
         return self._core.trouble
 
     @property
@@ -182,7 +182,7 @@ class Director:
 
     @property
     def upload_outcome(self) -> VerifiedUploadOutcome | None:
-        """How the newest upload that has ended did."""
+        """The outcome of the newest upload that has ended."""
         return self._parts.writer.outcome
 
     @property
@@ -209,16 +209,16 @@ class Director:
         return self._parts.desk.pending
 
     def plan_made(self, task: PlanTask, made: Plan | MissionError, now_s: float) -> None:
-        """Take a plan, or why there is none; what is not waited for any more is left."""
+        """Take a plan, or why there is none; one that nobody waits for any more is ignored."""
         self._heed(self._parts.desk.plan_made(task, made, now_s), now_s)
 
     @property
     def awaits_confirmation(self) -> bool:
-        """Whether a plan stands that is uploaded only after `confirm`."""
+        """Whether a plan waits for `confirm` before it is uploaded."""
         return self._parts.writer.awaits_confirmation
 
     def confirm(self, now_s: float) -> None:
-        """Take the operator's yes to the plan that stands; a yes to none is forgotten."""
+        """Take the operator's yes to the plan that waits for it; ignored where none does."""
         self._heed(self._parts.writer.confirm(), now_s)
 
     def take_target(self, position: LatLon, now_s: float) -> None:

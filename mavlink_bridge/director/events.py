@@ -63,7 +63,7 @@ SCHEMA: dict[EventName, tuple[Severity, tuple[str, ...]]] = {
         Severity.INFO,
         (
             *("length_m", "drawn_clearance_m", "clearance_m", "duration_s", "waypoints", "path"),
-            *("extrapolated", "warnings"),
+            *("extrapolated", "info", "warnings"),
         ),
     ),
     EventName.NO_PLAN: (Severity.WARNING, ("error", "details")),

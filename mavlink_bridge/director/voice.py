@@ -94,6 +94,7 @@ class Voice:
             len(plan.items),
             [list(position) for position in plan.path],
             list(plan.extrapolated),
+            list(plan.info),
             list(plan.warnings),
         )
 

@@ -286,10 +286,12 @@ class DriveGrader:
 
     def _foresee(self, heading_deg: float | None) -> Envelope | None:
         if self.way.odd is not None:
-            self._notes.append(f"no prediction: the drive model does not know {self.way.odd}")
+            self._notes.append(f"no prediction: the drive model does not cover {self.way.odd}")
             return None
         if self._field.vehicle.autopilot is not Autopilot.ARDUPILOT:
-            self._notes.append("the drive model was measured on ArduPilot Rover, which this is not")
+            self._notes.append(
+                "the drive model was measured on ArduPilot Rover; this vehicle runs another autopilot"
+            )
         try:
             forecast = envelope(
                 self._points,

@@ -11,13 +11,14 @@ from __future__ import annotations
 import math
 import struct
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.mavlink.messages import MissionType
 from missions.items import Command, CoordinateFrame, MissionItem
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
 _FRAMES = {
     int(CoordinateFrame.MISSION): int(CoordinateFrame.GLOBAL),
@@ -84,113 +85,27 @@ def _dropped(value: float) -> _Stored:  # noqa: ARG001 - one of a family
 
 
 _KEEPS_ALL = (_float32, _float32, _float32, _float32)
-_KEPT_PARAMS: dict[int, tuple[Callable[[float], _Stored], ...]] = {
-    Command.NAV_WAYPOINT: (_whole, _dropped, _dropped, _dropped),
-    Command.NAV_LOITER_UNLIM: (_dropped, _dropped, _whole, _dropped),
-    Command.NAV_LOITER_TURNS: (_turns, _dropped, _turn_radius, _flag),
-    Command.NAV_LOITER_TIME: (_whole, _dropped, _sign, _flag),
-    Command.NAV_RETURN_TO_LAUNCH: (_dropped, _dropped, _dropped, _dropped),
-    Command.NAV_LAND: (_whole, _dropped, _dropped, _dropped),
-    Command.NAV_TAKEOFF: (_whole, _dropped, _dropped, _dropped),
-    Command.NAV_GUIDED_ENABLE: (_whole, _dropped, _dropped, _dropped),
-    Command.NAV_DELAY: (_float32, _whole, _whole, _whole),
-    Command.CONDITION_DELAY: (_float32, _dropped, _dropped, _dropped),
-    Command.CONDITION_DISTANCE: (_float32, _dropped, _dropped, _dropped),
-    Command.DO_SET_MODE: (_whole, _dropped, _dropped, _dropped),
-    Command.DO_JUMP: (_whole, _whole, _dropped, _dropped),
-    Command.DO_CHANGE_SPEED: (_whole, _float32, _float32, _dropped),
-    Command.DO_SET_HOME: (_whole, _dropped, _dropped, _dropped),
-    Command.DO_SET_REVERSE: (_whole, _dropped, _dropped, _dropped),
-    Command.DO_FENCE_ENABLE: (_whole, _dropped, _dropped, _dropped),
-    Command.NAV_SET_YAW_SPEED: (_float32, _float32, _whole, _dropped),
-    30: (_whole, _dropped, _dropped, _dropped),  # NAV_CONTINUE_AND_CHANGE_ALT
-    31: (_dropped, _whole, _dropped, _flag),  # NAV_LOITER_TO_ALT
-    82: (_whole, _dropped, _dropped, _dropped),  # NAV_SPLINE_WAYPOINT
-    83: (_float32, _float32, _whole, _dropped),  # NAV_ALTITUDE_WAIT
-    84: (_dropped, _dropped, _dropped, _dropped),  # NAV_VTOL_TAKEOFF
-    85: (_whole, _dropped, _dropped, _dropped),  # NAV_VTOL_LAND
-    94: (_hundredths, _dropped, _dropped, _dropped),  # NAV_PAYLOAD_PLACE
-    115: (_float32, _float32, _whole, _whole),  # CONDITION_YAW
-    181: (_whole, _whole, _dropped, _dropped),  # DO_SET_RELAY
-    182: (_whole, _whole, _float32, _dropped),  # DO_REPEAT_RELAY
-    183: (_whole, _whole, _dropped, _dropped),  # DO_SET_SERVO
-    184: (_whole, _whole, _whole, _float32),  # DO_REPEAT_SERVO
-    188: (_dropped, _dropped, _dropped, _dropped),  # DO_RETURN_PATH_START
-    189: (_dropped, _dropped, _dropped, _dropped),  # DO_LAND_START
-    191: (_dropped, _dropped, _dropped, _dropped),  # DO_GO_AROUND
-    193: (_whole, _dropped, _dropped, _dropped),  # DO_PAUSE_CONTINUE
-    195: (_whole, _dropped, _dropped, _dropped),  # DO_SET_ROI_LOCATION
-    197: (_whole, _dropped, _dropped, _dropped),  # DO_SET_ROI_NONE
-    201: (_whole, _dropped, _dropped, _dropped),  # DO_SET_ROI
-    202: (_whole, _whole, _whole, _whole),  # DO_DIGICAM_CONFIGURE
-    203: (_whole, _whole, _whole, _whole),  # DO_DIGICAM_CONTROL
-    205: (_float32, _float32, _float32, _dropped),  # DO_MOUNT_CONTROL
-    206: (
-        _float32,
-        _dropped,
-        _dropped,
-        _dropped,
-    ),  # DO_SET_CAM_TRIGG_DIST; newer firmware keeps the third, too
-    208: (_whole, _dropped, _dropped, _dropped),  # DO_PARACHUTE
-    210: (_whole, _dropped, _dropped, _dropped),  # DO_INVERTED_FLIGHT
-    211: (_whole, _whole, _dropped, _dropped),  # DO_GRIPPER
-    212: (_whole, _dropped, _dropped, _dropped),  # DO_AUTOTUNE_ENABLE
-    215: (_whole, _dropped, _dropped, _dropped),  # DO_SET_RESUME_REPEAT_DIST
-    216: (_whole, _dropped, _dropped, _dropped),  # DO_SPRAYER
-    217: (_whole, _float32, _float32, _float32),  # DO_SEND_SCRIPT_MESSAGE
-    218: (_whole, _whole, _dropped, _dropped),  # DO_AUX_FUNCTION
-    222: (_whole, _float32, _float32, _float32),  # DO_GUIDED_LIMITS
-    223: (_flag, _flag, _hundredths, _odd),  # DO_ENGINE_CONTROL
-    531: (_whole, _float32, _dropped, _dropped),  # SET_CAMERA_ZOOM
-    532: (_whole, _float32, _dropped, _dropped),  # SET_CAMERA_FOCUS
-    534: (_whole, _whole, _whole, _dropped),  # SET_CAMERA_SOURCE
-    600: (_whole, _dropped, _dropped, _dropped),  # JUMP_TAG
-    601: (_whole, _whole, _dropped, _dropped),  # DO_JUMP_TAG
-    1000: (_whole, _whole, _whole, _whole),  # DO_GIMBAL_MANAGER_PITCHYAW
-    2000: (_whole, _float32, _whole, _whole),  # IMAGE_START_CAPTURE
-    2001: (_whole, _dropped, _dropped, _dropped),  # IMAGE_STOP_CAPTURE
-    2500: (_whole, _dropped, _dropped, _dropped),  # VIDEO_START_CAPTURE
-    2501: (_whole, _dropped, _dropped, _dropped),  # VIDEO_STOP_CAPTURE
-    3000: (_whole, _dropped, _dropped, _dropped),  # DO_VTOL_TRANSITION
-    42600: (_whole, _whole, _float32, _float32),  # DO_WINCH
-    42702: (_whole, _whole, _float16, _float16),  # NAV_SCRIPT_TIME
-    42703: (_whole, _whole, _whole, _whole),  # NAV_ATTITUDE_TIME
+_KEEPERS = {
+    keep.__name__[1:]: keep
+    for keep in (_float32, _float16, _whole, _sign, _flag, _turns, _turn_radius, _hundredths, _odd, _dropped)
 }
-STORED_WITH_PLACE = frozenset(
-    {
-        Command.NAV_WAYPOINT,
-        Command.NAV_LOITER_UNLIM,
-        Command.NAV_LOITER_TURNS,
-        Command.NAV_LOITER_TIME,
-        Command.NAV_LAND,
-        Command.NAV_TAKEOFF,
-        Command.NAV_GUIDED_ENABLE,
-        Command.DO_SET_HOME,
-        30,  # NAV_CONTINUE_AND_CHANGE_ALT
-        31,  # NAV_LOITER_TO_ALT
-        82,  # NAV_SPLINE_WAYPOINT
-        84,  # NAV_VTOL_TAKEOFF
-        85,  # NAV_VTOL_LAND
-        94,  # NAV_PAYLOAD_PLACE
-        188,  # DO_RETURN_PATH_START
-        189,  # DO_LAND_START
-        191,  # DO_GO_AROUND
-        195,  # DO_SET_ROI_LOCATION
-        201,  # DO_SET_ROI
-    }
-)
+_ROWS = [
+    line.split(",")
+    for line in Path(__file__).with_name("stored_commands.csv").read_text(encoding="ascii").splitlines()[1:]
+]
+"""Command by command what ArduPilot keeps of each parameter, where it takes NaN, and whether it keeps the place.
+
+Of DO_SET_CAM_TRIGG_DIST newer firmware keeps the third parameter, too.
+"""
+
+_KEPT_PARAMS = {
+    int(command): tuple(_KEEPERS[param or "dropped"] for param in params)
+    for command, _, *params, _, _ in _ROWS
+}
+STORED_WITH_PLACE = frozenset(int(command) for command, *_, has_place in _ROWS if has_place)
 """Commands stored with a place and a frame (``AP_Mission::stored_in_location``); others read back with frame 0 and mostly without a place."""
 
-_NAN_TAKEN = frozenset(
-    {
-        (int(Command.NAV_WAYPOINT), 3),
-        (int(Command.NAV_LAND), 3),
-        (int(Command.NAV_TAKEOFF), 3),
-        (84, 3),
-        (85, 2),
-        (85, 3),
-    }
-)
+_NAN_TAKEN = {(int(command), int(param) - 1) for command, *_, params, _ in _ROWS for param in params.split()}
 """Commands and the parameters of theirs, counted from 0, in which ArduPilot takes NaN."""
 
 _POLYGON_VERTICES = frozenset(

@@ -132,7 +132,7 @@ class FindVehicle(TableMachine[FindState, FindEvent]):
         """Return the error for a vehicle not heard; it notes whether anybody else was heard, which is another trouble than a dead line."""
         within = f"no vehicle's HEARTBEAT was heard within {self._patience_s:g} s"
         if not self._senders:
-            return VehicleNotFoundError(f"{within}, nothing else either", heard=[], advice=_SILENT_ADVICE)
+            return VehicleNotFoundError(f"{within}, nor any other message", heard=[], advice=_SILENT_ADVICE)
         names = ", ".join(
             f"system {system} component {component}" for system, component in sorted(self._senders)
         )

@@ -51,7 +51,7 @@ def check_items(
     name = mission_type.name.lower()
     if len(items) > _MOST_ITEMS:
         raise MissionFormatError(
-            f"{len(items)} {name} items are more than MAVLink counts ({_MOST_ITEMS}); {_NOTHING_SENT}"
+            f"{len(items)} {name} items are too many: MAVLink counts to {_MOST_ITEMS}; {_NOTHING_SENT}"
         )
     for seq, item in enumerate(items):
         if found := _misfit(item, allow_infinite=allow_infinite):

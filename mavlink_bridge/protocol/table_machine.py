@@ -35,7 +35,7 @@ class TableMachine(Outbox, Generic[StateT, EventT]):
     Parameters
     ----------
     table : mapping
-        For each state the events it accepts and where they lead; a state that accepts none is an end.
+        For each state the events it accepts and where they lead; a state that accepts none, or is not there, is an end.
     state : StateT
         Where the machine begins.
     """
@@ -48,7 +48,7 @@ class TableMachine(Outbox, Generic[StateT, EventT]):
     @property
     def is_done(self) -> bool:
         """Whether the machine has come to its outcome and wants no more calls."""
-        return not self._table[self.state]
+        return not self._table.get(self.state)
 
     @property
     def progress(self) -> tuple[int, int]:
@@ -57,7 +57,7 @@ class TableMachine(Outbox, Generic[StateT, EventT]):
 
     def _move(self, event: EventT) -> bool:
         """Go where the table leads; False if the state does not accept the event."""
-        following = self._table[self.state].get(event)
+        following = self._table.get(self.state, {}).get(event)
         if following is None:
             return False
         self.state = following

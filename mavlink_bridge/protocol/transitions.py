@@ -2,7 +2,7 @@
 
 Two rules: all transitions live here, and this file knows nothing of messages or time. A machine turns what it receives, and the
 passing of time, into an event; the table of its states holds where that leads. An event that a state does not list is ignored
-there. The machines run by these tables and the state diagrams in the documentation are drawn from them.
+there; a state that a table does not list is an end. The machines run by these tables and the state diagrams in the documentation are drawn from them.
 
 How a transfer goes wrong, and its event: the vehicle is silent for longer than our patience (SILENCE), it is busy with
 another ground station (DENIED) for longer than our patience (RIVAL_STAYS), or it refuses (REFUSAL).
@@ -11,6 +11,10 @@ another ground station (DENIED) for longer than our patience (RIVAL_STAYS), or i
 from __future__ import annotations
 
 from enum import StrEnum, auto
+from typing import TypeVar
+
+StateT = TypeVar("StateT", bound=StrEnum)
+EventT = TypeVar("EventT", bound=StrEnum)
 
 
 class DownloadState(StrEnum):
@@ -44,9 +48,7 @@ class DownloadEvent(StrEnum):
 
 
 DOWNLOAD = {
-    DownloadState.IDLE: {
-        DownloadEvent.START: DownloadState.COUNTING,
-    },
+    DownloadState.IDLE: {DownloadEvent.START: DownloadState.COUNTING},
     DownloadState.COUNTING: {
         DownloadEvent.COUNT: DownloadState.FETCHING,
         DownloadEvent.COUNT_ZERO: DownloadState.COMPLETE,
@@ -67,11 +69,6 @@ DOWNLOAD = {
         DownloadEvent.RETRY: DownloadState.COUNTING,
         DownloadEvent.RIVAL_STAYS: DownloadState.BUSY,
     },
-    DownloadState.COMPLETE: {},
-    DownloadState.REFUSED: {},
-    DownloadState.BUSY: {},
-    DownloadState.SILENT: {},
-    DownloadState.TOO_SLOW: {},
 }
 
 
@@ -98,9 +95,7 @@ class UndisturbedReadEvent(StrEnum):
 
 
 UNDISTURBED_READ = {
-    UndisturbedReadState.IDLE: {
-        UndisturbedReadEvent.START: UndisturbedReadState.READING,
-    },
+    UndisturbedReadState.IDLE: {UndisturbedReadEvent.START: UndisturbedReadState.READING},
     UndisturbedReadState.READING: {
         UndisturbedReadEvent.READ: UndisturbedReadState.COMPLETE,
         UndisturbedReadEvent.DISTURBANCE: UndisturbedReadState.SETTLING,
@@ -111,9 +106,6 @@ UNDISTURBED_READ = {
         UndisturbedReadEvent.QUIET: UndisturbedReadState.READING,
         UndisturbedReadEvent.OTHERS_STAY: UndisturbedReadState.DISTURBED,
     },
-    UndisturbedReadState.COMPLETE: {},
-    UndisturbedReadState.FAILED: {},
-    UndisturbedReadState.DISTURBED: {},
 }
 
 
@@ -147,9 +139,7 @@ class UploadEvent(StrEnum):
 
 
 UPLOAD = {
-    UploadState.IDLE: {
-        UploadEvent.START: UploadState.ANNOUNCED,
-    },
+    UploadState.IDLE: {UploadEvent.START: UploadState.ANNOUNCED},
     UploadState.ANNOUNCED: {
         UploadEvent.REQUEST: UploadState.SENDING,
         UploadEvent.ACCEPTED: UploadState.ACCEPTED,
@@ -171,10 +161,6 @@ UPLOAD = {
         UploadEvent.RETRY: UploadState.ANNOUNCED,
         UploadEvent.RIVAL_STAYS: UploadState.BUSY,
     },
-    UploadState.ACCEPTED: {},
-    UploadState.REFUSED: {},
-    UploadState.BUSY: {},
-    UploadState.UNCONFIRMED: {},
 }
 
 
@@ -234,7 +220,7 @@ VERIFIED_UPLOAD = {
         VerifiedUploadEvent.TIME_IS_UP: VerifiedUploadState.NOT_STARTED,
     },
     VerifiedUploadState.STORING_BACKUP: {
-        VerifiedUploadEvent.BACKUP_STORED: VerifiedUploadState.CHECKING_VEHICLE,
+        VerifiedUploadEvent.BACKUP_STORED: VerifiedUploadState.CHECKING_VEHICLE
     },
     VerifiedUploadState.CHECKING_VEHICLE: {
         VerifiedUploadEvent.CLEAR_TO_WRITE: VerifiedUploadState.PUSHING,
@@ -275,12 +261,6 @@ VERIFIED_UPLOAD = {
         VerifiedUploadEvent.OTHERS_WRITE: VerifiedUploadState.UNKNOWN,
         VerifiedUploadEvent.TIME_IS_UP: VerifiedUploadState.UNKNOWN,
     },
-    VerifiedUploadState.VERIFIED: {},
-    VerifiedUploadState.UNCHANGED: {},
-    VerifiedUploadState.RESTORED: {},
-    VerifiedUploadState.DIFFERENT: {},
-    VerifiedUploadState.UNKNOWN: {},
-    VerifiedUploadState.NOT_STARTED: {},
 }
 
 
@@ -329,8 +309,6 @@ PARAMETERS = {
         ParameterEvent.GIVEN_UP: ParameterState.DONE,
         ParameterEvent.SILENCE: ParameterState.SILENT,
     },
-    ParameterState.DONE: {},
-    ParameterState.SILENT: {},
 }
 
 
@@ -354,9 +332,7 @@ class CommandEvent(StrEnum):
 
 
 COMMAND = {
-    CommandState.IDLE: {
-        CommandEvent.START: CommandState.SENT,
-    },
+    CommandState.IDLE: {CommandEvent.START: CommandState.SENT},
     CommandState.SENT: {
         CommandEvent.PROGRESS: CommandState.IN_PROGRESS,
         CommandEvent.RESULT: CommandState.DONE,
@@ -367,8 +343,6 @@ COMMAND = {
         CommandEvent.RESULT: CommandState.DONE,
         CommandEvent.SILENCE: CommandState.SILENT,
     },
-    CommandState.DONE: {},
-    CommandState.SILENT: {},
 }
 
 
@@ -391,16 +365,12 @@ class VersionEvent(StrEnum):
 
 
 VERSION = {
-    VersionState.IDLE: {
-        VersionEvent.START: VersionState.ASKING,
-    },
+    VersionState.IDLE: {VersionEvent.START: VersionState.ASKING},
     VersionState.ASKING: {
         VersionEvent.VERSION: VersionState.TOLD,
         VersionEvent.GIVEN_UP: VersionState.NOT_TOLD,
         VersionEvent.SILENCE: VersionState.NOT_TOLD,
     },
-    VersionState.TOLD: {},
-    VersionState.NOT_TOLD: {},
 }
 
 
@@ -426,9 +396,7 @@ class FindEvent(StrEnum):
 
 
 FIND = {
-    FindState.IDLE: {
-        FindEvent.START: FindState.LISTENING,
-    },
+    FindState.IDLE: {FindEvent.START: FindState.LISTENING},
     FindState.LISTENING: {
         FindEvent.HEARD: FindState.COMPARING,
         FindEvent.NAMED_ONE_HEARD: FindState.FOUND,
@@ -442,8 +410,6 @@ FIND = {
         FindEvent.CHOICE_FAILED: FindState.NOT_FOUND,
         FindEvent.IDENTITY_TAKEN: FindState.NOT_FOUND,
     },
-    FindState.FOUND: {},
-    FindState.NOT_FOUND: {},
 }
 
 
@@ -476,10 +442,6 @@ MODE_SWITCH: dict[SwitchState, dict[SwitchEvent, SwitchState]] = {
         SwitchEvent.SEEN: SwitchState.SEEN,
         SwitchEvent.SILENCE: SwitchState.UNANSWERED,
     },
-    SwitchState.ACCEPTED: {},
-    SwitchState.SEEN: {},
-    SwitchState.REFUSED: {},
-    SwitchState.UNANSWERED: {},
 }
 MODE_SWITCH_UNTIL_SEEN: dict[SwitchState, dict[SwitchEvent, SwitchState]] = {
     **MODE_SWITCH,
@@ -495,15 +457,21 @@ MODE_SWITCH_UNTIL_SEEN: dict[SwitchState, dict[SwitchEvent, SwitchState]] = {
 }
 """The same where the answer may be that to another command: only a heartbeat that shows the mode ends it."""
 
+
+def _with_ends(table: dict[StateT, dict[EventT, StateT]]) -> dict[StateT, dict[EventT, StateT]]:
+    """Return a table with a row for each state."""
+    return {state: table.get(state, {}) for state in type(next(iter(table)))}
+
+
 TABLES = {
-    "find": FIND,
-    "download": DOWNLOAD,
-    "undisturbed_read": UNDISTURBED_READ,
-    "upload": UPLOAD,
-    "verified_upload": VERIFIED_UPLOAD,
-    "parameters": PARAMETERS,
-    "command": COMMAND,
-    "mode_switch": MODE_SWITCH,
-    "version": VERSION,
+    "find": _with_ends(FIND),
+    "download": _with_ends(DOWNLOAD),
+    "undisturbed_read": _with_ends(UNDISTURBED_READ),
+    "upload": _with_ends(UPLOAD),
+    "verified_upload": _with_ends(VERIFIED_UPLOAD),
+    "parameters": _with_ends(PARAMETERS),
+    "command": _with_ends(COMMAND),
+    "mode_switch": _with_ends(MODE_SWITCH),
+    "version": _with_ends(VERSION),
 }
 """All tables by name, for the documentation and the tests."""

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
     from pathlib import Path
 
-_WORDING: Final = ("log", "severity", "text", "warnings")
+_WORDING: Final = ("log", "severity", "text", "info", "warnings")
 _DETAILS: Final = ("details", "path", "waypoints", "drawn_clearance_m", "duration_s")
 """Left out of recorded expectations: wording, and details of routes and errors, which may change for the better."""
 
@@ -54,7 +54,7 @@ def read_expectation(path: Path) -> list[dict[str, Any]]:
     except OSError as error:
         raise LogError(f"{path} cannot be read: {error.strerror}", file=str(path)) from None
     except UnicodeDecodeError:
-        raise LogError(f"{path}: not JSON lines: not text", file=str(path)) from None
+        raise LogError(f"{path} is not a text file; expected JSON lines", file=str(path)) from None
     events = []
     for number, line in enumerate(lines, start=1):
         if not line.strip():

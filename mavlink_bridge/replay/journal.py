@@ -154,7 +154,9 @@ def read_journal(path: Path) -> Journal:
         raise LogError(f"{path} cannot be read: {error.strerror}", file=str(path)) from None
     except (ValueError, KeyError, TypeError, IndexError, MissionError) as error:
         line_number = len(calls) + len(events) + 2
-        raise LogError(f"{path}: line {line_number} is not a journal's: {error!r}", file=str(path)) from None
+        raise LogError(
+            f"{path}: line {line_number} is not a journal entry: {error!r}", file=str(path)
+        ) from None
     return Journal(orders, described, tuple(calls), tuple(events))
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import struct
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.simulator.parameters import float32
@@ -69,11 +70,10 @@ def _hundredths(value: float) -> float:
 
 
 def _fields(*fields: Callable[[float], float]) -> Callable[[Params], Params]:
-    """Return what keeps the first parameters each in a field, and no others."""
-    keepers = (*fields, *[_none] * (4 - len(fields)))
+    """Return what keeps each of the four parameters in its field."""
 
     def keep(params: Params) -> Params:
-        a, b, c, d = (keeper(param) for keeper, param in zip(keepers, params, strict=True))
+        a, b, c, d = (field(param) for field, param in zip(fields, params, strict=True))
         return (a, b, c, d)
 
     return keep
@@ -118,72 +118,28 @@ def _kept_attitude(params: Params) -> Params:
     )
 
 
-_nothing, _first, _float = _fields(), _fields(_uint16), _fields(float32)
+_FIELDS = {
+    field.__name__.lstrip("_"): field
+    for field in (_none, _uint8, _uint16, _int8, _int16, _whole, _float16, float32, _hundredths)
+}
 
-KEPT: dict[int, Callable[[Params], Params]] = {
-    Command.NAV_WAYPOINT: _first,
+
+def _kept_in_fields() -> dict[int, Callable[[Params], Params]]:
+    """Return the commands that keep each parameter in a field of its own, from the table beside this module."""
+    table = Path(__file__).with_name("stored_commands.csv").read_text(encoding="ascii")
+    rows = [line.split(",") for line in table.splitlines()[1:]]
+    return {
+        int(command): _fields(*(_FIELDS[name or "none"] for name in names)) for command, _, *names in rows
+    }
+
+
+KEPT: dict[int, Callable[[Params], Params]] = _kept_in_fields() | {
     Command.NAV_LOITER_UNLIM: _kept_radius,
     Command.NAV_LOITER_TURNS: _kept_turns,
     Command.NAV_LOITER_TIME: _kept_time,
-    Command.NAV_RETURN_TO_LAUNCH: _nothing,
     Command.NAV_LAND: _kept_land,
-    Command.NAV_TAKEOFF: _first,
-    30: _first,  # NAV_CONTINUE_AND_CHANGE_ALT
     31: _kept_loiter_to_alt,  # NAV_LOITER_TO_ALT
-    82: _first,  # NAV_SPLINE_WAYPOINT
-    83: _fields(float32, float32, _uint8),  # NAV_ALTITUDE_WAIT
-    84: _nothing,  # NAV_VTOL_TAKEOFF
-    85: _first,  # NAV_VTOL_LAND
-    Command.NAV_GUIDED_ENABLE: _first,
-    Command.NAV_DELAY: _fields(float32, _int8, _int8, _int8),
-    94: _fields(_hundredths),  # NAV_PAYLOAD_PLACE
-    Command.CONDITION_DELAY: _float,
-    Command.CONDITION_DISTANCE: _float,
-    115: _fields(float32, float32, _int8, _uint8),  # CONDITION_YAW
-    Command.DO_JUMP: _fields(_uint16, _int16),
-    Command.DO_CHANGE_SPEED: _fields(_whole, float32, float32),
-    Command.DO_SET_HOME: _first,
-    181: _fields(_uint8, _uint8),  # DO_SET_RELAY
-    182: _fields(_uint8, _int16, float32),  # DO_REPEAT_RELAY
-    183: _fields(_uint8, _uint16),  # DO_SET_SERVO
-    184: _fields(_uint8, _uint16, _int16, float32),  # DO_REPEAT_SERVO
-    188: _nothing,  # DO_RETURN_PATH_START
-    189: _nothing,  # DO_LAND_START
-    191: _nothing,  # DO_GO_AROUND
-    193: _first,  # DO_PAUSE_CONTINUE
-    Command.DO_SET_REVERSE: _first,
-    195: _first,  # DO_SET_ROI_LOCATION
-    197: _first,  # DO_SET_ROI_NONE
-    201: _first,  # DO_SET_ROI
-    202: _fields(_uint8, _uint16, _uint8, _uint16),  # DO_DIGICAM_CONFIGURE
-    203: _fields(_uint8, _uint8, _int8, _uint8),  # DO_DIGICAM_CONTROL
-    205: _fields(float32, float32, float32),  # DO_MOUNT_CONTROL
-    206: _fields(float32, _none, _uint8),  # DO_SET_CAM_TRIGG_DIST
-    Command.DO_FENCE_ENABLE: _first,
-    208: _first,  # DO_PARACHUTE
-    210: _first,  # DO_INVERTED_FLIGHT
-    211: _fields(_uint8, _uint8),  # DO_GRIPPER
-    212: _first,  # DO_AUTOTUNE_ENABLE
-    Command.NAV_SET_YAW_SPEED: _fields(float32, float32, _uint8),
-    215: _first,  # DO_SET_RESUME_REPEAT_DIST
-    216: _first,  # DO_SPRAYER
-    217: _fields(_uint16, float32, float32, float32),  # DO_SEND_SCRIPT_MESSAGE
-    218: _fields(_uint16, _uint8),  # DO_AUX_FUNCTION
-    222: _fields(_uint16, float32, float32, float32),  # DO_GUIDED_LIMITS
     223: _kept_engine,  # DO_ENGINE_CONTROL
-    531: _fields(_uint8, float32),  # SET_CAMERA_ZOOM
-    532: _fields(_uint8, float32),  # SET_CAMERA_FOCUS
-    534: _fields(_uint8, _uint8, _uint8),  # SET_CAMERA_SOURCE
-    600: _first,  # JUMP_TAG
-    601: _fields(_uint16, _int16),  # DO_JUMP_TAG
-    1000: _fields(_int8, _int16, _int8, _int8),  # DO_GIMBAL_MANAGER_PITCHYAW
-    2000: _fields(_uint8, float32, _uint16, _uint16),  # IMAGE_START_CAPTURE
-    2001: _first,  # IMAGE_STOP_CAPTURE
-    2500: _fields(_uint8),  # VIDEO_START_CAPTURE
-    2501: _fields(_uint8),  # VIDEO_STOP_CAPTURE
-    3000: _fields(_uint8),  # DO_VTOL_TRANSITION
-    42600: _fields(_uint8, _uint8, float32, float32),  # DO_WINCH
-    42702: _fields(_uint8, _uint8, _float16, _float16),  # NAV_SCRIPT_TIME
     42703: _kept_attitude,  # NAV_ATTITUDE_TIME
 }
 """What ArduPilot keeps of a mission command's four parameters; a command that is not here is unsupported."""

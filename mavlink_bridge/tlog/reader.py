@@ -47,7 +47,7 @@ class LogEntry:
 class TlogReader:
     """The frames of a telemetry log, in its order. Can be iterated over again and again.
 
-    Damage (see `Damage`) is passed over and counted. Frames that a log holds twice come twice. Signatures are not verified.
+    Damage (see `Damage`) is skipped and counted. Frames that a log holds twice come twice. Signatures are not verified.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ from shapely.ops import nearest_points
 
 from missions.checking.execution import CIRCLE_M, Course, CourseLeg, follow_mission
 from missions.checking.forecast import forecast_drive
-from missions.checking.holding import hold_check, hold_warnings
+from missions.checking.holding import hold_check, hold_info, hold_warnings
 from missions.checking.mission_end import crossed_zones, end_warnings, return_place, return_warnings
 from missions.drive_model import Envelope, extrapolated
 from missions.errors import SituationError, StartBlockedError
@@ -62,7 +62,7 @@ class CheckedLeg:
     length_m : float
         Its drawn length.
     drawn_clearance_m : float
-        The least distance of its straight line to forbidden ground; 0 where it crosses it, infinite without a fence.
+        The least distance of its straight line to any fence; 0 where it crosses one, infinite without a fence.
     driven_clearance_m : float
         The least distance predicted for the driven track, the corner at its end included.
     asked_m : float
@@ -70,9 +70,9 @@ class CheckedLeg:
     fence : str or None
         The zone that is nearest.
     at : LatLon or None
-        Where on the leg it is nearest; where it crosses forbidden ground, the first place of that.
+        Where on the leg it is nearest; where it crosses a fence, the first place where it does.
     crosses : tuple of str
-        The zones whose forbidden ground the straight line crosses, and seams of a union before which the vehicle stops.
+        The zones that the straight line crosses, and seams of a union before which the vehicle stops.
     time_s : float
         Time from the place before to this leg's end.
     """
@@ -114,7 +114,7 @@ class MissionCheck:
     mission : Mission
         What was checked.
     course : Course
-        What it has the vehicle drive.
+        The legs that it makes the vehicle drive.
     legs : tuple of CheckedLeg
         Each as often as it is driven.
     clearance_m : float
@@ -123,10 +123,12 @@ class MissionCheck:
         What is known to end in the fence, whatever the legs keep; with any of these the mission does not hold.
     warnings : tuple of str
         What else a person should know.
+    info : tuple of str
+        What was added to be safe.
     envelope : Envelope
-        The band that the vehicle is predicted to stay in.
+        The predicted corridor.
     extrapolated : tuple of str
-        In what the drive lies outside what was measured: then it is predicted, not promised, that the mission holds.
+        Why the drive lies outside the measured range: then it is predicted, not promised, that the mission holds.
     hold : HoldCheck or None
         What HOLD does on the way.
     """
@@ -142,6 +144,7 @@ class MissionCheck:
     vehicle: Vehicle
     envelope: Envelope
     extrapolated: tuple[str, ...] = ()
+    info: tuple[str, ...] = ()
     hold: HoldCheck | None = None
 
     @property
@@ -161,7 +164,7 @@ class MissionCheck:
 
     @property
     def duration_s(self) -> float:
-        """The time for all of it; of a mission without end for one time round."""
+        """The time for all of it; for one round of a mission that repeats without end."""
         return self.envelope.duration_s
 
     @property
@@ -207,6 +210,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
     FenceError, VehicleError, InvalidPositionError
         The fence, a parameter or a position cannot be used.
     """
+    # Long by its docstring and by the warnings, which stand in the order in which they are told.
     fence = known_fence(situation)
     request = replace(request, widest=False, speed_mps=None, corner_allowance_m=None)
     vehicle = known_vehicle(situation, request)
@@ -250,6 +254,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
         envelope=forecast,
         extrapolated=reasons,
         hold=hold,
+        info=(*asked.info, *hold_info(hold)),
     )
 
 
@@ -279,6 +284,7 @@ def plan_of(check: MissionCheck, situation: Situation, *, method: str = "optimal
         envelope=check.envelope,
         home=home,
         warnings=check.warnings,
+        info=check.info,
     )
 
 

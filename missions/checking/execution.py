@@ -160,13 +160,7 @@ def follow_mission(
         walk.notes.append(
             f"the mission has more than {most_legs} legs, jumps included; length and time count each jump {_FEW_TIMES} times"
         )
-    return Course(
-        tuple(walk.legs),
-        tuple(dict.fromkeys(walk.troubles)),
-        tuple(dict.fromkeys(walk.notes)),
-        walk.is_endless,
-        walk.ends_in_loiter,
-    )
+    return walk.course()
 
 
 @dataclass
@@ -193,6 +187,10 @@ class _Execution:
     notes: list[str] = field(default_factory=list)
     is_endless: bool = False
     ends_in_loiter: bool = False
+
+    def course(self) -> Course:
+        troubles, notes = tuple(dict.fromkeys(self.troubles)), tuple(dict.fromkeys(self.notes))
+        return Course(tuple(self.legs), troubles, notes, self.is_endless, self.ends_in_loiter)
 
     def run(self) -> None:
         index: int | None = 0

@@ -69,14 +69,20 @@ def hold_check(band: Envelope, vehicle: Vehicle, ground: Ground, stops: Stops) -
 
 
 def with_hold(plan: Plan, situation: Situation) -> Plan:
-    """Return a plan with what HOLD does on its route, and a warning where one would end beyond a fence."""
+    """Return a plan with what HOLD does on its route: a warning where one would end beyond a fence, else so much as info."""
     hold = hold_check(plan.envelope, plan.vehicle, plan.ground, situation.stops)
-    return replace(plan, hold=hold, warnings=(*plan.warnings, *hold_warnings(hold)))
+    info, warnings = (*plan.info, *hold_info(hold)), (*plan.warnings, *hold_warnings(hold))
+    return replace(plan, hold=hold, info=info, warnings=warnings)
 
 
 def hold_warnings(hold: HoldCheck | None) -> list[str]:
     """Return a warning where a HOLD would end beyond a fence."""
     return [hold.sentence] if hold is not None and hold.worst is not None else []
+
+
+def hold_info(hold: HoldCheck | None) -> list[str]:
+    """Return how far the vehicle rolls on, where every HOLD ends within the fence."""
+    return [hold.sentence] if hold is not None and hold.worst is None else []
 
 
 def _roll_out(

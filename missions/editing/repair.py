@@ -141,7 +141,7 @@ def repaired_plan(
         raise SituationError("no mission to repair; use --via-mission FILE")
     repair = repair_mission(mission, situation, request, should_stop=should_stop)
     made = plan_of(repair.check, situation, method=request.method)
-    return replace(made, warnings=(*repair.changes, *made.warnings))
+    return replace(made, info=(*repair.changes, *made.info))
 
 
 def repair_mission(
@@ -153,8 +153,8 @@ def repair_mission(
 ) -> Repair:
     """Replace the legs of a mission that break the clearance by routes around the fences.
 
-    A route's corners bear upon the legs beside it, so that what was repaired is checked again as a whole, and legs that break then, or
-    stand beside one that still does, are routed too.
+    A route's corners affect the legs beside it, so the repaired mission is checked again as a whole; legs that fail then, or stand
+    beside one that still does, are replaced too.
 
     Parameters
     ----------

@@ -20,12 +20,8 @@ if TYPE_CHECKING:
 
 def lead_away_remarks(found: DrivenRoute, least_m: float) -> list[str]:
     """Return remarks on how near the start is to a fence, and what the route does about it."""
-    if not found.lead_away:
+    if not found.lead_away or found.start_clearance_m < 0:
         return []
-    if found.start_clearance_m < 0:
-        return [
-            f"the start is inside an exclusion or outside the fence, {-found.start_clearance_m:.2f} m from the allowed area: leg 1 drives out of it"
-        ]
     if found.lead_away_m is None:
         distance = f"{metres(found.start_clearance_m)} from a fence, nearer than {metres(least_m)}"
         return [f"the start stands {distance}: the route first leads away, never nearer than that"]
@@ -38,8 +34,17 @@ def lead_away_remarks(found: DrivenRoute, least_m: float) -> list[str]:
     ]
 
 
-def moved_target_remarks(targets: Sequence[LatLon], reached: Sequence[LatLon]) -> list[str]:
-    """Return remarks on which targets were moved, and how far."""
+def escape_info(found: DrivenRoute) -> list[str]:
+    """Return from where a route drives out, as was asked for."""
+    if not found.lead_away or found.start_clearance_m >= 0:
+        return []
+    return [
+        f"the start is inside an exclusion or outside the fence, {-found.start_clearance_m:.2f} m from the allowed area: leg 1 drives out of it"
+    ]
+
+
+def moved_target_info(targets: Sequence[LatLon], reached: Sequence[LatLon]) -> list[str]:
+    """Return which targets were moved, as was asked for, and how far."""
     return [
         moved_text(f"target {asked}", distance_m(asked, found), found)
         for asked, found in zip(targets, reached, strict=True)

@@ -10,7 +10,7 @@ import numpy as np
 from missions.checking.forecast import forecast_drive
 from missions.errors import PlanCheckError, StartBlockedError
 from missions.finishing.mission_lines import Lines, check_lines, finished, mission_items
-from missions.finishing.remarks import drive_remarks, lead_away_remarks, moved_target_remarks
+from missions.finishing.remarks import drive_remarks, escape_info, lead_away_remarks, moved_target_info
 from missions.geo import rounded
 from missions.ground.from_situation import ground_for, heading_at, route_ends
 from missions.ground.known_fence import fence_warnings, known_fence
@@ -74,7 +74,6 @@ def plan_route(
     items, seqs = mission_items(lines, vehicle.speed_mps, request.speed_mps)
     reached = tuple(rounded(ground.frame.to_lat_lon(target)) for target in found.targets)
     warnings += lead_away_remarks(found, asked.drawn_m)
-    warnings += moved_target_remarks(targets, reached)
     warnings += drive_remarks(vehicle, heading_deg, asked, driven_m, found)
     return Plan(
         items=items,
@@ -99,6 +98,7 @@ def plan_route(
         vehicle=vehicle,
         home=situation.home.value if situation.home else None,
         warnings=tuple(dict.fromkeys(warnings)),
+        info=(*asked.info, *escape_info(found), *moved_target_info(targets, reached)),
     )
 
 

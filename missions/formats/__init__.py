@@ -112,7 +112,7 @@ FORMATS: dict[str, Format] = {
 
 
 def read_situation(path: Path | str, choices: Choices = NO_CHOICES) -> Situation:
-    """Read what a file holds: fence, mission, rally points, home, parameters; and remarks on what was passed over.
+    """Read what a file holds: fence, mission, rally points, home, parameters; and remarks on what was skipped or assumed.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Choices:
-    """What is said beside a file.
+    """What the user says of a map file's features, where the file does not.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ def within_reach(fence: Fence) -> tuple[Fence, int, int]:
     inclusions = [zone for zone in fence.zones if zone.kind is ZoneKind.INCLUSION]
     if not inclusions:
         return fence, 0, 0
-    origin_deg = _places(inclusions[0])[0].lon_deg
+    origin_deg = inclusions[0].places[0].lon_deg
     fields = [_box(zone, origin_deg, REACH_M) for zone in inclusions]
     near: list[Zone] = []
     left_out = cut = 0
@@ -56,7 +56,7 @@ def within_reach(fence: Fence) -> tuple[Fence, int, int]:
 
 def is_wide(*zones: Zone) -> bool:
     """Return whether zones reach together over more than `MOST_WIDE_DEG`."""
-    origin_deg = _places(zones[0])[0].lon_deg
+    origin_deg = zones[0].places[0].lon_deg
     south, north, west, east = _around([_box(zone, origin_deg) for zone in zones])
     return max(north - south, east - west) > MOST_WIDE_DEG
 
@@ -79,10 +79,6 @@ def _cut(zone: PolygonZone, origin_deg: float, reach: _Box) -> list[Zone]:
     ]
 
 
-def _places(zone: Zone) -> tuple[LatLon, ...]:
-    return zone.vertices if isinstance(zone, PolygonZone) else (zone.centre,)
-
-
 def _lons(places: tuple[LatLon, ...], origin_deg: float) -> list[float]:
     """Return longitudes from an origin on, all on the same turn as the first."""
     first_deg = wrap_lon_deg(places[0].lon_deg - origin_deg)
@@ -90,7 +86,7 @@ def _lons(places: tuple[LatLon, ...], origin_deg: float) -> list[float]:
 
 
 def _box(zone: Zone, origin_deg: float, wider_m: float = 0.0) -> _Box:
-    places = _places(zone)
+    places = zone.places
     lats, lons = [place.lat_deg for place in places], _lons(places, origin_deg)
     lat_deg = (wider_m + (zone.radius_m if isinstance(zone, CircleZone) else 0.0)) / _M_PER_DEG
     furthest_deg = min(89.0, max(map(abs, lats)) + lat_deg)

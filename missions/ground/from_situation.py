@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from missions.errors import NoRouteError, SituationError
-from missions.fence import PolygonZone
 from missions.geo import distance_m
 from missions.ground.frame import check_latitude, frame_around
 from missions.ground.ground import Ground, check_ground, lay_out
@@ -66,14 +65,9 @@ def ground_for(situation: Situation, vehicle: Vehicle, ends: Sequence[LatLon]) -
         As `missions.planning.plan.plan`.
     """
     fence = known_fence(situation)
-    positions = [
-        position
-        for zone in fence.zones
-        for position in (zone.vertices if isinstance(zone, PolygonZone) else (zone.centre,))
-    ]
-    frame = frame_around(positions)
+    frame = frame_around(fence.places)
     home = situation.home.value if situation.home and vehicle.fence.enforces_home_circle else None
-    named = [*(("", position) for position in positions), *([("home ", home)] if home else [])]
+    named = [*(("", position) for position in fence.places), *([("home ", home)] if home else [])]
     for name, position in named:
         if (away_m := distance_m(frame.origin, position)) > MAX_FIELD_M:
             raise SituationError(f"{name}{_too_far(position, frame.origin, away_m)}", distance_m=away_m)

@@ -38,12 +38,7 @@ def merged_fence(fence: Fence) -> Fence:
     numbers = [number for number, zone in enumerate(fence.zones) if zone.kind is ZoneKind.INCLUSION]
     if len(numbers) < 2:
         return fence
-    places = [
-        place
-        for zone in fence.zones
-        for place in (zone.vertices if isinstance(zone, PolygonZone) else (zone.centre,))
-    ]
-    frame = frame_around(places)
+    frame = frame_around(fence.places)
     drawn = lay_out(fence, frame, union=True)
     inside = drawn.keep_in.buffer(-_RESERVE_M, join_style="mitre").simplify(_SIMPLER_M)
     if not isinstance(inside, Polygon) or inside.is_empty:

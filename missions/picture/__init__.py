@@ -47,10 +47,10 @@ def check_picture_format(path: Path | str) -> None:
     library = _LIBRARIES.get(path.suffix.lower())
     if library is None:
         raise MissionFormatError(
-            f"{path}: no picture format for the suffix {path.suffix!r}; known are {', '.join(PICTURE_SUFFIXES)}, "
+            f"{path}: {path.suffix!r} is not a supported picture format; supported: {', '.join(PICTURE_SUFFIXES)}, "
             f"and {TERMINAL} for a sketch in the terminal",
             file=str(path),
-            advice="choose one of these",
+            advice="choose another file extension",
         )
     if find_spec(library) is None:
         raise MissionFormatError(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from missions.errors import MissionFormatError
-from missions.fence import Fence, PolygonZone
+from missions.fence import Fence
 from missions.ground.frame import frame_around
 from missions.ground.ground import lay_out
 from missions.picture.scene import Mark, PictureScene, TrackLine, no_points
@@ -57,13 +57,8 @@ def drive_scene(
         There is nothing to draw.
     """
     fence = fence or Fence(())
-    corners = [
-        place
-        for zone in fence.zones
-        for place in (zone.vertices if isinstance(zone, PolygonZone) else (zone.centre,))
-    ]
     driven = [place for _, positions in parts for place in positions]
-    places = [*corners, *driven, *(at for _, at in mission), *targets]
+    places = [*fence.places, *driven, *(at for _, at in mission), *targets]
     if not places:
         raise MissionFormatError("nothing to draw: no fence, no track, no mission and no target")
     frame = frame_around(places)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from html import escape
+from pathlib import Path
+from string import Template
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -39,39 +41,11 @@ _CONFIG = {
     "showSendToCloud": False,
     "modeBarButtonsToRemove": ["sendChartToCloud", "sendDataToCloud", "select2d", "lasso2d"],
 }
-_PAGE = """<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{title}</title>
-<style>
-html, body {{ height: 100%; margin: 0; }}
-body {{ display: flex; flex-direction: column; overflow: hidden; font: 16px/1.35 "Open Sans", verdana, arial, sans-serif; color: #222; }}
-h1 {{ font-size: 1rem; font-weight: normal; margin: 0.6rem 1rem 0; }}
-#picture {{ flex: 1; min-height: 0; }}
-#picture > div {{ height: 100%; }}
-</style>
-</head>
-<body>
-<h1>{heading}</h1>
-<div id="picture">{plot}</div>
-</body>
-</html>
-"""
-_RESCALE = """
-const plot = document.getElementById("plan"), bar = %d;
-plot.on("plotly_relayout", () => {
-  const [west, east] = plot._fullLayout.xaxis.range, [south, north] = plot._fullLayout.yaxis.range;
-  const most = Math.abs(east - west) / 5, power = 10 ** Math.floor(Math.log10(most));
-  const length = [5, 2, 1].map((step) => step * power).find((metres) => metres <= most);
-  const x = west + (east - west) / 50, y = south + (north - south) / 50;
-  if (plot.data[bar].x[0] === x && plot.data[bar].y[0] === y && plot.data[bar].x[1] === x + length) return;
-  const text = " " + Number(length.toPrecision(1)) + " m";
-  Plotly.restyle(plot, {x: [[x, x + length]], y: [[y, y]], text: [["", text]]}, [bar]);
-});
-"""
-"""Keeps the scale bar in the corner, and of a round length, wherever the page is moved and zoomed to."""
+_PAGE, _RESCALE = (
+    Template(Path(__file__).with_name(name).read_text(encoding="utf-8"))
+    for name in ("page.html", "scale_bar.js")
+)
+"""The page, and what keeps the scale bar in the corner, and of a round length, wherever the page is moved and zoomed to."""
 
 # The picture's size and place in pixels and shares of it: by eye.
 _NORTH = {
@@ -97,10 +71,10 @@ def scene_page(scene: PictureScene) -> bytes:
         div_id="plan",
         default_height="100%",
         config=_CONFIG,
-        post_script=_RESCALE % bar,
+        post_script=_RESCALE.substitute(bar=bar),
     )
     lines = [plain_text(line) for line in scene.title]
-    page = _PAGE.format(title=f"{lines[0]} – PBPP Rover", heading="<br>".join(lines), plot=plot)
+    page = _PAGE.substitute(title=f"{lines[0]} – PBPP Rover", heading="<br>".join(lines), plot=plot)
     return bytes(page, "utf-8")
 
 

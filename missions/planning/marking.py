@@ -20,10 +20,8 @@ def marked(plan: Plan, request: Request) -> Plan:
     reasons = extrapolated(plan.vehicle, plan.envelope, *plan.speeds)
     if not reasons or plan.clearance_m is None:
         return plan
-    said = _TRUSTED if request.trusts_model else _NOTHING
-    return replace(
-        plan,
-        clearance_m=plan.clearance_m if request.trusts_model else None,
-        extrapolated=reasons,
-        warnings=(*dict.fromkeys((*plan.warnings, *reasons)), said),
-    )
+    if request.trusts_model:
+        others = tuple(warning for warning in plan.warnings if warning not in reasons)
+        return replace(plan, extrapolated=reasons, warnings=others, info=(*plan.info, *reasons, _TRUSTED))
+    warnings = (*dict.fromkeys((*plan.warnings, *reasons)), _NOTHING)
+    return replace(plan, clearance_m=None, extrapolated=reasons, warnings=warnings)

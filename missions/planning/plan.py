@@ -95,7 +95,8 @@ def _with_room(
         asked_m=planned.asked_m,
         blocks=planned.blocks,
         home=planned.home,
-        warnings=(*planned.warnings, left_out_text(left_out, most + 1)),
+        warnings=planned.warnings,
+        info=(*planned.info, left_out_text(left_out, most + 1)),
     )
 
 

@@ -71,16 +71,15 @@ def plan_tour(situation: Situation, request: Tour, *, should_stop: Callable[[], 
         As `missions.planning.plan.plan`; NoRouteError too where RTL at the end would break the promise.
     """
     start, targets = route_ends(situation, request)
-    said: list[str] = []
+    found: TargetOrder | None = None
     if request.order is Order.BEST and len(targets) > 1:
         found = target_order(situation, request, should_stop=should_stop)
         targets = tuple(targets[index] for index in found.indices)
-        said = _order_text(found)
     if request.comes_back:
         targets = (*targets, situation.home.value if situation.home else start)
     planned = plan_route(situation, replace(request, targets=targets), should_stop=should_stop)
     planned = with_end(planned, situation, request)
-    return replace(planned, warnings=(*said, *planned.warnings))
+    return planned if found is None else _with_order(planned, found)
 
 
 def target_order(
@@ -220,16 +219,14 @@ def with_end(planned: Plan, situation: Situation, request: Tour) -> Plan:
     )
 
 
-def _order_text(found: TargetOrder) -> list[str]:
-    """Return a sentence on the order, where it is not the one given."""
-    texts = []
+def _with_order(planned: Plan, found: TargetOrder) -> Plan:
+    """Return a plan that says in which order its targets are, and whether a shorter one may exist."""
+    info, warnings = planned.info, planned.warnings
     if found.indices != tuple(range(len(found.indices))):
         numbers = ", ".join(str(index + 1) for index in found.indices)
-        texts.append(
-            f"targets reordered: {numbers} ({found.length_m:.1f} m around the fences, {found.given_m:.1f} m in the order given)"
-        )
+        lengths = f"{found.length_m:.1f} m around the fences, {found.given_m:.1f} m in the order given"
+        info = (f"targets reordered: {numbers} ({lengths})", *info)
     if found.bound_m < found.length_m * 0.9999:
-        texts.append(
-            f"this order may not be the shortest: {found.length_m:.1f} m, no order is shorter than {found.bound_m:.1f} m"
-        )
-    return texts
+        bound = f"{found.length_m:.1f} m, no order is shorter than {found.bound_m:.1f} m"
+        warnings = (f"this order may not be the shortest: {bound}", *warnings)
+    return replace(planned, info=info, warnings=warnings)

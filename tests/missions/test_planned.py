@@ -64,7 +64,7 @@ def test_what_else_is_known_goes_into_the_file_too(made, tmp_path):
 def test_it_draws_itself(made, tmp_path, name, begin):
     made.plot(tmp_path / name, title="Round the wall", blocks=True)
     assert (tmp_path / name).read_bytes().lstrip()[: len(begin)] == begin
-    with pytest.raises(MissionFormatError, match="no picture format"):
+    with pytest.raises(MissionFormatError, match="is not a supported picture format"):
         made.plot(tmp_path / "a.jpeg")
 
 

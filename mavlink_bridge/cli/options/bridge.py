@@ -6,8 +6,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from mavlink_bridge.cli.options.shared import (
     AnyVehicleOption,
     CommonOptions,
@@ -18,8 +16,10 @@ from mavlink_bridge.cli.options.shared import (
     SystemOption,
     TimeoutOption,
     TrustOption,
+    flag,
+    metres,
+    option,
 )
-from mavlink_bridge.cli.values import MOST_M, within
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,66 +36,50 @@ class BridgeOptions(CommonOptions):
     """
 
     connect: RequiredConnectOption
-    target: Annotated[
-        list[str],
-        typer.Option(metavar="LAT,LON", help="The first target; more can be typed or clicked."),
-    ] = field(default_factory=list)
+    target: Annotated[list[str], option("The first target; more can be typed or clicked.", "LAT,LON")] = (
+        field(default_factory=list)
+    )
     target_from: Annotated[
         list[str],
-        typer.Option(
-            metavar="SOURCE",
-            help="typed, reposition, position-target, guided-item, mission, rally or echo; repeatable.",
+        option(
+            "Where targets may come from: typed, reposition, position-target, guided-item, mission, rally, echo; repeatable.",
+            "SOURCE",
         ),
     ] = field(default_factory=list)
     clearance: Annotated[
-        str | None,
-        typer.Option(metavar="M|max", help="Clearance to keep while driving. Default: from FENCE_MARGIN."),
+        str | None, option("Clearance to keep while driving. Default: from FENCE_MARGIN.", "M|max")
     ] = None
-    corner_allowance: Annotated[str, typer.Option(metavar="M|auto", help="Extra room for cut corners.")] = (
-        "auto"
-    )
-    snap: Annotated[
-        float,
-        typer.Option(
-            metavar="M",
-            parser=within(0.0, MOST_M, "metres"),
-            help="Move a blocked target to the nearest free place within M metres.",
-        ),
-    ] = 0.0
+    corner_allowance: Annotated[str, option("Extra room for cut corners.", "M|auto")] = "auto"
+    snap: Annotated[float, metres("Move a blocked target to the nearest free place within M metres.")] = 0.0
     vehicle: Annotated[
-        Path | None, typer.Option(metavar="FILE.parm", help="Parameters that the vehicle does not report.")
+        Path | None, option("Parameter file, for what the vehicle does not report.", "FILE.parm")
     ] = None
     firmware: FirmwareOption = None
     stopping: StoppingOption = field(default_factory=list)
     trust_model: TrustOption = False
-    upload: Annotated[bool, typer.Option("--upload", help="Write missions to the vehicle.")] = False
+    upload: Annotated[bool, flag("--upload", "Write missions to the vehicle.")] = False
     drive: Annotated[
         bool,
-        typer.Option(
+        flag(
             "--drive",
-            help="With --upload: switch modes (HOLD before a new route and after arrival, AUTO for a verified route).",
+            "With --upload: switch modes (HOLD before a new route and after arrival, AUTO for a verified route).",
         ),
     ] = False
-    arm: Annotated[bool, typer.Option("--arm", help="With --drive: arm before AUTO.")] = False
-    confirm: Annotated[bool, typer.Option("--confirm", help="Upload a plan only after you type yes.")] = False
-    once: Annotated[bool, typer.Option("--once", help="Exit after one job.")] = False
+    arm: Annotated[bool, flag("--arm", "With --drive: arm before AUTO.")] = False
+    confirm: Annotated[bool, flag("--confirm", "Upload a plan only after you type yes.")] = False
+    once: Annotated[bool, flag("--once", "Exit after the first target.")] = False
     log: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE.tlog",
-            help="Record both directions, with a journal next to it; a restart continues in run.2.tlog, run.3.tlog …",
+        option(
+            "Record both directions, with a journal next to it; a restart continues in run.2.tlog, run.3.tlog …",
+            "FILE.tlog",
         ),
     ] = None
     system: SystemOption = None
     any_vehicle: AnyVehicleOption = False
     source_system: Annotated[
-        int | None,
-        typer.Option(
-            metavar="N", min=1, max=255, help="System id that pbpp uses. Default: the vehicle's own."
-        ),
+        int | None, option("System id that pbpp uses. Default: the vehicle's own.", "N", min=1, max=255)
     ] = None
-    source_component: Annotated[
-        int, typer.Option(metavar="N", min=1, max=255, help="Component id that pbpp uses.")
-    ] = 195
+    source_component: Annotated[int, option("Component id that pbpp uses.", "N", min=1, max=255)] = 195
     signing_key: SigningKeyOption = None
     timeout: TimeoutOption = 30.0

@@ -6,30 +6,23 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from mavlink_bridge.cli.options.shared import (
     OUTPUT_PANEL,
     VEHICLE_PANEL,
+    ClearanceOptions,
     ConnectOption,
     FirmwareOption,
-    GpsOption,
     HomeOption,
-    IgnorePointsOption,
-    LengthOption,
     LinkOptions,
-    OutermostOption,
-    PositionErrorOption,
-    ReserveOption,
-    RoleOption,
+    MapOptions,
     StoppingOption,
-    WidthOption,
+    metres,
+    option,
 )
-from mavlink_bridge.cli.values import MOST_M, within
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CheckOptions(LinkOptions):
+class CheckOptions(MapOptions, ClearanceOptions, LinkOptions):
     """Check every leg of a mission against a fence: the clearance of its straight line and of the predicted track. Exit 8 if a leg fails.
 
     For example:
@@ -41,56 +34,27 @@ class CheckOptions(LinkOptions):
     `pbpp check --log field.tlog`
     """
 
-    mission: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Mission file: .plan, .waypoints, …")
-    ] = None
+    mission: Annotated[Path | None, option("Mission file: .plan, .waypoints, …", "FILE")] = None
     fence: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Fence file; not needed if the --mission file holds one."),
+        Path | None, option("Fence file; not needed if the --mission file holds one.", "FILE")
     ] = None
-    log: Annotated[
-        Path | None, typer.Option(metavar="FILE.tlog", help="Recorded log, for what is not given as a file.")
-    ] = None
+    log: Annotated[Path | None, option("Recorded log, for what is not given as a file.", "FILE.tlog")] = None
     connect: ConnectOption = None
     start: Annotated[
         str | None,
-        typer.Option(
-            metavar="LAT,LON",
-            help="Start position. Default: the vehicle's position; for files and logs, home.",
-        ),
+        option("Start position. Default: the vehicle's position; for files and logs, home.", "LAT,LON"),
     ] = None
     home: HomeOption = None
     vehicle: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE.parm",
-            help="Parameter file, for what the log or link does not report.",
-            rich_help_panel=VEHICLE_PANEL,
-        ),
+        option("Parameter file, for what the log or link does not report.", "FILE.parm", panel=VEHICLE_PANEL),
     ] = None
+    firmware: FirmwareOption = None
+    stopping: StoppingOption = field(default_factory=list)
     clearance: Annotated[
-        float | None,
-        typer.Option(
-            metavar="M",
-            parser=within(0.0, MOST_M, "metres"),
-            help="Fence clearance each leg must keep while driving. Default: from FENCE_MARGIN.",
-        ),
+        float | None, metres("Fence clearance each leg must keep while driving. Default: from FENCE_MARGIN.")
     ] = None
     plot: Annotated[
         list[Path],
-        typer.Option(
-            metavar="FILE",
-            help="Draw the check: .png, .svg, .pdf, .html; - in the terminal.",
-            rich_help_panel=OUTPUT_PANEL,
-        ),
+        option("Draw the check: .png, .svg, .pdf, .html; - in the terminal.", "FILE", panel=OUTPUT_PANEL),
     ] = field(default_factory=list)
-    role: RoleOption = field(default_factory=list)
-    outermost: OutermostOption = None
-    ignore_points: IgnorePointsOption = False
-    firmware: FirmwareOption = None
-    stopping: StoppingOption = field(default_factory=list)
-    reserve: ReserveOption = 0.0
-    position_error: PositionErrorOption = None
-    length: LengthOption = 0.0
-    width: WidthOption = 0.0
-    gps: GpsOption = "0,0"

@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-import typer
-
-from mavlink_bridge.cli.options.shared import CommonOptions
+from mavlink_bridge.cli.options.shared import CommonOptions, flag
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,4 +23,4 @@ class ConfigOptions(CommonOptions):
     `pbpp config --template`
     """
 
-    template: Annotated[bool, typer.Option("--template", help="Print an example options file.")] = False
+    template: Annotated[bool, flag("--template", "Print an example options file.")] = False

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from mavlink_bridge.cli.options.shared import CommonOptions, IgnorePointsOption, OutermostOption, RoleOption
+from mavlink_bridge.cli.options.shared import CommonOptions, MapOptions, option
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ConvertOptions(CommonOptions):
+class ConvertOptions(MapOptions, CommonOptions):
     """Convert a file with a fence, a mission, rally points or parameters; the file extensions choose the formats.
 
     For example:
@@ -33,15 +33,8 @@ class ConvertOptions(CommonOptions):
         Path, typer.Argument(metavar="OUT", help="What to write: .plan, .waypoints, .geojson, .kml, .gpx, …")
     ]
     only: Annotated[
-        str | None,
-        typer.Option(
-            metavar="mission|fence|rally", help="Write only this part, if IN holds more than OUT can."
-        ),
+        str | None, option("Write only this part, if IN holds more than OUT can.", "mission|fence|rally")
     ] = None
     return_point: Annotated[
-        str | None,
-        typer.Option(metavar="LAT,LON", help="The fence's return point, which .fen files must have."),
+        str | None, option("The fence's return point, which .fen files must have.", "LAT,LON")
     ] = None
-    role: RoleOption = field(default_factory=list)
-    outermost: OutermostOption = None
-    ignore_points: IgnorePointsOption = False

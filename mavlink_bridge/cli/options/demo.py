@@ -6,9 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from mavlink_bridge.cli.options.shared import CommonOptions
+from mavlink_bridge.cli.options.shared import CommonOptions, option
 from mavlink_bridge.cli.values import within
 
 
@@ -16,14 +14,10 @@ from mavlink_bridge.cli.values import within
 class DemoOptions(CommonOptions):
     """Run a demonstration: simulated rover, fence, target, plan, upload, verify, drive, picture, report."""
 
-    out: Annotated[
-        Path, typer.Option(metavar="DIR", help="Folder for the picture, the mission and the log.")
-    ] = Path("demo-out")
+    out: Annotated[Path, option("Folder for the picture, the mission and the log.", "DIR")] = Path("demo-out")
     speedup: Annotated[
         float,
-        typer.Option(
-            metavar="X",
-            parser=within(1.0, 20.0),
-            help="How many times faster than real time, if the computer keeps up.",
+        option(
+            "How many times faster than real time, if the computer keeps up.", "X", parser=within(1.0, 20.0)
         ),
     ] = 4.0

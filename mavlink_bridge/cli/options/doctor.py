@@ -6,9 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from mavlink_bridge.cli.options.shared import CommonOptions, FirmwareOption
+from mavlink_bridge.cli.options.shared import CommonOptions, FirmwareOption, option
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,10 +24,6 @@ class DoctorOptions(CommonOptions):
     `pbpp doctor --vehicle rover.parm --firmware 4.6`
     """
 
-    signing_key: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Check this signing key and its permissions.")
-    ] = None
-    vehicle: Annotated[
-        Path | None, typer.Option(metavar="FILE.parm", help="Check this vehicle's parameters too.")
-    ] = None
+    signing_key: Annotated[Path | None, option("Check this signing key and its permissions.", "FILE")] = None
+    vehicle: Annotated[Path | None, option("Check this vehicle's parameters too.", "FILE.parm")] = None
     firmware: FirmwareOption = None

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from mavlink_bridge.cli.options.shared import LinkOptions, RequiredConnectOption
+from mavlink_bridge.cli.options.shared import LinkOptions, RequiredConnectOption, option
 
 KINDS = ("mission", "fence", "rally", "parameters")
 
@@ -28,10 +28,10 @@ class DownloadOptions(LinkOptions):
     connect: RequiredConnectOption = ""
     output: Annotated[
         list[Path],
-        typer.Option(
+        option(
+            "File to write: .waypoints, .plan; parameters: .parm, .param. Default: list on the terminal.",
+            "FILE",
             "-o",
             "--output",
-            metavar="FILE",
-            help="File to write: .waypoints, .plan; parameters: .parm, .param. Default: list on the terminal.",
         ),
     ] = field(default_factory=list)

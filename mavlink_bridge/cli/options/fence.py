@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from mavlink_bridge.cli.options.shared import CommonOptions, IgnorePointsOption, OutermostOption, RoleOption
+from mavlink_bridge.cli.options.shared import CommonOptions, MapOptions, option
 
 ACTIONS = ("merge",)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FenceOptions(CommonOptions):
+class FenceOptions(MapOptions, CommonOptions):
     """Make a fence fit for the vehicle. `merge`: one inclusion polygon in place of several that overlap.
 
     The autopilot allows only the intersection of all inclusions; an area drawn in several pieces is meant as their union.
@@ -24,12 +24,9 @@ class FenceOptions(CommonOptions):
     `pbpp fence merge pieces.plan -o field.plan`
     """
 
-    action: Annotated[str, typer.Argument(metavar="|".join(ACTIONS), help="What to do.")]
-    source: Annotated[Path, typer.Argument(metavar="FILE", help="A fence: .plan, .waypoints, .kml, …")]
-    output: Annotated[
-        Path,
-        typer.Option("-o", "--output", metavar="FILE", help="File to write: .plan, .waypoints, .geojson, …"),
+    action: Annotated[
+        str,
+        typer.Argument(metavar="|".join(ACTIONS), help="merge: make one inclusion of several that overlap."),
     ]
-    role: RoleOption = field(default_factory=list)
-    outermost: OutermostOption = None
-    ignore_points: IgnorePointsOption = False
+    source: Annotated[Path, typer.Argument(metavar="FILE", help="A fence: .plan, .waypoints, .kml, …")]
+    output: Annotated[Path, option("File to write: .plan, .waypoints, .geojson, …", "FILE", "-o", "--output")]

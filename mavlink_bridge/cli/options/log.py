@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from mavlink_bridge.cli.options.shared import CommonOptions, SystemOption
+from mavlink_bridge.cli.options.shared import CommonOptions, SystemOption, flag, option
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,12 +27,9 @@ class LogOptions(CommonOptions):
     files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Telemetry logs: .tlog, .raw, .gz.")]
     plot: Annotated[
         list[Path],
-        typer.Option(
-            metavar="FILE",
-            help="Draw fence, drives, mission and targets: .png, .svg, .pdf, .html; - in the terminal.",
+        option(
+            "Draw fence, drives, mission and targets: .png, .svg, .pdf, .html; - in the terminal.", "FILE"
         ),
     ] = field(default_factory=list)
-    messages: Annotated[
-        bool, typer.Option("--messages", help="List the messages by type, with count and rate.")
-    ] = False
+    messages: Annotated[bool, flag("--messages", "List the messages by type, with count and rate.")] = False
     system: SystemOption = None

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from mavlink_bridge.cli.options.shared import AnyVehicleOption, CommonOptions, SystemOption
+from mavlink_bridge.cli.options.shared import AnyVehicleOption, CommonOptions, SystemOption, flag, option
 from mavlink_bridge.cli.values import within
 
 MOST_SPEED = 1e6
@@ -35,36 +35,30 @@ class ReplayOptions(CommonOptions):
     logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Recorded telemetry logs (.tlog).")]
     expect: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Expected events (JSON lines), or a folder with each log's .events.jsonl; exit 8 if they differ.",
+        option(
+            "Expected events (JSON lines), or a folder with each log's .events.jsonl; exit 8 if they differ.",
+            "FILE",
         ),
     ] = None
-    record: Annotated[
-        bool, typer.Option("--record", help="Write the events next to each log, as its .events.jsonl.")
-    ] = False
+    record: Annotated[bool, flag("--record", "Write the events next to each log, as its .events.jsonl.")] = (
+        False
+    )
     send: Annotated[
-        str | None,
-        typer.Option(metavar="CONNECTION", help="Play the vehicle's side of one log to a live client."),
+        str | None, option("Play the vehicle's side of one log to a live client.", "CONNECTION")
     ] = None
     speed: Annotated[
         float | None,
-        typer.Option(
-            metavar="X",
+        option(
+            "Replay speed as a multiple of the log's own. Default: as fast as possible; 1 with --send.",
+            "X",
             parser=within(0.0, MOST_SPEED, above=True),
-            help="Replay speed as a multiple of the log's own. Default: as fast as possible; 1 with --send.",
         ),
     ] = None
     jobs: Annotated[
         int | None,
-        typer.Option(
-            metavar="N",
-            min=1,
-            max=MOST_JOBS,
-            help="Logs replayed in parallel. Default: one per processor.",
-        ),
+        option("Logs replayed in parallel. Default: one per processor.", "N", min=1, max=MOST_JOBS),
     ] = None
-    clearance: Annotated[str | None, typer.Option(metavar="M|max", help="As in pbpp plan.")] = None
-    corner_allowance: Annotated[str, typer.Option(metavar="M|auto", help="As in pbpp plan.")] = "auto"
+    clearance: Annotated[str | None, option("As in pbpp plan.", "M|max")] = None
+    corner_allowance: Annotated[str, option("As in pbpp plan.", "M|auto")] = "auto"
     system: SystemOption = None
     any_vehicle: AnyVehicleOption = False

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -18,128 +18,55 @@ LINK_PANEL, OUTPUT_PANEL, VEHICLE_PANEL = "Link", "Output", "Vehicle"
 _MAP_PANEL = "Map files: what each zone is"
 """How help groups what many commands have."""
 
+
+def option(text: str, metavar: str | None = None, *names: str, panel: str | None = None, **more: Any) -> Any:  # noqa: ANN401 - typer's own
+    """Return an option: its help, what help shows for its value, and its names if they are not the field's."""
+    return typer.Option(*names, metavar=metavar, help=text, rich_help_panel=panel, **more)
+
+
+def flag(name: str, text: str, panel: str | None = None) -> Any:  # noqa: ANN401 - as above
+    """Return an option that takes no value, and has no opposite."""
+    return option(text, None, name, panel=panel)
+
+
+def metres(text: str, panel: str | None = None, most_m: float = MOST_M) -> Any:  # noqa: ANN401 - as above
+    """Return an option that takes metres, none of them negative."""
+    return option(text, "M", panel=panel, parser=within(0.0, most_m, "metres"))
+
+
 ConnectOption = Annotated[
     str | None,
-    typer.Option(
+    option(
+        "A live link: udpin:0.0.0.0:14550, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:…, /dev/ttyACM0[,BAUD], COM7[,BAUD].",
+        "CONNECTION",
         "--connect",
-        metavar="CONNECTION",
-        help="A live link: udpin:0.0.0.0:14550, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:…, /dev/ttyACM0[,BAUD], COM7[,BAUD].",
     ),
 ]
 SystemOption = Annotated[
     int | None,
-    typer.Option(
-        "--system",
-        metavar="N",
-        min=1,
-        max=255,
-        help="Which vehicle, when several are heard.",
-        rich_help_panel=LINK_PANEL,
-    ),
+    option("Which vehicle, when several are heard.", "N", "--system", panel=LINK_PANEL, min=1, max=255),
 ]
 TimeoutOption = Annotated[
     float,
-    typer.Option(
-        metavar="S",
-        parser=within(0.1, MOST_S, "seconds"),
-        help="How long to wait for the vehicle.",
-        rich_help_panel=LINK_PANEL,
-    ),
+    option("How long to wait for the vehicle.", "S", panel=LINK_PANEL, parser=within(0.1, MOST_S, "seconds")),
 ]
 AnyVehicleOption = Annotated[
-    bool,
-    typer.Option(
-        "--any-vehicle", help="Accept vehicles other than rovers and boats.", rich_help_panel=LINK_PANEL
-    ),
+    bool, flag("--any-vehicle", "Accept vehicles other than rovers and boats.", LINK_PANEL)
 ]
 RequiredConnectOption = Annotated[
     str,
-    typer.Option(
+    option(
+        "udpin:0.0.0.0:14550, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:…, /dev/ttyACM0[,BAUD], COM7[,BAUD].",
+        "CONNECTION",
         "--connect",
-        metavar="CONNECTION",
-        help="udpin:0.0.0.0:14550, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:…, /dev/ttyACM0[,BAUD], COM7[,BAUD].",
     ),
 ]
 SigningKeyOption = Annotated[
     Path | None,
-    typer.Option(
-        metavar="FILE",
-        help="Sign with this key: 32 bytes, hex, base64, or a passphrase.",
-        rich_help_panel=LINK_PANEL,
-    ),
-]
-ReserveOption = Annotated[
-    float,
-    typer.Option(
-        metavar="M",
-        parser=within(0.0, MOST_M, "metres"),
-        help="Extra clearance, for wind and wheel slip.",
-        rich_help_panel=VEHICLE_PANEL,
-    ),
-]
-PositionErrorOption = Annotated[
-    float | None,
-    typer.Option(
-        metavar="M",
-        parser=within(0.0, MOST_M, "metres"),
-        help="Position error to add to the clearance. Default: from the GPS fix type.",
-        rich_help_panel=VEHICLE_PANEL,
-    ),
+    option("Sign with this key: 32 bytes, hex, base64, or a passphrase.", "FILE", panel=LINK_PANEL),
 ]
 HomeOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="LAT,LON",
-        help="Home, if the source has none: start, return and centre of FENCE_RADIUS.",
-    ),
-]
-LengthOption = Annotated[
-    float,
-    typer.Option(
-        metavar="M",
-        parser=within(0.0, MOST_VEHICLE_M, "metres"),
-        help="The vehicle's length, tools included.",
-        rich_help_panel=VEHICLE_PANEL,
-    ),
-]
-WidthOption = Annotated[
-    float,
-    typer.Option(
-        metavar="M",
-        parser=within(0.0, MOST_VEHICLE_M, "metres"),
-        help="The vehicle's width, tools included.",
-        rich_help_panel=VEHICLE_PANEL,
-    ),
-]
-GpsOption = Annotated[
-    str,
-    typer.Option(
-        metavar="FORWARD,RIGHT",
-        help="Offset of the GPS antenna from the vehicle's centre, metres.",
-        rich_help_panel=VEHICLE_PANEL,
-    ),
-]
-RoleOption = Annotated[
-    list[str],
-    typer.Option(
-        metavar="NAME=inclusion|exclusion|route|ignore",
-        help="What the named feature is, in KML, GeoJSON and other maps. Repeatable.",
-        rich_help_panel=_MAP_PANEL,
-    ),
-]
-OutermostOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="inclusion",
-        help="The zone around all others is the inclusion, the others are exclusions.",
-        rich_help_panel=_MAP_PANEL,
-    ),
-]
-IgnorePointsOption = Annotated[
-    bool,
-    typer.Option(
-        "--ignore-points", help="Ignore points whose role the file does not say.", rich_help_panel=_MAP_PANEL
-    ),
+    str | None, option("Home, if the source has none: start, return and centre of FENCE_RADIUS.", "LAT,LON")
 ]
 
 
@@ -152,70 +79,114 @@ def _firmware(text: str) -> Firmware:
 
 FirmwareOption = Annotated[
     Firmware | None,
-    typer.Option(
-        metavar="VERSION",
+    option(
+        "Firmware version (4.5, 4.6.3), if the source does not report it.",
+        "VERSION",
+        panel=VEHICLE_PANEL,
         parser=_firmware,
-        help="Firmware version (4.5, 4.6.3), if the source does not report it.",
-        rich_help_panel=VEHICLE_PANEL,
     ),
 ]
 StoppingOption = Annotated[
     list[Stop],
-    typer.Option(
-        metavar="M@MPS",
-        parser=stop_from,
-        help="How far your rover rolls on after HOLD: 6@3 is 6 m from 3 m/s. Repeatable. Default: its own stops, where it was seen to stop; else those of "
+    option(
+        "How far your rover rolls on after HOLD: 6@3 is 6 m from 3 m/s. Repeatable. Default: its own stops, where it was seen to stop; else those of "
         "ArduPilot's simulation.",
-        rich_help_panel=VEHICLE_PANEL,
+        "M@MPS",
+        panel=VEHICLE_PANEL,
+        parser=stop_from,
     ),
 ]
 TrustOption = Annotated[
-    bool,
-    typer.Option(
-        "--trust-model",
-        help="Promise a clearance even outside the measured range.",
-        rich_help_panel=VEHICLE_PANEL,
-    ),
+    bool, flag("--trust-model", "Promise a clearance even outside the measured range.", VEHICLE_PANEL)
 ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class MapOptions:
+    """What is said beside a map file."""
+
+    role: Annotated[
+        list[str],
+        option(
+            "What the named feature is, in KML, GeoJSON and other maps. Repeatable.",
+            "NAME=inclusion|exclusion|route|ignore",
+            panel=_MAP_PANEL,
+        ),
+    ] = field(default_factory=list)
+    outermost: Annotated[
+        str | None,
+        option(
+            "The zone around all others is the inclusion, the others are exclusions.",
+            "inclusion",
+            panel=_MAP_PANEL,
+        ),
+    ] = None
+    ignore_points: Annotated[
+        bool, flag("--ignore-points", "Ignore points whose role the file does not say.", _MAP_PANEL)
+    ] = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClearanceOptions:
+    """What the vehicle adds to a clearance: its size, how well its position is known, a reserve."""
+
+    reserve: Annotated[float, metres("Extra clearance, for wind and wheel slip.", VEHICLE_PANEL)] = 0.0
+    position_error: Annotated[
+        float | None,
+        metres("Position error to add to the clearance. Default: from the GPS fix type.", VEHICLE_PANEL),
+    ] = None
+    length: Annotated[
+        float, metres("The vehicle's length, tools included.", VEHICLE_PANEL, most_m=MOST_VEHICLE_M)
+    ] = 0.0
+    width: Annotated[
+        float, metres("The vehicle's width, tools included.", VEHICLE_PANEL, most_m=MOST_VEHICLE_M)
+    ] = 0.0
+    gps: Annotated[
+        str,
+        option(
+            "Offset of the GPS antenna from the vehicle's centre, metres.",
+            "FORWARD,RIGHT",
+            panel=VEHICLE_PANEL,
+        ),
+    ] = "0,0"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommonOptions:
     """What every command has."""
 
-    json_output: Annotated[
-        bool, typer.Option("--json", help="One JSON document on stdout.", rich_help_panel=OUTPUT_PANEL)
-    ] = False
+    json_output: Annotated[bool, flag("--json", "One JSON document on stdout.", OUTPUT_PANEL)] = False
     quiet: Annotated[
         int,
-        typer.Option(
+        option(
+            "Print only warnings and errors; -qq: only errors.",
+            "",
             "--quiet",
             "-q",
+            panel=OUTPUT_PANEL,
             count=True,
-            metavar="",
             show_default=False,
-            help="Print only warnings and errors; -qq: only errors.",
-            rich_help_panel=OUTPUT_PANEL,
         ),
     ] = 0
     config: Annotated[
         Path | None,
-        typer.Option(
+        option(
+            "Options from a file; options given here override it. See `pbpp config`.",
+            "FILE.toml",
             "--config",
-            metavar="FILE.toml",
+            panel=OUTPUT_PANEL,
             is_eager=True,
             callback=take_options,
-            help="Options from a file; options given here override it. See `pbpp config`.",
-            rich_help_panel=OUTPUT_PANEL,
         ),
     ] = None
     verbose: Annotated[
         bool,
-        typer.Option(
+        option(
+            "Show more: details of errors, progress without a terminal.",
+            None,
             "--verbose",
             "-v",
-            help="Show more: details of errors, progress without a terminal.",
-            rich_help_panel=OUTPUT_PANEL,
+            panel=OUTPUT_PANEL,
         ),
     ] = False
 
@@ -232,16 +203,10 @@ class LinkOptions(CommonOptions):
     system: SystemOption = None
     any_vehicle: AnyVehicleOption = False
     source_system: Annotated[
-        int,
-        typer.Option(
-            metavar="N", min=1, max=255, help="System id that pbpp uses.", rich_help_panel=LINK_PANEL
-        ),
+        int, option("System id that pbpp uses.", "N", panel=LINK_PANEL, min=1, max=255)
     ] = 245
     source_component: Annotated[
-        int,
-        typer.Option(
-            metavar="N", min=1, max=255, help="Component id that pbpp uses.", rich_help_panel=LINK_PANEL
-        ),
+        int, option("Component id that pbpp uses.", "N", panel=LINK_PANEL, min=1, max=255)
     ] = 190
     signing_key: SigningKeyOption = None
     timeout: TimeoutOption = 30.0

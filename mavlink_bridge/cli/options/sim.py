@@ -6,9 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from mavlink_bridge.cli.options.shared import CommonOptions, IgnorePointsOption, OutermostOption, RoleOption
+from mavlink_bridge.cli.options.shared import CommonOptions, MapOptions, option
 from mavlink_bridge.cli.values import MOST_S, within
 
 MOST_SEED = 2**63 - 1
@@ -16,7 +14,7 @@ MOST_SEED = 2**63 - 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SimOptions(CommonOptions):
+class SimOptions(MapOptions, CommonOptions):
     """Run a simulated rover until Ctrl-C.
 
     It answers MAVLink 2 as ArduPilot Rover does: missions, fences, rally points, parameters, modes, arming; it drives AUTO and GUIDED.
@@ -30,53 +28,31 @@ class SimOptions(CommonOptions):
     """
 
     listen: Annotated[
-        str,
-        typer.Option(
-            metavar="CONNECTION", help="tcpin:, udpin: or udpout:HOST:PORT; port 0 is any free one."
-        ),
+        str, option("tcpin:, udpin: or udpout:HOST:PORT; port 0 is any free one.", "CONNECTION")
     ] = "tcpin:127.0.0.1:5760"
-    home: Annotated[
-        str, typer.Option(metavar="LAT,LON[,HEADING]", help="Position and heading at the start.")
-    ] = "40.071374,-105.229930,0"
-    fence: Annotated[Path | None, typer.Option(help="Fence file stored in the rover.")] = None
+    home: Annotated[str, option("Position and heading at the start.", "LAT,LON[,HEADING]")] = (
+        "40.071374,-105.229930,0"
+    )
+    fence: Annotated[Path | None, option("Fence file stored in the rover.", "FILE")] = None
     mission: Annotated[
-        Path | None,
-        typer.Option(help="Mission file stored in the rover; its home, if it has one, is not used."),
+        Path | None, option("Mission file stored in the rover; its home, if it has one, is not used.", "FILE")
     ] = None
-    param: Annotated[list[str], typer.Option(metavar="NAME=VALUE", help="Set a parameter; repeatable.")] = (
-        field(default_factory=list)
+    param: Annotated[list[str], option("Set a parameter; repeatable.", "NAME=VALUE")] = field(
+        default_factory=list
     )
     speedup: Annotated[
-        float,
-        typer.Option(metavar="X", parser=within(0.01, 1000.0), help="How many times faster than real time."),
+        float, option("How many times faster than real time.", "X", parser=within(0.01, 1000.0))
     ] = 1.0
-    loss: Annotated[
-        float, typer.Option(metavar="P", parser=within(0.0, 1.0), help="Share of frames lost, each way.")
-    ] = 0.0
+    loss: Annotated[float, option("Share of frames lost, each way.", "P", parser=within(0.0, 1.0))] = 0.0
     duplicate: Annotated[
-        float,
-        typer.Option(metavar="P", parser=within(0.0, 1.0), help="Share of frames duplicated, each way."),
+        float, option("Share of frames duplicated, each way.", "P", parser=within(0.0, 1.0))
     ] = 0.0
     latency: Annotated[
-        float,
-        typer.Option(
-            metavar="S",
-            parser=within(0.0, MOST_S, "seconds"),
-            help="Delay of each frame in seconds, each way.",
-        ),
+        float, option("Delay of each frame in seconds, each way.", "S", parser=within(0.0, MOST_S, "seconds"))
     ] = 0.0
     jitter: Annotated[
         float,
-        typer.Option(
-            metavar="S",
-            parser=within(0.0, MOST_S, "seconds"),
-            help="Random extra delay, up to so many seconds.",
-        ),
+        option("Random extra delay, up to so many seconds.", "S", parser=within(0.0, MOST_S, "seconds")),
     ] = 0.0
-    seed: Annotated[
-        int, typer.Option(min=-MOST_SEED, max=MOST_SEED, help="Random seed of the link's faults.")
-    ] = 0
-    system: Annotated[int, typer.Option(min=1, max=255, help="MAVLink system id.")] = 1
-    role: RoleOption = field(default_factory=list)
-    outermost: OutermostOption = None
-    ignore_points: IgnorePointsOption = False
+    seed: Annotated[int, option("Random seed of the link's faults.", "N", min=-MOST_SEED, max=MOST_SEED)] = 0
+    system: Annotated[int, option("MAVLink system id.", "N", min=1, max=255)] = 1

@@ -181,7 +181,7 @@ def test_a_vehicle_in_auto_is_a_matter_of_hold() -> None:
         ("udpin:0.0.0.0:14550", "this computer's address"),
         ("0.0.0.0:14550", "this computer's address"),
         ("udpout:10.0.0.1:14550", "listen on this address"),
-        ("tcp:10.0.0.1:5760", "send its MAVLink"),
+        ("tcp:10.0.0.1:5760", "send MAVLink on this port"),
         ("tcpin:0.0.0.0:5760", "connect to this address"),
     ],
 )
@@ -209,7 +209,7 @@ def test_a_start_in_an_exclusion_hears_of_escape(fields: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        (("--plot", "{out}/x.jpg"), "choose one of these"),
+        (("--plot", "{out}/x.jpg"), "choose another file extension"),
         (("-o", "{out}/x.fen"), "file extension|suffix"),
     ],
 )

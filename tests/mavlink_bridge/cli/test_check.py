@@ -82,7 +82,22 @@ def test_a_person_sees_a_table(yard):
     assert (
         "FAIL: leg 1 → 2 crosses exclusion polygon 1, exclusion polygon 2, first at 40.07156" in result.stdout
     )
-    assert run("check", "--mission", yard["mission"], "--fence", yard["fence"], "-q").stdout == ""
+    fails = [line for line in result.stdout.splitlines() if line.startswith("FAIL: ")]
+    for quiet in ("-q", "-qq"):  # what fails is an error
+        words = ("--mission", yard["mission"], "--fence", yard["fence"], "--clearance", "2", quiet)
+        assert run("check", *words).stdout.splitlines() == fails
+
+
+def test_the_table_fits_80_columns(yard, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    files = ("--mission", yard["mission"], "--fence", yard["fence"])
+    told = run("check", *files).stdout.splitlines()
+    heads = next(number for number, line in enumerate(told) if line.startswith("leg "))
+    ends = next(number for number, line in enumerate(told) if re.match(r"\d+ legs, ", line))
+    table = told[heads:ends]
+    rows = [line for line in table if re.search(r" 40\.\d{7},-105\.\d{7} *$", line)]
+    assert len(rows) == len(document_of("check", *files, code=8)["legs"])
+    assert max(map(len, table)) <= 80
 
 
 def test_a_leg_that_is_only_near_says_how_near(tmp_path, yard):
@@ -149,7 +164,7 @@ def test_a_live_vehicle_is_asked(fields, yard, streams):
         # The fix is good to 0.3 m: kept on top of what is promised, it is more than FENCE_MARGIN and its reserve ask for.
         assert document["clearance_m"] == 2
         assert document["legs"][-1]["asked_m"] == pytest.approx(2.3)
-        assert any("added 0.3 m for GPS error" in text for text in document["warnings"])
+        assert any("added 0.3 m for GPS error" in text for text in document["info"])
         assert document["system"] == 1
         assert document["legs"][0]["start"] == pytest.approx(away, abs=1e-5)
         assert not any("no position from the vehicle" in text for text in document["warnings"])
@@ -243,7 +258,7 @@ def test_the_best_order_and_the_way_home(tmp_path, yard):
     )
     assert sorted(best["targets"][:3]) == sorted(given["targets"])
     assert best["targets"][3] == best["path"][-1] == [HOME.lat_deg, HOME.lon_deg]
-    assert best["warnings"][0].startswith("targets reordered: ")
+    assert best["info"][0].startswith("targets reordered: ")
     assert (
         document_of("check", "--mission", made, "--fence", yard["fence"], "--clearance", "2")["broken"] == 0
     )
@@ -278,7 +293,7 @@ def test_a_mission_is_repaired(tmp_path, yard):
     document = document_of(
         "plan", "--fence", yard["fence"], "--via-mission", yard["mission"], "--clearance", "2", "-o", made
     )
-    assert document["warnings"][0].startswith("leg 1 → 2: replaced by a route")
+    assert document["info"][0].startswith("leg 1 → 2: replaced by a route")
     old, new = read_mission(yard_path({"fence": yard["mission"]})), read_mission(made)
     assert (new.items[0].position, new.items[-1].position) == (old.items[0].position, old.items[-1].position)
     assert new.home == old.home

@@ -40,7 +40,7 @@ def run(*arguments: object):
 def findings(*arguments: object) -> dict[str, dict]:
     result = run("doctor", *arguments, "--json")
     document = json.loads(result.stdout)
-    wrong = any(finding["verdict"] == "wrong" for finding in document["findings"])
+    wrong = any(finding["verdict"] == "error" for finding in document["findings"])
     assert result.exit_code == (8 if wrong else 0)
     assert document["status"] == ("error" if wrong else "ok")
     return {finding["what"]: finding for finding in document["findings"]}
@@ -67,7 +67,7 @@ class TestVehicle:
         vehicle = tmp_path / "rover.parm"
         vehicle.write_text("WP_SPEED -8\n", encoding="utf-8")
         assert findings("--vehicle", vehicle)["vehicle"]["found"].startswith("WP_SPEED is -8")
-        assert findings("--vehicle", tmp_path / "none.parm")["vehicle"]["verdict"] == "wrong"
+        assert findings("--vehicle", tmp_path / "none.parm")["vehicle"]["verdict"] == "error"
 
 
 class TestDoctor:
@@ -75,7 +75,7 @@ class TestDoctor:
         monkeypatch.setattr("serial.tools.list_ports.comports", list)
         found = findings()
         assert found["numpy"]["found"] == metadata.version("numpy")
-        assert {finding["verdict"] for finding in found.values()} <= {"ok", "note"}
+        assert {finding["verdict"] for finding in found.values()} <= {"ok", "info", "warning"}
 
     def test_the_known_answer_is_right(self, fields):
         """The expected length by a visibility graph in a map of the test's own."""
@@ -100,7 +100,7 @@ class TestDoctor:
 
     def test_a_planner_that_is_off_is_seen(self, monkeypatch):
         monkeypatch.setattr(doctor_command, "SHORTEST_M", 170.0)
-        assert findings()["test plan"]["verdict"] == "wrong"
+        assert findings()["test plan"]["verdict"] == "error"
 
     def test_a_planner_that_breaks_is_seen(self, monkeypatch):
         def broken(*_):
@@ -108,7 +108,7 @@ class TestDoctor:
 
         monkeypatch.setattr("missions.planning.plan.plan", broken)
         found = findings()["test plan"]
-        assert (found["verdict"], found["found"]) == ("wrong", "OSError: no such library")
+        assert (found["verdict"], found["found"]) == ("error", "OSError: no such library")
 
     @pytest.mark.skipif(os.name != "posix", reason="Windows does not say who may use a port")
     def test_ports_and_who_may_use_them(self, monkeypatch):
@@ -121,7 +121,7 @@ class TestDoctor:
         found = findings()
         assert found["serial port /dev/ttyACM0"]["verdict"] == "ok"
         refused = found["serial port /dev/ttyUSB9"]
-        assert refused["verdict"] == "wrong"
+        assert refused["verdict"] == "error"
         assert "/dev/ttyUSB9" in refused["advice"]
 
     @pytest.mark.skipif(os.name != "posix", reason="Windows does not say who may use a port")
@@ -130,7 +130,7 @@ class TestDoctor:
         monkeypatch.setattr("serial.tools.list_ports.comports", lambda: [port])
         monkeypatch.setattr(os, "access", lambda *_: False)
         found = findings()["serial port /dev/ttyS0"]
-        assert (found["verdict"], found["found"]) == ("note", "present, but you have no permission to use it")
+        assert (found["verdict"], found["found"]) == ("info", "present, but you have no permission to use it")
         assert found["advice"]
 
     @pytest.mark.parametrize(
@@ -151,7 +151,7 @@ class TestDoctor:
         key.write_bytes(bytes(range(1, 33)))
         key.chmod(0o644)
         found = findings("--signing-key", key)["signing key"]
-        assert found["verdict"] == "wrong"
+        assert found["verdict"] == "error"
         assert "chmod 600" in found["found"]
         key.chmod(0o600)
         assert findings("--signing-key", key)["signing key"]["verdict"] == "ok"
@@ -159,7 +159,7 @@ class TestDoctor:
     def test_backups_that_cannot_be_kept(self, tmp_path, monkeypatch):
         (tmp_path / "file").write_text("")
         monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "file"))
-        assert findings()["backups"]["verdict"] == "wrong"
+        assert findings()["backups"]["verdict"] == "error"
 
     def test_missing_packages(self, monkeypatch):
         def version(name):
@@ -169,12 +169,12 @@ class TestDoctor:
 
         monkeypatch.setattr(metadata, "version", version)
         found = findings()
-        assert (found["plotly"]["verdict"], found["pyserial"]["verdict"]) == ("note", "wrong")
+        assert (found["plotly"]["verdict"], found["pyserial"]["verdict"]) == ("info", "error")
 
     def test_options_that_cannot_be_read(self):
         write_options("[plan]\nclearence = 2\n")
         found = findings()["options file"]
-        assert found["verdict"] == "wrong"
+        assert found["verdict"] == "error"
         assert "unknown option 'clearence' in [plan]" in found["found"]
         write_options("[plan\n")  # which no command can go on with
         assert run("doctor").exit_code == 2
@@ -184,7 +184,7 @@ class TestDoctor:
         monkeypatch.setattr("serial.tools.list_ports.comports", list)
         lines = run("doctor", "-q").stdout.splitlines()
         assert len(lines) == 2
-        assert lines[0].startswith("wrong")
+        assert lines[0].startswith("error")
 
 
 class TestConfig:

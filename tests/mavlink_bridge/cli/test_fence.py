@@ -35,7 +35,10 @@ def test_a_route_through_areas_that_overlap_once_they_are_one(pieces, tmp_path):
     assert "only the intersection of all inclusions" in refused.stderr
     merged = tmp_path / "field.plan"
     result = run("fence", "merge", pieces, "-o", merged)
-    assert (result.exit_code, result.stdout) == (0, f"Wrote {merged}: 2 inclusions are one; 2 zones in all\n")
+    assert (result.exit_code, result.stdout) == (
+        0,
+        f"Wrote {merged}: 2 inclusions merged into one; 2 zones in all\n",
+    )
     assert run("plan", "--fence", merged, *asked).exit_code == 0
 
 
@@ -85,7 +88,7 @@ def test_exclusions_out_of_reach_are_left_out_with_a_word(tmp_path):
     write_fence(Fence((*PIECES.zones, far)), path)
     result = run("fence", "merge", path, "-o", output)
     assert (result.exit_code, len(read_fence(output).zones)) == (0, 2)
-    assert "left out: 1" in result.stderr
+    assert "exclusions left out, more than 1 km from every inclusion: 1" in result.stderr
 
 
 def test_the_other_parts_of_a_plan_stay(fields, tmp_path):

@@ -162,7 +162,7 @@ def test_people_see_the_plan_before_anything_is_written(config, tmp_path, monkey
     assert all(is_shown)
     lines = [line.split(" ")[0] for line in result.stdout.splitlines()]
     assert lines == ["Route:", "Fence", "Wrote", "Uploaded", "The", "Arrived"]
-    assert re.search(r"Arrived after [0-9.]+ m in \d+ s; least clearance [0-9.]+ m while driving, breaches 0", result.stdout)  # fmt: skip
+    assert re.search(r"Arrived after [0-9.]+ m in \d+ s; least clearance [0-9.]+ m while driving, fence breaches: 0", result.stdout)  # fmt: skip
 
 
 def test_hold_stops_it_first(config):

@@ -66,7 +66,7 @@ def test_when_a_log_begins(short, tmp_path):
     assert log_begin(short) == LogBegin(BEGIN_S, is_dated=True)
     raw = tmp_path / "short.raw"
     raw.write_bytes(b"".join(Codec(1, 1).encode(Heartbeat(10, 3)) for _ in range(3)))
-    assert str(log_begin(raw)) == "raw: without times of its own"
+    assert str(log_begin(raw)) == "raw (no timestamps)"
     empty = tmp_path / "empty.tlog"
     empty.touch()
     with pytest.raises(LogError, match=r"empty\.tlog: the file is empty"):
@@ -75,4 +75,4 @@ def test_when_a_log_begins(short, tmp_path):
 
 def test_a_clock_that_was_wrong_has_no_date():
     assert date_text(0.0) == "1970-01-01 00:00:00 UTC"
-    assert date_text(1e13) == "1e+13 s after 1970, by a clock that was wrong"
+    assert date_text(1e13) == "1e+13 s after 1970 (the clock was not set)"

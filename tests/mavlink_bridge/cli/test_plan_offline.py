@@ -234,8 +234,8 @@ class TestFiles:
         assert lines[0].startswith("Route: ")
         assert "m in a straight line" in lines[0]
         assert "at least 2.5 m while driving" in lines[1]
-        assert lines[2].startswith("HOLD does not brake: from 2 m/s the vehicle rolls on 4.1 m")
-        assert lines[3] == f"Wrote {mission}"
+        assert lines[2] == f"Wrote {mission}"
+        assert "info: HOLD does not brake: from 2 m/s the vehicle rolls on 4.1 m" in result.stderr
         assert all(line.startswith("warning: ") for line in result.stderr.splitlines())
         quiet = run("--fence", fields / "yard-fence.waypoints", "--start", START, "--target", TARGET, "-q")
         assert (quiet.exit_code, quiet.stdout) == (0, "")
@@ -249,7 +249,21 @@ class TestFiles:
         refused = run(*words, "41,-105", "-qq")
         assert refused.exit_code != 0
         assert refused.stderr.startswith("error: ")
-        assert json.loads(run(*words, TARGET, "--json", "-qq").stdout)["warnings"]
+        assert json.loads(run(*words, TARGET, "--json", "-q").stdout)["warnings"]
+        assert not json.loads(run(*words, TARGET, "--json", "-qq").stdout)["warnings"]
+
+    def test_what_was_asked_for_is_no_warning(self, fields: Path, drawn: tuple) -> None:
+        in_the_barn = ("--target", "40.0715987,-105.2296779", "--snap", 10)
+        words = ("--fence", fields / "yard-fence.waypoints", "--start", START, "--clearance", 1, *drawn)
+        found = document(*words, *in_the_barn)
+        moved = next(text for text in found["info"] if "moved" in text)
+        assert "is blocked by a fence: moved" in moved
+        assert moved not in found["warnings"]
+        told = run(*words, *in_the_barn).stderr.splitlines()
+        assert f"info: {moved}" in told
+        quiet = run(*words, *in_the_barn, "-q")
+        assert not any("moved" in line for line in quiet.stderr.splitlines())
+        assert document(*words, *in_the_barn, "-q")["info"] == []
 
     def test_a_plan_file_holds_mission_and_fence_and_plans_again(
         self, fields: Path, tmp_path: Path, drawn: tuple
@@ -319,7 +333,7 @@ class TestFiles:
         assert blocked["error"] == "TargetBlockedError"
         assert blocked["exit_code"] == 4
         moved = document(*source, *in_the_barn, "--snap", 10)
-        assert any("is blocked by a fence: moved" in warning for warning in moved["warnings"])
+        assert any("is blocked by a fence: moved" in text for text in moved["info"])
 
     def test_a_source_is_not_overwritten_with_a_mission(self, fields: Path, tmp_path: Path) -> None:
         fence = tmp_path / "fence.waypoints"
@@ -451,7 +465,7 @@ WRONG_OPTIONS: list[tuple[tuple[str, ...], int, str]] = [
     (("--fence", "F", *ENDS, "--method", "best"), 2, "--method 'best': expected one of"),
     (("--fence", "F", *ENDS, "-o", "x.docx"), 3, "cannot write files with extension '.docx'"),
     (("--fence", "F", *ENDS, "-o", "x.tlog"), 3, "cannot write files with extension '.tlog'"),
-    (("--fence", "F", *ENDS, "--plot", "x.txt"), 3, "no picture format for the suffix '.txt'"),
+    (("--fence", "F", *ENDS, "--plot", "x.txt"), 3, "'.txt' is not a supported picture format"),
     (("--fence", "F", *ENDS, "-o", "no/where/x.plan"), 3, "cannot be written"),
     (("--fence", "F", *ENDS, "--plot", "no/where/x.png"), 3, "cannot be written"),
     (("--fence", "F", "--start", "here", "--target", "40,5"), 2, "'here' is not a position"),

@@ -43,16 +43,31 @@ def test_recorded_then_expected(copies, tmp_path):
     same = run(*copies, "--expect", str(tmp_path), "--jobs", "1")
     count = sum(len(file.read_text().splitlines()) for file in tmp_path.glob("*.events.jsonl"))
     assert (same.exit_code, same.stdout.splitlines()[-1]) == (0, f"As expected: all {count} events came")
-    quiet = run(*copies, "--expect", str(tmp_path), "--quiet", "--jobs", "1")
+    quiet = run(*copies, "--expect", str(tmp_path), "-qq", "--jobs", "1")
     assert (quiet.exit_code, quiet.stdout) == (0, "")
     assert "As expected" not in run(*copies, "--expect", str(tmp_path), "--json", "--jobs", "1").stdout
     path = tmp_path / "no-fence.events.jsonl"
     path.write_text(path.read_text().replace("FenceMissingError", "FenceError"))
-    different = run(*copies, "--expect", str(tmp_path), "--quiet", "--jobs", "1")
+    different = run(*copies, "--expect", str(tmp_path), "-qq", "--jobs", "1")
     assert different.exit_code == 8
     assert different.stdout == ""
     assert "~ no-fence.tlog" in different.stderr
     assert 'expected "FenceError", got "FenceMissingError"' in different.stderr
+
+
+def test_quiet_leaves_warnings_and_quieter_only_errors(copies):
+    everything = [json.loads(line) for line in run(*copies, "--json", "--jobs", "1").stdout.splitlines()]
+    grave = {"warning", "error", "critical"}
+    assert {event["severity"] for event in everything} & grave == {"warning"}
+    warnings = [event for event in everything if event["severity"] in grave]
+    quiet = run(*copies, "--json", "-q", "--jobs", "1")
+    assert [json.loads(line) for line in quiet.stdout.splitlines()] == warnings
+    told = run(*copies, "-q", "--jobs", "1").stdout.splitlines()
+    loud = run(*copies, "--jobs", "1").stdout.splitlines()
+    assert len(told) == len(warnings)
+    assert set(told) < set(loud)  # the same seconds since the log's begin, too
+    for quieter in (["-qq"], ["-qq", "--json"]):
+        assert run(*copies, *quieter, "--jobs", "1").stdout == ""
 
 
 def test_side_by_side_gives_the_same_in_the_same_order(copies):
@@ -115,7 +130,10 @@ def test_a_log_with_times_of_1970_and_nothing_in_it_is_read(tmp_path, zeros):
     assert "learnt: no fence seen, no mission seen" in told.stdout
     summary = CliRunner().invoke(app, ["log", str(path)])
     assert summary.exit_code == 0
-    assert summary.stdout.splitlines()[-1] == "Verdict on vehicle 1: no fence known, not measured"
+    assert (
+        summary.stdout.splitlines()[-1]
+        == "Verdict on vehicle 1: no fence in the log, so no clearance was measured"
+    )
 
 
 def test_all_together_against_one_file(copies, tmp_path):

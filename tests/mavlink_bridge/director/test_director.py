@@ -140,7 +140,7 @@ def test_a_plan_waits_for_the_fix_but_not_for_ever():
     )
     assert late.run() is State.DONE
     assert late.director.situation.fix.value.error_m == 0.3
-    assert any("added 0.3 m for GPS error" in text for text in late.director.plan.warnings)
+    assert any("added 0.3 m for GPS error" in text for text in late.director.plan.info)
     never = conductor(rover())
     never.down.push = _without(never.down.push, m.GpsRawInt)
     assert never.run() is State.DONE

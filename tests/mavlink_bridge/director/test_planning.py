@@ -152,9 +152,7 @@ def test_a_mission_longer_than_the_vehicle_holds_is_shortened_or_refused(monkeyp
     most = len(whole.items)  # one less, with home
     run = verified_or_refused(most)
     assert len(run.vehicles[0].mission) <= most
-    assert any(
-        f"left out to fit the vehicle's limit of {most}" in text for text in run.director.plan.warnings
-    )
+    assert any(f"left out to fit the vehicle's limit of {most}" in text for text in run.director.plan.info)
     assert run.director.plan.targets == whole.targets
     assert run.director.plan.driven_clearance_m >= 1.5 - 0.01
     run = verified_or_refused(2)

@@ -57,7 +57,7 @@ def test_ground_stations_and_companions_are_no_vehicles():
 def test_a_dead_line_is_told_from_one_without_a_vehicle():
     script = Script(FindVehicle(patience_s=5.0))
     script.pass_time(5.1)
-    assert str(script.machine.trouble) == "no vehicle's HEARTBEAT was heard within 5 s, nothing else either"
+    assert str(script.machine.trouble) == "no vehicle's HEARTBEAT was heard within 5 s, nor any other message"
     assert script.machine.trouble.details["heard"] == []
     assert "--system" not in script.machine.trouble.details["advice"]
 

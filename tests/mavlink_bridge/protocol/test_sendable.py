@@ -68,7 +68,7 @@ def test_numbers_that_are_none_pass_and_what_a_vehicle_held_is_put_back():
 
 
 def test_a_list_longer_than_mavlink_counts():
-    with pytest.raises(MissionFormatError, match=r"65536 rally items are more than MAVLink counts \(65535\)"):
+    with pytest.raises(MissionFormatError, match=r"65536 rally items are too many: MAVLink counts to 65535"):
         check_items([MissionItem(5100)] * 65536, MissionType.RALLY)
 
 

@@ -54,7 +54,7 @@ def test_the_tables_know_nothing_of_messages():
         for node in ast.walk(ast.parse((FOLDER / "transitions.py").read_text(encoding="utf-8")))
         if isinstance(node, ast.ImportFrom)
     }
-    assert imported == {"__future__", "enum"}
+    assert imported == {"__future__", "enum", "typing"}
     assert transitions.TABLES
 
 

@@ -260,7 +260,7 @@ def test_a_repaired_mission_is_a_plan():
     assert made.path[0] == HOME
     assert made.path[-1] == EAST.position
     assert made.driven_clearance_m >= 1.99
-    assert made.warnings[0].startswith("leg 1 → 3: ")
+    assert made.info[0].startswith("leg 1 → 3: ")
     assert repaired_plan(situation, asked).items == made.items
 
 

@@ -159,7 +159,7 @@ def test_a_long_tour_fits_or_says_why_not(monkeypatch):
     assert len(fitted.items) + 1 <= most
     assert fitted.targets == whole.targets
     assert set(fitted.targets) <= set(fitted.path)
-    assert any(f"left out to fit the vehicle's limit of {most}" in text for text in fitted.warnings)
+    assert any(f"left out to fit the vehicle's limit of {most}" in text for text in fitted.info)
     assert fitted.driven_clearance_m >= 1.0 - 0.01
     assert_clear_of_posts(fitted.path, 1.0)
     assert check_mission(Mission(fitted.items), situation, request).holds

@@ -27,7 +27,7 @@ def test_known_suffixes() -> None:
 def test_unknown_suffixes() -> None:
     with pytest.raises(
         MissionFormatError,
-        match=r"x\.bmp: no picture format for the suffix '\.bmp'; known are \.png, .*, and - for",
+        match=r"x\.bmp: '\.bmp' is not a supported picture format; supported: \.png, .*, and - for",
     ):
         check_picture_format(Path("x.bmp"))
 

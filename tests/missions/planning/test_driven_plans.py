@@ -191,7 +191,7 @@ class TestClearance:
             assert result.clearance_m == 2.0
             assert result.asked_m == pytest.approx(2.0 + error_m)
             assert result.driven_clearance_m >= 2.0 + error_m
-            assert any("m for GPS error" in warning for warning in result.warnings)
+            assert any("m for GPS error" in text for text in result.info)
         none = plan(replace(situation, fix=Known(Fix(1), 0.0, "test")), request)
         assert none.asked_m == 2.0
         assert any("no 3D GPS fix" in warning for warning in none.warnings)
@@ -293,7 +293,7 @@ class TestEscape:
         assert math.dist(first, second) == pytest.approx(7.3 if allowance_m is None else 7.0, abs=0.1)
         rest = LineString(chart.points(result.path[1:]))
         assert rest.distance(chart.zone_line(block)) >= 2.0 - MERCATOR_TOLERANCE_M
-        assert any("drives out of it" in warning for warning in result.warnings)
+        assert any("drives out of it" in text for text in result.info)
 
     def test_not_across_other_forbidden_ground(self) -> None:
         ring = [

@@ -514,12 +514,12 @@ class TestSnap:
         result = drawn(situation_of(FIELD, WALL), place(50, 0), place(4, 0), snap_m=4.0)
         assert_keeps(result, 2)
         assert length_m([place(4, 0), result.targets[0]]) == pytest.approx(3.01, abs=0.05)
-        assert any(warning.startswith("target ") and "moved 3.0" in warning for warning in result.warnings)
+        assert any(text.startswith("target ") and "moved 3.0" in text for text in result.info)
 
     def test_a_free_target_stays(self) -> None:
         result = drawn(situation_of(FIELD, WALL), place(50, 0), place(20, 0), snap_m=4.0)
         assert result.targets == (place(20, 0),)
-        assert not any("moved" in warning for warning in result.warnings)
+        assert not any("moved" in text for text in result.info)
 
     def test_not_further_than_asked(self) -> None:
         with pytest.raises(TargetBlockedError, match=r"the nearest free point is 3\.0\d m away"):
@@ -712,11 +712,15 @@ def test_outside_what_was_measured_nothing_is_promised_unless_the_model_is_trust
     silent, trusted = (plan(situation, replace(request, trusts_model=trusts)) for trusts in (False, True))
     assert (silent.clearance_m, trusted.clearance_m) == (None, 2.0)
     assert silent.driven_clearance_m == trusted.driven_clearance_m >= 2.0
-    for result, words in ((silent, "no clearance is promised"), (trusted, "clearance is promised anyway")):
+    for result, told, words in (
+        (silent, silent.warnings, "no clearance is promised"),
+        (trusted, trusted.info, "clearance is promised anyway"),  # asked for, so no warning
+    ):
         assert len(result.extrapolated) == 1
         assert result.extrapolated[0].startswith("OA_TYPE 1: ArduPilot plans its own way")
-        assert result.extrapolated[0] in result.warnings
-        assert words in result.warnings[-1]
+        assert result.extrapolated[0] in told
+        assert words in told[-1]
+    assert not set(trusted.warnings) & {*trusted.info}
 
 
 @pytest.mark.parametrize("parameters", [{}, {"FENCE_NTF_FREQ": 1.0, "WP_SPEED": 2.0}])

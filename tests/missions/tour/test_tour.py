@@ -97,7 +97,7 @@ def test_the_best_order_is_the_shortest_of_all_plans(comes_back):
 def test_the_nearest_as_the_crow_flies_may_come_last():
     made = plan(WALLED, request(NEAR_BUT_BEHIND, FAR_BUT_HERE, order="best"))
     assert [tuple(target) for target in made.targets] == [tuple(FAR_BUT_HERE), tuple(NEAR_BUT_BEHIND)]
-    assert made.warnings[0].startswith("targets reordered: 2, 1 (")
+    assert made.info[0].startswith("targets reordered: 2, 1 (")
     given = plan(WALLED, request(NEAR_BUT_BEHIND, FAR_BUT_HERE))
     assert given.targets == (NEAR_BUT_BEHIND, FAR_BUT_HERE)
     assert made.length_m < given.length_m

@@ -1,6 +1,6 @@
 """Whether planned missions are driven as promised: seeded fields, three vehicles, the simulator's drive law in stepped time.
 
-``python benchmarks/drive.py [--fields N] [--first SEED] [--kinds usual|more] [--firmware VERSION] [--jobs N] [--progress] [-o FILE]``. Each run plans a mission, hands
+``python benchmarks/drive.py [--fields N] [--first SEED] [--kinds usual|more|table] [--firmware VERSION] [--jobs N] [--progress] [-o FILE]``. Each run plans a mission, hands
 its items to the simulated rover, drives it in AUTO with the fence enabled, and measures the true track against the fence.
 """
 
@@ -25,17 +25,20 @@ from typing import TYPE_CHECKING
 
 from drive_fields import Field, make_field
 from drive_more_fields import make_more
+from drive_table import make_case
 
 from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.simulator.config import SimulatorConfig
 from mavlink_bridge.simulator.rover import TICK_S
 from mavlink_bridge.simulator.vehicle import SimulatedVehicle
+from missions.drive_model import beyond_measured
 from missions.errors import MissionError
 from missions.fence import fence_to_items
 from missions.firmware import Firmware, read_firmware
 from missions.geo import distance_m
-from missions.ground.from_situation import ground_for
+from missions.ground.from_situation import route_ground
 from missions.planning.plan import plan
+from missions.promise import promise
 from missions.request import GoTo
 from missions.routing.bottleneck import widest_clearance_m
 from missions.situation import Known, Pose, Situation
@@ -90,7 +93,6 @@ class Run:
     promised_m: float
     widest_m: float
     refusal: str | None = None
-    extrapolated: tuple[str, ...] = ()
     planning_s: float = 0.0
     leads_away_m: float | None = None
     length_m: float = 0.0
@@ -103,6 +105,15 @@ class Run:
     driven_s: float = 0.0
     breaches: int = 0
     arrived: bool = False
+    is_measured: bool = True
+    """Whether vehicle and drive lie inside what was measured."""
+
+    @property
+    def group(self) -> str:
+        """Which row of the table it counts in."""
+        if self.vehicle in VEHICLES and self.is_measured:
+            return self.vehicle
+        return "inside what was measured" if self.is_measured else "extrapolated: promises nothing"
 
     @property
     def short_m(self) -> float:
@@ -118,6 +129,8 @@ and the vehicle's avoidance on (`FENCE_MARGIN` is the promise less 0.1 m), and m
 or 3 m, the start faces any way. The rover's drive law ([simulator](simulator.md)) was written apart from the [drive model](drive-model.md)
 that the plans rest on. `--first SEED` gives other fields of these kinds, `--kinds more` other kinds (starts near a fence, targets
 behind the vehicle, short routes, corridors, zigzag walls, mazes, woods of small circles, gates hardly wider than need be).
+`--kinds table` draws a vehicle for each field over the whole table of parameters (`benchmarks/drive_table.py`: 0.2 to 8 m/s, both steerings, radii, pivots,
+margins, avoidance, S-curves, one inclusion, two or a union). What lies outside the measured range is driven too, with `--trust-model`, and counted apart.
 """
 
 
@@ -126,7 +139,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--fields", type=int, default=200)
     parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--kinds", choices=tuple(KINDS), default="usual")
+    parser.add_argument("--kinds", choices=(*KINDS, "table"), default="usual")
     parser.add_argument("--firmware", type=read_firmware, default=Firmware(4, 6))
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--progress", action="store_true")
@@ -149,8 +162,11 @@ def main() -> None:
 
 def runs_of(seed: int, kinds: str = "usual", firmware: Firmware = Firmware(4, 6)) -> list[Run]:  # noqa: B008 - frozen
     """Plan and drive one field with each vehicle."""
+    if kinds == "table":
+        field, name, parameters = make_case(seed)
+        return [_run(replace(field, seed=seed), name, {**_KNOWN, **parameters}, firmware)]
     field = KINDS[kinds](seed)
-    return [_run(field, name, firmware) for name in VEHICLES]
+    return [_run(field, name, parameters_of(field, name), firmware) for name in VEHICLES]
 
 
 def parameters_of(field: Field, name: str) -> dict[str, float]:
@@ -173,30 +189,32 @@ def situation_of(
     )
 
 
-def _run(field: Field, name: str, firmware: Firmware) -> Run:
-    parameters = parameters_of(field, name)
+def _run(field: Field, name: str, parameters: dict[str, float], firmware: Firmware) -> Run:
     situation = situation_of(field, parameters, firmware)
-    ground = ground_for(situation, vehicle_from_parameters(parameters), (field.start, field.target))
+    vehicle = vehicle_from_parameters(parameters, firmware=firmware)
+    ground = route_ground(situation, vehicle, (field.start, field.target))
     widest_m = widest_clearance_m(
         ground, [ground.frame.to_local(field.start), ground.frame.to_local(field.target)]
     )
-    request = GoTo(target=field.target, clearance_m=field.clearance_m)
+    # What is extrapolated is driven too, and counted apart.
+    request = GoTo(target=field.target, clearance_m=field.clearance_m, trusts_model=True)
     known = {
         "seed": field.seed,
         "kind": field.kind,
         "vehicle": name,
-        "promised_m": field.clearance_m,
+        "promised_m": promise(situation, request, vehicle).promised_m,
         "widest_m": widest_m,
     }
     begun_s = time.process_time()
     try:
         planned = plan(situation, request)
     except MissionError as error:
-        return Run(**known, refusal=str(error), planning_s=time.process_time() - begun_s)  # type: ignore[arg-type]
+        is_measured = not beyond_measured(vehicle)
+        took_s = time.process_time() - begun_s
+        return Run(**known, refusal=str(error), planning_s=took_s, is_measured=is_measured)  # type: ignore[arg-type]
     planning_s = time.process_time() - begun_s
     promised_m = planned.clearance_m
-    if promised_m is None:
-        return Run(**known, extrapolated=planned.extrapolated, planning_s=planning_s)  # type: ignore[arg-type]
+    assert promised_m is not None  # the model is trusted
     shortest = plan(situation, replace(request, corner_allowance_m=0.0))
     driven_s, rover, arrived = _drive(field, planned, parameters, firmware)
     return Run(
@@ -213,6 +231,7 @@ def _run(field: Field, name: str, firmware: Firmware) -> Run:
         driven_s=driven_s,
         breaches=rover.breaches,
         arrived=arrived,
+        is_measured=not planned.extrapolated,
     )
 
 
@@ -251,8 +270,9 @@ def _made() -> str:
 
 def report(runs: list[Run], took_s: float) -> str:
     """Return the tables."""
+    groups = list(dict.fromkeys(run.group for run in runs))
     lines = [
-        f"{len({run.seed for run in runs})} fields x {len(VEHICLES)} vehicles, {took_s:.0f} s.",
+        f"{len({run.seed for run in runs})} fields x {len({run.vehicle for run in runs})} vehicles, {len(runs)} runs, {took_s:.0f} s.",
         "",
         (
             "| | routes | refused, widest ≥ promised + 0.5 m | least driven − promised | short by > 0.10 m | breaches | not arrived "
@@ -260,18 +280,18 @@ def report(runs: list[Run], took_s: float) -> str:
         ),
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
-    for name in VEHICLES:
-        mine = [run for run in runs if run.vehicle == name]
-        routes = [run for run in mine if run.refusal is None and not run.extrapolated]
+    for name in groups:
+        mine = [run for run in runs if run.group == name]
+        routes = [run for run in mine if run.refusal is None]
         wide = [run for run in mine if run.widest_m >= run.promised_m + SPARE_M]
         refused = [run for run in wide if run.refusal is not None]
         longer = sorted(run.length_m / run.shortest_m - 1 for run in routes)
         times = sorted(run.foreseen_s / run.driven_s for run in routes if run.arrived)
         lines.append(
             f"| {name} | {len(routes)} of {len(mine)} | {len(refused)} of {len(wide)} ({len(refused) / max(1, len(wide)):.1%}) "
-            f"| {min(-run.short_m for run in routes):+.2f} m | {sum(run.short_m > TOLERANCE_M for run in routes)} "
+            f"| {min((-run.short_m for run in routes), default=math.nan):+.2f} m | {sum(run.short_m > TOLERANCE_M for run in routes)} "
             f"| {sum(run.breaches for run in routes)} | {sum(not run.arrived for run in routes)} "
-            f"| {statistics.median(longer):.1%} / {_p(longer, 0.9):.1%} "
+            f"| {statistics.median(longer or [math.nan]):.1%} / {_p(longer, 0.9):.1%} "
             f"| {_p(times, 0.1):.2f} … {_p(times, 0.9):.2f} "
             f"| {statistics.median(run.planning_s for run in mine):.2f} / {max(run.planning_s for run in mine):.2f} s |"
         )
@@ -282,26 +302,23 @@ def report(runs: list[Run], took_s: float) -> str:
     ]
     lines += ["", "Refused although the widest route keeps 0.5 m more than promised:", ""]
     lines += [
-        f"- {run.kind} {run.seed}, {run.vehicle}, widest {run.widest_m:.2f} m: {run.refusal}"
+        f"- {_named(run)}, widest {run.widest_m:.2f} m: {run.refusal}"
         for run in runs
         if run.refusal is not None and run.widest_m >= run.promised_m + SPARE_M
     ] or ["- none"]
-    lines += ["", "Extrapolated: nothing promised, not driven:", ""]
-    lines += [
-        f"- {run.kind} {run.seed}, {run.vehicle}: {'; '.join(run.extrapolated)}"
-        for run in runs
-        if run.extrapolated
-    ] or ["- none"]
     lines += ["", "Short of the promise, or not arrived:", ""]
     lines += [
-        f"- {run.kind} {run.seed}, {run.vehicle}: promised {run.promised_m:g} m, foreseen {run.foreseen_m:.2f} m, driven {run.driven_m:.2f} m, "
+        f"- {_named(run)}: promised {run.promised_m:g} m, foreseen {run.foreseen_m:.2f} m, driven {run.driven_m:.2f} m, "
         f"{'arrived' if run.arrived else 'not arrived'}, {run.breaches} breaches"
         for run in runs
-        if run.refusal is None
-        and not run.extrapolated
-        and (run.short_m > TOLERANCE_M or not run.arrived or run.breaches)
+        if run.refusal is None and (run.short_m > TOLERANCE_M or not run.arrived or run.breaches)
     ] or ["- none"]
     return "\n".join(lines)
+
+
+def _named(run: Run) -> str:
+    apart = "" if run.is_measured else "extrapolated: "
+    return f"{apart}{run.kind} {run.seed}, {run.vehicle}"
 
 
 def _p(values: list[float], share: float) -> float:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.autopilot_facts import with_autopilot, with_banner, with_parameter, with_version
 from mavlink_bridge.mavlink.parameter_values import parameter_value
+from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.mavlink.vehicles import is_vehicle
 from mavlink_bridge.protocol.wire import item_from_message, mission_result
 from missions.errors import FenceError, InvalidPositionError
@@ -91,18 +92,26 @@ def _is_the_vehicles(situation: Situation, frame: Frame) -> bool:
     return situation.component in (None, frame.component) or isinstance(frame.message, m.ParamValue)
 
 
-def _heartbeat(situation: Situation, frame: Frame, _time_s: float) -> Situation:
+def _heartbeat(situation: Situation, frame: Frame, time_s: float) -> Situation:
     heartbeat = frame.message
     assert isinstance(heartbeat, m.Heartbeat)
     if not is_vehicle(heartbeat):
         return situation
-    return replace(
+    after = replace(
         with_autopilot(situation, heartbeat.autopilot),
         component=frame.component,
         vehicle_type=heartbeat.type,
         mode=heartbeat.custom_mode,
         armed=bool(heartbeat.base_mode & m.ModeFlag.SAFETY_ARMED),
     )
+    if _rolls(after) == _rolls(situation):
+        return after
+    return replace(after, stops=after.stops.begun(time_s) if _rolls(after) else after.stops.ended())
+
+
+def _rolls(situation: Situation) -> bool:
+    """Return whether the motors do nothing, so that what moves rolls (ArduPilot's HOLD does not brake)."""
+    return situation.armed is False or situation.mode == Mode.HOLD
 
 
 def _param_value(situation: Situation, frame: Frame, _time_s: float) -> Situation:
@@ -131,7 +140,9 @@ def _global_position(situation: Situation, frame: Frame, time_s: float) -> Situa
     if position is None:
         return situation
     heading_deg = None if message.hdg == _HEADING_UNKNOWN else message.hdg / 100
-    return replace(situation, pose=Known(Pose(position, heading_deg), time_s, "GLOBAL_POSITION_INT"))
+    pose = Pose(position, heading_deg, (message.vy / 100, message.vx / 100))
+    stops = situation.stops.moved(position, pose.speed_mps, time_s)
+    return replace(situation, pose=Known(pose, time_s, "GLOBAL_POSITION_INT"), stops=stops)
 
 
 def _gps_raw(situation: Situation, frame: Frame, time_s: float) -> Situation:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from missions.drive_model import Envelope
+    from missions.drive_model.stopping import HoldCheck
     from missions.fence import Fence
     from missions.formats.files import Writer
     from missions.geo import LatLon
@@ -71,6 +72,8 @@ class Plan:
         Why the drive lies outside the measured range; empty where it does not.
     start_clearance_m : float or None
         Promised on the first legs, while it leaves the place where it stands, where that place leaves less; else None.
+    hold : HoldCheck or None
+        What HOLD does on the route.
     """
 
     items: tuple[MissionItem, ...]
@@ -98,6 +101,7 @@ class Plan:
     asked_targets: tuple[LatLon, ...] = ()
     extrapolated: tuple[str, ...] = ()
     start_clearance_m: float | None = None
+    hold: HoldCheck | None = None
 
     @property
     def turn_count(self) -> int:

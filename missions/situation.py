@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from enum import StrEnum
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Generic, TypeVar
+
+from missions.stops import Stops
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from missions.fence import Fence
     from missions.firmware import Firmware
-    from missions.geo import LatLon
+    from missions.geo import LatLon, Vector
     from missions.items import MissionItem
     from missions.rally import RallyPoint
 
@@ -42,10 +45,16 @@ class Mission:
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """Where the vehicle is and where it heads (degrees clockwise from north, None where unknown)."""
+    """Where the vehicle is, where it heads (degrees clockwise from north) and how it moves (east and north, m/s); None where unknown."""
 
     position: LatLon
     heading_deg: float | None = None
+    velocity_mps: Vector | None = None
+
+    @property
+    def speed_mps(self) -> float:
+        """How fast it moves; 0 where that is not known."""
+        return math.hypot(*self.velocity_mps) if self.velocity_mps is not None else 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,6 +137,8 @@ class Situation:
         Lists on their way, by kind and direction (True: to the vehicle).
     fence_trouble : str or None
         Why the newest fence that was seen could not be used.
+    stops : Stops
+        How far it rolls on after HOLD or disarming, as far as that was said or seen.
     remarks : tuple of str
         Warnings from reading a file: what was skipped, and what was assumed.
     """
@@ -153,4 +164,5 @@ class Situation:
         default_factory=lambda: MappingProxyType({})
     )
     fence_trouble: str | None = None
+    stops: Stops = field(default_factory=Stops)
     remarks: tuple[str, ...] = ()

@@ -60,7 +60,7 @@ def bridge(options: BridgeOptions) -> None:
     """Run the director on a link until its single job is done, or for ever."""
     check_permissions(upload=options.upload, drive=options.drive, arm=options.arm)
     orders = _orders(options)
-    described = described_vehicle(options.vehicle, options.firmware)
+    described = described_vehicle(options.vehicle, options.firmware, options.stopping)
     with contextlib.ExitStack() as stack:
         recorder, journal = _recorders(stack, options.log, orders, described)
         director = Director(orders, described)

@@ -15,6 +15,7 @@ from mavlink_bridge.cli.drawing import cell, console
 from mavlink_bridge.cli.failing import ExitCode
 from mavlink_bridge.cli.field_files import read_fence_file, read_file, with_mission_home
 from mavlink_bridge.cli.pictures import check_plots, draw
+from mavlink_bridge.cli.plan_results import hold_document
 from mavlink_bridge.cli.terminal import echo, print_json
 from mavlink_bridge.cli.values import position_from
 from mavlink_bridge.cli.vehicle_options import (
@@ -82,7 +83,9 @@ def _situation(options: CheckOptions) -> tuple[Situation, list[str]]:
 
         situation, unknown = live_situation(options)
     situation = _with_files(situation, options)
-    situation = with_description(situation, described_vehicle(options.vehicle, options.firmware))
+    situation = with_description(
+        situation, described_vehicle(options.vehicle, options.firmware, options.stopping)
+    )
     return with_home_option(situation, options.home), unknown
 
 
@@ -233,6 +236,7 @@ def _document(
         "mission_items": len(checked.mission.items) + 1,
         "endless": checked.course.is_endless,
         "broken": len(checked.broken),
+        "stopping": hold_document(checked.hold),
         "legs": [_leg_document(leg) for leg in checked.legs],
         "not_understood": list(checked.troubles),
         "dangers": list(checked.dangers),

@@ -18,6 +18,7 @@ from missions.words import counted
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from missions.drive_model.stopping import HoldCheck
     from missions.planned import Plan
     from missions.situation import Situation
 
@@ -56,10 +57,32 @@ def plan_document(planned: Plan) -> dict[str, object]:
             "vertices": fence.vertex_count,
             "union": planned.ground.union,
         },
+        "stopping": hold_document(planned.hold),
         "blocks": planned.blocks,
         "mission_items": len(planned.items) + 1,
         "extrapolated": list(planned.extrapolated),
         **remarks_document(planned.info, planned.warnings),
+    }
+
+
+def hold_document(hold: HoldCheck | None) -> dict[str, object] | None:
+    """Return for the JSON document what HOLD does on a route; null where that is not known."""
+    if hold is None:
+        return None
+    worst = hold.worst
+    return {
+        "speed_mps": round(hold.speed_mps, 2),
+        "distance_m": round(hold.stopping_m, 2),
+        "source": hold.source,
+        "leaves_fence": worst
+        and {
+            "at": list(worst.at),
+            "speed_mps": round(worst.speed_mps, 2),
+            "distance_m": round(worst.stopping_m, 2),
+            "to_fence_m": round(worst.to_fence_m, 2),
+            "beyond_m": round(worst.beyond_m, 2),
+            "fence": worst.fence,
+        },
     }
 
 

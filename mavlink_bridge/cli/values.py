@@ -10,6 +10,7 @@ import typer
 from mavlink_bridge.errors import UsageError
 from missions.errors import InvalidPositionError
 from missions.geo import parse_lat_lon
+from missions.stops import Stop
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -110,6 +111,20 @@ def metres_or(option: str, text: str | None, word: str) -> float | None:
         return checked_number(text, 0.0, MOST_M, "metres", word=word)
     except UsageError as error:
         raise UsageError(f"{option} {error}") from None
+
+
+def stop_from(text: str | Stop) -> Stop:
+    """Return the stop that an option is (typer's ``parser=``): ``M@MPS``, metres rolled from metres a second."""
+    if isinstance(text, Stop):
+        return text
+    distance, _, speed = text.partition("@")
+    try:
+        return Stop(
+            checked_number(speed, LEAST_MPS, MOST_MPS, "metres a second"),
+            checked_number(distance, 0.0, MOST_M, "metres"),
+        )
+    except UsageError as error:
+        raise typer.BadParameter(f"{text!r}: expected M@MPS, such as 6@3 (6 m from 3 m/s); {error}") from None
 
 
 def position_from(option: str, text: str) -> LatLon:

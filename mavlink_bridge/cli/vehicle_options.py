@@ -9,14 +9,17 @@ from mavlink_bridge.cli.field_files import read_vehicle_file
 from mavlink_bridge.cli.values import MOST_VEHICLE_M, checked_number, position_from
 from mavlink_bridge.errors import UsageError
 from missions.situation import Known, Situation
+from missions.stops import Stops
 from missions.vehicle import Footprint
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from mavlink_bridge.cli.options.shared import ClearanceOptions
     from missions.firmware import Firmware
     from missions.request import Request
+    from missions.stops import Stop
 
 
 def with_vehicle(request: Request, options: ClearanceOptions) -> Request:
@@ -57,10 +60,12 @@ def with_home_option(situation: Situation, home: str | None) -> Situation:
     return replace(situation, home=Known(position_from("--home", home), None, "--home"))
 
 
-def described_vehicle(file: Path | None, firmware: Firmware | None) -> Situation:
-    """Return what the user says of the vehicle: a parameter file, and the firmware's version, else the one that the file names."""
+def described_vehicle(
+    file: Path | None, firmware: Firmware | None, stopping: Sequence[Stop] = ()
+) -> Situation:
+    """Return what the user says of the vehicle: a parameter file, the firmware's version (else the one that the file names), how far it rolls on."""
     described = read_vehicle_file(file) if file else Situation()
-    return replace(described, firmware=firmware or described.firmware)
+    return replace(described, firmware=firmware or described.firmware, stops=Stops(given=tuple(stopping)))
 
 
 def with_description(situation: Situation, described: Situation) -> Situation:
@@ -69,4 +74,5 @@ def with_description(situation: Situation, described: Situation) -> Situation:
         situation,
         parameters={**described.parameters, **situation.parameters},
         firmware=situation.firmware or described.firmware,
+        stops=replace(situation.stops, given=described.stops.given),
     )

@@ -18,6 +18,7 @@ in `handlers`.
 `ListWatch`         knows which of the vehicle's lists are as they were read, and reads the others again
 `Halter`            HOLD, and whether the vehicle stands
 `DriveSupervisor`   watches a drive until it has arrived
+`HoldWatch`         where a HOLD ends: announces breaches to come, lets the vehicle go on first where that is better
 `TargetInbox`       targets of all sources, answers to who asked, and a target that waits
 `RouteDesk`         has plans made, drops those nobody waits for, and checks the one that stands
 `MissionWriter`     a plan that stands → a verified mission on the vehicle

@@ -39,6 +39,7 @@ class EventName(StrEnum):
     DRIVING = auto()
     PROGRESS = auto()
     LEFT_ENVELOPE = auto()
+    BREACH_AHEAD = auto()
     BREACH = auto()
     FAILSAFE = auto()
     ARRIVED = auto()
@@ -77,6 +78,10 @@ SCHEMA: dict[EventName, tuple[Severity, tuple[str, ...]]] = {
         ("item", "distance_left_m", "time_left_s", "least_clearance_m", "deviation_m", "position"),
     ),
     EventName.LEFT_ENVELOPE: (Severity.WARNING, ("outside_m", "position")),
+    EventName.BREACH_AHEAD: (
+        Severity.CRITICAL,
+        ("fence", "to_fence_m", "stopping_m", "speed_mps", "source", "best", "go_on_m"),
+    ),
     EventName.BREACH: (
         Severity.CRITICAL,
         ("breaches", "position", "fence", "beyond_m", "breach_type", "mode"),

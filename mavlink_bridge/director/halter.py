@@ -9,7 +9,6 @@ from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.orders import TargetSource
 from mavlink_bridge.director.states import Cue, Notice, Signal, State
-from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.protocol.mode_switch import ModeSwitch
 
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
 FRESH_S = 1.5
 """How old a heartbeat may be to tell what the vehicle does now."""
 
-_STILL_MPS = 0.3
+STILL_MPS = 0.3
 """Slower than this counts as standing."""
 
 _STOP_AT_LEAST_S = 0.25
@@ -53,7 +52,6 @@ class Halter(Part):
         self.may_be_in_auto = False
         self.is_hold_granted = False
         self._stopped_s = -math.inf  # when the vehicle took it
-        self._speed_mps = 0.0
         self._held_at_s: float | None = None
         self._standstill_due_s = math.inf
 
@@ -68,12 +66,6 @@ class Halter(Part):
     def messages_to_send(self) -> list[Message]:
         """Return and forget what is to be sent before anything else."""
         return self.stopping.messages_to_send() if self.stopping is not None else []
-
-    def receive(self, frame: Frame, now_s: float) -> Sequence[Signal]:  # noqa: ARG002 - a part
-        """Notice how fast the vehicle is."""
-        if self.core.is_from_vehicle(frame) and isinstance(frame.message, m.GlobalPositionInt):
-            self._speed_mps = math.hypot(frame.message.vx, frame.message.vy) / 100
-        return []
 
     def hear_answer(self, frame: Frame, now_s: float) -> Sequence[Signal]:
         """Take a frame for the HOLD that is under way."""
@@ -202,7 +194,8 @@ class Halter(Part):
         is_patience_over = (
             now_s >= self._held_at_s + _STOP_PATIENCE_S and self.core.situation.mode == Mode.HOLD
         )
-        if self._speed_mps <= _STILL_MPS or is_patience_over:
+        pose = self.core.situation.pose
+        if pose is None or pose.value.speed_mps <= STILL_MPS or is_patience_over:
             return True
         self._standstill_due_s = now_s + _STOP_AT_LEAST_S
         return False

@@ -130,6 +130,24 @@ def _on_route_wanted(parts: Parts, _now_s: float, *, is_own_idea: bool = False) 
 
 
 def _on_route_outdated(parts: Parts, now_s: float) -> Iterable[Signal]:
+    if parts.halter.may_stop_it and parts.hold_watch.goes_on_first(now_s):
+        return ()
+    return _on_route_wanted(parts, now_s, is_own_idea=True)
+
+
+def _on_target_came(parts: Parts, now_s: float) -> Iterable[Signal]:
+    """Go into a target; one that was not clicked waits where the vehicle is to go on before its HOLD."""
+    core, inbox = parts.core, parts.inbox
+    if inbox.came.is_click or not parts.halter.may_stop_it or not parts.hold_watch.goes_on_first(now_s):
+        return inbox.go_into(now_s)
+    core.operator.take_target(now_s, is_click=False)
+    inbox.waiting = inbox.came
+    return ()
+
+
+def _on_gone_on(parts: Parts, now_s: float) -> Iterable[Signal]:
+    if parts.inbox.waiting is not None:
+        return [Notice.TARGET_IS_DUE]
     return _on_route_wanted(parts, now_s, is_own_idea=True)
 
 
@@ -199,7 +217,7 @@ def _on_drive_ended(parts: Parts, _now_s: float) -> Iterable[Signal]:
     """End a drive that has arrived; a single job is done with it."""
     parts.driver.holds_after_arrival = False
     _let_loose(parts)
-    return parts.core.end()
+    return [*parts.core.end(), Notice.TARGET_IS_DUE]
 
 
 # The operator's word
@@ -249,12 +267,13 @@ HANDLERS: dict[Signal, Callable[[Parts, float], Iterable[Signal] | None]] = {
     Cue.GIVE_UP: lambda parts, _now_s: parts.core.steps.clear(),
     # HELD, UPLOAD_VERIFIED, TROUBLE and END move the state, and that is all.
     # Notices: the state is as it was
-    Notice.TARGET_CAME: lambda parts, now_s: parts.inbox.go_into(now_s),
+    Notice.TARGET_CAME: _on_target_came,
     Notice.TARGET_WAITS: _on_target_waits,
     Notice.TARGET_AGAIN: lambda parts, now_s: parts.halter.stop_again(parts.inbox.came, now_s),
     Notice.TARGET_IS_DUE: lambda parts, _now_s: parts.inbox.take_waiting(),
     Notice.ROUTE_WANTED: _on_route_wanted,
     Notice.ROUTE_OUTDATED: _on_route_outdated,
+    Notice.GONE_ON: _on_gone_on,
     Notice.FENCE_CHANGED: lambda parts, now_s: parts.desk.fence_changed(now_s),
     Notice.MISSION_READ: lambda parts, _now_s: parts.writer.mission_read(),
     Notice.MISSION_TAKEN: lambda parts, now_s: parts.writer.mission_taken(now_s),

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from mavlink_bridge.director.drive_supervisor import DriveSupervisor
 from mavlink_bridge.director.halter import Halter
 from mavlink_bridge.director.hand_over import HandOver
+from mavlink_bridge.director.hold_watch import HoldWatch
 from mavlink_bridge.director.identity_guard import IdentityGuard
 from mavlink_bridge.director.learner import Learner
 from mavlink_bridge.director.list_watch import ListWatch
@@ -42,18 +43,26 @@ class Parts:
         self.inbox: TargetInbox = TargetInbox(core)
         self.halter: Halter = Halter(core, self.lists)
         self.driver: DriveSupervisor = DriveSupervisor(core, self.halter)
-        self.desk: RouteDesk = RouteDesk(core, self.lists, self.driver)
+        self.hold_watch: HoldWatch = HoldWatch(core, self.halter, self.driver)
+        self.desk: RouteDesk = RouteDesk(core, self.lists, self.driver, self.hold_watch)
         self.writer: MissionWriter = MissionWriter(core, self.lists, self.halter, self.desk)
         self.starter: Starter = Starter(core, self.lists, self.halter, self.driver, self.desk)
         self.hand_over: HandOver = HandOver(core, self.halter, self.driver)
         self.guard: IdentityGuard = IdentityGuard(core, self.learner, self.halter, self.inbox, self.writer)
         self.hearers: tuple[Part, ...] = (
-            self.halter,
             self.learner,
             self.hand_over,
             self.guard,
             self.driver,
+            self.hold_watch,
             self.lists,
             self.inbox,
         )
-        self.timed: tuple[Part, ...] = (self.halter, self.desk, self.driver, self.learner, self.lists)
+        self.timed: tuple[Part, ...] = (
+            self.halter,
+            self.hold_watch,
+            self.desk,
+            self.driver,
+            self.learner,
+            self.lists,
+        )

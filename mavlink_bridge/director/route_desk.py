@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from mavlink_bridge.director.drive_supervisor import DriveSupervisor
+    from mavlink_bridge.director.hold_watch import HoldWatch
     from mavlink_bridge.director.list_watch import ListWatch
     from missions.planned import Plan
     from missions.request import Request
@@ -37,10 +38,11 @@ class RouteDesk(Part):
         Whether the route is made because the one before broke, not because somebody asked.
     """
 
-    def __init__(self, core: Core, lists: ListWatch, driver: DriveSupervisor) -> None:
+    def __init__(self, core: Core, lists: ListWatch, driver: DriveSupervisor, hold_watch: HoldWatch) -> None:
         super().__init__(core)
         self._lists = lists
         self._driver = driver
+        self._hold_watch = hold_watch
         self._made: Plan | MissionError | None = None
         self._planned_on = Grounds.of(core.situation)
         self.is_own_idea = False
@@ -128,10 +130,15 @@ class RouteDesk(Part):
         core = self.core
         core.drop_plan_task()
         if core.state is State.READY and core.target is not None:
+            self._hold_watch.announce(now_s)
             return [Notice.ROUTE_OUTDATED]
         if core.plan is None or core.state in _MAKING_A_ROUTE or core.state is State.ARRIVED:
+            self._hold_watch.announce(now_s)
             return []
         found = self.recheck(self._driver.item)
+        if found.holds and core.is_driving_ours:
+            return []
+        self._hold_watch.announce(now_s)
         if found.holds:
             return []
         is_ours_to_mend = core.state not in (State.READY, State.LET_GO)

@@ -78,6 +78,7 @@ class Notice(StrEnum):
     MISSION_HEARD = auto()  # its end may be a target
     RALLY_HEARD = auto()
     LEARNING_FAILED = auto()
+    GONE_ON = auto()  # on the route, as far as was better than a HOLD at once
     HOLD_ENDED = auto()  # taken, or not
     UPLOAD_ENDED = auto()  # well or badly; the state has moved already
     DRIVE_ENDED = auto()

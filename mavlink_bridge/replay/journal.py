@@ -17,6 +17,7 @@ from missions.firmware import read_firmware
 from missions.geo import LatLon
 from missions.request import request_of
 from missions.situation import Situation
+from missions.stops import Stop, Stops
 from missions.vehicle import Footprint
 
 if TYPE_CHECKING:
@@ -71,7 +72,7 @@ class JournalWriter:
     orders : Orders
         What the director may do.
     described : Situation
-        What was known beforehand: parameters, and the firmware's version.
+        What was known beforehand: parameters, the firmware's version, how far it rolls on.
 
     Raises
     ------
@@ -87,6 +88,7 @@ class JournalWriter:
                 "orders": _orders_to_json(orders),
                 "parameters": dict(described.parameters),
                 "firmware": str(described.firmware) if described.firmware else None,
+                "stopping": [[one.speed_mps, one.distance_m] for one in described.stops.given],
             }
         )
 
@@ -137,7 +139,8 @@ def read_journal(path: Path) -> Journal:
             raise LogError(f"{path}: journal format {head['journal']!r}; expected {_FORMAT}")
         orders = _orders_from_json(head["orders"])
         firmware = read_firmware(head["firmware"]) if head.get("firmware") else None
-        described = Situation(parameters=head["parameters"], firmware=firmware)
+        given = tuple(Stop(*one) for one in head.get("stopping", ()))
+        described = Situation(parameters=head["parameters"], firmware=firmware, stops=Stops(given))
         for line in lines[1:]:
             entry = json.loads(line)
             if "told" in entry:

@@ -13,6 +13,7 @@ from shapely.ops import nearest_points
 
 from missions.checking.execution import CIRCLE_M, Course, CourseLeg, follow_mission
 from missions.checking.forecast import forecast_drive, pivot_remarks
+from missions.checking.holding import hold_check, hold_info, hold_warnings
 from missions.checking.mission_end import crossed_zones, end_warnings, return_place, return_warnings
 from missions.drive_model import Envelope, extrapolated
 from missions.errors import SituationError, StartBlockedError
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
 
+    from missions.drive_model.stopping import HoldCheck
     from missions.fence import Fence
     from missions.request import Request
     from missions.situation import Mission, Situation
@@ -129,6 +131,8 @@ class MissionCheck:
         Why the drive lies outside the measured range: then it is predicted, not promised, that the mission holds.
     trusts_model : bool
         Whether that is promised all the same.
+    hold : HoldCheck or None
+        What HOLD does on the way.
     """
 
     mission: Mission
@@ -144,6 +148,7 @@ class MissionCheck:
     extrapolated: tuple[str, ...] = ()
     trusts_model: bool = False
     info: tuple[str, ...] = ()
+    hold: HoldCheck | None = None
 
     @property
     def broken(self) -> tuple[CheckedLeg, ...]:
@@ -227,6 +232,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
     forecast = _forecast(course, ground, vehicle, heading_deg)
     legs = _checked_legs(course, ground, forecast, asked.required_m, seams_of(ground, vehicle))
     dangers, hazards = _at_start(ground, start, vehicle)
+    hold = hold_check(forecast, vehicle, ground, situation.stops)
     reasons = extrapolated(vehicle, forecast, *(leg.speed_mps for leg in course.legs))
     warnings = [
         *parameter_remarks(situation),
@@ -240,6 +246,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
         *_drive_warnings(vehicle, forecast, course),
         *pivot_remarks(ground, vehicle, forecast, _items_of(course)),
         *reasons,
+        *([] if any(leg.crosses for leg in legs) else hold_warnings(hold)),
         *return_warnings(situation, vehicle, ground, course.path),
         *end_warnings(situation, vehicle, course),
     ]
@@ -256,7 +263,8 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
         envelope=forecast,
         extrapolated=reasons,
         trusts_model=request.trusts_model,
-        info=asked.info,
+        hold=hold,
+        info=(*asked.info, *hold_info(hold)),
     )
 
 

@@ -44,7 +44,7 @@ ASIDE_DEG = 5.0
 """It may look so far to either side of the way that it is meant to go."""
 
 # Steps of the pursuit: chosen, not measured; how well the whole holds against driven tracks stands in docs/drive-model.md, 4.
-_STEP_S = 0.3
+STEP_S = 0.3
 _LONGEST_S = 7 * 86400.0
 """No rover drives a mission for longer, and a drive is followed step by step; chosen, not measured."""
 _SETTLE_S = 1.0  # of the target's time scale: acceleration over jerk in AR_WPNav, 1 s with the measured 1 m/s² and 1 m/s³
@@ -83,7 +83,7 @@ def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry) -> Env
     }
     found = [(band.cores, band.bands_m, band.waypoints)]
     for either_m in sorted(middles_m):
-        target = _TargetPoint(band, vehicle, either_m)
+        target = TargetPoint(band, vehicle, either_m)
         lags = target.lags(vehicle, FenceAhead(fence, _plane(target.places), vehicle))
         if lags and len((pieces := target.pieces(lags))[0]):
             found.append(pieces)
@@ -93,7 +93,7 @@ def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry) -> Env
     return replace(band, cores=cores, bands_m=bands_m, waypoints=waypoints)
 
 
-class _TargetPoint:
+class TargetPoint:
     """How the target point moves along all legs: each leg's motion begins while the one before still ends.
 
     Parameters
@@ -123,26 +123,26 @@ class _TargetPoint:
                 f"at its speeds the drive takes {whole_s / 86400:.3g} days; at most {_LONGEST_S / 86400:g} days can be predicted",
                 duration_s=whole_s,
             )
-        self.times_s = np.arange(0.0, whole_s + _STEP_S, _STEP_S)
+        self.times_s = np.arange(0.0, whole_s + STEP_S, STEP_S)
         points = band.points[:, 0] + 1j * band.points[:, 1]
         self.places: NDArray[np.complex128] = np.full(len(self.times_s), points[0])
         for leg, profile, begin_s in zip(band.legs, profiles, begins_s, strict=True):
             step = points[leg.first + 1] - points[leg.first]
-            leg_s = np.append(np.arange(0.0, profile.duration_s, _STEP_S), profile.duration_s)
+            leg_s = np.append(np.arange(0.0, profile.duration_s, STEP_S), profile.duration_s)
             shares = profile.all_travelled_m(leg_s) / profile.length_m
             self.places += np.interp(self.times_s - begin_s, leg_s, shares) * step
 
     def lags(self, vehicle: Vehicle, fence: FenceAhead) -> list[complex]:
         """Return at each time how far the rover is behind, east and north; an empty list where it never is."""
         steps = np.diff(self.places)
-        moved_m = np.maximum(np.abs(steps), _LEAST_MPS * _STEP_S)
+        moved_m = np.maximum(np.abs(steps), _LEAST_MPS * STEP_S)
         is_slowed = np.zeros(len(steps), dtype=np.bool_)
         near = self._near_corners()[:-1]
         for side in _SIDES:
             allowed_mps = fence.speeds_mps(
                 _plane(self.places[:-1][near]), _plane(side * (steps / moved_m)[near])
             )
-            is_slowed[near] |= allowed_mps < _SLOWED_SHARE * moved_m[near] / _STEP_S
+            is_slowed[near] |= allowed_mps < _SLOWED_SHARE * moved_m[near] / STEP_S
         if not is_slowed.any():
             return []
         return _followed(self.places.tolist(), is_slowed.tolist(), vehicle, fence)
@@ -196,7 +196,7 @@ def _followed(
     narrow routes was spent in here when each step called functions of its own.
     """
     lags = [0j] * len(is_slowed)
-    velocities = [(after - before) / _STEP_S for before, after in pairwise(places)]
+    velocities = [(after - before) / STEP_S for before, after in pairwise(places)]
     velocities.append(velocities[-1])
     top_mps = max(map(abs, velocities))
     gain_per_s, allowed_speed_mps = vehicle.position_gain_per_s, fence.speeds_about(top_mps)
@@ -214,7 +214,7 @@ def _followed(
             behind, scale, at = 0j, 1.0, float(slowed[following])
             driven = velocities[slowed[following] - 1]
             continue
-        here = places[sample] + (at - sample) * _STEP_S * velocity - behind
+        here = places[sample] + (at - sample) * STEP_S * velocity - behind
         wanted = velocity + gain_per_s * behind
         wanted_mps = abs(wanted) or 1.0
         way = wanted / wanted_mps
@@ -223,19 +223,19 @@ def _followed(
         wanted_mps = abs(wanted)
         now_mps = abs(driven)
         heading = driven / now_mps if now_mps > _LEAST_MPS else wanted / (wanted_mps or 1.0)
-        accel = (velocities[sample + 1] - velocity) / _STEP_S
+        accel = (velocities[sample + 1] - velocity) / STEP_S
         turn_radps = ((wanted + accel) * heading.conjugate()).imag / max(now_mps, 1.0)
         if is_steered:
             most_radps = now_mps / turn_radius_m
             turn_radps = min(max(turn_radps, -most_radps), most_radps)
-        heading *= cmath.rect(1.0, turn_radps * _STEP_S)
+        heading *= cmath.rect(1.0, turn_radps * STEP_S)
         driven = heading * max(min(wanted_mps, turn_mps), (wanted * heading.conjugate()).real, 0.0)
         # How fast time runs for the target point: it waits for a rover that cannot keep up (AR_WPNav). 0.05 as in the simulator's `drive`.
         target_mps = max(abs(velocity), _LEAST_MPS)
         along_mps = ((driven - gain_per_s * behind) * velocity.conjugate()).real / target_mps
         runs = min(max(0.05 + along_mps / target_mps, _LEAST_SCALE), 1.0)
-        scale += (runs - scale) * _STEP_S / _SETTLE_S
-        behind += (scale * velocity - driven) * _STEP_S
+        scale += (runs - scale) * STEP_S / _SETTLE_S
+        behind += (scale * velocity - driven) * STEP_S
         if abs(behind) > abs(lags[sample]):
             lags[sample] = behind
         at += scale

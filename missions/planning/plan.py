@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from missions.checking.check import plan_of
+from missions.checking.holding import with_hold
 from missions.editing.repair import repaired_plan
 from missions.editing.shorten import shortened
 from missions.errors import PlanStoppedError
@@ -57,12 +58,13 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
     """
     should_stop = PlanStoppedError.when(should_stop)
     if isinstance(request, RepairMission):
-        return marked(repaired_plan(situation, request, should_stop=should_stop), request)
+        planned = repaired_plan(situation, request, should_stop=should_stop)
+        return with_hold(marked(planned, request), situation)
     if isinstance(request, Tour):
         planned = plan_tour(situation, request, should_stop=should_stop)
     else:
         planned = plan_route(situation, request, should_stop=should_stop)
-    return marked(_with_room(planned, situation, request, should_stop), request)
+    return with_hold(marked(_with_room(planned, situation, request, should_stop), request), situation)
 
 
 def _with_room(

@@ -111,9 +111,9 @@ class TestVehicle:
         assert after(NEW, (sender, heartbeat)) == NEW
 
     def test_position_and_heading(self) -> None:
-        found = after(NEW, (ROVER, m.GlobalPositionInt(0, 400713740, -1052299300, hdg=9050)))
+        found = after(NEW, (ROVER, m.GlobalPositionInt(0, 400713740, -1052299300, vx=120, vy=-50, hdg=9050)))
         assert found.pose is not None
-        assert found.pose.value == Pose(HOME, 90.5)
+        assert found.pose.value == Pose(HOME, 90.5, (-0.5, 1.2))
         assert (found.pose.time_s, found.pose.source) == (0.0, "GLOBAL_POSITION_INT")
         unknown = after(NEW, (ROVER, m.GlobalPositionInt(0, 400713740, -1052299300, hdg=65535)))
         assert unknown.pose is not None

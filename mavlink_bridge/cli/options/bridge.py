@@ -13,6 +13,7 @@ from mavlink_bridge.cli.options.shared import (
     FirmwareOption,
     RequiredConnectOption,
     SigningKeyOption,
+    StoppingOption,
     SystemOption,
     TimeoutOption,
     TrustOption,
@@ -56,6 +57,7 @@ class BridgeOptions(CommonOptions):
         Path | None, option("Parameter file, for what the vehicle does not report.", "FILE.parm")
     ] = None
     firmware: FirmwareOption = None
+    stopping: StoppingOption = field(default_factory=list)
     trust_model: TrustOption = False
     upload: Annotated[bool, flag("--upload", "Write missions to the vehicle.")] = False
     drive: Annotated[

@@ -15,6 +15,7 @@ from mavlink_bridge.cli.options.shared import (
     HomeOption,
     LinkOptions,
     MapOptions,
+    StoppingOption,
     TrustOption,
     metres,
     option,
@@ -51,6 +52,7 @@ class CheckOptions(MapOptions, ClearanceOptions, LinkOptions):
     ] = None
     firmware: FirmwareOption = None
     trust_model: TrustOption = False
+    stopping: StoppingOption = field(default_factory=list)
     clearance: Annotated[
         float | None, metres("Fence clearance each leg must keep while driving. Default: from FENCE_MARGIN.")
     ] = None

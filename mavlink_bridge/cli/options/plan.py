@@ -16,6 +16,7 @@ from mavlink_bridge.cli.options.shared import (
     HomeOption,
     LinkOptions,
     MapOptions,
+    StoppingOption,
     TrustOption,
     flag,
     metres,
@@ -118,6 +119,7 @@ class PlanOptions(MapOptions, ClearanceOptions, LinkOptions):
         ),
     ] = None
     firmware: FirmwareOption = None
+    stopping: StoppingOption = field(default_factory=list)
     trust_model: TrustOption = False
     order: Annotated[
         str, option("given: as listed; best: in the shortest order.", "|".join(ORDERS), panel=_TOURS)

@@ -9,9 +9,10 @@ from typing import Annotated, Any
 import typer
 
 from mavlink_bridge.cli.options_file import take_options
-from mavlink_bridge.cli.values import MOST_M, MOST_S, MOST_VEHICLE_M, within
+from mavlink_bridge.cli.values import MOST_M, MOST_S, MOST_VEHICLE_M, stop_from, within
 from missions.errors import VehicleError
 from missions.firmware import Firmware, read_firmware
+from missions.stops import Stop
 
 LINK_PANEL, OUTPUT_PANEL, VEHICLE_PANEL = "Link", "Output", "Vehicle"
 _MAP_PANEL = "Map files: what each zone is"
@@ -84,6 +85,16 @@ FirmwareOption = Annotated[
         "VERSION",
         panel=VEHICLE_PANEL,
         parser=firmware_option,
+    ),
+]
+StoppingOption = Annotated[
+    list[Stop],
+    option(
+        "How far your rover rolls on after HOLD: 6@3 is 6 m from 3 m/s. Repeatable. Default: its own stops, where it was seen to stop; else those of "
+        "ArduPilot's simulation.",
+        "M@MPS",
+        panel=VEHICLE_PANEL,
+        parser=stop_from,
     ),
 ]
 TrustOption = Annotated[

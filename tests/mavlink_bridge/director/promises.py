@@ -2,21 +2,36 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.director import State
+from mavlink_bridge.director import EventName, State
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.rover import Mode
+from missions.fence import CircleZone, ZoneKind
 from missions.items import Command
 
 if TYPE_CHECKING:
     from director.conducting import Conductor
+
+    from mavlink_bridge.director import Event
+    from missions.fence import Zone
+    from missions.situation import Pose
 
 ON_ITS_WAY_S = 0.55
 """What is overheard so soon after a target may have been on its way before it."""
 
 SLOWEST_LINK_S = 0.3
 """A heartbeat that comes sooner after a takeover may tell what was before it."""
+
+ROLLS_S = 1.0
+"""Every rover rolls on farther than it drives in this time: braking with 1 m/s² from 2 m/s on, rolling by the measured rows from any speed."""
+
+TAKEN_S = 0.5
+"""A HOLD that the link brings later than this may end farther on than was foretold."""
+
+ROLLING_S = 15.0
+"""The longest measured way to a standstill took 12.2 s."""
 
 
 class Promises:
@@ -41,13 +56,33 @@ class Promises:
         self._asked_s = -1e9
         self._last_auto_heartbeats = -1
         self._texts_s = -1e9
-        receive, messages_to_send = run.director.receive, run.director.messages_to_send
+        self._announced_s = -1e9
+        self._owes_announcement = ""
+        self._hold_s: float | None = None  # our newest HOLD, as long as it may roll
+        self._held_fence: object = None
+        self._mode_before: int | None = None
+        self._breaches = 0
+        director = run.director
+        receive, messages_to_send, take_events = (
+            director.receive,
+            director.messages_to_send,
+            director.take_events,
+        )
 
         def listen(frame: m.Frame, now_s: float) -> None:
             self._hear(frame, now_s)
+            fence, was_driving = director.situation.fence, director.state is State.DRIVING
             receive(frame, now_s)
+            if director.situation.fence is not fence and was_driving:
+                self._hear_of_fence()
+
+        def told() -> list[Event]:
+            events = take_events()
+            self._check_announced(events)
+            return events
 
         def send() -> list[m.Message]:
+            self._check_breach()
             messages = messages_to_send()
             for message in messages:
                 self._check(message)
@@ -56,6 +91,7 @@ class Promises:
 
         run.director.receive = listen
         run.director.messages_to_send = send
+        run.director.take_events = told
 
     # What others do
 
@@ -96,6 +132,50 @@ class Promises:
         shows_mode = mode not in (None, Mode.HOLD, Mode.GUIDED) and self._mode == mode
         self._knows = self._knows or shows_mode
 
+    # Breaches to come
+
+    def _hear_of_fence(self) -> None:
+        """Note that a fence arrived so near ahead that no HOLD stops before it, while the vehicle drives."""
+        situation = self._run.director.situation
+        pose = situation.pose.value if situation.pose is not None else None
+        if pose is None or pose.speed_mps < 2.0 or self._run.director.state is State.DRIVING:
+            return  # a route that keeps off it goes on
+        if _is_fence_within(pose, ROLLS_S * pose.speed_mps, situation.fence.value.zones):
+            self._owes_announcement = (
+                f"a fence within {ROLLS_S * pose.speed_mps:.1f} m at {pose.speed_mps:.1f} m/s"
+            )
+
+    def _check_announced(self, events: list[Event]) -> None:
+        if any(event.name is EventName.BREACH_AHEAD for event in events):
+            self._announced_s = self._run.now_s
+        elif self._owes_announcement:
+            self._break(f"{self._owes_announcement} was not announced")
+        self._owes_announcement = ""
+
+    @property
+    def _fence(self) -> object:
+        fence = self._run.director.situation.fence
+        return fence.value if fence is not None else None
+
+    def _check_breach(self) -> None:
+        """Look whether a HOLD of ours has led into a fence that was known, without a word."""
+        run, vehicle = self._run, self._run.vehicles[0]
+        if vehicle.mode == Mode.HOLD != self._mode_before and self._hold_s is not None:
+            is_late = run.now_s > self._hold_s + TAKEN_S
+            self._hold_s = None if is_late else self._hold_s
+        is_rolling = self._hold_s is not None and run.now_s <= self._hold_s + ROLLING_S
+        if (
+            vehicle.breaches > self._breaches
+            and self._mode_before == Mode.HOLD
+            and is_rolling
+            and vehicle.is_armed
+            and vehicle.rover.body.speed_mps > 0
+            and self._fence == self._held_fence
+            and self._announced_s < self._hold_s - 2.0
+        ):
+            self._break("a breach by our HOLD that was not announced")
+        self._mode_before, self._breaches = vehicle.mode, vehicle.breaches
+
     # What the bridge sends
 
     def _check(self, message: m.Message) -> None:
@@ -135,8 +215,11 @@ class Promises:
             self._break("a mode change without orders to drive")
         if mode not in (Mode.HOLD, Mode.AUTO):
             self._break(f"mode {mode} is none of ours")
+        if mode == Mode.HOLD and self._mode_before != Mode.HOLD:
+            self._hold_s, self._held_fence = self._run.now_s, self._fence
         if mode != Mode.AUTO:
             return
+        self._hold_s = None
         if self._mode != Mode.HOLD:
             self._break(f"AUTO though the last heartbeat said mode {self._mode}")
         if self._heartbeats == self._last_auto_heartbeats:
@@ -160,3 +243,29 @@ class Promises:
 
     def _break(self, what: str) -> None:
         self.broken.append(f"{self._run.now_s:.2f} s, {self._run.director.state}: {what}")
+
+
+def _is_fence_within(pose: Pose, reach_m: float, zones: tuple[Zone, ...]) -> bool:
+    """Return whether the straight way on leads out of the inclusions or into an exclusion; by points, in the flat metres of the place."""
+    north_m, east_m = 111_200.0, 111_320.0 * math.cos(math.radians(pose.position.lat_deg))
+    away = (pose.velocity_mps[0] / pose.speed_mps / east_m, pose.velocity_mps[1] / pose.speed_mps / north_m)
+    for step in range(int(reach_m / 0.1)):
+        lon_deg, lat_deg = (
+            pose.position.lon_deg + 0.1 * step * away[0],
+            pose.position.lat_deg + 0.1 * step * away[1],
+        )
+        for zone in zones:
+            if isinstance(zone, CircleZone):
+                off_m = math.hypot(
+                    (lon_deg - zone.centre.lon_deg) * east_m, (lat_deg - zone.centre.lat_deg) * north_m
+                )
+                is_in = off_m < zone.radius_m
+            else:
+                is_in = False
+                for a, b in zip(zone.vertices, (*zone.vertices[1:], zone.vertices[0]), strict=True):
+                    if (a.lat_deg > lat_deg) != (b.lat_deg > lat_deg):
+                        share = (lat_deg - a.lat_deg) / (b.lat_deg - a.lat_deg)
+                        is_in ^= lon_deg < a.lon_deg + share * (b.lon_deg - a.lon_deg)
+            if is_in != (zone.kind is ZoneKind.INCLUSION):
+                return True
+    return False

@@ -129,7 +129,7 @@ class Soak:
     def _act(self) -> None:
         self.run.planning_s = self.random.choice((0.0, 0.0, 0.5, 4.0))
         acts = (
-            (self._type, 5), (self._click, 5), (self._change_fence, 3), (self._change_mission, 1),
+            (self._type, 5), (self._click, 5), (self._change_fence, 3), (self._block_way, 2), (self._change_mission, 1),
             (self._take_over, 3), (self._disarm, 1), (self._cut, 2), (self._spoil, 2), (self._reboot, 1), (self._spoof, 1),
         )  # fmt: skip
         act = self.random.choices([act for act, _ in acts], [weight for _, weight in acts])[0]
@@ -151,6 +151,17 @@ class Soak:
     def _change_fence(self) -> None:
         if self._rival is None:
             self._begin(m.MissionType.FENCE, fence_to_items(self.random.choice(FENCES)))
+
+    def _block_way(self) -> None:
+        """Put a fence in the vehicle's way, nearer than it can stop or farther."""
+        body = self.vehicle.rover.body
+        if self._rival is None and body.speed_mps > 0.5:
+            radius_m = 3.0
+            place = self.vehicle.rover.frame.to_lat_lon(
+                body.position_m + body.direction * (radius_m + self.random.uniform(0.5, 12.0))
+            )
+            circle = CircleZone(ZoneKind.EXCLUSION, place, radius_m)
+            self._begin(m.MissionType.FENCE, fence_to_items(Fence((*YARD.zones, circle))))
 
     def _change_mission(self) -> None:
         if self._rival is None:

@@ -19,6 +19,7 @@ from missions.firmware import Firmware
 from missions.geo import LatLon
 from missions.request import End, GoTo, Order, RepairMission, Request, Tour
 from missions.situation import Situation
+from missions.stops import Stop, Stops
 from missions.vehicle import Footprint
 
 FOLDER = Path(__file__).parents[3] / "sitl_logs"
@@ -107,7 +108,8 @@ CALLS = (Call(0, 10.0, "start"), Call(3, 11.5, "timer"), Call(9, 12.25, "target"
 
 def test_a_journal_reads_back_as_written(tmp_path):
     path = journal_path(tmp_path / "run.tlog")
-    known = Situation(parameters={"WP_RADIUS": 2.0}, firmware=Firmware(4, 7, 0, 0))
+    stops = Stops(given=(Stop(3.0, 6.0), Stop(5.0, 12.5)))
+    known = Situation(parameters={"WP_RADIUS": 2.0}, firmware=Firmware(4, 7, 0, 0), stops=stops)
     with path.open("w") as file:
         writer = JournalWriter(file, ORDERS, known)
         for call in CALLS:

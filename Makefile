@@ -12,7 +12,7 @@ COVERAGE_PERCENT := 97
 LOCKED := --quiet --disable-pip-version-check --require-hashes --no-deps
 quoted = '$(subst ','\'',$(1))'
 
-.PHONY: coverage locks package release bench bench-bridge bench-drive bench-transfer test-foreign docs soak bench-tlog campaign fuzz hunt demo test lint format types walls check lock clean
+.PHONY: coverage locks package release bench bench-bridge bench-drive bench-transfer test-foreign docs soak bench-tlog bench-ladder campaign fuzz hunt demo test lint format types walls check lock clean
 
 demo: .venv/run.stamp
 	$(BIN)/pbpp demo --out $(call quoted,$(OUT))
@@ -92,6 +92,9 @@ bench: .venv/dev.stamp
 
 bench-drive: .venv/dev.stamp
 	$(BIN)/python benchmarks/drive.py
+
+bench-ladder: .venv/dev.stamp
+	$(BIN)/python benchmarks/ladder.py
 
 bench-transfer: .venv/dev.stamp
 	$(BIN)/python benchmarks/transfer.py

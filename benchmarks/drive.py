@@ -1,6 +1,6 @@
 """Whether planned missions are driven as promised: seeded fields, three vehicles, the simulator's drive law in stepped time.
 
-``python benchmarks/drive.py [--fields N] [--first SEED] [--kinds usual|more|table] [--jobs N] [--progress] [-o FILE]``. Each run plans a mission, hands
+``python benchmarks/drive.py [--fields N] [--first SEED] [--kinds usual|more|table] [--firmware VERSION] [--jobs N] [--progress] [-o FILE]``. Each run plans a mission, hands
 its items to the simulated rover, drives it in AUTO with the fence enabled, and measures the true track against the fence.
 """
 
@@ -34,7 +34,7 @@ from mavlink_bridge.simulator.vehicle import SimulatedVehicle
 from missions.drive_model import beyond_measured
 from missions.errors import MissionError
 from missions.fence import fence_to_items
-from missions.firmware import Firmware
+from missions.firmware import Firmware, read_firmware
 from missions.geo import distance_m
 from missions.ground.from_situation import route_ground
 from missions.planning.plan import plan
@@ -45,6 +45,8 @@ from missions.situation import Known, Pose, Situation
 from missions.vehicle import vehicle_from_parameters
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from missions.planned import Plan
 
 TOLERANCE_M = 0.10
@@ -67,6 +69,7 @@ VEHICLES: dict[str, dict[str, float]] = {
         "CRUISE_THROTTLE": 75.0,
     },
 }
+KINDS: dict[str, Callable[[int], Field]] = {"usual": make_field, "more": make_more}
 _KNOWN = {
     "TURN_RADIUS": 0.9,
     "ATC_TURN_MAX_G": 0.6,
@@ -90,6 +93,7 @@ class Run:
     promised_m: float
     widest_m: float
     refusal: str | None = None
+    extrapolated: tuple[str, ...] = ()
     planning_s: float = 0.0
     leads_away_m: float | None = None
     length_m: float = 0.0
@@ -102,15 +106,18 @@ class Run:
     driven_s: float = 0.0
     breaches: int = 0
     arrived: bool = False
-    is_measured: bool = True
-    """Whether vehicle and drive lie inside what was measured."""
+
+    @property
+    def is_driven(self) -> bool:
+        """Whether it was driven."""
+        return self.driven_s > 0
 
     @property
     def group(self) -> str:
         """Which row of the table it counts in."""
         if self.vehicle in VEHICLES:
             return self.vehicle
-        return "inside what was measured" if self.is_measured else "extrapolated: promises nothing"
+        return "extrapolated: promises nothing" if self.extrapolated else "inside what was measured"
 
     @property
     def short_m(self) -> float:
@@ -136,7 +143,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--fields", type=int, default=200)
     parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--kinds", choices=("usual", "more", "table"), default="usual")
+    parser.add_argument("--kinds", choices=(*KINDS, "table"), default="usual")
+    parser.add_argument("--firmware", type=read_firmware, default=Firmware(4, 6))
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--progress", action="store_true")
     parser.add_argument("-o", "--output", type=Path)
@@ -145,7 +153,7 @@ def main() -> None:
     begun_s = time.perf_counter()
     with ProcessPoolExecutor(options.jobs) as pool:
         runs = []
-        for found in pool.map(partial(runs_of, kinds=options.kinds), seeds):
+        for found in pool.map(partial(runs_of, kinds=options.kinds, firmware=options.firmware), seeds):
             runs += found
             if options.progress:
                 for run in found:
@@ -156,31 +164,45 @@ def main() -> None:
         options.output.write_text(f"{HEAD}\n{_made()}\n\n{text}\n", encoding="utf-8")
 
 
-def runs_of(seed: int, kinds: str = "usual") -> list[Run]:
+def runs_of(seed: int, kinds: str = "usual", firmware: Firmware = Firmware(4, 6)) -> list[Run]:  # noqa: B008 - frozen
     """Plan and drive one field with each vehicle."""
     if kinds == "table":
         field, name, parameters = make_case(seed)
-        return [_run(replace(field, seed=seed), name, {**_KNOWN, **parameters})]
-    field = make_field(seed) if kinds == "usual" else make_more(seed)
-    margin = {"FENCE_MARGIN": field.clearance_m - 0.1}
-    return [_run(field, name, {**_KNOWN, **vehicle, **margin}) for name, vehicle in VEHICLES.items()]
+        return [_run(replace(field, seed=seed), name, {**_KNOWN, **parameters}, firmware, trusts_model=True)]
+    field = KINDS[kinds](seed)
+    return [_run(field, name, parameters_of(field, name), firmware) for name in VEHICLES]
 
 
-def _run(field: Field, name: str, parameters: dict[str, float]) -> Run:
-    situation = Situation(
+def parameters_of(field: Field, name: str) -> dict[str, float]:
+    """Return a vehicle's parameters on a field."""
+    return {**_KNOWN, **VEHICLES[name], "FENCE_MARGIN": field.clearance_m - 0.1}
+
+
+def situation_of(
+    field: Field,
+    parameters: dict[str, float],
+    firmware: Firmware = Firmware(4, 6),  # noqa: B008 - frozen
+) -> Situation:
+    """Return what a plan on a field has to go by."""
+    return Situation(
         fence=Known(field.fence, None, "bench"),
         pose=Known(Pose(field.start, field.heading_deg), None, "bench"),
         home=Known(field.start, None, "bench"),
         parameters=parameters,
-        firmware=Firmware(4, 6),
+        firmware=firmware,
     )
-    vehicle = vehicle_from_parameters(parameters, firmware=situation.firmware)
+
+
+def _run(
+    field: Field, name: str, parameters: dict[str, float], firmware: Firmware, *, trusts_model: bool = False
+) -> Run:
+    situation = situation_of(field, parameters, firmware)
+    vehicle = vehicle_from_parameters(parameters, firmware=firmware)
     ground = route_ground(situation, vehicle, (field.start, field.target))
     widest_m = widest_clearance_m(
         ground, [ground.frame.to_local(field.start), ground.frame.to_local(field.target)]
     )
-    # What is extrapolated is driven too, and counted apart.
-    request = GoTo(target=field.target, clearance_m=field.clearance_m, trusts_model=True)
+    request = GoTo(target=field.target, clearance_m=field.clearance_m, trusts_model=trusts_model)
     known = {
         "seed": field.seed,
         "kind": field.kind,
@@ -192,18 +214,19 @@ def _run(field: Field, name: str, parameters: dict[str, float]) -> Run:
     try:
         planned = plan(situation, request)
     except MissionError as error:
-        is_measured = not beyond_measured(vehicle)
+        beyond = beyond_measured(vehicle) if trusts_model else ()
         took_s = time.process_time() - begun_s
-        return Run(**known, refusal=str(error), planning_s=took_s, is_measured=is_measured)  # type: ignore[arg-type]
+        return Run(**known, refusal=str(error), planning_s=took_s, extrapolated=beyond)  # type: ignore[arg-type]
     planning_s = time.process_time() - begun_s
     promised_m = planned.clearance_m
-    assert promised_m is not None  # the model is trusted
+    if promised_m is None:
+        return Run(**known, extrapolated=planned.extrapolated, planning_s=planning_s)  # type: ignore[arg-type]
     shortest = plan(situation, replace(request, corner_allowance_m=0.0))
-    driven_s, rover, arrived = _drive(field, planned, parameters)
+    driven_s, rover, arrived = _drive(field, planned, parameters, firmware)
     return Run(
         **known,  # type: ignore[arg-type]
         planning_s=planning_s,
-        leads_away_m=promised_m if promised_m < known["promised_m"] else None,
+        leads_away_m=planned.start_clearance_m,
         length_m=planned.length_m,
         shortest_m=shortest.length_m,
         waypoints=len(planned.path) - 1,
@@ -214,11 +237,13 @@ def _run(field: Field, name: str, parameters: dict[str, float]) -> Run:
         driven_s=driven_s,
         breaches=rover.breaches,
         arrived=arrived,
-        is_measured=not planned.extrapolated,
+        extrapolated=planned.extrapolated,
     )
 
 
-def _drive(field: Field, planned: Plan, parameters: dict[str, float]) -> tuple[float, SimulatedVehicle, bool]:
+def _drive(
+    field: Field, planned: Plan, parameters: dict[str, float], firmware: Firmware
+) -> tuple[float, SimulatedVehicle, bool]:
     """Drive a plan in AUTO until it is complete, or much longer than foreseen."""
     vehicle = SimulatedVehicle(
         SimulatorConfig(
@@ -227,6 +252,7 @@ def _drive(field: Field, planned: Plan, parameters: dict[str, float]) -> tuple[f
             mission=planned.items,
             fence=fence_to_items(field.fence),
             parameters=parameters,
+            firmware=firmware,
             streams=False,
         )
     )
@@ -250,7 +276,6 @@ def _made() -> str:
 
 def report(runs: list[Run], took_s: float) -> str:
     """Return the tables."""
-    groups = list(dict.fromkeys(run.group for run in runs))
     lines = [
         f"{len({run.seed for run in runs})} fields x {len({run.vehicle for run in runs})} vehicles, {len(runs)} runs, {took_s:.0f} s.",
         "",
@@ -260,9 +285,9 @@ def report(runs: list[Run], took_s: float) -> str:
         ),
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
-    for name in groups:
+    for name in dict.fromkeys(run.group for run in runs):
         mine = [run for run in runs if run.group == name]
-        routes = [run for run in mine if run.refusal is None]
+        routes = [run for run in mine if run.is_driven]
         wide = [run for run in mine if run.widest_m >= run.promised_m + SPARE_M]
         refused = [run for run in wide if run.refusal is not None]
         longer = sorted(run.length_m / run.shortest_m - 1 for run in routes)
@@ -286,18 +311,24 @@ def report(runs: list[Run], took_s: float) -> str:
         for run in runs
         if run.refusal is not None and run.widest_m >= run.promised_m + SPARE_M
     ] or ["- none"]
+    lines += ["", "Extrapolated: nothing promised, not driven:", ""]
+    lines += [
+        f"- {run.kind} {run.seed}, {run.vehicle}: {'; '.join(run.extrapolated)}"
+        for run in runs
+        if run.extrapolated and not run.is_driven and run.refusal is None
+    ] or ["- none"]
     lines += ["", "Short of the promise, or not arrived:", ""]
     lines += [
         f"- {_named(run)}: promised {run.promised_m:g} m, foreseen {run.foreseen_m:.2f} m, driven {run.driven_m:.2f} m, "
         f"{'arrived' if run.arrived else 'not arrived'}, {run.breaches} breaches"
         for run in runs
-        if run.refusal is None and (run.short_m > TOLERANCE_M or not run.arrived or run.breaches)
+        if run.is_driven and (run.short_m > TOLERANCE_M or not run.arrived or run.breaches)
     ] or ["- none"]
     return "\n".join(lines)
 
 
 def _named(run: Run) -> str:
-    apart = "" if run.is_measured else "extrapolated: "
+    apart = "extrapolated: " if run.extrapolated else ""
     return f"{apart}{run.kind} {run.seed}, {run.vehicle}"
 
 

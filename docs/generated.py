@@ -128,6 +128,8 @@ def _parameter_row(row: Parameter, name: str) -> str:
             if row.measured_skid
             else f"{measured} on steered wheels"
         )
+    if row.measured_before_4_6:
+        measured += f"; before 4.6 {row.measured_before_4_6}"
     autopilot = "PX4: " if row.autopilot is Autopilot.PX4 else ""
     return f"| {name}{since} | {taken} | {row.documented or '—'} | {measured} | {autopilot}{row.changes} |"
 

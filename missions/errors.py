@@ -16,6 +16,7 @@
         ├── StartBlockedError    the vehicle stands where it must not be
         ├── TargetBlockedError   the target lies where the vehicle must not be
         ├── NoRouteError         start and target are not connected
+        ├── ExtrapolatedError    a route outside what was measured, which promises nothing and so is not uploaded
         └── MissionTooLongError  the vehicle cannot hold that many items
 """
 
@@ -101,6 +102,10 @@ class TargetBlockedError(RouteError):
 
 class NoRouteError(RouteError):
     """Start and target are not connected; the message says which fences separate them."""
+
+
+class ExtrapolatedError(RouteError):
+    """A route that lies outside what was measured, so that nothing is promised of it: it is not taken to a vehicle; the message says why."""
 
 
 class MissionTooLongError(RouteError):

@@ -43,8 +43,8 @@ class Plan:
     speeds : tuple of float or None
         The speed asked for on each leg of the path in m/s; None is the vehicle's own.
     clearance_m : float or None
-        Promised for the rover as it drives: what was asked for, or less where the start leaves less; None where only drawn lines were asked for,
-        and where the drive is extrapolated.
+        Promised for the rover as it drives, once it has left the start: what was asked for, or more. None where only drawn lines were asked
+        for, and where the drive is extrapolated.
     asked_m : float
         What the drawn lines have to keep (less where the first ones lead away from a fence nearby); where the route is fitted to the
         drive model, the predicted corridor too: the promise, the position's error and the owner's reserve.
@@ -72,6 +72,8 @@ class Plan:
         Why the drive lies outside the measured range; empty where it does not.
     hold : HoldCheck or None
         What HOLD does on the route.
+    start_clearance_m : float or None
+        Promised on the first legs, while it leaves the place where it stands, where that place leaves less; else None.
     """
 
     items: tuple[MissionItem, ...]
@@ -99,6 +101,7 @@ class Plan:
     asked_targets: tuple[LatLon, ...] = ()
     extrapolated: tuple[str, ...] = ()
     hold: HoldCheck | None = None
+    start_clearance_m: float | None = None
 
     @property
     def turn_count(self) -> int:

@@ -44,6 +44,8 @@ class Promise:
         What differs from what was asked for, and what is unknown.
     info : tuple of str
         What else was added.
+    asked_m : float or None
+        What was asked for; the vehicle may need more. None where nothing was.
     """
 
     promised_m: float
@@ -51,6 +53,14 @@ class Promise:
     allowance_m: float | None
     warnings: tuple[str, ...]
     info: tuple[str, ...] = ()
+    asked_m: float | None = None
+
+    @property
+    def words(self) -> str:
+        """What was asked for, as the one who asked knows it, and what it was raised to."""
+        if self.asked_m is None or self.asked_m == self.promised_m:
+            return f"{self.promised_m:g} m"
+        return f"{self.asked_m:g} m (raised to {self.promised_m:g} m)"
 
     @property
     def required_m(self) -> float:
@@ -101,7 +111,9 @@ def promise(situation: Situation, request: Request, vehicle: Vehicle) -> Promise
         if promised_m < vehicle.stops_within_m:
             warnings.append(f"{_stops(vehicle)}; the clearance of {promised_m:g} m is less")
         error_m = request.reserve_m + (request.position_error_m or 0.0)
-        return Promise(promised_m, error_m, request.corner_allowance_m, tuple(warnings))
+        return Promise(
+            promised_m, error_m, request.corner_allowance_m, tuple(warnings), asked_m=request.clearance_m
+        )
     error_m, trouble = _position_error_m(situation, request)
     is_ours = bool(error_m) and request.position_error_m is None
     info = (f"added {error_m:g} m for GPS error (--position-error)",) if is_ours else ()
@@ -113,13 +125,22 @@ def promise(situation: Situation, request: Request, vehicle: Vehicle) -> Promise
                 f"{_stops(vehicle)}; the clearance of {promised_m:g} m is raised to {raised_m:g} m"
             )
         promised_m = raised_m
-    return Promise(promised_m, error_m + request.reserve_m, None, (*warnings, *trouble), info)
+    return Promise(
+        promised_m, error_m + request.reserve_m, None, (*warnings, *trouble), info, request.clearance_m
+    )
 
 
 def asked_clearance(situation: Situation, request: Request) -> tuple[Vehicle, float]:
     """Return the situation's vehicle and the clearance that a plan would promise."""
     vehicle = known_vehicle(situation, request)
     return vehicle, promise(situation, request, vehicle).promised_m
+
+
+def stop_warnings(vehicle: Vehicle, promised: Promise) -> list[str]:
+    """Return a warning where a clearance that nobody asked for, that of the widest route, lets the vehicle's own avoidance stop it."""
+    if not vehicle.avoids_fence or promised.required_m >= vehicle.stops_within_m + MARGIN_RESERVE_M:
+        return []
+    return [f"{_stops(vehicle)}; the clearance of {promised.promised_m:g} m is less"]
 
 
 def _stops(vehicle: Vehicle) -> str:

@@ -91,6 +91,8 @@ class Request(metaclass=_Kinds):
         Whether a vehicle inside an exclusion or outside the fence may drive out.
     trusts_model : bool
         Promise also where the drive lies outside what was measured.
+    accepts_less : bool
+        Where no route keeps the clearance, take the widest there is.
 
     Raises
     ------
@@ -112,6 +114,7 @@ class Request(metaclass=_Kinds):
     footprint: Footprint = POINT
     escape: bool = False
     trusts_model: bool = False
+    accepts_less: bool = False
 
     def __post_init__(self) -> None:
         if self.start is not None:
@@ -222,7 +225,7 @@ class RepairMission(Request):
         super().__post_init__()
         if not isinstance(self.mission, Mission | None):
             raise _senseless("mission", self.mission, "a Mission")
-        for name in ("widest", "corner_allowance_m", "speed_mps", "escape"):
+        for name in ("widest", "accepts_less", "corner_allowance_m", "speed_mps", "escape"):
             if getattr(self, name) != _DEFAULTS[name]:
                 raise _senseless(
                     name,
@@ -240,14 +243,15 @@ class RepairMission(Request):
         return {**super().words(), "via": self.mission, "via_own": self.mission is None}
 
 
+_LATER_WORDS = ("trusts_model", "accepts_less")
 _TOUR_WORDS = ("targets", "order", "comes_back", "end")
 _DEFAULTS: dict[str, Any] = {
     "start": None,
     "targets": (),
-    **{one.name: one.default for one in fields(Tour) if one.name != "trusts_model"},
+    **{one.name: one.default for one in fields(Tour) if one.name not in _LATER_WORDS},
     "via": None,
     "via_own": False,
-    "trusts_model": False,
+    **dict.fromkeys(_LATER_WORDS, False),
 }
 """What `request_of` knows, in the order in which `Request` takes it, as it is where it is left out."""
 

@@ -19,6 +19,13 @@ def counted(count: int, name: str) -> str:
 HEADING_UNKNOWN = "heading unknown; assuming the rover faces waypoint 1"
 
 
+def less_text(asked: str, promised_m: float) -> str:
+    """Return a sentence on a plan that promises less than was asked, because that was allowed."""
+    return (
+        f"no route keeps {asked} while driving: the widest, with {promised_m:g} m, was taken (--accept-less)"
+    )
+
+
 def left_out_text(count: int, most: int) -> str:
     """Return a sentence on the items of a route that were left out, because the vehicle holds no more than ``most``."""
     return f"{counted(count, 'route item')} left out to fit the vehicle's limit of {most}"

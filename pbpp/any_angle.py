@@ -26,6 +26,7 @@ from math import inf, sqrt
 from typing import TYPE_CHECKING
 
 from .partition.base import TOLERANCE_M
+from .partition.sweep import Sweep
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -74,51 +75,40 @@ class SearchResult:
 
 
 def shortest_path(
-    slabs: Slabs,
-    start: Point,
-    goal: Point,
-    should_stop: Callable[[], bool] | None = None,
-    *,
-    compiled: bool = False,
+    slabs: Slabs, start: Point, goal: Point, should_stop: Callable[[], bool] | None = None
 ) -> SearchResult:
     """Return the shortest path between two points of free space.
 
     Parameters
     ----------
     slabs : Slabs
-        The partition of free space.
+        The partition of free space. If it was swept in compiled form, the search runs so too, and gives the same result.
     start, goal : (east, north)
         Metres from the scene's origin, in free space or on its boundary.
     should_stop : callable, optional
         Asked now and then; when it returns True the search ends with the bound reached so far.
-    compiled : bool, default False
-        Search with the compiled form, which needs numba and gives the same result; it cannot ask ``should_stop``, so the plain one does
-        where there is one to ask.
 
     Returns
     -------
     SearchResult
         The path with its certificate.
     """
-    if compiled and should_stop is None:
-        return _compiled_search(slabs, start, goal)
-    return _Query(slabs, start, goal).run(should_stop)
-
-
-def _compiled_search(slabs: Slabs, start: Point, goal: Point) -> SearchResult:
-    from .compiled.search import search  # noqa: PLC0415 - numba is an extra, and takes a while to load
-
+    if isinstance(slabs.swept, Sweep):
+        return _Query(slabs, slabs.swept, start, goal).run(should_stop)
+    assert slabs.searcher is not None  # as they are not swept plainly
     blocks = slabs.locate(start)
     neighbours = [vertex for block in blocks for vertex, _ in slabs.line_neighbours(start, block)]
-    turns, length_m, expanded = search(slabs.flat, start, goal, blocks, slabs.locate(goal), neighbours)
-    return SearchResult(None if turns is None else tuple(turns), length_m, expanded, stopped=False)
+    ends = blocks, slabs.locate(goal), neighbours
+    turns, length_m, expanded, stopped = slabs.searcher.search(start, goal, ends, should_stop)
+    return SearchResult(None if turns is None else tuple(turns), length_m, expanded, stopped)
 
 
 class _Query:
     """One query."""
 
-    def __init__(self, slabs: Slabs, start: Point, goal: Point) -> None:
-        self._slabs = slabs
+    def __init__(self, slabs: Slabs, swept: Sweep, start: Point, goal: Point) -> None:
+        self._slabs, self._swept = slabs, swept
+        self._beside = swept.west_above, swept.west_below, swept.east_above, swept.east_below
         self._fans = slabs.vertices.fans
         self._start_blocks = slabs.locate(start)
         self._goal_blocks = frozenset(slabs.locate(goal))
@@ -233,7 +223,7 @@ class _Query:
         east, north = x - self._root_x[before], mirror * (y - self._root_y[before])
         edge_east, edge_north = neighbours[:2] if side == _LEFT else neighbours[2:]
         edge_north *= mirror
-        west_above, west_below, east_above, east_below = self._slabs.beside
+        west_above, west_below, east_above, east_below = self._beside
         if side == _LEFT:  # turning left one faces what lies below an obstacle eastwards, above it westwards
             east_block, west_block = east_below[vertex], west_above[vertex]
         else:
@@ -271,11 +261,11 @@ class _Query:
         """Reach what stands on the line of a vertex, straight above or below it."""
         x, y = self._root_x[root], self._root_y[root]
         goal_x, goal_y = self._goal_x, self._goal_y
-        west_above, west_below, east_above, east_below = self._slabs.beside
+        west_above, west_below, east_above, east_below = self._beside
         if upwards:
-            neighbour, sides, rise = self._slabs.above[vertex], (west_above, east_above), goal_y - y
+            neighbour, sides, rise = self._swept.above[vertex], (west_above, east_above), goal_y - y
         else:
-            neighbour, sides, rise = self._slabs.below[vertex], (west_below, east_below), y - goal_y
+            neighbour, sides, rise = self._swept.below[vertex], (west_below, east_below), y - goal_y
         if (
             abs(goal_x - x) <= TOLERANCE_M
             and rise >= 0.0
@@ -290,7 +280,7 @@ class _Query:
         """Follow a cone through blocks as long as there is one way on; queue the cones where it divides."""
         root_x, root_y = self._root_x[root], self._root_y[root]
         block, direction, low, high = cone
-        portals, goal_blocks = self._slabs.ways[direction], self._goal_blocks
+        portals, goal_blocks = self._swept.ways[direction], self._goal_blocks
         # Looking east the turn around a portal's low end is to the right; looking west it is to the left.
         low_side, high_side = (_RIGHT, _LEFT) if direction == _EAST else (_LEFT, _RIGHT)
         steps = 0

@@ -10,7 +10,7 @@ import shapely
 
 from .block_search import BlockGraph
 from .errors import InvalidGeometryError
-from .free_space import Scene, build_free_space, snapped
+from .free_space import FreeSpace, Scene, build_free_space, snapped
 from .partition.blocks import Blocks
 from .partition.slabs import Slabs
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from .clearance import Geometries
     from .errors import GoalBlockedError, StartBlockedError
     from .geometry import Point
+    from .partition.flat import Engine
 
 __all__ = ["BOUNDARY_TOLERANCE_M", "Field"]
 
@@ -48,6 +49,10 @@ class Field:
         Points that the bounded part of the open plane must hold, metres from the scene's origin.
     grown : (n,) array of shapely geometry, optional
         The exclusions grown by the clearance, if they are known already.
+    free : FreeSpace, optional
+        The free space, if it is known already.
+    engine : Engine, optional
+        The compiled sweep and search.
     """
 
     def __init__(
@@ -58,9 +63,14 @@ class Field:
         rounded: bool = False,
         reach: Sequence[Point] = (),
         grown: Geometries | None = None,
+        free: FreeSpace | None = None,
+        engine: Engine | None = None,
     ) -> None:
         self.scene = scene
-        self.free = build_free_space(scene, clearance_m, rounded=rounded, reach=reach, grown=grown)
+        self.engine = engine
+        if free is None:
+            free = build_free_space(scene, clearance_m, rounded=rounded, reach=reach, grown=grown)
+        self.free = free
         self._graphs: dict[str, BlockGraph] = {}
 
     @cached_property
@@ -81,7 +91,7 @@ class Field:
 
     def _checked_slabs(self) -> Slabs:
         try:
-            slabs = Slabs(self.free.polygons)
+            slabs = Slabs(self.free.polygons, self.engine)
         except (IndexError, ValueError) as error:
             raise InvalidGeometryError("the rings of free space do not fit together") from error
         area_m2 = float(shapely.area(self.free.geometry))

@@ -18,11 +18,12 @@ from shapely.geometry.base import BaseGeometry
 from .clearance import Geometries, grow, shrink
 from .errors import InvalidGeometryError
 from .geometry import Floats, Point, Ring, parse_rings, polygons_only
+from .subtract import subtracted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-__all__ = ["FreeSpace", "Scene", "build_free_space", "parse_scene", "snapped"]
+__all__ = ["FreeSpace", "Scene", "build_free_space", "parse_scene", "snapped", "with_obstacles"]
 
 GeometryT = TypeVar("GeometryT", bound=BaseGeometry)
 
@@ -212,7 +213,18 @@ def build_free_space(
     if clearance_m > 0.0:
         lines = np.array(_loose_lines(scene.inclusions), dtype=object)
         obstacles += list(grow(lines, clearance_m, rounded=rounded)) if len(lines) else []
-    free = shapely.difference(ground, shapely.disjoint_subset_union_all(obstacles)) if obstacles else ground
+    free = subtracted(ground, obstacles) if obstacles else ground
+    return _tidied(free, clearance_m, grown)
+
+
+def with_obstacles(free: FreeSpace, added: Geometries) -> FreeSpace:
+    """Return free space without more grown exclusions, which come last."""
+    return _tidied(
+        subtracted(free.untidied, list(added)), free.clearance_m, np.concatenate((free.grown, added))
+    )
+
+
+def _tidied(free: BaseGeometry, clearance_m: float, grown: Geometries) -> FreeSpace:
     # Overlays leave vertices some 1e-10 m apart, which say nothing and make edges without direction.
     try:
         tidy = shapely.remove_repeated_points(free, _TINY_EDGE_M)

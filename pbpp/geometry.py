@@ -7,6 +7,7 @@ encloses. A ring without area is a wall: it matters as soon as there is a cleara
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,7 +22,16 @@ if TYPE_CHECKING:
 
     from shapely.geometry.base import BaseGeometry
 
-__all__ = ["Floats", "Point", "Ring", "circle_ring", "parse_point", "parse_rings", "polygons_only"]
+__all__ = [
+    "Floats",
+    "Point",
+    "Ring",
+    "circle_ring",
+    "parse_point",
+    "parse_points",
+    "parse_rings",
+    "polygons_only",
+]
 
 Floats = npt.NDArray[np.float64]
 Point = tuple[float, float]
@@ -76,6 +86,11 @@ def parse_point(point: Sequence[float] | npt.ArrayLike, name: str) -> Point:
     InvalidGeometryError
         If it is not a pair of finite numbers.
     """
+    # Pairs of floats, as most are: an array of two takes ten times as long.
+    if isinstance(point, tuple | list) and len(point) == 2:
+        east, north = point
+        if isinstance(east, float) and isinstance(north, float) and isfinite(east) and isfinite(north):
+            return float(east), float(north)
     try:
         array = np.asarray(point, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -83,6 +98,39 @@ def parse_point(point: Sequence[float] | npt.ArrayLike, name: str) -> Point:
     if array.shape != (2,) or not np.isfinite(array).all():
         raise InvalidGeometryError(f"the {name} is not a pair of finite numbers: {point!r}")
     return float(array[0]), float(array[1])
+
+
+def parse_points(points: npt.ArrayLike, name: str) -> Floats:
+    """Return points as an (n, 2) array.
+
+    Parameters
+    ----------
+    points : (n, 2) array-like
+        East and north in metres.
+    name : str
+        What the points are, for the error.
+
+    Returns
+    -------
+    (n, 2) array
+        East and north in metres.
+
+    Raises
+    ------
+    InvalidGeometryError
+        If they are not pairs of finite numbers.
+    """
+    try:
+        array = np.asarray(points, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InvalidGeometryError(f"the {name} are not pairs of numbers") from error
+    if array.size == 0:
+        return array.reshape(0, 2)
+    if array.ndim != 2 or array.shape[1] != 2 or not np.isfinite(array).all():
+        raise InvalidGeometryError(
+            f"the {name} are not pairs of finite numbers: their shape is {array.shape}"
+        )
+    return array
 
 
 def parse_rings(rings: Sequence[Ring], kind: str) -> list[BaseGeometry]:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from itertools import chain
 from math import dist, isfinite
 from typing import TYPE_CHECKING
 
@@ -14,12 +16,20 @@ import numpy.typing as npt
 
 from .any_angle import shortest_path
 from .block_search import BlockGraph, block_sequence
-from .compiled import require_numba
-from .errors import GoalBlockedError, InvalidGeometryError, NoPathError, StartBlockedError
+from .compiled import load_engine
+from .compiled.batch import spread
+from .errors import (
+    GoalBlockedError,
+    InvalidGeometryError,
+    NoPathError,
+    PlanningError,
+    SearchStoppedError,
+    StartBlockedError,
+)
 from .field import Field
-from .free_space import Scene, grow_exclusions, parse_scene
+from .free_space import FreeSpace, Scene, grow_exclusions, parse_scene, with_obstacles
 from .funnel import taut_path
-from .geometry import Point, Ring, parse_point
+from .geometry import Floats, Point, Ring, parse_point, parse_points
 from .planned_path import PlannedPath, length_of, straightened
 from .plotting import Drawing
 from .three_cases import crossing_point
@@ -30,6 +40,7 @@ if TYPE_CHECKING:
     from shapely.geometry import MultiPolygon
 
     from .clearance import Geometries
+    from .partition.flat import Answer, Engine
 
 __all__ = ["Planner", "plan_path"]
 
@@ -100,9 +111,9 @@ class Planner:
         What the block methods search: the paper's blocks if left out, or their merged form, which is much smaller. The exact search
         uses slabs whatever is said here; its answer depends on neither.
     compiled : bool, default False
-        Whether the exact search runs in its compiled form: the same paths, many times faster once numba has compiled it, which takes some
-        seconds the first time and a good part of one in each later process. It pays for some hundred queries and more. Needs the
-        extra ``fast``. Where a query brings a ``should_stop``, the plain search answers.
+        Whether the partition is swept and the exact search runs in compiled form: the same paths, many times faster once numba has compiled it,
+        which takes some seconds the first time and a good part of one in each later process. It pays for some hundred queries and more. Needs the extra
+        ``fast``.
 
     Raises
     ------
@@ -126,10 +137,10 @@ class Planner:
             raise InvalidGeometryError(f"the clearance must be 0 m or more, not {clearance_m!r}")
         if partition not in {None, "slabs", "blocks"}:
             raise ValueError(f'partition must be "slabs", "blocks" or None, not {partition!r}')
-        if compiled:
-            require_numba()
-        self._partition, self._compiled = partition, compiled
-        self._space = _Space.swept(parse_scene(inclusions, exclusions, union=union), float(clearance_m))
+        engine = load_engine() if compiled else None
+        self._partition = partition
+        scene = parse_scene(inclusions, exclusions, union=union)
+        self._space = _Space.swept(scene, float(clearance_m), engine)
 
     def with_exclusion(self, ring: Ring) -> Planner:
         """Return a planner for the same fence with one exclusion more, faster than from scratch.
@@ -149,9 +160,11 @@ class Planner:
         InvalidGeometryError
             If the ring cannot be used.
         """
-        scene, grown = self._space.scene.with_exclusion(ring), self._space.mitred.free.grown
+        scene, before = self._space.scene.with_exclusion(ring), self._space.mitred
         added = grow_exclusions(replace(scene, exclusions=scene.exclusions[-1:]), self.clearance_m)
-        return self._changed(scene, np.concatenate((grown, added)))
+        if not len(scene.inclusions):  # the bounded part of the plane grows with what is drawn
+            return self._changed(scene, grown=np.concatenate((before.free.grown, added)))
+        return self._changed(scene, free=with_obstacles(before.free, added))
 
     def without_exclusion(self, index: int) -> Planner:
         """Return a planner for the same fence without one of its exclusions, faster than from scratch.
@@ -172,11 +185,14 @@ class Planner:
             If there is no such exclusion.
         """
         grown = np.delete(self._space.mitred.free.grown, index)
-        return self._changed(self._space.scene.without_exclusion(index), grown)
+        return self._changed(self._space.scene.without_exclusion(index), grown=grown)
 
-    def _changed(self, scene: Scene, grown: Geometries) -> Planner:
+    def _changed(
+        self, scene: Scene, *, grown: Geometries | None = None, free: FreeSpace | None = None
+    ) -> Planner:
         changed = copy(self)
-        changed._space = _Space.swept(scene, self.clearance_m, grown)  # noqa: SLF001 - one of our own
+        engine = self._space.mitred.engine
+        changed._space = _Space.swept(scene, self.clearance_m, engine, grown=grown, free=free)  # noqa: SLF001 - one of our own
         return changed
 
     @property
@@ -239,6 +255,96 @@ class Planner:
                 raise
         return plan(self._space.rounded)
 
+    def lengths(
+        self,
+        starts: npt.ArrayLike,
+        goals: npt.ArrayLike | None = None,
+        *,
+        should_stop: ShouldStop | None = None,
+    ) -> Floats:
+        """Return the lengths of the shortest paths between many points, as `plan` finds them.
+
+        A compiled planner searches in as many threads as there are processors.
+
+        Parameters
+        ----------
+        starts : (n, 2) array-like
+            East and north in metres.
+        goals : (m, 2) array-like, optional
+            East and north in metres; if left out, the starts, and each pair of points is searched one way only.
+        should_stop : callable, optional
+            Asked now and then.
+
+        Returns
+        -------
+        (n, m) array
+            Lengths in metres; infinite where there is no path, or an end lies outside free space.
+
+        Raises
+        ------
+        InvalidGeometryError
+            If a point is not a pair of finite numbers.
+        SearchStoppedError
+            If ``should_stop`` returned True.
+        """
+        from_points = parse_points(starts, "starts")
+        to_points = from_points if goals is None else parse_points(goals, "goals")
+        count, width = len(from_points), len(to_points)
+        one, other = np.triu_indices(count, 1) if goals is None else np.indices((count, width)).reshape(2, -1)
+        ends = np.stack((from_points[one], to_points[other]), axis=1)
+        lengths_m = np.full(len(ends), np.inf)
+        self._space = self._space.holding([*from_points, *to_points])
+        searcher = self._space.mitred.slabs.searcher
+        if searcher is not None:
+            search = partial(searcher.lengths_m, origin_m=self._space.scene.origin_m, should_stop=should_stop)
+            lengths_m = np.concatenate([lengths_m[:0], *spread(search, ends)])
+        for place in np.flatnonzero(np.isinf(lengths_m)).tolist():
+            if should_stop is not None and should_stop():
+                raise SearchStoppedError
+            with suppress(NoPathError, StartBlockedError, GoalBlockedError):
+                lengths_m[place] = self.plan(*ends[place]).length_m
+        matrix_m = np.zeros((count, width))
+        matrix_m[one, other] = lengths_m
+        return matrix_m + matrix_m.T if goals is None else matrix_m
+
+    def plan_many(self, ends: npt.ArrayLike) -> list[PlannedPath | PlanningError]:
+        """Return the shortest paths of many queries, as `plan` finds them.
+
+        A compiled planner searches in as many threads as there are processors.
+
+        Parameters
+        ----------
+        ends : (n, 2, 2) array-like
+            Start and goal of each query, east and north in metres.
+
+        Returns
+        -------
+        list of PlannedPath or PlanningError
+            For each query its path, or the error that `plan` raises.
+
+        Raises
+        ------
+        InvalidGeometryError
+            If a point is not a pair of finite numbers.
+        """
+        points = parse_points(np.asarray(ends, dtype=np.float64).reshape(-1, 2), "ends").reshape(-1, 2, 2)
+        self._space = self._space.holding(points.reshape(-1, 2))
+        field = self._space.mitred
+        searcher = field.slabs.searcher
+        answers: Iterable[Answer | None] = [None] * len(points)
+        if searcher is not None:
+            search = partial(searcher.answers, origin_m=field.scene.origin_m)
+            answers = chain.from_iterable(spread(search, points))
+        found: list[PlannedPath | PlanningError] = []
+        for pair, answer in zip(points, answers, strict=True):
+            try:
+                found.append(
+                    self.plan(*pair) if answer is None else _direct_path(field, answer, self._partition)
+                )
+            except PlanningError as error:
+                found.append(error)
+        return found
+
     def widest(
         self,
         start: npt.ArrayLike,
@@ -274,12 +380,17 @@ class Planner:
     def _plan_in(
         self, field: Field, ends: tuple[Point, Point], method: str, cost: str, should_stop: ShouldStop | None
     ) -> PlannedPath:
+        searcher = field.slabs.searcher
+        if method == "optimal" and searcher is not None and should_stop is None:
+            answer = searcher.direct(*ends, field.scene.origin_m)
+            if answer is not None:
+                return _direct_path(field, answer, self._partition)
         common = field.require(ends[0], StartBlockedError) & field.require(ends[1], GoalBlockedError)
         if not common:
             raise NoPathError(self.clearance_m)
         start, goal = (field.onto(field.scene.to_local(end), common) for end in ends)
         if method == "optimal":
-            found = _optimal(field, start, goal, should_stop, compiled=self._compiled)
+            found = _optimal(field, start, goal, should_stop)
         else:
             graph = field.graph(self._partition or "blocks")
             taut = method == "pbpp-taut"
@@ -308,19 +419,30 @@ class _Space:
     mitred: Field
 
     @classmethod
-    def swept(cls, scene: Scene, clearance_m: float, grown: Geometries | None = None) -> _Space:
+    def swept(
+        cls,
+        scene: Scene,
+        clearance_m: float,
+        engine: Engine | None,
+        *,
+        grown: Geometries | None = None,
+        free: FreeSpace | None = None,
+    ) -> _Space:
         """Return the space with its slabs made: searches need them, and better now than in the first query."""
         with uncollected():
-            field = Field(scene, clearance_m, grown=grown)
+            field = Field(scene, clearance_m, grown=grown, free=free, engine=engine)
             _ = field.slabs
         return cls(field)
 
-    def holding(self, ends: tuple[Point, Point]) -> _Space:
-        """Return the same space; without inclusions one whose bounded part of the plane holds both ends."""
-        local = [self.scene.to_local(end) for end in ends]
-        if len(self.scene.inclusions) or all(map(self.mitred.holds, local)):
+    def holding(self, ends: Iterable[Point]) -> _Space:
+        """Return the same space; without inclusions one whose bounded part of the plane holds all ends."""
+        if len(self.scene.inclusions):
             return self
-        return _Space(Field(self.scene, self.mitred.free.clearance_m, reach=local))
+        local = [self.scene.to_local(end) for end in ends]
+        if all(map(self.mitred.holds, local)):
+            return self
+        clearance_m, engine = self.mitred.free.clearance_m, self.mitred.engine
+        return _Space(Field(self.scene, clearance_m, reach=local, engine=engine))
 
     @property
     def scene(self) -> Scene:
@@ -335,7 +457,8 @@ class _Space:
     @cached_property
     def rounded(self) -> Field:
         """The same with round corners: asked before anyone is told that there is no way."""
-        return Field(self.scene, self.mitred.free.clearance_m, rounded=True)
+        clearance_m, engine = self.mitred.free.clearance_m, self.mitred.engine
+        return Field(self.scene, clearance_m, rounded=True, engine=engine)
 
 
 @dataclass(frozen=True)
@@ -349,10 +472,20 @@ class _Found:
     sequence: Sequence[int] = ()
 
 
-def _optimal(
-    field: Field, start: Point, goal: Point, should_stop: ShouldStop | None, *, compiled: bool
-) -> _Found | None:
-    result = shortest_path(field.slabs, start, goal, should_stop, compiled=compiled)
+def _direct_path(field: Field, answer: Answer, partition: str | None) -> PlannedPath:
+    return PlannedPath(
+        points=answer.points,
+        length_m=answer.length_m,
+        lower_bound_m=answer.length_m,
+        method="optimal",
+        blocks=len(field.slabs),
+        expanded=answer.expanded,
+        drawing=Drawing(field, partition or "slabs", answer.turns[1:-1]),
+    )
+
+
+def _optimal(field: Field, start: Point, goal: Point, should_stop: ShouldStop | None) -> _Found | None:
+    result = shortest_path(field.slabs, start, goal, should_stop)
     blocks = len(field.slabs)
     if result.vertices is not None:
         turns = field.slabs.vertices.points[list(result.vertices)].tolist()

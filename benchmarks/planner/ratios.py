@@ -35,46 +35,76 @@ def least(function: Callable[[], object], runs: int) -> float:
     return min(times)
 
 
-def case_times(case: dict, clearance_m: float = 0.0) -> dict:
-    """Return the build time, the median query time and the time of the triangulation in milliseconds."""
+def case_times(case: dict, clearance_m: float = 0.0, runs: int = 7) -> dict:
+    """Return the times of building, of queries and of the triangulation in milliseconds, plain and compiled, and their ratios."""
+    fence = [case["inclusion"]], case["exclusions"]
 
-    def build() -> pbpp.Planner:
-        return pbpp.Planner([case["inclusion"]], case["exclusions"], clearance_m=clearance_m)
+    def build(*, compiled: bool) -> pbpp.Planner:
+        return pbpp.Planner(*fence, clearance_m=clearance_m, compiled=compiled)
 
-    planner = build()
-    triangles_s = least(lambda: shapely.constrained_delaunay_triangles(planner.free_space), 7)
-    build_s = least(build, 7)
-    query_s = []
-    for query in case["queries"]:
-        try:
-            planner.plan(query[:2], query[2:])
-        except pbpp.PlanningError:
-            continue
-        query_s.append(least(lambda query=query: planner.plan(query[:2], query[2:]), 4))
-    compiled = pbpp.Planner([case["inclusion"]], case["exclusions"], clearance_m=clearance_m, compiled=True)
-    compiled_s = []
-    for query in case["queries"]:
-        try:
-            compiled.plan(query[:2], query[2:])
-        except pbpp.PlanningError:
-            continue
-        compiled_s.append(least(lambda query=query: compiled.plan(query[:2], query[2:]), 9))
-    return {
-        "vertices": int(shapely.get_num_coordinates(planner.free_space)),
-        "triangles_ms": 1e3 * triangles_s,
-        "build_ms": 1e3 * build_s,
-        "query_ms": 1e3 * statistics.median(query_s),
-        "build_ratio": build_s / triangles_s,
-        "query_ratio": statistics.median(query_s) / triangles_s,
-        "compiled_query_ms": 1e3 * statistics.median(compiled_s),
-        "compiled_query_ratio": statistics.median(compiled_s) / triangles_s,
+    plain, compiled = build(compiled=False), build(compiled=True)
+    triangles_s = least(lambda: shapely.constrained_delaunay_triangles(plain.free_space), runs)
+    times = {
+        "build": least(lambda: build(compiled=False), runs),
+        "query": median_query_s(plain, case, 4),
+        "compiled_build": least(lambda: build(compiled=True), runs),
+        "compiled_query": median_query_s(compiled, case, 30),
     }
+    # Queries one after the other, none twice: each finds the caches as the one before has left them.
+    ends = np.array(reachable(compiled, case)).reshape(-1, 2, 2)
+    starts, goals = ends[:, 0], ends[:, 1]
+    pairs = [(start, goal) for start in starts.tolist() for goal in goals.tolist()]
+    times["compiled_alone"] = least(lambda: [compiled.plan(*pair) for pair in pairs], 3) / len(pairs)
+    times["compiled_in_matrix"] = least(lambda: compiled.lengths(starts, goals), 3) / len(pairs)
+    result = {
+        "vertices": int(shapely.get_num_coordinates(plain.free_space)),
+        "triangles_ms": 1e3 * triangles_s,
+    }
+    for name, time_s in times.items():
+        result |= {f"{name}_ms": 1e3 * time_s, f"{name}_ratio": time_s / triangles_s}
+    return result
+
+
+def reachable(planner: pbpp.Planner, case: dict) -> list[list[float]]:
+    """Return the queries of a case that have a path."""
+    return [
+        query for query in case["queries"] if np.isfinite(planner.lengths([query[:2]], [query[2:]])[0, 0])
+    ]
+
+
+def median_query_s(planner: pbpp.Planner, case: dict, runs: int) -> float:
+    """Return the median over the queries of the least time of some runs in seconds."""
+    return statistics.median(
+        least(lambda query=query: planner.plan(query[:2], query[2:]), runs)
+        for query in reachable(planner, case)
+    )
+
+
+def town(blocks: int) -> dict:
+    """Return blocks of houses with common walls between the same points, as OpenStreetMap has them, some with courts."""
+    rng = np.random.default_rng(1)
+    turn = np.array([[np.cos(0.3), np.sin(0.3)], [-np.sin(0.3), np.cos(0.3)]])
+    houses = []
+    for corner in np.indices((blocks, blocks)).reshape(2, -1).T * 100.0:
+        places = np.stack(np.meshgrid(np.arange(7.0), np.arange(7.0), indexing="ij"), axis=-1) * 14.0
+        places = (places + corner + rng.uniform(-2.0, 2.0, places.shape)) @ turn
+        houses += [
+            places[[i, i + 1, i + 1, i], [j, j, j + 1, j + 1]]
+            for i in range(6)
+            for j in range(6)
+            if (i in {0, 5} or j in {0, 5}) and rng.random() < 0.92
+        ]
+    size = 100.0 * blocks
+    square = np.array([[-50.0, -50.0], [size, -50.0], [size, size], [-50.0, size]]) @ turn
+    ends = (rng.integers(0, blocks, (20, 2, 2)) * 100.0 - 7.0) @ turn
+    return {"inclusion": square, "exclusions": houses, "queries": ends.reshape(-1, 4).tolist()}
 
 
 def larger(case: dict, factor: float = 3.0) -> dict:
-    """Return a map of the same density and about three times the obstacles: four copies side by side, cut to a square."""
+    """Return a map of the same density and so many times the obstacles: copies side by side, cut to a square."""
     size = case["bounds"][2] * np.sqrt(factor)
-    shifts = [np.array([east, north]) * case["bounds"][2] for east in (0, 1) for north in (0, 1)]
+    copies = range(int(np.ceil(np.sqrt(factor))))
+    shifts = [np.array([east, north]) * case["bounds"][2] for east in copies for north in copies]
     copies = [np.array(ring) + shift for shift in shifts for ring in case["exclusions"]]
     inside = [ring for ring in copies if ring.max() < size]
     blocked = shapely.union_all([shapely.Polygon(ring) for ring in inside])
@@ -112,19 +142,20 @@ def operator_ms() -> float:
     return 1e3 * least(lambda: pbpp.plan_path([square], boxes, (1, 1), (199, 199), clearance_m=0.5), 9)
 
 
-def reuse_ratio(case: dict) -> float:
+def reuse_ratio(case: dict, *, compiled: bool) -> float:
     """Return the time of adding one obstacle over that of building from scratch."""
-    planner = pbpp.Planner([case["inclusion"]], case["exclusions"][:-1], clearance_m=1.0)
-    scratch = least(lambda: pbpp.Planner([case["inclusion"]], case["exclusions"], clearance_m=1.0), 5)
+    fence = {"clearance_m": 1.0, "compiled": compiled}
+    planner = pbpp.Planner([case["inclusion"]], case["exclusions"][:-1], **fence)
+    scratch = least(lambda: pbpp.Planner([case["inclusion"]], case["exclusions"], **fence), 5)
     return least(lambda: planner.with_exclusion(case["exclusions"][-1]), 5) / scratch
 
 
 def compiled_start_s() -> float:
-    """Return the CPU time of the first compiled query of a new process in seconds, numba's cache being full."""
+    """Return the CPU time of the first compiled planner and its query in a new process in seconds, numba's cache being full."""
     code = (
-        "import time, pbpp\n"
+        "import time, pbpp; t = time.process_time()\n"
         "planner = pbpp.Planner([[(0, 0), (1, 0), (1, 1)]], [], compiled=True)\n"
-        "t = time.process_time(); planner.plan((0.5, 0.1), (0.9, 0.5)); print(time.process_time() - t)"
+        "planner.plan((0.5, 0.1), (0.9, 0.5)); print(time.process_time() - t)"
     )
     runs = [
         subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, text=True).stdout
@@ -152,6 +183,9 @@ def main() -> None:
         "rand1000": first,
         "rand1000 at 1 m": case_times(cases["rand1000"], 1.0),
         "three times rand1000": more,
+        "nine times rand1000": case_times(larger(cases["rand1000"], 9.0), runs=3),
+        "town of touching houses": case_times(town(7)),
+        "large town": case_times(town(22), runs=3),
         "growth of build": more["build_ms"] / first["build_ms"],
         "growth of query": more["query_ms"] / first["query_ms"],
         "import of shapely, ms": shapely_ms,
@@ -159,7 +193,8 @@ def main() -> None:
         "import ratio": own_ms / shapely_ms,
         "operator's fence (196 vertices, 0.5 m) from polygons to path, ms": operator,
         "the same over the import of shapely": operator / shapely_ms,
-        "adding one obstacle over building anew": reuse_ratio(cases["rand1000"]),
+        "adding one obstacle over building anew": reuse_ratio(cases["rand1000"], compiled=False),
+        "the same, compiled": reuse_ratio(cases["rand1000"], compiled=True),
         "first compiled query of a process, s": compiled_start_s(),
         "paper's path on rand100 from polygons, s": blocks_s(cases["rand100"]),
     }

@@ -93,6 +93,7 @@ def _orders(options: BridgeOptions) -> Orders:
                 None, options.target, options.clearance, options.corner_allowance, options.snap, "optimal"
             ),
             trusts_model=options.trust_model,
+            accepts_less=options.accept_less,
         ),
         upload=options.upload,
         drive=options.drive,

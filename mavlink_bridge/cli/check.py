@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 def check(options: CheckOptions) -> None:
     """Check each leg, and report, draw or print as JSON what was found."""
     _check_options(options)
-    request = with_vehicle(GoTo(clearance_m=options.clearance), options)
+    request = with_vehicle(GoTo(clearance_m=options.clearance, trusts_model=options.trust_model), options)
     begin = position_from("--start", options.start) if options.start is not None else None
     situation, unknown = _situation(options)
     if situation.mission is None:
@@ -66,7 +66,7 @@ def check(options: CheckOptions) -> None:
         print_json(_document(checked, warnings, situation.system, options.plot))
     else:
         _report(checked, options.plot, is_quiet=options.quiet > 0)
-    if not checked.holds:
+    if not checked.is_promised:
         raise typer.Exit(ExitCode.CHECK)
 
 
@@ -157,13 +157,17 @@ def _report(checked: MissionCheck, plots: list[Path], *, is_quiet: bool) -> None
         echo(f"DANGER: {danger}", typer.colors.RED)
     for leg in checked.broken:
         echo(f"FAIL: {_sentence(leg)}", typer.colors.RED)
-    if not checked.holds or is_quiet:
-        return
     kept = f"{checked.clearance_m:g} m while driving"
-    if checked.extrapolated:
-        echo(f"Every leg is predicted to keep {kept}; not confirmed by measurements")
-    else:
-        echo(f"PASS: every leg keeps {kept}")
+    if checked.holds and not checked.is_promised:
+        echo(
+            f"NOT CONFIRMED: every leg is predicted to keep {kept}, but the drive is extrapolated beyond what was measured "
+            "(--trust-model takes the prediction)",
+            typer.colors.RED,
+        )
+    if not checked.is_promised or is_quiet:
+        return
+    trusted = "; the drive model is trusted beyond what was measured" if checked.extrapolated else ""
+    echo(f"PASS: every leg keeps {kept}{trusted}")
 
 
 def _report_legs(checked: MissionCheck, plots: list[Path]) -> None:
@@ -220,9 +224,9 @@ def _document(
     checked: MissionCheck, warnings: list[str], system: int | None, plots: list[Path]
 ) -> dict[str, object]:
     return {
-        "status": "ok" if checked.holds else "failed",
+        "status": "ok" if checked.is_promised else "failed",
         "command": "check",
-        "exit_code": int(ExitCode.DONE if checked.holds else ExitCode.CHECK),
+        "exit_code": int(ExitCode.DONE if checked.is_promised else ExitCode.CHECK),
         "system": system,
         "clearance_m": checked.clearance_m,
         "length_m": round(checked.length_m, 3),

@@ -89,7 +89,14 @@ _ADVICE: Mapping[type[Exception], tuple[str, ...]] = {
         "use fewer targets, or drive in parts",
         "give --vehicle FILE if the vehicle has more storage (BRD_SD_MISSION)",
     ),
-    mission_errors.NoRouteError: ("ask for less with --clearance (--clearance max finds the widest route)",),
+    mission_errors.ExtrapolatedError: (
+        "change what the message names",
+        "add --trust-model to promise, and upload, all the same",
+    ),
+    mission_errors.NoRouteError: (
+        "ask for less with --clearance (--clearance max finds the widest route)",
+        "add --accept-less to take the widest route there is",
+    ),
     mission_errors.PlanCheckError: (
         "nothing was written; please report this with the command and its input files",
     ),

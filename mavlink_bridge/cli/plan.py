@@ -76,6 +76,7 @@ def _request(options: PlanOptions) -> Request:
         speed_mps=options.speed,
         escape=options.escape,
         trusts_model=options.trust_model,
+        accepts_less=options.accept_less,
     )
     return with_tour(request, options)
 

@@ -60,6 +60,10 @@ def with_tour(request: Request, options: PlanOptions) -> Request:
         )
     if request.widest:
         raise UsageError("--via-mission needs a clearance in metres, not max")
+    if request.accepts_less:
+        raise UsageError(
+            "--via-mission repairs a mission to the clearance asked for; it does not go with --accept-less"
+        )
     if request.speed_mps is not None or request.corner_allowance_m is not None or request.escape:
         raise UsageError(
             "--via-mission keeps the mission's own speeds and relies on the drive model; it cannot be combined with --speed, "

@@ -46,6 +46,7 @@ def plan_document(planned: Plan) -> dict[str, object]:
         "straight_line_m": round(planned.straight_line_m, 3),
         "duration_s": round(planned.duration_s, 1),
         "clearance_m": planned.clearance_m,
+        "start_clearance_m": planned.start_clearance_m,
         "drawn_clearance_m": _finite(planned.drawn_clearance_m),
         "driven_clearance_m": _finite(planned.driven_clearance_m),
         "fence": {
@@ -148,6 +149,8 @@ def report_plan(planned: Plan, written: list[Path]) -> None:
         if planned.clearance_m is not None
         else f"{planned.drawn_clearance_m:.2f} m along straight legs, nothing promised while driving"
     )
+    if planned.start_clearance_m is not None:
+        promise += f"; {planned.start_clearance_m:g} m while leaving the start"
     if planned.extrapolated:
         promise += ", extrapolated beyond what was measured"
     waypoints = sum(item.is_placed for item in planned.items)

@@ -60,6 +60,7 @@ def _config(options: SimOptions) -> SimulatorConfig:
         else (),
         mission=read_mission_file(options.mission, options).items if options.mission else (),
         parameters=dict(_parse_parameter(text) for text in options.param),
+        firmware=options.firmware,
     )
 
 

@@ -13,6 +13,7 @@ from mavlink_bridge.director.plan_task import PlanTask
 from mavlink_bridge.director.states import Cue, Notice, Signal, State
 from missions.checking.recheck import Recheck, recheck
 from missions.errors import MissionError
+from missions.planning.marking import unpromised
 from missions.promise import asked_clearance
 
 if TYPE_CHECKING:
@@ -66,7 +67,8 @@ class RouteDesk(Part):
         """Take a plan, or why there is none; what is not waited for any more is left."""
         if task is not self.pending:
             return []
-        self._made = made
+        refused = unpromised(made) if self.core.orders.upload and not isinstance(made, MissionError) else None
+        self._made = refused or made
         return self._go_on(now_s)
 
     def _go_on(self, now_s: float) -> Sequence[Signal]:

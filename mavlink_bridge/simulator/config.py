@@ -10,6 +10,7 @@ from missions.geo import LatLon
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from missions.firmware import Firmware
     from missions.items import MissionItem
 
 
@@ -39,6 +40,8 @@ class SimulatorConfig:
         Whether telemetry flows unasked; without it only HEARTBEAT does.
     list_ids : bool
         Whether MISSION_CURRENT carries ids of the lists, as PX4's does and ArduPilot's does not.
+    firmware : Firmware or None
+        The version it says that it is, and drives like; None: 4.7.0-dev of October 2025, the best measured.
     uid : bytes
         The board's own id in AUTOPILOT_VERSION, at most 18 bytes; empty: none.
     """
@@ -54,4 +57,5 @@ class SimulatorConfig:
     ready_after_s: float = 0.0
     streams: bool = True
     list_ids: bool = False
+    firmware: Firmware | None = None
     uid: bytes = b""

@@ -5,11 +5,9 @@ from __future__ import annotations
 import cmath
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from mavlink_bridge.simulator.body import Body
     from mavlink_bridge.simulator.parameters import ParameterStore
 
@@ -45,6 +43,7 @@ class Settings:
     velocity_p: float
     velocity_filter_hz: float
     speed_scale_base_mps: float
+    slew_per_s: float
     is_skid: bool
 
     @classmethod
@@ -77,8 +76,17 @@ class Settings:
             velocity_p=p["PSC_VEL_P"],
             velocity_filter_hz=p["PSC_VEL_FLTE"],
             speed_scale_base_mps=p["MOT_SPD_SCA_BASE"],
+            slew_per_s=p["MOT_SLEWRATE"] / 100.0 or math.inf,
             is_skid=(p["SERVO1_FUNCTION"], p["SERVO3_FUNCTION"]) == (73.0, 74.0),
         )
+
+
+class KeepsOff(Protocol):
+    """What keeps a rover off a fence."""
+
+    def keep_off(self, place_m: complex, velocity_mps: complex, dt_s: float) -> tuple[complex, bool]:
+        """Return the velocity that does, and whether the rover is to back away."""
+        ...
 
 
 class _Pid:
@@ -118,13 +126,21 @@ class Attitude:
         self.steering = 0.0
         self.throttle = 0.0
 
-    def reset(self) -> None:
-        """Forget everything: the motors are off."""
+    def reset(self, throttle: float = 0.0) -> None:
+        """Forget everything: the controllers are off."""
         self._rate_pid.reset()
         self._speed_pid.reset()
         self._turn_rate_radps = self._body.turn_rate_radps
         self.speed_mps = self._body.speed_mps
-        self.steering = self.throttle = 0.0
+        self.steering, self.throttle = 0.0, throttle
+
+    def let_go(self, dt_s: float) -> None:
+        """Take the throttle back to 0 as fast as the motors may."""
+        self.reset(
+            throttle=math.copysign(
+                max(0.0, abs(self.throttle) - self.settings.slew_per_s * dt_s), self.throttle
+            )
+        )
 
     def limited_speed(self, speed_mps: float, dt_s: float) -> float:
         """Return the speed that the acceleration limits allow next, on the way to the one asked."""
@@ -189,17 +205,16 @@ class Position:
         self.target_velocity_mps = 0j
         self._velocity_error = None
 
-    def update(
-        self, accel_mps2: complex, avoid: Callable[[complex], complex] | None, dt_s: float
-    ) -> tuple[float, float]:
+    def update(self, accel_mps2: complex, avoidance: KeepsOff | None, dt_s: float) -> tuple[float, float]:
         """Return turn rate and speed for the target point, its velocity and its acceleration."""
         limits, body = self.settings, self._body
         most_accel = min(limits.accel_mps2, limits.lateral_accel_mps2)
         velocity_mps = self.target_velocity_mps + sqrt_controlled(self.error_m, limits.position_p, most_accel)
         if abs(velocity_mps) > self.speed_mps:
             velocity_mps *= self.speed_mps / abs(velocity_mps)
-        if avoid is not None:
-            velocity_mps = avoid(velocity_mps)
+        is_backing = False
+        if avoidance is not None:
+            velocity_mps, is_backing = avoidance.keep_off(body.estimate_m, velocity_mps, dt_s)
         error_mps = velocity_mps - body.velocity_mps
         if self._velocity_error is not None:
             filter_s = 1 / (2 * math.pi * limits.velocity_filter_hz)
@@ -208,9 +223,11 @@ class Position:
         wanted = (limits.velocity_p * error_mps + accel_mps2) * body.direction.conjugate()
         ahead = velocity_mps * body.direction.conjugate()
         turn_speed_mps = math.sqrt(limits.lateral_accel_mps2 * 0.5 * self._turn_radius())
-        speed_mps = max(min(abs(velocity_mps), turn_speed_mps), ahead.real)
+        least_mps = min(abs(velocity_mps), turn_speed_mps)
+        # Backing away is always backwards, as if the fence lay ahead.
+        speed_mps = min(-least_mps, ahead.real) if is_backing else max(least_mps, ahead.real)
         speed_mps = self._attitude.limited_speed(speed_mps, dt_s)
-        divisor = math.copysign(max(abs(speed_mps), 1.0), speed_mps)
+        divisor = -max(-speed_mps, 1.0) if speed_mps < 0 else max(speed_mps, 1.0)
         return wanted.imag / divisor, speed_mps
 
     def _turn_radius(self) -> float:

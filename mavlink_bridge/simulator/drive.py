@@ -15,8 +15,7 @@ from mavlink_bridge.simulator.controllers import Attitude, Position, Settings
 from mavlink_bridge.simulator.scurve import LegMotion, MotionLimits
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
+    from mavlink_bridge.simulator.avoidance import Avoidance
     from mavlink_bridge.simulator.body import Body
 
 # So near to the next leg a pivot ends; chosen, not measured: ArduPilot's AR_PIVOT_ANGLE_ACCURACY is 5°.
@@ -32,10 +31,13 @@ class Driver:
         Limits and gains.
     body : Body
         What is moved.
+    turns_early : bool
+        Whether it begins turns as ArduPilot did before 4.6.
     """
 
-    def __init__(self, settings: Settings, body: Body) -> None:
+    def __init__(self, settings: Settings, body: Body, *, turns_early: bool = False) -> None:
         self.body = body
+        self._turns_early = turns_early
         self._attitude = Attitude(settings, body)
         self._position = Position(settings, body, self._attitude)
         self._speed_mps = settings.speed_mps
@@ -139,15 +141,15 @@ class Driver:
         self._leg.change_speed(speed_mps)
         self._next_leg.change_speed(speed_mps)
 
-    def step(self, dt_s: float, avoid: Callable[[complex], complex] | None = None) -> None:
+    def step(self, dt_s: float, avoidance: Avoidance | None = None) -> None:
         """Let a short time pass.
 
         Parameters
         ----------
         dt_s : float
             The time, 0.02 s on a rover.
-        avoid : callable, optional
-            Takes a velocity (m/s, north + east·j) and gives the one that keeps away from fences.
+        avoidance : Avoidance, optional
+            What keeps it off a fence.
         """
         if self._destination_m is None:
             self._attitude.drive(0.0, 0.0, dt_s)
@@ -155,12 +157,13 @@ class Driver:
             self._pivot(self._pivot_to, dt_s)
         else:
             accel_mps2 = self._advance(dt_s)
-            self._attitude.drive(*self._position.update(accel_mps2, avoid, dt_s), dt_s)
+            self._attitude.drive(*self._position.update(accel_mps2, avoidance, dt_s), dt_s)
         self.body.step(self._attitude.steering, self._attitude.throttle, dt_s)
 
-    def coast(self, dt_s: float) -> None:
-        """Let a short time pass with the motors off."""
-        self.body.step(0.0, 0.0, dt_s)
+    def coast(self, dt_s: float, *, armed: bool) -> None:
+        """Let a short time pass without throttle; the motors of an armed rover take it back no faster than MOT_SLEWRATE."""
+        self._attitude.let_go(dt_s if armed else math.inf)
+        self.body.step(0.0, self._attitude.throttle, dt_s)
 
     def _apply_speed(self) -> None:
         limits = self._settings
@@ -190,6 +193,8 @@ class Driver:
         rate = max(
             -limits.pivot_rate_radps, min(limits.pivot_rate_radps, error_rad * limits.steering_angle_p)
         )
+        if self._attitude.limited_speed(0.0, dt_s):
+            rate = 0.0  # first it comes to a stop, by the speed that was asked for
         self._attitude.drive(rate, 0.0, dt_s)
         if abs(error_rad) < _PIVOT_ACCURACY_RAD:
             if self._pivot_since_s >= limits.pivot_delay_s:
@@ -237,7 +242,10 @@ class Driver:
     def _may_turn(self) -> bool:
         """Whether the next leg may begin: the middle of the turn lies within the waypoint's radius (SCurve.cpp)."""
         leg, after = self._leg, self._next_leg
-        if leg.elapsed_s < leg.slowing_from_s or leg.left_s >= after.duration_s / 2:
+        from_s = leg.slowing_from_s - (after.turn_in_s if self._turns_early else 0.0)
+        if leg.elapsed_s < from_s or leg.left_s >= after.duration_s / 2:
+            return False
+        if self._turns_early and abs(leg.at(leg.elapsed_s)[0]) < leg.length_m / 2:
             return False
         half_s = leg.left_s / 2
         before = leg.at(leg.elapsed_s + half_s)

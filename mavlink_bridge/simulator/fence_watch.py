@@ -1,4 +1,4 @@
-"""The fence as the rover sees it: where forbidden ground begins, and how far ahead it lies."""
+"""The fence as the rover sees it: where forbidden ground begins."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol
 
 import shapely
-from shapely.geometry import LineString, Point, Polygon, box
+from shapely.geometry import Point, Polygon, box
 
 from missions.fence import CircleZone, Fence, Zone, ZoneKind, fence_from_items
 
@@ -54,8 +54,7 @@ class FenceArea:
         union: bool = False,
         home_circle: tuple[complex, float] | None = None,
     ) -> None:
-        fence = fence_from_items([_bounded(item) for item in items])
-        self._forbidden = _forbidden(fence, plane, union=union, home_circle=home_circle)
+        self._forbidden = _forbidden(bounded_fence(items), plane, union=union, home_circle=home_circle)
         self._edge = self._forbidden.boundary
         shapely.prepare(self._forbidden)
         shapely.prepare(self._edge)
@@ -73,19 +72,12 @@ class FenceArea:
         distance_m = float(shapely.distance(self._edge, point))
         return -distance_m if self._forbidden.contains(point) else distance_m
 
-    def ahead_m(self, point_m: complex, direction: complex, reach_m: float) -> float:
-        """Return how far the first edge lies in a direction; infinite if beyond ``reach_m``."""
-        end_m = point_m + direction * reach_m
-        ray = LineString([(point_m.real, point_m.imag), (end_m.real, end_m.imag)])
-        if not self._edge.intersects(ray):
-            return math.inf
-        crossing = shapely.intersection(self._edge, ray)
-        return float(shapely.distance(crossing, Point(point_m.real, point_m.imag)))
 
-
-def _bounded(item: MissionItem) -> MissionItem:
-    # ArduPilot takes an infinite circle; shapely does not.
-    return replace(item, params=(min(item.params[0], _FAR_M), *item.params[1:]))
+def bounded_fence(items: Sequence[MissionItem]) -> Fence:
+    """Return the fence that items are, with no circle beyond what shapely takes; ArduPilot takes an infinite one."""
+    return fence_from_items(
+        [replace(item, params=(min(item.params[0], _FAR_M), *item.params[1:])) for item in items]
+    )
 
 
 def _forbidden(

@@ -8,9 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.errors import BridgeError
+from mavlink_bridge.simulator.personality import missing_names, own_defaults
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
+
+    from missions.firmware import Firmware
 
 _ROWS = [
     line.split(",")
@@ -40,6 +43,8 @@ class ParameterStore:
     ----------
     overrides : mapping of str to float
         What differs from `DEFAULTS`.
+    firmware : Firmware or None
+        The version whose defaults and names it has; None: those of `DEFAULTS`.
 
     Raises
     ------
@@ -47,16 +52,18 @@ class ParameterStore:
         An override of a parameter the rover does not have.
     """
 
-    def __init__(self, overrides: Mapping[str, float]) -> None:
-        unknown = sorted(set(overrides) - set(DEFAULTS))
+    def __init__(self, overrides: Mapping[str, float], firmware: Firmware | None = None) -> None:
+        missing = missing_names(firmware)
+        unknown = sorted(set(overrides) - set(DEFAULTS) | set(overrides) & missing)
         if unknown:
             raise BridgeError(
                 f"the simulated rover has no parameter {', '.join(unknown)}; it has {len(DEFAULTS)},"
                 " all listed in docs/simulator.md",
                 parameters=unknown,
             )
-        self._values = {name: float32(value) for name, value in (DEFAULTS | dict(overrides)).items()}
-        self._names = tuple(self._values)
+        values = DEFAULTS | dict(own_defaults(firmware)) | dict(overrides)
+        self._values = {name: float32(value) for name, value in values.items()}
+        self._names = tuple(name for name in self._values if name not in missing)
 
     def __len__(self) -> int:
         return len(self._names)
@@ -68,7 +75,7 @@ class ParameterStore:
         return self._values[name]
 
     def __contains__(self, name: object) -> bool:
-        return name in self._values
+        return name in self._names
 
     def flag(self, name: str, bit: int) -> bool:
         """Whether the bit of that value is set in a bit mask."""

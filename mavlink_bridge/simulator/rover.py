@@ -6,10 +6,11 @@ import math
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.mavlink.rover import Mode
+from mavlink_bridge.simulator.avoidance import Avoidance, AvoidanceSettings
 from mavlink_bridge.simulator.body import Body
-from mavlink_bridge.simulator.controllers import Settings, sqrt_controlled
+from mavlink_bridge.simulator.controllers import Settings
 from mavlink_bridge.simulator.drive import Driver
-from mavlink_bridge.simulator.fence_watch import FenceArea
+from mavlink_bridge.simulator.fence_watch import FenceArea, bounded_fence
 from mavlink_bridge.simulator.flat import FlatFrame, TrueFrame
 from mavlink_bridge.simulator.mission_run import MissionRun
 from missions.geo import from_e7, to_e7
@@ -30,7 +31,15 @@ GIVE_UP_M = 100.0
 _CIRCLE, _POLYGON = 2, 4  # bits 1 and 2 of FENCE_TYPE
 _UNION = 2  # FENCE_OPTIONS bit 1
 _AVOID_FENCE = 1  # AVOID_ENABLE bit 0
-_DRIVING = (Mode.AUTO, Mode.GUIDED, Mode.RTL)
+_DISARM, _LOITER = 5, 6  # FENCE_ACTION
+_ON_BREACH = {1: Mode.RTL, 3: Mode.SMART_RTL, 4: Mode.SMART_RTL, _LOITER: Mode.LOITER}
+"""FENCE_ACTION: the mode, HOLD for any other."""
+
+_HOMING = (Mode.RTL, Mode.SMART_RTL)
+_DRIVING = (Mode.AUTO, Mode.GUIDED, *_HOMING)
+_COASTING = (Mode.MANUAL, Mode.HOLD)
+"""With centred sticks: no throttle, no brake."""
+
 _MODES = frozenset({*_DRIVING, Mode.MANUAL, Mode.HOLD, Mode.LOITER})
 """The modes that the simulated rover can be switched to."""
 
@@ -48,6 +57,8 @@ class Rover:
         Where it looks, clockwise from north.
     mission, fence : callable
         Give the lists as they are stored.
+    turns_early : bool
+        Whether it begins turns as ArduPilot did before 4.6.
 
     Attributes
     ----------
@@ -68,8 +79,11 @@ class Rover:
         heading_deg: float,
         mission: Callable[[], Sequence[MissionItem]],
         fence: Callable[[], Sequence[MissionItem]],
+        *,
+        turns_early: bool = False,
     ) -> None:
         self.parameters = parameters
+        self._turns_early = turns_early
         self._fence = fence
         self._mission = mission
         self.least_clearance_m = math.inf
@@ -89,7 +103,7 @@ class Rover:
         self.breach_time_s = 0.0
         settings = Settings.from_parameters(self.parameters)
         self.body = Body(0j, math.radians(heading_deg), settings.is_skid)
-        self.drive = Driver(settings, self.body)
+        self.drive = Driver(settings, self.body, turns_early=self._turns_early)
         self.mission_run = MissionRun(self._mission, self.drive, self.frame)
         self._current_before_auto = False
         self.renew_fence()
@@ -148,6 +162,10 @@ class Rover:
         own = items if self._enforced & _POLYGON else ()
         self._area = FenceArea(own, self.frame, union=union, home_circle=circle)
         self._true_area = FenceArea(items, self._true_frame, union=union, home_circle=circle)
+        self._avoidance = None
+        if parameters.flag("AVOID_ENABLE", _AVOID_FENCE) and not self._area.is_empty:
+            settings = AvoidanceSettings.from_parameters(parameters)
+            self._avoidance = Avoidance(bounded_fence(own), self.frame, settings, circle)
         self._measure_clearance()
 
     def set_mode(self, number: int, now_s: float) -> bool:
@@ -166,7 +184,7 @@ class Rover:
             if self._current_before_auto:
                 self.texts.append((2, "Internal Errors 0x20000000"))
             self.mission_run.start(now_s)
-        elif mode == Mode.RTL:
+        elif mode in _HOMING:  # SMART_RTL straight home too: no way is remembered
             self.drive.go_to(self.frame.to_flat(self.home), None)
         self._current_before_auto = False
         self._pass_on()
@@ -205,11 +223,11 @@ class Rover:
 
     def step(self, now_s: float) -> None:
         """Let one tick pass."""
-        if self.is_armed:
+        if self.is_armed and self.mode not in _COASTING:
             self._follow(now_s)
-            self.drive.step(TICK_S, self._keep_off if self._is_avoiding() else None)
+            self.drive.step(TICK_S, self._avoidance)
         else:
-            self.drive.coast(TICK_S)
+            self.drive.coast(TICK_S, armed=self.is_armed)
         self._measure_clearance()
         self.check_fence(now_s)
 
@@ -227,10 +245,11 @@ class Rover:
         if not self.is_armed:
             return
         action = self.parameters.whole("FENCE_ACTION")
-        if action == 0:
-            return
-        home_wanted = action in (1, 3) and -clearance_m < GIVE_UP_M
-        self.set_mode(Mode.RTL if home_wanted else Mode.HOLD, now_s)
+        if action == _DISARM:
+            self.disarm()
+        elif action:
+            can_return = action == _LOITER or -clearance_m < GIVE_UP_M
+            self.set_mode(_ON_BREACH.get(action, Mode.HOLD) if can_return else Mode.HOLD, now_s)
 
     def _follow(self, now_s: float) -> None:
         if self.mode == Mode.AUTO:
@@ -249,29 +268,6 @@ class Rover:
         self.reached += self.mission_run.reached
         self.mission_run.texts.clear()
         self.mission_run.reached.clear()
-
-    def _is_avoiding(self) -> bool:
-        return self.parameters.flag("AVOID_ENABLE", _AVOID_FENCE) and not self._area.is_empty
-
-    def _keep_off(self, velocity_mps: complex) -> complex:
-        """Slow down before a fence so as to stand FENCE_MARGIN short of it (AC_Avoid, behaviour "stop")."""
-        speed_mps = abs(velocity_mps)
-        if not speed_mps:
-            return velocity_mps
-        margin_m = self.parameters.fence_margin_m
-        p = self.parameters["PSC_POS_P"]
-        accel = min(self.parameters["ATC_ACCEL_MAX"] or 1.0, self.parameters["AVOID_ACCEL_MAX"])
-        linear_mps = accel / p
-        stopping_m = speed_mps / p
-        if speed_mps > linear_mps:
-            stopping_m = accel / (2 * p * p) + speed_mps * speed_mps / (2 * accel)
-        direction = velocity_mps / speed_mps
-        ahead_m = self._area.ahead_m(self.body.position_m, direction, 2.0 + margin_m + stopping_m)
-        if ahead_m <= margin_m:
-            return 0j
-        if math.isinf(ahead_m):
-            return velocity_mps
-        return min(speed_mps, abs(sqrt_controlled(complex(ahead_m - margin_m), p, accel))) * direction
 
     def _measure_clearance(self) -> None:
         clearance_m = self._true_area.clearance_m(self._true_frame.to_flat(self.position))

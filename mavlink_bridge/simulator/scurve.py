@@ -104,6 +104,7 @@ class LegMotion:
         cruise_m = max(0.0, self.length_m - gone_m - ramp_m)
         at_s, at_m = self._ramp(from_s, gone_m, speed_mps, top_mps)
         self.at_speed_from_s = at_s
+        self.turn_in_s = at_s - self._ramp_times(abs(top_mps - speed_mps))[0]
         if cruise_m > 0 and top_mps > 0:
             self._pieces.append(_Piece(at_s, at_m, top_mps, 0.0, 0.0))
             at_s, at_m = at_s + cruise_m / top_mps, at_m + cruise_m

@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.simulator import streams
+from mavlink_bridge.simulator.personality import version_number
 from missions.geo import to_e7
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from mavlink_bridge.simulator.rover import Rover
+    from missions.firmware import Firmware
 
 # Bits of MAV_SYS_STATUS_SENSOR: enabled and healthy, present, and three single ones.
 _SENSORS = 322_011_183
@@ -35,7 +37,6 @@ _CAPABILITIES = (
     | m.Capability.MISSION_RALLY
     | m.Capability.PARAM_ENCODE_C_CAST
 )
-_VERSION_4_7_0_DEV = 4 << 24 | 7 << 16  # major and minor in the two top bytes; type 0 is development
 _STANDBY, _ACTIVE, _CALIBRATING = 3, 4, 2
 _NO_MISSION, _NOT_STARTED, _ACTIVE_MISSION, _PAUSED, _COMPLETE = 1, 2, 3, 4, 5
 _BOUNDARY = 3  # FENCE_BREACH_BOUNDARY
@@ -45,7 +46,7 @@ _BOUNDARY = 3  # FENCE_BREACH_BOUNDARY
 class TelemetrySource:
     """What telemetry is about: the rover, the items in its mission (home included), its time since boot, whether it has a position.
 
-    The ids are those of mission, fence and rally points, 0 where none are known; the uid is the board's own.
+    The ids are those of mission, fence and rally points, 0 where none are known; the uid is the board's own, the firmware its version.
     """
 
     rover: Rover
@@ -54,6 +55,7 @@ class TelemetrySource:
     is_ready: bool
     list_ids: tuple[int, int, int] = (0, 0, 0)
     uid: bytes = b""
+    firmware: Firmware | None = None
 
 
 def telemetry(message_id: int, state: TelemetrySource) -> m.Message | None:
@@ -179,7 +181,7 @@ def _home(state: TelemetrySource) -> m.Message | None:
 
 def _version(state: TelemetrySource) -> m.Message:
     return m.AutopilotVersion(
-        int(_CAPABILITIES), _VERSION_4_7_0_DEV, uid2=tuple(state.uid.ljust(18, b"\0")[:18])
+        int(_CAPABILITIES), version_number(state.firmware), uid2=tuple(state.uid.ljust(18, b"\0")[:18])
     )
 
 

@@ -18,6 +18,7 @@ from mavlink_bridge.simulator.config import SimulatorConfig
 from mavlink_bridge.simulator.item_lists import FenceList, MissionList, RallyList, StoredList
 from mavlink_bridge.simulator.mission_server import MissionServer
 from mavlink_bridge.simulator.parameters import ParameterStore, kind
+from mavlink_bridge.simulator.personality import turns_early
 from mavlink_bridge.simulator.rover import TICK_S, Rover
 from mavlink_bridge.simulator.streams import DEFAULT_RATES_HZ, FENCE_STATUS, HEARTBEAT, Streams
 from mavlink_bridge.simulator.telemetry import TelemetrySource, telemetry
@@ -69,7 +70,7 @@ class SimulatedVehicle:
 
     def __init__(self, config: SimulatorConfig | None = None) -> None:
         self.config = config or SimulatorConfig()
-        self.parameters = ParameterStore(self.config.parameters)
+        self.parameters = ParameterStore(self.config.parameters, self.config.firmware)
         self._home: LatLon = self.config.home
         self._mission = MissionList(
             lambda: self._home,
@@ -89,6 +90,7 @@ class SimulatedVehicle:
             self.config.heading_deg,
             lambda: self._mission.items,
             lambda: self._fence.items,
+            turns_early=turns_early(self.config.firmware),
         )
         self._home = self.rover.home
         self._outbox: list[m.Message] = []
@@ -356,6 +358,7 @@ class SimulatedVehicle:
             self._is_ready(now_s),
             (mission_id, fence_id, rally_id),
             self.config.uid,
+            self.config.firmware,
         )
         return telemetry(message_id, state)
 

@@ -12,7 +12,7 @@ from shapely import LineString, Point
 from shapely.ops import nearest_points
 
 from missions.checking.execution import CIRCLE_M, Course, CourseLeg, follow_mission
-from missions.checking.forecast import forecast_drive
+from missions.checking.forecast import forecast_drive, pivot_remarks
 from missions.checking.holding import hold_check, hold_info, hold_warnings
 from missions.checking.mission_end import crossed_zones, end_warnings, return_place, return_warnings
 from missions.drive_model import Envelope, extrapolated
@@ -131,6 +131,8 @@ class MissionCheck:
         Why the drive lies outside the measured range: then it is predicted, not promised, that the mission holds.
     hold : HoldCheck or None
         What HOLD does on the way.
+    trusts_model : bool
+        Whether that is promised all the same.
     """
 
     mission: Mission
@@ -144,6 +146,7 @@ class MissionCheck:
     vehicle: Vehicle
     envelope: Envelope
     extrapolated: tuple[str, ...] = ()
+    trusts_model: bool = False
     info: tuple[str, ...] = ()
     hold: HoldCheck | None = None
 
@@ -156,6 +159,11 @@ class MissionCheck:
     def holds(self) -> bool:
         """Whether every leg keeps its clearance, everything was understood, and nothing is known to end in the fence."""
         return not self.broken and not self.troubles and not self.dangers
+
+    @property
+    def is_promised(self) -> bool:
+        """Whether it holds, and that was measured or the drive model is trusted."""
+        return self.holds and (self.trusts_model or not self.extrapolated)
 
     @property
     def troubles(self) -> tuple[str, ...]:
@@ -236,6 +244,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
         *_seam_warnings(vehicle, legs),
         *_start_warnings(start, heading_deg, legs[0], asked.required_m),
         *_drive_warnings(vehicle, forecast, course),
+        *pivot_remarks(ground, vehicle, forecast, _items_of(course)),
         *reasons,
         *([] if any(leg.crosses for leg in legs) else hold_warnings(hold)),
         *return_warnings(situation, vehicle, ground, course.path),
@@ -254,6 +263,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
         envelope=forecast,
         extrapolated=reasons,
         hold=hold,
+        trusts_model=request.trusts_model,
         info=(*asked.info, *hold_info(hold)),
     )
 
@@ -490,9 +500,14 @@ def _start_warnings(
     return warnings
 
 
+def _items_of(course: Course) -> list[int]:
+    """Return the mission items of its places."""
+    return [course.legs[0].first_item, *(leg.last_item for leg in course.legs)]
+
+
 def _drive_warnings(vehicle: Vehicle, forecast: Envelope, course: Course) -> list[str]:
     """Return warnings of where the drive model does not hold, and of parameters that were not known."""
-    items = [course.legs[0].first_item, *(leg.last_item for leg in course.legs)]
+    items = _items_of(course)
     warnings = [
         f"item {items[corner.waypoint]}: {abs(corner.turn_deg):.0f}° turn between short legs; "
         "in tests rovers swung wider there than predicted"

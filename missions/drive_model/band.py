@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 
 from missions.drive_model import corner as at_corner
-from missions.drive_model.legs_and_corners import Stray
+from missions.drive_model.stray import Stray
 from missions.geo import Vector
 from missions.vehicle import Autopilot
 
@@ -112,7 +112,12 @@ def add_corner(pieces: Pieces, drive: DrivePlan, number: int) -> None:
     path = _blend_path(drive, number)
     left = drive.stray_at(number, before.profile.duration_s - corner.blend.duration_s).widest_m
     # The band about a blend is narrower on its inside: the same strip, moved outwards.
-    outwards_m = (band_m - min(band_m, at_corner.INSIDE_BAND_M)) / 2
+    outwards_m = (
+        band_m
+        - at_corner.inside_band_m(
+            drive.vehicle, max(before.profile.top_speed_mps, after.profile.top_speed_mps), band_m
+        )
+    ) / 2
     side = Stray(outwards_m, -outwards_m) if corner.turn_deg >= 0 else Stray(-outwards_m, outwards_m)
     strip = Stray(left + side.left_m, left + side.right_m)
     rungs = [_beside(place, direction, strip) for place, direction in path]
@@ -155,7 +160,7 @@ def _swing_hull(drive: DrivePlan, number: int) -> list[Vector]:
     hull = [*corner.places]
     for along_m in (-corner.behind_m, 0.0):
         place = _shifted(after.start, after.direction, along_m)
-        hull += _beside(place, after.direction, drive.strays[number + 1])
+        hull += _beside(place, after.direction, drive.stray_after(number))
     return hull
 
 
@@ -169,7 +174,7 @@ def _swing_strip(drive: DrivePlan, number: int) -> list[Vector]:
     strip: list[Vector] = []
     for along_m in (0.0, ahead_m):
         strip += _beside(
-            _shifted(after.start, after.direction, along_m), after.direction, drive.strays[number + 1]
+            _shifted(after.start, after.direction, along_m), after.direction, drive.stray_after(number)
         )
     return strip
 

@@ -6,8 +6,10 @@ Ranges of parameters stand in their table (`missions.vehicle.parameters`), from 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from missions.drive_model.corner import SLOW_MPS
 from missions.vehicle import Autopilot, Steering
 from missions.vehicle.parameters import PARAMETERS
 
@@ -17,17 +19,12 @@ if TYPE_CHECKING:
     from missions.drive_model.envelope import Envelope
     from missions.vehicle import Vehicle
 
-SLOW_MPS = 1.0
-"""Slower steered rovers swing out farther and farther: the firmware turns lateral acceleration into turn rate with at least 1 m/s."""
-
 LEAST_MARGIN_M = PARAMETERS["FENCE_MARGIN"].measured.least if PARAMETERS["FENCE_MARGIN"].measured else 0.0
 """With less FENCE_MARGIN measured rovers stopped at the fence or past it (0: 0.02 to 0.04 m past, 0.05: 0.02 m before)."""
 
 SAME_TURN_DEG = 20.0
 SAME_MPS = 3.0
-"""Up to such a turn and speed firmware before 4.6 kept within the model's corners too (162 corners on long legs, within 0.04 m); so it did where it pivots."""
-
-_OLD_CORNERS = "before 4.6 rovers cut corners up to twice as far, and swing out up to 5.4 m after sharp turns"
+"""Up to such a turn and speed firmware before 4.6 kept within the later corners too (162 corners on long legs, within 0.04 m); so it did where it pivots."""
 
 
 def beyond_measured(vehicle: Vehicle, *speeds_mps: float | None) -> tuple[str, ...]:
@@ -53,14 +50,15 @@ def beyond_measured(vehicle: Vehicle, *speeds_mps: float | None) -> tuple[str, .
     speeds = {vehicle.speed_mps, *filter(None, speeds_mps)}
     return (
         *_beyond_kinds(vehicle, min(speeds)),
-        *_beyond_ranges(vehicle, max(speeds)),
+        *_beyond_ranges(vehicle, min(speeds), max(speeds)),
         *_beyond_margin(vehicle),
     )
 
 
 def extrapolated(vehicle: Vehicle, band: Envelope, *speeds_mps: float | None) -> tuple[str, ...]:
     """Return in what a drive lies outside the measurements: its vehicle (`beyond_measured`), and corners that its firmware may drive otherwise."""
-    return (*beyond_measured(vehicle, *speeds_mps), *_beyond_corners(vehicle, band))
+    speeds = {vehicle.speed_mps, *filter(None, speeds_mps)}
+    return (*beyond_measured(vehicle, *speeds_mps), *_beyond_corners(vehicle, band, speeds))
 
 
 def _beyond_kinds(vehicle: Vehicle, least_mps: float) -> Iterator[str]:
@@ -75,41 +73,51 @@ def _beyond_kinds(vehicle: Vehicle, least_mps: float) -> Iterator[str]:
         )
     if vehicle.oa_type:
         yield f"OA_TYPE {vehicle.oa_type}: ArduPilot plans its own way around fences and may leave the route; set OA_TYPE 0"
-    if vehicle.has_measured_corners is False:
-        yield f"ArduPilot {vehicle.firmware} was not measured: {_OLD_CORNERS}"
 
 
-def _beyond_corners(vehicle: Vehicle, band: Envelope) -> Iterator[str]:
-    """Yield that the firmware is not known, where that decides how a corner is driven."""
-    if vehicle.has_measured_corners is not None or vehicle.autopilot is not Autopilot.ARDUPILOT:
+def _beyond_corners(vehicle: Vehicle, band: Envelope, speeds_mps: set[float]) -> Iterator[str]:
+    """Yield which corners firmware before 4.6 was not measured at; where the version is not known, in what it would matter."""
+    if vehicle.has_measured_corners or vehicle.autopilot is not Autopilot.ARDUPILOT:
         return
-    turns_deg = [
-        abs(corner.turn_deg)
-        for corner in band.corners
-        if not (corner.pivots or corner.stops)
-        and (abs(corner.turn_deg) > SAME_TURN_DEG or vehicle.speed_mps > SAME_MPS)
-    ]
-    if turns_deg:
-        version = (
-            "unknown"
-            if vehicle.firmware is None
-            else f"{vehicle.firmware}, which may be older than April 2025"
+    turns_deg = [abs(corner.turn_deg) for corner in band.corners if not corner.bounded]
+    unmeasured = (
+        [f"turns like those of this drive (up to {max(turns_deg):.0f}°) were not measured"]
+        if turns_deg
+        else []
+    )
+    if vehicle.has_measured_corners is None:
+        ends_mps = min(speeds_mps), max(speeds_mps)
+        is_decisive = any(
+            not (corner.pivots or corner.stops)
+            and (abs(corner.turn_deg) > SAME_TURN_DEG or ends_mps[1] > SAME_MPS)
+            for corner in band.corners
         )
-        yield (
-            f"firmware {version}: {_OLD_CORNERS}; this drive has turns of up to {max(turns_deg):.0f}°. Give the version (--firmware 4.6), "
-            "or connect to the vehicle"
-        )
+        early = replace(vehicle, has_measured_corners=False)
+        known = set(_beyond_ranges(vehicle, *ends_mps))
+        unmeasured += [
+            reason for reason in _beyond_ranges(early, *ends_mps) if is_decisive and reason not in known
+        ]
+    if unmeasured:
+        yield f"{_age(vehicle)}: {'; '.join(unmeasured)}"
 
 
-def _beyond_ranges(vehicle: Vehicle, top_mps: float) -> Iterator[str]:
+def _age(vehicle: Vehicle) -> str:
+    if vehicle.has_measured_corners is False:
+        return f"ArduPilot {vehicle.firmware} (before 4.6)"
+    version = "unknown" if vehicle.firmware is None else f"{vehicle.firmware}"
+    return f"firmware {version}, which may be older than April 2025 (give the version: --firmware 4.6, or connect to the vehicle)"
+
+
+def _beyond_ranges(vehicle: Vehicle, least_mps: float, top_mps: float) -> Iterator[str]:
     """Yield which of the vehicle's limits, gains and distances were not measured."""
+    is_early = vehicle.has_measured_corners is False
     is_steered = vehicle.steering is Steering.ACKERMANN
     radius_m = (
         max(vehicle.waypoint_radius_m, vehicle.turn_radius_m) if is_steered else vehicle.waypoint_radius_m
     )
     no_limit = math.inf  # what 0 means, and what a limit that is not told is taken for
     told = (
-        ("WP_SPEED", top_mps, "m/s", "the drive"),
+        ("WP_SPEED", least_mps if is_early and least_mps < SLOW_MPS else top_mps, "m/s", "the drive"),
         ("WP_RADIUS", radius_m, "m", "corners"),
         ("TURN_RADIUS", vehicle.turn_radius_m, "m", "swings"),
         ("ATC_TURN_MAX_G", vehicle.turn_max_g, "g", "turns"),
@@ -125,6 +133,14 @@ def _beyond_ranges(vehicle: Vehicle, top_mps: float) -> Iterator[str]:
         is_too_slow = name == "WP_SPEED" and is_steered and value < SLOW_MPS  # has a sentence of its own
         if measured and value not in measured and not is_too_slow:
             yield f"{name} {value:g} {unit} was not measured (only {measured}, {vehicle.steering} steering): {what} may differ"
+        elif (
+            measured
+            and is_early
+            and row.measured_before_4_6
+            and value not in row.measured_before_4_6
+            and not is_too_slow
+        ):
+            yield f"{name} {value:g} {unit} was not measured before ArduPilot 4.6 (only {row.measured_before_4_6}): {what} may differ"
 
 
 def _beyond_margin(vehicle: Vehicle) -> Iterator[str]:

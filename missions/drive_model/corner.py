@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from missions.vehicle import Steering
+from missions.drive_model import before_4_6
+from missions.vehicle import Autopilot, Steering
 
 if TYPE_CHECKING:
     from missions.drive_model.motion import LegProfile
+    from missions.drive_model.stray import Bend
     from missions.vehicle import Vehicle
 
 GRAVITY_MPS2 = 9.80665  # standard gravity; ArduPilot's GRAVITY_MSS
@@ -35,6 +37,14 @@ SAME_PLACE_STRAY_M = 0.35
 
 SWING_PER_TURN_RADIUS = 2.45
 """How far a rover with steered wheels swings out where it turns right round, in turning radii (2.2 m at 0.9 m)."""
+
+TURN_BACK_DEG = (168.0, 180.0)
+TURN_BACK_SWING = 1.28
+"""Between these turns it swings out farther, by up to so many turning radii: 3.6 m in all after 180° at 1 m/s, the only speed measured there."""
+
+SLOW_MPS = 1.0
+SLOW_SKID_SWING_M, SLOW_SKID_TURN_DEG = 0.3, 45.0
+"""Slower skid-steered rovers swing out so far at corners that they do not pivot at: 0.49 m after 45° at 0.2 to 0.5 m/s, band included; at gentler ones less."""
 
 SWING_LENGTHS = 2.5
 """A swing is widest within so many turning radii along the next leg; only then it dies away."""
@@ -96,11 +106,21 @@ def band_m(vehicle: Vehicle, speed_mps: float) -> float:
     return BAND_AT_REST_M + BAND_HEADING_ERROR * speed_mps / vehicle.position_gain_per_s
 
 
+def inside_band_m(vehicle: Vehicle, speed_mps: float, band_m: float) -> float:
+    """Return how far a rover strays to the inside of a cut, of the path that its autopilot aims for."""
+    return before_4_6.inside_band_m(speed_mps) if is_early(vehicle) else min(band_m, INSIDE_BAND_M)
+
+
+def is_early(vehicle: Vehicle) -> bool:
+    """Whether its firmware begins turns as ArduPilot did before 4.6."""
+    return vehicle.has_measured_corners is False and vehicle.autopilot is Autopilot.ARDUPILOT
+
+
 def blend(vehicle: Vehicle, before: LegProfile, after: LegProfile, turn_deg: float) -> Blend:
     """Return the overlap of two legs' motions at a corner.
 
     The next leg starts as early as the middle of the turn lies within the waypoint radius and its acceleration within
-    ATC_TURN_MAX_G, at the earliest when the present leg begins to brake (SCurve::advance_target_along_track).
+    ATC_TURN_MAX_G, at the earliest when the present leg begins to brake (SCurve::advance_target_along_track), and sooner before 4.6.
     """
     ramp = before.ramp if before.ramp.duration_s <= after.ramp.duration_s else after.ramp
     half_s = ramp.duration_s / 2
@@ -108,6 +128,8 @@ def blend(vehicle: Vehicle, before: LegProfile, after: LegProfile, turn_deg: flo
     lateral_mps2 = vehicle.turn_max_g * GRAVITY_MPS2
     if 2 * ramp.accel_at_mps2(half_s) * sine > lateral_mps2 > 0:
         half_s = lateral_mps2 / (2 * ramp.jerk_mps3 * sine)
+    elif is_early(vehicle):
+        half_s = before_4_6.half_blend_s(ramp, before, after, turn_deg)
     reach_m = ramp.travelled_m(half_s)
     # On skid steer the turning radius does not count (AR_WPNav::set_turn_params).
     radius_m = vehicle.waypoint_radius_m
@@ -119,21 +141,26 @@ def blend(vehicle: Vehicle, before: LegProfile, after: LegProfile, turn_deg: flo
     return Blend(2 * half_s, reach_m)
 
 
-def corner_swing_m(vehicle: Vehicle, turn_deg: float, reach_m: float, shorter_leg_m: float) -> float:
+def corner_swing_m(vehicle: Vehicle, bend: Bend, reach_m: float) -> float:
     """Return how far a rover is carried out beyond its band after a corner that it does not stop at.
 
     Steered wheels cannot follow a sharp blend; a blend that starts early gives room back. On short legs a rover is still swinging from
     one corner when the next begins.
     """
+    slow_m = 0.0
+    if vehicle.steering is Steering.SKID and bend.speed_mps < SLOW_MPS:
+        slow_m = SLOW_SKID_SWING_M * min(bend.widest_deg / SLOW_SKID_TURN_DEG, 1.0)
     if vehicle.can_pivot:
-        return 0.0
+        return slow_m
     radius_m = max(vehicle.turn_radius_m, MEASURED_TURN_RADIUS_M)
     # The exponents and their bounds are fitted to benchmarks/data (docs/drive-model.md, 3): 2.5 where the blend or a leg is short, to 6.
-    short = math.exp(-shorter_leg_m / SHORT_LEG_M)
+    short = math.exp(-bend.shorter_run_m / SHORT_LEG_M)
     early = np.interp(reach_m, (0.2 * radius_m, 0.6 * radius_m), (0.0, 1.0))
-    half_turn = math.sin(math.radians(abs(turn_deg)) / 2) ** 2
+    half_turn = math.sin(math.radians(bend.widest_deg) / 2) ** 2
     exponent = 2.5 + 3.5 * float(early) * max(1 - 3 * short, 0.0)
-    return float(SWING_PER_TURN_RADIUS * radius_m * half_turn**exponent * (1 + 1.5 * short))
+    back = np.interp(bend.widest_deg, TURN_BACK_DEG, (0.0, TURN_BACK_SWING))
+    swing_m = radius_m * (SWING_PER_TURN_RADIUS * half_turn**exponent + float(back)) * (1 + 1.5 * short)
+    return max(float(swing_m), slow_m)
 
 
 def swing_length_m(vehicle: Vehicle) -> float:
@@ -141,9 +168,20 @@ def swing_length_m(vehicle: Vehicle) -> float:
     return SWING_LENGTHS * max(vehicle.turn_radius_m, MEASURED_TURN_RADIUS_M)
 
 
-def pivot_swing_m(shorter_leg_m: float) -> float:
+def pivot_swing_m(vehicle: Vehicle, shorter_leg_m: float) -> float:
     """Return how far beyond its band a rover strays that pivots between short legs."""
-    return PIVOT_SWING_M * math.exp(-shorter_leg_m / SHORT_LEG_M)
+    factor = before_4_6.PIVOT_SWING_FACTOR if is_early(vehicle) else 1.0
+    return factor * PIVOT_SWING_M * math.exp(-shorter_leg_m / SHORT_LEG_M)
+
+
+def early_swing(vehicle: Vehicle, bend: Bend) -> before_4_6.Swing:
+    """Return how far a rover with firmware before 4.6 is carried out after a corner that it does not stop at, and what is left of it long after."""
+    if vehicle.steering is Steering.SKID:
+        return before_4_6.Swing(
+            pivot_swing_m(vehicle, bend.shorter_run_m) if may_pivot_or_cut(vehicle, bend.turn_deg) else 0.0
+        )
+    radius_m = max(vehicle.waypoint_radius_m, vehicle.turn_radius_m)
+    return before_4_6.swing(bend.widest_deg, bend.speed_mps, radius_m, bend.shorter_run_m)
 
 
 def start_swing_m(vehicle: Vehicle, error_deg: float) -> float:
@@ -161,8 +199,14 @@ def pivots(vehicle: Vehicle, turn_deg: float) -> bool:
     return vehicle.can_pivot and abs(turn_deg) > vehicle.pivot_angle_deg
 
 
-def is_bounded(vehicle: Vehicle, turn_deg: float, shorter_leg_m: float) -> bool:
+def is_bounded(vehicle: Vehicle, turn_deg: float, shorter_leg_m: float, *, stops: bool) -> bool:
     """Whether corners like this kept within the model when measured; steered wheels between sharp turns on short legs did not."""
+    if is_early(vehicle):
+        is_steered = vehicle.steering is Steering.ACKERMANN
+        if pivots(vehicle, turn_deg):
+            return True
+        run_m = 0.0 if stops and is_steered else shorter_leg_m  # stops were not measured before 4.6
+        return before_4_6.is_bounded(turn_deg, run_m, is_steered=is_steered)
     sharp = abs(turn_deg) > UNBOUNDED_TURN_DEG and shorter_leg_m < UNBOUNDED_LEG_M
     return vehicle.steering is Steering.SKID or not sharp
 

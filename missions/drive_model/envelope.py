@@ -35,13 +35,13 @@ class Corner:
         How far it may get off its two legs to the inside and to the outside of the turn, the band included.
     reach_m : float
         How far before and after the waypoint it may leave the legs for the cut.
-    middle_m : float
-        How far before and after the waypoint the middle of the cut lies along each leg; 0 where it stops.
+    middle_m, least_middle_m : float
+        How far before and after the waypoint the middle of the cut lies along each leg, at the most and at the least; 0 where it stops.
     time_lost_s : float
         Against driving on at full speed.
     bounded : bool
-        False at a sharp turn between short legs (measured rovers with steered wheels left the model's bounds there), and at a turn
-        where the speed changes, which was not measured.
+        False at a sharp turn between short legs (measured rovers with steered wheels left the model's bounds there), at a turn
+        where the speed changes, which was not measured, and before ArduPilot 4.6 at any that was not.
     """
 
     waypoint: int
@@ -52,6 +52,7 @@ class Corner:
     outside_overshoot_m: float
     reach_m: float
     middle_m: float
+    least_middle_m: float
     time_lost_s: float
     bounded: bool
 

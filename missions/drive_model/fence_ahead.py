@@ -12,6 +12,8 @@ import numpy as np
 import shapely
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import ArrayLike, NDArray
     from shapely.geometry.base import BaseGeometry
 
@@ -20,6 +22,9 @@ if TYPE_CHECKING:
 
 _MOVED_M = 5.0
 """So far a place may move until the edges near it are looked for again."""
+
+_MOST_ACCEL_MPS2 = 1.0
+"""ArduPilot's avoidance reckons with no more braking, whatever the vehicle can (AC_Avoid.h, AC_AVOID_ACCEL_CMSS_MAX)."""
 
 _SPARE_M = 0.1  # beyond the farthest edge that counts: chosen, so that rounding loses none
 _TOUCHING_M2 = 1e-9  # a ray through the end of an edge meets it, rounding or not
@@ -41,7 +46,8 @@ class FenceAhead:
 
     def __init__(self, fence: BaseGeometry, places: NDArray[np.float64], vehicle: Vehicle) -> None:
         self._stops_within_m = vehicle.stops_within_m
-        self._gain_per_s, self._accel_mps2 = vehicle.position_gain_per_s, vehicle.accel_max_mps2
+        self._gain_per_s = vehicle.position_gain_per_s
+        self._accel_mps2 = min(vehicle.accel_max_mps2, _MOST_ACCEL_MPS2)
         self._linear_m = self._accel_mps2 / self._gain_per_s**2
         points, lines = shapely.get_coordinates(shapely.get_parts(fence), return_index=True)
         self._edges = np.stack((points[:-1], points[1:]), axis=1)[lines[1:] == lines[:-1]]
@@ -49,9 +55,6 @@ class FenceAhead:
         self._edges = self._edges[self._touch(places.min(axis=0), places.max(axis=0), within_m)]
         self._starts = _complex(self._edges[:, 0])
         self._steps = _complex(self._edges[:, 1]) - self._starts
-        self._centre, self._reach_m = 0j, -math.inf
-        self._near = self._starts, self._steps
-        self._near_edges: list[tuple[complex, complex]] = []
 
     def counts_within_m(self, top_mps: float) -> float:
         """Return the distance beyond which an edge does not slow a rover that drives at a speed."""
@@ -65,22 +68,30 @@ class FenceAhead:
 
     def speed_mps(self, place: Vector, way: Vector, top_mps: float) -> float:
         """Return the speed that is allowed at one place in one direction; exact up to ``top_mps``, and above that no less."""
-        here = complex(*place)
-        self._look_about(here, self.counts_within_m(top_mps) + _SPARE_M)
-        left_m = max(self._one_ahead_m(here, complex(*way)) - self._stops_within_m, 0.0)
-        if left_m <= self._linear_m:
-            return self._gain_per_s * left_m
-        return math.sqrt(2 * self._accel_mps2 * max(left_m - self._linear_m / 2, 0.0))
+        return self.speeds_about(top_mps)(complex(*place), complex(*way))
 
-    def _look_about(self, place: complex, reach_m: float) -> None:
-        """Leave for one place's own use only the edges within reach of it."""
-        if abs(place - self._centre) <= _MOVED_M and reach_m <= self._reach_m:
-            return
-        self._centre, self._reach_m = place, reach_m
-        here = (place.real, place.imag)
-        near = self._touch(here, here, reach_m + _MOVED_M)
-        self._near = self._starts[near], self._steps[near]
-        self._near_edges = list(zip(*(part.tolist() for part in self._near), strict=True))
+    def speeds_about(self, top_mps: float) -> Callable[[complex, complex], float]:
+        """Return the same as a function of places and ways, east + j north, which looks only at edges near the last places asked for."""
+        reach_m = self.counts_within_m(top_mps) + _SPARE_M + _MOVED_M
+        stops_within_m, gain_per_s, linear_m = self._stops_within_m, self._gain_per_s, self._linear_m
+        twice_mps2 = 2 * self._accel_mps2
+        centre, edges = complex(math.inf), _Edges(self._starts[:0], self._steps[:0])
+
+        def allowed_mps(place: complex, way: complex) -> float:
+            nonlocal centre, edges
+            if not abs(place - centre) <= _MOVED_M:
+                centre = place
+                here = (place.real, place.imag)
+                near = self._touch(here, here, reach_m)
+                edges = _Edges(self._starts[near], self._steps[near])
+            left_m = edges.ahead_m(place, way) - stops_within_m
+            if left_m <= 0:
+                return 0.0
+            if left_m <= linear_m:
+                return gain_per_s * left_m
+            return math.sqrt(twice_mps2 * (left_m - linear_m / 2))
+
+        return allowed_mps
 
     def _touch(self, low: ArrayLike, high: ArrayLike, reach_m: float) -> NDArray[np.bool_]:
         """Return which edges may come within reach of a box."""
@@ -100,14 +111,21 @@ class FenceAhead:
         met = (away_m >= 0) & (share >= 0) & (share <= 1)
         return np.asarray(np.where(met, away_m, np.inf).min(axis=1, initial=np.inf))
 
-    def _one_ahead_m(self, place: complex, way: complex) -> float:
-        """Return the same for one place, from the edges near it: this is asked so often that a few edges are best looked at one by one."""
+
+class _Edges:
+    """The edges near a place, in numpy and one by one: they are asked for so often that a few are best looked at one by one."""
+
+    def __init__(self, starts: NDArray[np.complex128], steps: NDArray[np.complex128]) -> None:
+        self._starts, self._steps = starts, steps
+        self._pairs = list(zip(starts.tolist(), steps.tolist(), strict=True))
+
+    def ahead_m(self, place: complex, way: complex) -> float:
+        """Return how far ahead of one place the first edge lies; infinite without one."""
         back = way.conjugate()
-        edges = self._near_edges
+        edges = self._pairs
         if len(edges) > _FEW:
-            starts, steps = self._near
-            aside_m = ((starts - place) * back).imag
-            crossing = aside_m * (aside_m + (steps * back).imag) <= _TOUCHING_M2
+            aside_m = ((self._starts - place) * back).imag
+            crossing = aside_m * (aside_m + (self._steps * back).imag) <= _TOUCHING_M2
             edges = [edges[edge] for edge in np.flatnonzero(crossing).tolist()]
         first_m = math.inf
         for start, step in edges:

@@ -6,9 +6,11 @@ import itertools
 import math
 from typing import TYPE_CHECKING
 
+from missions.drive_model import before_4_6
 from missions.drive_model import corner as at_corner
-from missions.drive_model.legs_and_corners import Bend, CornerPlan, DrivePlan, LegPlan, Stray
+from missions.drive_model.legs_and_corners import CornerPlan, DrivePlan, LegPlan
 from missions.drive_model.motion import leg_profile
+from missions.drive_model.stray import Bend, Stray
 from missions.geo import change_deg
 
 if TYPE_CHECKING:
@@ -48,7 +50,10 @@ def drive_plan(
         turn_deg = turns_deg[number]
         whole_deg = turn_deg + (whole_deg if before.profile.length_m < at_corner.NEAR_M else 0.0)
         changes_speed = asked[number] != asked[number + 1] and abs(turn_deg) > at_corner.STRAIGHT_ON_DEG
-        bend = Bend(turn_deg, whole_deg, min(runs_m[number], runs_m[number + 1]), changes_speed)
+        fastest_mps = max(
+            vehicle.speed_mps if speed_mps is None else speed_mps for speed_mps in asked[number : number + 2]
+        )
+        bend = Bend(turn_deg, whole_deg, min(runs_m[number], runs_m[number + 1]), fastest_mps, changes_speed)
         corners.append(_corner(vehicle, group, (before, after), bend, stops))
     strays = [start]
     middle_s = at_corner.START_HOLD_S
@@ -58,7 +63,20 @@ def drive_plan(
         left = strays[-1].after(passed_s, vehicle.position_gain_per_s)
         stray = left.turned(corner.turn_deg).swung(corner.turn_deg, corner.swing_m)
         strays.append(stray.widened(corner.stray_m))
-    return DrivePlan(vehicle, legs, tuple(corners), tuple(strays))
+    return DrivePlan(vehicle, legs, tuple(corners), tuple(strays), _tails(vehicle, legs, corners))
+
+
+def _tails(vehicle: Vehicle, legs: Sequence[LegPlan], corners: Sequence[CornerPlan]) -> tuple[Stray, ...]:
+    """Return what each leg begins with of the tails that hardly die away: of several the widest counts."""
+    if not at_corner.is_early(vehicle):
+        return ()
+    tails = [Stray()]
+    begin_s = 0.0
+    for leg, corner in zip(legs, corners, strict=False):
+        passed_s = leg.profile.duration_s - corner.blend.duration_s / 2 - begin_s
+        begin_s = corner.blend.duration_s
+        tails.append(before_4_6.left_of(tails[-1], passed_s).turned(corner.turn_deg).wider(corner.tail))
+    return tuple(tails)
 
 
 def _grouped(points: NDArray[np.float64]) -> list[list[tuple[int, Vector]]]:
@@ -110,9 +128,10 @@ def _corner(
     delay_s = sum(stops.get(number, 0.0) for number, _ in group)
     stopped = len(group) > 1 or any(number in stops for number, _ in group)
     doubtful = at_corner.may_pivot_or_cut(vehicle, turn_deg) and not stopped
+    tail = Stray()
     if pivots and not doubtful:
         blend = at_corner.STANDSTILL
-        swing_m = at_corner.pivot_swing_m(bend.shorter_run_m)
+        swing_m = at_corner.pivot_swing_m(vehicle, bend.shorter_run_m)
         behind_m = 0.0
     elif stopped:
         blend = at_corner.STANDSTILL
@@ -120,8 +139,13 @@ def _corner(
         behind_m = at_corner.start_behind_m(vehicle, turn_deg)
     else:
         blend = at_corner.blend(vehicle, before.profile, after.profile, turn_deg)
-        swing_m = at_corner.corner_swing_m(vehicle, bend.widest_deg, blend.reach_m, bend.shorter_run_m)
+        swing_m = at_corner.corner_swing_m(vehicle, bend, blend.reach_m)
         behind_m = swing_m / 4
+        if at_corner.is_early(vehicle):
+            swing = at_corner.early_swing(vehicle, bend)
+            swing_m = swing.outside_m
+            behind_m = swing_m / 2
+            tail = Stray(swing.later_outside_m, swing.later_inside_m).seen_from(turn_deg)
     top_mps = min(before.profile.top_speed_mps, after.profile.top_speed_mps)
     ramps_s = (before.profile.ramp.duration_s + after.profile.ramp.duration_s) / 2
     lost_s = ramps_s - blend.duration_s + at_corner.swing_time_s(swing_m, top_mps) + delay_s
@@ -136,12 +160,13 @@ def _corner(
         stops=stopped or pivots,
         pivots=pivots,
         doubtful=doubtful,
-        bounded=at_corner.is_bounded(vehicle, turn_deg, bend.shorter_run_m)
+        bounded=at_corner.is_bounded(vehicle, turn_deg, bend.shorter_run_m, stops=stopped)
         and (stopped or pivots or not bend.changes_speed),
         blend=blend,
         swing_m=swing_m,
         behind_m=behind_m,
         stray_m=_stray_m(len(group), delay_s),
+        tail=tail,
         time_lost_s=lost_s,
     )
 

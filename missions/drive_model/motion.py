@@ -9,6 +9,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_NEWTON_STEPS = 8  # each doubles the digits that are right; 8 leave no more than rounding
 
 
 @dataclass(frozen=True)
@@ -55,13 +63,33 @@ class Ramp:
         return self.jerk_mps3 * min(time_s, self.jerk_s)
 
     def time_s(self, distance_m: float) -> float:
-        """Return the time to a distance within the first half of the ramp."""
+        """Return the time to a distance; beyond the ramp the speed stays."""
         jerk_m = self.jerk_mps3 * self.jerk_s**3 / 6
         if distance_m <= jerk_m:
             return math.cbrt(6 * distance_m / self.jerk_mps3)
+        if distance_m > self._first_half_m(self.duration_s / 2):
+            return self._late_time_s(distance_m)
         half_s = self.jerk_s / 2
         accel_mps2 = self.jerk_mps3 * self.jerk_s
         return self.jerk_s - half_s + math.sqrt(half_s**2 + 2 * (distance_m - jerk_m) / accel_mps2)
+
+    def time_to_speed_s(self, speed_mps: float) -> float:
+        """Return the time to a speed, at most that of the ramp."""
+        if speed_mps > self.speed_mps / 2:
+            return self.duration_s - self.time_to_speed_s(max(self.speed_mps - speed_mps, 0.0))
+        jerk_mps = self.jerk_mps3 * self.jerk_s**2 / 2
+        if speed_mps <= jerk_mps:
+            return math.sqrt(2 * speed_mps / self.jerk_mps3)
+        return self.jerk_s + (speed_mps - jerk_mps) / (self.jerk_mps3 * self.jerk_s)
+
+    def _late_time_s(self, distance_m: float) -> float:
+        """Return the time to a distance in the second half and beyond, where the speed hardly changes: by Newton's method."""
+        time_s = self.duration_s / 2 + (distance_m - self.length_m / 2) / self.speed_mps
+        for _ in range(_NEWTON_STEPS):
+            rest_s = max(self.duration_s - time_s, 0.0)
+            lost_mps = self.jerk_mps3 * (rest_s**2 / 2 - max(rest_s - self.jerk_s, 0.0) ** 2 / 2)
+            time_s += (distance_m - self.travelled_m(time_s)) / (self.speed_mps - lost_mps)
+        return time_s
 
     def _first_half_m(self, time_s: float) -> float:
         jerk_s = self.jerk_s
@@ -101,6 +129,19 @@ class LegProfile:
         if time_s > self.duration_s / 2:
             return self.length_m - self.ramp.travelled_m(self.duration_s - time_s)
         return self.ramp.travelled_m(time_s)
+
+    def all_travelled_m(self, times_s: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the same for many times within the leg at once."""
+        ramp = self.ramp
+        is_late = times_s > self.duration_s / 2
+        from_rest_s = np.where(is_late, self.duration_s - times_s, times_s)
+        half_s = ramp.duration_s / 2
+        rising_s = np.where(from_rest_s > half_s, np.maximum(ramp.duration_s - from_rest_s, 0.0), from_rest_s)
+        jerking_s = np.minimum(rising_s, ramp.jerk_s)
+        more_s = rising_s - jerking_s
+        away_m = ramp.jerk_mps3 * (jerking_s**3 / 6 + ramp.jerk_s * more_s * (ramp.jerk_s + more_s) / 2)
+        away_m += ramp.speed_mps * np.maximum(from_rest_s - half_s, 0.0)
+        return np.asarray(np.where(is_late, self.length_m - away_m, away_m))
 
 
 def leg_profile(length_m: float, speed_mps: float, accel_mps2: float, jerk_mps3: float) -> LegProfile:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -13,7 +13,7 @@ from missions.drive_model import corner as at_corner
 from missions.drive_model.band import Pieces, add_corner, add_end, add_leg, add_start, convex
 from missions.drive_model.envelope import Envelope
 from missions.drive_model.from_points import SAME_PLACE_M, drive_plan
-from missions.drive_model.legs_and_corners import Stray
+from missions.drive_model.stray import Stray
 from missions.drive_model.summary import arrivals_s, told_corner, told_leg
 from missions.errors import InvalidPositionError, VehicleError
 from missions.vehicle.parameters import LEAST_MPS
@@ -81,8 +81,20 @@ def plan_drive(
     if heading_deg is None and len(array) > 1:
         # Starting straight on it is sooner at speed, and then strays further from short legs than after the worst start.
         starts.append(_start(array, vehicle, _bearing_deg(array)))
-    plans = tuple(drive_plan(array, vehicle, speeds, stops or {}, stray) for stray, _ in starts)
-    return Drive(array, plans, tuple(behind_m for _, behind_m in starts))
+    drives = [
+        (drive_plan(array, known, speeds, stops or {}, stray), behind_m)
+        for known in _of_known_corners(vehicle)
+        for stray, behind_m in starts
+    ]
+    plans, behind = zip(*drives, strict=True)
+    return Drive(array, plans, behind)
+
+
+def _of_known_corners(vehicle: Vehicle) -> Sequence[Vehicle]:
+    """Return the vehicle; where its firmware may be older than 4.6 or not, as either: the worse of both counts."""
+    if vehicle.has_measured_corners is not None:
+        return (vehicle,)
+    return tuple(replace(vehicle, has_measured_corners=has_them) for has_them in (True, False))
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +106,7 @@ class Drive:
     points : ndarray of float, shape (n, 2)
         What is driven, east and north in metres.
     plans : tuple of DrivePlan
-        Legs and corners; the second one, where there is one, for another heading at the start.
+        Legs and corners: for another heading at the start, and for another age of the firmware, each its own.
     behind_m : tuple of float
         How far behind its place each start takes the rover.
     """
@@ -129,8 +141,8 @@ class Drive:
             cores=cores,
             bands_m=np.asarray(self.pieces.bands_m),
             waypoints=np.asarray(self.pieces.waypoints, dtype=np.int64),
-            corners=tuple(told_corner(plan, number) for number in range(len(plan.corners))),
-            legs=tuple(told_leg(plan, number) for number in range(len(plan.legs))),
+            corners=tuple(told_corner(self.plans, number) for number in range(len(plan.corners))),
+            legs=tuple(told_leg(self.plans, number) for number in range(len(plan.legs))),
             arrivals_s=self.arrivals_s,
         )
 
@@ -186,7 +198,9 @@ def corner_forecast(
         ]
     )
     stops = {} if stop_s is None else {1: stop_s}
-    return told_corner(drive_plan(points, vehicle, [speed_mps, speed_mps], stops, Stray()), 0)
+    speeds = [speed_mps, speed_mps]
+    plans = [drive_plan(points, known, speeds, stops, Stray()) for known in _of_known_corners(vehicle)]
+    return told_corner(plans, 0)
 
 
 def _checked(points: ArrayLike) -> NDArray[np.float64]:

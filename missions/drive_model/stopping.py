@@ -137,7 +137,7 @@ def motion(band: Envelope, vehicle: Vehicle, fence: BaseGeometry | None = None) 
     """
     if not band.legs or band.duration_s > _LONGEST_S:
         return None
-    target = TargetPoint(band, vehicle)
+    target = TargetPoint(band, vehicle, [corner.middle_m for corner in band.corners])
     places = target.places.view(np.float64).reshape(-1, 2)
     every = 1 + (len(places) - 2) // _MOST_SAMPLES
     steps = np.diff(places, axis=0)[::every]

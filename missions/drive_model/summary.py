@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +13,8 @@ from missions.drive_model.envelope import Corner, Leg
 from missions.vehicle import Autopilot
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from missions.drive_model.legs_and_corners import DrivePlan, LegPlan
@@ -20,26 +23,46 @@ START_AND_END_LAG_S = 2.0
 """For both together, besides the motions of the legs (docs/drive-model.md, 5)."""
 
 
-def told_corner(drive: DrivePlan, number: int) -> Corner:
-    """Return the prediction for a corner."""
+def told_corner(drives: Sequence[DrivePlan], number: int) -> Corner:
+    """Return the prediction for a corner: the worst of several ways in which it may be driven, with the time of the first."""
+    corners = [_corner(drive, number) for drive in drives]
+    if len(corners) == 1:
+        return corners[0]
+    return replace(
+        corners[0],
+        inside_cut_m=max(corner.inside_cut_m for corner in corners),
+        outside_overshoot_m=max(corner.outside_overshoot_m for corner in corners),
+        reach_m=max(corner.reach_m for corner in corners),
+        middle_m=max(corner.middle_m for corner in corners),
+        least_middle_m=min(corner.least_middle_m for corner in corners),
+        bounded=all(corner.bounded for corner in corners),
+    )
+
+
+def _corner(drive: DrivePlan, number: int) -> Corner:
     plan, before, after = drive.corners[number], drive.legs[number], drive.legs[number + 1]
     band_m = max(before.band_m, after.band_m)
     blend_s = before.profile.duration_s - plan.blend.duration_s
     coming_m = drive.stray_at(number, blend_s).widest_m
     midway = drive.stray_at(number, before.profile.duration_s / 2).seen_from(plan.turn_deg)
-    going = drive.strays[number + 1].seen_from(plan.turn_deg)
+    going = drive.stray_after(number).seen_from(plan.turn_deg)
     return Corner(
         waypoint=plan.waypoint,
         turn_deg=plan.turn_deg,
         stops=plan.stops,
         pivots=plan.pivots,
         inside_cut_m=max(
-            _cut_m(drive, number) + coming_m + min(band_m, at_corner.INSIDE_BAND_M),
+            _cut_m(drive, number)
+            + coming_m
+            + at_corner.inside_band_m(
+                drive.vehicle, max(before.profile.top_speed_mps, after.profile.top_speed_mps), band_m
+            ),
             max(going.right_m, midway.right_m) + band_m,
         ),
         outside_overshoot_m=max(coming_m, going.left_m, midway.left_m) + band_m,
         reach_m=before.profile.length_m - before.profile.travelled_m(blend_s),
         middle_m=plan.blend.reach_m,
+        least_middle_m=plan.blend.reach_m,
         time_lost_s=plan.time_lost_s,
         bounded=plan.bounded,
     )
@@ -53,18 +76,17 @@ def _cut_m(drive: DrivePlan, number: int) -> float:
     return plan.blend.reach_m * sine
 
 
-def told_leg(drive: DrivePlan, number: int) -> Leg:
-    """Return the prediction for a leg."""
-    leg: LegPlan = drive.legs[number]
-    begin_s, _ = drive.span_s(number)
-    stray = drive.stray_at(number, begin_s)
+def told_leg(drives: Sequence[DrivePlan], number: int) -> Leg:
+    """Return the prediction for a leg: the worst of several ways in which it may be driven."""
+    leg: LegPlan = drives[0].legs[number]
+    strays = [drive.stray_at(number, drive.span_s(number)[0]) for drive in drives]
     return Leg(
         first=leg.first,
         length_m=leg.profile.length_m,
         top_speed_mps=leg.profile.top_speed_mps,
         half_width_m=leg.band_m,
-        left_m=leg.band_m + stray.left_m,
-        right_m=leg.band_m + stray.right_m,
+        left_m=leg.band_m + max(stray.left_m for stray in strays),
+        right_m=leg.band_m + max(stray.right_m for stray in strays),
     )
 
 

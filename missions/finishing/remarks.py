@@ -18,16 +18,14 @@ if TYPE_CHECKING:
     from missions.vehicle import Vehicle
 
 
-def lead_away_remarks(found: DrivenRoute, least_m: float) -> list[str]:
+def lead_away_remarks(found: DrivenRoute, asked: Promise) -> list[str]:
     """Return remarks on how near the start is to a fence, and what the route does about it."""
     if not found.lead_away or found.start_clearance_m < 0:
         return []
     if found.lead_away_m is None:
-        distance = f"{metres(found.start_clearance_m)} from a fence, nearer than {metres(least_m)}"
+        distance = f"{metres(found.start_clearance_m)} from a fence, nearer than {metres(asked.drawn_m)}"
         return [f"the start stands {distance}: the route first leads away, never nearer than that"]
-    distance = (
-        f"{metres(found.start_clearance_m)} from a fence, too near to leave it with {metres(least_m)} kept"
-    )
+    distance = f"{metres(found.start_clearance_m)} from a fence, too near to leave it with {asked.promised_m:g} m kept"
     nearest_m = max(found.lead_away_m, 0.0)
     return [
         f"the start stands {distance}: the route first leads away; turning there the vehicle may come as near as {nearest_m:.2f} m"

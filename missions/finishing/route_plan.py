@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from missions.checking.forecast import forecast_drive
+from missions.checking.forecast import forecast_drive, pivot_remarks
 from missions.errors import PlanCheckError, StartBlockedError
 from missions.finishing.mission_lines import Lines, check_lines, finished, mission_items
 from missions.finishing.remarks import drive_remarks, escape_info, lead_away_remarks, moved_target_info
@@ -18,12 +19,13 @@ from missions.ground.legs import path_length_m
 from missions.ground.seams import with_seams
 from missions.ground.start_hazard import start_hazard
 from missions.planned import Plan
-from missions.promise import known_vehicle, promise
+from missions.promise import known_vehicle, promise, stop_warnings
 from missions.routing.drawn_route import Sought
-from missions.routing.fitted_route import FittedRoute
-from missions.routing.no_route import NoRoute, explained
+from missions.routing.no_route import NoRoute, NoRouteKind, explained
+from missions.routing.promised_route import PromisedRoute
 from missions.routing.uniform_route import uniform_route, widest_uniform_route
 from missions.vehicle.parameter_remarks import parameter_remarks
+from missions.words import less_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -38,6 +40,9 @@ if TYPE_CHECKING:
     from missions.vehicle import Vehicle
 
 _ROUNDING_M = 1e-6  # a micrometre: differences of floating point, nothing that can be driven
+_LESS_HELPS = frozenset(
+    {NoRouteKind.TARGET_BLOCKED, NoRouteKind.NOWHERE_FREE, NoRouteKind.TOO_NARROW, NoRouteKind.CORNER}
+)
 
 
 def plan_route(
@@ -66,15 +71,28 @@ def plan_route(
     heading_deg = heading_at(situation, start)
     local_start, *local_targets = (ground.frame.to_local(position) for position in (start, *targets))
     sought = Sought(
-        ground, local_start, local_targets, request.method, request.snap_m, request.escape, should_stop
+        ground,
+        local_start,
+        local_targets,
+        request.method,
+        request.snap_m,
+        request.escape,
+        should_stop,
+        "" if request.widest else asked.words,
     )
-    asked, found = _route(sought, request, asked, vehicle, heading_deg)
+    wanted = asked
+    asked, found = _route(sought, request, wanted, vehicle, heading_deg)
+    if asked.promised_m < wanted.promised_m:
+        warnings += stop_warnings(vehicle, asked)
+        warnings += [] if request.widest else [less_text(wanted.words, asked.promised_m)]
     lines, drawn_m, band = _finished(ground, found, asked, vehicle, heading_deg)
     driven_m = max(0.0, band.clearance_m(ground.edge))
     items, seqs = mission_items(lines, vehicle.speed_mps, request.speed_mps)
     reached = tuple(rounded(ground.frame.to_lat_lon(target)) for target in found.targets)
-    warnings += lead_away_remarks(found, asked.drawn_m)
+    start_m = None if asked.allowance_m is not None else _start_m(band, lines, ground, asked)
+    warnings += lead_away_remarks(found, asked)
     warnings += drive_remarks(vehicle, heading_deg, asked, driven_m, found)
+    warnings += pivot_remarks(plain, vehicle, band, seqs)
     return Plan(
         items=items,
         path=lines.path,
@@ -87,7 +105,8 @@ def plan_route(
         length_m=path_length_m(lines.path),
         straight_line_m=path_length_m((start, *targets)),
         duration_s=band.duration_s,
-        clearance_m=_promised_m(asked, driven_m),
+        clearance_m=None if asked.allowance_m == 0 else asked.promised_m,
+        start_clearance_m=start_m,
         asked_m=asked.drawn_m,
         drawn_clearance_m=drawn_m,
         driven_clearance_m=driven_m,
@@ -113,10 +132,14 @@ def _route(
         There is none.
     """
     if asked.allowance_m is None:
-        fitted = FittedRoute(sought, vehicle, heading_deg)
-        found = fitted.widest(asked) if request.widest else fitted.find(asked)
+        promised = PromisedRoute(sought, vehicle, heading_deg)
+        find, widest = promised.find, promised.widest
     else:
-        found = widest_uniform_route(sought, asked) if request.widest else uniform_route(sought, asked)
+        find, widest = partial(uniform_route, sought), partial(widest_uniform_route, sought)
+    found = widest(asked) if request.widest else find(asked)
+    if isinstance(found, NoRoute) and request.accepts_less and found.kind in _LESS_HELPS:
+        less = widest(asked)
+        found = found if isinstance(less, NoRoute) else less
     if isinstance(found, NoRoute):
         raise explained(found, vehicle).error()
     return found
@@ -154,12 +177,14 @@ def _start_remarks(ground: Ground, start: LatLon, vehicle: Vehicle) -> list[str]
     return [hazard] if hazard else []
 
 
-def _promised_m(asked: Promise, driven_m: float) -> float | None:
-    """Return the promised clearance: what was asked for, or less where the start leaves less; nothing for drawn lines only."""
-    if asked.allowance_m is not None:
-        return asked.promised_m if asked.allowance_m else None
-    kept_m = math.floor(100 * max(driven_m - asked.error_m, 0.0)) / 100
-    return asked.promised_m if driven_m >= asked.required_m - _ROUNDING_M else min(asked.promised_m, kept_m)
+def _start_m(band: Envelope, lines: Lines, ground: Ground, asked: Promise) -> float | None:
+    """Return what is promised while the route leads away from the start, where that is less than beyond."""
+    if not lines.lead_away:
+        return None
+    driven_m = band.clearances_m(ground.edge)[band.waypoints <= lines.lead_away].min(initial=np.inf)
+    if driven_m >= asked.required_m - _ROUNDING_M:
+        return None
+    return math.floor(100 * max(float(driven_m) - asked.error_m, 0.0)) / 100
 
 
 def _check_band(ground: Ground, lines: Lines, band: Envelope, found: DrivenRoute, asked: Promise) -> None:

@@ -280,7 +280,7 @@ class Trial:
         least_m = np.full(len(required_m), np.inf)
         np.minimum.at(least_m, self._waypoints, self._clearances_m)
         missing_m = np.maximum(required_m - least_m, self._asked_lines_m)
-        for corner in self._drive.plans[0].corners:
+        for corner in (corner for plan in self._drive.plans for corner in plan.corners):
             turns_back = abs(corner.turn_deg) > TURN_BACK_DEG and not corner.pivots
             if not corner.bounded or turns_back:
                 here = slice(corner.waypoint, corner.waypoint + 2)

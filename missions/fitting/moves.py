@@ -43,6 +43,16 @@ is as good as 10 or 15 (rows ``slow`` of benchmarks/data). 3 m/s was not measure
 APART_M = 3.0
 """Turns nearer to one another are one turn to a rover, as for `drive_model.corner.NEAR_M`."""
 
+REJOINED_M = (
+    0.3,
+    0.7,
+    1.2,
+    2.0,
+    3.0,
+)  # how far out one corner in the place of several may lie; as coarse as `MOVES`
+QUICK_AFTER_M, QUICK_BEFORE_M = (0.0, 6.0, 15.0), (0.0, 5.0, 10.0)
+"""What of a slow leg stays slow behind its first corner and before its last: as `SLOW_AFTER_M` and `SLOW_BEFORE_M`."""
+
 CHANGE_TURN_DEG, CHANGE_AWAY_M = 8.0, 4.0
 """The speed changes on a straight line only, 4 m from any turn of more than 8°: at corners it was not measured (docs/drive-model.md)."""
 
@@ -150,6 +160,67 @@ def merged(drawing: Drawing, index: int) -> Iterator[Drawing]:
     for place in (meeting, middle):
         if place is not None and math.dist(place, middle) < 3 * math.dist(here.place, following.place):
             yield (*drawing[:index], following.at(place), *drawing[index + 2 :])
+
+
+def rejoined(drawing: Drawing, index: int) -> Iterator[Drawing]:
+    """Make one corner of this one and the next, or the next two, farther out than where the outer legs meet.
+
+    Short legs are slow, and one corner farther out is often quicker than two that keep close to a fence.
+    """
+    for last in range(index + 1, min(index + 3, len(drawing) - 1)):
+        if any(drawn.is_end_or_fixed(drawing, number) for number in range(index, last + 1)):
+            return
+        first, final = drawing[index], drawing[last]
+        meeting = drawn.crossing(drawing[index - 1], first, final, drawing[last + 1])
+        spread_m = math.dist(first.place, final.place)
+        if meeting is None or math.dist(meeting, first.place) > 3 * spread_m + REJOINED_M[-1]:
+            continue
+        single = (*drawing[:index], final.at(meeting), *drawing[last + 1 :])
+        yield single
+        if (out := drawn.outward(single, index)) is not None:
+            for out_m in REJOINED_M:
+                yield _with(single, index, shifted(meeting, out, out_m))
+
+
+def quickened(drawing: Drawing, index: int, speed_mps: float) -> Iterator[Drawing]:
+    """Drive the slow stretch that begins with the leg to a point faster: all of it, this leg, or the middle of this leg."""
+    slow_mps = drawing[index].speed_mps
+    if slow_mps is None:
+        return
+    ends = (number for number in range(index, len(drawing)) if drawing[number].speed_mps != slow_mps)
+    end = next(ends, len(drawing))
+    faster = [None, *(other for other in SLOW_MPS if slow_mps < other < speed_mps)]
+    is_first = drawing[index - 1].speed_mps != slow_mps or index == 1
+    for quick_mps in faster:
+        quick = [replace(point, speed_mps=quick_mps) for point in drawing]
+        if is_first and end > index + 1:
+            yield (*drawing[:index], *quick[index:end], *drawing[end:])
+        yield (*drawing[:index], quick[index], *drawing[index + 1 :])
+    length_m = math.dist(drawing[index - 1].place, drawing[index].place)
+    ahead = drawn.direction(drawing[index - 1], drawing[index])
+    for after_m, before_m in itertools.product(QUICK_AFTER_M, QUICK_BEFORE_M):
+        if length_m - after_m - before_m < APART_M:
+            continue
+        points = [
+            replace(drawing[index].at(place), is_fixed=False, stop_s=None)
+            for place in (
+                shifted(drawing[index - 1].place, ahead, after_m),
+                shifted(drawing[index].place, ahead, -before_m),
+            )
+        ]
+        for quick_mps in faster:
+            middle = replace(points[1], speed_mps=quick_mps)
+            if after_m and before_m:
+                yield (*drawing[:index], points[0], middle, *drawing[index:])
+            elif after_m:
+                yield (
+                    *drawing[:index],
+                    points[0],
+                    replace(drawing[index], speed_mps=quick_mps),
+                    *drawing[index + 1 :],
+                )
+            elif before_m:
+                yield (*drawing[:index], middle, *drawing[index:])
 
 
 def split(drawing: Drawing, index: int) -> Iterator[Drawing]:

@@ -43,7 +43,7 @@ def start_hazard(ground: Ground, start: LocalPoint, vehicle: Vehicle) -> StartBl
     """
     if not vehicle.avoids_fence or not ground.allowed.covers(Point(start)):
         return None
-    away_m, fence = _nearest_avoided(ground, Point(start))
+    away_m, fence = nearest_avoided(ground, Point(start))
     leaves_from_m = vehicle.stops_within_m + _LEAVES_FROM_M
     if away_m >= leaves_from_m:
         return None
@@ -66,7 +66,7 @@ def start_hazard(ground: Ground, start: LocalPoint, vehicle: Vehicle) -> StartBl
     return None
 
 
-def _nearest_avoided(ground: Ground, point: Point) -> tuple[float, str]:
+def nearest_avoided(ground: Ground, point: Point) -> tuple[float, str]:
     """Return the distance to what avoidance sees from a place, and its name: exclusions, and edges of inclusions around the place."""
     distances = [
         (

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from missions.drive_model import extrapolated
+from missions.errors import ExtrapolatedError
 
 if TYPE_CHECKING:
     from missions.planned import Plan
@@ -13,6 +14,16 @@ if TYPE_CHECKING:
 
 _NOTHING = "the drive is extrapolated beyond what was measured: no clearance is promised (--trust-model promises it anyway)"
 _TRUSTED = "the drive is extrapolated beyond what was measured; clearance is promised anyway (--trust-model)"
+
+
+def unpromised(plan: Plan) -> ExtrapolatedError | None:
+    """Return why a plan is not to be taken to a vehicle: it was to promise something, and lies outside what was measured."""
+    if not plan.extrapolated or plan.clearance_m is not None:
+        return None
+    return ExtrapolatedError(
+        f"not uploaded: the drive is extrapolated beyond what was measured, and no clearance is promised: {'; '.join(plan.extrapolated)}",
+        extrapolated=list(plan.extrapolated),
+    )
 
 
 def marked(plan: Plan, request: Request) -> Plan:
@@ -24,4 +35,4 @@ def marked(plan: Plan, request: Request) -> Plan:
         others = tuple(warning for warning in plan.warnings if warning not in reasons)
         return replace(plan, extrapolated=reasons, warnings=others, info=(*plan.info, *reasons, _TRUSTED))
     warnings = (*dict.fromkeys((*plan.warnings, *reasons)), _NOTHING)
-    return replace(plan, clearance_m=None, extrapolated=reasons, warnings=warnings)
+    return replace(plan, clearance_m=None, start_clearance_m=None, extrapolated=reasons, warnings=warnings)

@@ -92,6 +92,7 @@ def _with_room(
         asked_targets=planned.asked_targets,
         straight_line_m=planned.straight_line_m,
         clearance_m=planned.clearance_m,
+        start_clearance_m=planned.start_clearance_m,
         asked_m=planned.asked_m,
         blocks=planned.blocks,
         home=planned.home,

@@ -94,6 +94,8 @@ class Sought:
         ``optimal``, ``pbpp-taut`` or ``pbpp``.
     snap_m : float
         A blocked target is moved to free ground within this distance.
+    asked : str
+        The clearance that is asked for, as the one who asked knows it.
     escape : bool
         Whether a start on forbidden ground is left by the shortest straight line that crosses no other forbidden ground.
     should_stop : callable, optional
@@ -107,6 +109,7 @@ class Sought:
     snap_m: float = 0.0
     escape: bool = False
     should_stop: Callable[[], bool] | None = None
+    asked: str = ""
     _narrowest: dict[tuple[LocalPoint, LocalPoint], NarrowestPlace | None] = field(
         default_factory=dict, init=False
     )
@@ -162,8 +165,6 @@ class DrawnRoutes:
         What the drawn lines keep to any fence; where the start is nearer, a route first leads away, never nearer than the start is.
     planner : pbpp.Planner
         Plans at that clearance.
-    promised_m : float, optional
-        What of it is promised while driving, for people.
     is_other_way : bool
         Whether places are blocked that are none of the fence's, to find another way round.
     """
@@ -171,17 +172,16 @@ class DrawnRoutes:
     sought: Sought
     clearance_m: float
     planner: pbpp.Planner
-    promised_m: float | None = None
     is_other_way: bool = False
 
     @classmethod
-    def at(cls, sought: Sought, clearance_m: float, promised_m: float | None = None) -> DrawnRoutes:
+    def at(cls, sought: Sought, clearance_m: float) -> DrawnRoutes:
         """Return those at a clearance."""
         inclusions, exclusions = (
             sought.ground.areas(kind) for kind in (ZoneKind.INCLUSION, ZoneKind.EXCLUSION)
         )
         planner = pbpp.Planner(inclusions, exclusions, clearance_m=clearance_m, union=sought.ground.union)
-        return cls(sought, clearance_m, planner, promised_m)
+        return cls(sought, clearance_m, planner)
 
     def around(self, place: Polygon) -> DrawnRoutes:
         """Return those that keep away from one more place, as from an exclusion."""
@@ -222,9 +222,8 @@ class DrawnRoutes:
     @property
     def asked(self) -> str:
         """The clearance in words."""
-        if self.promised_m is None:
-            return metres(self.clearance_m)
-        return f"{metres(self.promised_m)} while driving ({metres(self.clearance_m)} drawn)"
+        drawn = metres(self.clearance_m)
+        return f"{self.sought.asked} ({drawn} along straight legs)" if self.sought.asked else drawn
 
     def is_free(self, point: LocalPoint) -> bool:
         """Whether the planner takes a point: mitred offsets hold it, or its true distance is what round ones hold."""
@@ -249,7 +248,7 @@ class DrawnRoutes:
             raise _NoWayError(
                 NoRoute(
                     NoRouteKind.NOWHERE_FREE,
-                    f"no place in the field keeps {metres(self.clearance_m)} from every fence",
+                    f"no place in the field keeps {self.asked} from every fence",
                     {"clearance_m": self.clearance_m},
                 )
             )

@@ -52,6 +52,8 @@ class NoRoute:
         What would help.
     at_start : bool
         Whether it is because of how the vehicle stands.
+    is_held : bool
+        Whether the vehicle cannot turn where it stands, so that other clearances make no difference.
     is_seam : bool
         Whether a seam of the union is to blame.
     """
@@ -62,6 +64,7 @@ class NoRoute:
     fences: Sequence[str] = ()
     advice: str | None = None
     at_start: bool = False
+    is_held: bool = False
     is_seam: bool = False
 
     def error(self) -> RouteError:

@@ -17,8 +17,7 @@ if TYPE_CHECKING:
 
     from missions.fitting.cost import Measured
     from missions.fitting.polyline import Drawing
-    from missions.ground.ground import Ground
-    from missions.routing.drawn_route import Route
+    from missions.routing.drawn_route import Route, Sought
 
 _START_ADVICE = "the vehicle has no room to turn where it stands: turn it by hand to face its way, or move it, or ask for less with --clearance"
 AT_START = 2
@@ -30,7 +29,7 @@ _BLOCK_AWAY_M = 8.0
 
 
 def refusal(
-    ground: Ground,
+    sought: Sought,
     required_m: float,
     reserve_m: float,
     drawing: Drawing,
@@ -39,6 +38,7 @@ def refusal(
     held_at_start: bool,
 ) -> NoRoute:
     """Return which corner refused, by how much and at which fence; with advice where the vehicle cannot turn at its start."""
+    ground = sought.ground
     index = measured.worst_index
     point = drawing[index]
     position = ground.frame.to_lat_lon(point.place)
@@ -64,12 +64,13 @@ def refusal(
     }
     return NoRoute(
         NoRouteKind.CORNER,
-        f"no route keeps {metres(required_m)} while driving: at {where} this vehicle would come as near as "
+        f"no route keeps {sought.asked or metres(required_m)} while driving: at {where} this vehicle would come as near as "
         f"{metres(kept_m)} to {fence}, whatever was tried",
         facts,
         [fence],
         advice=_START_ADVICE if index == 0 or held_at_start else None,
         at_start=index <= AT_START,
+        is_held=held_at_start,
     )
 
 

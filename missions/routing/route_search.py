@@ -25,9 +25,11 @@ import numpy as np
 from shapely import Point
 
 from missions.drive_model import corner_forecast
+from missions.fitting.cost import ENOUGH_M
 from missions.fitting.local_search import MOST_MEASUREMENTS, Fitting
 from missions.fitting.polyline import Drawing, DrawnPoint
-from missions.ground.legs import reserve_m
+from missions.geo import rounded
+from missions.ground.legs import ROUNDING_RESERVE_M, reserve_m
 from missions.routing.departure import ROOM_M, departures
 from missions.routing.drawn_route import DrawnRoutes, Route
 from missions.routing.no_route import NoRoute
@@ -56,8 +58,13 @@ _OTHER_WAYS = 5  # squares laid over refusing places before the search gives up
 # Missing at the start beyond what a slower, narrower band could win back: nothing else is tried
 _HELD_M = 0.05
 _DEPARTURES_TRIED = 8  # of the first legs, the shortest routes
-# What the first leg may keep less than the best departure, for rounding and bending
-_DEPARTURE_SLACK_M = 0.05
+# What the first leg may keep less than the best departure, for rounding and bending; and as a share of it: with 5 cm alone lines that
+# could be driven were refused for a centimetre at the start, or crept all the way (the recorded maze, 4.3 m to 7.7 m)
+_DEPARTURE_SLACK_M, _DEPARTURE_SLACK_SHARE = 0.05, 0.1
+_LINE_SLACK_M = (
+    0.5 * ROUNDING_RESERVE_M
+)  # and the drawn line there: half of what the finished lines are let off
+_MISSED_AT_START_M = 0.05  # so much less the first legs may keep, where no lines keep all of that; it is said (`DrivenRoute.lead_away_m`)
 _TURN_COST_M_PER_DEG = 0.1  # orders the departures: a turn of 90° counts as 9 m
 _MOST_TURN_DEG = 100.0
 """At the end of a first leg: tried with more, rovers that came back the way they went left the band."""
@@ -83,6 +90,12 @@ class DrivenRoute:
         Blocks of the partition that was searched.
     lead_away_m : float or None
         What the band has to keep while the route leads away; None where the lines were not fitted to a vehicle.
+    kept_m : float or None
+        What the band has to keep beyond; None as above.
+    is_whole : bool
+        Whether that is all that was aimed at.
+    cost_s : float
+        The predicted time, and a little for each waypoint (`fitting.cost`).
     """
 
     drawing: Drawing
@@ -91,20 +104,24 @@ class DrivenRoute:
     targets: tuple[LocalPoint, ...]
     blocks: int
     lead_away_m: float | None = None
+    kept_m: float | None = None
+    is_whole: bool = True
+    cost_s: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class _Attempt:
-    """One route fitted to the vehicle: what became of its lines, and the driven route where they keep what is required."""
+    """One route fitted to the vehicle: what became of its lines, the driven route that they are, and whether it keeps enough."""
 
     drawing: Drawing
     measured: Measured
     driven: DrivenRoute | None
+    is_enough: bool
 
     @property
     def is_refused_at_start(self) -> bool:
         """Whether most is missing because of how it begins."""
-        return self.driven is None and self.measured.worst_index <= AT_START
+        return not self.is_enough and self.measured.worst_index <= AT_START
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,55 +133,74 @@ class RouteSearch:
     sought : Sought
         The field, the ends, and how to search.
     required_m : float
-        What the driven band has to keep to any fence.
+        What the driven band has to keep to any fence: what is aimed at.
     vehicle : Vehicle
         What drives.
     heading_deg : float or None
         Where it faces at the start, clockwise from north; None is along the first leg.
-    measurements : int, optional
-        How often the drive model may be asked.
+    enough_m : float, optional
+        What is enough of it, where what is aimed at cannot be kept all the way. Default: all of it.
     """
 
     sought: Sought
     required_m: float
     vehicle: Vehicle
     heading_deg: float | None
-    measurements: int | None = None
+    enough_m: float | None = None
     _drawn: dict[float, DrawnRoutes] = field(default_factory=dict, init=False)
 
-    def find(self) -> DrivenRoute | NoRoute:
-        """Find the quickest of the routes tried whose band keeps what is required."""
-        fast_m, slow_m = self._bands_m()
-        routes = self._first_routes(fast_m, slow_m)
+    def find(self, *, briefly: bool = False) -> DrivenRoute | NoRoute:
+        """Find the quickest of the routes tried whose band keeps enough; ``briefly`` tries the first ones only."""
+        routes = self._first_routes
         if isinstance(routes, NoRoute):
             return routes
-        attempts = self._fit_first([route for route, _ in routes])
-        if attempts[-1].is_refused_at_start and not _found(attempts):
-            attempts += self._until_found(self._departing(slow_m))
-        is_held = not _found(attempts) and self._is_held_at_start(attempts, fast_m - slow_m)
-        if not _found(attempts) and not is_held:
-            attempts += self._until_found(self._slowly(routes[-1][0]))
-        if not _found(attempts) and not is_held:
-            attempts += self._until_found(self._other_ways(*routes[-1], attempts[-1]))
-        if found := _found(attempts):
-            return min(found, key=lambda one: one[0])[1]
-        least = min(attempts, key=lambda one: sum(one.measured.missing_m))
+        found = self._first_attempts if briefly else self._attempts
+        if enough := _found(found):
+            return min(enough, key=lambda one: one[0])[1]
+        least = min(found, key=lambda one: sum(one.measured.missing_m))
         return refusal(
-            self.sought.ground,
+            self.sought,
             self.required_m,
             self._reserve_m,
             least.drawing,
             least.measured,
-            held_at_start=is_held,
+            held_at_start=self._is_held_at_start(found),
         )
 
+    def widest(self, *, briefly: bool = False) -> DrivenRoute | NoRoute:
+        """Find the route that keeps most of what is aimed at."""
+        found = self.find(briefly=briefly)
+        if isinstance(found, DrivenRoute) or isinstance(self._first_routes, NoRoute):
+            return found
+        attempts = self._first_attempts if briefly else self._attempts
+        driven = [one.driven for one in attempts if one.driven is not None]
+        return max(driven, key=lambda one: (one.kept_m or 0.0, -one.cost_s), default=found)
+
+    @cached_property
+    def _attempts(self) -> list[_Attempt]:
+        routes = self._first_routes
+        assert not isinstance(routes, NoRoute)
+        _, slow_m = self._bands_m
+        attempts = [*self._first_attempts]
+        if attempts[-1].is_refused_at_start and not _found(attempts) and not self._is_limited_by_start:
+            attempts += self._until_found(self._departing(slow_m))
+        is_held = not _found(attempts) and self._is_held_at_start(attempts)
+        if not _found(attempts) and not is_held:
+            attempts += self._until_found(self._slowly(routes[-1][0]))
+        if not _found(attempts) and not is_held:
+            attempts += self._until_found(self._other_ways(*routes[-1], attempts[-1]))
+        return attempts
+
+    @cached_property
     def _bands_m(self) -> tuple[float, float]:
         fast_m = corner_forecast(0.0, self.vehicle).outside_overshoot_m
         slow_mps = min(SLOW_MPS, self.vehicle.speed_mps)
         return fast_m, corner_forecast(0.0, self.vehicle, speed_mps=slow_mps).outside_overshoot_m
 
-    def _first_routes(self, fast_m: float, slow_m: float) -> list[tuple[Route, DrawnRoutes]] | NoRoute:
-        """Return the shortest route at full speed's band, and the one at the slow speed's; why there is none where there is neither."""
+    @cached_property
+    def _first_routes(self) -> list[tuple[Route, DrawnRoutes]] | NoRoute:
+        """The shortest route at full speed's band, and the one at the slow speed's; why there is none where there is neither."""
+        fast_m, slow_m = self._bands_m
         all_drawn = [
             self._drawn_at(band_m) for band_m in sorted({fast_m, slow_m}, reverse=True) if band_m <= fast_m
         ]
@@ -173,10 +209,19 @@ class RouteSearch:
         last = tried[-1][0]
         return last if isinstance(last, NoRoute) and not found else found
 
-    def _fit_first(self, routes: Sequence[Route]) -> list[_Attempt]:
-        """Fit the first routes: the second only where the first fails, or is longer by some per cent."""
+    @cached_property
+    def _first_attempts(self) -> list[_Attempt]:
+        """The first routes, fitted: the second only where the first fails, or is longer by some per cent."""
+        assert not isinstance(self._first_routes, NoRoute)
+        routes = [route for route, _ in self._first_routes]
+        attempts = []
+        if self._is_limited_by_start:
+            # Lines that turn in the open are quicker than those that creep away, and to fit.
+            attempts = self._until_found(self._departing(self._bands_m[1]))
+            if attempts and attempts[-1].is_enough:
+                return attempts
         fitting = self._fitting(MOST_MEASUREMENTS)
-        attempts = [self._fit(fitting, routes[0])]
+        attempts.append(self._fit(fitting, routes[0]))
         is_shorter = routes[-1].length_m < _SHORTER_SHARE * routes[0].length_m
         if len(routes) > 1 and (is_shorter or not _found(attempts)):
             attempts.append(self._fit(fitting, routes[1]))
@@ -187,15 +232,17 @@ class RouteSearch:
         made = []
         for attempt in attempts:
             made.append(attempt)
-            if attempt.driven is not None or self._is_stopped():
+            if attempt.is_enough or self._is_stopped():
                 break
         return made
 
-    def _is_held_at_start(self, attempts: Sequence[_Attempt], narrower_m: float) -> bool:
+    def _is_held_at_start(self, attempts: Sequence[_Attempt]) -> bool:
         """Return whether nothing more is worth trying, as the vehicle cannot turn at its start.
 
         However slowly it drives it swings as far where it starts with its heading wrong; only its band becomes narrower.
         """
+        fast_m, slow_m = self._bands_m
+        narrower_m = fast_m - slow_m
         return all(
             one.is_refused_at_start and one.measured.missing_m[0] > narrower_m + _HELD_M for one in attempts
         )
@@ -223,31 +270,69 @@ class RouteSearch:
             yield refused
 
     def _fitting(self, measurements: int) -> Fitting:
-        most = min(measurements, self.measurements or measurements)
-        return Fitting(self.sought.ground, self.vehicle, self.heading_deg, self.sought.should_stop, most)
+        return Fitting(
+            self.sought.ground, self.vehicle, self.heading_deg, self.sought.should_stop, measurements
+        )
 
     def _drawn_at(self, band_m: float) -> DrawnRoutes:
         """Return the routes drawn with room for a band; what is free at it is computed once."""
         if band_m not in self._drawn:
             clearance_m = self.required_m + band_m + self._reserve_m
-            self._drawn[band_m] = DrawnRoutes.at(self.sought, clearance_m, self.required_m)
+            self._drawn[band_m] = DrawnRoutes.at(self.sought, clearance_m)
         return self._drawn[band_m]
 
     def _fit(self, fitting: Fitting, route: Route, speed_mps: float | None = None) -> _Attempt:
         drawing, measured = fitting.fit(
             tuple(replace(point, speed_mps=speed_mps) for point in self._drawing(route))
         )
+        departing_m = self._least_departing_m(route)
+        kept, kept_m, lead_m = measured, self.required_m, departing_m
         if not measured.is_enough:
-            return _Attempt(drawing, measured, None)
+            lower = self._lowered(fitting, drawing)
+            if lower is None:
+                return _Attempt(drawing, measured, None, is_enough=False)
+            drawing, kept, missed_m, missed_at_start_m = lower
+            kept_m, lead_m = kept_m - missed_m, lead_m - missed_at_start_m
         driven = DrivenRoute(
             drawing,
             self._lead_away(drawing),
             route.start_clearance_m,
             route.targets,
             route.blocks,
-            self._least_departing_m(route),
+            lead_m,
+            kept_m,
+            measured.is_enough,
+            kept.cost_s,
         )
-        return _Attempt(drawing, measured, driven)
+        enough_m = self.required_m if self.enough_m is None else self.enough_m
+        return _Attempt(drawing, measured, driven, is_enough=kept_m >= min(enough_m, self.required_m))
+
+    def _lowered(self, fitting: Fitting, drawing: Drawing) -> tuple[Drawing, Measured, float, float] | None:
+        """Return lines that miss some of what is required, as they are rounded and with no more required than they keep; what they miss, and on the first legs.
+
+        None where the first legs miss more than a little, or nothing is kept.
+        """
+        frame = self.sought.ground.frame
+        drawing = tuple(point.at(frame.to_local(rounded(frame.to_lat_lon(point.place)))) for point in drawing)
+        missing_m = fitting.measure(drawing).missing_m
+        first = self._lead_away(drawing) + 1 if self._lead_away(drawing) else 0
+        missed_m, missed_at_start_m = (
+            missed if missed > ENOUGH_M else 0.0
+            for missed in (max(missing_m[first:], default=0.0), max(missing_m[:first], default=0.0))
+        )
+        if missed_at_start_m > _MISSED_AT_START_M or missed_m >= self.required_m:
+            return None
+        drawing = tuple(
+            replace(
+                point,
+                required_m=point.required_m - (missed_m if number >= first else missed_at_start_m),
+                line_m=point.line_m
+                - (missed_m if number >= first else min(missed_at_start_m, _LINE_SLACK_M)),
+            )
+            for number, point in enumerate(drawing)
+        )
+        measured = fitting.measure(drawing)
+        return (drawing, measured, missed_m, missed_at_start_m) if measured.is_enough else None
 
     def _drawing(self, route: Route) -> Drawing:
         """Return a route's lines with what each point has to keep: where the route leads away, no less than the start does."""
@@ -281,7 +366,13 @@ class RouteSearch:
         best_m = self._departures[0].kept_m
         if best_m >= self.required_m + self._reserve_m:
             return self.required_m
-        return min(self.required_m, best_m - 2 * self._reserve_m - _DEPARTURE_SLACK_M)
+        slack_m = max(_DEPARTURE_SLACK_M, _DEPARTURE_SLACK_SHARE * best_m)
+        return min(self.required_m, best_m - 2 * self._reserve_m - slack_m)
+
+    @property
+    def _is_limited_by_start(self) -> bool:
+        """Whether the vehicle's turning at this start leaves less than is required."""
+        return 0 <= self.departure_m < self.required_m
 
     @cached_property
     def _departures(self) -> list[Departure]:
@@ -318,7 +409,8 @@ class RouteSearch:
 
     def _lead_away(self, drawing: Drawing) -> int:
         """Return how many of the first legs lead away."""
-        near = [point.required_m < self.required_m for point in drawing[1:]]
+        most_m = max(point.required_m for point in drawing)
+        near = [point.required_m < most_m - self._reserve_m for point in drawing[1:]]
         return near.index(False) if False in near else len(near)
 
     def _is_stopped(self) -> bool:
@@ -327,7 +419,7 @@ class RouteSearch:
 
 def _found(attempts: Sequence[_Attempt]) -> list[tuple[float, DrivenRoute]]:
     """Return the routes that were found, with what each costs."""
-    return [(one.measured.cost_s, one.driven) for one in attempts if one.driven is not None]
+    return [(one.driven.cost_s, one.driven) for one in attempts if one.is_enough and one.driven is not None]
 
 
 def _turn_at_deg(start: LocalPoint, onward: Route) -> float:

@@ -58,6 +58,8 @@ class Range:
     def __str__(self) -> str:
         if self.most == math.inf:
             return f"{self.least:g} or more"
+        if self.least == self.most:
+            return f"{self.least:g}"
         return f"{self.least:g} to {self.most:g}"
 
 
@@ -86,6 +88,8 @@ class Parameter:
     measured, measured_skid : Range or None
         Where the drive model was measured, with steered wheels and with skid steering; None where it makes no difference or is no number of its own.
         Open above where a larger value only limits less than the measured one.
+    measured_before_4_6 : Range or None
+        Where corners of firmware before 4.6 were measured, within the others; None where that is the same.
     is_told : bool
         Whether a driver should see its default where that stands in for the vehicle's own value.
     autopilot : Autopilot
@@ -102,6 +106,7 @@ class Parameter:
     before: tuple[Firmware, float] | None = None
     measured: Range | None = None
     measured_skid: Range | None = None
+    measured_before_4_6: Range | None = None
     is_told: bool = False
     autopilot: Autopilot = Autopilot.ARDUPILOT
 
@@ -117,20 +122,20 @@ _ANY = Range(-MOST)
 
 _ARDUPILOT = (
     Parameter("WP_SPEED", 2.0, "speed between waypoints; 0 is CRUISE_SPEED", _FAST, LEAST_MPS, Range(0, 100),
-              measured=Range(1, 5), measured_skid=Range(0.2, 3), is_told=True),
+              measured=Range(1, 5), measured_skid=Range(0.2, 3), measured_before_4_6=Range(1, 5), is_told=True),
     Parameter("CRUISE_SPEED", 2.0, "speed where WP_SPEED is 0", _FAST, LEAST_MPS, Range(0, 100)),
     Parameter("WP_RADIUS", 2.0, "how early a corner is begun", _WIDE, documented=Range(0, 100),
-              measured=Range(0.9, 5), measured_skid=Range(0.9, 5), is_told=True),
+              measured=Range(0.9, 5), measured_skid=Range(0.9, 5), measured_before_4_6=Range(1, 3), is_told=True),
     Parameter("TURN_RADIUS", 0.9, "with steered wheels the smallest WP_RADIUS that counts; swings grow with it", _WIDE, documented=Range(0, 10),
-              measured=Range(0.27, 2), is_told=True),
+              measured=Range(0.27, 2), measured_before_4_6=Range(0.9, 0.9), is_told=True),
     Parameter("ATC_TURN_MAX_G", 0.6, "least speed in a corner", _FAST, documented=Range(0.1, 10),
-              measured=Range(0.2, math.inf), measured_skid=Range(0.2, math.inf), is_told=True),
+              measured=Range(0.2, math.inf), measured_skid=Range(0.2, math.inf), measured_before_4_6=Range(0.6, math.inf), is_told=True),
     Parameter("ATC_ACCEL_MAX", 1.0, "how deep a corner is cut: half of it cuts 1.9 times as deep at 2 m/s; 0 is no limit", _FAST,
-              LEAST_ACCEL_MPS2, Range(0, 10), measured=Range(0.5, 2), measured_skid=Range(0.5, 2), is_told=True),
+              LEAST_ACCEL_MPS2, Range(0, 10), measured=Range(0.5, 2), measured_skid=Range(0.5, 2), measured_before_4_6=Range(1, 1), is_told=True),
     Parameter("ATC_DECEL_MAX", 0.0, "as ATC_ACCEL_MAX, where it is less; 0 is ATC_ACCEL_MAX", _FAST, LEAST_ACCEL_MPS2, Range(0, 10)),
     Parameter("WP_ACCEL", 0.0, "as ATC_ACCEL_MAX, where it is less; 0 is ATC_ACCEL_MAX", _FAST, LEAST_ACCEL_MPS2, Range(0, 100)),
     Parameter("WP_JERK", 0.0, "how gently speed changes; 0 is as much as the acceleration", _FAST, LEAST_ACCEL_MPS2, Range(0, 100),
-              measured=Range(0.5, 2), measured_skid=Range(0.5, 2)),
+              measured=Range(0.5, 2), measured_skid=Range(0.5, 2), measured_before_4_6=Range(1, 1)),
     Parameter("ATC_STR_RAT_MAX", 120.0, "how fast it turns: with 40 it swings out twice as far after 150°; 0 is no limit", _WIDE,
               documented=Range(0, 1000), measured=Range(120, math.inf), measured_skid=Range(120, math.inf)),
     Parameter("ATC_STR_ACC_MAX", 120.0, "how fast a turn begins; 0 is no limit", Range(), documented=Range(0, 1000),
@@ -139,7 +144,7 @@ _ARDUPILOT = (
               measured=Range(120, math.inf), measured_skid=Range(120, math.inf)),
     Parameter("ATC_STR_RAT_FF", None, "steering tune: how far steered rovers below 1 m/s swing out", documented=Range(0, 3)),
     Parameter("PSC_POS_P", 0.2, "how fast it comes back to its line", Range(0.01, _MOST_FAST), documented=Range(0.5, 2),
-              measured=Range(0.15, 0.3), measured_skid=Range(0.15, 0.3)),  # chosen around the one measured value
+              measured=Range(0.15, 0.3), measured_skid=Range(0.15, 0.3), measured_before_4_6=Range(0.2, 0.2)),  # chosen around the one measured value
     Parameter("PSC_VEL_P", None, "the same as ATC_STR_RAT_FF", documented=Range(0.1, 6)),
     Parameter("WP_PIVOT_ANGLE", 0.0, "on skid steer, corners sharper than this are turned on the spot; 0 never", Range(most=360.0),
               documented=Range(0, 360), before=(_FROM_4_7, 60.0), is_told=True),

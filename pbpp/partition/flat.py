@@ -1,19 +1,32 @@
-"""Slabs as arrays: what the compiled search reads."""
+"""Slabs as arrays: what the compiled sweep writes and the compiled search reads."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable
 
-    from .sweep import PortalView
+    from pbpp.geometry import Floats, Point
+
+    from .places import Places
     from .vertices import Ints, Vertices
 
-__all__ = ["FlatSlabs", "Records", "flatten", "record"]
+__all__ = [
+    "BLOCK",
+    "CORNER",
+    "PORTAL",
+    "WAY",
+    "Answer",
+    "Engine",
+    "FlatSearch",
+    "FlatSlabs",
+    "Records",
+    "record",
+]
 
 Records = npt.NDArray[Any]
 """An array of records: numba reads their fields as attributes."""
@@ -26,8 +39,10 @@ def record(metres: str, indices: str) -> np.dtype[np.void]:
     )
 
 
-_WAY = record("east south north", "low_end high_end block")
-_CORNER = record(
+BLOCK = record("west east", "floor ceiling")
+PORTAL = record("east low high", "low_end high_end west_block east_block")
+WAY = record("east south north", "low_end high_end block")
+CORNER = record(
     "x y before_east before_north after_east after_north",
     "west_above west_below east_above east_below above below",
 )
@@ -38,6 +53,10 @@ class FlatSlabs(NamedTuple):
 
     Parameters
     ----------
+    blocks : (b,) array of records
+        East of each block's west and east side in metres, and the vertices that its floor and its ceiling start at.
+    portals : (p,) array of records
+        East, low and high north of each portal in metres, its low and its high vertex, and the blocks west and east of it.
     first : (2, b + 1) array of int
         Where the ways of each block begin, westwards and eastwards.
     ways : (2, p) array of records
@@ -47,22 +66,68 @@ class FlatSlabs(NamedTuple):
         straight above and straight below it.
     """
 
+    blocks: Records
+    portals: Records
     first: Ints
     ways: Records
     corners: Records
 
 
-def flatten(
-    vertices: Vertices,
-    ways: Sequence[Sequence[Sequence[PortalView]]],
-    beside: Sequence[Sequence[int]],
-    above: Sequence[int],
-    below: Sequence[int],
-) -> FlatSlabs:
-    """Return as arrays what `Slabs` keeps in lists under the same names."""
-    corners = zip(vertices.fans, *beside, above, below, strict=True)
-    return FlatSlabs(
-        np.array([np.cumsum([0, *map(len, side)]) for side in ways], dtype=np.int64),
-        np.array([[way for block in side for way in block] for side in ways], dtype=_WAY),
-        np.array([(*fan, *around) for fan, *around in corners], dtype=_CORNER),
-    )
+class Answer(NamedTuple):
+    """A shortest path.
+
+    Parameters
+    ----------
+    turns : (n, 2) array
+        Start, all points that the path turns at or passes straight, goal: east and north in metres on the map.
+    points : (m, 2) array
+        The same without those on the straight way between their neighbours.
+    length_m : float
+        The length of the latter in metres.
+    expanded : int
+        How many nodes were taken from the queue.
+    """
+
+    turns: Floats
+    points: Floats
+    length_m: float
+    expanded: int
+
+
+class FlatSearch(Protocol):
+    """The search over flat slabs; the methods of `pbpp.compiled.search.Searcher`."""
+
+    def search(
+        self,
+        start: Point,
+        goal: Point,
+        ends: tuple[list[int], list[int], list[int]],
+        should_stop: Callable[[], bool] | None,
+    ) -> tuple[list[int] | None, float, int, bool]:
+        """Return the shortest path between two points of free space, wherever in it they lie."""
+
+    def direct(self, start: Point, goal: Point, origin_m: Floats) -> Answer | None:
+        """Return the shortest path between two points that lie well inside of one block each."""
+
+    def answers(self, ends: Floats, origin_m: Floats) -> list[Answer | None]:
+        """Return the paths of many queries as `direct` does."""
+
+    def lengths_m(
+        self, ends: Floats, origin_m: Floats, should_stop: Callable[[], bool] | None = None
+    ) -> Floats:
+        """Return the lengths of the paths of many queries."""
+
+
+class Engine(NamedTuple):
+    """What makes flat slabs and searches them: `pbpp.compiled`, which stands on this room.
+
+    Parameters
+    ----------
+    sweep : callable
+        Returns the slabs of free space with the given vertices.
+    searcher : callable
+        Returns the search over them.
+    """
+
+    sweep: Callable[[Vertices], FlatSlabs]
+    searcher: Callable[[FlatSlabs, Vertices, Places], FlatSearch]

@@ -56,6 +56,13 @@ class Places:
         East of each block's west and east side in metres, the west sides rising.
     height_m : (b,) array
         The greatest height of each block. Those that are closed gaps have no portals: an end in one is in none.
+
+    Attributes
+    ----------
+    open_east : (b,) array
+        East of each block's east side in metres; minus infinity for a closed gap.
+    rounding_m : float
+        How far from an edge a point is taken to lie beside it for certain.
     """
 
     def __init__(
@@ -64,11 +71,11 @@ class Places:
         self._vertices = vertices
         self._floor, self._ceiling = edges
         self._west, self._east = sides
-        self._open_east = np.where(height_m > TOLERANCE_M, self._east, -np.inf)
+        self.open_east = np.where(height_m > TOLERANCE_M, self._east, -np.inf)
         self._lines: list[float] = vertices.line_x.tolist()
         self._located: dict[Point, tuple[list[int], bool]] = {}
         bounds_m = float(np.abs(vertices.points).max(initial=1.0))
-        self._rounding_m = _ROUNDINGS * float(np.spacing(bounds_m))
+        self.rounding_m = _ROUNDINGS * float(np.spacing(bounds_m))
 
     def locate(self, point: Point) -> list[int]:
         """Return the blocks that a point lies in or on the edge of, in rising order."""
@@ -118,8 +125,8 @@ class Places:
             moved = False
             for edge, upwards in ((floor, 1.0), (ceiling, -1.0)):
                 off_m = upwards * edge.left_of(x, y)
-                if off_m < self._rounding_m:
-                    push_m = upwards * (2.0 * (1 << step) * self._rounding_m - off_m)
+                if off_m < self.rounding_m:
+                    push_m = upwards * (2.0 * (1 << step) * self.rounding_m - off_m)
                     x, y = x - edge.rise * push_m, y + edge.run * push_m
                     moved = True
             if not west <= x <= east:
@@ -171,7 +178,7 @@ class Places:
             for place in (depth_m >= -TOLERANCE_M).nonzero()[0].tolist():
                 block = int(near[place])
                 blocks.append(block)
-                if depth_m[place] >= self._rounding_m and self._west[block] <= point[0] <= self._east[block]:
+                if depth_m[place] >= self.rounding_m and self._west[block] <= point[0] <= self._east[block]:
                     inside = True
             found = self._located[point] = blocks, inside
         return found
@@ -184,15 +191,15 @@ class Places:
         east, north = point
         # The sweep opens blocks in the order of their west sides.
         last = int(self._west.searchsorted(east + tolerance_m, side="right"))
-        near = (self._open_east[:last] >= east - tolerance_m).nonzero()[0]
-        across_x, across_y, offset_m = self._half_planes.take(near, axis=2)
+        near = (self.open_east[:last] >= east - tolerance_m).nonzero()[0]
+        across_x, across_y, offset_m = self.half_planes.take(near, axis=2)
         depth_m = across_x * east
         depth_m += across_y * north
         depth_m += offset_m
         return near, np.minimum(depth_m[0], depth_m[1])
 
     @cached_property
-    def _half_planes(self) -> Floats:
+    def half_planes(self) -> Floats:
         """What lies above the floor and what below the ceiling of each block, (3, 2, b) array: the unit vector inwards and the offset."""
         v = self._vertices
         sides = []

@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .base import TOLERANCE_M, Portals
-from .flat import FlatSlabs, flatten
 from .places import Places
 from .sweep import Sweep
 from .vertices import Ints, Vertices
@@ -29,6 +28,8 @@ if TYPE_CHECKING:
     from shapely.geometry import Polygon
 
     from pbpp.geometry import Floats, Point
+
+    from .flat import Engine, FlatSearch, FlatSlabs
 
 __all__ = ["Slabs"]
 
@@ -41,33 +42,34 @@ class Slabs:
     polygons : sequence of shapely.Polygon
         Disjoint polygons, metres from the scene's origin.
 
+    engine : Engine, optional
+        The compiled sweep and search; they give the same.
+
     Attributes
     ----------
     vertices : Vertices
         Of free space.
-    ways : tuple of two lists
-        ``ways[1][block]`` are the portals through which a block is left eastwards, ``ways[0][block]`` westwards.
-    beside : (4, n) list
-        For each vertex the blocks west above, west below, east above and east below; -1 for none. A block that passes a vertex whole is
-        both above and below.
-    above, below : list of int
-        The corner reached from each vertex straight up and down along its line; negative for none.
+    swept : Sweep or FlatSlabs
+        What the search reads: lists, or arrays if compiled.
     """
 
     name = "slabs"
 
-    def __init__(self, polygons: Sequence[Polygon]) -> None:
+    def __init__(self, polygons: Sequence[Polygon], engine: Engine | None = None) -> None:
         self.vertices = Vertices(polygons)
-        sweep = Sweep(self.vertices)
-        sweep.run()
-        self._floor = np.array(sweep.floor, dtype=np.intp)
-        self._ceiling = np.array(sweep.ceiling, dtype=np.intp)
-        self._west = np.array(sweep.west)
-        self._east = np.array(sweep.east)
-        self._portal_rows = sweep.portals
-        self.ways = sweep.ways
-        self.beside = (sweep.west_above, sweep.west_below, sweep.east_above, sweep.east_below)
-        self.above, self.below = sweep.above, sweep.below
+        self.swept: Sweep | FlatSlabs
+        self._engine = engine
+        if engine is not None:
+            self.swept = flat = engine.sweep(self.vertices)
+            self._floor, self._ceiling = flat.blocks["floor"], flat.blocks["ceiling"]
+            self._west, self._east = flat.blocks["west"], flat.blocks["east"]
+        else:
+            self.swept = lists = Sweep(self.vertices)
+            lists.run()
+            self._floor = np.array(lists.floor, dtype=np.intp)
+            self._ceiling = np.array(lists.ceiling, dtype=np.intp)
+            self._west = np.array(lists.west)
+            self._east = np.array(lists.east)
 
     def __len__(self) -> int:
         return len(self._west)
@@ -104,11 +106,6 @@ class Slabs:
         """Lowest and highest north of each block."""
         floor_west, floor_east, ceiling_west, ceiling_east = self._sides
         return np.minimum(floor_west, floor_east), np.maximum(ceiling_west, ceiling_east)
-
-    @cached_property
-    def flat(self) -> FlatSlabs:
-        """The same as arrays, for the compiled search."""
-        return flatten(self.vertices, self.ways, self.beside, self.above, self.below)
 
     @cached_property
     def centers(self) -> Floats:
@@ -149,17 +146,32 @@ class Slabs:
         floor_west, floor_east, ceiling_west, ceiling_east = self._sides
         sides_m = float((ceiling_west - floor_west).sum() + (ceiling_east - floor_east).sum())
         upright_m = float(np.abs(v.y[v.next] - v.y)[v.x[v.next] == v.x].sum())
-        low, high = itemgetter(1), itemgetter(2)
-        portals_m: float = sum(map(high, self._portal_rows)) - sum(map(low, self._portal_rows))
-        return sides_m - upright_m - 2.0 * portals_m
+        return sides_m - upright_m - 2.0 * self._portals_m
+
+    @property
+    def _portals_m(self) -> float:
+        """Sum of the lengths of all portals in metres."""
+        portals = self.swept.portals
+        # Added up in one order, so that both sweeps pass the check or none does.
+        if isinstance(portals, list):
+            length_m: float = sum(map(itemgetter(2), portals)) - sum(map(itemgetter(1), portals))
+        else:
+            length_m = sum(portals["high"].tolist()) - sum(portals["low"].tolist())
+        return length_m
 
     @cached_property
     def portals(self) -> Portals:
         """The portals between blocks."""
-        rows = np.array(self._portal_rows, dtype=np.float64).reshape(-1, 5)
-        east = rows[:, 0]
-        ends = np.stack((np.column_stack((east, rows[:, 1])), np.column_stack((east, rows[:, 2]))), axis=1)
-        return Portals(rows[:, 3:].astype(np.intp), ends)
+        portals = self.swept.portals
+        if isinstance(portals, list):
+            rows = np.array(portals, dtype=np.float64).reshape(-1, 5)
+            east, low, high = rows[:, :3].T
+            blocks = rows[:, 3:].astype(np.intp)
+        else:
+            east, low, high = portals["east"], portals["low"], portals["high"]
+            blocks = np.column_stack((portals["west_block"], portals["east_block"]))
+        ends = np.stack((np.column_stack((east, low)), np.column_stack((east, high))), axis=1)
+        return Portals(blocks, ends)
 
     def outline(self, block: int) -> Floats:
         """Return the corners of a block, (3 or 4, 2) array, counter-clockwise, metres from the scene's origin."""
@@ -178,6 +190,13 @@ class Slabs:
         floor_west, floor_east, ceiling_west, ceiling_east = self._sides
         height_m = np.maximum(ceiling_west - floor_west, ceiling_east - floor_east)
         return Places(self.vertices, (self._floor, self._ceiling), (self._west, self._east), height_m)
+
+    @cached_property
+    def searcher(self) -> FlatSearch | None:
+        """The compiled search over them; None if they were swept plainly."""
+        if self._engine is None or isinstance(self.swept, Sweep):
+            return None
+        return self._engine.searcher(self.swept, self.vertices, self.places)
 
     def locate(self, point: Point) -> list[int]:
         """Return the blocks that a point lies in or on the edge of, in rising order."""

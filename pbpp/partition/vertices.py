@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from functools import cached_property, cmp_to_key
-from math import atan2, dist, tau
+from math import dist, tau
+from operator import attrgetter
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -26,6 +26,8 @@ Ints = npt.NDArray[np.intp]
 
 # The rounding of an end, 1e-9 m, turns an edge of a millimetre by as much; chosen, not measured.
 _ONE_WAY_RAD = 1e-6
+# So much of its two products a determinant is wrong by at the most (Shewchuk, "Adaptive precision floating-point arithmetic", 1997, section 4.3).
+_ORIENTED = (3.0 + 16.0 * 2.0**-53) * 2.0**-53
 
 
 class _Spoke(NamedTuple):
@@ -41,11 +43,14 @@ class _Spoke(NamedTuple):
 
 def _in_order(spokes: list[_Spoke]) -> list[_Spoke]:
     """Return edges counter-clockwise, those of one direction side by side: counted from the widest angle between two of them."""
-    angles_rad = sorted(spoke.angle_rad for spoke in spokes)
+    spokes.sort(key=attrgetter("angle_rad"))
+    angles_rad = [spoke.angle_rad for spoke in spokes]
     gaps_rad = [
         after - before for before, after in zip(angles_rad[-1:] + angles_rad, angles_rad, strict=False)
     ]
     gaps_rad[0] += tau
+    if min(gaps_rad) > _ONE_WAY_RAD:
+        return spokes
     first_rad = angles_rad[gaps_rad.index(max(gaps_rad))]
     turned = [spoke._replace(angle_rad=(spoke.angle_rad - first_rad) % tau) for spoke in spokes]
     return sorted(turned, key=cmp_to_key(_compare))
@@ -63,9 +68,15 @@ def _compare(one: _Spoke, other: _Spoke) -> int:
 
 def _left_of(line: tuple[Point, Point], point: Point) -> int:
     """Return 1 if a point lies to the left of a line, -1 to the right, 0 on it: exactly."""
-    (x, y), (end_x, end_y), (point_x, point_y) = (
-        (Fraction(east), Fraction(north)) for east, north in (*line, point)
-    )
+    (x, y), (end_x, end_y), (point_x, point_y) = (*line, point)
+    one, other = (end_x - x) * (point_y - y), (end_y - y) * (point_x - x)
+    left: float = one - other
+    if abs(left) > _ORIENTED * (abs(one) + abs(other)):
+        return 1 if left > 0.0 else -1
+    # Floats are whole numbers over powers of two: over the greatest of these, which all others divide, they are whole.
+    ratios = [number.as_integer_ratio() for number in (x, y, end_x, end_y, point_x, point_y)]
+    parts = max(below for _, below in ratios)
+    x, y, end_x, end_y, point_x, point_y = (above * (parts // below) for above, below in ratios)
     left = (end_x - x) * (point_y - y) - (end_y - y) * (point_x - x)
     return (left > 0) - (left < 0)
 
@@ -125,28 +136,40 @@ class Vertices:
     def _split_pinches(self) -> None:
         """Link the edges at a point shared by several rings so that each free fan there is one vertex."""
         x, y = self.x[self.order], self.y[self.order]
-        same = np.flatnonzero((x[1:] == x[:-1]) & (np.diff(y) <= TOLERANCE_M))
-        groups: dict[int, list[int]] = {}
-        for place in same.tolist():
-            groups[place + 1] = [*groups.pop(place, [int(self.order[place])]), int(self.order[place + 1])]
-        after = self.next.copy()
-        for members in groups.values():
-            # One point for all: of two heights the sweep would take the wrong fan's vertex for a portal's end.
-            self.y[members] = self.y[members[0]]
-        for members in groups.values():
-            spokes = [self._spoke(v, int(after[v]), starts=True) for v in members]
-            spokes += [self._spoke(v, int(self.prev[v]), starts=False) for v in members]
-            spokes = _in_order(spokes)
-            for one, other in zip(spokes, [*spokes[1:], spokes[0]], strict=True):
-                if one.starts == other.starts or (other is not spokes[0] and self._crossed(one, other)):
-                    raise ValueError("the edges at a point do not bound free fans")
-                if one.starts:
-                    self.prev[one.vertex] = other.neighbour
-                    self.next[other.neighbour] = one.vertex
+        same = (x[1:] == x[:-1]) & (np.diff(y) <= TOLERANCE_M)
+        # Runs of vertices one at the other's place.
+        edges = np.flatnonzero(np.diff(same, prepend=False, append=False)).reshape(-1, 2)
+        if not len(edges):
+            return
+        sizes = edges[:, 1] - edges[:, 0] + 1
+        members = self.order[np.concatenate([np.arange(first, last + 1) for first, last in edges.tolist()])]
+        # One point for all: of two heights the sweep would take the wrong fan's vertex for a portal's end.
+        self.y[members] = np.repeat(self.y[self.order[edges[:, 0]]], sizes)
+        here = np.repeat(members, 2)
+        neighbours = np.column_stack((self.next[members], self.prev[members])).ravel()
+        way = self.points[neighbours] - self.points[here]
+        columns = (
+            map(tuple, self.points[here].tolist()),
+            map(tuple, self.points[neighbours].tolist()),
+            np.arctan2(way[:, 1], way[:, 0]).tolist(),
+            [True, False] * len(members),
+            here.tolist(),
+            neighbours.tolist(),
+        )
+        spokes = list(map(_Spoke, *columns))
+        last = 0
+        for size in sizes.tolist():
+            first, last = last, last + 2 * size
+            self._link(_in_order(spokes[first:last]))
 
-    def _spoke(self, vertex: int, neighbour: int, *, starts: bool) -> _Spoke:
-        (x, y), (other_x, other_y) = self.points[[vertex, neighbour]].tolist()
-        return _Spoke((x, y), (other_x, other_y), atan2(other_y - y, other_x - x), starts, vertex, neighbour)
+    def _link(self, spokes: list[_Spoke]) -> None:
+        """Make the edges beside each free fan of a point neighbours."""
+        for one, other in zip(spokes, [*spokes[1:], spokes[0]], strict=True):
+            if one.starts == other.starts or (other is not spokes[0] and self._crossed(one, other)):
+                raise ValueError("the edges at a point do not bound free fans")
+            if one.starts:
+                self.prev[one.vertex] = other.neighbour
+                self.next[other.neighbour] = one.vertex
 
     def _crossed(self, one: _Spoke, other: _Spoke) -> bool:
         """Return whether two edges one after the other have changed places where their ends were made one point."""

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 from mavlink_bridge.cli.options.shared import (
+    AcceptLessOption,
     AnyVehicleOption,
     CommonOptions,
     FirmwareOption,
@@ -49,6 +50,7 @@ class BridgeOptions(CommonOptions):
     clearance: Annotated[
         str | None, option("Clearance to keep while driving. Default: from FENCE_MARGIN.", "M|max")
     ] = None
+    accept_less: AcceptLessOption = False
     corner_allowance: Annotated[str, option("Extra room for cut corners.", "M|auto")] = "auto"
     snap: Annotated[float, metres("Move a blocked target to the nearest free place within M metres.")] = 0.0
     vehicle: Annotated[

@@ -16,6 +16,7 @@ from mavlink_bridge.cli.options.shared import (
     LinkOptions,
     MapOptions,
     StoppingOption,
+    TrustOption,
     metres,
     option,
 )
@@ -51,6 +52,7 @@ class CheckOptions(MapOptions, ClearanceOptions, LinkOptions):
     ] = None
     firmware: FirmwareOption = None
     stopping: StoppingOption = field(default_factory=list)
+    trust_model: TrustOption = False
     clearance: Annotated[
         float | None, metres("Fence clearance each leg must keep while driving. Default: from FENCE_MARGIN.")
     ] = None

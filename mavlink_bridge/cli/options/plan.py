@@ -9,6 +9,7 @@ from typing import Annotated
 from mavlink_bridge.cli.options.shared import (
     OUTPUT_PANEL,
     VEHICLE_PANEL,
+    AcceptLessOption,
     ClearanceOptions,
     ConnectOption,
     FirmwareOption,
@@ -63,6 +64,7 @@ class PlanOptions(MapOptions, ClearanceOptions, LinkOptions):
             "M|max",
         ),
     ] = None
+    accept_less: AcceptLessOption = False
     output: Annotated[
         list[Path],
         option("Write the mission: .waypoints, .plan, .geojson, .kml, .gpx.", "FILE", "-o", "--output"),

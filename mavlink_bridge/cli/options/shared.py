@@ -70,7 +70,8 @@ HomeOption = Annotated[
 ]
 
 
-def _firmware(text: str) -> Firmware:
+def firmware_option(text: str) -> Firmware:
+    """Return the version that an option names; another text is wrong usage."""
     try:
         return read_firmware(text)
     except VehicleError as error:
@@ -83,7 +84,7 @@ FirmwareOption = Annotated[
         "Firmware version (4.5, 4.6.3), if the source does not report it.",
         "VERSION",
         panel=VEHICLE_PANEL,
-        parser=_firmware,
+        parser=firmware_option,
     ),
 ]
 StoppingOption = Annotated[
@@ -97,7 +98,16 @@ StoppingOption = Annotated[
     ),
 ]
 TrustOption = Annotated[
-    bool, flag("--trust-model", "Promise a clearance even outside the measured range.", VEHICLE_PANEL)
+    bool,
+    flag(
+        "--trust-model",
+        "Promise a clearance even outside the measured range; without it no such plan is uploaded.",
+        VEHICLE_PANEL,
+    ),
+]
+AcceptLessOption = Annotated[
+    bool,
+    flag("--accept-less", "If no route keeps the clearance, take the widest; else there is no plan then."),
 ]
 
 

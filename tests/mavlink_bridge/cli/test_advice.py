@@ -108,7 +108,7 @@ ADVICE = {
     "RouteError": None,
     "StartBlockedError": "drive the vehicle into the allowed area by hand, or add --escape to plan the way out",
     "TargetBlockedError": "choose another target, or add --snap M to move it to the nearest free place within M metres",
-    "NoRouteError": "ask for less with --clearance (--clearance max finds the widest route)",
+    "NoRouteError": "ask for less with --clearance (--clearance max finds the widest route), or add --accept-less to take the widest route there is",
     "MissionTooLongError": "use fewer targets, or drive in parts, or give --vehicle FILE if the vehicle has more storage (BRD_SD_MISSION)",
     "BridgeError": None,
     "UsageError": "see `pbpp plan --help`",

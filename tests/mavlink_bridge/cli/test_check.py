@@ -23,7 +23,7 @@ from missions.errors import SituationError
 from missions.fence import Fence, PolygonZone, ZoneKind, fence_to_items
 from missions.formats import read_fence, read_mission, read_situation, write_situation
 from missions.geo import LatLon
-from missions.items import Command, CoordinateFrame, MissionItem, with_home
+from missions.items import Command, CoordinateFrame, MissionItem, waypoint, with_home
 from missions.request import Request
 from missions.situation import Known, Mission, Situation
 
@@ -442,7 +442,8 @@ def test_a_seam_before_which_the_vehicle_stops_is_named_with_its_place(tmp_path)
         r"FAIL: leg start → 1 crosses the inner edge of inclusion polygon 2: the vehicle stops at 40\.07137\d+,-105\.22970\d+",
         result.output,
     )
-    assert "set AVOID_ENABLE 2 (without bit 0), or draw the inclusions as one polygon" in result.output
+    assert "`pbpp fence merge FILE -o merged.plan`" in result.output
+    assert "or set AVOID_ENABLE 2 (without bit 0)" in result.output
     document = document_of(*asked, code=8)
     assert document["legs"][0]["crosses"][0].startswith("the inner edge of inclusion polygon")
     vehicle.write_text(UNION.replace("AVOID_ENABLE 3", "AVOID_ENABLE 2"), encoding="utf-8")
@@ -483,13 +484,30 @@ def test_a_slow_mission_and_old_firmware_are_said(tmp_path, yard):
     assert any("FENCE_MARGIN 0 m does not switch avoidance off" in one for one in warnings)
 
 
+def test_an_extrapolated_mission_passes_only_where_the_model_is_trusted(tmp_path, yard):
+    vehicle = tmp_path / "rover.parm"
+    vehicle.write_text("WP_SPEED 2\nOA_TYPE 2\n", encoding="utf-8")
+    corner = (LatLon(40.071374, -105.229930), LatLon(40.0714396, -105.2299785))
+    mission = tmp_path / "short.waypoints"
+    items = tuple(map(waypoint, corner))
+    write_situation(Situation(mission=Known(Mission(items, corner[0]), None, "test")), mission)
+    asked = ("check", "--mission", mission, "--fence", yard["fence"], "--clearance", "0.5")
+    options = (*asked, "--vehicle", vehicle, "--firmware", "4.6")
+    usual, untrusted, trusted = run(*asked), run(*options), run(*options, "--trust-model")
+    assert [result.exit_code for result in (usual, untrusted, trusted)] == [0, 8, 0]
+    assert "NOT CONFIRMED: every leg is predicted to keep 0.5 m while driving" in untrusted.output
+    assert "PASS: every leg keeps 0.5 m while driving; the drive model is trusted" in trusted.output
+    document = json.loads(run(*options, "--json").stdout)
+    assert (document["status"], document["exit_code"], document["broken"]) == ("failed", 8, 0)
+
+
 def test_the_firmware_is_taken_from_the_option_else_from_the_file(tmp_path, yard):
     vehicle = tmp_path / "rover.parm"
     vehicle.write_text("# Version: 4.5.7\nWP_SPEED 2\nFENCE_NTF_FREQ 1\n", encoding="utf-8")
     assert check_yard(yard, "--vehicle", str(vehicle))["extrapolated"] == []
-    vehicle.write_text("# Version: 4.5.7\nWP_SPEED 2\n", encoding="utf-8")
+    vehicle.write_text("# Version: 4.5.7\nWP_SPEED 2\nTURN_RADIUS 0.6\n", encoding="utf-8")
     picture = tmp_path / "check.html"
     (old,) = check_yard(yard, "--vehicle", str(vehicle), "--plot", str(picture))["extrapolated"]
-    assert "ArduPilot 4.5.7 was not measured" in old
+    assert "TURN_RADIUS 0.6 m was not measured before ArduPilot 4.6" in old
     assert "while driving, extrapolated" in picture.read_text(encoding="utf-8")
     assert check_yard(yard, "--vehicle", str(vehicle), "--firmware", "4.6")["extrapolated"] == []

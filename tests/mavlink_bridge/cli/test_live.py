@@ -54,6 +54,24 @@ def test_plans_without_writing(config):
     assert document["system"] == 1
 
 
+def test_an_extrapolated_plan_is_uploaded_only_where_the_model_is_trusted(config):
+    config = replace(config, parameters={**config.parameters, "OA_TYPE": 2.0})
+    with Simulator(config, "tcpin:127.0.0.1:0") as simulator:
+        before = simulator.vehicle.mission
+        plan = ("plan", "--connect", simulator.connection, "--target", TARGET, "--upload", "--json")
+        refused = run(*plan)
+        assert simulator.vehicle.mission == before
+        trusted = run(*plan, "--trust-model")
+        assert simulator.vehicle.mission != before
+    document = json.loads(refused.stdout)
+    assert refused.exit_code == document["exit_code"] == 4
+    assert document["error"] == "ExtrapolatedError"
+    assert document["message"].startswith("not uploaded: the drive is extrapolated beyond what was measured")
+    assert "--trust-model" in document["advice"]
+    assert trusted.exit_code == 0
+    assert json.loads(trusted.stdout)["verified"]
+
+
 def test_uploads_and_verifies(config, state_folder):
     with Simulator(config, "tcpin:127.0.0.1:0") as simulator:
         old = simulator.vehicle.mission

@@ -131,6 +131,25 @@ def test_a_plan_outside_what_was_measured_says_so_and_promises_nothing(trusts):
     assert usual.last(EventName.PLANNED).data["extrapolated"] == []
 
 
+@pytest.mark.parametrize("trusts", [False, True])
+def test_a_plan_outside_what_was_measured_is_uploaded_only_where_the_model_is_trusted(trusts):
+    config = SimulatorConfig(
+        home=HOME, fence=fence_to_items(FENCE), parameters={"OA_TYPE": 2.0, "WP_SPEED": 3.0}
+    )
+    asked = Request(clearance_m=2.5, trusts_model=trusts)
+    run = ready(conductor(vehicle=SimulatedVehicle(config), request=asked))
+    run.ground_station(reposition(FAR))
+    run.run_until(run.happened(EventName.VERIFIED if trusts else EventName.NO_PLAN), 40)
+    if trusts:
+        assert run.last(EventName.PLANNED).data["clearance_m"] == 2.5
+        return
+    refused = run.last(EventName.NO_PLAN)
+    assert refused.data["error"] == "ExtrapolatedError"
+    assert refused.text.startswith("not uploaded: the drive is extrapolated beyond what was measured")
+    assert not any(event.name in {EventName.PLANNED, EventName.UPLOADING} for event in run.events)
+    assert len(run.vehicles[0].mission) == 1  # home
+
+
 def test_without_orders_to_drive_it_changes_no_mode_and_warns_of_an_unsafe_straight_line():
     run = ready(conductor(drive=False))
     arm(run)

@@ -333,3 +333,17 @@ def test_a_defect_while_a_drive_is_checked_holds_the_vehicle(monkeypatch):
     run.run_until(run.happened(EventName.HOLDING, changed), 20)
     assert "a bug in pbpp" in run.last(EventName.ROUTE_BROKEN).text
     assert not run.director.is_done
+
+
+def test_a_target_across_a_seam_of_a_union_is_refused_with_what_would_do():
+    north = CircleZone(ZoneKind.INCLUSION, HOME, 40.0)
+    south = CircleZone(ZoneKind.INCLUSION, LatLon(HOME.lat_deg - 60 / 1.113e5, HOME.lon_deg), 40.0)
+    parameters = {"FENCE_ENABLE": 1.0, "FENCE_OPTIONS": 2.0, "WP_SPEED": 3.0}
+    config = SimulatorConfig(home=HOME, fence=fence_to_items(Fence((north, south))), parameters=parameters)
+    run = ready(conductor(vehicle=SimulatedVehicle(config)))
+    run.director.take_target(south.centre, run.now_s)
+    run.run_until(run.happened(EventName.NO_PLAN), 20)
+    told = run.last(EventName.NO_PLAN)
+    assert "the inner edge of inclusion circle" in told.text
+    assert "`pbpp fence merge FILE -o merged.plan`" in told.data["details"]["advice"]
+    assert not run.happened(EventName.UPLOADING)()

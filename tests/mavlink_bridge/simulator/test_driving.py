@@ -84,13 +84,23 @@ def test_without_avoidance_it_breaches_and_drives_home():
 
 
 @pytest.mark.parametrize(
-    ("action", "mode"), [(0, Mode.AUTO), (1, Mode.RTL), (2, Mode.HOLD), (3, Mode.RTL), (4, Mode.HOLD)]
+    ("action", "mode"),
+    [
+        (0, Mode.AUTO),
+        (1, Mode.RTL),
+        (2, Mode.HOLD),
+        (3, Mode.SMART_RTL),
+        (4, Mode.SMART_RTL),
+        (5, Mode.AUTO),
+        (6, Mode.LOITER),
+    ],
 )
 def test_what_a_breach_does(action, mode):
     bench = bench_of(fence=BLOCK, AVOID_ENABLE=0.0, FENCE_ACTION=action)
     bench.start_auto()
     bench.run_until(lambda: bench.vehicle.breaches == 1, 60.0)
     assert bench.vehicle.mode == mode
+    assert bench.vehicle.is_armed is (action != 5)
 
 
 def test_far_outside_it_stops_instead_of_driving_home():
@@ -141,12 +151,16 @@ def test_disabled_avoidance_does_not_matter_beside_the_line():
 
 def test_union_of_inclusions():
     fields = [*square(0, 0, 30.0, inclusion=True), *square(40, 0, 30.0, inclusion=True)]
-    both, one = (bench_of(kept_line(), fields, FENCE_OPTIONS=option) for option in (2.0, 0.0))
-    for bench in (both, one):
+    both, avoiding, one = (
+        bench_of(kept_line(), fields, FENCE_OPTIONS=option, AVOID_ENABLE=avoid)
+        for option, avoid in ((2.0, 0.0), (2.0, 3.0), (0.0, 0.0))
+    )
+    for bench in (both, avoiding, one):
         bench.start_auto()
         bench.run(40.0)
-    assert both.vehicle.breaches == 0
+    assert both.vehicle.breaches == avoiding.vehicle.breaches == 0
     assert both.vehicle.rover.mission_run.is_complete
+    assert north_m(avoiding) == pytest.approx(28.0, abs=0.2)  # a seam is a wall to its avoidance
     assert one.vehicle.least_clearance_m < 0
 
 
@@ -277,7 +291,7 @@ def test_hold_stops_and_auto_resumes():
     bench.start_auto()
     bench.run_until(lambda: bench.vehicle.rover.mission_run.seq == 3, 60.0)
     bench.command(Command.DO_SET_MODE, 1, 4)
-    bench.run(15.0)
+    bench.run(20.0)  # it rolls out
     assert bench.vehicle.rover.body.speed_mps == pytest.approx(0.0, abs=0.01)
     assert bench.vehicle.rover.is_idle
     bench.command(Command.DO_SET_MODE, 1, 10)
@@ -394,11 +408,11 @@ def test_flat_frames_agree_with_their_definitions():
     assert across.to_lat_lon(complex(0, 100)).lon_deg < 0
 
 
-def test_a_rover_that_stands_in_the_margin_does_not_go_towards_the_fence():
+def test_a_rover_within_the_margin_with_its_nose_to_the_fence_backs_out_of_it():
     bench = bench_of(fence=tuple(square(6.5, 0)))
     bench.start_auto()
     bench.run(20.0)
-    assert north_m(bench) == pytest.approx(0.0, abs=0.1)
+    assert north_m(bench) == pytest.approx(-0.5, abs=0.1)
     assert bench.vehicle.mode == Mode.AUTO
 
 

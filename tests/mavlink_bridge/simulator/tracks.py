@@ -68,11 +68,13 @@ def settings(vehicle: str, **parameters: float) -> Settings:
     return Settings.from_parameters(ParameterStore({**(SKID if vehicle == "skid" else {}), **parameters}))
 
 
-def drive(points_m: list[complex], limits: Settings, *, heading_rad: float | None = None) -> Track:
+def drive(
+    points_m: list[complex], limits: Settings, *, heading_rad: float | None = None, turns_early: bool = False
+) -> Track:
     """Drive along points without stops; return the track."""
     first_rad = cmath.phase(points_m[1] - points_m[0]) if heading_rad is None else heading_rad
     body = Body(points_m[0], first_rad, limits.is_skid)
-    driver = Driver(limits, body)
+    driver = Driver(limits, body, turns_early=turns_early)
     after = [*points_m[2:], None, None]
     index = 1
     rows = []

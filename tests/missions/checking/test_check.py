@@ -399,7 +399,7 @@ def test_what_was_not_measured_is_said_of_a_check() -> None:
         for situation in (
             situation_of(FIELD, BARN),
             situation_of(FIELD, BARN, OA_TYPE=2.0),
-            replace(situation_of(FIELD, BARN, WP_SPEED=2.0), firmware=None),
+            replace(situation_of(FIELD, BARN, WP_SPEED=2.0, WP_RADIUS=4.0), firmware=None),
         )
     )
     assert usual.extrapolated == ()
@@ -408,5 +408,10 @@ def test_what_was_not_measured_is_said_of_a_check() -> None:
     )
     assert len(unknown.extrapolated) == 1
     assert "firmware unknown" in unknown.extrapolated[0]
-    assert "turns of up to 90°" in unknown.extrapolated[0]
+    assert "WP_RADIUS 4 m was not measured before ArduPilot 4.6" in unknown.extrapolated[0]
+    assert usual.is_promised
+    assert dijkstra.holds
+    assert not dijkstra.is_promised
+    trusting = Request(clearance_m=2.0, trusts_model=True)
+    assert check_mission(dijkstra.mission, situation_of(FIELD, BARN, OA_TYPE=2.0), trusting).is_promised
     assert set(dijkstra.extrapolated) <= set(dijkstra.warnings)

@@ -18,6 +18,7 @@ from mavlink_bridge.simulator.vehicle import SimulatedVehicle
 from missions.drive_model import envelope
 from missions.drive_model.avoidance import with_avoidance
 from missions.fence import Fence, fence_to_items
+from missions.firmware import Firmware
 from missions.items import waypoint
 from missions.vehicle import Vehicle, vehicle_from_parameters
 
@@ -49,7 +50,7 @@ def wall(south_m: float, north_m: float, west_m: float = -60.0, east_m: float = 
 
 
 def vehicle_of(parameters: dict[str, float]) -> Vehicle:
-    return vehicle_from_parameters({**AVOIDING, **parameters})
+    return vehicle_from_parameters({**AVOIDING, **parameters}, firmware=Firmware(4, 6))
 
 
 def bands(

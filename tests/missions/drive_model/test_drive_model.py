@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
+from drive_model.extents import area_extents
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from shapely import LineString, Point, Polygon
 
-from missions.drive_model import Corner, Envelope, beyond_measured, corner_forecast, envelope, extrapolated
-from missions.drive_model.calibrated_range import SAME_TURN_DEG
+from missions.drive_model import Corner, Envelope, beyond_measured, corner_forecast, envelope
 from missions.drive_model.corner import blend
 from missions.drive_model.motion import LegProfile, leg_profile
 from missions.errors import InvalidPositionError, VehicleError
@@ -112,25 +112,6 @@ def foreseen(drive: list[dict[str, str]]) -> tuple[Envelope, list[int]]:
     return envelope(
         polyline(legs_m, turns_deg), vehicle, heading_deg=0.0, speeds=speeds, stops=stops
     ), numbers
-
-
-def area_extents(track: Envelope, number: int, before_m: float, after_m: float) -> tuple[float, float]:
-    """Measure, on the area alone, how far it lies to the inside and the outside of a corner's legs, as the rows were measured."""
-    mine = np.isin(track.waypoints, range(number - 1, number + 3))
-    edge = shapely.segmentize(shapely.union_all(track.pieces[mine]).boundary, 0.2)
-    place = track.points[number]
-    ahead, onward = place - track.points[number - 1], track.points[number + 1] - place
-    ahead, onward = ahead / np.hypot(*ahead), onward / np.hypot(*onward)
-    offsets = shapely.get_coordinates(edge) - place
-    first = LineString([place - ahead * before_m, place])
-    second = LineString([place, place + onward * after_m])
-    points = shapely.points(offsets + place)
-    is_first = shapely.distance(first, points) <= shapely.distance(second, points)
-    along = np.where(is_first, -offsets @ ahead, offsets @ onward)
-    right = np.where(is_first, offsets @ (ahead[1], -ahead[0]), offsets @ (onward[1], -onward[0]))
-    window = along < np.where(is_first, before_m / 2, after_m / 2)
-    inside = right if ahead[0] * onward[1] - ahead[1] * onward[0] <= 0 else -right
-    return inside[window].max(), -inside[window].min()
 
 
 @pytest.mark.parametrize("kind", ["clean", "delay", "slow1at5", "straight"])
@@ -589,49 +570,6 @@ def test_sharp_turns_on_short_legs_are_named() -> None:
     assert bounded(150, 30)
     assert bounded(90, 5)
     assert bounded(150, 5, TANK)
-
-
-def test_gentle_turns_and_pivots_are_driven_alike_before_4_6() -> None:
-    with (DATA / "corners_before_4_6.csv").open(newline="") as file:
-        rows = list(csv.DictReader(file))
-    for row in rows:
-        vehicle = Vehicle(
-            waypoint_radius_m=float(row["wp_radius_m"]),
-            speed_mps=float(row["wp_speed_mps"]),
-            steering=Steering(row["vehicle"]),
-        )
-        corner = corner_forecast(
-            abs(float(row["turn_deg"])),
-            vehicle,
-            leg_before_m=float(row["leg_before_m"]),
-            leg_after_m=float(row["leg_after_m"]),
-        )
-        assert corner.pivots or abs(corner.turn_deg) <= SAME_TURN_DEG
-        assert float(row["inside_cut_m"]) <= corner.inside_cut_m + 0.05
-        assert float(row["outside_overshoot_m"]) <= corner.outside_overshoot_m + 0.05
-    assert len(rows) > 150
-
-
-@pytest.mark.parametrize(
-    ("turn_deg", "changes", "is_told"),
-    [
-        (90.0, {}, True),
-        (25.0, {}, True),
-        (15.0, {}, False),
-        (15.0, {"speed_mps": 4.0}, True),
-        (90.0, {"steering": Steering.SKID}, False),
-        (50.0, {"steering": Steering.SKID}, True),
-        (90.0, {"has_measured_corners": True}, False),
-    ],
-)
-def test_an_unknown_firmware_counts_where_it_decides_how_a_corner_is_driven(
-    turn_deg: float, changes: dict[str, object], is_told: bool
-) -> None:
-    vehicle = replace(SLOW_ROVER, **{"has_measured_corners": None, **changes})
-    band = envelope(polyline([30.0, 30.0], [turn_deg]), vehicle, heading_deg=0.0)
-    told = extrapolated(vehicle, band)
-    assert any("firmware unknown: before 4.6 rovers cut corners" in text for text in told) is is_told
-    assert len(told) == is_told
 
 
 def test_vehicles_of_the_measured_kind() -> None:

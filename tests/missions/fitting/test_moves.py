@@ -166,3 +166,33 @@ def test_a_leg_is_bent_away_from_a_fence() -> None:
     bent = list(moves.bent(RIGHT_ANGLE, 1, (0.0, 30.0), (-1.0, 0.0), 0.5))
     assert [one[1].place.east_m for one in bent] == pytest.approx([-0.55, -0.85, -1.3])
     assert not list(moves.bent(RIGHT_ANGLE, 1, (0.0, 59.0), (-1.0, 0.0), 0.5))
+
+
+def test_two_corners_become_one_farther_out_each_time() -> None:
+    drawing = lines((0, 0), (0, 40), (6, 46), (60, 46))
+    found = list(moves.rejoined(drawing, 1))
+    assert [len(one) for one in found] == [3] * 6
+    assert found[0][1].place == pytest.approx((0.0, 46.0))
+    out_m = [math.dist(one[1].place, found[0][1].place) for one in found]
+    assert out_m == pytest.approx([0.0, *moves.REJOINED_M])
+    assert all(one[1].place[0] <= 0.0 and one[1].place[1] >= 46.0 for one in found)
+
+
+def test_fixed_points_are_not_rejoined() -> None:
+    assert not list(moves.rejoined(lines((0, 0), (0, 40), (6, 46), (60, 46), fixed=(2,)), 1))
+
+
+def test_a_slow_stretch_is_driven_faster_whole_or_in_part() -> None:
+    slow = tuple(replace(point, speed_mps=1.0) for point in RIGHT_ANGLE)
+    found = list(moves.quickened(slow, 1, 5.0))
+    speeds = {tuple(drawn.speeds(one)) for one in found}
+    assert {(None, None), (None, 1.0), (3.0, 3.0), (1.0, None, 1.0, 1.0), (1.0, 2.0, 1.0)} <= speeds
+    for one in found:
+        assert drawn.distances_m(one)[-1] == pytest.approx(120.0)
+        assert {point.place for point in RIGHT_ANGLE} <= {point.place for point in one}
+
+
+def test_what_is_not_slow_is_not_quickened() -> None:
+    assert not list(moves.quickened(RIGHT_ANGLE, 1, 5.0))
+    slowest = tuple(replace(point, speed_mps=2.0) for point in RIGHT_ANGLE)
+    assert all(one[1].speed_mps != 3.0 for one in moves.quickened(slowest, 1, 3.0))

@@ -29,6 +29,7 @@ from hypothesis import example, given, settings
 from shapely import Polygon
 from strategies import RandomField, random_fields
 
+from missions.checking.check import check_mission
 from missions.errors import (
     FenceError,
     FenceMissingError,
@@ -423,7 +424,7 @@ class TestStartNearAFence:
         below = box(OUT, -60, -20, 60, 0)
         with pytest.raises(
             NoRouteError,
-            match=r"no route keeps 20\.01 m; the widest keeps 1\.50 m, narrowest at exclusion polygon 2",
+            match=r"no route keeps 20 m \(20\.01 m along straight legs\); the widest keeps 1\.50 m, narrowest at exclusion polygon 2",
         ) as caught:
             drawn(situation_of(FIELD, ring, below), place(-30, 1.5), place(50, 50), clearance_m=20)
         assert caught.value.details["fences"]
@@ -464,7 +465,8 @@ class TestBlockedEnds:
 
     def test_target_too_near_a_fence(self) -> None:
         with pytest.raises(
-            TargetBlockedError, match=r"the target is 1\.2\d m from exclusion polygon 1, closer than 2\.0\d m"
+            TargetBlockedError,
+            match=r"the target is 1\.2\d m from exclusion polygon 1, closer than 2 m \(2\.0\d m along straight legs\)",
         ):
             drawn(situation_of(FIELD, WALL), place(-50, 0), place(6.25, 0))
 
@@ -476,7 +478,9 @@ class TestBlockedEnds:
             drawn(situation_of(FIELD, WALL), place(-50, 0), place(50, 0), place(0, 0))
 
     def test_no_ground_keeps_the_clearance(self) -> None:
-        with pytest.raises(RouteError, match=r"no place in the field keeps 150\.0"):
+        with pytest.raises(
+            RouteError, match=r"no place in the field keeps 150 m \(150\.0\d m along straight legs\)"
+        ):
             drawn(situation_of(FIELD, WALL), place(-50, 0), place(50, 0), clearance_m=150)
 
     def test_a_target_off_a_sharp_corner_is_free_if_its_true_distance_says_so(self) -> None:
@@ -565,7 +569,7 @@ class TestUnreachable:
         zones = (box(OUT, -5, -100, 5, -1.5), box(OUT, -5, 1.5, 5, 100))
         with pytest.raises(
             NoRouteError,
-            match=r"no route keeps 2\.0\d m; the widest keeps 1\.(49|50) m, narrowest between exclusion polygon [12] and exclusion polygon [12]",
+            match=r"no route keeps 2 m \(2\.0\d m along straight legs\); the widest keeps 1\.(49|50) m, narrowest between exclusion polygon [12] and exclusion polygon [12]",
         ) as caught:
             drawn(situation_of(FIELD, *zones), place(-50, 0), place(50, 0))
         assert caught.value.details["widest_m"] == pytest.approx(1.5, abs=0.02)
@@ -730,8 +734,22 @@ def test_an_unknown_firmware_is_no_matter_where_all_is_assumed_or_a_name_tells(
     situation = replace(situation_of(FIELD, WALL, **parameters), firmware=None)
     request = Request(place(-50, 0), (place(50, 0),), 2.0)
     assert plan(situation, request).clearance_m == 2.0
-    known = replace(situation, parameters={"WP_SPEED": 2.0, "WP_RADIUS": 2.0})
+    known = replace(situation, parameters={"WP_SPEED": 2.0, "WP_RADIUS": 4.0})
     found = plan(known, request)
     assert found.clearance_m is None
     assert "firmware unknown" in found.extrapolated[0]
     assert plan(replace(known, firmware=Firmware(4, 6)), request).extrapolated == ()
+
+
+def test_an_unknown_firmware_promises_what_the_older_and_the_newer_keep() -> None:
+    request = Request(place(-50, 0), (place(50, 0),), 2.0)
+    known = {"WP_SPEED": 3.0, "WP_RADIUS": 3.0}
+    plans = {
+        version: plan(replace(situation_of(FIELD, WALL, **known), firmware=version), request)
+        for version in (None, Firmware(4, 5), Firmware(4, 6))
+    }
+    for made in plans.values():
+        assert (made.clearance_m, made.extrapolated) == (2.0, ())
+    for version in (Firmware(4, 5), Firmware(4, 6)):
+        situation = replace(situation_of(FIELD, WALL, **known), firmware=version)
+        assert check_mission(Mission(plans[None].items), situation, request).is_promised

@@ -74,5 +74,5 @@ def test_a_seam_explains_itself_and_leaves_the_reason_as_it_was():
     told = explained(seam, vehicle)
     assert told.text.startswith("no route: with AVOID_ENABLE 1 (bit 0) the vehicle stops")
     assert told.error().details["seam"] is True
-    assert "draw the inclusions as one polygon" in told.error().details["advice"]
+    assert "pbpp fence merge" in told.error().details["advice"]
     assert (seam.advice, seam.is_seam, "seam" in seam.error().details) == ("x", False, False)

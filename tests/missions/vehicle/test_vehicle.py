@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import csv
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -354,10 +355,9 @@ def test_which_firmware_has_the_corners_that_were_measured(
 ) -> None:
     vehicle = vehicle_from_parameters({"WP_SPEED": 2.0, **told}, firmware=firmware)
     assert vehicle.has_measured_corners is has_measured_corners
-    said = any(
-        f"ArduPilot {firmware} was not measured: before 4.6" in text for text in beyond_measured(vehicle)
-    )
-    assert said is (has_measured_corners is False)
+    said = beyond_measured(replace(vehicle, turn_radius_m=0.5))
+    assert bool(said) is (has_measured_corners is False)
+    assert all("TURN_RADIUS 0.5 m was not measured before ArduPilot 4.6 (only 0.9)" in text for text in said)
 
 
 @pytest.mark.parametrize(
@@ -412,10 +412,10 @@ def test_every_parameter_that_is_asked_for_is_published_and_what_is_read_is_aske
     assert read <= set(PARAMETER_NAMES)
 
 
-def measured_cells() -> list[dict[str, str]]:
+def measured_cells(*, before_4_6: bool = False) -> list[dict[str, str]]:
     path = Path(__file__).parent / "data" / "measured_cells.csv"
     with path.open(newline="", encoding="utf-8") as file:
-        return [row for row in csv.DictReader(file) if row["firmware"] != "before 4.6"]
+        return [row for row in csv.DictReader(file) if (row["firmware"] == "before 4.6") is before_4_6]
 
 
 @pytest.mark.parametrize(
@@ -428,6 +428,25 @@ def test_no_range_is_wider_than_what_was_measured(name: str, column: str, steeri
     claimed = row.measured_skid if steering is Steering.SKID else row.measured
     values = [float(cell[column]) for cell in measured_cells() if cell["steering"] == steering]
     assert claimed is None or min(values) <= claimed.least <= claimed.most <= max(values)
+
+
+def test_before_4_6_no_range_is_wider_than_what_was_measured() -> None:
+    for name, column in (
+        ("WP_SPEED", "wp_speed_mps"),
+        ("WP_RADIUS", "wp_radius_m"),
+        ("TURN_RADIUS", "turn_radius_m"),
+    ):
+        claimed = PARAMETERS[name].measured_before_4_6
+        values = [float(cell[column]) for cell in measured_cells(before_4_6=True)]
+        assert claimed is not None
+        assert min(values) <= claimed.least <= claimed.most <= max(values)
+    assert {cell["parameters"] for cell in measured_cells(before_4_6=True)} == {
+        ""
+    }  # so all others had their defaults
+    for name in ("ATC_TURN_MAX_G", "ATC_ACCEL_MAX", "PSC_POS_P"):
+        claimed = PARAMETERS[name].measured_before_4_6
+        assert claimed is not None
+        assert claimed.least == PARAMETERS[name].default
 
 
 @pytest.mark.parametrize(("name", "ends"), [("ATC_ACCEL_MAX", (0.5, 2.0)), ("ATC_TURN_MAX_G", (0.2,))])

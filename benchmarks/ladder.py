@@ -1,0 +1,199 @@
+"""Whether ``--clearance`` is one coherent thing: every clearance of a ladder asked on the recorded maze and yard, and on seeded fields.
+
+``python benchmarks/ladder.py [--fields N] [--first SEED] [--step M] [--jobs N] [--progress] [-o FILE]``. For each place the widest route is planned, and every rung from 0.5 to
+8 m; counted is what contradicts: less promised than asked, a clearance refused below one that is planned, a time that falls by more than 1 %
+as the clearance grows, a rung that keeps more than the widest route.
+"""
+
+from __future__ import annotations
+
+import argparse
+import datetime as dt
+import platform
+import statistics
+import sys
+import time
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from drive import VEHICLES, parameters_of, situation_of
+from drive_fields import make_field
+
+from mavlink_bridge.logbook.log_situation import situation_from_log
+from missions.errors import RouteError
+from missions.planning.plan import plan
+from missions.request import GoTo
+
+if TYPE_CHECKING:
+    from missions.situation import Situation
+
+_LOGS = Path(__file__).parent.parent / "sitl_logs"
+LOGS = {"maze": "guided-maze.tlog", "yard": "position-target-yard.tlog"}
+FIRST_M, LAST_M = 0.5, 8.0
+TIME_TOLERANCE = 0.01
+MARGIN_M = 0.3
+"""FENCE_MARGIN of the fields' vehicles: what is asked for is not raised to it."""
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One clearance asked, and what came of it; the widest route where none was asked."""
+
+    asked_m: float | None
+    promised_m: float | None
+    start_m: float | None
+    duration_s: float
+    planning_s: float
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """All rungs of one place."""
+
+    place: str
+    widest: Rung
+    rungs: tuple[Rung, ...]
+
+    def contradictions(self) -> dict[str, list[str]]:
+        """Return what contradicts, by kind: promises, feasibility, times, the widest."""
+        planned = [rung for rung in self.rungs if rung.promised_m is not None]
+        least = [
+            f"{rung.asked_m:g} → {rung.promised_m:g} m"
+            for rung in planned
+            if rung.promised_m < rung.asked_m - 1e-9
+        ]
+        most_asked_m = max((rung.asked_m for rung in planned), default=0.0)
+        holes = [
+            f"{rung.asked_m:g} m"
+            for rung in self.rungs
+            if rung.promised_m is None and rung.asked_m < most_asked_m
+        ]
+        slower = []
+        for number, rung in enumerate(planned):
+            quickest = min(planned[number:], key=lambda one: one.duration_s)
+            if rung.duration_s > quickest.duration_s * (1 + TIME_TOLERANCE):
+                slower.append(
+                    f"{rung.asked_m:g} m {rung.duration_s:.1f} s, {quickest.asked_m:g} m {quickest.duration_s:.1f} s"
+                )
+        widest_m = self.widest.promised_m or 0.0
+        wider = [f"{rung.asked_m:g} m" for rung in planned if rung.promised_m > widest_m + 1e-9]
+        return {"promise": least, "feasibility": holes, "time": slower, "widest": wider}
+
+
+def ladder_of(place: str, step_m: float, last_m: float = LAST_M) -> Ladder:
+    """Plan every rung of a place: a log's name, or a field's seed."""
+    situation, request = _asked(place)
+    widest = _rung(situation, GoTo(**request, widest=True), None)
+    count = round((last_m - FIRST_M) / step_m)
+    asked = [round(FIRST_M + number * step_m, 3) for number in range(count + 1)]
+    return Ladder(
+        place, widest, tuple(_rung(situation, GoTo(**request, clearance_m=one), one) for one in asked)
+    )
+
+
+def _asked(place: str) -> tuple[Situation, dict[str, object]]:
+    if place in LOGS:
+        return situation_from_log(_LOGS / LOGS[place]), {}
+    seed = int(place.removeprefix("field "))
+    field = make_field(seed)
+    vehicle = list(VEHICLES)[seed % len(VEHICLES)]
+    parameters = {**parameters_of(field, vehicle), "FENCE_MARGIN": MARGIN_M}
+    return situation_of(field, parameters), {"target": field.target}
+
+
+def _rung(situation: Situation, request: GoTo, asked_m: float | None) -> Rung:
+    begun_s = time.process_time()
+    try:
+        made = plan(situation, request)
+    except RouteError:
+        return Rung(asked_m, None, None, 0.0, time.process_time() - begun_s)
+    took_s = time.process_time() - begun_s
+    return Rung(asked_m, made.clearance_m, made.start_clearance_m, made.duration_s, took_s)
+
+
+HEAD = """# The clearance ladder
+
+`make bench-ladder` asks every clearance from 0.5 to 8 m, and the widest route, on the recorded maze and yard and on the seeded fields of the
+[drive benchmark](drive-bench.md), its three vehicles in turn. It counts what would contradict: less promised than asked; a clearance refused
+below one that is planned; a rung whose route is slower by more than 1 % than that of a greater clearance; a rung that keeps more than `--clearance max`.
+"""
+
+
+def main() -> None:
+    """Run the ladder and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--fields", type=int, default=50)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--step", type=float, default=0.1)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--progress", action="store_true")
+    parser.add_argument("-o", "--output", type=Path)
+    options = parser.parse_args()
+    places = [*(f"field {seed}" for seed in range(options.first, options.first + options.fields)), *LOGS]
+    ladders = []
+    with ProcessPoolExecutor(options.jobs) as pool:
+        for found in pool.map(partial(ladder_of, step_m=options.step), places):
+            ladders.append(found)
+            if options.progress:
+                told = {kind: texts for kind, texts in found.contradictions().items() if texts}
+                print(found.place, found.widest, told, file=sys.stderr, flush=True)
+    text = report(ladders, options.step)
+    print(text)
+    if options.output:
+        options.output.write_text(f"{HEAD}\n{_made()}\n\n{text}\n", encoding="utf-8")
+
+
+def report(ladders: list[Ladder], step_m: float) -> str:
+    """Return the tables."""
+    rungs = [rung for one in ladders for rung in one.rungs]
+    planned = [rung for rung in rungs if rung.promised_m is not None]
+    refused = [rung for rung in rungs if rung.promised_m is None]
+    found = {one.place: one.contradictions() for one in ladders}
+    lines = [
+        f"{len(ladders)} places, {len(rungs)} rungs of {step_m:g} m: {len(planned)} planned, {len(refused)} refused.",
+        "",
+        "| contradiction | rungs | places |",
+        "|---|---|---|",
+    ]
+    names = {
+        "promise": "less promised than asked",
+        "feasibility": "refused below one that is planned",
+        "widest": "keeps more than the widest route",
+        "time": f"slower by more than {TIME_TOLERANCE:.0%} than a greater clearance",
+    }
+    for kind, name in names.items():
+        counts = [len(texts[kind]) for texts in found.values()]
+        lines.append(f"| {name} | {sum(counts)} | {sum(map(bool, counts))} |")
+    lines += ["", "| planning (CPU) | median | p90 | max |", "|---|---|---|---|"]
+    for name, some in (
+        ("planned", planned),
+        ("refused", refused),
+        ("widest", [one.widest for one in ladders]),
+    ):
+        times = sorted(rung.planning_s for rung in some) or [0.0]
+        lines.append(
+            f"| {name} | {statistics.median(times):.2f} s | {times[int(0.9 * (len(times) - 1))]:.2f} s | {times[-1]:.2f} s |"
+        )
+    told = [
+        f"- {place}: {'; '.join(texts[kind])}"
+        for place, texts in found.items()
+        for kind in names
+        if texts[kind] and kind != "time"
+    ]
+    return "\n".join([*lines, *(["", "The contradictions other than of time:", "", *told] if told else [])])
+
+
+def _made() -> str:
+    versions = ", ".join(f"{name} {version(name)}" for name in ("numpy", "shapely"))
+    today = dt.datetime.now(tz=dt.UTC).date()
+    return f"Made on {today} by `benchmarks/ladder.py`, Python {platform.python_version()}, {versions}, {platform.machine()}."
+
+
+if __name__ == "__main__":
+    main()

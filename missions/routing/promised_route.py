@@ -1,0 +1,220 @@
+"""A route that keeps what is asked of it, the widest there is, or why there is none: one answer for all that may be asked.
+
+**What holds.** A route that keeps some clearance serves whoever asks for less. So where lines cannot be fitted to what is asked, they are
+fitted to more, step by step up to what the ground leaves, and those count that keep what is asked; only where none do is it refused. The
+widest route is the one that keeps most of all that are looked at, from the widest clearance that lines can be drawn at downwards.
+
+**Why.** Fitting is a heuristic (`routing.route_search`): at one clearance it fails by a centimetre and at the next it succeeds. Without this
+4.53 m were refused and 4.6 m planned, and the widest route kept less than others did.
+
+What the vehicle keeps on its first legs, as it leaves the place where it stands, no clearance that is asked for can change: it is told apart
+(`DrivenRoute.lead_away_m`).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+from shapely import Point
+
+from missions.drive_model import corner_forecast
+from missions.ground.legs import reserve_m
+from missions.routing.drawn_route import DrawnRoutes, Route
+from missions.routing.no_route import NoRoute, NoRouteKind
+from missions.routing.route_search import SLOW_MPS, DrivenRoute, RouteSearch
+from missions.words import metres
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from missions.promise import Promise
+    from missions.routing.drawn_route import Sought
+    from missions.vehicle import Vehicle
+
+STEP_M = 0.1
+"""Between the clearances that lines are fitted to, where those asked for do not do."""
+
+# Chosen, not measured: steps below the widest that are looked at one after another, and how many of them with all that can be tried; they
+# bound the time until a refusal
+_STEPS_DOWN = (0, 2, 8, 32)
+_TRIED_WHOLLY = 1
+_STEPS_UP = (1,)
+"""Steps above what is asked that are looked at first: nearly what is asked, and mostly they do."""
+_ALL_M = 0.01  # what keeps so little less than it aims at is as wide as can be
+
+_NOTHING_ADVICE = (
+    "less clearance does not help this vehicle: turn it by hand to face the route, drive slower (--speed), or widen the "
+    "narrowest place"
+)
+
+Found = tuple["Promise", DrivenRoute]
+
+
+@dataclass(frozen=True, eq=False)
+class PromisedRoute:
+    """What a route is sought with.
+
+    Parameters
+    ----------
+    sought : Sought
+        The field, the ends, and how to search.
+    vehicle : Vehicle
+        What drives.
+    heading_deg : float or None
+        Where it faces.
+    """
+
+    sought: Sought
+    vehicle: Vehicle
+    heading_deg: float | None
+    _tried: dict[float, RouteSearch] = field(default_factory=dict, init=False)
+
+    def find(self, asked: Promise) -> Found | NoRoute:
+        """Return a route that keeps at least what is asked, and what is promised for it; else why there is none."""
+        direct = self._search(asked.required_m, asked.required_m)
+        found = direct.find(briefly=True)
+        is_whole = isinstance(found, DrivenRoute) and found.is_whole
+        if not is_whole and (isinstance(found, DrivenRoute) or found.kind is NoRouteKind.CORNER):
+            found = self._with_more(direct, asked)
+        if isinstance(found, DrivenRoute):
+            return _promised(asked, found), found
+        return found if found.is_held else self._compared(found, asked)
+
+    def widest(self, asked: Promise) -> Found | NoRoute:
+        """Return the route that keeps most, and what is promised for it; else why there is none."""
+        most_m = self._most_drawn_m
+        if isinstance(most_m, NoRoute):
+            return most_m
+        found = self._widest(most_m, asked.error_m, 0.0)
+        if isinstance(found, DrivenRoute):
+            return _promised(asked, found, is_widest=True), found
+        return replace(found, advice=_NOTHING_ADVICE) if found.kind is NoRouteKind.CORNER else found
+
+    def _widest(self, most_m: float, error_m: float, enough_m: float) -> DrivenRoute | NoRoute:
+        """Return the route that keeps most, aimed at the widest that lines can be drawn for and, as far as it is enough, at less."""
+        best: DrivenRoute | None = None
+        why: NoRoute | None = None
+        for number, required_m in enumerate((*_downwards(most_m, error_m), 0.0)):
+            if required_m < enough_m or (best is not None and _kept_m(best) >= required_m):
+                break
+            found = self._widest_at(required_m, briefly=required_m > 0 and number >= _TRIED_WHOLLY)
+            if isinstance(found, DrivenRoute):
+                best = found if best is None or _kept_m(found) > _kept_m(best) else best
+            else:
+                is_first, why = why is None, found
+                least = self._widest_at(0.0) if is_first and found.at_start and not enough_m else None
+                if isinstance(least, NoRoute) and least.at_start:
+                    # Where the least asks too much of the start, what lies between does.
+                    return least
+        if best is not None:
+            return best
+        assert why is not None
+        return why
+
+    def _with_more(self, direct: RouteSearch, asked: Promise) -> DrivenRoute | NoRoute:
+        """Return a route fitted to what is asked, or to more of it where that does not do."""
+        why = direct.find(briefly=True)
+        if isinstance(why, NoRoute) and why.is_held:
+            why = direct.find()
+            if isinstance(why, DrivenRoute) or why.is_held:
+                return why
+        enough_m = asked.required_m
+        most_m = self._most_drawn_m
+        assert not isinstance(most_m, NoRoute)  # lines were drawn, and could not be fitted
+        more_m = [enough_m + step * STEP_M for step in _STEPS_UP if enough_m + step * STEP_M < most_m]
+        searches = [direct, *(self._search(required_m, enough_m) for required_m in more_m)]
+        quick = [search.find(briefly=True) for search in searches]
+        if driven := [found for found in quick if isinstance(found, DrivenRoute)]:
+            return min(driven, key=lambda found: found.cost_s)
+        why = direct.find()
+        if isinstance(why, DrivenRoute):
+            return why
+        widest = self._widest(most_m, asked.error_m, enough_m) if most_m > enough_m else why
+        return widest if isinstance(widest, DrivenRoute) and _kept_m(widest) >= enough_m else why
+
+    def _widest_at(self, required_m: float, *, briefly: bool = False) -> DrivenRoute | NoRoute:
+        """Return the route that keeps most where so much is aimed at; each is tried once."""
+        if required_m not in self._tried:
+            self._tried[required_m] = self._search(required_m, max(required_m - _ALL_M, 0.0))
+        return self._tried[required_m].widest(briefly=briefly)
+
+    def _compared(self, why: NoRoute, asked: Promise) -> NoRoute:
+        """Return why there is no route, with what the widest one keeps while this vehicle drives it."""
+        if why.kind is not NoRouteKind.TOO_NARROW:
+            return why
+        widest = self.widest(asked)
+        if isinstance(widest, NoRoute):
+            text = f"{why.text}, and none of those tried can be driven by this vehicle at any clearance"
+            return replace(why, text=text, advice=_NOTHING_ADVICE)
+        promised_m = widest[0].promised_m
+        facts = {**why.facts, "widest_m": round(promised_m, 3)}
+        text = f"no route keeps {self.sought.asked} while driving; the widest keeps {metres(promised_m)}"
+        places = filter(None, self.sought.narrowest_places())
+        place = min(places, key=lambda place: place.clearance_m)
+        if place.clearance_m < promised_m:  # the start itself, which the route leaves behind
+            return replace(why, text=text, facts=facts)
+        return replace(
+            why,
+            text=f"{text} ({metres(place.clearance_m)} drawn){place.where}",
+            facts={**facts, "widest_drawn_m": round(place.clearance_m, 3)},
+        )
+
+    @cached_property
+    def _most_drawn_m(self) -> float | NoRoute:
+        """The most that lines can be drawn for, as slowly as can be; why there are none where there are none at all."""
+        slow_mps = min(SLOW_MPS, self.vehicle.speed_mps)
+        band_m = corner_forecast(0.0, self.vehicle, speed_mps=slow_mps).outside_overshoot_m
+        beside_m = band_m + reserve_m(self.sought.ground)
+
+        def drawn(required_m: float) -> Route | NoRoute:
+            return DrawnRoutes.at(self.sought, required_m + beside_m).find()
+
+        least = drawn(0.0)
+        if isinstance(least, NoRoute):
+            return least
+        low_m, high_m = 0.0, max(self._widest_ground_m() - beside_m, 0.0)
+        if isinstance(drawn(high_m), Route):
+            return high_m
+        while high_m - low_m > _ALL_M:
+            middle_m = (low_m + high_m) / 2
+            low_m, high_m = (middle_m, high_m) if isinstance(drawn(middle_m), Route) else (low_m, middle_m)
+        return low_m
+
+    def _widest_ground_m(self) -> float:
+        """Return a clearance that no route exceeds once it has left the start."""
+        ground, start = self.sought.ground, self.sought.start
+        bounds_m = [ground.clearance_m(Point(target)) + self.sought.snap_m for target in self.sought.targets]
+        start_m = ground.clearance_m(Point(start))
+        for a, b in pairwise((start, *self.sought.targets)):
+            place = self.sought.narrowest_place(a, b)
+            if place is not None and (a is not start or place.clearance_m < start_m - _ALL_M):
+                bounds_m.append(place.clearance_m)
+        return min(*bounds_m, ground.bounds.bounds[2] - ground.bounds.bounds[0])
+
+    def _search(self, required_m: float, enough_m: float) -> RouteSearch:
+        return RouteSearch(self.sought, required_m, self.vehicle, self.heading_deg, enough_m)
+
+
+def _downwards(most_m: float, error_m: float) -> Iterator[float]:
+    """Return what is aimed at for the widest route, most first: the widest, then whole steps of what is promised below it."""
+    yield math.floor(100 * most_m) / 100
+    steps = math.floor((most_m - error_m) / STEP_M)
+    yield from (error_m + (steps - down) * STEP_M for down in _STEPS_DOWN if steps > down)
+
+
+def _kept_m(found: DrivenRoute) -> float:
+    return found.kept_m or 0.0
+
+
+def _promised(asked: Promise, found: DrivenRoute, *, is_widest: bool = False) -> Promise:
+    """Return what is promised for a route: what it keeps, to the centimetre; where that is less than is kept for errors, nothing."""
+    kept_m = _kept_m(found)
+    promised_m = max(0.0, math.floor(100 * (kept_m - asked.error_m) + 1e-6) / 100)
+    if not is_widest:
+        promised_m = max(promised_m, asked.promised_m)
+        return replace(asked, promised_m=promised_m)
+    return replace(asked, promised_m=promised_m, error_m=min(asked.error_m, kept_m))

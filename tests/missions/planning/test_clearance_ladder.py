@@ -1,0 +1,131 @@
+"""``--clearance`` is one coherent thing: the small form of `benchmarks/ladder.py`, and each rule by itself."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from charts import FIELD, IN, OUT, WALL, box, place, situation_of
+from shapely import Point
+
+from missions.errors import NoRouteError, RequestError, TargetBlockedError
+from missions.planning.plan import plan
+from missions.request import GoTo, RepairMission, Tour
+from missions.routing.no_route import NoRoute, NoRouteKind
+from missions.routing.promised_route import PromisedRoute
+from missions.routing.route_search import RouteSearch
+from missions.situation import Known, Pose
+
+sys.path.insert(0, str(Path(__file__).parents[3] / "benchmarks"))
+
+from ladder import ladder_of
+
+GATE = [box(IN, -60, -60, 60, 60), box(OUT, -3, -60, 3, -2.5), box(OUT, -3, 2.5, 3, 60)]
+THROUGH = GoTo(start=place(-50, 0), target=place(50, 0))
+
+
+def gate(**parameters: float):
+    situation = situation_of(*GATE, WP_SPEED=2.0, WP_RADIUS=2.0, **parameters)
+    return replace(situation, pose=Known(Pose(place(-50, 0), 90.0), None, "test"))
+
+
+@pytest.mark.parametrize(("place_name", "last_m"), [("field 2", 3.0), ("field 3", 6.5)])
+def test_a_ladder_of_clearances_does_not_contradict_itself(place_name: str, last_m: float) -> None:
+    """Field 3 has hairpins and a target near a fence, field 2 gates: both refuse the last rungs."""
+    found = ladder_of(place_name, 0.5, last_m)
+    contradictions = found.contradictions()
+    assert {kind: texts for kind, texts in contradictions.items() if texts and kind != "time"} == {}
+    planned = [rung for rung in found.rungs if rung.promised_m is not None]
+    assert 3 < len(planned) < len(found.rungs)
+    assert found.widest.promised_m is not None
+
+
+def test_where_what_is_asked_cannot_be_fitted_more_of_it_serves(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lines that fail at one clearance and not at a greater one were refused at the first."""
+    find = RouteSearch.find
+
+    def only_from_2_m(self: RouteSearch, *, briefly: bool = False):
+        if self.required_m < 1.95:
+            return NoRoute(NoRouteKind.CORNER, "a centimetre is missing")
+        return find(self, briefly=briefly)
+
+    monkeypatch.setattr(RouteSearch, "find", only_from_2_m)
+    found = plan(gate(), replace(THROUGH, clearance_m=1.8))
+    assert found.clearance_m is not None
+    assert 1.95 <= found.clearance_m <= 2.5
+    assert found.driven_clearance_m >= found.clearance_m
+
+
+def test_less_than_was_asked_needs_a_word() -> None:
+    asked = replace(THROUGH, clearance_m=4.53)
+    with pytest.raises(
+        NoRouteError, match=r"no route keeps 4\.53 m while driving; the widest keeps 2\.\d\d m"
+    ) as caught:
+        plan(gate(), asked)
+    less = plan(gate(), replace(asked, accepts_less=True))
+    widest = plan(gate(), replace(THROUGH, widest=True))
+    assert less.clearance_m == widest.clearance_m == caught.value.details["widest_m"]
+    assert any("no route keeps 4.53 m while driving: the widest, with 2." in text for text in less.warnings)
+    assert not any("--accept-less" in text for text in widest.warnings)
+
+
+def test_a_target_too_near_a_fence_is_reached_with_less_where_less_is_accepted() -> None:
+    near = GoTo(start=place(-50, 0), target=place(-4, 30), clearance_m=2.0)
+    with pytest.raises(TargetBlockedError, match=r"closer than 2 m while driving|closer than 2 m"):
+        plan(gate(), near)
+    less = plan(gate(), replace(near, accepts_less=True))
+    assert less.clearance_m is not None
+    assert 0 < less.clearance_m < 1.0
+
+
+def test_messages_quote_what_was_typed() -> None:
+    """Asked for 0.5 m with FENCE_MARGIN 3 m they spoke of 3.1 m alone."""
+    margin = {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 4.0, "FENCE_MARGIN": 3.0, "AVOID_ENABLE": 1.0}
+    with pytest.raises(NoRouteError, match=r"no route keeps 0\.5 m \(raised to 3\.1 m\) while driving"):
+        plan(gate(**margin), replace(THROUGH, clearance_m=0.5))
+    with pytest.raises(NoRouteError, match=r"no route keeps 2\.6 m while driving"):
+        plan(gate(), replace(THROUGH, clearance_m=2.6, position_error_m=0.3))
+
+
+def test_what_the_start_costs_is_told_apart() -> None:
+    """3 m before a wall, facing it: the route keeps what was asked, the first legs what the place leaves."""
+    situation = replace(
+        situation_of(FIELD, WALL, WP_SPEED=2.0), pose=Known(Pose(place(-8, 0), 90.0), None, "test")
+    )
+    found = plan(situation, GoTo(target=place(50, 0), clearance_m=2.5))
+    assert found.clearance_m == 2.5
+    assert found.start_clearance_m is not None
+    assert 0 < found.start_clearance_m < 2.5
+    assert found.driven_clearance_m >= found.start_clearance_m
+    start = Point(found.ground.frame.to_local(found.start))
+    assert found.start_clearance_m < found.ground.clearance_m(start)
+    open_field = plan(situation, GoTo(start=place(-50, 0), target=place(50, 0), clearance_m=2.5))
+    assert open_field.start_clearance_m is None
+
+
+def test_the_widest_is_no_less_than_what_was_found_for_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each clearance is aimed at once: a refusal and the widest route that it names share what was tried."""
+    asked = []
+    search = PromisedRoute._search
+
+    def counted(self: PromisedRoute, required_m: float, enough_m: float) -> RouteSearch:
+        asked.append(required_m)
+        return search(self, required_m, enough_m)
+
+    monkeypatch.setattr(PromisedRoute, "_search", counted)
+    with pytest.raises(NoRouteError, match="the widest keeps"):
+        plan(gate(), replace(THROUGH, clearance_m=2.4))
+    assert len(asked) == len(set(asked))
+
+
+def test_tours_take_less_too_and_repairs_never_do() -> None:
+    tour = Tour(start=place(-50, 0), targets=(place(50, 10), place(50, -10)), clearance_m=4.0, order="best")
+    with pytest.raises(NoRouteError, match="no route"):
+        plan(gate(), tour)
+    less = plan(gate(), replace(tour, accepts_less=True))
+    assert less.clearance_m is not None
+    assert 1.5 < less.clearance_m < 2.5
+    with pytest.raises(RequestError, match="accepts_less True: expected none"):
+        RepairMission(accepts_less=True)

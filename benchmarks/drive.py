@@ -168,6 +168,7 @@ def runs_of(seed: int, kinds: str = "usual", firmware: Firmware = Firmware(4, 6)
     """Plan and drive one field with each vehicle."""
     if kinds == "table":
         field, name, parameters = make_case(seed)
+        firmware = Firmware(4, 7) if "FENCE_MARGIN_XY" in parameters else firmware  # which has it
         return [_run(replace(field, seed=seed), name, {**_KNOWN, **parameters}, firmware, trusts_model=True)]
     field = KINDS[kinds](seed)
     return [_run(field, name, parameters_of(field, name), firmware) for name in VEHICLES]

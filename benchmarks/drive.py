@@ -93,6 +93,7 @@ class Run:
     promised_m: float
     widest_m: float
     refusal: str | None = None
+    extrapolated: tuple[str, ...] = ()
     planning_s: float = 0.0
     leads_away_m: float | None = None
     length_m: float = 0.0
@@ -105,15 +106,18 @@ class Run:
     driven_s: float = 0.0
     breaches: int = 0
     arrived: bool = False
-    is_measured: bool = True
-    """Whether vehicle and drive lie inside what was measured."""
+
+    @property
+    def is_driven(self) -> bool:
+        """Whether it was driven."""
+        return self.driven_s > 0
 
     @property
     def group(self) -> str:
         """Which row of the table it counts in."""
-        if self.vehicle in VEHICLES and self.is_measured:
+        if self.vehicle in VEHICLES:
             return self.vehicle
-        return "inside what was measured" if self.is_measured else "extrapolated: promises nothing"
+        return "extrapolated: promises nothing" if self.extrapolated else "inside what was measured"
 
     @property
     def short_m(self) -> float:
@@ -164,7 +168,8 @@ def runs_of(seed: int, kinds: str = "usual", firmware: Firmware = Firmware(4, 6)
     """Plan and drive one field with each vehicle."""
     if kinds == "table":
         field, name, parameters = make_case(seed)
-        return [_run(replace(field, seed=seed), name, {**_KNOWN, **parameters}, firmware)]
+        firmware = Firmware(4, 7) if "FENCE_MARGIN_XY" in parameters else firmware  # which has it
+        return [_run(replace(field, seed=seed), name, {**_KNOWN, **parameters}, firmware, trusts_model=True)]
     field = KINDS[kinds](seed)
     return [_run(field, name, parameters_of(field, name), firmware) for name in VEHICLES]
 
@@ -189,15 +194,16 @@ def situation_of(
     )
 
 
-def _run(field: Field, name: str, parameters: dict[str, float], firmware: Firmware) -> Run:
+def _run(
+    field: Field, name: str, parameters: dict[str, float], firmware: Firmware, *, trusts_model: bool = False
+) -> Run:
     situation = situation_of(field, parameters, firmware)
     vehicle = vehicle_from_parameters(parameters, firmware=firmware)
     ground = route_ground(situation, vehicle, (field.start, field.target))
     widest_m = widest_clearance_m(
         ground, [ground.frame.to_local(field.start), ground.frame.to_local(field.target)]
     )
-    # What is extrapolated is driven too, and counted apart.
-    request = GoTo(target=field.target, clearance_m=field.clearance_m, trusts_model=True)
+    request = GoTo(target=field.target, clearance_m=field.clearance_m, trusts_model=trusts_model)
     known = {
         "seed": field.seed,
         "kind": field.kind,
@@ -209,12 +215,13 @@ def _run(field: Field, name: str, parameters: dict[str, float], firmware: Firmwa
     try:
         planned = plan(situation, request)
     except MissionError as error:
-        is_measured = not beyond_measured(vehicle)
+        beyond = beyond_measured(vehicle) if trusts_model else ()
         took_s = time.process_time() - begun_s
-        return Run(**known, refusal=str(error), planning_s=took_s, is_measured=is_measured)  # type: ignore[arg-type]
+        return Run(**known, refusal=str(error), planning_s=took_s, extrapolated=beyond)  # type: ignore[arg-type]
     planning_s = time.process_time() - begun_s
     promised_m = planned.clearance_m
-    assert promised_m is not None  # the model is trusted
+    if promised_m is None:
+        return Run(**known, extrapolated=planned.extrapolated, planning_s=planning_s)  # type: ignore[arg-type]
     shortest = plan(situation, replace(request, corner_allowance_m=0.0))
     driven_s, rover, arrived = _drive(field, planned, parameters, firmware)
     return Run(
@@ -231,7 +238,7 @@ def _run(field: Field, name: str, parameters: dict[str, float], firmware: Firmwa
         driven_s=driven_s,
         breaches=rover.breaches,
         arrived=arrived,
-        is_measured=not planned.extrapolated,
+        extrapolated=planned.extrapolated,
     )
 
 
@@ -270,7 +277,6 @@ def _made() -> str:
 
 def report(runs: list[Run], took_s: float) -> str:
     """Return the tables."""
-    groups = list(dict.fromkeys(run.group for run in runs))
     lines = [
         f"{len({run.seed for run in runs})} fields x {len({run.vehicle for run in runs})} vehicles, {len(runs)} runs, {took_s:.0f} s.",
         "",
@@ -280,9 +286,9 @@ def report(runs: list[Run], took_s: float) -> str:
         ),
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
-    for name in groups:
+    for name in dict.fromkeys(run.group for run in runs):
         mine = [run for run in runs if run.group == name]
-        routes = [run for run in mine if run.refusal is None]
+        routes = [run for run in mine if run.is_driven]
         wide = [run for run in mine if run.widest_m >= run.promised_m + SPARE_M]
         refused = [run for run in wide if run.refusal is not None]
         longer = sorted(run.length_m / run.shortest_m - 1 for run in routes)
@@ -306,18 +312,24 @@ def report(runs: list[Run], took_s: float) -> str:
         for run in runs
         if run.refusal is not None and run.widest_m >= run.promised_m + SPARE_M
     ] or ["- none"]
+    lines += ["", "Extrapolated: nothing promised, not driven:", ""]
+    lines += [
+        f"- {run.kind} {run.seed}, {run.vehicle}: {'; '.join(run.extrapolated)}"
+        for run in runs
+        if run.extrapolated and not run.is_driven and run.refusal is None
+    ] or ["- none"]
     lines += ["", "Short of the promise, or not arrived:", ""]
     lines += [
         f"- {_named(run)}: promised {run.promised_m:g} m, foreseen {run.foreseen_m:.2f} m, driven {run.driven_m:.2f} m, "
         f"{'arrived' if run.arrived else 'not arrived'}, {run.breaches} breaches"
         for run in runs
-        if run.refusal is None and (run.short_m > TOLERANCE_M or not run.arrived or run.breaches)
+        if run.is_driven and (run.short_m > TOLERANCE_M or not run.arrived or run.breaches)
     ] or ["- none"]
     return "\n".join(lines)
 
 
 def _named(run: Run) -> str:
-    apart = "" if run.is_measured else "extrapolated: "
+    apart = "extrapolated: " if run.extrapolated else ""
     return f"{apart}{run.kind} {run.seed}, {run.vehicle}"
 
 

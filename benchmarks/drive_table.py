@@ -45,13 +45,14 @@ def make_case(seed: int) -> tuple[Field, str, dict[str, float]]:
         "WP_PIVOT_ANGLE": pivot_deg,
         "WP_JERK": jerk,
         "FENCE_MARGIN": margin_m,
-        "FENCE_MARGIN_XY": xy_m,
         "FENCE_OPTIONS": 2.0 if zones == "any" else 0.0,
         "AVOID_ENABLE": 3.0 if avoids else 0.0,
         "BRD_SD_FENCE": 64.0,  # so that a cut inclusion fits into the storage
         "CRUISE_SPEED": 5.0,
         "CRUISE_THROTTLE": 30.0,
     }
+    if xy_m:
+        parameters["FENCE_MARGIN_XY"] = xy_m
     if is_skid:
         parameters |= {"SERVO1_FUNCTION": 73.0, "SERVO3_FUNCTION": 74.0, "ATC_STR_RAT_FF": 0.2}
         parameters |= {"CRUISE_SPEED": 3.0, "CRUISE_THROTTLE": 75.0}

@@ -53,7 +53,8 @@ class Range:
     most: float = MOST
 
     def __contains__(self, value: float) -> bool:
-        return self.least <= value <= self.most
+        # Vehicles tell parameters as float32, 0.9 as 0.8999999762: less than 1e-7 of it off.
+        return self.least - 1e-7 * abs(self.least) <= value <= self.most + 1e-7 * abs(self.most)
 
     def __str__(self) -> str:
         if self.most == math.inf:

@@ -104,6 +104,7 @@ ADVICE = {
     "RequestError": None,
     "SituationError": None,
     "PlanStoppedError": None,
+    "ExtrapolatedError": "change what the message names, or add --trust-model to promise, and upload, all the same",
     "PlanCheckError": "nothing was written; please report this with the command and its input files",
     "RouteError": None,
     "StartBlockedError": "drive the vehicle into the allowed area by hand, or add --escape to plan the way out",

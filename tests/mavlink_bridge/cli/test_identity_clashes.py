@@ -134,7 +134,7 @@ def test_what_comes_back_of_ours_is_noted_once(rover, forge, mission_file, after
     assert result.exit_code == 0
     assert is_held(rover, NEW)
     assert WARNING not in result.stderr
-    assert result.stderr.count("note: this link echoes our own messages; they are ignored") == 1
+    assert result.stderr.count("info: this link echoes our own messages; they are ignored") == 1
 
 
 def test_a_note_is_left_out_where_little_is_to_be_told(rover, forge, mission_file):

@@ -461,7 +461,9 @@ def check_lines(stderr: str) -> str:
     """Return the error's message, once its form is right: warnings, one error, at most one piece of advice."""
     lines = stderr.splitlines()
     assert "Traceback" not in stderr
-    assert [line.split(":")[0] for line in lines if not line.startswith(("warning: ", "link: "))] in (
+    assert [
+        line.split(":")[0] for line in lines if not line.startswith(("info: ", "warning: ", "link: "))
+    ] in (
         ["error"],
         ["error", "advice"],
     )

@@ -43,6 +43,7 @@ def test_json_and_quiet(fields: Path, tmp_path: Path) -> None:
         "outputs": [str(path)],
         "parts": ["mission"],
         "left_out": [],
+        "info": [],
         "warnings": [],
     }
     assert run(source, path, "-q").stdout == ""

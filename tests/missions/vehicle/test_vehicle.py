@@ -5,6 +5,7 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -533,3 +534,11 @@ def test_a_turn_rate_below_the_measured_one_is_told(rate_dps: float | None, is_t
     known = {} if rate_dps is None else {"ATC_STR_RAT_MAX": rate_dps}
     told = beyond_measured(vehicle_from_parameters({**KNOWN, "TURN_RADIUS": 0.9, **known}))
     assert any("was not measured (only 120 or more" in text for text in told) is is_told
+
+
+def test_a_range_holds_its_ends_as_vehicles_tell_them():
+    one = Range(0.9, 0.9)
+    assert float(np.float32(0.9)) in one
+    assert float(np.float32(0.9)) != 0.9
+    assert 0.901 not in one
+    assert 0.899 not in one

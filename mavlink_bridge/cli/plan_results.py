@@ -144,13 +144,13 @@ def arrival_document(arrival: Mapping[str, object] | None) -> dict[str, object]:
 
 def report_plan(planned: Plan, written: list[Path]) -> None:
     """Print a plan for people, and where it was written."""
-    promise = (
-        f"at least {planned.clearance_m:g} m while driving ({planned.drawn_clearance_m:.2f} m along straight legs)"
-        if planned.clearance_m is not None
-        else f"{planned.drawn_clearance_m:.2f} m along straight legs, nothing promised while driving"
-    )
-    if planned.start_clearance_m is not None:
-        promise += f"; {planned.start_clearance_m:g} m while leaving the start"
+    along = f"{planned.drawn_clearance_m:.2f} m along straight legs"
+    if planned.clearance_m is None:
+        promise = f"{along}, nothing promised while driving"
+    elif planned.start_clearance_m is not None:  # the straight legs count the start's too
+        promise = f"at least {planned.clearance_m:g} m while driving, but {planned.start_clearance_m:g} m while leaving the start"
+    else:
+        promise = f"at least {planned.clearance_m:g} m while driving ({along})"
     if planned.extrapolated:
         promise += ", extrapolated beyond what was measured"
     waypoints = sum(item.is_placed for item in planned.items)

@@ -107,8 +107,10 @@ def plan_title(plan: Plan, crossing: tuple[int, ...]) -> tuple[str, ...]:
     along = f"{drawn_m:.2f} m along straight legs"
     if plan.clearance_m is None:
         return length, f"fence clearance: {along}, none promised while driving"
-    at_start = "" if plan.start_clearance_m is None else f", {plan.start_clearance_m:g} m at the start"
-    return length, f"fence clearance: at least {plan.clearance_m:g} m while driving{at_start} ({along})"
+    kept = f"fence clearance: at least {plan.clearance_m:g} m while driving"
+    if plan.start_clearance_m is not None:  # the straight legs count the start's too
+        return length, f"{kept}, but {plan.start_clearance_m:g} m at the start"
+    return length, f"{kept} ({along})"
 
 
 def leg_clearances_m(plan: Plan) -> list[float]:

@@ -210,7 +210,9 @@ def test_it_finds_no_path_where_there_is_none(square):
 def test_the_result_is_kept_where_the_user_may_write(tmp_path):
     # A read-only install: no place beside the module. A program without a file has no place at all.
     code = (
-        "import numba.core.caching as c; c.InTreeCacheLocator.ensure_cache_path = lambda s: (_ for _ in ()).throw(OSError())\n"
+        "import numba.core.caching as c\n"
+        "place = getattr(c, 'InTreeCacheLocator', None) or c._InTreeCacheLocator\n"
+        "place.ensure_cache_path = lambda s: (_ for _ in ()).throw(OSError())\n"
         "from pbpp.compiled.jit import compiled\n"
         "print(compiled(lambda x: x + 1.0)(1.0))\n"
         "import pbpp.compiled.sweep as s; print(s._sort._cache.cache_path)"

@@ -51,7 +51,8 @@ def test_houses_with_common_walls_are_united_without_an_overlay(seed, monkeypatc
         assert not len(geometries)
         return shapely.MultiPolygon()
 
-    monkeypatch.setattr(shapely, "disjoint_subset_union_all", not_needed)
+    if shapely.geos_version >= (3, 14, 0):  # older ones do not take these houses for a coverage
+        monkeypatch.setattr(shapely, "disjoint_subset_union_all", not_needed)
     assert subtracted(GROUND, obstacles).equals(expected)
 
 

@@ -19,9 +19,6 @@ MARGIN_RESERVE_M = 0.1
 DEFAULT_BEYOND_MARGIN_M = 0.5
 LEAST_DEFAULT_M = 1.0
 
-NARROWEST_BAND_M = 0.3
-"""What the band of a straight line at 1 m/s, rounding and the search for the widest route leave of its clearance."""
-
 _FIX_NOT_TOLD = "GPS accuracy unknown: nothing added for GPS error (use --position-error M)"
 
 FIX_ERRORS_M = {3: 1.5, 4: 0.6, 5: 0.3, 6: 0.05}

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
     from shapely.geometry.base import BaseGeometry
 
-    from missions.geo import Vector
     from missions.vehicle import Vehicle
 
 _MOVED_M = 5.0
@@ -66,12 +65,11 @@ class FenceAhead:
         far_mps = np.sqrt(2 * self._accel_mps2 * np.maximum(left_m - self._linear_m / 2, 0.0))
         return np.where(left_m <= self._linear_m, self._gain_per_s * left_m, far_mps)
 
-    def speed_mps(self, place: Vector, way: Vector, top_mps: float) -> float:
-        """Return the speed that is allowed at one place in one direction; exact up to ``top_mps``, and above that no less."""
-        return self.speeds_about(top_mps)(complex(*place), complex(*way))
-
     def speeds_about(self, top_mps: float) -> Callable[[complex, complex], float]:
-        """Return the same as a function of places and ways, east + j north, which looks only at edges near the last places asked for."""
+        """Return the speed that is allowed at one place in one direction, both east + j north, as a function; exact up to ``top_mps``, and above no less.
+
+        It looks only at edges near the last places asked for.
+        """
         reach_m = self.counts_within_m(top_mps) + _SPARE_M + _MOVED_M
         stops_within_m, gain_per_s, linear_m = self._stops_within_m, self._gain_per_s, self._linear_m
         twice_mps2 = 2 * self._accel_mps2

@@ -209,18 +209,10 @@ def quickened(drawing: Drawing, index: int, speed_mps: float) -> Iterator[Drawin
             )
         ]
         for quick_mps in faster:
-            middle = replace(points[1], speed_mps=quick_mps)
-            if after_m and before_m:
-                yield (*drawing[:index], points[0], middle, *drawing[index:])
-            elif after_m:
-                yield (
-                    *drawing[:index],
-                    points[0],
-                    replace(drawing[index], speed_mps=quick_mps),
-                    *drawing[index + 1 :],
-                )
-            elif before_m:
-                yield (*drawing[:index], middle, *drawing[index:])
+            if after_m or before_m:
+                slow = points[:1] if after_m else []
+                last, rest = (points[1], index) if before_m else (drawing[index], index + 1)
+                yield (*drawing[:index], *slow, replace(last, speed_mps=quick_mps), *drawing[rest:])
 
 
 def split(drawing: Drawing, index: int) -> Iterator[Drawing]:

@@ -79,7 +79,7 @@ class PromisedRoute:
         found = direct.find(briefly=True)
         is_whole = isinstance(found, DrivenRoute) and found.is_whole
         if not is_whole and (isinstance(found, DrivenRoute) or found.kind is NoRouteKind.CORNER):
-            found = self._with_more(direct, asked)
+            found = self._with_more(direct, found, asked)
         if isinstance(found, DrivenRoute):
             return _promised(asked, found), found
         return found if found.is_held else self._compared(found, asked)
@@ -115,10 +115,11 @@ class PromisedRoute:
         assert why is not None
         return why
 
-    def _with_more(self, direct: RouteSearch, asked: Promise) -> DrivenRoute | NoRoute:
-        """Return a route fitted to what is asked, or to more of it where that does not do."""
-        why = direct.find(briefly=True)
-        if isinstance(why, NoRoute) and why.is_held:
+    def _with_more(
+        self, direct: RouteSearch, first: DrivenRoute | NoRoute, asked: Promise
+    ) -> DrivenRoute | NoRoute:
+        """Return a route fitted to what is asked, or to more of it where that does not do; the first lines tried are known."""
+        if isinstance(first, NoRoute) and first.is_held:
             why = direct.find()
             if isinstance(why, DrivenRoute) or why.is_held:
                 return why
@@ -126,8 +127,7 @@ class PromisedRoute:
         most_m = self._most_drawn_m
         assert not isinstance(most_m, NoRoute)  # lines were drawn, and could not be fitted
         more_m = [enough_m + step * STEP_M for step in _STEPS_UP if enough_m + step * STEP_M < most_m]
-        searches = [direct, *(self._search(required_m, enough_m) for required_m in more_m)]
-        quick = [search.find(briefly=True) for search in searches]
+        quick = [first, *(self._search(required_m, enough_m).find(briefly=True) for required_m in more_m)]
         if driven := [found for found in quick if isinstance(found, DrivenRoute)]:
             return min(driven, key=lambda found: found.cost_s)
         why = direct.find()

@@ -59,10 +59,11 @@ def test_the_speed_is_that_of_the_first_edge_ahead(
     many_mps = ahead.speeds_mps(
         np.full((len(units), 2), (east_m, north_m)), np.array([(unit.real, unit.imag) for unit in units])
     )
+    allowed_mps = ahead.speeds_about(speed_mps)
     for unit, one_of_many_mps in zip(units, many_mps, strict=True):
         wanted_mps = min(expected_mps(fence, place, unit, vehicle), speed_mps)
         assert min(float(one_of_many_mps), speed_mps) == pytest.approx(wanted_mps, abs=1e-6)
-        one_mps = ahead.speed_mps((east_m, north_m), (unit.real, unit.imag), speed_mps)
+        one_mps = allowed_mps(place, unit)
         assert min(one_mps, speed_mps) == pytest.approx(wanted_mps, abs=1e-6)
 
 
@@ -70,8 +71,9 @@ def test_places_far_apart_look_at_their_own_edges() -> None:
     vehicle = vehicle_at(2.0)
     walls = shapely.MultiLineString([[(10.0, -5.0), (10.0, 5.0)], [(210.0, -5.0), (210.0, 5.0)]])
     ahead = FenceAhead(walls, np.array([(0.0, 0.0), (200.0, 0.0)]), vehicle)
+    allowed_mps = ahead.speeds_about(2.0)
     for east_m in (0.0, 200.0, 1.0):
-        assert ahead.speed_mps((east_m, 0.0), (1.0, 0.0), 2.0) == pytest.approx(
+        assert allowed_mps(complex(east_m), 1 + 0j) == pytest.approx(
             expected_mps(walls, complex(east_m), 1 + 0j, vehicle)
         )
 
@@ -81,4 +83,4 @@ def test_an_edge_along_the_way_is_met_at_its_neighbour() -> None:
     corner = shapely.LineString([(4.0, 0.0), (8.0, 0.0), (8.0, 3.0)])
     ahead = FenceAhead(corner, np.array([(0.0, 0.0)]), vehicle)
     left_m = 8.0 - vehicle.fence.margin_m
-    assert ahead.speed_mps((0.0, 0.0), (1.0, 0.0), 2.0) == pytest.approx(vehicle.position_gain_per_s * left_m)
+    assert ahead.speeds_about(2.0)(0j, 1 + 0j) == pytest.approx(vehicle.position_gain_per_s * left_m)

@@ -1,20 +1,22 @@
 """Whether planned missions are driven as promised: seeded fields, three vehicles, the simulator's drive law in stepped time.
 
-``python benchmarks/drive.py [--fields N] [--first SEED] [--kinds usual|more|table] [--firmware VERSION] [--jobs N] [--progress] [-o FILE]``. Each run plans a mission, hands
-its items to the simulated rover, drives it in AUTO with the fence enabled, and measures the true track against the fence.
+``python benchmarks/drive.py [--fields N] [--first SEED] [--kinds usual|more|table] [--firmware VERSION] [--jobs N] [--lines FILE] [-o FILE]``. Each run plans a mission, hands
+its items to the simulated rover, drives it in AUTO with the fence enabled, and measures the true track against the fence. ``--lines`` keeps each run as a line of
+JSON; started again with that file, seeds that stand in it are not run again.
 """
 
 from __future__ import annotations
 
 import argparse
 import datetime as dt
+import json
 import math
 import platform
 import statistics
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -51,6 +53,9 @@ if TYPE_CHECKING:
 
 TOLERANCE_M = 0.10
 SPARE_M = 0.5
+STANDS_S, STANDS_M = 60.0, 0.05
+"""A rover that came no farther than this in so long, in AUTO, is stuck: the longest turn on the spot takes 3 s."""
+
 VEHICLES: dict[str, dict[str, float]] = {
     "steered, 2 m/s, WP_RADIUS 2": {"WP_SPEED": 2.0, "WP_RADIUS": 2.0},
     "steered, 5 m/s, WP_RADIUS 3": {
@@ -80,6 +85,7 @@ _KNOWN = {
     "FENCE_ENABLE": 1.0,
     "FENCE_TYPE": 4.0,
     "AVOID_ENABLE": 3.0,
+    "BRD_SD_FENCE": 64.0,  # so that fences of many vertices fit into the storage
 }
 
 
@@ -106,6 +112,7 @@ class Run:
     driven_s: float = 0.0
     breaches: int = 0
     arrived: bool = False
+    cpu_s: float = 0.0
 
     @property
     def is_driven(self) -> bool:
@@ -146,32 +153,52 @@ def main() -> None:
     parser.add_argument("--kinds", choices=(*KINDS, "table"), default="usual")
     parser.add_argument("--firmware", type=read_firmware, default=Firmware(4, 6))
     parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--progress", action="store_true")
+    parser.add_argument("--lines", type=Path)
     parser.add_argument("-o", "--output", type=Path)
     options = parser.parse_args()
-    seeds = range(options.first, options.first + options.fields)
-    begun_s = time.perf_counter()
+    runs = read_lines(options.lines)
+    done = {run.seed for run in runs}
+    seeds = [one for one in range(options.first, options.first + options.fields) if one not in done]
     with ProcessPoolExecutor(options.jobs) as pool:
-        runs = []
         for found in pool.map(partial(runs_of, kinds=options.kinds, firmware=options.firmware), seeds):
             runs += found
-            if options.progress:
-                for run in found:
-                    print(run, file=sys.stderr, flush=True)
-    text = report(runs, time.perf_counter() - begun_s)
+            if options.lines:
+                with options.lines.open("a", encoding="utf-8") as file:
+                    file.writelines(json.dumps(asdict(run)) + "\n" for run in found)
+    text = report(runs)
     print(text)
     if options.output:
         options.output.write_text(f"{HEAD}\n{_made()}\n\n{text}\n", encoding="utf-8")
 
 
+def read_lines(lines: Path | None) -> list[Run]:
+    """Return the runs that a file of lines holds, none if there is no such file."""
+    if lines is None or not lines.exists():
+        return []
+    found = [json.loads(line) for line in lines.read_text(encoding="utf-8").splitlines()]
+    return [Run(**{**one, "extrapolated": tuple(one["extrapolated"])}) for one in found]
+
+
 def runs_of(seed: int, kinds: str = "usual", firmware: Firmware = Firmware(4, 6)) -> list[Run]:  # noqa: B008 - frozen
     """Plan and drive one field with each vehicle."""
     if kinds == "table":
-        field, name, parameters = make_case(seed)
-        firmware = Firmware(4, 7) if "FENCE_MARGIN_XY" in parameters else firmware  # which has it
-        return [_run(replace(field, seed=seed), name, {**_KNOWN, **parameters}, firmware, trusts_model=True)]
+        field, name, parameters, firmware = _case(seed, firmware)
+        return [_run(field, name, parameters, firmware, trusts_model=True)]
     field = KINDS[kinds](seed)
     return [_run(field, name, parameters_of(field, name), firmware) for name in VEHICLES]
+
+
+def table_case(seed: int) -> tuple[Situation, GoTo]:
+    """Return the situation and the request of one drive over the table."""
+    field, _, parameters, firmware = _case(seed, Firmware(4, 6))
+    return situation_of(field, parameters, firmware), GoTo(target=field.target, clearance_m=field.clearance_m)
+
+
+def _case(seed: int, firmware: Firmware) -> tuple[Field, str, dict[str, float], Firmware]:
+    """Return a field, a vehicle in words and as parameters, and its firmware: 4.7 where it has FENCE_MARGIN_XY, which only that knows."""
+    field, name, parameters = make_case(seed)
+    firmware = Firmware(4, 7) if "FENCE_MARGIN_XY" in parameters else firmware
+    return replace(field, seed=seed), name, {**_KNOWN, **parameters}, firmware
 
 
 def parameters_of(field: Field, name: str) -> dict[str, float]:
@@ -196,6 +223,14 @@ def situation_of(
 
 def _run(
     field: Field, name: str, parameters: dict[str, float], firmware: Firmware, *, trusts_model: bool = False
+) -> Run:
+    begun_s = time.process_time()
+    run = _planned_and_driven(field, name, parameters, firmware, trusts_model=trusts_model)
+    return replace(run, cpu_s=time.process_time() - begun_s)
+
+
+def _planned_and_driven(
+    field: Field, name: str, parameters: dict[str, float], firmware: Firmware, *, trusts_model: bool
 ) -> Run:
     situation = situation_of(field, parameters, firmware)
     vehicle = vehicle_from_parameters(parameters, firmware=firmware)
@@ -222,14 +257,16 @@ def _run(
     promised_m = planned.clearance_m
     if promised_m is None:
         return Run(**known, extrapolated=planned.extrapolated, planning_s=planning_s)  # type: ignore[arg-type]
-    shortest = plan(situation, replace(request, corner_allowance_m=0.0))
+    shortest_m = (
+        math.nan if trusts_model else plan(situation, replace(request, corner_allowance_m=0.0)).length_m
+    )
     driven_s, rover, arrived = _drive(field, planned, parameters, firmware)
     return Run(
         **known,  # type: ignore[arg-type]
         planning_s=planning_s,
         leads_away_m=planned.start_clearance_m,
         length_m=planned.length_m,
-        shortest_m=shortest.length_m,
+        shortest_m=shortest_m,
         waypoints=len(planned.path) - 1,
         slow=sum(speed is not None for speed in planned.speeds),
         foreseen_s=planned.duration_s,
@@ -261,10 +298,15 @@ def _drive(
     rover.arm()
     now_s = 1.0
     rover.set_mode(Mode.AUTO, now_s)
-    limit_s = 3 * planned.duration_s + 60.0
+    limit_s = 3 * planned.duration_s + STANDS_S
+    place, place_s = vehicle.position, now_s
     while rover.mode == Mode.AUTO and not rover.mission_run.is_complete and now_s < limit_s:
         now_s += TICK_S
         rover.step(now_s)
+        if now_s - place_s > STANDS_S:
+            if distance_m(place, vehicle.position) < STANDS_M:
+                break
+            place, place_s = vehicle.position, now_s
     near = distance_m(vehicle.position, planned.targets[-1]) < max(parameters["WP_RADIUS"], 1.5) + 1.0
     return now_s - 1.0, vehicle, rover.mission_run.is_complete and near
 
@@ -275,10 +317,10 @@ def _made() -> str:
     return f"Made on {today} by `benchmarks/drive.py`, Python {platform.python_version()}, {versions}, {platform.machine()}."
 
 
-def report(runs: list[Run], took_s: float) -> str:
+def report(runs: list[Run]) -> str:
     """Return the tables."""
     lines = [
-        f"{len({run.seed for run in runs})} fields x {len({run.vehicle for run in runs})} vehicles, {len(runs)} runs, {took_s:.0f} s.",
+        f"{len({run.seed for run in runs})} fields x {len({run.vehicle for run in runs})} vehicles, {len(runs)} runs, {sum(run.cpu_s for run in runs):.0f} s of CPU.",
         "",
         (
             "| | routes | refused, widest ≥ promised + 0.5 m | least driven − promised | short by > 0.10 m | breaches | not arrived "
@@ -291,7 +333,7 @@ def report(runs: list[Run], took_s: float) -> str:
         routes = [run for run in mine if run.is_driven]
         wide = [run for run in mine if run.widest_m >= run.promised_m + SPARE_M]
         refused = [run for run in wide if run.refusal is not None]
-        longer = sorted(run.length_m / run.shortest_m - 1 for run in routes)
+        longer = sorted(run.length_m / run.shortest_m - 1 for run in routes if run.shortest_m > 0)
         times = sorted(run.foreseen_s / run.driven_s for run in routes if run.arrived)
         lines.append(
             f"| {name} | {len(routes)} of {len(mine)} | {len(refused)} of {len(wide)} ({len(refused) / max(1, len(wide)):.1%}) "

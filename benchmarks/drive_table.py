@@ -47,7 +47,6 @@ def make_case(seed: int) -> tuple[Field, str, dict[str, float]]:
         "FENCE_MARGIN": margin_m,
         "FENCE_OPTIONS": 2.0 if zones == "any" else 0.0,
         "AVOID_ENABLE": 3.0 if avoids else 0.0,
-        "BRD_SD_FENCE": 64.0,  # so that a cut inclusion fits into the storage
         "CRUISE_SPEED": 5.0,
         "CRUISE_THROTTLE": 30.0,
     }

@@ -127,11 +127,10 @@ class _Wall:
     def _is_inside(self, place_m: complex) -> bool:
         """By even and odd."""
         north, east = place_m.real * 100, place_m.imag * 100
-        low, high = self._starts[:, 1] > east, self._ends[:, 1] > east
-        with np.errstate(divide="ignore", invalid="ignore"):
-            share = (east - self._starts[:, 1]) / self._steps[:, 1]
-        crossed = (low != high) & (north < self._starts[:, 0] + share * self._steps[:, 0])
-        return bool(np.count_nonzero(crossed) % 2)
+        crossing = (self._starts[:, 1] > east) != (self._ends[:, 1] > east)
+        starts, steps = self._starts[crossing], self._steps[crossing]
+        share = (east - starts[:, 1]) / steps[:, 1]
+        return bool(np.count_nonzero(north < starts[:, 0] + share * steps[:, 0]) % 2)
 
 
 class Avoidance:

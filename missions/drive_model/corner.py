@@ -65,8 +65,22 @@ START_SWING_M = ((0.0, 0.0), (90.0, 0.9), (135.0, 1.5), (150.0, 1.75), (165.0, 2
 START_BEHIND_M = ((0.0, 0.0), (90.0, 0.0), (135.0, 0.3), (170.0, 1.4), (180.0, 3.6))
 """Heading error in degrees at a start or after a stop; how far off the line, and how far behind the point, at a turning radius of 0.9 m."""
 
+SKID_START_SWING_M = (
+    (0.0, 0.0),
+    (20.0, 0.31),
+    (45.0, 0.51),
+    (90.0, 0.68),
+    (120.0, 0.75),
+    (150.0, 0.79),
+    (170.0, 0.98),
+    (180.0, 0.98),
+)
+SKID_START_BEHIND_M = ((0.0, 0.0), (90.0, 0.0), (120.0, 0.75), (170.0, 0.98), (180.0, 0.98))
+"""The same for skid steer that does not pivot: it turns where it stands. Its starts were not measured; taken as the largest swings of its corners that were
+driven through, as turned (500 rows of 0.2 to 3 m/s, tests/missions/drive_model/data/corners_by_parameters.csv), and as far behind as aside. Without the band."""
+
 MEASURED_TURN_RADIUS_M = 0.9
-"""Swings grow with the turning radius beyond this; below it they are taken as measured."""
+"""Swings of steered wheels grow with the turning radius beyond this; below it they are taken as measured. TURN_RADIUS does nothing on skid steer (AR_WPNav::set_turn_params)."""
 
 START_HOLD_S = 1.5
 """A swing at the start begins to die away only then."""
@@ -80,6 +94,9 @@ UNBOUNDED_TURN_DEG = 115.0
 UNBOUNDED_LEG_M = 15.0
 PIVOT_DOUBT_DEG = 2.0
 """Corners this near to the pivot angle may be cut or pivoted: rounding of coordinates decides."""
+
+
+_Table = tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +169,7 @@ def corner_swing_m(vehicle: Vehicle, bend: Bend, reach_m: float) -> float:
         slow_m = SLOW_SKID_SWING_M * min(bend.widest_deg / SLOW_SKID_TURN_DEG, 1.0)
     if vehicle.can_pivot:
         return slow_m
-    radius_m = max(vehicle.turn_radius_m, MEASURED_TURN_RADIUS_M)
+    radius_m = _swing_radius_m(vehicle)
     # The exponents and their bounds are fitted to benchmarks/data (docs/drive-model.md, 3): 2.5 where the blend or a leg is short, to 6.
     short = math.exp(-bend.shorter_run_m / SHORT_LEG_M)
     early = np.interp(reach_m, (0.2 * radius_m, 0.6 * radius_m), (0.0, 1.0))
@@ -165,7 +182,7 @@ def corner_swing_m(vehicle: Vehicle, bend: Bend, reach_m: float) -> float:
 
 def swing_length_m(vehicle: Vehicle) -> float:
     """Return how far along its next leg a rover comes before a swing is at its widest."""
-    return SWING_LENGTHS * max(vehicle.turn_radius_m, MEASURED_TURN_RADIUS_M)
+    return SWING_LENGTHS * _swing_radius_m(vehicle)
 
 
 def pivot_swing_m(vehicle: Vehicle, shorter_leg_m: float) -> float:
@@ -186,12 +203,12 @@ def early_swing(vehicle: Vehicle, bend: Bend) -> before_4_6.Swing:
 
 def start_swing_m(vehicle: Vehicle, error_deg: float) -> float:
     """Return how far off its line, beyond its band, a rover swings that starts with its heading wrong."""
-    return _start(vehicle, error_deg, START_SWING_M)
+    return _start(vehicle, error_deg, START_SWING_M, SKID_START_SWING_M)
 
 
 def start_behind_m(vehicle: Vehicle, error_deg: float) -> float:
     """Return how far behind its start a rover comes that starts with its heading wrong."""
-    return _start(vehicle, error_deg, START_BEHIND_M)
+    return _start(vehicle, error_deg, START_BEHIND_M, SKID_START_BEHIND_M)
 
 
 def pivots(vehicle: Vehicle, turn_deg: float) -> bool:
@@ -227,12 +244,15 @@ def swing_time_s(swing_m: float, speed_mps: float) -> float:
     return swing_m * (0.7 + 0.4 / max(speed_mps, 0.5))
 
 
-def _start(vehicle: Vehicle, error_deg: float, table: tuple[tuple[float, float], ...]) -> float:
+def _start(vehicle: Vehicle, error_deg: float, steered: _Table, skid: _Table) -> float:
     if vehicle.can_pivot:
         return 0.0  # it pivots, or strays no farther than its band
-    errors_deg, distances_m = zip(*table, strict=True)
-    return (
-        float(np.interp(abs(error_deg), errors_deg, distances_m))
-        * max(vehicle.turn_radius_m, MEASURED_TURN_RADIUS_M)
-        / MEASURED_TURN_RADIUS_M
-    )
+    errors_deg, distances_m = zip(*(skid if vehicle.steering is Steering.SKID else steered), strict=True)
+    wider = _swing_radius_m(vehicle) / MEASURED_TURN_RADIUS_M
+    return float(np.interp(abs(error_deg), errors_deg, distances_m)) * wider
+
+
+def _swing_radius_m(vehicle: Vehicle) -> float:
+    """Return the turning radius that swings grow with."""
+    own_m = vehicle.turn_radius_m if vehicle.steering is Steering.ACKERMANN else 0.0
+    return max(own_m, MEASURED_TURN_RADIUS_M)

@@ -1,7 +1,8 @@
 """A start inside the margin of a fence that the vehicle avoids: where measured rovers backed into it, or never moved.
 
 Measured (docs/drive-model.md), 42 starts each 0.5 to 1.5 m from a fence of 2 m margin: of steered rovers 29 breached it backwards, 9 wandered
-to the end, 4 arrived; of skid-steered ones 41 stood. With AVOID_BACKUP_SPD 0 all skid-steered and 5 of 6 steered ones left along it, all away
+to the end, 4 arrived; of skid-steered ones 41 stood. Before 4.6 only 4 starts were measured (2 skid-steered that stood, a steered one that
+backed into the fence, one that wandered): taken as since. With AVOID_BACKUP_SPD 0 all skid-steered and 5 of 6 steered ones left along it, all away
 from it. From the margin and 0.05 m on all left as usual.
 """
 
@@ -51,19 +52,30 @@ def start_hazard(ground: Ground, start: LocalPoint, vehicle: Vehicle) -> StartBl
     where = f"the start is {away_m:.2f} m from {fence}, where fence avoidance acts (within {margin})"
     advice = f"drive it at least {leaves_from_m:.2f} m away from the fence by hand, or set AVOID_BACKUP_SPD 0 or AVOID_ENABLE 0 until it is there"
     is_steered = vehicle.steering is Steering.ACKERMANN
-    if is_steered and vehicle.backs_away:
+    if vehicle.backs_away:
+        there = (
+            "the vehicle backs up there, and in tests rovers backed into the fence (29 of 42 starts, at any heading)"
+            if is_steered
+            else "in tests skid-steered rovers did not move from there (41 of 42 starts)"
+        )
         return StartBlockedError(
-            f"{where}: the vehicle backs up there, and in tests rovers backed into the fence (29 of 42 starts, at any heading)",
+            f"{where}: {there}{_few_rows(vehicle)}",
             fences=[fence],
             distance_m=round(away_m, 3),
             margin_m=vehicle.stops_within_m,
             advice=advice,
         )
-    if is_steered:
-        return f"{where}: with AVOID_BACKUP_SPD 0 rovers left it in tests, but 1 of 3 that had to drive along it did not move"
-    if vehicle.backs_away:
-        return f"{where}: in tests skid-steered rovers did not move from there (41 of 42 starts); {advice}"
+    along = (
+        "with AVOID_BACKUP_SPD 0 rovers left it in tests, but 1 of 3 that had to drive along it did not move"
+    )
+    if is_steered or vehicle.has_measured_corners is not True:
+        return f"{where}: {along if is_steered else 'skid-steered rovers left it with AVOID_BACKUP_SPD 0'}{_few_rows(vehicle)}"
     return None
+
+
+def _few_rows(vehicle: Vehicle) -> str:
+    """Return what is to be said of firmware before 4.6, or that may be."""
+    return "" if vehicle.has_measured_corners else "; only 4 of these starts were before ArduPilot 4.6"
 
 
 def nearest_avoided(ground: Ground, point: Point) -> tuple[float, str]:

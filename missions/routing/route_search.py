@@ -140,6 +140,8 @@ class RouteSearch:
         Where it faces at the start, clockwise from north; None is along the first leg.
     enough_m : float, optional
         What is enough of it, where what is aimed at cannot be kept all the way. Default: all of it.
+    departure_limit_m : float
+        What the best first leg keeps that a route leads on from, where that is known.
     """
 
     sought: Sought
@@ -147,6 +149,7 @@ class RouteSearch:
     vehicle: Vehicle
     heading_deg: float | None
     enough_m: float | None = None
+    departure_limit_m: float = math.inf
     _drawn: dict[float, DrawnRoutes] = field(default_factory=dict, init=False)
 
     def find(self, *, briefly: bool = False) -> DrivenRoute | NoRoute:
@@ -184,6 +187,8 @@ class RouteSearch:
         attempts = [*self._first_attempts]
         if attempts[-1].is_refused_at_start and not _found(attempts) and not self._is_limited_by_start:
             attempts += self._until_found(self._departing(slow_m))
+            if not _found(attempts):
+                attempts += self._leaving_nearer(slow_m)
         is_held = not _found(attempts) and self._is_held_at_start(attempts)
         if not _found(attempts) and not is_held:
             attempts += self._until_found(self._slowly(routes[-1][0]))
@@ -251,6 +256,14 @@ class RouteSearch:
         """Leave by first legs that the vehicle can drive as it faces."""
         fitting = self._fitting(LATER_MEASUREMENTS)
         return (self._fit(fitting, route) for route in self._departing_routes(band_m))
+
+    def _leaving_nearer(self, band_m: float) -> list[_Attempt]:
+        """Leave as well as can be on the way: the first legs that would keep all that is required lead nowhere."""
+        departure = next((one for one in self._departures if self._onward(one, band_m) is not None), None)
+        if departure is None or departure.kept_m >= self.required_m + self._reserve_m:
+            return []
+        nearer = replace(self, departure_limit_m=departure.kept_m)
+        return nearer._first_attempts if nearer._is_limited_by_start else []  # noqa: SLF001 - of its own kind
 
     def _slowly(self, route: Route) -> Iterator[_Attempt]:
         """Drive a route slowly all the way, so that nothing changes at corners."""
@@ -363,7 +376,7 @@ class RouteSearch:
         """
         if self.sought.ground.clearance_m(Point(self.sought.start)) >= self.required_m + ROOM_M:
             return self.required_m
-        best_m = self._departures[0].kept_m
+        best_m = min(self._departures[0].kept_m, self.departure_limit_m)
         if best_m >= self.required_m + self._reserve_m:
             return self.required_m
         slack_m = max(_DEPARTURE_SLACK_M, _DEPARTURE_SLACK_SHARE * best_m)
@@ -385,12 +398,8 @@ class RouteSearch:
         for departure in self._departures:
             if departure.kept_m < keeps_m:
                 break
-            onward = self._drawn_at(band_m).find(departure.there)
-            if (
-                isinstance(onward, NoRoute)
-                or onward.lead_away
-                or _turn_at_deg(self.sought.start, onward) > _MOST_TURN_DEG
-            ):
+            onward = self._onward(departure, band_m)
+            if onward is None:
                 continue
             route = replace(
                 onward,
@@ -403,15 +412,23 @@ class RouteSearch:
         routes.sort(key=lambda one: one[0])
         yield from (route for _, route in routes[:_DEPARTURES_TRIED])
 
+    def _onward(self, departure: Departure, band_m: float) -> Route | None:
+        """Return the route on from a first leg, None where it does not lead on."""
+        onward = self._drawn_at(band_m).find(departure.there)
+        if isinstance(onward, NoRoute) or onward.lead_away:
+            return None
+        return onward if _turn_at_deg(self.sought.start, onward) <= _MOST_TURN_DEG else None
+
     def _least_departing_m(self, route: Route) -> float:
         """Return what the band has to keep while the route leads away; nothing while it leaves forbidden ground."""
         return self.departure_m if route.start_clearance_m >= 0 else -math.inf
 
     def _lead_away(self, drawing: Drawing) -> int:
-        """Return how many of the first legs lead away."""
+        """Return how many of the first legs lead away: one at least where the start keeps less, as it does when fitting drops the leg's end."""
         most_m = max(point.required_m for point in drawing)
-        near = [point.required_m < most_m - self._reserve_m for point in drawing[1:]]
-        return near.index(False) if False in near else len(near)
+        near = [point.required_m < most_m - self._reserve_m for point in drawing]
+        leading = near.index(False) if False in near else len(near)
+        return max(leading - 1, int(near[0]))
 
     def _is_stopped(self) -> bool:
         return self.sought.should_stop is not None and self.sought.should_stop()

@@ -24,7 +24,8 @@ from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig
 from mavlink_bridge.simulator.fence_watch import FenceArea
 from mavlink_bridge.simulator.flat import TrueFrame
 from mavlink_bridge.simulator.personality import version_number
-from missions.fence import PolygonZone, fence_to_items
+from missions.drive_model.corner import SKID_START_SWING_M
+from missions.fence import Fence, PolygonZone, ZoneKind, fence_to_items
 from missions.firmware import firmware_from_number, read_firmware
 from missions.formats import read_fence
 from missions.geo import LatLon
@@ -179,6 +180,17 @@ def test_a_skid_steered_rover_pivots_at_the_start(wrong_deg):
     assert track.points_m.real.min() >= -0.1
 
 
+@pytest.mark.parametrize("wrong_deg", [45, 90, 135, 170])
+@pytest.mark.parametrize("speed_mps", [0.2, 0.5, 3.0])
+def test_a_skid_steered_rover_that_does_not_pivot_turns_where_it_stands(wrong_deg, speed_mps):
+    """Within what the drive model takes from corners: starts were not measured."""
+    limits = settings("skid", WP_SPEED=speed_mps, WP_PIVOT_ANGLE=0.0)
+    track = drive([0j, 20 + 0j], limits, heading_rad=math.radians(wrong_deg))
+    bound_m = np.interp(wrong_deg, *zip(*SKID_START_SWING_M, strict=True))
+    assert 0.1 < abs(track.points_m.imag).max() <= bound_m
+    assert track.points_m.real.min() >= -0.1
+
+
 @pytest.mark.parametrize("vehicle", ["ackermann", "skid"])
 def test_a_straight_line_is_driven_a_little_to_the_left(vehicle):
     track = drive([0j, 100 + 0j], settings(vehicle, WP_SPEED=3.0))
@@ -297,3 +309,23 @@ def test_personalities_by_firmware(version, turns_early, pivot_deg, number, has_
     assert told.has_measured_corners is not turns_early
     assert told.pivot_angle_deg == vehicle.parameters["WP_PIVOT_ANGLE"] == pivot_deg
     assert ("FENCE_MARGIN_XY" in vehicle.parameters) is has_margin_xy
+
+
+def test_a_corner_given_twice_is_no_trouble_to_avoidance():
+    """Its edge of no length has no slope."""
+    north, east = 52.0, 9.0
+    corners = [(-3e-5, -5e-5), (3e-5, -5e-5), (3e-5, -5e-5), (3e-5, 5e-5), (-3e-5, 5e-5)]
+    zone = PolygonZone(ZoneKind.INCLUSION, tuple(LatLon(north + a, east + b) for a, b in corners))
+    vehicle = SimulatedVehicle(
+        SimulatorConfig(
+            home=LatLon(north, east),
+            mission=(waypoint(LatLon(north, east + 1e-5)),),
+            fence=fence_to_items(Fence((zone,))),
+            parameters={"FENCE_ENABLE": 1.0, "FENCE_TYPE": 4.0, "AVOID_ENABLE": 3.0},
+        )
+    )
+    vehicle.rover.arm()
+    vehicle.rover.set_mode(10, 0.0)
+    for tick in range(100):
+        vehicle.rover.step(tick * TICK_S)
+    assert vehicle.breaches == 0

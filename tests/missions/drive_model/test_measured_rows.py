@@ -17,8 +17,9 @@ import pytest
 import shapely
 from drive_model.extents import area_extents
 
-from missions.drive_model import Corner, Envelope, corner_forecast, envelope, extrapolated
+from missions.drive_model import Corner, Envelope, beyond_measured, corner_forecast, envelope, extrapolated
 from missions.drive_model.calibrated_range import SAME_MPS, SAME_TURN_DEG
+from missions.drive_model.corner import start_swing_m
 from missions.firmware import Firmware, read_firmware
 from missions.vehicle import Steering, Vehicle, vehicle_from_parameters
 
@@ -161,6 +162,38 @@ OTHER = {  # by parameters, and whether it is extrapolated: how many; those with
     "defaults": {False: 613, True: 40},
     "slow steered": {True: 243},
 }
+
+
+def test_a_skid_steered_start_is_taken_as_wide_as_what_was_driven_without_a_pivot() -> None:
+    """Nothing was measured of starts for themselves; a corner that is driven through swings farther than one from rest."""
+    checked = 0
+    for drive in drives("corners_by_parameters.csv"):
+        vehicle = vehicle_of(drive[0])
+        if vehicle.steering is Steering.ACKERMANN or beyond_measured(vehicle):
+            continue
+        for row in drive:
+            turn_deg = abs(float(row["turn_deg"]))
+            if vehicle.pivot_angle_deg and turn_deg > vehicle.pivot_angle_deg:
+                continue
+            checked += 1
+            at_rest = replace(vehicle, pivot_angle_deg=0.0, turn_radius_m=4.0)
+            assert start_swing_m(at_rest, turn_deg) >= float(row["outside_overshoot_m"]) - 0.005, row
+    assert checked == 500
+
+
+def test_the_turning_radius_does_nothing_on_skid_steer() -> None:
+    points = [(0.0, 0.0), (40.0, 0.0), (40.0, 40.0), (0.0, 38.0)]
+    bands = [
+        envelope(
+            points,
+            Vehicle(steering=Steering.SKID, pivot_angle_deg=pivot_deg, turn_radius_m=radius_m),
+            heading_deg=0.0,
+        )
+        for pivot_deg in (0.0, 60.0)
+        for radius_m in (0.9, 4.0)
+    ]
+    for narrow, wide in (bands[:2], bands[2:]):
+        assert wide.area.equals_exact(narrow.area, 1e-9)
 
 
 def test_gentle_turns_and_pivots_are_driven_alike_before_4_6() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import pytest
 from charts import IN, OUT, box, place, situation_of
@@ -11,6 +12,7 @@ from missions.checking.check import check_mission
 from missions.editing.repair import repair_mission
 from missions.errors import StartBlockedError
 from missions.fence import CircleZone
+from missions.firmware import Firmware
 from missions.items import waypoint
 from missions.planning.plan import plan
 from missions.request import Request
@@ -18,13 +20,14 @@ from missions.situation import Mission
 
 AVOIDING = {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 4.0, "FENCE_MARGIN": 2.0, "AVOID_ENABLE": 3.0, "AVOID_BACKUP_SPD": 0.75,
             "SERVO1_FUNCTION": 26.0, "SERVO3_FUNCTION": 70.0}  # fmt: skip
+NEW = Firmware(4, 6)
 SKID = {"SERVO1_FUNCTION": 73.0, "SERVO3_FUNCTION": 74.0, "WP_PIVOT_ANGLE": 60.0}
 FIELD, WALL = box(IN, -100, -100, 100, 100), box(OUT, -20, 10, 20, 20)
 TARGET = (0.0, -60.0)
 
 
-def route(north_m, zones=(FIELD, WALL), east_m=0.0, **parameters):
-    situation = situation_of(*zones, **{**AVOIDING, **parameters})
+def route(north_m, zones=(FIELD, WALL), east_m=0.0, firmware=NEW, **parameters):
+    situation = replace(situation_of(*zones, **{**AVOIDING, **parameters}), firmware=firmware)
     return plan(situation, Request(place(east_m, north_m), (place(*TARGET),), 2.2))
 
 
@@ -103,11 +106,25 @@ def test_the_edge_of_an_inclusion_that_it_is_not_in_does_not_count() -> None:
 def test_what_else_rovers_do_there_is_said() -> None:
     (text,) = said(route(9.0, AVOID_BACKUP_SPD=0.0).warnings, "where fence avoidance acts")
     assert text.endswith("but 1 of 3 that had to drive along it did not move")
-    (text,) = said(route(9.0, **SKID).warnings, "where fence avoidance acts")
-    assert (
-        "skid-steered rovers did not move from there (41 of 42 starts); drive it at least 2.05 m away" in text
-    )
     assert not said(route(9.0, **SKID, AVOID_BACKUP_SPD=0.0).warnings, "where fence avoidance acts")
+
+
+def test_a_skid_steered_rover_is_not_sent_from_where_it_would_stand() -> None:
+    with pytest.raises(
+        StartBlockedError, match=r"skid-steered rovers did not move from there \(41 of 42 starts\)$"
+    ) as caught:
+        route(9.0, **SKID)
+    assert caught.value.details["advice"].startswith("drive it at least 2.05 m away")
+
+
+@pytest.mark.parametrize("firmware", [Firmware(4, 5), None], ids=["4.5", "unknown"])
+def test_before_4_6_it_is_said_that_few_starts_were_measured(firmware: Firmware | None) -> None:
+    few = "only 4 of these starts were before ArduPilot 4.6"
+    for steering in ({}, SKID):
+        with pytest.raises(StartBlockedError, match=few):
+            route(9.0, firmware=firmware, **steering)
+        found = route(9.0, firmware=firmware, AVOID_BACKUP_SPD=0.0, **steering)
+        assert said(found.warnings, few)
 
 
 def test_a_check_does_not_hold_there() -> None:
@@ -120,8 +137,9 @@ def test_a_check_does_not_hold_there() -> None:
     assert check(7.9).holds
     assert check(9.0, AVOID_BACKUP_SPD=0.0).holds
     skid = check(9.0, **SKID)
-    assert skid.holds
-    assert said(skid.warnings, "did not move from there")
+    assert not skid.broken
+    assert not skid.holds
+    assert "skid-steered rovers did not move from there" in skid.dangers[0]
 
 
 def test_a_mission_from_there_is_not_repaired() -> None:

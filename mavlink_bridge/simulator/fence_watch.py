@@ -58,6 +58,7 @@ class FenceArea:
         self._edge = self._forbidden.boundary
         shapely.prepare(self._forbidden)
         shapely.prepare(self._edge)
+        self._measured = 0j, -math.inf
 
     @property
     def is_empty(self) -> bool:
@@ -70,7 +71,14 @@ class FenceArea:
             return math.inf
         point = Point(point_m.real, point_m.imag)
         distance_m = float(shapely.distance(self._edge, point))
-        return -distance_m if self._forbidden.contains(point) else distance_m
+        clearance_m = -distance_m if self._forbidden.contains(point) else distance_m
+        self._measured = point_m, clearance_m
+        return clearance_m
+
+    def surely_keeps(self, point_m: complex, least_m: float) -> bool:
+        """Whether a point keeps so much, by how far it is from the one measured last; False where that does not tell."""
+        measured_at_m, clearance_m = self._measured
+        return clearance_m - abs(point_m - measured_at_m) >= least_m
 
 
 def bounded_fence(items: Sequence[MissionItem]) -> Fence:

@@ -59,7 +59,7 @@ def demo(options: DemoOptions) -> None:
     begun_s = time.monotonic()
     with ExitStack() as stack:
         recorder = stack.enter_context(TlogWriter(out / "demo.tlog"))
-        rover = _rover(options.speedup)
+        rover = _rover(options)
         link = stack.enter_context(Link(rover, _IDENTITY, recorder, clock=rover.now_s))
         request = GoTo(target=LatLon(*_TARGET), clearance_m=_CLEARANCE_M)
         orders = Orders(identity=_IDENTITY, request=request, upload=True, drive=True, arm=True)
@@ -99,15 +99,16 @@ def demo(options: DemoOptions) -> None:
         raise typer.Exit(ExitCode.CHECK)
 
 
-def _rover(speedup: float) -> SteppedRover:
+def _rover(options: DemoOptions) -> SteppedRover:
     """Return a rover in the maze, on a link that no slow computer breaks."""
     config = SimulatorConfig(
         home=LatLon(*_HOME),
         fence=fence_to_items(_maze()),
         parameters={"FENCE_ENABLE": 1.0, "WP_RADIUS": 2.0, "WP_SPEED": 4.0},
+        firmware=options.firmware,
         uid=secrets.token_bytes(12),  # each demo is a new rover: an interrupted one does not bear on the next
     )
-    return SteppedRover(SimulatedVehicle(config), speedup)
+    return SteppedRover(SimulatedVehicle(config), options.speedup)
 
 
 def _maze() -> Fence:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from mavlink_bridge.cli.options.shared import CommonOptions, option
+from mavlink_bridge.cli.options.shared import CommonOptions, SimulatedFirmwareOption, option
 from mavlink_bridge.cli.values import within
 
 
@@ -21,3 +21,4 @@ class DemoOptions(CommonOptions):
             "How many times faster than real time, if the computer keeps up.", "X", parser=within(1.0, 20.0)
         ),
     ] = 4.0
+    firmware: SimulatedFirmwareOption = None

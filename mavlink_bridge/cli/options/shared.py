@@ -87,6 +87,15 @@ FirmwareOption = Annotated[
         parser=firmware_option,
     ),
 ]
+
+SimulatedFirmwareOption = Annotated[
+    Firmware | None,
+    option(
+        "Firmware version (4.5, 4.6.3) that the simulated rover reports, and drives like. Default: 4.7.0-dev of October 2025.",
+        "VERSION",
+        parser=firmware_option,
+    ),
+]
 StoppingOption = Annotated[
     list[Stop],
     option(

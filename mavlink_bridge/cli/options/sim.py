@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
-from mavlink_bridge.cli.options.shared import CommonOptions, MapOptions, firmware_option, option
+from mavlink_bridge.cli.options.shared import CommonOptions, MapOptions, SimulatedFirmwareOption, option
 from mavlink_bridge.cli.values import MOST_S, within
-from missions.firmware import Firmware
 
 MOST_SEED = 2**63 - 1
 """What fits everywhere a seed is kept."""
@@ -38,14 +37,7 @@ class SimOptions(MapOptions, CommonOptions):
     mission: Annotated[
         Path | None, option("Mission file stored in the rover; its home, if it has one, is not used.", "FILE")
     ] = None
-    firmware: Annotated[
-        Firmware | None,
-        option(
-            "Firmware version (4.5, 4.6.3) that it reports, and drives like. Default: 4.7.0-dev of October 2025.",
-            "VERSION",
-            parser=firmware_option,
-        ),
-    ] = None
+    firmware: SimulatedFirmwareOption = None
     param: Annotated[list[str], option("Set a parameter; repeatable.", "NAME=VALUE")] = field(
         default_factory=list
     )

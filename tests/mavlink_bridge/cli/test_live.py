@@ -13,6 +13,7 @@ import processes
 import pytest
 from typer.testing import CliRunner
 
+from mavlink_bridge import situation_from_log
 from mavlink_bridge.cli.app import app
 from mavlink_bridge.mavlink.messages import CommandLong
 from mavlink_bridge.mavlink.rover import Mode
@@ -234,7 +235,8 @@ def test_demo_arrives_without_a_breach(tmp_path):
 
 
 def test_the_log_of_a_demo_can_be_planned_from(tmp_path):
-    run("demo", "--out", str(tmp_path), "--speedup", "10", "--quiet")
+    run("demo", "--out", str(tmp_path), "--speedup", "10", "--quiet", "--firmware", "4.5")
+    assert str(situation_from_log(tmp_path / "demo.tlog").firmware).startswith("4.5")
     start = f"{HOME.lat_deg},{HOME.lon_deg}"
     result = run("plan", "--log", str(tmp_path / "demo.tlog"), "--start", start, "--clearance", "2", "--json")
     document = json.loads(result.stdout)

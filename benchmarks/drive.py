@@ -2,7 +2,8 @@
 
 ``python benchmarks/drive.py [--fields N] [--first SEED] [--kinds usual|more|table] [--firmware VERSION] [--jobs N] [--lines FILE] [-o FILE]``. Each run plans a mission, hands
 its items to the simulated rover, drives it in AUTO with the fence enabled, and measures the true track against the fence. ``--lines`` keeps each run as a line of
-JSON; started again with that file, seeds that stand in it are not run again.
+JSON; started again with that file, seeds that stand in it are not run again. ``python benchmarks/drive.py --page usual.jsonl more.jsonl table.jsonl -o FILE`` makes the
+page from what was kept (each is named by its kinds).
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import datetime as dt
 import json
 import math
 import platform
+import re
 import statistics
 import sys
 import time
@@ -131,7 +133,22 @@ class Run:
         """How much less than promised was kept."""
         return (self.promised_m if self.leads_away_m is None else self.leads_away_m) - self.driven_m
 
+    @property
+    def is_wide(self) -> bool:
+        """Whether the widest route there is keeps clearly more than promised."""
+        return self.widest_m >= self.promised_m + SPARE_M
 
+    @property
+    def is_amiss(self) -> bool:
+        """Whether it was short of the promise, breached the fence or did not arrive."""
+        return self.short_m > TOLERANCE_M or bool(self.breaches) or not self.arrived
+
+
+TITLES = {
+    "usual": "Usual fields",
+    "more": "More kinds of fields",
+    "table": "Vehicles over the whole table",
+}
 HEAD = """# Planned, and driven
 
 `make bench-drive` plans 200 seeded fields for three vehicles, hands each mission to the simulated rover, drives it in AUTO with the fence
@@ -140,6 +157,7 @@ and the vehicle's avoidance on (`FENCE_MARGIN` is the promise less 0.1 m), and m
 or 3 m, the start faces any way. The rover's drive law ([simulator](simulator.md)) was written apart from the [drive model](drive-model.md)
 that the plans rest on. `--first SEED` gives other fields of these kinds, `--kinds more` other kinds (starts near a fence, targets
 behind the vehicle, short routes, corridors, zigzag walls, mazes, woods of small circles, gates hardly wider than need be).
+
 `--kinds table` draws a vehicle for each field over the whole table of parameters (`benchmarks/drive_table.py`: 0.2 to 8 m/s, both steerings, radii, pivots,
 margins, avoidance, S-curves, one inclusion, two or a union). What lies outside the measured range is driven too, with `--trust-model`, and counted apart.
 """
@@ -154,21 +172,31 @@ def main() -> None:
     parser.add_argument("--firmware", type=read_firmware, default=Firmware(4, 6))
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--lines", type=Path)
+    parser.add_argument("--page", type=Path, nargs="+", default=())
     parser.add_argument("-o", "--output", type=Path)
     options = parser.parse_args()
-    runs = read_lines(options.lines)
-    done = {run.seed for run in runs}
+    kept = options.page or [options.lines]
+    found = {path.stem if path else options.kinds: read_lines(path) for path in kept}
+    if not options.page:
+        found = {options.kinds: _run_all(options, *found.values())}
+    text = "\n\n".join(f"## {TITLES[kinds]}\n\n{report(runs)}" for kinds, runs in found.items())
+    print(text)
+    if options.output:
+        options.output.write_text(f"{HEAD}\n{_made()}\n\n{text}\n", encoding="utf-8")
+
+
+def _run_all(options: argparse.Namespace, kept: list[Run]) -> list[Run]:
+    """Return the runs that are kept, and those of the seeds that are not, which are kept then."""
+    done = {run.seed for run in kept}
     seeds = [one for one in range(options.first, options.first + options.fields) if one not in done]
+    runs = list(kept)
     with ProcessPoolExecutor(options.jobs) as pool:
         for found in pool.map(partial(runs_of, kinds=options.kinds, firmware=options.firmware), seeds):
             runs += found
             if options.lines:
                 with options.lines.open("a", encoding="utf-8") as file:
                     file.writelines(json.dumps(asdict(run)) + "\n" for run in found)
-    text = report(runs)
-    print(text)
-    if options.output:
-        options.output.write_text(f"{HEAD}\n{_made()}\n\n{text}\n", encoding="utf-8")
+    return runs
 
 
 def read_lines(lines: Path | None) -> list[Run]:
@@ -318,61 +346,78 @@ def _made() -> str:
 
 
 def report(runs: list[Run]) -> str:
-    """Return the tables."""
+    """Return the tables, and what did not end as it should, run by run; of extrapolated ones in counts."""
+    vehicles = len({run.vehicle for run in runs})
     lines = [
-        f"{len({run.seed for run in runs})} fields x {len({run.vehicle for run in runs})} vehicles, {len(runs)} runs, {sum(run.cpu_s for run in runs):.0f} s of CPU.",
+        f"{len({run.seed for run in runs})} fields, {vehicles} vehicles, {len(runs)} runs, {sum(run.is_driven for run in runs)} of them driven; {sum(run.cpu_s for run in runs):.0f} s of CPU.",
         "",
         (
             "| | routes | refused, widest ≥ promised + 0.5 m | least driven − promised | short by > 0.10 m | breaches | not arrived "
             "| longer than the shortest, median / p90 | predicted / driven time, p10 … p90 | planning (CPU), median / max |"
         ),
         "|---|---|---|---|---|---|---|---|---|---|",
-    ]
-    for name in dict.fromkeys(run.group for run in runs):
-        mine = [run for run in runs if run.group == name]
-        routes = [run for run in mine if run.is_driven]
-        wide = [run for run in mine if run.widest_m >= run.promised_m + SPARE_M]
-        refused = [run for run in wide if run.refusal is not None]
-        longer = sorted(run.length_m / run.shortest_m - 1 for run in routes if run.shortest_m > 0)
-        times = sorted(run.foreseen_s / run.driven_s for run in routes if run.arrived)
-        lines.append(
-            f"| {name} | {len(routes)} of {len(mine)} | {len(refused)} of {len(wide)} ({len(refused) / max(1, len(wide)):.1%}) "
-            f"| {min((-run.short_m for run in routes), default=math.nan):+.2f} m | {sum(run.short_m > TOLERANCE_M for run in routes)} "
-            f"| {sum(run.breaches for run in routes)} | {sum(not run.arrived for run in routes)} "
-            f"| {statistics.median(longer or [math.nan]):.1%} / {_p(longer, 0.9):.1%} "
-            f"| {_p(times, 0.1):.2f} … {_p(times, 0.9):.2f} "
-            f"| {statistics.median(run.planning_s for run in mine):.2f} / {max(run.planning_s for run in mine):.2f} s |"
-        )
-    away = [run for run in runs if run.leads_away_m is not None]
-    lines += [
+        *(
+            _row(name, [run for run in runs if run.group == name])
+            for name in sorted({run.group for run in runs})
+        ),
         "",
-        f"{len(away)} runs begin nearer to a fence than the promise (counted against what the plan says of them).",
+        f"{sum(run.leads_away_m is not None for run in runs)} runs begin where turning leaves less than the promise (counted against what the plan says of them).",
     ]
-    lines += ["", "Refused although the widest route keeps 0.5 m more than promised:", ""]
-    lines += [
-        f"- {_named(run)}, widest {run.widest_m:.2f} m: {run.refusal}"
-        for run in runs
-        if run.refusal is not None and run.widest_m >= run.promised_m + SPARE_M
-    ] or ["- none"]
-    lines += ["", "Extrapolated: nothing promised, not driven:", ""]
-    lines += [
-        f"- {run.kind} {run.seed}, {run.vehicle}: {'; '.join(run.extrapolated)}"
-        for run in runs
-        if run.extrapolated and not run.is_driven and run.refusal is None
-    ] or ["- none"]
-    lines += ["", "Short of the promise, or not arrived:", ""]
-    lines += [
-        f"- {_named(run)}: promised {run.promised_m:g} m, foreseen {run.foreseen_m:.2f} m, driven {run.driven_m:.2f} m, "
-        f"{'arrived' if run.arrived else 'not arrived'}, {run.breaches} breaches"
-        for run in runs
-        if run.is_driven and (run.short_m > TOLERANCE_M or not run.arrived or run.breaches)
-    ] or ["- none"]
+    told = [run for run in runs if not run.extrapolated]
+    parts = {
+        "Refused although the widest route keeps 0.5 m more than promised:": [
+            f"- {_named(run)}, widest {run.widest_m:.2f} m: {run.refusal}"
+            for run in told
+            if run.is_wide and run.refusal is not None
+        ],
+        "Short of the promise, or not arrived:": [
+            f"- {_named(run)}: promised {run.promised_m:g} m, foreseen {run.foreseen_m:.2f} m, driven {run.driven_m:.2f} m, "
+            f"{'arrived' if run.arrived else 'not arrived'}, {run.breaches} breaches"
+            for run in told
+            if run.is_driven and run.is_amiss
+        ],
+        "Extrapolated, by why: how many of those driven were short, breached or stuck, and the most that was missing:": _amiss(
+            runs
+        ),
+    }
+    for title, found in parts.items():
+        lines += ["", title, "", *(found or ["- none"])]
     return "\n".join(lines)
 
 
+def _row(name: str, mine: list[Run]) -> str:
+    routes = [run for run in mine if run.is_driven]
+    wide = [run for run in mine if run.is_wide]
+    refused = [run for run in wide if run.refusal is not None]
+    longer = sorted(run.length_m / run.shortest_m - 1 for run in routes if run.shortest_m > 0)
+    times = sorted(run.foreseen_s / run.driven_s for run in routes if run.arrived)
+    shortest = f"{statistics.median(longer):.1%} / {_p(longer, 0.9):.1%}" if longer else "not planned"
+    return (
+        f"| {name} | {len(routes)} of {len(mine)} | {len(refused)} of {len(wide)} ({len(refused) / max(1, len(wide)):.1%}) "
+        f"| {min((-run.short_m for run in routes), default=math.nan):+.2f} m | {sum(run.short_m > TOLERANCE_M for run in routes)} "
+        f"| {sum(run.breaches for run in routes)} | {sum(not run.arrived for run in routes)} "
+        f"| {shortest} "
+        f"| {_p(times, 0.1):.2f} … {_p(times, 0.9):.2f} "
+        f"| {statistics.median(run.planning_s for run in mine):.2f} / {max(run.planning_s for run in mine):.2f} s |"
+    )
+
+
+def _amiss(runs: list[Run]) -> list[str]:
+    """Return a line for each reason for which drives are extrapolated: the parameter, or the words up to the first comma."""
+    by_reason: dict[str, list[Run]] = {}
+    for run in (run for run in runs if run.is_driven):
+        for reason in run.extrapolated:
+            by_reason.setdefault(re.findall(r"^[A-Z_]{2,}|^[^,]+", reason)[0], []).append(run)
+    lines = []
+    for what, mine in sorted(by_reason.items()):
+        amiss = [run for run in mine if run.is_amiss]
+        most = f", by up to {max(run.short_m for run in amiss):.2f} m" if amiss else ""
+        lines.append(f"- {what}: {len(amiss)} of {len(mine)}{most}")
+    return lines
+
+
 def _named(run: Run) -> str:
-    apart = "extrapolated: " if run.extrapolated else ""
-    return f"{apart}{run.kind} {run.seed}, {run.vehicle}"
+    return f"{run.kind} {run.seed}, {run.vehicle}"
 
 
 def _p(values: list[float], share: float) -> float:

@@ -7,6 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
+from shapely import Point
 
 from missions.checking.forecast import forecast_drive, pivot_remarks
 from missions.errors import PlanCheckError, StartBlockedError
@@ -20,6 +21,7 @@ from missions.ground.seams import with_seams
 from missions.ground.start_hazard import start_hazard
 from missions.planned import Plan
 from missions.promise import known_vehicle, promise, stop_warnings
+from missions.routing.departure import least_turning_m, turning_hazard
 from missions.routing.drawn_route import Sought
 from missions.routing.no_route import NoRoute, NoRouteKind, explained
 from missions.routing.promised_route import PromisedRoute
@@ -89,7 +91,7 @@ def plan_route(
     driven_m = max(0.0, band.clearance_m(ground.edge))
     items, seqs = mission_items(lines, vehicle.speed_mps, request.speed_mps)
     reached = tuple(rounded(ground.frame.to_lat_lon(target)) for target in found.targets)
-    start_m = None if asked.allowance_m is not None else _start_m(band, lines, ground, asked)
+    start_m = None if asked.allowance_m is not None else _start_m(band, lines, ground, asked, vehicle)
     warnings += lead_away_remarks(found, asked)
     warnings += drive_remarks(vehicle, heading_deg, asked, driven_m, found)
     warnings += pivot_remarks(plain, vehicle, band, seqs)
@@ -177,14 +179,30 @@ def _start_remarks(ground: Ground, start: LatLon, vehicle: Vehicle) -> list[str]
     return [hazard] if hazard else []
 
 
-def _start_m(band: Envelope, lines: Lines, ground: Ground, asked: Promise) -> float | None:
-    """Return what is promised while the route leads away from the start, where that is less than beyond."""
+def _start_m(band: Envelope, lines: Lines, ground: Ground, asked: Promise, vehicle: Vehicle) -> float | None:
+    """Return what is promised while the route leads away from the start, where that is less than beyond.
+
+    Raises
+    ------
+    StartBlockedError
+        There the vehicle's avoidance may back it into the fence.
+    """
     if not lines.lead_away:
         return None
-    driven_m = band.clearances_m(ground.edge)[band.waypoints <= lines.lead_away].min(initial=np.inf)
+    driven_m = float(band.clearances_m(ground.edge)[band.waypoints <= lines.lead_away].min(initial=np.inf))
     if driven_m >= asked.required_m - _ROUNDING_M:
         return None
-    return math.floor(100 * max(float(driven_m) - asked.error_m, 0.0)) / 100
+    start = ground.frame.to_local(lines.path[0])
+    # So much less the first legs may keep, where no lines keep all of that (`routing.route_search`); none of it is measured so closely.
+    if driven_m < least_turning_m(ground, start, vehicle) - 0.1 and ground.allowed.covers(Point(start)):
+        text, advice = turning_hazard(vehicle)
+        raise StartBlockedError(
+            f"turning at the start the vehicle may come as near as {max(driven_m, 0.0):.2f} m to a fence: {text}",
+            distance_m=round(driven_m, 3),
+            margin_m=vehicle.stops_within_m,
+            advice=advice,
+        )
+    return math.floor(100 * max(driven_m - asked.error_m, 0.0)) / 100
 
 
 def _check_band(ground: Ground, lines: Lines, band: Envelope, found: DrivenRoute, asked: Promise) -> None:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from missions.ground.ground import Ground
     from missions.vehicle import Vehicle
 
-_LEAVES_FROM_M = 0.05
+LEAVES_FROM_M = 0.05
 """So much more than the margin, and measured rovers left as usual."""
 
 
@@ -45,10 +45,10 @@ def start_hazard(ground: Ground, start: LocalPoint, vehicle: Vehicle) -> StartBl
     if not vehicle.avoids_fence or not ground.allowed.covers(Point(start)):
         return None
     away_m, fence = nearest_avoided(ground, Point(start))
-    leaves_from_m = vehicle.stops_within_m + _LEAVES_FROM_M
+    leaves_from_m = vehicle.stops_within_m + LEAVES_FROM_M
     if away_m >= leaves_from_m:
         return None
-    margin = f"{vehicle.fence.margin_name} {vehicle.stops_within_m:g} m plus {_LEAVES_FROM_M:g} m"
+    margin = f"{vehicle.fence.margin_name} {vehicle.stops_within_m:g} m plus {LEAVES_FROM_M:g} m"
     where = f"the start is {away_m:.2f} m from {fence}, where fence avoidance acts (within {margin})"
     advice = f"drive it at least {leaves_from_m:.2f} m away from the fence by hand, or set AVOID_BACKUP_SPD 0 or AVOID_ENABLE 0 until it is there"
     is_steered = vehicle.steering is Steering.ACKERMANN

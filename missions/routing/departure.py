@@ -5,9 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from shapely import Point
+
 from missions.drive_model import envelope
+from missions.drive_model.corner import band_m
 from missions.fitting.polyline import shifted
 from missions.geo import heading_vector
+from missions.ground.start_hazard import LEAVES_FROM_M
+from missions.vehicle import Steering
 
 if TYPE_CHECKING:
     from missions.geo import LocalPoint
@@ -67,3 +72,23 @@ def departures(
             turn_deg = abs((course_deg - facing_deg + 180.0) % 360.0 - 180.0)
             found.append(Departure(there, band.clearance_m(ground.edge), turn_deg))
     return sorted(found, key=lambda one: -one.kept_m)
+
+
+def least_turning_m(ground: Ground, start: LocalPoint, vehicle: Vehicle) -> float:
+    """Return what the driven band must keep while a vehicle turns into its way; 0 where nothing follows from less.
+
+    A steered rover whose swing takes it within the margin of its avoidance is where those that started there backed into the fence. The band of
+    a straight line does not count: from a little more than the margin on they left as usual.
+    """
+    if not (vehicle.avoids_fence and vehicle.backs_away and vehicle.steering is Steering.ACKERMANN):
+        return 0.0
+    away_m = min(ground.clearance_m(Point(start)), vehicle.stops_within_m + LEAVES_FROM_M)
+    return max(away_m - band_m(vehicle, vehicle.speed_mps), 0.0)
+
+
+def turning_hazard(vehicle: Vehicle) -> tuple[str, str]:
+    """Return what avoidance does to a vehicle that keeps less while it turns, and what helps."""
+    return (
+        f"within {vehicle.fence.margin_name} {vehicle.stops_within_m:g} m its avoidance takes over, and backs it up towards the fence",
+        "turn it by hand to face its way, or move it, or set AVOID_BACKUP_SPD 0 or AVOID_ENABLE 0 until it has turned",
+    )

@@ -9,6 +9,7 @@ import shapely
 from shapely import Point
 
 from missions.fitting import polyline as drawn
+from missions.routing.departure import least_turning_m, turning_hazard
 from missions.routing.no_route import NoRoute, NoRouteKind
 from missions.words import metres
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from missions.fitting.cost import Measured
     from missions.fitting.polyline import Drawing
     from missions.routing.drawn_route import Route, Sought
+    from missions.vehicle import Vehicle
 
 _START_ADVICE = "the vehicle has no room to turn where it stands: turn it by hand to face its way, or move it, or ask for less with --clearance"
 AT_START = 2
@@ -35,6 +37,7 @@ def refusal(
     drawing: Drawing,
     measured: Measured,
     *,
+    vehicle: Vehicle,
     held_at_start: bool,
 ) -> NoRoute:
     """Return which corner refused, by how much and at which fence; with advice where the vehicle cannot turn at its start."""
@@ -62,13 +65,20 @@ def refusal(
         "fences": [fence],
         "at_start": index <= AT_START,
     }
+    text = (
+        f"no route keeps {sought.asked or metres(required_m)} while driving: at {where} this vehicle would come as near as "
+        f"{metres(kept_m)} to {fence}, whatever was tried"
+    )
+    advice = _START_ADVICE if index == 0 or held_at_start else None
+    if advice and kept_m < least_turning_m(ground, sought.start, vehicle):
+        hazard, advice = turning_hazard(vehicle)
+        text = f"{text}; {hazard}"
     return NoRoute(
         NoRouteKind.CORNER,
-        f"no route keeps {sought.asked or metres(required_m)} while driving: at {where} this vehicle would come as near as "
-        f"{metres(kept_m)} to {fence}, whatever was tried",
+        text,
         facts,
         [fence],
-        advice=_START_ADVICE if index == 0 or held_at_start else None,
+        advice=advice,
         at_start=index <= AT_START,
         is_held=held_at_start,
     )

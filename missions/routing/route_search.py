@@ -30,7 +30,7 @@ from missions.fitting.local_search import MOST_MEASUREMENTS, Fitting
 from missions.fitting.polyline import Drawing, DrawnPoint
 from missions.geo import rounded
 from missions.ground.legs import ROUNDING_RESERVE_M, reserve_m
-from missions.routing.departure import ROOM_M, departures
+from missions.routing.departure import ROOM_M, departures, least_turning_m
 from missions.routing.drawn_route import DrawnRoutes, Route
 from missions.routing.no_route import NoRoute
 from missions.routing.refusal import AT_START, block, refusal
@@ -65,6 +65,7 @@ _LINE_SLACK_M = (
     0.5 * ROUNDING_RESERVE_M
 )  # and the drawn line there: half of what the finished lines are let off
 _MISSED_AT_START_M = 0.05  # so much less the first legs may keep, where no lines keep all of that; it is said (`DrivenRoute.lead_away_m`)
+_NEARER_M = 0.3  # so much less than required a first leg may keep where those that keep it lead nowhere
 _TURN_COST_M_PER_DEG = 0.1  # orders the departures: a turn of 90° counts as 9 m
 _MOST_TURN_DEG = 100.0
 """At the end of a first leg: tried with more, rovers that came back the way they went left the band."""
@@ -167,6 +168,7 @@ class RouteSearch:
             self._reserve_m,
             least.drawing,
             least.measured,
+            vehicle=self.vehicle,
             held_at_start=self._is_held_at_start(found),
         )
 
@@ -259,11 +261,13 @@ class RouteSearch:
 
     def _leaving_nearer(self, band_m: float) -> list[_Attempt]:
         """Leave as well as can be on the way: the first legs that would keep all that is required lead nowhere."""
-        departure = next((one for one in self._departures if self._onward(one, band_m) is not None), None)
+        near = (one for one in self._departures if one.kept_m >= self.required_m - _NEARER_M)
+        departure = next((one for one in near if self._onward(one, band_m) is not None), None)
         if departure is None or departure.kept_m >= self.required_m + self._reserve_m:
             return []
         nearer = replace(self, departure_limit_m=departure.kept_m)
-        return nearer._first_attempts if nearer._is_limited_by_start else []  # noqa: SLF001 - of its own kind
+        attempts = nearer._first_attempts if nearer._is_limited_by_start else []  # noqa: SLF001 - of its own kind
+        return [one for one in attempts if one.is_enough]
 
     def _slowly(self, route: Route) -> Iterator[_Attempt]:
         """Drive a route slowly all the way, so that nothing changes at corners."""
@@ -372,7 +376,8 @@ class RouteSearch:
     def departure_m(self) -> float:
         """What the band has to keep on the first leg: what is required, or what the vehicle's turning at this start leaves of it.
 
-        A vehicle that stands near a fence, or faces it, can do no better than to leave by the best way.
+        A vehicle that stands near a fence, or faces it, can do no better than to leave by the best way; where that takes it to where its own
+        avoidance backs it into the fence, it is not sent.
         """
         if self.sought.ground.clearance_m(Point(self.sought.start)) >= self.required_m + ROOM_M:
             return self.required_m
@@ -380,7 +385,9 @@ class RouteSearch:
         if best_m >= self.required_m + self._reserve_m:
             return self.required_m
         slack_m = max(_DEPARTURE_SLACK_M, _DEPARTURE_SLACK_SHARE * best_m)
-        return min(self.required_m, best_m - 2 * self._reserve_m - slack_m)
+        left_m = best_m - 2 * self._reserve_m - slack_m
+        least_m = least_turning_m(self.sought.ground, self.sought.start, self.vehicle)
+        return min(self.required_m, max(left_m, least_m))
 
     @property
     def _is_limited_by_start(self) -> bool:

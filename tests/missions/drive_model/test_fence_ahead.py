@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import cmath
+import csv
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -84,3 +86,35 @@ def test_an_edge_along_the_way_is_met_at_its_neighbour() -> None:
     ahead = FenceAhead(corner, np.array([(0.0, 0.0)]), vehicle)
     left_m = 8.0 - vehicle.fence.margin_m
     assert ahead.speeds_about(2.0)(0j, 1 + 0j) == pytest.approx(vehicle.position_gain_per_s * left_m)
+
+
+FENCES = Path(__file__).parents[2] / "mavlink_bridge" / "simulator" / "data" / "fences.csv"
+
+
+def wall_rows() -> list[dict[str, str]]:
+    with FENCES.open() as file:
+        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    return [
+        row
+        for row in rows
+        if (row["test"], row["avoid_enable"]) == ("wall ahead", "3") and "AVOID" not in row["case"]
+    ]
+
+
+def test_a_measured_rover_slows_for_a_wall_where_it_is_foreseen_or_a_little_later() -> None:
+    """So it is not foreseen too broadly: real ones lag by 0.25 to 0.42 s."""
+    later_s = []
+    for row in wall_rows():
+        speed_mps, margin_m = float(row["wp_speed_mps"]), float(row["fence_margin_m"])
+        vehicle = vehicle_from_parameters({**AVOIDING, "WP_SPEED": speed_mps, "FENCE_MARGIN": margin_m})
+        wall = shapely.LineString([(40.0, -20.0), (40.0, 20.0)])
+        along_m = np.arange(0.0, 40.0, 0.01)
+        places = np.stack((along_m, np.zeros_like(along_m)), axis=1)
+        allowed_mps = FenceAhead(wall, places, vehicle).speeds_mps(
+            places, np.broadcast_to((1.0, 0.0), places.shape)
+        )
+        foreseen_m = along_m[np.flatnonzero(allowed_mps < 0.8 * speed_mps)[0]]
+        later_s.append((float(row["slow_below_80pct_at_m"]) - foreseen_m) / speed_mps)
+    assert len(later_s) == 10
+    assert min(later_s) >= 0.2
+    assert max(later_s) <= 0.45

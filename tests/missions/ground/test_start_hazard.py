@@ -10,13 +10,13 @@ from charts import IN, OUT, box, place, situation_of
 
 from missions.checking.check import check_mission
 from missions.editing.repair import repair_mission
-from missions.errors import StartBlockedError
+from missions.errors import RouteError, StartBlockedError
 from missions.fence import CircleZone
 from missions.firmware import Firmware
 from missions.items import waypoint
 from missions.planning.plan import plan
-from missions.request import Request
-from missions.situation import Mission
+from missions.request import GoTo, Request
+from missions.situation import Known, Mission, Pose
 
 AVOIDING = {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 4.0, "FENCE_MARGIN": 2.0, "AVOID_ENABLE": 3.0, "AVOID_BACKUP_SPD": 0.75,
             "SERVO1_FUNCTION": 26.0, "SERVO3_FUNCTION": 70.0}  # fmt: skip
@@ -125,6 +125,23 @@ def test_before_4_6_it_is_said_that_few_starts_were_measured(firmware: Firmware 
             route(9.0, firmware=firmware, **steering)
         found = route(9.0, firmware=firmware, AVOID_BACKUP_SPD=0.0, **steering)
         assert said(found.warnings, few)
+
+
+def test_a_steered_rover_is_not_sent_where_turning_takes_it_into_the_margin() -> None:
+    """Facing back in a lane it swings out by up to 2.7 m; two such plans were driven into the fence in the simulator."""
+
+    def turned(heading_deg: float, **parameters):
+        lane = situation_of(box(IN, -60, -3.4, 60, 3.4), **{**AVOIDING, **parameters})
+        situation = replace(lane, pose=Known(Pose(place(0, 0), heading_deg), None, "test"))
+        return plan(situation, GoTo(target=place(50, 0), clearance_m=2.2))
+
+    with pytest.raises(RouteError, match=r"within FENCE_MARGIN 2 m its avoidance takes over") as caught:
+        turned(270.0)
+    assert caught.value.details["advice"].endswith("AVOID_BACKUP_SPD 0 or AVOID_ENABLE 0 until it has turned")
+    assert turned(90.0).start_clearance_m is None
+    for free in ({"AVOID_ENABLE": 0.0}, {"AVOID_BACKUP_SPD": 0.0}):
+        assert turned(270.0, **free).start_clearance_m < 1.5
+    assert turned(270.0, **SKID).start_clearance_m is None
 
 
 def test_a_check_does_not_hold_there() -> None:

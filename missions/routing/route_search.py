@@ -65,7 +65,6 @@ _LINE_SLACK_M = (
     0.5 * ROUNDING_RESERVE_M
 )  # and the drawn line there: half of what the finished lines are let off
 _MISSED_AT_START_M = 0.05  # so much less the first legs may keep, where no lines keep all of that; it is said (`DrivenRoute.lead_away_m`)
-_NEARER_M = 0.3  # so much less than required a first leg may keep where those that keep it lead nowhere
 _TURN_COST_M_PER_DEG = 0.1  # orders the departures: a turn of 90° counts as 9 m
 _MOST_TURN_DEG = 100.0
 """At the end of a first leg: tried with more, rovers that came back the way they went left the band."""
@@ -261,8 +260,8 @@ class RouteSearch:
 
     def _leaving_nearer(self, band_m: float) -> list[_Attempt]:
         """Leave as well as can be on the way: the first legs that would keep all that is required lead nowhere."""
-        near = (one for one in self._departures if one.kept_m >= self.required_m - _NEARER_M)
-        departure = next((one for one in near if self._onward(one, band_m) is not None), None)
+        kept = (one for one in self._departures if one.kept_m > 0)
+        departure = next((one for one in kept if self._onward(one, band_m) is not None), None)
         if departure is None or departure.kept_m >= self.required_m + self._reserve_m:
             return []
         nearer = replace(self, departure_limit_m=departure.kept_m)
@@ -420,7 +419,12 @@ class RouteSearch:
         yield from (route for _, route in routes[:_DEPARTURES_TRIED])
 
     def _onward(self, departure: Departure, band_m: float) -> Route | None:
-        """Return the route on from a first leg, None where it does not lead on."""
+        """Return the route on from a first leg, None where it does not lead on: from where less is free than is drawn with, it would first lead away."""
+        if (
+            self.sought.ground.clearance_m(Point(departure.there))
+            < self.required_m + band_m + self._reserve_m
+        ):
+            return None
         onward = self._drawn_at(band_m).find(departure.there)
         if isinstance(onward, NoRoute) or onward.lead_away:
             return None

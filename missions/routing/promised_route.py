@@ -80,6 +80,8 @@ class PromisedRoute:
         is_whole = isinstance(found, DrivenRoute) and found.is_whole
         if not is_whole and (isinstance(found, DrivenRoute) or found.kind is NoRouteKind.CORNER):
             found = self._with_more(direct, found, asked)
+            if isinstance(found, NoRoute) and found.at_start:
+                found = direct.nearer_start() or found
         if isinstance(found, DrivenRoute):
             return _promised(asked, found), found
         return found if found.is_held else self._compared(found, asked)

@@ -180,6 +180,16 @@ class RouteSearch:
         driven = [one.driven for one in attempts if one.driven is not None]
         return max(driven, key=lambda one: (one.kept_m or 0.0, -one.cost_s), default=found)
 
+    def nearer_start(self) -> DrivenRoute | None:
+        """Leave as well as can be on the way, where the first legs that would keep all that is required lead nowhere; None where that does not help."""
+        kept = (one for one in self._departures if one.kept_m > 0)
+        departure = next((one for one in kept if self._onward(one, self._bands_m[1]) is not None), None)
+        if departure is None or departure.kept_m >= self.required_m + self._reserve_m:
+            return None
+        nearer = replace(self, departure_limit_m=departure.kept_m)
+        found = nearer.find(briefly=True) if nearer._is_limited_by_start else None  # noqa: SLF001 - of its own kind
+        return found if isinstance(found, DrivenRoute) else None
+
     @cached_property
     def _attempts(self) -> list[_Attempt]:
         routes = self._first_routes
@@ -188,8 +198,6 @@ class RouteSearch:
         attempts = [*self._first_attempts]
         if attempts[-1].is_refused_at_start and not _found(attempts) and not self._is_limited_by_start:
             attempts += self._until_found(self._departing(slow_m))
-            if not _found(attempts):
-                attempts += self._leaving_nearer(slow_m)
         is_held = not _found(attempts) and self._is_held_at_start(attempts)
         if not _found(attempts) and not is_held:
             attempts += self._until_found(self._slowly(routes[-1][0]))
@@ -257,16 +265,6 @@ class RouteSearch:
         """Leave by first legs that the vehicle can drive as it faces."""
         fitting = self._fitting(LATER_MEASUREMENTS)
         return (self._fit(fitting, route) for route in self._departing_routes(band_m))
-
-    def _leaving_nearer(self, band_m: float) -> list[_Attempt]:
-        """Leave as well as can be on the way: the first legs that would keep all that is required lead nowhere."""
-        kept = (one for one in self._departures if one.kept_m > 0)
-        departure = next((one for one in kept if self._onward(one, band_m) is not None), None)
-        if departure is None or departure.kept_m >= self.required_m + self._reserve_m:
-            return []
-        nearer = replace(self, departure_limit_m=departure.kept_m)
-        attempts = nearer._first_attempts if nearer._is_limited_by_start else []  # noqa: SLF001 - of its own kind
-        return [one for one in attempts if one.is_enough]
 
     def _slowly(self, route: Route) -> Iterator[_Attempt]:
         """Drive a route slowly all the way, so that nothing changes at corners."""

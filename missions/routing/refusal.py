@@ -70,7 +70,7 @@ def refusal(
         f"{metres(kept_m)} to {fence}, whatever was tried"
     )
     advice = _START_ADVICE if index == 0 or held_at_start else None
-    if advice and kept_m < least_turning_m(ground, sought.start, vehicle):
+    if index == 0 and kept_m < least_turning_m(ground, sought.start, vehicle):
         hazard, advice = turning_hazard(vehicle)
         text = f"{text}; {hazard}"
     return NoRoute(

@@ -8,7 +8,7 @@ vehicle can drive as it faces, if it is the start that refuses; the whole route 
 square laid over the place where most was missing so far. Of those found the one of least cost is the answer.
 
 **Why.** A path that is exact for the vehicle would need a search over position, heading and speed. Shortest paths of a disc are exact and
-quick, and fitting them loses little (docs/drive-bench.md: 590 of 600 found, in the median 0.6 to 1.7 % longer than the shortest).
+quick, and fitting them loses little (docs/drive-bench.md: 176 of 180 found, in the median 0.7 to 2.6 % longer than the shortest).
 The square works because shortest paths leave nothing between: what is nearly as short passes the same place, so another try has to be kept off
 it. Each stage has its allowance of measurements, so that a refusal comes in bounded time. It is a heuristic: a refusal names the
 corner that refused; it does not prove that no route exists.

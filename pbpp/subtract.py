@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from .clearance import Geometries
     from .partition.vertices import Ints
 
-__all__ = ["subtracted"]
+__all__ = ["subtracted", "united"]
 
 _MISSES = 4  # clusters that are not houses, beyond those that are: then no more of them are tried. A try costs a third of a union
 _AREA_SLACK = 1e-12  # so small a share of houses that lies in two of them is rounding; chosen, not measured
@@ -52,6 +52,17 @@ def subtracted(ground: BaseGeometry, obstacles: Sequence[BaseGeometry]) -> BaseG
     if not apart.all():
         ground = shapely.difference(ground, _united(parts[~apart], cluster[~apart]))
     return _with_holes(np.array(polygons_only(ground), dtype=object), shapely.get_exterior_ring(parts[apart]))
+
+
+def united(parts: Geometries) -> Geometries:
+    """Return polygons that touch nothing but themselves in place of obstacles, as `subtracted` cuts them out: those that touch nothing stay as they are."""
+    cluster = _clusters(parts)
+    apart = np.bincount(cluster, minlength=len(parts))[cluster] == 1
+    if apart.all():
+        return parts
+    return np.append(
+        parts[apart], np.array(polygons_only(_united(parts[~apart], cluster[~apart])), dtype=object)
+    )
 
 
 def _clusters(parts: Geometries) -> Ints:

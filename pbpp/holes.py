@@ -185,11 +185,10 @@ class Holes:
 def _meeting(some: Geometries, others: Geometries, bounds: Floats) -> Ints:
     """Return the places of those of many geometries, with their bounds, that meet any of a few."""
     west, south, east, north = bounds.T
-    found = [np.empty(0, dtype=np.intp)]
+    meets = np.zeros(len(others), dtype=bool)
     for one, (one_west, one_south, one_east, one_north) in zip(
         some, shapely.bounds(some).tolist(), strict=True
     ):
         near = (west <= one_east) & (east >= one_west) & (south <= one_north) & (north >= one_south)
-        places = np.flatnonzero(near)
-        found.append(places[shapely.intersects(others[places], one)])
-    return np.unique(np.concatenate(found))
+        meets[near] |= shapely.intersects(others[near], one)
+    return np.flatnonzero(meets)

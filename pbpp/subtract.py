@@ -50,12 +50,13 @@ def subtracted(ground: BaseGeometry, obstacles: Sequence[BaseGeometry]) -> BaseG
     if len(across):
         ground = shapely.difference(ground, MultiPolygon(across.tolist()))
     cut = cut[is_within]
-    # What courts enclose lies apart from all other ground.
-    rings, owner = shapely.get_rings(cut, return_index=True)
-    is_shell = np.diff(owner, prepend=-1) > 0
-    courts = np.asarray(shapely.polygons(rings[~is_shell]), dtype=object)
+    courts: list[Polygon] = []
+    if shapely.get_num_interior_rings(cut).any():
+        # What they enclose lies apart from all other ground.
+        rings, owner = shapely.get_rings(cut, return_index=True)
+        courts = shapely.polygons(rings[np.diff(owner, prepend=-1) == 0]).tolist()
     grounds = np.array([*polygons_only(ground), *courts, None], dtype=object)[:-1]
-    return _with_holes(grounds, rings[is_shell])
+    return _with_holes(grounds, shapely.get_exterior_ring(cut))
 
 
 def united(parts: Geometries) -> Geometries:
@@ -67,14 +68,20 @@ def _grouped(parts: Geometries) -> tuple[Geometries, Geometries, Geometries]:
     """Return the obstacles that touch nothing, the unions of clusters that are one polygon, and the polygons of all others, which may touch one another."""
     cluster, has_common_corners = _clusters(parts)
     is_alone = np.bincount(cluster, minlength=len(parts))[cluster] == 1
-    alone, parts, cluster = parts[is_alone], parts[~is_alone], cluster[~is_alone]
-    is_tried = np.isin(cluster, cluster[has_common_corners[~is_alone]])
+    alone, none = parts[is_alone], parts[:0]
+    if is_alone.all():
+        return alone, none, none
+    is_tried = np.zeros(len(parts), dtype=bool)
+    is_tried[cluster[has_common_corners]] = True
+    is_tried = is_tried[cluster]
     found = _within_walls(parts[is_tried], cluster[is_tried])
-    is_other = ~np.isin(cluster, list(found))
-    united = polygons_only(shapely.disjoint_subset_union_all(parts[is_other])) if is_other.any() else []
+    is_done = is_alone.copy()
+    is_done[list(found)] = True
+    others = parts[~is_done[cluster]]
+    united = polygons_only(shapely.disjoint_subset_union_all(others)) if len(others) else []
     single = [polygons[0] for polygons in found.values() if len(polygons) == 1]
-    others = [polygon for polygons in found.values() if len(polygons) > 1 for polygon in polygons]
-    rest = np.array([*united, *others, None], dtype=object)[:-1]
+    several = [polygon for polygons in found.values() if len(polygons) > 1 for polygon in polygons]
+    rest = np.array([*united, *several, None], dtype=object)[:-1]
     touches = np.zeros(len(rest), dtype=bool)
     one, other = shapely.STRtree(rest).query(rest, predicate="intersects")
     touches[one[one != other]] = True

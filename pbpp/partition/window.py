@@ -124,7 +124,9 @@ def window_of(
     floor, ceiling = blocks.floor[opened], blocks.ceiling[opened]
     there = v.order[v.line_start[first] : v.line_start[last]]
     edges = np.concatenate((there, v.prev[there], floor, ceiling))
-    names = np.unique(np.concatenate((edges, v.next[edges])))
+    is_there = np.zeros(len(v.x), dtype=bool)
+    is_there[edges] = is_there[v.next[edges]] = True
+    names = np.flatnonzero(is_there)
 
     def numbered(vertices: Ints) -> Ints:
         # What lies beyond is not asked for: it is put at some place that is there.

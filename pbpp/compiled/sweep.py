@@ -255,12 +255,14 @@ def _new_slot(state: _State, floor: int, ceiling: int, block: int) -> int:
 @_inlined
 def _new_portal(
     state: _State, x: float, low: float, high: float, low_end: int, high_end: int, west: int, east: int
-) -> None:
-    if high - low > TOLERANCE_M:
-        portal = state.portals[state.sizes[_PORTALS]]
-        portal.east, portal.low, portal.high = x, low, high
-        portal.low_end, portal.high_end, portal.west_block, portal.east_block = low_end, high_end, west, east
-        state.sizes[_PORTALS] += 1
+) -> bool:
+    if high - low <= TOLERANCE_M:
+        return False
+    portal = state.portals[state.sizes[_PORTALS]]
+    portal.east, portal.low, portal.high = x, low, high
+    portal.low_end, portal.high_end, portal.west_block, portal.east_block = low_end, high_end, west, east
+    state.sizes[_PORTALS] += 1
+    return True
 
 
 @_uncounted
@@ -309,10 +311,9 @@ def _bend(state: _State, x: float, vertex: int, before: int, is_floor: bool) -> 
     east = _new_block(state, x, slot.floor, slot.ceiling)
     slot.block = east
     if is_floor:
-        _new_portal(state, x, y, _north(edges, slot.ceiling, x), end, OPEN_END, west, east)
-        around.west_above, around.east_above = west, east
-    else:
-        _new_portal(state, x, _north(edges, slot.floor, x), y, OPEN_END, end, west, east)
+        if _new_portal(state, x, y, _north(edges, slot.ceiling, x), end, OPEN_END, west, east):
+            around.west_above, around.east_above = west, east
+    elif _new_portal(state, x, _north(edges, slot.floor, x), y, OPEN_END, end, west, east):
         around.west_below, around.east_below = west, east
     return True
 
@@ -333,10 +334,10 @@ def _divide(state: _State, x: float, vertex: int, before: int) -> bool:
     slot.ceiling, slot.block = before, lower
     edges[before].by_ceiling = number
     _insert(state, place + 1, _new_slot(state, vertex, ceiling, upper))
-    _new_portal(state, x, _north(edges, floor, x), y, OPEN_END, end, west, lower)
-    _new_portal(state, x, y, _north(edges, ceiling, x), end, OPEN_END, west, upper)
-    around.west_above = around.west_below = west
-    around.east_above, around.east_below = upper, lower
+    if _new_portal(state, x, _north(edges, floor, x), y, OPEN_END, end, west, lower):
+        around.west_below, around.east_below = west, lower
+    if _new_portal(state, x, y, _north(edges, ceiling, x), end, OPEN_END, west, upper):
+        around.west_above, around.east_above = west, upper
     return True
 
 
@@ -358,10 +359,10 @@ def _unite(state: _State, x: float, vertex: int, before: int) -> bool:
     east = _new_block(state, x, floor, ceiling)
     slot.ceiling, slot.block = ceiling, east
     edges[ceiling].by_ceiling = below
-    _new_portal(state, x, _north(edges, floor, x), y, OPEN_END, end, lower, east)
-    _new_portal(state, x, y, _north(edges, ceiling, x), end, OPEN_END, upper, east)
-    around.west_above, around.west_below = upper, lower
-    around.east_above = around.east_below = east
+    if _new_portal(state, x, _north(edges, floor, x), y, OPEN_END, end, lower, east):
+        around.west_below, around.east_below = lower, east
+    if _new_portal(state, x, y, _north(edges, ceiling, x), end, OPEN_END, upper, east):
+        around.west_above, around.east_above = upper, east
     return True
 
 
@@ -603,9 +604,9 @@ def _place(state: _State, there: Ints, which: int, count: int) -> None:
         y, around = state.edges[vertex].y, state.corners[vertex]
         above = below = _NONE
         for side in sides[:count]:
-            if side.low <= y < side.high:
+            if side.low <= y and side.high - y > TOLERANCE_M:
                 above = side.block
-            if side.low < y <= side.high:
+            if y - side.low > TOLERANCE_M and y <= side.high:
                 below = side.block
         if which == _CLOSED:
             around.west_above, around.west_below = above, below

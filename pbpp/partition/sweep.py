@@ -173,12 +173,15 @@ class Sweep:
 
     def _new_portal(
         self, portal: tuple[float, float, float], ends: tuple[int, int], west: int, east: int
-    ) -> None:
+    ) -> bool:
+        """Make a portal, and return whether there is one: a narrower gap is closed."""
         x, low, high = portal
-        if high - low > TOLERANCE_M:
-            self.portals.append((x, low, high, west, east))
-            self.ways[1][west].append((x, low, high, ends[0], ends[1], east))
-            self.ways[0][east].append((x, low, high, ends[0], ends[1], west))
+        if high - low <= TOLERANCE_M:
+            return False
+        self.portals.append((x, low, high, west, east))
+        self.ways[1][west].append((x, low, high, ends[0], ends[1], east))
+        self.ways[0][east].append((x, low, high, ends[0], ends[1], west))
+        return True
 
     def _vertex(self, x: float, vertex: int) -> None:
         """Do what `_line` does for a line with one vertex, by far the most frequent one."""
@@ -218,7 +221,7 @@ class Sweep:
             self.ceiling.append(other)
             low, high = y, self._left_y[other] + self._slope[other] * (x - self._left_x[other])
             low_end, high_end = end, OPEN_END
-            self.west_above[vertex], self.east_above[vertex] = west, east
+            beside = self.west_above, self.east_above
         else:
             slot[1] = before
             self._by_ceiling[before] = slot
@@ -227,7 +230,7 @@ class Sweep:
             self.ceiling.append(before)
             low, high = self._left_y[other] + self._slope[other] * (x - self._left_x[other]), y
             low_end, high_end = OPEN_END, end
-            self.west_below[vertex], self.east_below[vertex] = west, east
+            beside = self.west_below, self.east_below
         self.west.append(x)
         self.east.append(x)
         westwards, eastwards = self.ways
@@ -237,6 +240,7 @@ class Sweep:
             self.portals.append((x, low, high, west, east))
             eastwards[west].append((x, low, high, low_end, high_end, east))
             westwards.append([(x, low, high, low_end, high_end, west)])
+            beside[0][vertex], beside[1][vertex] = west, east
         else:
             westwards.append([])
 
@@ -253,10 +257,10 @@ class Sweep:
         above = [vertex, ceiling, upper]
         self._by_floor[vertex] = self._by_ceiling[ceiling] = above
         self._active.insert(place + 1, above)
-        self._new_portal((x, self._north(floor, x), y), (OPEN_END, end), west, lower)
-        self._new_portal((x, y, self._north(ceiling, x)), (end, OPEN_END), west, upper)
-        self.west_above[vertex] = self.west_below[vertex] = west
-        self.east_above[vertex], self.east_below[vertex] = upper, lower
+        if self._new_portal((x, self._north(floor, x), y), (OPEN_END, end), west, lower):
+            self.west_below[vertex], self.east_below[vertex] = west, lower
+        if self._new_portal((x, y, self._north(ceiling, x)), (end, OPEN_END), west, upper):
+            self.west_above[vertex], self.east_above[vertex] = west, upper
 
     def _unite(self, x: float, vertex: int, before: int) -> None:
         """Join two blocks where the obstacle between them ends."""
@@ -269,10 +273,10 @@ class Sweep:
         east = self._new_block(x, floor, ceiling)
         below[1:] = ceiling, east
         self._by_ceiling[ceiling] = below
-        self._new_portal((x, self._north(floor, x), y), (OPEN_END, end), lower, east)
-        self._new_portal((x, y, self._north(ceiling, x)), (end, OPEN_END), upper, east)
-        self.west_above[vertex], self.west_below[vertex] = upper, lower
-        self.east_above[vertex] = self.east_below[vertex] = east
+        if self._new_portal((x, self._north(floor, x), y), (OPEN_END, end), lower, east):
+            self.west_below[vertex], self.east_below[vertex] = lower, east
+        if self._new_portal((x, y, self._north(ceiling, x)), (end, OPEN_END), upper, east):
+            self.west_above[vertex], self.east_above[vertex] = upper, east
 
     def _line(self, x: float, there: list[int]) -> None:
         """Close the blocks that end on a line, open those that begin, and join them by portals."""
@@ -455,7 +459,7 @@ class Sweep:
                 j += 1
 
     def _place(self, there: list[int], left: list[_Side], right: list[_Side]) -> None:
-        """Note which blocks lie beside each vertex of a line."""
+        """Note which blocks lie beside each vertex of a line; none that only a closed gap leads to."""
         for sides, above, below in (
             (left, self.west_above, self.west_below),
             (right, self.east_above, self.east_below),
@@ -463,7 +467,7 @@ class Sweep:
             for vertex in there:
                 y = self._y[vertex]
                 for low, _, high, _, block in sides:
-                    if low <= y < high:
+                    if low <= y and high - y > TOLERANCE_M:
                         above[vertex] = block
-                    if low < y <= high:
+                    if y - low > TOLERANCE_M and y <= high:
                         below[vertex] = block

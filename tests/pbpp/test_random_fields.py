@@ -23,7 +23,9 @@ def many(count):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("part", range(5))
+@pytest.mark.parametrize(
+    "part", [0, *(pytest.param(part, marks=pytest.mark.campaign) for part in range(1, 5))]
+)
 @given(seed=SEEDS)
 @many(70)
 def test_the_path_is_safe_and_shortest(kind, part, seed):

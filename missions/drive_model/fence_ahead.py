@@ -30,26 +30,45 @@ _TOUCHING_M2 = 1e-9  # a ray through the end of an edge meets it, rounding or no
 _FEW = 24  # more edges than this are quicker in numpy than one by one; chosen, it changes no answer
 
 
+class FenceEdges:
+    """The straight edges of a fence.
+
+    Parameters
+    ----------
+    fence : shapely geometry
+        Its lines, metres.
+    """
+
+    def __init__(self, fence: BaseGeometry) -> None:
+        points, lines = shapely.get_coordinates(shapely.get_parts(fence), return_index=True)
+        self.ends: NDArray[np.float64] = np.stack((points[:-1], points[1:]), axis=1)[lines[1:] == lines[:-1]]
+        """Where each begins and ends, shape (n, 2, 2)."""
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether there is none."""
+        return not len(self.ends)
+
+
 class FenceAhead:
     """The straight edges of a fence that a drive has to do with.
 
     Parameters
     ----------
-    fence : shapely geometry
-        The lines it avoids, metres.
+    fence : FenceEdges
+        What it avoids.
     places : ndarray of float, shape (n, 2)
         Where it drives, east and north in metres.
     vehicle : Vehicle
         What drives.
     """
 
-    def __init__(self, fence: BaseGeometry, places: NDArray[np.float64], vehicle: Vehicle) -> None:
+    def __init__(self, fence: FenceEdges, places: NDArray[np.float64], vehicle: Vehicle) -> None:
         self._stops_within_m = vehicle.stops_within_m
         self._gain_per_s = vehicle.position_gain_per_s
         self._accel_mps2 = min(vehicle.accel_max_mps2, _MOST_ACCEL_MPS2)
         self._linear_m = self._accel_mps2 / self._gain_per_s**2
-        points, lines = shapely.get_coordinates(shapely.get_parts(fence), return_index=True)
-        self._edges = np.stack((points[:-1], points[1:]), axis=1)[lines[1:] == lines[:-1]]
+        self._edges = fence.ends
         within_m = self.counts_within_m(vehicle.speed_mps)
         self._edges = self._edges[self._touch(places.min(axis=0), places.max(axis=0), within_m)]
         self._starts = _complex(self._edges[:, 0])

@@ -143,7 +143,9 @@ class TargetPoint:
         near = self._near_corners()[:-1]
         places, ways = self.places[:-1][near], (steps / moved_m)[near]
         sides = np.concatenate([side * ways for side in _SIDES])
-        allowed_mps = fence.speeds_mps(_plane(np.tile(places, len(_SIDES))), _plane(sides))
+        allowed_mps = fence.speeds_mps(
+            _plane(np.tile(places, len(_SIDES))), _plane(sides), float(moved_m.max(initial=0.0)) / STEP_S
+        )
         is_slowed[near] = (allowed_mps.reshape(len(_SIDES), -1) < _SLOWED_SHARE * moved_m[near] / STEP_S).any(
             axis=0
         )

@@ -57,7 +57,9 @@ def test_the_speed_is_that_of_the_first_edge_ahead(
     ahead = FenceAhead(FenceEdges(fence), np.array([(-20.0, -20.0), (20.0, 20.0)]), vehicle)
     units = [cmath.rect(1.0, way) for way in ways]
     many_mps = ahead.speeds_mps(
-        np.full((len(units), 2), (east_m, north_m)), np.array([(unit.real, unit.imag) for unit in units])
+        np.full((len(units), 2), (east_m, north_m)),
+        np.array([(unit.real, unit.imag) for unit in units]),
+        speed_mps,
     )
     allowed_mps = ahead.speeds_about(speed_mps)
     for unit, one_of_many_mps in zip(units, many_mps, strict=True):
@@ -76,6 +78,17 @@ def test_places_far_apart_look_at_their_own_edges() -> None:
         assert allowed_mps(complex(east_m), 1 + 0j) == pytest.approx(
             expected_mps(walls, complex(east_m), 1 + 0j, vehicle)
         )
+
+
+def test_many_edges_are_looked_at_by_parts_of_the_way() -> None:
+    vehicle = vehicle_at(2.0)
+    fence = shapely.union_all([ring(500, 5.0, 30.0 * number, 9.0) for number in range(10)])
+    places = np.column_stack([np.linspace(0.0, 270.0, 400), np.zeros(400)])
+    ways = np.tile([0.6, 0.8], (400, 1))
+    ahead = FenceAhead(FenceEdges(fence), places, vehicle)
+    for place, mps in list(zip(places.tolist(), ahead.speeds_mps(places, ways, 2.0), strict=True))[::20]:
+        wanted_mps = expected_mps(fence, complex(*place), 0.6 + 0.8j, vehicle)
+        assert min(mps, 2.0) == pytest.approx(min(wanted_mps, 2.0), abs=1e-6)
 
 
 def test_an_edge_along_the_way_is_met_at_its_neighbour() -> None:

@@ -20,15 +20,17 @@ if TYPE_CHECKING:
 
 def lead_away_remarks(found: DrivenRoute, asked: Promise) -> list[str]:
     """Return remarks on how near the start is to a fence, and what the route does about it."""
-    if not found.lead_away or found.start_clearance_m < 0:
+    is_limited = found.lead_away_m is not None and found.lead_away_m < asked.required_m
+    if not (found.lead_away or is_limited) or found.start_clearance_m < 0:
         return []
     if found.lead_away_m is None:
         distance = f"{metres(found.start_clearance_m)} from a fence, nearer than {metres(asked.drawn_m)}"
         return [f"the start stands {distance}: the route first leads away, never nearer than that"]
     distance = f"{metres(found.start_clearance_m)} from a fence, too near to leave it with {asked.promised_m:g} m kept"
     nearest_m = max(found.lead_away_m, 0.0)
+    leads_away = "the route first leads away; " if found.lead_away else ""
     return [
-        f"the start stands {distance}: the route first leads away; turning there the vehicle may come as near as {nearest_m:.2f} m"
+        f"the start stands {distance}: {leads_away}turning there the vehicle may come as near as {nearest_m:.2f} m"
     ]
 
 

@@ -25,7 +25,7 @@ from missions.drive_model import corner_forecast
 from missions.ground.legs import reserve_m
 from missions.routing.drawn_route import DrawnRoutes, Route
 from missions.routing.no_route import NoRoute, NoRouteKind
-from missions.routing.route_search import SLOW_MPS, DrivenRoute, RouteSearch
+from missions.routing.route_search import SLOW_MPS, DrivenRoute, Known, RouteSearch
 from missions.words import metres
 
 if TYPE_CHECKING:
@@ -72,6 +72,7 @@ class PromisedRoute:
     vehicle: Vehicle
     heading_deg: float | None
     _tried: dict[float, RouteSearch] = field(default_factory=dict, init=False)
+    _known: Known = field(default_factory=Known, init=False)
 
     def find(self, asked: Promise) -> Found | NoRoute:
         """Return a route that keeps at least what is asked, and what is promised for it; else why there is none."""
@@ -126,7 +127,7 @@ class PromisedRoute:
         enough_m = asked.required_m
         most_m = self._most_drawn_m
         assert not isinstance(most_m, NoRoute)  # lines were drawn, and could not be fitted
-        more_m = [enough_m + step * STEP_M for step in _STEPS_UP if enough_m + step * STEP_M < most_m]
+        more_m = [rung for step in _STEPS_UP if (rung := round(enough_m + step * STEP_M, 9)) < most_m]
         quick = [first, *(self._search(required_m, enough_m).find(briefly=True) for required_m in more_m)]
         if driven := [found for found in quick if isinstance(found, DrivenRoute)]:
             return min(driven, key=lambda found: found.cost_s)
@@ -196,14 +197,15 @@ class PromisedRoute:
         return min(*bounds_m, ground.bounds.bounds[2] - ground.bounds.bounds[0])
 
     def _search(self, required_m: float, enough_m: float) -> RouteSearch:
-        return RouteSearch(self.sought, required_m, self.vehicle, self.heading_deg, enough_m)
+        return RouteSearch(self.sought, required_m, self.vehicle, self.heading_deg, enough_m, self._known)
 
 
 def _downwards(most_m: float, error_m: float) -> Iterator[float]:
     """Return what is aimed at for the widest route, most first: the widest, then whole steps of what is promised below it."""
     yield math.floor(100 * most_m) / 100
     steps = math.floor((most_m - error_m) / STEP_M)
-    yield from (error_m + (steps - down) * STEP_M for down in _STEPS_DOWN if steps > down)
+    # Rounded, so that what comes to the same is the same, and is fitted once.
+    yield from (round(error_m + (steps - down) * STEP_M, 9) for down in _STEPS_DOWN if steps > down)
 
 
 def _kept_m(found: DrivenRoute) -> float:

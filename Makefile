@@ -90,6 +90,7 @@ lock: .venv/run.stamp
 
 bench: .venv/dev.stamp
 	$(BIN)/python benchmarks/planner/run.py
+	$(BIN)/python benchmarks/planner/growth.py
 	$(BIN)/python benchmarks/table1.py --write
 
 bench-drive: .venv/dev.stamp

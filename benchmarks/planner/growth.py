@@ -2,7 +2,7 @@
 
 The maps are rand100, rand1000 and copies of the latter side by side, up to 100,000 vertices; with ``--maps`` also those of a folder, JSON files like the
 cases in tests/pbpp/data. Beside ours stands shapely's constrained triangulation of the same free space, with which a search over triangles would begin.
-Writes benchmarks/results/growth.*.
+Writes benchmarks/results/growth.json and docs/figures/planner-growth.svg.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ mpl.use("Agg")
 from matplotlib import pyplot as plt
 
 RESULTS = Path(__file__).parents[1] / "results"
+FIGURE = Path(__file__).parents[2] / "docs" / "figures" / "planner-growth.svg"
 FACTORS = (1.0, 3.0, 6.0, 14.4)
 LINES = {
     "triangles_ms": "shapely's triangulation",
@@ -55,7 +56,7 @@ def main() -> None:
     ax.grid(alpha=0.3)
     ax.legend()
     figure.tight_layout()
-    figure.savefig(RESULTS / "growth.svg")
+    figure.savefig(FIGURE)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,13 @@
 """A route that keeps what is asked of it, the widest there is, or why there is none: one answer for all that may be asked.
 
-**What holds.** A route that keeps some clearance serves whoever asks for less. So where lines cannot be fitted to what is asked, they are
-fitted to more, step by step up to what the ground leaves, and those count that keep what is asked; only where none do is it refused. The
-widest route is the one that keeps most of all that are looked at, from the widest clearance that lines can be drawn at downwards.
+**What holds.** A route that keeps some clearance serves whoever asks for less. So where lines cannot be fitted to what is asked, or only to
+be driven slowly, they are fitted to more, step by step up to what the ground leaves, and the quickest counts that keeps what is asked; only
+where none do is it refused. The widest route is the one that keeps most of all that are looked at: from the widest clearance that lines can
+be drawn at downwards, and from the first that is found upwards, step by step, as long as more is kept. Where the start refuses, routes that
+begin otherwise are looked for: another way, or leading away first.
+
+That no more can be had than the widest keeps, that all up to it can, and that less clearance never takes longer, does not follow: for that all
+clearances would have to be fitted for each plan. docs/clearance-ladder.md counts the exceptions.
 
 **Why.** Fitting is a heuristic (`routing.route_search`): at one clearance it fails by a centimetre and at the next it succeeds. Without this
 4.53 m were refused and 4.6 m planned, and the widest route kept less than others did.
@@ -13,6 +18,7 @@ What the vehicle keeps on its first legs, as it leaves the place where it stands
 
 from __future__ import annotations
 
+import bisect
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -22,6 +28,7 @@ from typing import TYPE_CHECKING
 from shapely import Point
 
 from missions.drive_model import corner_forecast
+from missions.fitting.local_search import CRAWL_MEASUREMENTS, FIT_MEASUREMENTS
 from missions.ground.legs import reserve_m
 from missions.routing.drawn_route import DrawnRoutes, Route
 from missions.routing.no_route import NoRoute, NoRouteKind
@@ -42,8 +49,12 @@ STEP_M = 0.1
 # bound the time until a refusal
 _STEPS_DOWN = (0, 2, 8, 32)
 _TRIED_WHOLLY = 1
-_STEPS_UP = (1,)
+_STEPS_UP = (1, 3)
 """Steps above what is asked that are looked at first: nearly what is asked, and mostly they do."""
+_OTHERWISE_STEPS = (
+    64  # above a clearance at which the start refuses, within which routes that begin otherwise are sought
+)
+_OTHER_MEASUREMENTS = FIT_MEASUREMENTS + CRAWL_MEASUREMENTS
 _ALL_M = 0.01  # what keeps so little less than it aims at is as wide as can be
 
 _NOTHING_ADVICE = (
@@ -77,8 +88,7 @@ class PromisedRoute:
         """Return a route that keeps at least what is asked, and what is promised for it; else why there is none."""
         direct = self._search(asked.required_m, asked.required_m)
         found = direct.find(briefly=True)
-        is_whole = isinstance(found, DrivenRoute) and found.is_whole
-        if not is_whole and (isinstance(found, DrivenRoute) or found.kind is NoRouteKind.CORNER):
+        if not _is_good(found) and (isinstance(found, DrivenRoute) or found.kind is NoRouteKind.CORNER):
             found = self._with_more(direct, found, asked)
         if isinstance(found, DrivenRoute):
             return _promised(asked, found), found
@@ -91,6 +101,7 @@ class PromisedRoute:
             return most_m
         found = self._widest(most_m, asked.error_m, 0.0)
         if isinstance(found, DrivenRoute):
+            found = self._climbed(found, asked.error_m)
             return _promised(asked, found, is_widest=True), found
         return replace(found, advice=_NOTHING_ADVICE) if found.kind is NoRouteKind.CORNER else found
 
@@ -108,39 +119,72 @@ class PromisedRoute:
                 is_first, why = why is None, found
                 least = self._widest_at(0.0) if is_first and found.at_start and not enough_m else None
                 if isinstance(least, NoRoute) and least.at_start:
-                    # Where the least asks too much of the start, what lies between does.
-                    return least
+                    # Where the least asks too much of the start, what begins the same way does.
+                    others = [
+                        self._widest_at(other_m, briefly=True) for other_m in self._begun_otherwise_m(0.0)
+                    ]
+                    return max(
+                        (other for other in others if isinstance(other, DrivenRoute)),
+                        key=_kept_m,
+                        default=least,
+                    )
         if best is not None:
             return best
         assert why is not None
         return why
 
+    def _climbed(self, best: DrivenRoute, error_m: float) -> DrivenRoute:
+        """Return a route that keeps more, aimed at the next steps above what one keeps, as far as each keeps more than the last."""
+        failed_m = min((tried_m for tried_m in self._tried if tried_m > _kept_m(best) + _ALL_M), default=0.0)
+        while (required_m := error_m + (_steps(_kept_m(best) - error_m) + 1) * STEP_M) < failed_m - _ALL_M:
+            found = self._widest_at(required_m, briefly=True)
+            if isinstance(found, NoRoute) or _kept_m(found) <= _kept_m(best):
+                break
+            best = found
+        return best
+
     def _with_more(
         self, direct: RouteSearch, first: DrivenRoute | NoRoute, asked: Promise
     ) -> DrivenRoute | NoRoute:
         """Return a route fitted to what is asked, or to more of it where that does not do; the first lines tried are known."""
-        if isinstance(first, NoRoute) and first.is_held:
-            why = direct.find()
-            if isinstance(why, DrivenRoute) or why.is_held:
-                return why
         enough_m = asked.required_m
-        most_m = self._most_drawn_m
-        assert not isinstance(most_m, NoRoute)  # lines were drawn, and could not be fitted
-        more_m = [enough_m + step * STEP_M for step in _STEPS_UP if enough_m + step * STEP_M < most_m]
-        quick = [first, *(self._search(required_m, enough_m).find(briefly=True) for required_m in more_m)]
+        is_held = isinstance(first, NoRoute) and first.is_held
+        quick = [first]
+        for required_m in (enough_m + step * STEP_M for step in _STEPS_UP):
+            if is_held or _is_good(quick[-1]):
+                break
+            quick.append(self._other_search(required_m, enough_m).find(briefly=True))
         if driven := [found for found in quick if isinstance(found, DrivenRoute)]:
             return min(driven, key=lambda found: found.cost_s)
         why = direct.find()
         if isinstance(why, DrivenRoute):
             return why
+        if why.at_start:
+            for other_m in self._begun_otherwise_m(enough_m):
+                other = self._other_search(other_m, enough_m).find(briefly=True)
+                if isinstance(other, DrivenRoute):
+                    return other
+        most_m = 0.0 if why.is_held else self._most_drawn_m
+        assert not isinstance(most_m, NoRoute)  # lines were drawn, and could not be fitted
         widest = self._widest(most_m, asked.error_m, enough_m) if most_m > enough_m else why
         return widest if isinstance(widest, DrivenRoute) and _kept_m(widest) >= enough_m else why
 
     def _widest_at(self, required_m: float, *, briefly: bool = False) -> DrivenRoute | NoRoute:
         """Return the route that keeps most where so much is aimed at; each is tried once."""
         if required_m not in self._tried:
-            self._tried[required_m] = self._search(required_m, max(required_m - _ALL_M, 0.0))
+            search = self._other_search(required_m, max(required_m - _ALL_M, 0.0))
+            self._tried[required_m] = replace(search, any_speed=True)
         return self._tried[required_m].widest(briefly=briefly)
+
+    def _begun_otherwise_m(self, from_m: float) -> list[float]:
+        """Return the least steps above a clearance at which drawn routes begin otherwise than at it: another way, or leading away first."""
+        least = self._search(from_m, 0.0)
+
+        def is_other(step: int) -> bool:
+            return self._search(from_m + step * STEP_M, 0.0).begins_otherwise(least)
+
+        first = bisect.bisect_left(range(1, _OTHERWISE_STEPS), x=True, key=is_other) + 1
+        return [from_m + step * STEP_M for step in (first, first + 1)]
 
     def _compared(self, why: NoRoute, asked: Promise) -> NoRoute:
         """Return why there is no route, with what the widest one keeps while this vehicle drives it."""
@@ -195,6 +239,10 @@ class PromisedRoute:
                 bounds_m.append(place.clearance_m)
         return min(*bounds_m, ground.bounds.bounds[2] - ground.bounds.bounds[0])
 
+    def _other_search(self, required_m: float, enough_m: float) -> RouteSearch:
+        """Return what looks for a route at a clearance that was not asked for: one route is fitted to it, and given up sooner."""
+        return replace(self._search(required_m, enough_m), measurements=_OTHER_MEASUREMENTS)
+
     def _search(self, required_m: float, enough_m: float) -> RouteSearch:
         return RouteSearch(self.sought, required_m, self.vehicle, self.heading_deg, enough_m)
 
@@ -202,8 +250,18 @@ class PromisedRoute:
 def _downwards(most_m: float, error_m: float) -> Iterator[float]:
     """Return what is aimed at for the widest route, most first: the widest, then whole steps of what is promised below it."""
     yield math.floor(100 * most_m) / 100
-    steps = math.floor((most_m - error_m) / STEP_M)
+    steps = _steps(most_m - error_m)
     yield from (error_m + (steps - down) * STEP_M for down in _STEPS_DOWN if steps > down)
+
+
+def _steps(promised_m: float) -> int:
+    """Return how many whole steps a clearance has, rounding aside."""
+    return math.floor(promised_m / STEP_M + 1e-6)
+
+
+def _is_good(found: DrivenRoute | NoRoute) -> bool:
+    """Return whether there is no reason to aim at more: all is kept that was aimed at, and it is not driven slowly."""
+    return isinstance(found, DrivenRoute) and found.is_whole and not found.is_slow
 
 
 def _kept_m(found: DrivenRoute) -> float:

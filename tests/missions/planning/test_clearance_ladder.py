@@ -21,7 +21,7 @@ from missions.situation import Known, Pose
 PATH = list(sys.path)
 sys.path.append(str(Path(__file__).parents[3] / "benchmarks"))
 
-from ladder import ladder_of  # noqa: E402
+from ladder import asked_of, ladder_of  # noqa: E402
 
 sys.path[:] = PATH  # modules of the benchmarks have names of rooms of the tests
 
@@ -59,6 +59,16 @@ def test_where_what_is_asked_cannot_be_fitted_more_of_it_serves(monkeypatch: pyt
     assert found.clearance_m is not None
     assert 1.95 <= found.clearance_m <= 2.5
     assert found.driven_clearance_m >= found.clearance_m
+
+
+def test_a_start_that_refuses_one_route_is_left_by_one_that_begins_otherwise() -> None:
+    """In field 1 a rover that cannot turn faces away: 2 m was planned, leading away first, and all from 0.5 to 1.9 m refused."""
+    situation, request = asked_of("field 1")
+    found = plan(situation, GoTo(**request, clearance_m=1.5))
+    widest = plan(situation, GoTo(**request, widest=True))
+    assert found.clearance_m is not None
+    assert widest.clearance_m is not None
+    assert 1.5 <= found.clearance_m <= widest.clearance_m
 
 
 def test_less_than_was_asked_needs_a_word() -> None:

@@ -374,7 +374,7 @@ def test_where_no_clearance_helps_the_advice_is_another(monkeypatch: pytest.Monk
         "less clearance does not help this vehicle: turn it"
     )
     assert asked_m[0] == pytest.approx(1.3, abs=0.05)
-    assert asked_m[-1] == 0.0
+    assert 0.0 in asked_m
 
 
 def test_a_gap_that_no_clearance_lets_this_vehicle_through_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -447,14 +447,14 @@ def test_a_place_more_is_added_to_the_free_space_that_is_there(monkeypatch: pyte
 def test_other_ways_and_first_legs_are_drawn_in_the_free_space_that_is_there(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Each once took its own: up to five ways round, and 72 first legs."""
+    """Each once took its own: up to five ways round, and 72 first legs. Seven more clearances are drawn at, to see where routes begin otherwise."""
     counts = counted(monkeypatch)
     lane = box(IN, -2.9, -60, 2.9, 60)
     facing_away = facing(situation_of(lane, **VEHICLES[1]), 0, 40, 0.0)
     with pytest.raises(NoRouteError, match="at the start this vehicle would come as near as"):
         plan(facing_away, Request(targets=(place(0, -50),), clearance_m=1.0))
-    assert counts["whole"] <= 2
-    assert counts["widest"] == 0
+    assert counts["whole"] <= 2 * (1 + 7 + 2)
+    assert counts["widest"] <= 1
 
 
 def test_the_widest_way_is_looked_for_once(monkeypatch: pytest.MonkeyPatch) -> None:

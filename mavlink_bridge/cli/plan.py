@@ -36,7 +36,9 @@ def plan(options: PlanOptions) -> None:
     check_permissions(upload=options.upload, drive=options.drive, hold=options.hold)
     request = _request(options)
     _check_options(options)
-    told = Told(options.output, options.plot, blocks=options.blocks, is_silent=options.is_silent)
+    told = Told(
+        options.output, options.plot, blocks=options.blocks, is_silent=options.is_silent, drives=options.drive
+    )
     verified, arrival, backup = False, None, None
     if options.connect is not None:
         from mavlink_bridge.cli.plan_on_link import plan_on_link  # noqa: PLC0415 - pymavlink only with a link

@@ -45,10 +45,10 @@ if TYPE_CHECKING:
 STEP_M = 0.1
 """Between the clearances that lines are fitted to, where those asked for do not do."""
 
-# Chosen, not measured: steps below the widest that are looked at one after another, and how many of them with all that can be tried; they
-# bound the time until a refusal
+# Chosen, not measured, as they bound the time until a refusal: steps below the widest that are looked at one after another, and how near the
+# best of them has to come to it so that the widest is not aimed at again with all that can be tried
 _STEPS_DOWN = (0, 2, 8, 32)
-_TRIED_WHOLLY = 1
+_NEAR_TOP_M = 0.12
 _STEPS_UP = (1, 3)
 """Steps above what is asked that are looked at first: nearly what is asked, and mostly they do."""
 _OTHERWISE_STEPS = (
@@ -109,10 +109,12 @@ class PromisedRoute:
         """Return the route that keeps most, aimed at the widest that lines can be drawn for and, as far as it is enough, at less."""
         best: DrivenRoute | None = None
         why: NoRoute | None = None
-        for number, required_m in enumerate((*_downwards(most_m, error_m), 0.0)):
+        levels_m = tuple(_downwards(most_m, error_m))
+        top_m = levels_m[0]
+        for required_m in (*levels_m, 0.0):
             if required_m < enough_m or (best is not None and _kept_m(best) >= required_m):
                 break
-            found = self._widest_at(required_m, briefly=required_m > 0 and number >= _TRIED_WHOLLY)
+            found = self._widest_at(required_m, briefly=required_m > 0)
             if isinstance(found, DrivenRoute):
                 best = found if best is None or _kept_m(found) > _kept_m(best) else best
             else:
@@ -128,6 +130,13 @@ class PromisedRoute:
                         key=_kept_m,
                         default=least,
                     )
+        if why is not None and (best is None or _kept_m(best) < top_m - _NEAR_TOP_M):
+            whole = self._widest_at(top_m)
+            best = max(
+                (found for found in (best, whole) if isinstance(found, DrivenRoute)),
+                key=_kept_m,
+                default=None,
+            )
         if best is not None:
             return best
         assert why is not None

@@ -254,7 +254,7 @@ class TestStarts:
             situation_of(FIELD, WALL, WP_SPEED=2.0), -8, 0, 90.0
         )  # 3 m from the wall, facing it
         result = plan(situation, Request(targets=(place(50, 0),), clearance_m=2.5))
-        assert any("first leads away" in warning for warning in result.warnings)
+        assert any("leaving it, the rover keeps" in warning for warning in result.warnings)
         start_m = result.ground.clearance_m(Point(result.ground.frame.to_local(result.start)))
         assert result.drawn_clearance_m >= min(start_m, 2.5) - 0.02
         assert result.clearance_m == 2.5

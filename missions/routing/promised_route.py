@@ -22,15 +22,12 @@ import bisect
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import pairwise
 from typing import TYPE_CHECKING
-
-from shapely import Point
 
 from missions.drive_model import corner_forecast
 from missions.fitting.local_search import CRAWL_MEASUREMENTS, FIT_MEASUREMENTS
 from missions.ground.legs import reserve_m
-from missions.routing.drawn_route import DrawnRoutes, Route
+from missions.routing.drawn_route import widest_drawn_m
 from missions.routing.no_route import NoRoute, NoRouteKind
 from missions.routing.route_search import SLOW_MPS, DrivenRoute, RouteSearch
 from missions.words import metres
@@ -222,31 +219,7 @@ class PromisedRoute:
         slow_mps = min(SLOW_MPS, self.vehicle.speed_mps)
         band_m = corner_forecast(0.0, self.vehicle, speed_mps=slow_mps).outside_overshoot_m
         beside_m = band_m + reserve_m(self.sought.ground)
-
-        def drawn(required_m: float) -> Route | NoRoute:
-            return DrawnRoutes.at(self.sought, required_m + beside_m).find()
-
-        least = drawn(0.0)
-        if isinstance(least, NoRoute):
-            return least
-        low_m, high_m = 0.0, max(self._widest_ground_m() - beside_m, 0.0)
-        if isinstance(drawn(high_m), Route):
-            return high_m
-        while high_m - low_m > _ALL_M:
-            middle_m = (low_m + high_m) / 2
-            low_m, high_m = (middle_m, high_m) if isinstance(drawn(middle_m), Route) else (low_m, middle_m)
-        return low_m
-
-    def _widest_ground_m(self) -> float:
-        """Return a clearance that no route exceeds once it has left the start."""
-        ground, start = self.sought.ground, self.sought.start
-        bounds_m = [ground.clearance_m(Point(target)) + self.sought.snap_m for target in self.sought.targets]
-        start_m = ground.clearance_m(Point(start))
-        for a, b in pairwise((start, *self.sought.targets)):
-            place = self.sought.narrowest_place(a, b)
-            if place is not None and (a is not start or place.clearance_m < start_m - _ALL_M):
-                bounds_m.append(place.clearance_m)
-        return min(*bounds_m, ground.bounds.bounds[2] - ground.bounds.bounds[0])
+        return widest_drawn_m(self.sought, beside_m)
 
     def _other_search(self, required_m: float, enough_m: float) -> RouteSearch:
         """Return what looks for a route at a clearance that was not asked for: one route is fitted to it, and given up sooner."""

@@ -142,3 +142,15 @@ def test_tours_take_less_too_and_repairs_never_do() -> None:
     assert 1.5 < less.clearance_m < 2.5
     with pytest.raises(RequestError, match="accepts_less True: expected none"):
         RepairMission(accepts_less=True)
+
+
+@pytest.mark.parametrize("allowance_m", [0.0, 0.3])
+def test_with_a_corner_allowance_the_widest_is_the_most_that_can_be_asked(allowance_m: float) -> None:
+    """It was 97 % of it: more could be asked than the widest kept."""
+    widest = plan(gate(), replace(THROUGH, widest=True, corner_allowance_m=allowance_m))
+    most_m = widest.asked_m - allowance_m
+    assert most_m == pytest.approx(2.5 - allowance_m, abs=0.03)
+    asked = plan(gate(), replace(THROUGH, clearance_m=most_m, corner_allowance_m=allowance_m))
+    assert asked.asked_m == pytest.approx(widest.asked_m)
+    with pytest.raises(NoRouteError):
+        plan(gate(), replace(THROUGH, clearance_m=most_m + 0.03, corner_allowance_m=allowance_m))

@@ -7,7 +7,7 @@ import random
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from pyproj import Proj
@@ -15,12 +15,19 @@ from shapely import LineString, Point, Polygon
 from typer.testing import CliRunner
 
 from mavlink_bridge.cli import plan as plan_command
+from mavlink_bridge.cli import planning_progress
 from mavlink_bridge.cli.app import app
 from mavlink_bridge.cli.failing import exit_code_of
+from mavlink_bridge.cli.timed_plan import timed_plan
 from missions.errors import FenceError, PlanCheckError
 from missions.fence import CircleZone, Fence, ZoneKind
 from missions.formats import read_fence, read_mission, read_situation
 from missions.geo import LatLon, distance_m
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from missions.planned import Plan
 
 START, TARGET = "40.071374,-105.229930", "40.0720926,-105.2286152"
 KEYS = {
@@ -553,7 +560,7 @@ def test_not_a_number_in_a_log_is_still_one_document(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("json_output", [False, True])
 def test_a_defect_says_how_to_report_it(fields: Path, monkeypatch, json_output: bool) -> None:
-    def break_down(*_: object) -> None:
+    def break_down(*_: object, **__: object) -> None:
         raise ZeroDivisionError("by nothing")
 
     monkeypatch.setattr(plan_command, "timed_plan", break_down)
@@ -571,13 +578,35 @@ def test_a_defect_says_how_to_report_it(fields: Path, monkeypatch, json_output: 
 
 
 def test_an_interrupt(fields: Path, monkeypatch) -> None:
-    def interrupt(*_: object) -> None:
+    def interrupt(*_: object, should_stop: Callable[[], bool]) -> None:
+        assert not should_stop()
         raise KeyboardInterrupt
 
     monkeypatch.setattr(plan_command, "timed_plan", interrupt)
     found = failure("--fence", fields / "yard-fence.waypoints")
     assert (found["exit_code"], found["error"]) == (130, "Interrupted")
-    assert "left as it was" in found["message"]
+    assert found["message"] == "interrupted while planning; nothing was written"
+
+
+def test_a_plan_that_takes_long_shows_so(fields: Path, monkeypatch) -> None:
+    def take_long(*given: object, should_stop: Callable[[], bool]) -> tuple[Plan, float]:
+        monkeypatch.setattr(planning_progress, "_AFTER_S", 0.0)
+        return timed_plan(*given, should_stop=should_stop)
+
+    monkeypatch.setattr(plan_command, "timed_plan", take_long)
+    words = (
+        "--fence",
+        fields / "yard-fence.waypoints",
+        "--start",
+        START,
+        "--target",
+        TARGET,
+        "--clearance",
+        "max",
+    )
+    assert "planning the widest route" in run(*words, "-v").stderr
+    assert "planning the widest route" not in run(*words, "-v", "-q").stderr
+    assert "planning" not in run(*words).stderr
 
 
 def test_every_error_has_its_exit_code() -> None:

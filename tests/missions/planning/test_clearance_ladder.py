@@ -152,5 +152,5 @@ def test_with_a_corner_allowance_the_widest_is_the_most_that_can_be_asked(allowa
     assert most_m == pytest.approx(2.5 - allowance_m, abs=0.03)
     asked = plan(gate(), replace(THROUGH, clearance_m=most_m, corner_allowance_m=allowance_m))
     assert asked.asked_m == pytest.approx(widest.asked_m)
-    with pytest.raises(NoRouteError):
+    with pytest.raises(NoRouteError, match="no route keeps"):
         plan(gate(), replace(THROUGH, clearance_m=most_m + 0.03, corner_allowance_m=allowance_m))

@@ -30,7 +30,7 @@ def start_near_text(distance_m: float, asked_m: float, kept_m: float) -> str:
     """Return a sentence on a start that is nearer to a fence than what is asked for, and what is kept as the vehicle leaves it."""
     return (
         f"the start is {metres(distance_m)} from a fence, too near to keep {asked_m:g} m: "
-        f"leaving it, the rover keeps at least {metres(max(kept_m, 0.0))}"
+        f"while leaving it, the rover keeps at least {metres(max(kept_m, 0.0))}"
     )
 
 

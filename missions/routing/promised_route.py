@@ -198,7 +198,7 @@ class PromisedRoute:
             return why
         widest = self.widest(asked)
         if isinstance(widest, NoRoute):
-            text = f"{why.text}, and none of those tried can be driven by this vehicle at any clearance"
+            text = f"{why.text}, and this vehicle can drive none of the routes tried, at any clearance"
             return replace(why, text=text, advice=_NOTHING_ADVICE)
         promised_m = widest[0].promised_m
         facts = {**why.facts, "widest_m": round(promised_m, 3)}
@@ -209,7 +209,7 @@ class PromisedRoute:
             return replace(why, text=text, facts=facts)
         return replace(
             why,
-            text=f"{text} ({metres(place.clearance_m)} drawn){place.where}",
+            text=f"{text} ({metres(place.clearance_m)} along straight legs){place.where}",
             facts={**facts, "widest_drawn_m": round(place.clearance_m, 3)},
         )
 

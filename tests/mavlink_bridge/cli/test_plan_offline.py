@@ -156,7 +156,7 @@ class TestRecordedLogs:
     def test_a_rover_nearer_than_the_clearance_leads_away(self, logs: Path, drawn: tuple) -> None:
         found = document("--log", logs / "position-target-yard.tlog", "--clearance", 3, *drawn)
         assert 2.68 <= found["drawn_clearance_m"] <= 2.71
-        assert any("leaving it, the rover keeps" in warning for warning in found["warnings"])
+        assert any("while leaving it, the rover keeps" in warning for warning in found["warnings"])
 
     def test_the_changed_fence_counts(self, logs: Path, drawn: tuple) -> None:
         ends = ("--start", "40.0715,-105.2286", "--target", TARGET)
@@ -217,7 +217,7 @@ class TestRecordedLogs:
     @pytest.mark.parametrize("name", ["guided-maze", "position-target-yard", "fence-change-yard"])
     def test_the_defaults_promise_something(self, logs: Path, name: str) -> None:
         found = document("--log", logs / f"{name}.tlog")
-        leads_away = any("leaving it, the rover keeps" in warning for warning in found["warnings"])
+        leads_away = any("while leaving it, the rover keeps" in warning for warning in found["warnings"])
         at_start_m = found["start_clearance_m"]
         assert found["clearance_m"] == 2.5
         assert at_start_m is None or (leads_away and 1.2 < at_start_m < 2.5)

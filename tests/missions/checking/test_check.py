@@ -178,7 +178,9 @@ def test_a_start_near_a_fence_has_to_keep_what_it_has():
     assert near.holds
     assert 0.4 < near.legs[0].asked_m < 0.8
     kept_m = near.legs[0].driven_clearance_m
-    assert any(f"leaving it, the rover keeps at least {kept_m:.2f} m" in warning for warning in near.warnings)
+    assert any(
+        f"while leaving it, the rover keeps at least {kept_m:.2f} m" in warning for warning in near.warnings
+    )
     nearer = check_mission(mission_of((39.6, 60.0)), situation, Request(place(38.8, 10.0), clearance_m=2.0))
     assert [leg.name for leg in nearer.broken] == ["start → 1"]
 

@@ -127,7 +127,7 @@ def test_where_no_route_can_be_driven_the_error_says_what_the_widest_keeps() -> 
     situation = facing(situation_of(box(IN, -60, -60, 60, 60), *walls, WP_SPEED=5.0), -50, 0, 90.0)
     with pytest.raises(
         NoRouteError,
-        match=r"no route keeps 2.4 m while driving; the widest keeps 2.2\d m \(2.50 m drawn\), narrowest between "
+        match=r"no route keeps 2.4 m while driving; the widest keeps 2.2\d m \(2.50 m along straight legs\), narrowest between "
         "exclusion polygon . and exclusion polygon . at ",
     ) as caught:
         plan(situation, Request(targets=(place(50, 0),), clearance_m=2.4))
@@ -254,7 +254,7 @@ class TestStarts:
             situation_of(FIELD, WALL, WP_SPEED=2.0), -8, 0, 90.0
         )  # 3 m from the wall, facing it
         result = plan(situation, Request(targets=(place(50, 0),), clearance_m=2.5))
-        assert any("leaving it, the rover keeps" in warning for warning in result.warnings)
+        assert any("while leaving it, the rover keeps" in warning for warning in result.warnings)
         start_m = result.ground.clearance_m(Point(result.ground.frame.to_local(result.start)))
         assert result.drawn_clearance_m >= min(start_m, 2.5) - 0.02
         assert result.clearance_m == 2.5
@@ -296,7 +296,7 @@ class TestEscape:
         assert math.dist(first, second) == pytest.approx(7.3 if allowance_m is None else 7.0, abs=0.1)
         rest = LineString(chart.points(result.path[1:]))
         assert rest.distance(chart.zone_line(block)) >= 2.0 - MERCATOR_TOLERANCE_M
-        assert any("drives out of it" in text for text in result.info)
+        assert any("leg 1 drives into it" in text for text in result.info)
 
     def test_not_across_other_forbidden_ground(self) -> None:
         ring = [
@@ -385,7 +385,7 @@ def test_a_gap_that_no_clearance_lets_this_vehicle_through_is_told(monkeypatch: 
     walls = [box(OUT, -3, -60, 3, -2.5), box(OUT, -3, 2.5, 3, 60)]
     situation = facing(situation_of(box(IN, -60, -60, 60, 60), *walls, WP_SPEED=5.0), -50, 0, 90.0)
     with pytest.raises(
-        NoRouteError, match=r"the widest keeps 2.50 m.*, and none .* at any clearance"
+        NoRouteError, match=r"the widest keeps 2.50 m.*, and this vehicle can drive none .* at any clearance"
     ) as caught:
         plan(situation, Request(targets=(place(50, 0),), clearance_m=2.4))
     assert "widen the narrowest place" in str(caught.value.details["advice"])

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 def lead_away_remarks(found: DrivenRoute, asked: Promise) -> list[str]:
     """Return remarks on how near the start is to a fence, and what the route does about it."""
-    if not found.lead_away or found.start_clearance_m < 0:
+    is_limited = found.lead_away_m is not None and found.lead_away_m < asked.required_m
+    if not (found.lead_away or is_limited) or found.start_clearance_m < 0:
         return []
     if found.lead_away_m is None:
         return [start_near_text(found.start_clearance_m, asked.drawn_m, found.start_clearance_m)]

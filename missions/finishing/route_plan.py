@@ -188,9 +188,7 @@ def _start_remarks(ground: Ground, start: LatLon, vehicle: Vehicle) -> list[str]
 
 
 def _start_m(band: Envelope, lines: Lines, ground: Ground, asked: Promise) -> float | None:
-    """Return what is promised while the route leads away from the start, where that is less than beyond."""
-    if not lines.lead_away:
-        return None
+    """Return what is promised while the vehicle turns at its start and leads away from it, where that is less than beyond."""
     driven_m = band.clearances_m(ground.edge)[band.waypoints <= lines.lead_away].min(initial=np.inf)
     if driven_m >= asked.required_m - _ROUNDING_M:
         return None
@@ -200,7 +198,7 @@ def _start_m(band: Envelope, lines: Lines, ground: Ground, asked: Promise) -> fl
 def _check_band(ground: Ground, lines: Lines, band: Envelope, found: DrivenRoute, asked: Promise) -> None:
     """Refuse a plan whose band breaks the promise."""
     clearances_m = band.clearances_m(ground.edge)
-    leading = (band.waypoints <= lines.lead_away) & (lines.lead_away > 0)
+    leading = band.waypoints <= lines.lead_away  # the start's own pieces, where no leg leads away
     near_m = asked.required_m if found.lead_away_m is None else found.lead_away_m
     for name, part, least_m in (
         ("lead-away", leading, near_m),

@@ -29,7 +29,7 @@ from missions.fitting.local_search import CRAWL_MEASUREMENTS, FIT_MEASUREMENTS
 from missions.ground.legs import reserve_m
 from missions.routing.drawn_route import widest_drawn_m
 from missions.routing.no_route import NoRoute, NoRouteKind
-from missions.routing.route_search import SLOW_MPS, DrivenRoute, RouteSearch
+from missions.routing.route_search import SLOW_MPS, DrivenRoute, Known, RouteSearch
 from missions.words import metres
 
 if TYPE_CHECKING:
@@ -80,6 +80,7 @@ class PromisedRoute:
     vehicle: Vehicle
     heading_deg: float | None
     _tried: dict[float, RouteSearch] = field(default_factory=dict, init=False)
+    _known: Known = field(default_factory=Known, init=False)
 
     def find(self, asked: Promise) -> Found | NoRoute:
         """Return a route that keeps at least what is asked, and what is promised for it; else why there is none."""
@@ -142,7 +143,9 @@ class PromisedRoute:
     def _climbed(self, best: DrivenRoute, error_m: float) -> DrivenRoute:
         """Return a route that keeps more, aimed at the next steps above what one keeps, as far as each keeps more than the last."""
         failed_m = min((tried_m for tried_m in self._tried if tried_m > _kept_m(best) + _ALL_M), default=0.0)
-        while (required_m := error_m + (_steps(_kept_m(best) - error_m) + 1) * STEP_M) < failed_m - _ALL_M:
+        while (
+            required_m := round(error_m + (_steps(_kept_m(best) - error_m) + 1) * STEP_M, 9)
+        ) < failed_m - _ALL_M:
             found = self._widest_at(required_m, briefly=True)
             if isinstance(found, NoRoute) or _kept_m(found) <= _kept_m(best):
                 break
@@ -156,7 +159,7 @@ class PromisedRoute:
         enough_m = asked.required_m
         is_held = isinstance(first, NoRoute) and first.is_held
         quick = [first]
-        for required_m in (enough_m + step * STEP_M for step in _STEPS_UP):
+        for required_m in (round(enough_m + step * STEP_M, 9) for step in _STEPS_UP):
             if is_held or _is_good(quick[-1]):
                 break
             quick.append(self._other_search(required_m, enough_m).find(briefly=True))
@@ -187,10 +190,10 @@ class PromisedRoute:
         least = self._search(from_m, 0.0)
 
         def is_other(step: int) -> bool:
-            return self._search(from_m + step * STEP_M, 0.0).begins_otherwise(least)
+            return self._search(round(from_m + step * STEP_M, 9), 0.0).begins_otherwise(least)
 
         first = bisect.bisect_left(range(1, _OTHERWISE_STEPS), x=True, key=is_other) + 1
-        return [from_m + step * STEP_M for step in (first, first + 1)]
+        return [round(from_m + step * STEP_M, 9) for step in (first, first + 1)]
 
     def _compared(self, why: NoRoute, asked: Promise) -> NoRoute:
         """Return why there is no route, with what the widest one keeps while this vehicle drives it."""
@@ -226,14 +229,15 @@ class PromisedRoute:
         return replace(self._search(required_m, enough_m), measurements=_OTHER_MEASUREMENTS)
 
     def _search(self, required_m: float, enough_m: float) -> RouteSearch:
-        return RouteSearch(self.sought, required_m, self.vehicle, self.heading_deg, enough_m)
+        return RouteSearch(self.sought, required_m, self.vehicle, self.heading_deg, enough_m, self._known)
 
 
 def _downwards(most_m: float, error_m: float) -> Iterator[float]:
     """Return what is aimed at for the widest route, most first: the widest, then whole steps of what is promised below it."""
     yield math.floor(100 * most_m) / 100
     steps = _steps(most_m - error_m)
-    yield from (error_m + (steps - down) * STEP_M for down in _STEPS_DOWN if steps > down)
+    # Rounded, so that what comes to the same is the same, and is fitted once.
+    yield from (round(error_m + (steps - down) * STEP_M, 9) for down in _STEPS_DOWN if steps > down)
 
 
 def _steps(promised_m: float) -> int:

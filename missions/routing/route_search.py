@@ -130,6 +130,17 @@ class _Attempt:
         return not self.is_enough and self.measured.worst_index <= AT_START
 
 
+@dataclass(eq=False)
+class Known:
+    """What searches for one vehicle on one field share, whatever is required: nothing is drawn or fitted twice."""
+
+    drawn: dict[float, DrawnRoutes] = field(default_factory=dict)
+    """By the clearance of the drawn lines."""
+    fitted: dict[tuple[Drawing, int, int], tuple[Drawing, Measured, int]] = field(default_factory=dict)
+    """By the lines, and the measurements taken before and allowed; with those taken after."""
+    departures: list[Departure] | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class RouteSearch:
     """What is looked for.
@@ -146,6 +157,8 @@ class RouteSearch:
         Where it faces at the start, clockwise from north; None is along the first leg.
     enough_m : float, optional
         What is enough of it, where what is aimed at cannot be kept all the way. Default: all of it.
+    known : Known, optional
+        What other searches for the vehicle on the field know already.
     any_speed : bool
         Whether a slow route does, so that no quicker one is sought.
     measurements : int
@@ -157,9 +170,9 @@ class RouteSearch:
     vehicle: Vehicle
     heading_deg: float | None
     enough_m: float | None = None
+    known: Known = field(default_factory=Known)
     any_speed: bool = False
     measurements: int = MOST_MEASUREMENTS
-    _drawn: dict[float, DrawnRoutes] = field(default_factory=dict, init=False)
 
     def find(self, *, briefly: bool = False) -> DrivenRoute | NoRoute:
         """Find the quickest of the routes tried whose band keeps enough; ``briefly`` tries the first ones only."""
@@ -297,15 +310,17 @@ class RouteSearch:
 
     def _drawn_at(self, band_m: float) -> DrawnRoutes:
         """Return the routes drawn with room for a band; what is free at it is computed once."""
-        if band_m not in self._drawn:
-            clearance_m = self.required_m + band_m + self._reserve_m
-            self._drawn[band_m] = DrawnRoutes.at(self.sought, clearance_m)
-        return self._drawn[band_m]
+        clearance_m = self.required_m + band_m + self._reserve_m
+        if clearance_m not in self.known.drawn:
+            self.known.drawn[clearance_m] = DrawnRoutes.at(self.sought, clearance_m)
+        return self.known.drawn[clearance_m]
 
     def _fit(self, fitting: Fitting, route: Route, speed_mps: float | None = None) -> _Attempt:
-        drawing, measured = fitting.fit(
-            tuple(replace(point, speed_mps=speed_mps) for point in self._drawing(route))
-        )
+        drawn_lines = tuple(replace(point, speed_mps=speed_mps) for point in self._drawing(route))
+        key = (drawn_lines, fitting.measurements, fitting.most_measurements)
+        if key not in self.known.fitted:
+            self.known.fitted[key] = (*fitting.fit(drawn_lines), fitting.measurements)
+        drawing, measured, fitting.measurements = self.known.fitted[key]
         departing_m = self._least_departing_m(route)
         kept, kept_m, lead_m = measured, self.required_m, departing_m
         if not measured.is_enough:
@@ -396,9 +411,13 @@ class RouteSearch:
         """Whether the vehicle's turning at this start leaves less than is required."""
         return 0 <= self.departure_m < self.required_m
 
-    @cached_property
+    @property
     def _departures(self) -> list[Departure]:
-        return departures(self.sought.ground, self.vehicle, self.sought.start, self.heading_deg)
+        if self.known.departures is None:
+            self.known.departures = departures(
+                self.sought.ground, self.vehicle, self.sought.start, self.heading_deg
+            )
+        return self.known.departures
 
     def _departing_routes(self, band_m: float) -> Iterator[Route]:
         """Return routes by the first legs that the vehicle can drive as it faces, the shortest first."""

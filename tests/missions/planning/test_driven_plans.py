@@ -264,6 +264,24 @@ class TestStarts:
         rest = result.envelope.waypoints > 2
         assert result.envelope.clearances_m(result.ground.edge)[rest].min() >= 2.5
 
+    @pytest.mark.parametrize(("north_m", "heading_deg"), [(2.4, 110.0), (2.6, 140.0), (2.8, 210.0)])
+    def test_turning_at_the_start_is_told_apart_also_on_a_straight_way_to_the_target(
+        self, north_m: float, heading_deg: float
+    ) -> None:
+        """No leg leads away there: the fitted lines were finished, and then refused as a defect."""
+        field = situation_of(box(IN, -60, 0, 60, 120))
+        result = plan(
+            facing(field, 0, north_m, heading_deg), Request(targets=(place(0, 60),), clearance_m=2.0)
+        )
+        assert result.clearance_m == 2.0
+        assert result.start_clearance_m is not None
+        assert len(result.items) == 1
+        near_m = band_of(result, heading_deg).distance(fence_line(result))
+        assert result.start_clearance_m - 0.02 <= near_m < 2.0
+        assert any("turning there" in warning for warning in result.warnings)
+        rest = result.envelope.waypoints > 0
+        assert result.envelope.clearances_m(result.ground.edge)[rest].min() >= 2.0
+
     def test_the_widest_route_tells_apart_what_the_start_leaves(self) -> None:
         """From 4 m before a wall, facing it, no more than the turn leaves can be kept; beyond there is more room."""
         situation = facing(situation_of(FIELD, WALL, WP_SPEED=2.0), -9, 0, 90.0)

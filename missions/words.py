@@ -28,6 +28,14 @@ def less_text(asked: str, promised_m: float) -> str:
     )
 
 
+def start_near_text(distance_m: float, asked_m: float, kept_m: float) -> str:
+    """Return a sentence on a start that is nearer to a fence than what is asked for, and what is kept as the vehicle leaves it."""
+    return (
+        f"the start is {metres(distance_m)} from a fence, too near to keep {asked_m:g} m: "
+        f"while leaving it, the rover keeps at least {metres(max(kept_m, 0.0))}"
+    )
+
+
 def left_out_text(count: int, most: int) -> str:
     """Return a sentence on the items of a route that were left out, because the vehicle holds no more than ``most``."""
     return f"{counted(count, 'route item')} left out to fit the vehicle's limit of {most}"

@@ -16,7 +16,7 @@ from missions.errors import InvalidPositionError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from pyproj import Geod
+    from geographiclib.geodesic import Geodesic
 
 
 class LatLon(NamedTuple):
@@ -133,12 +133,24 @@ def rounded(position: LatLon) -> LatLon:
 
 def distance_m(a: LatLon, b: LatLon) -> float:
     """Return the geodesic distance in metres."""
-    return float(_geod().inv(a.lon_deg, a.lat_deg, b.lon_deg, b.lat_deg)[2])
+    return distance_and_bearing(a, b)[0]
 
 
 def bearing_deg(a: LatLon, b: LatLon) -> float:
     """Return the geodesic's bearing at ``a``, in degrees clockwise from north, 0 to 360."""
-    return float(_geod().inv(a.lon_deg, a.lat_deg, b.lon_deg, b.lat_deg)[0]) % 360.0
+    return distance_and_bearing(a, b)[1]
+
+
+def distance_and_bearing(a: LatLon, b: LatLon) -> tuple[float, float]:
+    """Return the geodesic distance in metres, and the bearing at ``a`` in degrees clockwise from north, 0 to 360 (0 where both are one)."""
+    found = _wgs84().Inverse(*a, *b)
+    return (found["s12"], found["azi1"] % 360.0) if found["s12"] else (0.0, 0.0)
+
+
+def destination(start: LatLon, away_m: float, along_deg: float) -> LatLon:
+    """Return the place that a geodesic reaches after a distance in metres, at a bearing from ``start`` in degrees clockwise from north."""
+    found = _wgs84().Direct(*start, along_deg, away_m)
+    return LatLon(found["lat2"], wrap_lon_deg(found["lon2"]))
 
 
 def heading_vector(heading_deg: float) -> Vector:
@@ -158,7 +170,8 @@ def wrap_lon_deg(lon_deg: float) -> float:
 
 
 @cache
-def _geod() -> Geod:
-    from pyproj import Geod  # noqa: PLC0415 - 100 ms that a usage error need not wait for
+def _wgs84() -> Geodesic:
+    # By the same author as PROJ's geodesics and equal to them within nanometres: loaded in 1 ms where pyproj takes 90 ms of processor time.
+    from geographiclib.geodesic import Geodesic  # noqa: PLC0415 - a usage error need not wait for it
 
-    return Geod(ellps="WGS84")
+    return Geodesic.WGS84

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import sys
+from copy import copy
 from difflib import get_close_matches
+from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -46,7 +48,8 @@ def _without_types(params: list[Any]) -> list[Any]:
         if getattr(param, "is_flag", False) and param.metavar is None:
             param.metavar = ""
         if isinstance(param, TyperArgument):
-            param.display_type_rich = lambda ctx: None  # type: ignore[method-assign] # noqa: ARG005
+            param.type = copy(param.type)  # some are shared
+            param.type.get_metavar = lambda param, ctx: ""  # type: ignore[method-assign] # noqa: ARG005
         param._get_number_range_help_str = lambda: None  # noqa: SLF001
     return params
 
@@ -102,6 +105,7 @@ class Commands(TyperGroup):
         sys.exit(code)
 
 
+@cache  # programs and tests call many commands in one process
 def load(name: str) -> Any:  # noqa: ANN401 - a command of the parser library that typer uses
     """Return a command, with its options."""
     single = typer.Typer(add_completion=False, rich_markup_mode="markdown", pretty_exceptions_enable=False)

@@ -38,7 +38,17 @@ if TYPE_CHECKING:
     from mavlink_bridge.cli.options.doctor import DoctorOptions
     from missions.firmware import Firmware
 
-_NEEDED = ("numpy", "shapely", "pyproj", "pymavlink", "pyserial", "typer", "rich", "platformdirs")
+_NEEDED = (
+    "numpy",
+    "shapely",
+    "geographiclib",
+    "pyproj",
+    "pymavlink",
+    "pyserial",
+    "typer",
+    "rich",
+    "platformdirs",
+)
 _WANTED = {"matplotlib": "pictures (.png, .svg, .pdf)", "plotly": "interactive pages (.html)"}
 _START, _TARGET = (40.071374, -105.229930), (40.0726316, -105.2290497)
 _CLEARANCE_M = 2.5  # of the test plan, for which `SHORTEST_M` holds

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from missions.items import MissionItem
 
 _FAR_M = 1e6  # farther than any fence: stands for no edge at all
+_ROUNDED_M = 1e-6  # more than distances are rounded by
 _CIRCLE_SEGMENTS = 64  # chords a quarter turn: they leave a 50 m circle by 4 mm
 
 
@@ -58,6 +59,7 @@ class FenceArea:
         self._edge = self._forbidden.boundary
         shapely.prepare(self._forbidden)
         shapely.prepare(self._edge)
+        self._measured = 0j, -math.inf
 
     @property
     def is_empty(self) -> bool:
@@ -70,7 +72,14 @@ class FenceArea:
             return math.inf
         point = Point(point_m.real, point_m.imag)
         distance_m = float(shapely.distance(self._edge, point))
-        return -distance_m if self._forbidden.contains(point) else distance_m
+        clearance_m = -distance_m if self._forbidden.contains(point) else distance_m
+        self._measured = point_m, clearance_m
+        return clearance_m
+
+    def is_beyond(self, least_m: float, point_m: complex) -> bool:
+        """Return whether a point's clearance is known to be more, near where it was measured last: then it need not be measured."""
+        measured_at_m, clearance_m = self._measured
+        return clearance_m - abs(point_m - measured_at_m) > least_m + _ROUNDED_M
 
 
 def bounded_fence(items: Sequence[MissionItem]) -> Fence:

@@ -18,7 +18,7 @@ from missions.formats.feature_writing import features_of
 from missions.formats.features import Feature, Role, Shape
 from missions.formats.numbers import number, swapped_hint
 from missions.formats.xml_tree import parse_xml
-from missions.geo import LatLon, checked_lat_lon
+from missions.geo import LatLon, checked_lat_lon, destination
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -221,14 +221,10 @@ def _coordinates(positions: Iterable[LatLon]) -> str:
 
 def _drawing(zone: Feature) -> Feature:
     """Return a polygon that draws a circle: around an exclusion, inside an inclusion."""
-    from pyproj import Geod  # noqa: PLC0415 - slow to come, only for circles
-
     radius_m = float(str(zone.properties["radius_m"]))
     if zone.properties["role"] == Role.EXCLUSION:
         radius_m /= math.cos(math.pi / _CIRCLE_CORNERS)
-    geod, centre = Geod(ellps="WGS84"), zone.position
-    bearings_deg = [360 * corner / _CIRCLE_CORNERS for corner in range(_CIRCLE_CORNERS)]
-    ends = (geod.fwd(centre.lon_deg, centre.lat_deg, bearing, radius_m) for bearing in bearings_deg)
-    ring = tuple(LatLon(lat_deg, lon_deg) for lon_deg, lat_deg, _ in ends)
+    bearings_deg = (360 * corner / _CIRCLE_CORNERS for corner in range(_CIRCLE_CORNERS))
+    ring = tuple(destination(zone.position, radius_m, along_deg) for along_deg in bearings_deg)
     properties = {"role": Role.DRAWING.value, "style": zone.properties["role"]}
     return Feature(Shape.POLYGON, (ring,), properties, (f"{zone.names[0]}, drawn",))

@@ -216,7 +216,7 @@ def test_sim_says_where_it_listens_and_ends_when_asked(fields):
         assert process.wait(60) == 0
 
 
-def test_demo_arrives_without_a_breach(tmp_path):
+def test_demo_arrives_without_a_breach_and_its_log_can_be_planned_from(tmp_path):
     begun_s = time.process_time()  # of this process: how busy the machine is does not count
     result = run("demo", "--out", str(tmp_path / "out"), "--speedup", "10", "--json")
     assert time.process_time() - begun_s < 60
@@ -231,12 +231,8 @@ def test_demo_arrives_without_a_breach(tmp_path):
     mission = read_situation(tmp_path / "out" / "mission.plan")
     assert mission.mission.value.items[-1].position == LatLon(40.0726316, -105.2290497)
     assert len(mission.fence.value.zones) == 9
-
-
-def test_the_log_of_a_demo_can_be_planned_from(tmp_path):
-    run("demo", "--out", str(tmp_path), "--speedup", "10", "--quiet")
-    start = f"{HOME.lat_deg},{HOME.lon_deg}"
-    result = run("plan", "--log", str(tmp_path / "demo.tlog"), "--start", start, "--clearance", "2", "--json")
+    start, log = f"{HOME.lat_deg},{HOME.lon_deg}", tmp_path / "out" / "demo.tlog"
+    result = run("plan", "--log", str(log), "--start", start, "--clearance", "2", "--json")
     document = json.loads(result.stdout)
     assert result.exit_code == 0
     assert document["fence"]["exclusion_circles"] == 2

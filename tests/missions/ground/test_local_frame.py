@@ -143,9 +143,22 @@ def test_a_line_of_no_length() -> None:
 
 @pytest.mark.parametrize("count", [0, 1, 2])
 def test_a_few_positions_are_an_array_too(count: int) -> None:
-    """One as well: some versions of pyproj take an array of one for a number."""
     frame = LocalFrame(LatLon(40.0, -105.0))
     places = [LatLon(40.001, -105.002), LatLon(39.999, -104.998)][:count]
     points = frame.to_local_array(places)
     assert points.shape == (count, 2)
     assert [LocalPoint(*point) for point in points.tolist()] == [frame.to_local(place) for place in places]
+
+
+@pytest.mark.parametrize("origin", [LatLon(40.0, -105.0), LatLon(-80.0, 180.0)])
+def test_many_positions_lie_where_each_by_itself_does(origin: LatLon) -> None:
+    """Many are placed by PROJ, few by GeographicLib: within nanometres the same."""
+    frame = LocalFrame(origin)
+    along_deg = np.linspace(0, 3600, 2500)
+    places = [away(origin, angle, 0.5 * turn) for turn, angle in enumerate(along_deg.tolist())]
+    points = frame.to_local_array(places)
+    assert points == pytest.approx(np.array([frame.to_local(place) for place in places]), abs=5e-9)
+    back = [frame.to_lat_lon(LocalPoint(*point)) for point in points[::100].tolist()]
+    assert [
+        GEOD.inv(*a[::-1], *b[::-1])[2] for a, b in zip(back, places[::100], strict=True)
+    ] == pytest.approx([0] * 25, abs=1e-8)

@@ -25,12 +25,13 @@ import numpy as np
 from shapely import Point
 
 from missions.drive_model import corner_forecast
+from missions.fitting import polyline
 from missions.fitting.cost import ENOUGH_M
 from missions.fitting.local_search import MOST_MEASUREMENTS, Fitting
 from missions.fitting.polyline import Drawing, DrawnPoint
 from missions.geo import rounded
 from missions.ground.legs import ROUNDING_RESERVE_M, reserve_m
-from missions.routing.departure import ROOM_M, departures
+from missions.routing.departure import ROOM_M, Departures
 from missions.routing.drawn_route import DrawnRoutes, Route
 from missions.routing.no_route import NoRoute
 from missions.routing.refusal import AT_START, block, refusal
@@ -40,7 +41,6 @@ if TYPE_CHECKING:
 
     from missions.fitting.cost import Measured
     from missions.geo import LocalPoint
-    from missions.routing.departure import Departure
     from missions.routing.drawn_route import Sought
     from missions.vehicle import Vehicle
 
@@ -54,6 +54,8 @@ LATER_MEASUREMENTS = 500
 """For each kind of route that is tried after the first ones. Chosen, not measured: it bounds the time until a refusal."""
 
 # Chosen, not measured, but the turn at the end of a first leg.
+_SLOW_SHARE = 1.6  # of the time at full speed: beyond it the lines that leave as they are drawn are tried beside those that turn in the open
+_OTHER_WAY_DEG = 45.0  # between first legs that leave the start another way
 _OTHER_WAYS = 5  # squares laid over refusing places before the search gives up
 # Missing at the start beyond what a slower, narrower band could win back: nothing else is tried
 _HELD_M = 0.05
@@ -96,6 +98,8 @@ class DrivenRoute:
         Whether that is all that was aimed at.
     cost_s : float
         The predicted time, and a little for each waypoint (`fitting.cost`).
+    is_slow : bool
+        Whether it takes much longer than its lines would at full speed, so that others may be quicker.
     """
 
     drawing: Drawing
@@ -107,6 +111,7 @@ class DrivenRoute:
     kept_m: float | None = None
     is_whole: bool = True
     cost_s: float = 0.0
+    is_slow: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +137,7 @@ class Known:
     """By the clearance of the drawn lines."""
     fitted: dict[tuple[Drawing, int, int], tuple[Drawing, Measured, int]] = field(default_factory=dict)
     """By the lines, and the measurements taken before and allowed; with those taken after."""
-    departures: list[Departure] | None = None
+    departures: Departures | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,6 +158,10 @@ class RouteSearch:
         What is enough of it, where what is aimed at cannot be kept all the way. Default: all of it.
     known : Known, optional
         What other searches for the vehicle on the field know already.
+    any_speed : bool
+        Whether a slow route does, so that no quicker one is sought.
+    measurements : int
+        For the first routes.
     """
 
     sought: Sought
@@ -161,6 +170,8 @@ class RouteSearch:
     heading_deg: float | None
     enough_m: float | None = None
     known: Known = field(default_factory=Known)
+    any_speed: bool = False
+    measurements: int = MOST_MEASUREMENTS
 
     def find(self, *, briefly: bool = False) -> DrivenRoute | NoRoute:
         """Find the quickest of the routes tried whose band keeps enough; ``briefly`` tries the first ones only."""
@@ -188,6 +199,15 @@ class RouteSearch:
         attempts = self._first_attempts if briefly else self._attempts
         driven = [one.driven for one in attempts if one.driven is not None]
         return max(driven, key=lambda one: (one.kept_m or 0.0, -one.cost_s), default=found)
+
+    def begins_otherwise(self, other: RouteSearch) -> bool:
+        """Return whether the shortest route leaves the start another way than that of another search, or leads away first where that does not."""
+        here, there = self._first_routes, other._first_routes
+        if isinstance(here, NoRoute) or isinstance(there, NoRoute):
+            return True
+        (route, _), (that, _) = here[0], there[0]
+        turn_deg = abs(_course_deg(route) - _course_deg(that))
+        return route.lead_away != that.lead_away or min(turn_deg, 360.0 - turn_deg) > _OTHER_WAY_DEG
 
     @cached_property
     def _attempts(self) -> list[_Attempt]:
@@ -231,9 +251,9 @@ class RouteSearch:
         if self._is_limited_by_start:
             # Lines that turn in the open are quicker than those that creep away, and to fit.
             attempts = self._until_found(self._departing(self._bands_m[1]))
-            if attempts and attempts[-1].is_enough:
+            if (driven := _found(attempts)) and (self.any_speed or not driven[-1][1].is_slow):
                 return attempts
-        fitting = self._fitting(MOST_MEASUREMENTS)
+        fitting = self._fitting(self.measurements)
         attempts.append(self._fit(fitting, routes[0]))
         is_shorter = routes[-1].length_m < _SHORTER_SHARE * routes[0].length_m
         if len(routes) > 1 and (is_shorter or not _found(attempts)):
@@ -318,6 +338,7 @@ class RouteSearch:
             kept_m,
             measured.is_enough,
             kept.cost_s,
+            kept.cost_s * self.vehicle.speed_mps > _SLOW_SHARE * polyline.distances_m(drawing)[-1],
         )
         enough_m = self.required_m if self.enough_m is None else self.enough_m
         return _Attempt(drawing, measured, driven, is_enough=kept_m >= min(enough_m, self.required_m))
@@ -378,9 +399,9 @@ class RouteSearch:
         """
         if self.sought.ground.clearance_m(Point(self.sought.start)) >= self.required_m + ROOM_M:
             return self.required_m
-        best_m = self._departures[0].kept_m
-        if best_m >= self.required_m + self._reserve_m:
+        if self._departures.any_keeps(self.required_m + self._reserve_m):
             return self.required_m
+        best_m = self._departures.best_first()[0].kept_m
         slack_m = max(_DEPARTURE_SLACK_M, _DEPARTURE_SLACK_SHARE * best_m)
         return min(self.required_m, best_m - 2 * self._reserve_m - slack_m)
 
@@ -390,9 +411,9 @@ class RouteSearch:
         return 0 <= self.departure_m < self.required_m
 
     @property
-    def _departures(self) -> list[Departure]:
+    def _departures(self) -> Departures:
         if self.known.departures is None:
-            self.known.departures = departures(
+            self.known.departures = Departures(
                 self.sought.ground, self.vehicle, self.sought.start, self.heading_deg
             )
         return self.known.departures
@@ -400,16 +421,15 @@ class RouteSearch:
     def _departing_routes(self, band_m: float) -> Iterator[Route]:
         """Return routes by the first legs that the vehicle can drive as it faces, the shortest first."""
         keeps_m = self.departure_m + self._reserve_m
+        drawn = self._drawn_at(band_m)
         routes = []
-        for departure in self._departures:
+        for departure in self._departures.best_first():
             if departure.kept_m < keeps_m:
                 break
-            onward = self._drawn_at(band_m).find(departure.there)
-            if (
-                isinstance(onward, NoRoute)
-                or onward.lead_away
-                or _turn_at_deg(self.sought.start, onward) > _MOST_TURN_DEG
-            ):
+            if not drawn.is_free(departure.there):
+                continue
+            onward = drawn.find(departure.there)
+            if isinstance(onward, NoRoute) or _turn_at_deg(self.sought.start, onward) > _MOST_TURN_DEG:
                 continue
             route = replace(
                 onward,
@@ -439,6 +459,12 @@ class RouteSearch:
 def _found(attempts: Sequence[_Attempt]) -> list[tuple[float, DrivenRoute]]:
     """Return the routes that were found, with what each costs."""
     return [(one.driven.cost_s, one.driven) for one in attempts if one.is_enough and one.driven is not None]
+
+
+def _course_deg(route: Route) -> float:
+    """Return where the first leg leads, clockwise from north."""
+    east_m, north_m = route.points[1] - route.points[0]
+    return math.degrees(math.atan2(east_m, north_m))
 
 
 def _turn_at_deg(start: LocalPoint, onward: Route) -> float:

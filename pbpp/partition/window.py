@@ -14,7 +14,7 @@ import numpy.typing as npt
 if TYPE_CHECKING:
     from pbpp.geometry import Floats
 
-    from .vertices import Ints, Vertices
+    from .vertices import Flags, Ints, Vertices
 
 ColumnT = TypeVar("ColumnT", npt.NDArray[np.intp], npt.NDArray[np.float64])
 
@@ -186,21 +186,9 @@ def patch_of(
     now = {(int(floor[one]), int(ceiling[one])): one for one in ends_with.tolist()}
     if were.keys() != now.keys():
         return None
-    numbers = np.full(len(floor), -1)
-    numbers[: len(opened)] = opened
-    there[dead] = True
-    free = np.flatnonzero(there)
     kept = [(one, were[edges]) for edges, one in now.items()]
-    for one, was in kept:
-        if numbers[one] < 0 and there[was]:
-            numbers[one] = was
-    is_taken = np.zeros(len(before.west), dtype=bool)
-    is_taken[numbers[numbers >= 0]] = True
-    free = free[~is_taken[free]]
-    unnumbered = np.flatnonzero(numbers < 0)
-    count = max(len(before.west), len(before.west) + len(unnumbered) - len(free))
-    free = np.append(free, np.arange(len(before.west), count))
-    numbers[unnumbered], dead = np.split(free, [len(unnumbered)])
+    there[dead] = True
+    numbers, dead, count = _numbered(opened, len(floor), kept, there)
     moved = []
     east_of = swept.east.copy()
     for one, was in kept:
@@ -221,6 +209,25 @@ def patch_of(
     after.floor[dead] = after.ceiling[dead] = floor[0]
     after.west[dead] = after.east[dead] = vertices.x[floor[0]]
     return Patch(window, numbers, np.arange(len(numbers)) >= len(opened), is_closed, moved, dead, after)
+
+
+def _numbered(opened: Ints, size: int, kept: list[tuple[int, int]], is_free: Flags) -> tuple[Ints, Ints, int]:
+    """Return the numbers of a window's blocks, those that are left without one, and how many there are in all.
+
+    Blocks that were open before keep theirs, those that are open at its end have the one known there, if it is free; the others take what is free.
+    """
+    numbers = np.full(size, -1)
+    numbers[: len(opened)] = opened
+    for one, was in kept:
+        if numbers[one] < 0 and is_free[was]:
+            numbers[one] = was
+    is_free[numbers[numbers >= 0]] = False
+    free = np.flatnonzero(is_free)
+    unnumbered = np.flatnonzero(numbers < 0)
+    count = len(is_free) + max(0, len(unnumbered) - len(free))
+    free = np.append(free, np.arange(len(is_free), count))
+    numbers[unnumbered], dead = np.split(free, [len(unnumbered)])
+    return numbers, dead, count
 
 
 def _with_values(column: ColumnT, count: int, numbers: Ints, values: ColumnT) -> ColumnT:

@@ -20,10 +20,10 @@ from matplotlib.path import Path as Outline
 from matplotlib.patheffects import Normal, Stroke
 from matplotlib.transforms import Affine2D, ScaledTranslation, Transform
 
-from missions.harmless import harmless
 from missions.picture import style
 from missions.picture.labels import place_labels
 from missions.picture.scene import polygons
+from missions.words import harmless
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -31,7 +31,7 @@ from missions.fitting.local_search import MOST_MEASUREMENTS, Fitting
 from missions.fitting.polyline import Drawing, DrawnPoint
 from missions.geo import rounded
 from missions.ground.legs import ROUNDING_RESERVE_M, reserve_m
-from missions.routing.departure import ROOM_M, departures
+from missions.routing.departure import ROOM_M, Departures
 from missions.routing.drawn_route import DrawnRoutes, Route
 from missions.routing.no_route import NoRoute
 from missions.routing.refusal import AT_START, block, refusal
@@ -41,7 +41,6 @@ if TYPE_CHECKING:
 
     from missions.fitting.cost import Measured
     from missions.geo import LocalPoint
-    from missions.routing.departure import Departure
     from missions.routing.drawn_route import Sought
     from missions.vehicle import Vehicle
 
@@ -138,7 +137,7 @@ class Known:
     """By the clearance of the drawn lines."""
     fitted: dict[tuple[Drawing, int, int], tuple[Drawing, Measured, int]] = field(default_factory=dict)
     """By the lines, and the measurements taken before and allowed; with those taken after."""
-    departures: list[Departure] | None = None
+    departures: Departures | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -400,9 +399,9 @@ class RouteSearch:
         """
         if self.sought.ground.clearance_m(Point(self.sought.start)) >= self.required_m + ROOM_M:
             return self.required_m
-        best_m = self._departures[0].kept_m
-        if best_m >= self.required_m + self._reserve_m:
+        if self._departures.any_keeps(self.required_m + self._reserve_m):
             return self.required_m
+        best_m = self._departures.best_first()[0].kept_m
         slack_m = max(_DEPARTURE_SLACK_M, _DEPARTURE_SLACK_SHARE * best_m)
         return min(self.required_m, best_m - 2 * self._reserve_m - slack_m)
 
@@ -412,9 +411,9 @@ class RouteSearch:
         return 0 <= self.departure_m < self.required_m
 
     @property
-    def _departures(self) -> list[Departure]:
+    def _departures(self) -> Departures:
         if self.known.departures is None:
-            self.known.departures = departures(
+            self.known.departures = Departures(
                 self.sought.ground, self.vehicle, self.sought.start, self.heading_deg
             )
         return self.known.departures
@@ -424,7 +423,7 @@ class RouteSearch:
         keeps_m = self.departure_m + self._reserve_m
         drawn = self._drawn_at(band_m)
         routes = []
-        for departure in self._departures:
+        for departure in self._departures.best_first():
             if departure.kept_m < keeps_m:
                 break
             if not drawn.is_free(departure.there):

@@ -10,7 +10,7 @@ from charts import FIELD, OUT, WALL, box, place, situation_of
 from missions.drive_model import envelope
 from missions.geo import LocalPoint
 from missions.ground.from_situation import ground_for
-from missions.routing.departure import LENGTHS_M, WAYS, departures
+from missions.routing.departure import LENGTHS_M, WAYS, Departures
 from missions.vehicle import Steering, Vehicle
 
 
@@ -23,7 +23,7 @@ def ground_of(*zones):
 def test_ways_all_round_the_one_that_keeps_most_first(heading_deg: float | None) -> None:
     ground = ground_of(FIELD, WALL)
     start = ground.frame.to_local(place(-9, 0))
-    found = departures(ground, Vehicle(), start, heading_deg)
+    found = Departures(ground, Vehicle(), start, heading_deg).best_first()
     assert len(found) == WAYS * len(LENGTHS_M)
     kept_m = [one.kept_m for one in found]
     assert kept_m == sorted(kept_m, reverse=True)
@@ -41,10 +41,10 @@ def test_ways_all_round_the_one_that_keeps_most_first(heading_deg: float | None)
 def test_facing_a_wall_the_best_way_turns_and_straight_on_is_the_worst() -> None:
     ground = ground_of(FIELD, WALL)
     start = ground.frame.to_local(place(-9, 0))
-    found = departures(ground, Vehicle(), start, 90.0)
+    found = Departures(ground, Vehicle(), start, 90.0).best_first()
     assert found[0].turn_deg > 45.0
     assert found[-1].kept_m < 0.0
-    free = departures(ground, Vehicle(), start, 270.0)
+    free = Departures(ground, Vehicle(), start, 270.0).best_first()
     assert free[0].turn_deg < 45.0
     assert free[0].kept_m > found[0].kept_m + 0.3
 
@@ -53,7 +53,7 @@ def test_a_vehicle_that_turns_on_the_spot_keeps_more() -> None:
     ground = ground_of(FIELD, WALL)
     start = ground.frame.to_local(place(-9, 0))
     best_m = [
-        departures(ground, Vehicle(steering=steering), start, 90.0)[0].kept_m
+        Departures(ground, Vehicle(steering=steering), start, 90.0).best_first()[0].kept_m
         for steering in (Steering.ACKERMANN, Steering.SKID)
     ]
     assert best_m[0] < best_m[1] - 0.3
@@ -67,5 +67,16 @@ def test_in_a_pen_no_way_keeps_anything() -> None:
         box(OUT, 3, -4, 4, 4),
     ]
     ground = ground_of(FIELD, *walls)
-    found = departures(ground, Vehicle(), LocalPoint(*ground.frame.to_local(place(0, 0))), 0.0)
+    found = Departures(ground, Vehicle(), LocalPoint(*ground.frame.to_local(place(0, 0))), 0.0).best_first()
     assert found[0].kept_m < 0.0
+
+
+def test_whether_one_keeps_enough_is_told_alike_whatever_was_asked_before() -> None:
+    ground = ground_of(FIELD, WALL)
+    start = ground.frame.to_local(place(-9, 0))
+    best_m = Departures(ground, Vehicle(), start, 90.0).best_first()[0].kept_m
+    ways = Departures(ground, Vehicle(), start, 90.0)
+    for clearance_m, one_keeps in ((0.0, True), (best_m, True), (best_m + 1e-9, False), (best_m, True)):
+        assert ways.any_keeps(clearance_m) is one_keeps
+    assert len(ways.best_first()) == WAYS * len(LENGTHS_M)
+    assert ways.best_first()[0].kept_m == best_m

@@ -3,8 +3,8 @@
 **What holds.** A route that keeps some clearance serves whoever asks for less. So where lines cannot be fitted to what is asked, or only to
 be driven slowly, they are fitted to more, step by step up to what the ground leaves, and the quickest counts that keeps what is asked; only
 where none do is it refused. The widest route is the one that keeps most of all that are looked at: from the widest clearance that lines can
-be drawn at downwards, and from the first that is found upwards, step by step, as long as more is kept. Where the start refuses, routes that
-begin otherwise are looked for: another way, or leading away first.
+be drawn at downwards; then the next steps above the best are asked for as anybody would ask, as long as there is a route. Where the start
+refuses, routes that begin otherwise are looked for: another way, or leading away first.
 
 That no more can be had than the widest keeps, that all up to it can, and that less clearance never takes longer, does not follow: for that all
 clearances would have to be fitted for each plan. docs/clearance-ladder.md counts the exceptions.

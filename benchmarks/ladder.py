@@ -197,15 +197,16 @@ def report(ladders: list[Ladder], step_m: float) -> str:
         ]
         lines.append(f"| {told:.0%} | {sum(counts)} | {sum(map(bool, counts))} |")
     lines += [f"| the most: {max(shares, default=0.0):.0%} | | |"]
-    lines += ["", "| planning (CPU) | median | p90 | max |", "|---|---|---|---|"]
+    usual_s = statistics.median([rung.planning_s for rung in planned] or [1.0])
+    lines += ["", "| CPU time, in medians of the planned rungs | median | p90 | max |", "|---|---|---|---|"]
     for name, some in (
         ("planned", planned),
         ("refused", refused),
         ("widest", [one.widest for one in ladders]),
     ):
-        times = sorted(rung.planning_s for rung in some) or [0.0]
+        times = [one / usual_s for one in sorted(rung.planning_s for rung in some) or [0.0]]
         lines.append(
-            f"| {name} | {statistics.median(times):.2f} s | {times[int(0.9 * (len(times) - 1))]:.2f} s | {times[-1]:.2f} s |"
+            f"| {name} | {statistics.median(times):.1f} | {times[int(0.9 * (len(times) - 1))]:.0f} | {times[-1]:.0f} |"
         )
     told = [
         f"- {place}, {names[kind]}: {'; '.join(texts[kind])}"

@@ -3,8 +3,8 @@
 **What holds.** A route that keeps some clearance serves whoever asks for less. So where lines cannot be fitted to what is asked, or only to
 be driven slowly, they are fitted to more, step by step up to what the ground leaves, and the quickest counts that keeps what is asked; only
 where none do is it refused. The widest route is the one that keeps most of all that are looked at: from the widest clearance that lines can
-be drawn at downwards, and from the first that is found upwards, step by step, as long as more is kept. Where the start refuses, routes that
-begin otherwise are looked for: another way, or leading away first.
+be drawn at downwards; then the next steps above the best are asked for as anybody would ask, as long as there is a route. Where the start
+refuses, routes that begin otherwise are looked for: another way, or leading away first.
 
 That no more can be had than the widest keeps, that all up to it can, and that less clearance never takes longer, does not follow: for that all
 clearances would have to be fitted for each plan. docs/clearance-ladder.md counts the exceptions.
@@ -42,10 +42,8 @@ if TYPE_CHECKING:
 STEP_M = 0.1
 """Between the clearances that lines are fitted to, where those asked for do not do."""
 
-# Chosen, not measured, as they bound the time until a refusal: steps below the widest that are looked at one after another, and how near the
-# best of them has to come to it so that the widest is not aimed at again with all that can be tried
 _STEPS_DOWN = (0, 2, 8, 32)
-_NEAR_TOP_M = 0.12
+"""Steps below the widest that are looked at one after another. Chosen, not measured: they bound the time until a refusal."""
 _STEPS_UP = (1, 3)
 """Steps above what is asked that are looked at first: nearly what is asked, and mostly they do."""
 _OTHERWISE_STEPS = (
@@ -84,13 +82,18 @@ class PromisedRoute:
 
     def find(self, asked: Promise) -> Found | NoRoute:
         """Return a route that keeps at least what is asked, and what is promised for it; else why there is none."""
+        found = self._fitted(asked)
+        if isinstance(found, DrivenRoute):
+            return _promised(asked, found), found
+        return found if found.is_held else self._compared(found, asked)
+
+    def _fitted(self, asked: Promise) -> DrivenRoute | NoRoute:
+        """Return a route that keeps at least what is asked; else why none was found."""
         direct = self._search(asked.required_m, asked.required_m)
         found = direct.find(briefly=True)
         if not _is_good(found) and (isinstance(found, DrivenRoute) or found.kind is NoRouteKind.CORNER):
             found = self._with_more(direct, found, asked)
-        if isinstance(found, DrivenRoute):
-            return _promised(asked, found), found
-        return found if found.is_held else self._compared(found, asked)
+        return found
 
     def widest(self, asked: Promise) -> Found | NoRoute:
         """Return the route that keeps most, and what is promised for it; else why there is none."""
@@ -99,7 +102,7 @@ class PromisedRoute:
             return most_m
         found = self._widest(most_m, asked.error_m, 0.0)
         if isinstance(found, DrivenRoute):
-            found = self._climbed(found, asked.error_m)
+            found = self._climbed(found, asked, most_m)
             return _promised(asked, found, is_widest=True), found
         return replace(found, advice=_NOTHING_ADVICE) if found.kind is NoRouteKind.CORNER else found
 
@@ -107,9 +110,7 @@ class PromisedRoute:
         """Return the route that keeps most, aimed at the widest that lines can be drawn for and, as far as it is enough, at less."""
         best: DrivenRoute | None = None
         why: NoRoute | None = None
-        levels_m = tuple(_downwards(most_m, error_m))
-        top_m = levels_m[0]
-        for required_m in (*levels_m, 0.0):
+        for required_m in (*_downwards(most_m, error_m), 0.0):
             if required_m < enough_m or (best is not None and _kept_m(best) >= required_m):
                 break
             found = self._widest_at(required_m, briefly=required_m > 0)
@@ -128,25 +129,15 @@ class PromisedRoute:
                         key=_kept_m,
                         default=least,
                     )
-        if why is not None and (best is None or _kept_m(best) < top_m - _NEAR_TOP_M):
-            whole = self._widest_at(top_m)
-            best = max(
-                (found for found in (best, whole) if isinstance(found, DrivenRoute)),
-                key=_kept_m,
-                default=None,
-            )
         if best is not None:
             return best
         assert why is not None
         return why
 
-    def _climbed(self, best: DrivenRoute, error_m: float) -> DrivenRoute:
-        """Return a route that keeps more, aimed at the next steps above what one keeps, as far as each keeps more than the last."""
-        failed_m = min((tried_m for tried_m in self._tried if tried_m > _kept_m(best) + _ALL_M), default=0.0)
-        while (
-            required_m := round(error_m + (_steps(_kept_m(best) - error_m) + 1) * STEP_M, 9)
-        ) < failed_m - _ALL_M:
-            found = self._widest_at(required_m, briefly=True)
+    def _climbed(self, best: DrivenRoute, asked: Promise, most_m: float) -> DrivenRoute:
+        """Return a route that keeps more, asked for as anybody would ask for the next steps, as far as there is one."""
+        while (required_m := _next_step_m(best, asked.error_m)) <= most_m:
+            found = self._fitted(replace(asked, promised_m=required_m - asked.error_m))
             if isinstance(found, NoRoute) or _kept_m(found) <= _kept_m(best):
                 break
             best = found
@@ -243,6 +234,11 @@ def _downwards(most_m: float, error_m: float) -> Iterator[float]:
 def _steps(promised_m: float) -> int:
     """Return how many whole steps a clearance has, rounding aside."""
     return math.floor(promised_m / STEP_M + 1e-6)
+
+
+def _next_step_m(found: DrivenRoute, error_m: float) -> float:
+    """Return what is aimed at to promise a step more than a route does."""
+    return round(error_m + (_steps(_kept_m(found) - error_m) + 1) * STEP_M, 9)
 
 
 def _is_good(found: DrivenRoute | NoRoute) -> bool:

@@ -13,6 +13,7 @@ from shapely import Point
 from missions.errors import NoRouteError, RequestError, TargetBlockedError
 from missions.planning.plan import plan
 from missions.request import GoTo, RepairMission, Tour
+from missions.routing import promised_route
 from missions.routing.no_route import NoRoute, NoRouteKind
 from missions.routing.promised_route import PromisedRoute
 from missions.routing.route_search import RouteSearch
@@ -131,6 +132,16 @@ def test_the_widest_is_no_less_than_what_was_found_for_more(monkeypatch: pytest.
     with pytest.raises(NoRouteError, match="the widest keeps"):
         plan(gate(), replace(THROUGH, clearance_m=2.4))
     assert len(asked) == len(set(asked))
+
+
+def test_the_widest_goes_on_to_what_can_be_asked_above_the_best_level_tried(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """In field 19 it promised 0.94 m, and 1 m could be asked for."""
+    whole = plan(gate(), replace(THROUGH, widest=True)).clearance_m
+    monkeypatch.setattr(promised_route, "_downwards", lambda *_: iter((1.8,)))
+    climbed = plan(gate(), replace(THROUGH, widest=True)).clearance_m
+    assert climbed == pytest.approx(whole, abs=0.1)
 
 
 def test_tours_take_less_too_and_repairs_never_do() -> None:

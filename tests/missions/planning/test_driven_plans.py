@@ -278,7 +278,7 @@ class TestStarts:
         assert len(result.items) == 1
         near_m = band_of(result, heading_deg).distance(fence_line(result))
         assert result.start_clearance_m - 0.02 <= near_m < 2.0
-        assert any("turning there" in warning for warning in result.warnings)
+        assert any("while leaving it, the rover keeps" in warning for warning in result.warnings)
         rest = result.envelope.waypoints > 0
         assert result.envelope.clearances_m(result.ground.edge)[rest].min() >= 2.0
 

@@ -23,7 +23,16 @@ from .subtract import subtracted
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-__all__ = ["FreeSpace", "Scene", "build_free_space", "parse_scene", "snapped", "with_obstacles"]
+__all__ = [
+    "FreeSpace",
+    "Scene",
+    "build_free_space",
+    "ground_box",
+    "loose_lines",
+    "parse_scene",
+    "snapped",
+    "tidied_rings",
+]
 
 GeometryT = TypeVar("GeometryT", bound=BaseGeometry)
 
@@ -74,7 +83,7 @@ class Scene:
         part = parse_rings([ring], "exclusion")[0]
         if self.origin_m.any():
             part = shapely.transform(part, lambda points: points - self.origin_m)
-        return replace(self, exclusions=np.array([*self.exclusions, part], dtype=object))
+        return replace(self, exclusions=np.append(self.exclusions, [part]))
 
     def without_exclusion(self, index: int) -> Scene:
         """Return the same fence without one of its exclusions."""
@@ -119,14 +128,14 @@ class FreeSpace:
         The distance in metres that it keeps from the fence.
     grown : (n,) array of shapely geometry
         The area that each exclusion takes away.
-    untidied : shapely geometry
+    untidied : shapely geometry, optional
         The same before tiny edges were taken out, which may turn slivers inside out.
     """
 
     polygons: tuple[Polygon, ...]
     clearance_m: float
     grown: Geometries
-    untidied: BaseGeometry
+    untidied: BaseGeometry | None = None
 
     @cached_property
     def geometry(self) -> MultiPolygon:
@@ -211,17 +220,16 @@ def build_free_space(
     ground = _ground(scene, clearance_m, rounded=rounded, reach=reach)
     obstacles = list(grown)
     if clearance_m > 0.0:
-        lines = np.array(_loose_lines(scene.inclusions), dtype=object)
+        lines = np.array(loose_lines(scene.inclusions), dtype=object)
         obstacles += list(grow(lines, clearance_m, rounded=rounded)) if len(lines) else []
     free = subtracted(ground, obstacles) if obstacles else ground
     return _tidied(free, clearance_m, grown)
 
 
-def with_obstacles(free: FreeSpace, added: Geometries) -> FreeSpace:
-    """Return free space without more grown exclusions, which come last."""
-    return _tidied(
-        subtracted(free.untidied, list(added)), free.clearance_m, np.concatenate((free.grown, added))
-    )
+def tidied_rings(rings: Geometries) -> Geometries:
+    """Return rings as those of free space are: without tiny edges, and none that encloses nothing."""
+    tidy = np.asarray(shapely.remove_repeated_points(rings, _TINY_EDGE_M), dtype=object)
+    return tidy[shapely.get_num_coordinates(tidy) >= _LEAST_RING]
 
 
 def _tidied(free: BaseGeometry, clearance_m: float, grown: Geometries) -> FreeSpace:
@@ -265,7 +273,7 @@ def snapped(free: FreeSpace) -> FreeSpace:
     """
     grid_m = _CLEAR_GRID_M if free.clearance_m > 0.0 else _GRID_M
     try:
-        tidy = shapely.set_precision(free.untidied, grid_m)
+        tidy = shapely.set_precision(free.geometry if free.untidied is None else free.untidied, grid_m)
     except shapely.GEOSException as error:
         raise InvalidGeometryError("the rings of free space do not fit together") from error
     if not shapely.is_valid(tidy):
@@ -282,7 +290,7 @@ def grow_exclusions(scene: Scene, clearance_m: float, *, rounded: bool = False) 
     return np.array(areas, dtype=object)
 
 
-def _loose_lines(inclusions: Geometries) -> list[BaseGeometry]:
+def loose_lines(inclusions: Geometries) -> list[BaseGeometry]:
     """Return the lines of self-crossing inclusions: a slit cut into one has no area, yet it is part of the fence."""
     parts = shapely.get_parts(
         inclusions[shapely.get_type_id(inclusions) == shapely.GeometryType.GEOMETRYCOLLECTION]
@@ -290,13 +298,18 @@ def _loose_lines(inclusions: Geometries) -> list[BaseGeometry]:
     return list(parts[shapely.get_dimensions(parts) == 1])
 
 
+def ground_box(scene: Scene) -> list[Point]:
+    """Return the south-west and the north-east corner of the exclusions where nothing else bounds the plane; none without any, or within inclusions."""
+    if len(scene.inclusions) or not len(scene.exclusions):
+        return []
+    west, south, east, north = shapely.total_bounds(scene.exclusions).tolist()
+    return [(west, south), (east, north)]
+
+
 def _ground(scene: Scene, clearance_m: float, *, rounded: bool, reach: Sequence[Point]) -> BaseGeometry:
     if scene.included is not None:
         return shrink(scene.included, clearance_m, rounded=rounded) if clearance_m > 0.0 else scene.included
-    corners = [np.asarray(reach, dtype=np.float64).reshape(-1, 2)]
-    if len(scene.exclusions):
-        corners.append(shapely.total_bounds(scene.exclusions).reshape(2, 2))
-    points = np.concatenate(corners)
+    points = np.array([*reach, *ground_box(scene)]).reshape(-1, 2)
     if not len(points):
         points = np.zeros((1, 2))
     # A shortest path stays in the convex hull of its ends and of what it turns around.

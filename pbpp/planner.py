@@ -27,7 +27,7 @@ from .errors import (
     StartBlockedError,
 )
 from .field import Field
-from .free_space import FreeSpace, Scene, grow_exclusions, parse_scene, with_obstacles
+from .free_space import Scene, grow_exclusions, parse_scene
 from .funnel import taut_path
 from .geometry import Floats, Point, Ring, parse_point, parse_points
 from .planned_path import PlannedPath, length_of, straightened
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from shapely.geometry import MultiPolygon
 
     from .clearance import Geometries
+    from .holes import Change
     from .partition.flat import Answer, Engine
 
 __all__ = ["Planner", "plan_path"]
@@ -162,9 +163,8 @@ class Planner:
         """
         scene, before = self._space.scene.with_exclusion(ring), self._space.mitred
         added = grow_exclusions(replace(scene, exclusions=scene.exclusions[-1:]), self.clearance_m)
-        if not len(scene.inclusions):  # the bounded part of the plane grows with what is drawn
-            return self._changed(scene, grown=np.concatenate((before.free.grown, added)))
-        return self._changed(scene, free=with_obstacles(before.free, added))
+        change = None if before.holes is None else before.holes.with_obstacle(added)
+        return self._changed(scene, np.concatenate((before.free.grown, added)), change)
 
     def without_exclusion(self, index: int) -> Planner:
         """Return a planner for the same fence without one of its exclusions, faster than from scratch.
@@ -184,15 +184,18 @@ class Planner:
         IndexError
             If there is no such exclusion.
         """
-        grown = np.delete(self._space.mitred.free.grown, index)
-        return self._changed(self._space.scene.without_exclusion(index), grown=grown)
+        before = self._space.mitred
+        grown = np.delete(before.free.grown, index)
+        change = None if before.holes is None else before.holes.without_obstacle(index)
+        return self._changed(self._space.scene.without_exclusion(index), grown, change)
 
-    def _changed(
-        self, scene: Scene, *, grown: Geometries | None = None, free: FreeSpace | None = None
-    ) -> Planner:
-        changed = copy(self)
-        engine = self._space.mitred.engine
-        changed._space = _Space.swept(scene, self.clearance_m, engine, grown=grown, free=free)  # noqa: SLF001 - one of our own
+    def _changed(self, scene: Scene, grown: Geometries, change: Change | None) -> Planner:
+        changed, before = copy(self), self._space.mitred
+        with uncollected():
+            field = before.changed(scene, change)
+        changed._space = (  # noqa: SLF001 - one of our own
+            _Space(field) if field else _Space.swept(scene, self.clearance_m, before.engine, grown=grown)
+        )
         return changed
 
     @property
@@ -294,7 +297,7 @@ class Planner:
         ends = np.stack((from_points[one], to_points[other]), axis=1)
         lengths_m = np.full(len(ends), np.inf)
         self._space = self._space.holding([*from_points, *to_points])
-        searcher = self._space.mitred.slabs.searcher
+        searcher = self._space.mitred.searched.searcher
         if searcher is not None:
             search = partial(searcher.lengths_m, origin_m=self._space.scene.origin_m, should_stop=should_stop)
             lengths_m = np.concatenate([lengths_m[:0], *spread(search, ends)])
@@ -330,7 +333,7 @@ class Planner:
         points = parse_points(np.asarray(ends, dtype=np.float64).reshape(-1, 2), "ends").reshape(-1, 2, 2)
         self._space = self._space.holding(points.reshape(-1, 2))
         field = self._space.mitred
-        searcher = field.slabs.searcher
+        searcher = field.searched.searcher
         answers: Iterable[Answer | None] = [None] * len(points)
         if searcher is not None:
             search = partial(searcher.answers, origin_m=field.scene.origin_m)
@@ -380,7 +383,7 @@ class Planner:
     def _plan_in(
         self, field: Field, ends: tuple[Point, Point], method: str, cost: str, should_stop: ShouldStop | None
     ) -> PlannedPath:
-        searcher = field.slabs.searcher
+        searcher = field.searched.searcher
         if method == "optimal" and searcher is not None and should_stop is None:
             answer = searcher.direct(*ends, field.scene.origin_m)
             if answer is not None:
@@ -426,11 +429,10 @@ class _Space:
         engine: Engine | None,
         *,
         grown: Geometries | None = None,
-        free: FreeSpace | None = None,
     ) -> _Space:
         """Return the space with its slabs made: searches need them, and better now than in the first query."""
         with uncollected():
-            field = Field(scene, clearance_m, grown=grown, free=free, engine=engine)
+            field = Field(scene, clearance_m, grown=grown, engine=engine)
             _ = field.slabs
         return cls(field)
 
@@ -478,17 +480,17 @@ def _direct_path(field: Field, answer: Answer, partition: str | None) -> Planned
         length_m=answer.length_m,
         lower_bound_m=answer.length_m,
         method="optimal",
-        blocks=len(field.slabs),
+        blocks=len(field.searched),
         expanded=answer.expanded,
         drawing=Drawing(field, partition or "slabs", answer.turns[1:-1]),
     )
 
 
 def _optimal(field: Field, start: Point, goal: Point, should_stop: ShouldStop | None) -> _Found | None:
-    result = shortest_path(field.slabs, start, goal, should_stop)
-    blocks = len(field.slabs)
+    result = shortest_path(field.searched, start, goal, should_stop)
+    blocks = len(field.searched)
     if result.vertices is not None:
-        turns = field.slabs.vertices.points[list(result.vertices)].tolist()
+        turns = field.searched.vertices.points[list(result.vertices)].tolist()
         bound_m = result.lower_bound_m if result.stopped else None
         return _Found([(east, north) for east, north in turns], bound_m, blocks, result.expanded)
     if not result.stopped:

@@ -6,11 +6,12 @@ Of houses whose common walls run between the same points the walls are dropped t
 
 from __future__ import annotations
 
+from cmath import phase, tau
 from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
-from shapely.geometry import MultiPolygon, Polygon
+from shapely.geometry import LinearRing, MultiPolygon, Polygon
 
 from .geometry import polygons_only
 
@@ -20,12 +21,9 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
     from .clearance import Geometries
-    from .partition.vertices import Ints
+    from .partition.vertices import Flags, Ints
 
-__all__ = ["subtracted"]
-
-_MISSES = 4  # clusters that are not houses, beyond those that are: then no more of them are tried. A try costs a third of a union
-_AREA_SLACK = 1e-12  # so small a share of houses that lies in two of them is rounding; chosen, not measured
+__all__ = ["subtracted", "united"]
 
 
 def subtracted(ground: BaseGeometry, obstacles: Sequence[BaseGeometry]) -> BaseGeometry:
@@ -44,61 +42,174 @@ def subtracted(ground: BaseGeometry, obstacles: Sequence[BaseGeometry]) -> BaseG
         The area that `shapely.difference` leaves; the vertices of obstacles that touch nothing stay as they are.
     """
     parts = shapely.get_parts(obstacles)
-    parts = parts[~shapely.is_empty(parts)]
-    cluster = _clusters(parts)
-    apart = np.bincount(cluster, minlength=len(parts))[cluster] == 1
+    alone, together, touching = _grouped(parts[~shapely.is_empty(parts)])
+    cut = np.concatenate((alone, together))
     shapely.prepare(ground)
-    apart &= shapely.contains_properly(ground, parts) & (shapely.get_num_interior_rings(parts) == 0)
-    if not apart.all():
-        ground = shapely.difference(ground, _united(parts[~apart], cluster[~apart]))
-    return _with_holes(np.array(polygons_only(ground), dtype=object), shapely.get_exterior_ring(parts[apart]))
+    is_within = np.asarray(shapely.contains_properly(ground, cut), dtype=bool)
+    across = np.concatenate((cut[~is_within], touching))
+    if len(across):
+        ground = shapely.difference(ground, MultiPolygon(across.tolist()))
+    cut = cut[is_within]
+    courts: list[Polygon] = []
+    if shapely.get_num_interior_rings(cut).any():
+        # What they enclose lies apart from all other ground.
+        rings, owner = shapely.get_rings(cut, return_index=True)
+        courts = shapely.polygons(rings[np.diff(owner, prepend=-1) == 0]).tolist()
+    grounds = np.array([*polygons_only(ground), *courts, None], dtype=object)[:-1]
+    return _with_holes(grounds, shapely.get_exterior_ring(cut))
 
 
-def _clusters(parts: Geometries) -> Ints:
-    """Return for each obstacle the least number of those that it hangs together with."""
-    one, other = shapely.STRtree(parts).query(parts, predicate="intersects")
-    cluster = np.arange(len(parts))
+def united(parts: Geometries) -> Geometries:
+    """Return polygons that do not overlap in place of obstacles, as `subtracted` cuts them out: those that touch nothing stay as they are."""
+    return np.concatenate(_grouped(parts))
+
+
+def _grouped(parts: Geometries) -> tuple[Geometries, Geometries, Geometries]:
+    """Return the obstacles that touch nothing, the unions of clusters that are one polygon, and the polygons of all others, which may touch one another."""
+    cluster, has_common_corners = _clusters(parts)
+    is_alone = np.bincount(cluster, minlength=len(parts))[cluster] == 1
+    alone, none = parts[is_alone], parts[:0]
+    if is_alone.all():
+        return alone, none, none
+    is_tried = np.zeros(len(parts), dtype=bool)
+    is_tried[cluster[has_common_corners]] = True
+    is_tried = is_tried[cluster]
+    found = _within_walls(parts[is_tried], cluster[is_tried])
+    is_done = is_alone.copy()
+    is_done[list(found)] = True
+    others = parts[~is_done[cluster]]
+    united = polygons_only(shapely.disjoint_subset_union_all(others)) if len(others) else []
+    single = [polygons[0] for polygons in found.values() if len(polygons) == 1]
+    several = [polygon for polygons in found.values() if len(polygons) > 1 for polygon in polygons]
+    rest = np.array([*united, *several, None], dtype=object)[:-1]
+    touches = np.zeros(len(rest), dtype=bool)
+    one, other = shapely.STRtree(rest).query(rest, predicate="intersects")
+    touches[one[one != other]] = True
+    return alone, np.array([*single, *rest[~touches], None], dtype=object)[:-1], rest[touches]
+
+
+def _clusters(parts: Geometries) -> tuple[Ints, Flags]:
+    """Return for each obstacle the least number of those that it hangs together with, and whether it has a corner in common with another."""
+    points, owner = shapely.get_coordinates(parts, return_index=True)
+    places = points.view(np.complex128).ravel()
+    order = np.argsort(places, kind="stable")
+    same = np.flatnonzero(np.diff(places[order]) == 0)
+    # Most neighbours have corners in common: only of the others it must be asked whether they meet.
+    one, other = owner[order[same]], owner[order[same + 1]]
+    cluster = _least(np.arange(len(parts)), one, other)
+    has_common_corners = np.zeros(len(parts), dtype=bool)
+    has_common_corners[one[one != other]] = True
+    one, other = shapely.STRtree(parts).query(parts)
+    is_asked = cluster[one] < cluster[other]
+    one, other = one[is_asked], other[is_asked]
+    meets = shapely.intersects(parts[one], parts[other])
+    return _least(cluster, one[meets], other[meets]), has_common_corners
+
+
+def _least(cluster: Ints, one: Ints, other: Ints) -> Ints:
+    """Return clusters, each named after its least member, after some of their members have been joined."""
     while True:
         least = cluster.copy()
-        np.minimum.at(least, one, cluster[other])
-        least = least[least]
+        joined = np.minimum(cluster[one], cluster[other])
+        for members in (cluster[one], cluster[other]):
+            np.minimum.at(least, members, joined)
+        least = least[least[cluster]]
         if (least == cluster).all():
             return cluster
         cluster = least
 
 
-def _united(parts: Geometries, cluster: Ints) -> BaseGeometry:
-    """Return the union of obstacles, clusters of houses by their outer walls."""
-    parts = parts[np.argsort(cluster, kind="stable")]
-    together: list[Polygon] = []
-    others: list[BaseGeometry] = []
-    misses = 0
-    for members in np.split(parts, np.flatnonzero(np.diff(np.sort(cluster))) + 1):
-        outer = _within_walls(members) if misses < _MISSES else None
-        misses += 1 if outer is None else -1
-        if outer is None:
-            others += members.tolist()
-        else:
-            together += polygons_only(outer)
-    together += polygons_only(shapely.disjoint_subset_union_all(others))
-    return MultiPolygon(together)
+def _within_walls(parts: Geometries, cluster: Ints) -> dict[int, list[Polygon]]:
+    """Return the unions of those clusters that all walls bound which do not occur twice: houses with common walls between the same points."""
+    if not len(parts):
+        return {}
+    rings, owner = shapely.get_rings(parts, return_index=True)
+    is_turned = shapely.is_ccw(rings) != (np.diff(owner, prepend=-1) > 0)
+    rings[is_turned] = shapely.reverse(rings[is_turned])
+    points, ring = shapely.get_coordinates(rings, return_index=True)
+    places, number = np.unique(points.view(np.complex128).ravel(), return_inverse=True)
+    is_wall = ring[1:] == ring[:-1]
+    start, end = number[:-1][is_wall], number[1:][is_wall]
+    members = cluster[owner[ring[:-1][is_wall]]]
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    _, wall, count = np.unique(low * len(places) + high, return_inverse=True, return_counts=True)
+    ways = np.bincount(wall, np.sign(end - start))
+    is_odd = (count > 2) | ((count == 2) & (ways != 0.0))
+    is_outer = (count[wall] == 1) & ~np.isin(members, members[is_odd[wall]])
+    cluster_at = np.zeros(len(places), dtype=np.intp)
+    cluster_at[start] = members
+    loops = _loops(start[is_outer].tolist(), end[is_outer].tolist(), places.tolist())
+    if not loops:
+        return {}
+    sizes = list(map(len, loops))
+    corners = np.concatenate(loops)
+    at = places[corners]
+    outlines = np.asarray(
+        shapely.linearrings(at.real, at.imag, indices=np.repeat(np.arange(len(loops)), sizes)), dtype=object
+    )
+    first = np.cumsum(sizes) - sizes
+    return _assembled(outlines, cluster_at[corners[first]])
 
 
-def _within_walls(parts: Geometries) -> BaseGeometry | None:
-    """Return the union of houses as all walls that do not occur twice bound it; None if it is not that."""
-    try:
-        together: BaseGeometry = shapely.coverage_union_all(parts)
-    except shapely.GEOSException:  # walls between other points
-        return None
-    # What lies in two of them would be missing, in three there again: then the area tells.
-    area_m2 = float(shapely.area(parts).sum())
-    if shapely.is_valid(together) and abs(together.area - area_m2) <= _AREA_SLACK * area_m2:
-        return together
-    return None
+def _loops(start: list[int], end: list[int], places: Sequence[complex]) -> list[list[int]]:
+    """Return the walls' loops, none of which comes to a point twice; where houses touch in a point, each has its own."""
+    onwards: dict[int, list[int]] = {}
+    for one, other in zip(start, end, strict=True):
+        onwards.setdefault(one, []).append(other)
+    loops = []
+    for first, ways in onwards.items():
+        path, place, before = [first], {first: 0}, first
+        while ways or len(path) > 1:
+            here = path[-1]
+            open_ways = onwards[here]
+            if len(open_ways) > 1 and before != here:
+                back = places[before] - places[here]
+                # The house lies to the left: on the way back from here its other wall comes first, clockwise.
+                open_ways.sort(key=lambda other: -(phase(back / (places[other] - places[here])) % tau))
+            point, before = open_ways.pop(), here
+            since = place.get(point)
+            if since is None:
+                place[point] = len(path)
+                path.append(point)
+                continue
+            loops.append(path[since:])
+            for passed in path[since + 1 :]:
+                del place[passed]
+            del path[since + 1 :]
+    return loops
+
+
+def _assembled(outlines: Geometries, cluster: Ints) -> dict[int, list[Polygon]]:
+    """Return the polygons that loops bound, counter-clockwise about them and clockwise about their courts, of those clusters where they are valid."""
+    is_shell = np.asarray(shapely.is_ccw(outlines), dtype=bool)
+    is_single = np.bincount(cluster)[cluster] == 1
+    single = is_single & is_shell
+    polygons = np.asarray(shapely.polygons(outlines[single]), dtype=object)
+    is_valid = shapely.is_valid(polygons)
+    names = cluster[single][is_valid].tolist()
+    found = {name: [polygon] for name, polygon in zip(names, polygons[is_valid].tolist(), strict=True)}
+    loops: dict[int, tuple[list[LinearRing], list[LinearRing]]] = {}
+    for place in np.flatnonzero(~is_single).tolist():
+        loops.setdefault(int(cluster[place]), ([], []))[not is_shell[place]].append(outlines[place])
+    for name, (shells, courts) in loops.items():
+        several = _each(shells, courts) if len(shells) > 1 else [Polygon(one, courts) for one in shells]
+        if several and shapely.is_valid(MultiPolygon(several)):
+            found[name] = several
+    return found
+
+
+def _each(shells: list[LinearRing], courts: list[LinearRing]) -> list[Polygon]:
+    """Return the polygons of several shells; each court is within the smallest that holds it."""
+    areas = sorted(map(Polygon, shells), key=lambda shell: float(shell.area))
+    holes: list[list[LinearRing]] = [[] for _ in areas]
+    for court in courts:
+        inside = shapely.contains(np.array(areas, dtype=object), Polygon(court).representative_point())
+        holes[int(inside.argmax())].append(court)
+    return [Polygon(shell.exterior, rings) for shell, rings in zip(areas, holes, strict=True)]
 
 
 def _with_holes(grounds: Geometries, holes: Geometries) -> BaseGeometry:
-    """Return disjoint polygons with rings cut out that touch neither them nor one another."""
+    """Return disjoint polygons with rings cut out that touch neither them nor one another; each ring lies in the smallest that holds it."""
     if not len(holes):
         return MultiPolygon(grounds.tolist())
     if len(grounds) == 1:
@@ -107,7 +218,9 @@ def _with_holes(grounds: Geometries, holes: Geometries) -> BaseGeometry:
     corners = np.asarray(shapely.points(points[np.diff(owner, prepend=-1) > 0]), dtype=object)
     around = np.zeros(len(holes), dtype=np.intp)
     ground, hole = shapely.STRtree(corners).query(grounds, predicate="contains")
-    around[hole] = ground
+    # From the largest to the smallest, the last one counts.
+    order = np.argsort(-shapely.area(grounds[ground]), kind="stable")
+    around[hole[order]] = ground[order]
     found = grounds.tolist()
     for number in np.unique(around).tolist():
         polygon = found[number]

@@ -11,6 +11,7 @@ import statistics
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -142,12 +143,26 @@ def operator_ms() -> float:
     return 1e3 * least(lambda: pbpp.plan_path([square], boxes, (1, 1), (199, 199), clearance_m=0.5), 9)
 
 
-def reuse_ratio(case: dict, *, compiled: bool) -> float:
-    """Return the time of adding one obstacle over that of building from scratch."""
-    fence = {"clearance_m": 1.0, "compiled": compiled}
-    planner = pbpp.Planner([case["inclusion"]], case["exclusions"][:-1], **fence)
-    scratch = least(lambda: pbpp.Planner([case["inclusion"]], case["exclusions"], **fence), 5)
-    return least(lambda: planner.with_exclusion(case["exclusions"][-1]), 5) / scratch
+def change_ratios(case: dict, clearance_m: float, *, compiled: bool) -> dict:
+    """Return the times of adding and of removing one obstacle over that of building from scratch: the median of some obstacles."""
+
+    def build() -> pbpp.Planner:
+        return pbpp.Planner(
+            [case["inclusion"]], case["exclusions"], clearance_m=clearance_m, compiled=compiled
+        )
+
+    planner, scratch_s = build(), least(build, 5)
+    times_s: dict[str, list[float]] = {"adding": [], "removing": []}
+    for index in range(50, len(case["exclusions"]), 100):
+        fewer = planner.without_exclusion(index)
+        add, remove = (
+            partial(fewer.with_exclusion, case["exclusions"][index]),
+            partial(planner.without_exclusion, index),
+        )
+        for kind, change in (("adding", add), ("removing", remove)):
+            change()  # the first change of a planner looks for all of its holes
+            times_s[kind].append(least(change, 5))
+    return {kind: statistics.median(found_s) / scratch_s for kind, found_s in times_s.items()}
 
 
 def compiled_start_s() -> float:
@@ -193,8 +208,10 @@ def main() -> None:
         "import ratio": own_ms / shapely_ms,
         "operator's fence (196 vertices, 0.5 m) from polygons to path, ms": operator,
         "the same over the import of shapely": operator / shapely_ms,
-        "adding one obstacle over building anew": reuse_ratio(cases["rand1000"], compiled=False),
-        "the same, compiled": reuse_ratio(cases["rand1000"], compiled=True),
+        "one obstacle over building anew": change_ratios(cases["rand1000"], 0.0, compiled=False),
+        "the same at 1 m": change_ratios(cases["rand1000"], 1.0, compiled=False),
+        "the same, compiled": change_ratios(cases["rand1000"], 0.0, compiled=True),
+        "the same, compiled, at 1 m": change_ratios(cases["rand1000"], 1.0, compiled=True),
         "first compiled query of a process, s": compiled_start_s(),
         "paper's path on rand100 from polygons, s": blocks_s(cases["rand100"]),
     }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from copy import copy
 from difflib import get_close_matches
+from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -104,6 +105,7 @@ class Commands(TyperGroup):
         sys.exit(code)
 
 
+@cache  # programs and tests call many commands in one process
 def load(name: str) -> Any:  # noqa: ANN401 - a command of the parser library that typer uses
     """Return a command, with its options."""
     single = typer.Typer(add_completion=False, rich_markup_mode="markdown", pretty_exceptions_enable=False)

@@ -38,6 +38,7 @@ _WOBBLE_M, _WOBBLE_TURN = (
 )  # chosen: no estimate stands still, and none lies due south of a corner
 
 _FORGETS_AFTER_S = 0.2  # AC_AVOID_ACCEL_TIMEOUT_MS
+_ROUNDED_M = 0.001  # more than four bytes of centimetres are off some kilometres from home
 _NOTHING_CM = float(np.finfo(np.float32).eps)  # FLT_EPSILON: what is_positive takes for 0, in cm and cm/s
 
 
@@ -100,6 +101,7 @@ class _Wall:
         self.keep_in = keep_in
         corners = np.array([(corner.real * 100, corner.imag * 100) for corner in corners_m], dtype=np.float32)
         self._known = 0j, 0.0, False
+        self._free_about = 0j, -math.inf
         self._ends = corners
         self._starts = np.roll(corners, -1, axis=0)
         self._steps = self._ends - self._starts
@@ -108,6 +110,15 @@ class _Wall:
             (complex(*start) / 100, complex(*end) / 100)
             for start, end in zip(self._starts.tolist(), self._ends.tolist(), strict=True)
         ]
+
+    def least_m(self, place_m: complex) -> float:
+        """Return what is known of how far the nearest edge is at least, without measuring."""
+        looked_from_m, free_m = self._free_about
+        return free_m - abs(place_m - looked_from_m) - _ROUNDED_M
+
+    def looked(self, place_m: complex, edge_m: float) -> None:
+        """Keep how far the nearest edge is from a place."""
+        self._free_about = place_m, edge_m
 
     def to_edges_cm(self, place_m: complex) -> NDArray[np.float32]:
         """Return the ways to the nearest point of each edge, north and east."""
@@ -209,9 +220,13 @@ class Avoidance:
         back = _Quadrants()
         nearest_m = math.inf
         for wall in self._walls:
+            if (least_m := wall.least_m(place_m)) > reach_m:
+                nearest_m = min(nearest_m, least_m)
+                continue
             ways_cm = wall.to_edges_cm(place_m)
             away_cm = np.sqrt((ways_cm**2).sum(axis=1))
             edge_m = float(away_cm.min()) / 100
+            wall.looked(place_m, edge_m)
             nearest_m = min(nearest_m, edge_m)
             if edge_m > reach_m or wall.holds(place_m, edge_m) is not wall.keep_in:
                 continue

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from missions.items import MissionItem
 
 _FAR_M = 1e6  # farther than any fence: stands for no edge at all
+_ROUNDED_M = 1e-6  # more than distances are rounded by
 _CIRCLE_SEGMENTS = 64  # chords a quarter turn: they leave a 50 m circle by 4 mm
 
 
@@ -75,10 +76,10 @@ class FenceArea:
         self._measured = point_m, clearance_m
         return clearance_m
 
-    def surely_keeps(self, point_m: complex, least_m: float) -> bool:
-        """Whether a point keeps so much, by how far it is from the one measured last; False where that does not tell."""
+    def is_beyond(self, least_m: float, point_m: complex) -> bool:
+        """Return whether a point's clearance is known to be more, near where it was measured last: then it need not be measured."""
         measured_at_m, clearance_m = self._measured
-        return clearance_m - abs(point_m - measured_at_m) >= least_m
+        return clearance_m - abs(point_m - measured_at_m) > least_m + _ROUNDED_M
 
 
 def bounded_fence(items: Sequence[MissionItem]) -> Fence:

@@ -233,7 +233,7 @@ class Rover:
 
     def check_fence(self, now_s: float) -> None:
         """Look whether the fence is breached now, and act on it."""
-        if self._area.is_empty or self._area.surely_keeps(self.body.position_m, 0.0):
+        if self._area.is_empty or self._area.is_beyond(0.0, self.body.position_m):
             self.breached = False
             return
         clearance_m = self._area.clearance_m(self.body.position_m)
@@ -271,5 +271,5 @@ class Rover:
 
     def _measure_clearance(self) -> None:
         place_m = self._true_frame.to_flat(self.position)
-        if not self._true_area.surely_keeps(place_m, self.least_clearance_m):
+        if not self._true_area.is_beyond(self.least_clearance_m, place_m):
             self.least_clearance_m = min(self.least_clearance_m, self._true_area.clearance_m(place_m))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from missions.drive_model.band import convex
 from missions.drive_model.calibrated_range import beyond_measured, extrapolated
 from missions.drive_model.envelope import Corner, Envelope, Leg
 from missions.drive_model.predict import Drive, corner_forecast, envelope, plan_drive
@@ -13,7 +12,6 @@ __all__ = [
     "Envelope",
     "Leg",
     "beyond_measured",
-    "convex",
     "corner_forecast",
     "envelope",
     "extrapolated",

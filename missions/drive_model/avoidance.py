@@ -20,7 +20,7 @@ import numpy as np
 import shapely
 
 from missions.drive_model.corner import GRAVITY_MPS2, INSIDE_BAND_M
-from missions.drive_model.fence_ahead import FenceAhead
+from missions.drive_model.fence_ahead import FenceAhead, FenceEdges
 from missions.drive_model.motion import LegProfile, Ramp
 from missions.errors import VehicleError
 from missions.vehicle import Steering
@@ -58,7 +58,7 @@ _ABOUT_CORNER_S = 7.0  # before and after a corner; chosen, not measured
 _SIDES = np.exp(1j * np.radians([0.0, ASIDE_DEG, -ASIDE_DEG]))
 
 
-def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry) -> Envelope:
+def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry | FenceEdges) -> Envelope:
     """Return an envelope with the extra room that corners before a fence need where the vehicle's avoidance is on.
 
     Parameters
@@ -67,15 +67,18 @@ def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry) -> Env
         The drive without avoidance.
     vehicle : Vehicle
         What drives.
-    fence : shapely geometry
-        The lines it avoids, metres.
+    fence : shapely geometry or FenceEdges
+        The lines it avoids, metres; for many drives their edges, which are looked for once.
 
     Returns
     -------
     Envelope
         The same where nothing is near, else with more pieces where the rover falls behind.
     """
-    if not vehicle.avoids_fence or fence.is_empty or not band.legs:
+    if not vehicle.avoids_fence or not band.legs:
+        return band
+    edges = fence if isinstance(fence, FenceEdges) else FenceEdges(fence)
+    if edges.is_empty:
         return band
     middles_m = {
         tuple(corner.middle_m for corner in band.corners),
@@ -84,7 +87,7 @@ def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry) -> Env
     found = [(band.cores, band.bands_m, band.waypoints)]
     for either_m in sorted(middles_m):
         target = TargetPoint(band, vehicle, either_m)
-        lags = target.lags(vehicle, FenceAhead(fence, _plane(target.places), vehicle))
+        lags = target.lags(vehicle, FenceAhead(edges, _plane(target.places), vehicle))
         if lags and len((pieces := target.pieces(lags))[0]):
             found.append(pieces)
     if len(found) == 1:
@@ -138,11 +141,14 @@ class TargetPoint:
         moved_m = np.maximum(np.abs(steps), _LEAST_MPS * STEP_S)
         is_slowed = np.zeros(len(steps), dtype=np.bool_)
         near = self._near_corners()[:-1]
-        for side in _SIDES:
-            allowed_mps = fence.speeds_mps(
-                _plane(self.places[:-1][near]), _plane(side * (steps / moved_m)[near])
-            )
-            is_slowed[near] |= allowed_mps < _SLOWED_SHARE * moved_m[near] / STEP_S
+        places, ways = self.places[:-1][near], (steps / moved_m)[near]
+        sides = np.concatenate([side * ways for side in _SIDES])
+        allowed_mps = fence.speeds_mps(
+            _plane(np.tile(places, len(_SIDES))), _plane(sides), float(moved_m.max(initial=0.0)) / STEP_S
+        )
+        is_slowed[near] = (allowed_mps.reshape(len(_SIDES), -1) < _SLOWED_SHARE * moved_m[near] / STEP_S).any(
+            axis=0
+        )
         if not is_slowed.any():
             return []
         return _followed(self.places.tolist(), is_slowed.tolist(), vehicle, fence)

@@ -11,57 +11,59 @@ import shapely
 
 from missions.drive_model import corner as at_corner
 from missions.drive_model.stray import Stray
-from missions.geo import Vector
 from missions.vehicle import Autopilot
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
     from missions.drive_model.legs_and_corners import DrivePlan
+    from missions.geo import Vector
 
 BLEND_SAMPLES = 6  # straight pieces of a blend; chosen, not measured
+_BLEND_SHARES = [(sample / BLEND_SAMPLES, 1 - sample / BLEND_SAMPLES) for sample in range(BLEND_SAMPLES + 1)]
 NEGLIGIBLE_M = 0.03  # a swing below this is left out; chosen: about a tenth of the band, 0.25 to 0.45 m
 TAIL_TIMES_S = (2.0, 4.5, 8.0, 14.0)
 """Where a leg's band is cut, in seconds since its corner; between them a tail is taken as straight, which is never too narrow."""
-
-
-Hull = tuple[Vector, ...]
 
 
 class Pieces:
     """Collects the corner points of convex pieces."""
 
     def __init__(self) -> None:
-        self.hulls: list[Hull] = []
         self.bands_m: list[float] = []
         self.waypoints: list[int] = []
+        self._coordinates: list[float] = []
+        self._sizes: list[int] = []
 
-    def add(self, vertices: Iterable[Vector], band_m: float, waypoint: int) -> None:
+    def add(self, vertices: Sequence[Vector], band_m: float, waypoint: int) -> None:
         """Add the hull of some places, to be grown by a band."""
-        self.hulls.append(tuple(vertices))
+        if len(vertices) == 1:
+            vertices = (*vertices, *vertices)
+        for vertex in vertices:
+            self._coordinates += vertex
+        self._sizes.append(len(vertices))
         self.bands_m.append(band_m)
         self.waypoints.append(waypoint)
 
-
-def convex(hulls: Sequence[Hull]) -> NDArray[np.object_]:
-    """Return the convex hulls of places."""
-    pairs = [hull if len(hull) > 1 else (*hull, *hull) for hull in hulls]
-    owners = np.repeat(np.arange(len(pairs)), [len(hull) for hull in pairs])
-    # Lines take far less to make than as many points, and their hulls are the same.
-    lines = shapely.linestrings(list(itertools.chain.from_iterable(pairs)), indices=owners)
-    return np.asarray(shapely.convex_hull(lines), dtype=np.object_)
+    def convex(self) -> NDArray[np.object_]:
+        """Return the convex hulls of their places."""
+        owners = np.repeat(np.arange(len(self._sizes)), self._sizes)
+        # Lines take far less to make than as many points, and their hulls are the same.
+        lines = shapely.linestrings(np.array(self._coordinates).reshape(-1, 2), indices=owners)
+        return np.asarray(shapely.convex_hull(lines), dtype=np.object_)
 
 
 def _beside(place: Vector, direction: Vector, stray: Stray) -> list[Vector]:
     """Return the place, or the two ends of the strip around it."""
-    if stray.widest_m < NEGLIGIBLE_M:
+    left_m, right_m = stray
+    if left_m < NEGLIGIBLE_M and right_m < NEGLIGIBLE_M:
         return [place]
     (east_m, north_m), (ahead_east, ahead_north) = place, direction
     return [
-        (east_m - ahead_north * stray.left_m, north_m + ahead_east * stray.left_m),
-        (east_m + ahead_north * stray.right_m, north_m - ahead_east * stray.right_m),
+        (east_m - ahead_north * left_m, north_m + ahead_east * left_m),
+        (east_m + ahead_north * right_m, north_m - ahead_east * right_m),
     ]
 
 
@@ -139,18 +141,24 @@ def _blend_path(drive: DrivePlan, number: int) -> list[tuple[Vector, Vector]]:
     duration_s = corner.blend.duration_s
     if duration_s == 0:
         return [(corner.places[0], before.direction)]
-    path = []
-    for sample in range(BLEND_SAMPLES + 1):
-        share = sample / BLEND_SAMPLES
-        from_leg = before.at(before.profile.duration_s - duration_s * (1 - share))
-        onto_leg = after.profile.travelled_m(duration_s * share)
-        heading = (
-            before.direction[0] * (1 - share) + after.direction[0] * share,
-            before.direction[1] * (1 - share) + after.direction[1] * share,
+    (east_0, north_0), (ahead_east_0, ahead_north_0), (ahead_east_1, ahead_north_1) = (
+        before.start,
+        before.direction,
+        after.direction,
+    )
+    begin_s = before.profile.duration_s
+    before_m, after_m = before.profile.travelled_m, after.profile.travelled_m
+    path: list[tuple[Vector, Vector]] = []
+    for share, rest in _BLEND_SHARES:
+        along_m, onto_m = before_m(begin_s - duration_s * rest), after_m(duration_s * share)
+        east, north = ahead_east_0 * rest + ahead_east_1 * share, ahead_north_0 * rest + ahead_north_1 * share
+        length = math.hypot(east, north)
+        direction = (east / length, north / length) if length > 0.01 else after.direction
+        place = (
+            east_0 + ahead_east_0 * along_m + ahead_east_1 * onto_m,
+            north_0 + ahead_north_0 * along_m + ahead_north_1 * onto_m,
         )
-        length = math.hypot(*heading)
-        direction = (heading[0] / length, heading[1] / length) if length > 0.01 else after.direction
-        path.append((_shifted(from_leg, after.direction, onto_leg), direction))
+        path.append((place, direction))
     return path
 
 

@@ -6,6 +6,7 @@ Inside, a point or a way is one complex number, east + j north: turning a way is
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,8 +27,34 @@ _MOST_ACCEL_MPS2 = 1.0
 """ArduPilot's avoidance reckons with no more braking, whatever the vehicle can (AC_Avoid.h, AC_AVOID_ACCEL_CMSS_MAX)."""
 
 _SPARE_M = 0.1  # beyond the farthest edge that counts: chosen, so that rounding loses none
+_MOST_AT_ONCE = 20_000  # places times edges: of more, parts of the way look only at what lies about them; chosen, it changes no answer
 _TOUCHING_M2 = 1e-9  # a ray through the end of an edge meets it, rounding or not
 _FEW = 24  # more edges than this are quicker in numpy than one by one; chosen, it changes no answer
+
+
+class FenceEdges:
+    """The straight edges of a fence.
+
+    Parameters
+    ----------
+    fence : shapely geometry
+        Its lines, metres.
+    """
+
+    def __init__(self, fence: BaseGeometry) -> None:
+        points, lines = shapely.get_coordinates(shapely.get_parts(fence), return_index=True)
+        is_edge = lines[1:] == lines[:-1]
+        starts, ends = points[:-1][is_edge], points[1:][is_edge]
+        self.lows, self.highs = np.minimum(starts, ends), np.maximum(starts, ends)
+        """The box about each, shape (n, 2)."""
+        self.starts: NDArray[np.complex128] = _complex(starts)
+        self.steps: NDArray[np.complex128] = _complex(ends) - self.starts
+        """Where each begins, and its way, east + j north."""
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether there is none."""
+        return not len(self.starts)
 
 
 class FenceAhead:
@@ -35,33 +62,43 @@ class FenceAhead:
 
     Parameters
     ----------
-    fence : shapely geometry
-        The lines it avoids, metres.
+    fence : FenceEdges
+        What it avoids.
     places : ndarray of float, shape (n, 2)
         Where it drives, east and north in metres.
     vehicle : Vehicle
         What drives.
     """
 
-    def __init__(self, fence: BaseGeometry, places: NDArray[np.float64], vehicle: Vehicle) -> None:
+    def __init__(self, fence: FenceEdges, places: NDArray[np.float64], vehicle: Vehicle) -> None:
         self._stops_within_m = vehicle.stops_within_m
         self._gain_per_s = vehicle.position_gain_per_s
         self._accel_mps2 = min(vehicle.accel_max_mps2, _MOST_ACCEL_MPS2)
         self._linear_m = self._accel_mps2 / self._gain_per_s**2
-        points, lines = shapely.get_coordinates(shapely.get_parts(fence), return_index=True)
-        self._edges = np.stack((points[:-1], points[1:]), axis=1)[lines[1:] == lines[:-1]]
+        self._lows, self._highs = fence.lows, fence.highs
         within_m = self.counts_within_m(vehicle.speed_mps)
-        self._edges = self._edges[self._touch(places.min(axis=0), places.max(axis=0), within_m)]
-        self._starts = _complex(self._edges[:, 0])
-        self._steps = _complex(self._edges[:, 1]) - self._starts
+        near = self._touch(places.min(axis=0), places.max(axis=0), within_m)
+        self._lows, self._highs = self._lows[near], self._highs[near]
+        self._starts, self._steps = fence.starts[near], fence.steps[near]
 
     def counts_within_m(self, top_mps: float) -> float:
         """Return the distance beyond which an edge does not slow a rover that drives at a speed."""
         return self._stops_within_m + max(top_mps / self._gain_per_s, top_mps**2 / self._accel_mps2)
 
-    def speeds_mps(self, places: NDArray[np.float64], ways: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the speed that is allowed at each place in its own direction (sqrt_controller of what is left to the margin)."""
-        left_m = np.maximum(self._ahead_m(_complex(places), _complex(ways)) - self._stops_within_m, 0.0)
+    def speeds_mps(
+        self, places: NDArray[np.float64], ways: NDArray[np.float64], top_mps: float
+    ) -> NDArray[np.float64]:
+        """Return the speed that is allowed at each place in its own direction (sqrt_controller of what is left to the margin); exact up to ``top_mps``, and above no less."""
+        reach_m = self.counts_within_m(top_mps) + _SPARE_M
+        parts = 1 + len(places) * len(self._starts) // _MOST_AT_ONCE
+        bounds = np.linspace(0, len(places), parts + 1).astype(np.int64)
+        ahead_m = np.concatenate(
+            [
+                self._ahead_m(places[begin:end], ways[begin:end], reach_m)
+                for begin, end in pairwise(bounds.tolist())
+            ]
+        )
+        left_m = np.maximum(ahead_m - self._stops_within_m, 0.0)
         far_mps = np.sqrt(2 * self._accel_mps2 * np.maximum(left_m - self._linear_m / 2, 0.0))
         return np.where(left_m <= self._linear_m, self._gain_per_s * left_m, far_mps)
 
@@ -93,16 +130,21 @@ class FenceAhead:
 
     def _touch(self, low: ArrayLike, high: ArrayLike, reach_m: float) -> NDArray[np.bool_]:
         """Return which edges may come within reach of a box."""
-        starts, ends = self._edges[:, 0], self._edges[:, 1]
-        near = np.maximum(starts, ends) >= np.subtract(low, reach_m)
-        near &= np.minimum(starts, ends) <= np.add(high, reach_m)
-        return np.asarray(near.all(axis=1))
+        near = self._highs >= np.subtract(low, reach_m)
+        near &= self._lows <= np.add(high, reach_m)
+        return np.asarray(near[:, 0] & near[:, 1])
 
-    def _ahead_m(self, places: NDArray[np.complex128], ways: NDArray[np.complex128]) -> NDArray[np.float64]:
-        """Return how far ahead the first edge lies; infinite without one."""
-        back = ways.conj()[:, None]
-        off = (self._starts - places[:, None]) * back
-        steps = self._steps * back
+    def _ahead_m(
+        self, places: NDArray[np.float64], ways: NDArray[np.float64], reach_m: float
+    ) -> NDArray[np.float64]:
+        """Return how far ahead the first edge lies, exact up to a reach and beyond no less; infinite without one."""
+        if not len(places):
+            return np.zeros(0)
+        ends = np.concatenate([places, places + reach_m * ways])
+        near = self._touch(ends.min(axis=0), ends.max(axis=0), _SPARE_M)
+        back = _complex(ways).conj()[:, None]
+        off = (self._starts[near] - _complex(places)[:, None]) * back
+        steps = self._steps[near] * back
         with np.errstate(divide="ignore", invalid="ignore"):  # an edge along the way is met at its neighbours
             share = -off.imag / steps.imag
             away_m = off.real + share * steps.real

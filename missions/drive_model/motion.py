@@ -7,8 +7,7 @@ last one has ended (SCurve.cpp). The short smoothing of the jerk itself (a snap 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,16 +33,16 @@ class Ramp:
     speed_mps: float
     accel_mps2: float
     jerk_mps3: float
+    jerk_s: float = field(init=False)
+    """How long the acceleration grows, and again how long it falls."""
+    duration_s: float = field(init=False)
+    """How long the whole ramp takes."""
 
-    @cached_property
-    def jerk_s(self) -> float:
-        """How long the acceleration grows, and again how long it falls."""
-        return min(self.accel_mps2 / self.jerk_mps3, math.sqrt(self.speed_mps / self.jerk_mps3))
-
-    @cached_property
-    def duration_s(self) -> float:
-        """How long the whole ramp takes."""
-        return self.jerk_s + self.speed_mps / (self.jerk_mps3 * self.jerk_s)
+    def __post_init__(self) -> None:
+        """Reckon what everything else asks for."""
+        jerk_s = min(self.accel_mps2 / self.jerk_mps3, math.sqrt(self.speed_mps / self.jerk_mps3))
+        object.__setattr__(self, "jerk_s", jerk_s)
+        object.__setattr__(self, "duration_s", jerk_s + self.speed_mps / (self.jerk_mps3 * jerk_s))
 
     @property
     def length_m(self) -> float:
@@ -52,10 +51,11 @@ class Ramp:
 
     def travelled_m(self, time_s: float) -> float:
         """Return the distance from the point of rest after a time; beyond the ramp the speed stays."""
-        if time_s > self.duration_s / 2:
+        half_s = self.duration_s / 2
+        if time_s > half_s:
             # The ramp is symmetric: its second half mirrors the first about the half speed.
             rest_s = max(self.duration_s - time_s, 0.0)
-            return self.speed_mps * (time_s - self.duration_s / 2) + self._first_half_m(rest_s)
+            return self.speed_mps * (time_s - half_s) + self._first_half_m(rest_s)
         return self._first_half_m(time_s)
 
     def accel_at_mps2(self, time_s: float) -> float:
@@ -113,16 +113,15 @@ class LegProfile:
 
     length_m: float
     ramp: Ramp
+    top_speed_mps: float = field(init=False)
+    """The highest speed on this leg; short legs do not reach the speed asked for."""
+    duration_s: float = field(init=False)
+    """How long it takes from rest to rest."""
 
-    @property
-    def top_speed_mps(self) -> float:
-        """The highest speed on this leg; short legs do not reach the speed asked for."""
-        return self.ramp.speed_mps
-
-    @cached_property
-    def duration_s(self) -> float:
-        """How long it takes from rest to rest."""
-        return self.length_m / self.top_speed_mps + self.ramp.duration_s
+    def __post_init__(self) -> None:
+        """Reckon what everything else asks for."""
+        object.__setattr__(self, "top_speed_mps", self.ramp.speed_mps)
+        object.__setattr__(self, "duration_s", self.length_m / self.ramp.speed_mps + self.ramp.duration_s)
 
     def travelled_m(self, time_s: float) -> float:
         """Return the distance from the leg's start after a time since its start."""

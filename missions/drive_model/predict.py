@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from missions.drive_model import corner as at_corner
-from missions.drive_model.band import Pieces, add_corner, add_end, add_leg, add_start, convex
+from missions.drive_model.band import Pieces, add_corner, add_end, add_leg, add_start
 from missions.drive_model.envelope import Envelope
 from missions.drive_model.from_points import SAME_PLACE_M, drive_plan
 from missions.drive_model.stray import Stray
@@ -81,13 +81,8 @@ def plan_drive(
     if heading_deg is None and len(array) > 1:
         # Starting straight on it is sooner at speed, and then strays further from short legs than after the worst start.
         starts.append(_start(array, vehicle, _bearing_deg(array)))
-    drives = [
-        (drive_plan(array, known, speeds, stops or {}, stray), behind_m)
-        for known in _of_known_corners(vehicle)
-        for stray, behind_m in starts
-    ]
-    plans, behind = zip(*drives, strict=True)
-    return Drive(array, plans, behind)
+    ways = tuple((known, *start) for known in _of_known_corners(vehicle) for start in starts)
+    return Drive(array, ways, speeds, stops or {})
 
 
 def _of_known_corners(vehicle: Vehicle) -> Sequence[Vehicle]:
@@ -99,48 +94,68 @@ def _of_known_corners(vehicle: Vehicle) -> Sequence[Vehicle]:
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """A drive whose band is made when it is asked for.
+    """A drive of which each part is made when it is asked for.
 
     Parameters
     ----------
     points : ndarray of float, shape (n, 2)
         What is driven, east and north in metres.
-    plans : tuple of DrivePlan
-        Legs and corners: for another heading at the start, and for another age of the firmware, each its own.
-    behind_m : tuple of float
-        How far behind its place each start takes the rover.
+    ways : tuple of (Vehicle, Stray, float)
+        How it may be driven: with another age of the firmware, or another heading at the start, which swings out and takes the rover so
+        far behind its place. The first tells the time.
+    speeds : sequence of float or None, or None
+        The speed asked for on each leg.
+    stops : mapping of int to float
+        Where it stops, and for how many seconds.
     """
 
     points: NDArray[np.float64]
-    plans: tuple[DrivePlan, ...]
-    behind_m: tuple[float, ...]
+    ways: tuple[tuple[Vehicle, Stray, float], ...]
+    speeds: Sequence[float | None] | None
+    stops: Mapping[int, float]
+    _plans: dict[int, DrivePlan] = field(default_factory=dict, init=False)
+
+    def plan(self, way: int) -> DrivePlan:
+        """Return the legs and corners of one way."""
+        if way not in self._plans:
+            vehicle, stray, _ = self.ways[way]
+            self._plans[way] = drive_plan(self.points, vehicle, self.speeds, self.stops, stray)
+        return self._plans[way]
+
+    @property
+    def plans(self) -> tuple[DrivePlan, ...]:
+        """The legs and corners of each way."""
+        return tuple(map(self.plan, range(len(self.ways))))
 
     @cached_property
     def arrivals_s(self) -> NDArray[np.float64]:
         """When the rover passes each point, from its start on, shape (n,)."""
-        return arrivals_s(self.plans[0], len(self.points))
+        return arrivals_s(self.plan(0), len(self.points))
 
-    @cached_property
-    def pieces(self) -> Pieces:
-        """The pieces of the band, as the places about which they lie."""
+    def pieces(self, *ways: int) -> Pieces:
+        """Return the pieces of the band of some ways, as the places about which they lie."""
         pieces = Pieces()
-        for plan, behind_m in zip(self.plans, self.behind_m, strict=True):
-            _add_plan(pieces, plan, self.points, behind_m)
+        for way in ways:
+            _add_plan(pieces, self.plan(way), self.points, self.ways[way][2])
         return pieces
 
     @property
     def envelope(self) -> Envelope:
         """The band, with the predictions for corners and legs."""
-        return self.with_cores(convex(self.pieces.hulls))
+        pieces = self.pieces(*range(len(self.ways)))
+        bands_m, waypoints = np.array(pieces.bands_m), np.array(pieces.waypoints, dtype=np.int64)
+        return self.with_cores(pieces.convex(), bands_m, waypoints)
 
-    def with_cores(self, cores: NDArray[np.object_]) -> Envelope:
-        """Return the band from the convex hulls of its pieces, already known."""
-        plan = self.plans[0]
+    def with_cores(
+        self, cores: NDArray[np.object_], bands_m: NDArray[np.float64], waypoints: NDArray[np.int64]
+    ) -> Envelope:
+        """Return the band from the convex hulls of its pieces of all ways, already known."""
+        plan = self.plan(0)
         return Envelope(
             points=self.points,
             cores=cores,
-            bands_m=np.asarray(self.pieces.bands_m),
-            waypoints=np.asarray(self.pieces.waypoints, dtype=np.int64),
+            bands_m=bands_m,
+            waypoints=waypoints,
             corners=tuple(told_corner(self.plans, number) for number in range(len(plan.corners))),
             legs=tuple(told_leg(self.plans, number) for number in range(len(plan.legs))),
             arrivals_s=self.arrivals_s,
@@ -227,14 +242,14 @@ def _check_speeds(speeds: Sequence[float | None] | None, legs: int) -> None:
 
 def _start(array: NDArray[np.float64], vehicle: Vehicle, heading_deg: float | None) -> tuple[Stray, float]:
     """Return the swing at the start, and how far behind its place it takes the rover."""
-    steps = array - array[0]
-    far = np.flatnonzero(np.hypot(steps[:, 0], steps[:, 1]) >= SAME_PLACE_M)
-    if not len(far):
+    here = array[0].tolist()
+    step = next((place for place in array.tolist() if math.dist(place, here) >= SAME_PLACE_M), None)
+    if step is None:
         return Stray(), 0.0
     if heading_deg is None:
         swing_m = at_corner.start_swing_m(vehicle, 180.0)
         return Stray(swing_m, swing_m), at_corner.start_behind_m(vehicle, 180.0)
-    east_m, north_m = steps[far[0]]
+    east_m, north_m = step[0] - here[0], step[1] - here[1]
     error_deg = (heading_deg - math.degrees(math.atan2(east_m, north_m)) + 180.0) % 360.0 - 180.0
     swing_m = at_corner.start_swing_m(vehicle, error_deg)
     either_side = abs(error_deg) > EITHER_SIDE_DEG

@@ -13,7 +13,7 @@ import numpy as np
 import shapely
 
 from missions.drive_model.avoidance import STEP_S, TargetPoint
-from missions.drive_model.fence_ahead import FenceAhead
+from missions.drive_model.fence_ahead import FenceAhead, FenceEdges
 from missions.vehicle import Steering
 
 if TYPE_CHECKING:
@@ -147,7 +147,9 @@ def motion(band: Envelope, vehicle: Vehicle, fence: BaseGeometry | None = None) 
     # Where two motions overlap their sum may be a little faster than the rover lets itself be.
     speeds_mps = np.minimum(moved_m[moves] / STEP_S, max(leg.top_speed_mps for leg in band.legs))
     if len(places) and vehicle.avoids_fence and fence is not None and not fence.is_empty:
-        allowed_mps = FenceAhead(fence, places, vehicle).speeds_mps(places, ways)
+        allowed_mps = FenceAhead(FenceEdges(fence), places, vehicle).speeds_mps(
+            places, ways, float(speeds_mps.max())
+        )
         speeds_mps = np.minimum(speeds_mps, allowed_mps)
     return Motion(places, speeds_mps, ways)
 

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 KEPT_ACROSS = 0.3
 """What is left to either side, at the least, of an error that a corner turns from sideways to lengthways."""
 
 
-@dataclass(frozen=True, slots=True)
-class Stray:
+class Stray(NamedTuple):
     """How far beyond its band a rover may be to the left and to the right of its path; it dies away with time.
+
+    A tuple, because tens of thousands are made for one plan.
 
     Parameters
     ----------
@@ -25,15 +27,19 @@ class Stray:
     @property
     def widest_m(self) -> float:
         """The larger of the two."""
-        return max(self.left_m, self.right_m)
+        return max(self)
 
     def after(self, time_s: float, gain_per_s: float) -> Stray:
         """Return what is left of the stray after a time."""
+        if not (self.left_m or self.right_m):
+            return self
         left = math.exp(-gain_per_s * max(time_s, 0.0))
         return Stray(self.left_m * left, self.right_m * left)
 
     def turned(self, turn_deg: float) -> Stray:
         """Return the stray as seen from the next leg."""
+        if not (self.left_m or self.right_m):
+            return self
         cosine = math.cos(math.radians(turn_deg))
         same, other = (cosine, 0.0) if cosine > 0 else (0.0, -cosine)
         least_m = KEPT_ACROSS * self.widest_m * abs(math.sin(math.radians(turn_deg)))

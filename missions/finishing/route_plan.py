@@ -86,7 +86,6 @@ def plan_route(
     asked, found = _route(sought, request, wanted, vehicle, heading_deg)
     if asked.promised_m < wanted.promised_m:
         warnings += stop_warnings(vehicle, asked)
-        warnings += [] if request.widest else [less_text(wanted.words, asked.promised_m)]
     lines, drawn_m, band = _finished(ground, found, asked, vehicle, heading_deg)
     driven_m = max(0.0, band.clearance_m(ground.edge))
     items, seqs = mission_items(lines, vehicle.speed_mps, request.speed_mps)
@@ -119,8 +118,19 @@ def plan_route(
         vehicle=vehicle,
         home=situation.home.value if situation.home else None,
         warnings=tuple(dict.fromkeys(warnings)),
-        info=(*asked.info, *escape_info(found), *moved_target_info(targets, reached)),
+        info=(
+            *asked.info,
+            *_less_info(request, wanted, asked),
+            *escape_info(found),
+            *moved_target_info(targets, reached),
+        ),
     )
+
+
+def _less_info(request: Request, wanted: Promise, asked: Promise) -> list[str]:
+    """Return that less is promised than was asked, as was allowed."""
+    is_less = asked.promised_m < wanted.promised_m and not request.widest
+    return [less_text(wanted.words, asked.promised_m)] if is_less else []
 
 
 def _route(
@@ -180,15 +190,13 @@ def _start_remarks(ground: Ground, start: LatLon, vehicle: Vehicle) -> list[str]
 
 
 def _start_m(band: Envelope, lines: Lines, ground: Ground, asked: Promise, vehicle: Vehicle) -> float | None:
-    """Return what is promised while the route leads away from the start, where that is less than beyond.
+    """Return what is promised while the vehicle turns at its start and leads away from it, where that is less than beyond.
 
     Raises
     ------
     StartBlockedError
         There the vehicle's avoidance may back it into the fence.
     """
-    if not lines.lead_away:
-        return None
     driven_m = float(band.clearances_m(ground.edge)[band.waypoints <= lines.lead_away].min(initial=np.inf))
     if driven_m >= asked.required_m - _ROUNDING_M:
         return None
@@ -208,7 +216,7 @@ def _start_m(band: Envelope, lines: Lines, ground: Ground, asked: Promise, vehic
 def _check_band(ground: Ground, lines: Lines, band: Envelope, found: DrivenRoute, asked: Promise) -> None:
     """Refuse a plan whose band breaks the promise."""
     clearances_m = band.clearances_m(ground.edge)
-    leading = (band.waypoints <= lines.lead_away) & (lines.lead_away > 0)
+    leading = band.waypoints <= lines.lead_away  # the start's own pieces, where no leg leads away
     near_m = asked.required_m if found.lead_away_m is None else found.lead_away_m
     for name, part, least_m in (
         ("lead-away", leading, near_m),

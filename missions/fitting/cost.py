@@ -23,8 +23,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from missions.drive_model import convex, plan_drive
+from missions.drive_model import plan_drive
 from missions.drive_model.avoidance import with_avoidance
+from missions.drive_model.fence_ahead import FenceEdges
 from missions.fitting import moves
 from missions.fitting import polyline as drawn
 from missions.geo import LocalPoint
@@ -57,6 +58,10 @@ _NEAR_TURNS_COST_S = 3.0  # two turns within `moves.APART_M`: driven as one, and
 _TURN_DEG = 5.0  # what counts as a turn for that
 # With more than this missing the avoidance is not reckoned: it is the dearest step and can only add
 _FAR_FROM_ENOUGH_M = 0.7
+
+
+_Looked = tuple["NDArray[np.object_]", "NDArray[np.float64]", "NDArray[np.int64]", "NDArray[np.float64]"]
+"""What was looked at of one way to drive: convex pieces, their bands, their waypoints, what they keep."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +108,7 @@ class Gauge:
 
     def __init__(self, ground: Ground, vehicle: Vehicle, heading_deg: float | None) -> None:
         self.ground, self.vehicle = ground, vehicle
+        self.edges = FenceEdges(ground.edge)
         self._heading_deg = heading_deg
         self._trials: dict[tuple[Drawing, bool, bool], Trial] = {}
         self._legs_m: dict[tuple[LocalPoint, LocalPoint], float] = {}
@@ -163,6 +169,7 @@ class Trial:
         "_gauge",
         "_is_first",
         "_is_last",
+        "_looked",
         "_measured",
         "_near_turns",
         "_other_cost_s",
@@ -193,7 +200,7 @@ class Trial:
         self._duration_s = 0.0
         self._near_turns = _near_turns(part)
         self._measured: Measured | None = None
-        self._steps: list[Callable[[], None]] = [self._avoid, self._dive, self._look_at_band, self._time]
+        self._steps: list[Callable[[], None]] = [self._avoid, self._dive, self._time]
         self._look_at_lines()
 
     def refine(self) -> bool:
@@ -242,14 +249,23 @@ class Trial:
             stops=drawn.stops(part),
         )
         self._duration_s = float(self._drive.arrivals_s[-1])
+        # Of an unknown firmware the older one's band comes last here, so first there: it is mostly the wider.
+        self._steps += [partial(self._look_at_band, way) for way in range(len(self._drive.ways))]
+        self._looked: list[_Looked] = []
         self._add_up()
 
-    def _look_at_band(self) -> None:
-        pieces = self._drive.pieces
-        self._cores = convex(pieces.hulls)
-        self._bands_m, self._waypoints = np.array(pieces.bands_m), np.array(pieces.waypoints)
-        self._clearances_m = self._gauge.distances_m(self._cores) - self._bands_m
-        self._settle()
+    def _look_at_band(self, way: int) -> None:
+        pieces = self._drive.pieces(way)
+        cores, bands_m = pieces.convex(), np.array(pieces.bands_m)
+        clearances_m = self._gauge.distances_m(cores) - bands_m
+        self._looked.insert(0, (cores, bands_m, np.array(pieces.waypoints, dtype=np.int64), clearances_m))
+        if len(self._looked) == 1:
+            self._cores, self._bands_m, self._waypoints, self._clearances_m = self._looked[0]
+        else:
+            self._cores, self._bands_m, self._waypoints, self._clearances_m = (
+                np.concatenate(column) for column in zip(*self._looked, strict=True)
+            )
+        self._settle(way)
 
     def _dive(self, begin: int = 0) -> None:
         """Count pieces inside a fence for more, the deeper they lie."""
@@ -264,8 +280,8 @@ class Trial:
         gauge = self._gauge
         if (self._required_m[self._waypoints] - self._clearances_m).max() >= _FAR_FROM_ENOUGH_M:
             return
-        band = self._drive.with_cores(self._cores)
-        slowed = with_avoidance(band, gauge.vehicle, gauge.ground.edge)
+        band = self._drive.with_cores(self._cores, self._bands_m, self._waypoints)
+        slowed = with_avoidance(band, gauge.vehicle, gauge.edges)
         if slowed is not band:
             plain = len(self._cores)
             more_m = gauge.distances_m(slowed.cores[plain:]) - slowed.bands_m[plain:]
@@ -274,13 +290,14 @@ class Trial:
             self._steps.append(partial(self._dive, plain))
             self._settle()
 
-    def _settle(self) -> None:
-        """Count what the band misses at each point."""
+    def _settle(self, first_way: int = 0) -> None:
+        """Count what the band misses at each point, of the ways looked at."""
         required_m = self._required_m
         least_m = np.full(len(required_m), np.inf)
         np.minimum.at(least_m, self._waypoints, self._clearances_m)
         missing_m = np.maximum(required_m - least_m, self._asked_lines_m)
-        for corner in (corner for plan in self._drive.plans for corner in plan.corners):
+        ways = range(first_way, len(self._drive.ways))
+        for corner in (corner for way in ways for corner in self._drive.plan(way).corners):
             turns_back = abs(corner.turn_deg) > TURN_BACK_DEG and not corner.pivots
             if not corner.bounded or turns_back:
                 here = slice(corner.waypoint, corner.waypoint + 2)

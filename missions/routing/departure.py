@@ -15,6 +15,8 @@ from missions.ground.start_hazard import LEAVES_FROM_M
 from missions.vehicle import Steering
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from missions.geo import LocalPoint
     from missions.ground.ground import Ground
     from missions.vehicle import Vehicle
@@ -45,10 +47,8 @@ class Departure:
     turn_deg: float
 
 
-def departures(
-    ground: Ground, vehicle: Vehicle, start: LocalPoint, heading_deg: float | None
-) -> list[Departure]:
-    """Return first legs in all directions, the one that keeps most first.
+class Departures:
+    """First legs in all directions, each predicted when it is asked for.
 
     Parameters
     ----------
@@ -61,7 +61,32 @@ def departures(
     heading_deg : float or None
         Where it faces, clockwise from north; None is along each leg.
     """
-    found = []
+
+    def __init__(
+        self, ground: Ground, vehicle: Vehicle, start: LocalPoint, heading_deg: float | None
+    ) -> None:
+        self._others = _all_round(ground, vehicle, start, heading_deg)
+        self._found: list[Departure] = []
+
+    def any_keeps(self, clearance_m: float) -> bool:
+        """Return whether one of them keeps so much: mostly one of the first does."""
+        if any(one.kept_m >= clearance_m for one in self._found):
+            return True
+        for one in self._others:
+            self._found.append(one)
+            if one.kept_m >= clearance_m:
+                return True
+        return False
+
+    def best_first(self) -> list[Departure]:
+        """Return all of them, the one that keeps most first."""
+        self._found += self._others
+        return sorted(self._found, key=lambda one: -one.kept_m)
+
+
+def _all_round(
+    ground: Ground, vehicle: Vehicle, start: LocalPoint, heading_deg: float | None
+) -> Iterator[Departure]:
     for number in range(WAYS):
         # Ways beside the present heading: straight on is the first of them.
         course_deg = (heading_deg or 0.0) + 360.0 * number / WAYS
@@ -70,8 +95,7 @@ def departures(
             facing_deg = course_deg if heading_deg is None else heading_deg
             band = envelope([start, there], vehicle, heading_deg=facing_deg % 360.0)
             turn_deg = abs((course_deg - facing_deg + 180.0) % 360.0 - 180.0)
-            found.append(Departure(there, band.clearance_m(ground.edge), turn_deg))
-    return sorted(found, key=lambda one: -one.kept_m)
+            yield Departure(there, band.clearance_m(ground.edge), turn_deg)
 
 
 def least_turning_m(ground: Ground, start: LocalPoint, vehicle: Vehicle) -> float:

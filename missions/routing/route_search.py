@@ -25,12 +25,13 @@ import numpy as np
 from shapely import Point
 
 from missions.drive_model import corner_forecast
+from missions.fitting import polyline
 from missions.fitting.cost import ENOUGH_M
 from missions.fitting.local_search import MOST_MEASUREMENTS, Fitting
 from missions.fitting.polyline import Drawing, DrawnPoint
 from missions.geo import rounded
 from missions.ground.legs import ROUNDING_RESERVE_M, reserve_m
-from missions.routing.departure import ROOM_M, departures, least_turning_m
+from missions.routing.departure import ROOM_M, Departures, least_turning_m
 from missions.routing.drawn_route import DrawnRoutes, Route
 from missions.routing.no_route import NoRoute
 from missions.routing.refusal import AT_START, block, refusal
@@ -54,6 +55,8 @@ LATER_MEASUREMENTS = 500
 """For each kind of route that is tried after the first ones. Chosen, not measured: it bounds the time until a refusal."""
 
 # Chosen, not measured, but the turn at the end of a first leg.
+_SLOW_SHARE = 1.6  # of the time at full speed: beyond it the lines that leave as they are drawn are tried beside those that turn in the open
+_OTHER_WAY_DEG = 45.0  # between first legs that leave the start another way
 _OTHER_WAYS = 5  # squares laid over refusing places before the search gives up
 # Missing at the start beyond what a slower, narrower band could win back: nothing else is tried
 _HELD_M = 0.05
@@ -96,6 +99,8 @@ class DrivenRoute:
         Whether that is all that was aimed at.
     cost_s : float
         The predicted time, and a little for each waypoint (`fitting.cost`).
+    is_slow : bool
+        Whether it takes much longer than its lines would at full speed, so that others may be quicker.
     """
 
     drawing: Drawing
@@ -107,6 +112,7 @@ class DrivenRoute:
     kept_m: float | None = None
     is_whole: bool = True
     cost_s: float = 0.0
+    is_slow: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +128,17 @@ class _Attempt:
     def is_refused_at_start(self) -> bool:
         """Whether most is missing because of how it begins."""
         return not self.is_enough and self.measured.worst_index <= AT_START
+
+
+@dataclass(eq=False)
+class Known:
+    """What searches for one vehicle on one field share, whatever is required: nothing is drawn or fitted twice."""
+
+    drawn: dict[float, DrawnRoutes] = field(default_factory=dict)
+    """By the clearance of the drawn lines."""
+    fitted: dict[tuple[Drawing, int, int], tuple[Drawing, Measured, int]] = field(default_factory=dict)
+    """By the lines, and the measurements taken before and allowed; with those taken after."""
+    departures: Departures | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,6 +157,12 @@ class RouteSearch:
         Where it faces at the start, clockwise from north; None is along the first leg.
     enough_m : float, optional
         What is enough of it, where what is aimed at cannot be kept all the way. Default: all of it.
+    known : Known, optional
+        What other searches for the vehicle on the field know already.
+    any_speed : bool
+        Whether a slow route does, so that no quicker one is sought.
+    measurements : int
+        For the first routes.
     departure_limit_m : float
         What the best first leg keeps that a route leads on from, where that is known.
     """
@@ -149,8 +172,10 @@ class RouteSearch:
     vehicle: Vehicle
     heading_deg: float | None
     enough_m: float | None = None
+    known: Known = field(default_factory=Known)
+    any_speed: bool = False
+    measurements: int = MOST_MEASUREMENTS
     departure_limit_m: float = math.inf
-    _drawn: dict[float, DrawnRoutes] = field(default_factory=dict, init=False)
 
     def find(self, *, briefly: bool = False) -> DrivenRoute | NoRoute:
         """Find the quickest of the routes tried whose band keeps enough; ``briefly`` tries the first ones only."""
@@ -182,13 +207,22 @@ class RouteSearch:
 
     def nearer_start(self) -> DrivenRoute | None:
         """Leave as well as can be on the way, where the first legs that would keep all that is required lead nowhere; None where that does not help."""
-        kept = (one for one in self._departures if one.kept_m > 0)
+        kept = (one for one in self._departures.best_first() if one.kept_m > 0)
         departure = next((one for one in kept if self._onward(one, self._bands_m[1]) is not None), None)
         if departure is None or departure.kept_m >= self.required_m + self._reserve_m:
             return None
         nearer = replace(self, departure_limit_m=departure.kept_m)
         found = nearer.find(briefly=True) if nearer._is_limited_by_start else None  # noqa: SLF001 - of its own kind
         return found if isinstance(found, DrivenRoute) else None
+
+    def begins_otherwise(self, other: RouteSearch) -> bool:
+        """Return whether the shortest route leaves the start another way than that of another search, or leads away first where that does not."""
+        here, there = self._first_routes, other._first_routes
+        if isinstance(here, NoRoute) or isinstance(there, NoRoute):
+            return True
+        (route, _), (that, _) = here[0], there[0]
+        turn_deg = abs(_course_deg(route) - _course_deg(that))
+        return route.lead_away != that.lead_away or min(turn_deg, 360.0 - turn_deg) > _OTHER_WAY_DEG
 
     @cached_property
     def _attempts(self) -> list[_Attempt]:
@@ -232,9 +266,9 @@ class RouteSearch:
         if self._is_limited_by_start:
             # Lines that turn in the open are quicker than those that creep away, and to fit.
             attempts = self._until_found(self._departing(self._bands_m[1]))
-            if attempts and attempts[-1].is_enough:
+            if (driven := _found(attempts)) and (self.any_speed or not driven[-1][1].is_slow):
                 return attempts
-        fitting = self._fitting(MOST_MEASUREMENTS)
+        fitting = self._fitting(self.measurements)
         attempts.append(self._fit(fitting, routes[0]))
         is_shorter = routes[-1].length_m < _SHORTER_SHARE * routes[0].length_m
         if len(routes) > 1 and (is_shorter or not _found(attempts)):
@@ -290,15 +324,17 @@ class RouteSearch:
 
     def _drawn_at(self, band_m: float) -> DrawnRoutes:
         """Return the routes drawn with room for a band; what is free at it is computed once."""
-        if band_m not in self._drawn:
-            clearance_m = self.required_m + band_m + self._reserve_m
-            self._drawn[band_m] = DrawnRoutes.at(self.sought, clearance_m)
-        return self._drawn[band_m]
+        clearance_m = self.required_m + band_m + self._reserve_m
+        if clearance_m not in self.known.drawn:
+            self.known.drawn[clearance_m] = DrawnRoutes.at(self.sought, clearance_m)
+        return self.known.drawn[clearance_m]
 
     def _fit(self, fitting: Fitting, route: Route, speed_mps: float | None = None) -> _Attempt:
-        drawing, measured = fitting.fit(
-            tuple(replace(point, speed_mps=speed_mps) for point in self._drawing(route))
-        )
+        drawn_lines = tuple(replace(point, speed_mps=speed_mps) for point in self._drawing(route))
+        key = (drawn_lines, fitting.measurements, fitting.most_measurements)
+        if key not in self.known.fitted:
+            self.known.fitted[key] = (*fitting.fit(drawn_lines), fitting.measurements)
+        drawing, measured, fitting.measurements = self.known.fitted[key]
         departing_m = self._least_departing_m(route)
         kept, kept_m, lead_m = measured, self.required_m, departing_m
         if not measured.is_enough:
@@ -317,6 +353,7 @@ class RouteSearch:
             kept_m,
             measured.is_enough,
             kept.cost_s,
+            kept.cost_s * self.vehicle.speed_mps > _SLOW_SHARE * polyline.distances_m(drawing)[-1],
         )
         enough_m = self.required_m if self.enough_m is None else self.enough_m
         return _Attempt(drawing, measured, driven, is_enough=kept_m >= min(enough_m, self.required_m))
@@ -378,9 +415,10 @@ class RouteSearch:
         """
         if self.sought.ground.clearance_m(Point(self.sought.start)) >= self.required_m + ROOM_M:
             return self.required_m
-        best_m = min(self._departures[0].kept_m, self.departure_limit_m)
-        if best_m >= self.required_m + self._reserve_m:
+        enough_m = self.required_m + self._reserve_m
+        if self.departure_limit_m >= enough_m and self._departures.any_keeps(enough_m):
             return self.required_m
+        best_m = min(self._departures.best_first()[0].kept_m, self.departure_limit_m)
         slack_m = max(_DEPARTURE_SLACK_M, _DEPARTURE_SLACK_SHARE * best_m)
         left_m = best_m - 2 * self._reserve_m - slack_m
         least_m = least_turning_m(self.sought.ground, self.sought.start, self.vehicle)
@@ -391,15 +429,19 @@ class RouteSearch:
         """Whether the vehicle's turning at this start leaves less than is required."""
         return 0 <= self.departure_m < self.required_m
 
-    @cached_property
-    def _departures(self) -> list[Departure]:
-        return departures(self.sought.ground, self.vehicle, self.sought.start, self.heading_deg)
+    @property
+    def _departures(self) -> Departures:
+        if self.known.departures is None:
+            self.known.departures = Departures(
+                self.sought.ground, self.vehicle, self.sought.start, self.heading_deg
+            )
+        return self.known.departures
 
     def _departing_routes(self, band_m: float) -> Iterator[Route]:
         """Return routes by the first legs that the vehicle can drive as it faces, the shortest first."""
         keeps_m = self.departure_m + self._reserve_m
         routes = []
-        for departure in self._departures:
+        for departure in self._departures.best_first():
             if departure.kept_m < keeps_m:
                 break
             onward = self._onward(departure, band_m)
@@ -418,12 +460,10 @@ class RouteSearch:
 
     def _onward(self, departure: Departure, band_m: float) -> Route | None:
         """Return the route on from a first leg, None where it does not lead on: from where less is free than is drawn with, it would first lead away."""
-        if (
-            self.sought.ground.clearance_m(Point(departure.there))
-            < self.required_m + band_m + self._reserve_m
-        ):
+        drawn = self._drawn_at(band_m)
+        if not drawn.is_free(departure.there):
             return None
-        onward = self._drawn_at(band_m).find(departure.there)
+        onward = drawn.find(departure.there)
         if isinstance(onward, NoRoute) or onward.lead_away:
             return None
         return onward if _turn_at_deg(self.sought.start, onward) <= _MOST_TURN_DEG else None
@@ -446,6 +486,12 @@ class RouteSearch:
 def _found(attempts: Sequence[_Attempt]) -> list[tuple[float, DrivenRoute]]:
     """Return the routes that were found, with what each costs."""
     return [(one.driven.cost_s, one.driven) for one in attempts if one.is_enough and one.driven is not None]
+
+
+def _course_deg(route: Route) -> float:
+    """Return where the first leg leads, clockwise from north."""
+    east_m, north_m = route.points[1] - route.points[0]
+    return math.degrees(math.atan2(east_m, north_m))
 
 
 def _turn_at_deg(start: LocalPoint, onward: Route) -> float:

@@ -84,6 +84,7 @@ class _Map(NamedTuple):
     """What queries read."""
 
     first: Ints
+    last: Ints
     ways: Records
     corners: Records
     points: Floats  # of the vertices as given
@@ -139,7 +140,15 @@ class Searcher:
         bucket = np.empty(int(bucket_first[-1]), np.int64)
         _fill(of_block, grid, bucket_first, bucket)
         self._map = _Map(
-            flat.first, flat.ways, flat.corners, vertices.points, of_block, bucket_first, bucket, grid
+            flat.first,
+            flat.last,
+            flat.ways,
+            flat.corners,
+            vertices.points,
+            of_block,
+            bucket_first,
+            bucket,
+            grid,
         )
         self._idle: list[_Work] = []
 
@@ -581,10 +590,10 @@ def _follow(
 
     Return how many entries it lacks room for: 0, or the cone is left where it has come to, to be followed again.
     """
-    first, sizes, nodes = the_map.first, work.sizes, work.nodes
+    first, last, sizes, nodes = the_map.first, the_map.last, work.sizes, work.nodes
     block, direction, low, high, steps = cone.block, cone.direction, cone.low, cone.high, cone.steps
     while True:
-        entries = 4 * (first[direction, block + 1] - first[direction, block])
+        entries = 4 * (last[direction, block] - first[direction, block])
         if sizes[_NODES] + _MARGIN + entries > len(nodes):
             cone.block, cone.low, cone.high, cone.steps = block, low, high, steps
             return int(entries)
@@ -623,11 +632,11 @@ def _look(
     high: float,
 ) -> int:
     """Find the ways out of a block that a cone sees, reach the corners beside them, and return how many there are."""
-    first, seen = the_map.first, work.seen
+    seen = work.seen
     root_x, root_y = work.roots[root].x, work.roots[root].y
     low_side = _RIGHT if direction == _EAST else _LEFT
     count = 0
-    for place in range(first[direction, block], first[direction, block + 1]):
+    for place in range(the_map.first[direction, block], the_map.last[direction, block]):
         way = the_map.ways[direction, place]
         run = way.east - root_x if direction == _EAST else root_x - way.east
         if run <= 0.0:

@@ -6,7 +6,7 @@ whether they went well.
 """
 
 # numba reads loops over indices and explicit comparisons best.
-# ruff: noqa: PLR0913, PLR0917, PLR1714
+# ruff: noqa: PLR1714
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from pbpp.compiled.jit import uncounted as _uncounted
 from pbpp.partition.base import TOLERANCE_M
 from pbpp.partition.flat import BLOCK, CORNER, PORTAL, WAY, FlatSlabs, Records, record
 from pbpp.partition.sweep import DULL_END, OPEN_END
+from pbpp.partition.window import BlockArrays, Window
 
 if TYPE_CHECKING:
     from pbpp.geometry import Floats
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 __all__ = ["sweep"]
 
+_NOTHING = BlockArrays(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0), np.empty(0))
 _NONE = -1
 _NEVER = -1  # as a stamp
 # A vertex opens two blocks at the most; a line one for each of its vertices and one for each block that it closes, of which a vertex touches two.
@@ -58,13 +60,13 @@ class _State(NamedTuple):
     sizes: Ints
 
 
-def sweep(vertices: Vertices) -> FlatSlabs:
-    """Return the slabs of free space.
+def sweep(vertices: Vertices | Window) -> FlatSlabs:
+    """Return the slabs of free space, or of some lines of it.
 
     Parameters
     ----------
-    vertices : Vertices
-        Of free space.
+    vertices : Vertices or Window
+        Of free space, or of the lines, which begin and end with open blocks.
 
     Returns
     -------
@@ -78,7 +80,8 @@ def sweep(vertices: Vertices) -> FlatSlabs:
     """
     v = vertices
     count = len(v.x)
-    most = _MOST_BLOCKS * count + 1
+    begins_with = v.begins_with if isinstance(v, Window) else _NOTHING
+    most = _MOST_BLOCKS * count + len(begins_with.west) + 1
     state = _State(
         np.empty(count, _EDGE),
         np.empty(count, CORNER),
@@ -90,28 +93,21 @@ def sweep(vertices: Vertices) -> FlatSlabs:
         np.empty((2, most), _OPENING),
         np.array([0, 0, 1, 0]),
     )
-    if not _sweep(state, v.x, v.y, v.next, v.prev, v.corner, v.line_x, v.line_start, v.order):
+    _lay_out(state, v.x, v.y, v.next, v.prev, v.corner, v.names)
+    _begin(state, *begins_with)
+    if not _sweep(state, v.line_x, v.line_start, v.order):
         raise ValueError("the rings of free space do not fit together")
     blocks = state.blocks[: state.sizes[_BLOCKS]].copy()
     portals = state.portals[: state.sizes[_PORTALS]].copy()
-    first, ways = np.zeros((2, len(blocks) + 1), np.int64), np.empty((2, len(portals)), WAY)
-    _sort(portals, first, ways)
-    return FlatSlabs(blocks, portals, first, ways, state.corners)
+    first, last = (np.zeros((2, len(blocks)), np.int64) for _ in range(2))
+    ways = np.empty((2, len(portals)), WAY)
+    _sort(portals, first, last, ways)
+    ends_with = state.slots["block"][state.active[: state.sizes[_OPEN]]]
+    return FlatSlabs(blocks, portals, first, last, ways, state.corners, ends_with)
 
 
 @_compiled
-def _sweep(
-    state: _State,
-    x: Floats,
-    y: Floats,
-    after: Ints,
-    before: Ints,
-    corner: Any,  # noqa: ANN401 - an array of bool
-    line_x: Floats,
-    line_start: Ints,
-    order: Ints,
-) -> bool:
-    _lay_out(state, x, y, after, before, corner)
+def _sweep(state: _State, line_x: Floats, line_start: Ints, order: Ints) -> bool:
     for line in range(len(line_x)):
         there = order[line_start[line] : line_start[line + 1]]
         if len(there) == 1 or _independent(state, line, line_x[line], there):
@@ -124,12 +120,31 @@ def _sweep(
 
 
 @_uncounted
-def _lay_out(state: _State, x: Floats, y: Floats, after: Ints, before: Ints, corner: Any) -> None:  # noqa: ANN401
+def _begin(state: _State, floor: Ints, ceiling: Ints, west: Floats, east: Floats) -> None:
+    for place in range(len(floor)):
+        slot = _new_slot(
+            state, floor[place], ceiling[place], _new_block(state, west[place], floor[place], ceiling[place])
+        )
+        state.active[place] = slot
+        state.blocks[place].east = east[place]
+    state.sizes[_OPEN] = len(floor)
+
+
+@_uncounted
+def _lay_out(
+    state: _State,
+    x: Floats,
+    y: Floats,
+    after: Ints,
+    before: Ints,
+    corner: Any,  # noqa: ANN401 - an array of bool
+    names: Ints,
+) -> None:
     for one in range(len(x)):
         edge, around = state.edges[one], state.corners[one]
         other = after[one]
         edge.x, edge.y, edge.next, edge.prev = x[one], y[one], other, before[one]
-        edge.end = one if corner[one] else DULL_END
+        edge.end = names[one] if corner[one] else DULL_END
         edge.by_floor = edge.by_ceiling = 0
         east = x[other] - x[one]
         edge.out = 1 if east > 0.0 else -1 if east < 0.0 else 0
@@ -147,19 +162,17 @@ def _lay_out(state: _State, x: Floats, y: Floats, after: Ints, before: Ints, cor
 
 
 @_compiled
-def _sort(portals: Records, first: Ints, ways: Records) -> None:
+def _sort(portals: Records, first: Ints, last: Ints, ways: Records) -> None:
     """Lay out the ways of each block one after the other, in the order in which they were made."""
     for portal in portals:
-        first[0, portal.east_block + 1] += 1
-        first[1, portal.west_block + 1] += 1
+        last[0, portal.east_block] += 1
+        last[1, portal.west_block] += 1
     for direction in range(2):
-        for block in range(1, first.shape[1]):
-            first[direction, block] += first[direction, block - 1]
-    # Backwards, each taking the last free place: `first` comes to what it shall be.
-    for direction in range(2):
-        for block in range(first.shape[1] - 1, 0, -1):
-            first[direction, block] = first[direction, block - 1]
-        first[direction, 0] = 0
+        place = 0
+        for block in range(first.shape[1]):
+            count = last[direction, block]
+            first[direction, block] = last[direction, block] = place
+            place += count
     for portal in portals:
         for direction in range(2):
             block, behind = (
@@ -167,8 +180,8 @@ def _sort(portals: Records, first: Ints, ways: Records) -> None:
                 if direction
                 else (portal.east_block, portal.west_block)
             )
-            way = ways[direction, first[direction, block + 1]]
-            first[direction, block + 1] += 1
+            way = ways[direction, last[direction, block]]
+            last[direction, block] += 1
             way.east, way.south, way.north = portal.east, portal.low, portal.high
             way.low_end, way.high_end, way.block = portal.low_end, portal.high_end, behind
 
@@ -242,12 +255,14 @@ def _new_slot(state: _State, floor: int, ceiling: int, block: int) -> int:
 @_inlined
 def _new_portal(
     state: _State, x: float, low: float, high: float, low_end: int, high_end: int, west: int, east: int
-) -> None:
-    if high - low > TOLERANCE_M:
-        portal = state.portals[state.sizes[_PORTALS]]
-        portal.east, portal.low, portal.high = x, low, high
-        portal.low_end, portal.high_end, portal.west_block, portal.east_block = low_end, high_end, west, east
-        state.sizes[_PORTALS] += 1
+) -> bool:
+    if high - low <= TOLERANCE_M:
+        return False
+    portal = state.portals[state.sizes[_PORTALS]]
+    portal.east, portal.low, portal.high = x, low, high
+    portal.low_end, portal.high_end, portal.west_block, portal.east_block = low_end, high_end, west, east
+    state.sizes[_PORTALS] += 1
+    return True
 
 
 @_uncounted
@@ -296,10 +311,9 @@ def _bend(state: _State, x: float, vertex: int, before: int, is_floor: bool) -> 
     east = _new_block(state, x, slot.floor, slot.ceiling)
     slot.block = east
     if is_floor:
-        _new_portal(state, x, y, _north(edges, slot.ceiling, x), end, OPEN_END, west, east)
-        around.west_above, around.east_above = west, east
-    else:
-        _new_portal(state, x, _north(edges, slot.floor, x), y, OPEN_END, end, west, east)
+        if _new_portal(state, x, y, _north(edges, slot.ceiling, x), end, OPEN_END, west, east):
+            around.west_above, around.east_above = west, east
+    elif _new_portal(state, x, _north(edges, slot.floor, x), y, OPEN_END, end, west, east):
         around.west_below, around.east_below = west, east
     return True
 
@@ -320,10 +334,10 @@ def _divide(state: _State, x: float, vertex: int, before: int) -> bool:
     slot.ceiling, slot.block = before, lower
     edges[before].by_ceiling = number
     _insert(state, place + 1, _new_slot(state, vertex, ceiling, upper))
-    _new_portal(state, x, _north(edges, floor, x), y, OPEN_END, end, west, lower)
-    _new_portal(state, x, y, _north(edges, ceiling, x), end, OPEN_END, west, upper)
-    around.west_above = around.west_below = west
-    around.east_above, around.east_below = upper, lower
+    if _new_portal(state, x, _north(edges, floor, x), y, OPEN_END, end, west, lower):
+        around.west_below, around.east_below = west, lower
+    if _new_portal(state, x, y, _north(edges, ceiling, x), end, OPEN_END, west, upper):
+        around.west_above, around.east_above = west, upper
     return True
 
 
@@ -345,10 +359,10 @@ def _unite(state: _State, x: float, vertex: int, before: int) -> bool:
     east = _new_block(state, x, floor, ceiling)
     slot.ceiling, slot.block = ceiling, east
     edges[ceiling].by_ceiling = below
-    _new_portal(state, x, _north(edges, floor, x), y, OPEN_END, end, lower, east)
-    _new_portal(state, x, y, _north(edges, ceiling, x), end, OPEN_END, upper, east)
-    around.west_above, around.west_below = upper, lower
-    around.east_above = around.east_below = east
+    if _new_portal(state, x, _north(edges, floor, x), y, OPEN_END, end, lower, east):
+        around.west_below, around.east_below = lower, east
+    if _new_portal(state, x, y, _north(edges, ceiling, x), end, OPEN_END, upper, east):
+        around.west_above, around.east_above = upper, east
     return True
 
 
@@ -590,9 +604,9 @@ def _place(state: _State, there: Ints, which: int, count: int) -> None:
         y, around = state.edges[vertex].y, state.corners[vertex]
         above = below = _NONE
         for side in sides[:count]:
-            if side.low <= y < side.high:
+            if side.low <= y and side.high - y > TOLERANCE_M:
                 above = side.block
-            if side.low < y <= side.high:
+            if y - side.low > TOLERANCE_M and y <= side.high:
                 below = side.block
         if which == _CLOSED:
             around.west_above, around.west_below = above, below

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from pbpp.geometry import Floats, Point
 
     from .vertices import Ints, Vertices
+    from .window import BlockArrays
 
 __all__ = ["Places"]
 
@@ -50,10 +51,8 @@ class Places:
     ----------
     vertices : Vertices
         Of free space.
-    edges : pair of (b,) array of int
-        Floor and ceiling of each block, each the vertex that its edge starts at.
-    sides : pair of (b,) array
-        East of each block's west and east side in metres, the west sides rising.
+    blocks : BlockArrays
+        The blocks.
     height_m : (b,) array
         The greatest height of each block. Those that are closed gaps have no portals: an end in one is in none.
 
@@ -65,12 +64,12 @@ class Places:
         How far from an edge a point is taken to lie beside it for certain.
     """
 
-    def __init__(
-        self, vertices: Vertices, edges: tuple[Ints, Ints], sides: tuple[Floats, Floats], height_m: Floats
-    ) -> None:
+    def __init__(self, vertices: Vertices, blocks: BlockArrays, height_m: Floats) -> None:
         self._vertices = vertices
-        self._floor, self._ceiling = edges
-        self._west, self._east = sides
+        self._floor, self._ceiling, self._west, self._east = blocks
+        # The order in which a sweep opens blocks; one over some lines only numbers them in another.
+        self._order = np.argsort(self._west, kind="stable")
+        self._rising = self._west[self._order]
         self.open_east = np.where(height_m > TOLERANCE_M, self._east, -np.inf)
         self._lines: list[float] = vertices.line_x.tolist()
         self._located: dict[Point, tuple[list[int], bool]] = {}
@@ -78,7 +77,7 @@ class Places:
         self.rounding_m = _ROUNDINGS * float(np.spacing(bounds_m))
 
     def locate(self, point: Point) -> list[int]:
-        """Return the blocks that a point lies in or on the edge of, in rising order."""
+        """Return the blocks that a point lies in or on the edge of, from west to east and then from south to north."""
         return self._place(point)[0]
 
     def settle(self, point: Point, tolerance_m: float, components: frozenset[int]) -> Point:
@@ -180,8 +179,16 @@ class Places:
                 blocks.append(block)
                 if depth_m[place] >= self.rounding_m and self._west[block] <= point[0] <= self._east[block]:
                     inside = True
+            if len(blocks) > 1:
+                # As a sweep over all of free space numbers them.
+                blocks.sort(key=lambda block: (self._west[block], self._south(block)))
             found = self._located[point] = blocks, inside
         return found
+
+    def _south(self, block: int) -> float:
+        """Return the north of a block's floor half way between its sides."""
+        middle = 0.5 * (self._west[block : block + 1] + self._east[block : block + 1])
+        return float(self._vertices.edge_north(self._floor[block : block + 1], middle)[0])
 
     def _depths(self, point: Point, tolerance_m: float) -> tuple[Ints, Floats]:
         """Return the blocks that a point may lie in, and how far it lies above their floors and below their ceilings, in metres.
@@ -189,9 +196,8 @@ class Places:
         Less than nothing outside. Measured square to the edges: beside a steep edge heights say nothing.
         """
         east, north = point
-        # The sweep opens blocks in the order of their west sides.
-        last = int(self._west.searchsorted(east + tolerance_m, side="right"))
-        near = (self.open_east[:last] >= east - tolerance_m).nonzero()[0]
+        begun = self._order[: int(self._rising.searchsorted(east + tolerance_m, side="right"))]
+        near = begun[self.open_east[begun] >= east - tolerance_m]
         across_x, across_y, offset_m = self.half_planes.take(near, axis=2)
         depth_m = across_x * east
         depth_m += across_y * north

@@ -11,6 +11,7 @@ linked anew, so that each of its free fans is a vertex of its own.
 
 from __future__ import annotations
 
+from copy import copy
 from functools import cached_property
 from operator import itemgetter
 from typing import TYPE_CHECKING
@@ -21,6 +22,7 @@ from .base import TOLERANCE_M, Portals
 from .places import Places
 from .sweep import Sweep
 from .vertices import Ints, Vertices
+from .window import BlockArrays, patch_of, window_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,8 +32,22 @@ if TYPE_CHECKING:
     from pbpp.geometry import Floats, Point
 
     from .flat import Engine, FlatSearch, FlatSlabs
+    from .window import Patch, Window
 
 __all__ = ["Slabs"]
+
+_LIVE = 0.75  # of the numbers of vertices, before slabs are made anew with none without meaning; chosen, not measured
+
+
+def _swept(vertices: Vertices | Window, engine: Engine | None) -> tuple[Sweep | FlatSlabs, BlockArrays]:
+    """Return what a sweep writes, and its blocks."""
+    if engine is None:
+        lists = Sweep(vertices)
+        lists.run()
+        return lists, lists.blocks
+    flat = engine.sweep(vertices)
+    floor, ceiling = (flat.blocks[name].astype(np.intp) for name in ("floor", "ceiling"))
+    return flat, BlockArrays(floor, ceiling, flat.blocks["west"], flat.blocks["east"])
 
 
 class Slabs:
@@ -57,49 +73,91 @@ class Slabs:
 
     def __init__(self, polygons: Sequence[Polygon], engine: Engine | None = None) -> None:
         self.vertices = Vertices(polygons)
-        self.swept: Sweep | FlatSlabs
         self._engine = engine
-        if engine is not None:
-            self.swept = flat = engine.sweep(self.vertices)
-            self._floor, self._ceiling = flat.blocks["floor"], flat.blocks["ceiling"]
-            self._west, self._east = flat.blocks["west"], flat.blocks["east"]
-        else:
-            self.swept = lists = Sweep(self.vertices)
-            lists.run()
-            self._floor = np.array(lists.floor, dtype=np.intp)
-            self._ceiling = np.array(lists.ceiling, dtype=np.intp)
-            self._west = np.array(lists.west)
-            self._east = np.array(lists.east)
+        self.swept, self._blocks = _swept(self.vertices, engine)
+        self._dead: Ints = np.empty(0, dtype=np.intp)
 
     def __len__(self) -> int:
-        return len(self._west)
+        return len(self._blocks.west) - len(self._dead)
+
+    def changed(self, gone: Ints, rings: Sequence[Floats], owner: int) -> Slabs | None:
+        """Return the slabs without some holes of free space and with others, swept anew only where that is.
+
+        They can be searched; as a partition they have numbers without a block.
+
+        Parameters
+        ----------
+        gone, rings, owner
+            As for `Vertices.changed`.
+
+        Returns
+        -------
+        Slabs or None
+            The slabs; None if they must be made anew.
+        """
+        vertices = self.vertices.changed(gone, rings, owner)
+        if vertices is None or len(vertices) < _LIVE * len(vertices.x):
+            return None
+        easts = np.concatenate((self.vertices.x[gone], vertices.x[len(self.vertices.x) :]))
+        ends = float(easts.min()), float(easts.max())
+        found = window_of(vertices, self._blocks, self._dead, ends)
+        if found is None:
+            return None
+        window, opened = found
+        part, swept = _swept(window, self._engine)
+        patch = patch_of(
+            vertices=vertices,
+            before=self._blocks,
+            dead=self._dead,
+            ends=ends,
+            window=window,
+            opened=opened,
+            swept=swept,
+            ends_with=np.asarray(part.ends_with, dtype=np.intp),
+        )
+        return None if patch is None else self._patched(vertices, patch, part)
+
+    def _patched(self, vertices: Vertices, patch: Patch, part: Sweep | FlatSlabs) -> Slabs:
+        new = copy(self)
+        for name in ("centers", "portals", "places", "searcher"):
+            new.__dict__.pop(name, None)
+        new._patch(vertices, patch, part)  # noqa: SLF001 - a copy
+        return new
+
+    def _patch(self, vertices: Vertices, patch: Patch, part: Sweep | FlatSlabs) -> None:
+        """Take over a window swept anew, before anything but the sides was asked for."""
+        more = np.zeros(len(patch.blocks.west) - len(self._blocks.west))
+        sides = [np.append(side, more) for side in self._sides]
+        self.vertices, self._blocks, self._dead = vertices, patch.blocks, patch.dead
+        if isinstance(self.swept, Sweep):
+            assert isinstance(part, Sweep)  # by the same engine
+            self.swept = self.swept.patched(patch, part)
+        else:
+            assert not isinstance(part, Sweep)
+            self.swept = self.swept.patched(patch, part)
+        changed = np.append(patch.numbers, patch.dead)
+        for side, values in zip(sides, self._sides_of(changed), strict=True):
+            side[changed] = values
+        self._sides = (sides[0], sides[1], sides[2], sides[3])
+        opened, closed = patch.numbers[patch.is_new], patch.numbers[patch.is_closed]
+        self.unjoined_m = self._unjoined_m(patch.window, part, opened, closed)
 
     @cached_property
     def _sides(self) -> tuple[Floats, Floats, Floats, Floats]:
         """North of floor west, floor east, ceiling west, ceiling east of each block."""
-        return (
-            self._edge_north(self._floor, self._west),
-            self._edge_north(self._floor, self._east),
-            self._edge_north(self._ceiling, self._west),
-            self._edge_north(self._ceiling, self._east),
-        )
+        return self._sides_of(np.arange(len(self._blocks.west)))
 
-    def _edge_north(self, edge: Ints, east: Floats) -> Floats:
-        """Return the north of edges at given easts, exact at their ends."""
-        v = self.vertices
-        first, second = edge, v.next[edge]
-        swap = v.x[first] > v.x[second]
-        first, second = np.where(swap, second, first), np.where(swap, first, second)
-        share = (east - v.x[first]) / (v.x[second] - v.x[first])
-        north = v.y[first] + share * (v.y[second] - v.y[first])
-        return np.where(share >= 1.0, v.y[second], north)
+    def _sides_of(self, blocks: Ints) -> tuple[Floats, Floats, Floats, Floats]:
+        of, north = self._blocks, self.vertices.edge_north
+        floor, ceiling, west, east = of.floor[blocks], of.ceiling[blocks], of.west[blocks], of.east[blocks]
+        return north(floor, west), north(floor, east), north(ceiling, west), north(ceiling, east)
 
     @property
     def area_m2(self) -> float:
         """Sum of the areas of all blocks in square metres."""
         floor_west, floor_east, ceiling_west, ceiling_east = self._sides
         heights = (ceiling_west - floor_west) + (ceiling_east - floor_east)
-        return float(0.5 * np.dot(heights, self._east - self._west))
+        return float(0.5 * np.dot(heights, self._blocks.east - self._blocks.west))
 
     @property
     def north_range(self) -> tuple[Floats, Floats]:
@@ -112,17 +170,19 @@ class Slabs:
         """CP, (b, 2) array: the middle of each block."""
         floor_west, floor_east, ceiling_west, ceiling_east = self._sides
         north = 0.25 * (floor_west + floor_east + ceiling_west + ceiling_east)
-        return np.column_stack((0.5 * (self._west + self._east), north))
+        return np.column_stack((0.5 * (self._blocks.west + self._blocks.east), north))
 
     def chord(self, block: Ints, north: Floats) -> tuple[Floats, Floats]:
         """Return the west and east ends of blocks' horizontal chords at given norths."""
-        west, east = self._west[block].copy(), self._east[block].copy()
+        west, east = self._blocks.west[block].copy(), self._blocks.east[block].copy()
         floor_west, floor_east, ceiling_west, ceiling_east = (side[block] for side in self._sides)
         for at_west, at_east, above in ((floor_west, floor_east, True), (ceiling_west, ceiling_east, False)):
             rise = at_east - at_west
             slanted = np.abs(rise) > TOLERANCE_M
             share = np.divide(north - at_west, rise, out=np.zeros_like(north), where=slanted)
-            cross = self._west[block] + np.clip(share, 0.0, 1.0) * (self._east[block] - self._west[block])
+            cross = self._blocks.west[block] + np.clip(share, 0.0, 1.0) * (
+                self._blocks.east[block] - self._blocks.west[block]
+            )
             # Above a rising floor, and below a falling ceiling, lies the west; else the east.
             ends_east = slanted & ((rise > 0.0) == above)
             east = np.where(ends_east, np.minimum(east, cross), east)
@@ -136,28 +196,27 @@ class Slabs:
         heights = np.concatenate((ceiling_west - floor_west, ceiling_east - floor_east))
         return float(heights.min(initial=0.0))
 
-    @property
+    @cached_property
     def unjoined_m(self) -> float:
         """How much of the blocks' sides is neither portal nor vertical boundary in metres, at least: 0 but for rounding.
 
-        Less than nothing where a portal leads through a boundary.
+        Less than nothing where a portal leads through a boundary. Of changed slabs: where they were swept anew.
         """
-        v = self.vertices
-        floor_west, floor_east, ceiling_west, ceiling_east = self._sides
-        sides_m = float((ceiling_west - floor_west).sum() + (ceiling_east - floor_east).sum())
-        upright_m = float(np.abs(v.y[v.next] - v.y)[v.x[v.next] == v.x].sum())
-        return sides_m - upright_m - 2.0 * self._portals_m
+        everything = np.arange(len(self._blocks.west))
+        return self._unjoined_m(self.vertices, self.swept, everything, everything)
 
-    @property
-    def _portals_m(self) -> float:
-        """Sum of the lengths of all portals in metres."""
-        portals = self.swept.portals
+    def _unjoined_m(self, v: Vertices | Window, swept: Sweep | FlatSlabs, wests: Ints, easts: Ints) -> float:
+        floor_west, floor_east, ceiling_west, ceiling_east = self._sides
+        sides_m = float((ceiling_west - floor_west)[wests].sum() + (ceiling_east - floor_east)[easts].sum())
+        after = v.next[v.order]
+        upright_m = float(np.abs(v.y[after] - v.y[v.order])[v.x[after] == v.x[v.order]].sum())
+        portals = swept.portals
         # Added up in one order, so that both sweeps pass the check or none does.
         if isinstance(portals, list):
-            length_m: float = sum(map(itemgetter(2), portals)) - sum(map(itemgetter(1), portals))
+            portals_m: float = sum(map(itemgetter(2), portals)) - sum(map(itemgetter(1), portals))
         else:
-            length_m = sum(portals["high"].tolist()) - sum(portals["low"].tolist())
-        return length_m
+            portals_m = sum(portals["high"].tolist()) - sum(portals["low"].tolist())
+        return sides_m - upright_m - 2.0 * portals_m
 
     @cached_property
     def portals(self) -> Portals:
@@ -176,7 +235,7 @@ class Slabs:
     def outline(self, block: int) -> Floats:
         """Return the corners of a block, (3 or 4, 2) array, counter-clockwise, metres from the scene's origin."""
         floor_west, floor_east, ceiling_west, ceiling_east = (float(side[block]) for side in self._sides)
-        west, east = float(self._west[block]), float(self._east[block])
+        west, east = float(self._blocks.west[block]), float(self._blocks.east[block])
         corners = [(west, floor_west), (east, floor_east)]
         if ceiling_east > floor_east:
             corners.append((east, ceiling_east))
@@ -189,7 +248,7 @@ class Slabs:
         """Where points lie among the blocks."""
         floor_west, floor_east, ceiling_west, ceiling_east = self._sides
         height_m = np.maximum(ceiling_west - floor_west, ceiling_east - floor_east)
-        return Places(self.vertices, (self._floor, self._ceiling), (self._west, self._east), height_m)
+        return Places(self.vertices, self._blocks, height_m)
 
     @cached_property
     def searcher(self) -> FlatSearch | None:
@@ -199,7 +258,7 @@ class Slabs:
         return self._engine.searcher(self.swept, self.vertices, self.places)
 
     def locate(self, point: Point) -> list[int]:
-        """Return the blocks that a point lies in or on the edge of, in rising order."""
+        """Return the blocks that a point lies in or on the edge of, from west to east and then from south to north."""
         return self.places.locate(point)
 
     def components(self, blocks: Sequence[int]) -> frozenset[int]:
@@ -226,8 +285,8 @@ class Slabs:
         found: list[tuple[int, bool]] = []
         floor_west, floor_east, ceiling_west, ceiling_east = (float(side[block]) for side in self._sides)
         for side, low, high in (
-            (float(self._west[block]), floor_west, ceiling_west),
-            (float(self._east[block]), floor_east, ceiling_east),
+            (float(self._blocks.west[block]), floor_west, ceiling_west),
+            (float(self._blocks.east[block]), floor_east, ceiling_east),
         ):
             if abs(side - east) > TOLERANCE_M:
                 continue

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from .base import TOLERANCE_M
+from .window import BlockArrays, Window
 
 if TYPE_CHECKING:
     from .vertices import Vertices
+    from .window import Patch
 
 __all__ = ["DULL_END", "OPEN_END", "PortalView", "Sweep"]
 
@@ -20,6 +25,8 @@ OPEN_END = -1
 DULL_END = -2
 """In place of a vertex: the portal ends at one around which no shortest path turns."""
 
+_AROUND = ("west_above", "west_below", "east_above", "east_below", "above", "below")
+
 _Slot = list[int]
 """An open block: [floor edge, ceiling edge, block]. Edges are numbered by the vertex they start at."""
 
@@ -27,16 +34,21 @@ _Side = tuple[float, int, float, int, int]
 """A block's side on the line: (low north, low vertex, high north, high vertex, block); vertex -1 for none."""
 
 
+def _way_to(block: int, way: PortalView) -> PortalView:
+    """Return a portal with another block behind it."""
+    return (way[0], way[1], way[2], way[3], way[4], block)
+
+
 class Sweep:
     """One sweep over free space.
 
     Parameters
     ----------
-    vertices : Vertices
-        Of free space.
+    vertices : Vertices or Window
+        Of free space, or of some lines of it: then it begins and ends with open blocks.
     """
 
-    def __init__(self, vertices: Vertices) -> None:
+    def __init__(self, vertices: Vertices | Window) -> None:
         v = vertices
         count = len(v.x)
         self._vertices = v
@@ -58,7 +70,7 @@ class Sweep:
         self._left_y: list[float] = v.y[left].tolist()
         # +1: the edge leaves the vertex eastwards (a floor), -1: westwards (a ceiling), 0: vertical.
         self._out: list[int] = ((east > 0.0).astype(int) - (east < 0.0)).tolist()
-        self._end: list[int] = [i if ok else DULL_END for i, ok in enumerate(v.corner.tolist())]
+        self._end: list[int] = np.where(v.corner, v.names, DULL_END).tolist()
         self._active: list[_Slot] = []
         self._by_floor: list[_Slot] = [[]] * count
         self._by_ceiling: list[_Slot] = [[]] * count
@@ -75,6 +87,61 @@ class Sweep:
         self.east_below = [-1] * count
         self.above = [-1] * count
         self.below = [-1] * count
+        if isinstance(v, Window):
+            self._begin(v.begins_with)
+
+    def _begin(self, blocks: BlockArrays) -> None:
+        """Begin with blocks that are open."""
+        for west, floor, ceiling in zip(
+            *(column.tolist() for column in (blocks.west, blocks.floor, blocks.ceiling)), strict=True
+        ):
+            slot = [floor, ceiling, self._new_block(west, floor, ceiling)]
+            self._by_floor[floor] = self._by_ceiling[ceiling] = slot
+            self._active.append(slot)
+
+    @property
+    def ends_with(self) -> list[int]:
+        """The blocks that are open at the end: of a whole free space none."""
+        return [block for _, _, block in self._active]
+
+    @property
+    def blocks(self) -> BlockArrays:
+        """The blocks as arrays."""
+        edges = np.array((self.floor, self.ceiling), dtype=np.intp)
+        return BlockArrays(edges[0], edges[1], np.array(self.west), np.array(self.east))
+
+    def patched(self, patch: Patch, part: Sweep) -> Sweep:
+        """Return a copy with a window of it replaced; it can be searched, and no more be swept."""
+        new = copy(self)
+        numbers, names = patch.numbers.tolist(), patch.window.names
+        count, total = len(patch.blocks.west), int(names.max()) + 1
+        westwards, eastwards = ([*ways, *([[]] * (count - len(ways)))] for ways in self.ways)
+        new.ways = (westwards, eastwards)
+        for block in patch.dead.tolist():
+            westwards[block] = eastwards[block] = []
+        for was, now, _ in patch.moved:
+            eastwards[now] = self.ways[1][was]
+            for *_, other in eastwards[now]:
+                westwards[other] = [_way_to(now, way) if way[5] == was else way for way in westwards[other]]
+        for direction, changes in enumerate((patch.is_new, patch.is_closed)):
+            for block in np.flatnonzero(changes).tolist():
+                ways = part.ways[direction][block]
+                new.ways[direction][numbers[block]] = [_way_to(numbers[way[5]], way) for way in ways]
+        there = patch.window.order.tolist()
+        vertices = names[there].tolist()
+        for name in _AROUND:
+            around = [*getattr(self, name), *([-1] * (total - len(self.above)))]
+            found = getattr(part, name)
+            is_block = name not in {"above", "below"}
+            for one, vertex in zip(there, vertices, strict=True):
+                around[vertex] = numbers[found[one]] if is_block and found[one] >= 0 else found[one]
+            setattr(new, name, around)
+        for was, now, ends in patch.moved:
+            for vertex in ends:
+                for around in (new.west_above, new.west_below):
+                    if around[vertex] == was:
+                        around[vertex] = now
+        return new
 
     def run(self) -> None:
         """Sweep all lines.
@@ -106,12 +173,15 @@ class Sweep:
 
     def _new_portal(
         self, portal: tuple[float, float, float], ends: tuple[int, int], west: int, east: int
-    ) -> None:
+    ) -> bool:
+        """Make a portal, and return whether there is one: a narrower gap is closed."""
         x, low, high = portal
-        if high - low > TOLERANCE_M:
-            self.portals.append((x, low, high, west, east))
-            self.ways[1][west].append((x, low, high, ends[0], ends[1], east))
-            self.ways[0][east].append((x, low, high, ends[0], ends[1], west))
+        if high - low <= TOLERANCE_M:
+            return False
+        self.portals.append((x, low, high, west, east))
+        self.ways[1][west].append((x, low, high, ends[0], ends[1], east))
+        self.ways[0][east].append((x, low, high, ends[0], ends[1], west))
+        return True
 
     def _vertex(self, x: float, vertex: int) -> None:
         """Do what `_line` does for a line with one vertex, by far the most frequent one."""
@@ -151,7 +221,7 @@ class Sweep:
             self.ceiling.append(other)
             low, high = y, self._left_y[other] + self._slope[other] * (x - self._left_x[other])
             low_end, high_end = end, OPEN_END
-            self.west_above[vertex], self.east_above[vertex] = west, east
+            beside = self.west_above, self.east_above
         else:
             slot[1] = before
             self._by_ceiling[before] = slot
@@ -160,7 +230,7 @@ class Sweep:
             self.ceiling.append(before)
             low, high = self._left_y[other] + self._slope[other] * (x - self._left_x[other]), y
             low_end, high_end = OPEN_END, end
-            self.west_below[vertex], self.east_below[vertex] = west, east
+            beside = self.west_below, self.east_below
         self.west.append(x)
         self.east.append(x)
         westwards, eastwards = self.ways
@@ -170,6 +240,7 @@ class Sweep:
             self.portals.append((x, low, high, west, east))
             eastwards[west].append((x, low, high, low_end, high_end, east))
             westwards.append([(x, low, high, low_end, high_end, west)])
+            beside[0][vertex], beside[1][vertex] = west, east
         else:
             westwards.append([])
 
@@ -186,10 +257,10 @@ class Sweep:
         above = [vertex, ceiling, upper]
         self._by_floor[vertex] = self._by_ceiling[ceiling] = above
         self._active.insert(place + 1, above)
-        self._new_portal((x, self._north(floor, x), y), (OPEN_END, end), west, lower)
-        self._new_portal((x, y, self._north(ceiling, x)), (end, OPEN_END), west, upper)
-        self.west_above[vertex] = self.west_below[vertex] = west
-        self.east_above[vertex], self.east_below[vertex] = upper, lower
+        if self._new_portal((x, self._north(floor, x), y), (OPEN_END, end), west, lower):
+            self.west_below[vertex], self.east_below[vertex] = west, lower
+        if self._new_portal((x, y, self._north(ceiling, x)), (end, OPEN_END), west, upper):
+            self.west_above[vertex], self.east_above[vertex] = west, upper
 
     def _unite(self, x: float, vertex: int, before: int) -> None:
         """Join two blocks where the obstacle between them ends."""
@@ -202,10 +273,10 @@ class Sweep:
         east = self._new_block(x, floor, ceiling)
         below[1:] = ceiling, east
         self._by_ceiling[ceiling] = below
-        self._new_portal((x, self._north(floor, x), y), (OPEN_END, end), lower, east)
-        self._new_portal((x, y, self._north(ceiling, x)), (end, OPEN_END), upper, east)
-        self.west_above[vertex], self.west_below[vertex] = upper, lower
-        self.east_above[vertex] = self.east_below[vertex] = east
+        if self._new_portal((x, self._north(floor, x), y), (OPEN_END, end), lower, east):
+            self.west_below[vertex], self.east_below[vertex] = lower, east
+        if self._new_portal((x, y, self._north(ceiling, x)), (end, OPEN_END), upper, east):
+            self.west_above[vertex], self.east_above[vertex] = upper, east
 
     def _line(self, x: float, there: list[int]) -> None:
         """Close the blocks that end on a line, open those that begin, and join them by portals."""
@@ -388,7 +459,7 @@ class Sweep:
                 j += 1
 
     def _place(self, there: list[int], left: list[_Side], right: list[_Side]) -> None:
-        """Note which blocks lie beside each vertex of a line."""
+        """Note which blocks lie beside each vertex of a line; none that only a closed gap leads to."""
         for sides, above, below in (
             (left, self.west_above, self.west_below),
             (right, self.east_above, self.east_below),
@@ -396,7 +467,7 @@ class Sweep:
             for vertex in there:
                 y = self._y[vertex]
                 for low, _, high, _, block in sides:
-                    if low <= y < high:
+                    if low <= y and high - y > TOLERANCE_M:
                         above[vertex] = block
-                    if low < y <= high:
+                    if y - low > TOLERANCE_M and y <= high:
                         below[vertex] = block

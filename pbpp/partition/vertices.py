@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from functools import cached_property, cmp_to_key
 from math import dist, tau
 from operator import attrgetter
@@ -20,9 +21,10 @@ if TYPE_CHECKING:
 
     from pbpp.geometry import Floats, Point
 
-__all__ = ["Ints", "Vertices"]
+__all__ = ["Flags", "Ints", "Vertices"]
 
 Ints = npt.NDArray[np.intp]
+Flags = npt.NDArray[np.bool_]
 
 # The rounding of an end, 1e-9 m, turns an edge of a millimetre by as much; chosen, not measured.
 _ONE_WAY_RAD = 1e-6
@@ -81,6 +83,13 @@ def _left_of(line: tuple[Point, Point], point: Point) -> int:
     return (left > 0) - (left < 0)
 
 
+def _lines(east: Floats) -> tuple[Floats, Ints, Floats]:
+    """Return the vertical lines that rising easts lie on, where each begins among them, and each one's line."""
+    jump = np.diff(east, prepend=-np.inf) > TOLERANCE_M
+    line_x = east[jump]
+    return line_x, np.append(np.flatnonzero(jump), len(east)), line_x[np.cumsum(jump) - 1]
+
+
 class Vertices:
     """The vertices of free space with their neighbours, free space lying on the left of every edge.
 
@@ -102,7 +111,7 @@ class Vertices:
         self.points: Floats = points[~last]
         self.owner: Ints = owner[ring_of]
         count = len(self.points)
-        place = np.arange(count)
+        self.names = place = np.arange(count)
         starts = np.flatnonzero(np.diff(ring_of, prepend=-1))
         ends = np.append(starts, count)[1:] - 1
         after = place + 1
@@ -114,17 +123,93 @@ class Vertices:
         self.prev: Ints = np.where(forward, before, after)
 
         east = self.points[:, 0]
-        order = np.argsort(east, kind="stable")
-        jump = np.diff(east[order], prepend=-np.inf) > TOLERANCE_M
-        line = np.cumsum(jump) - 1
-        self.line_x: Floats = east[order][jump]
-        self.x = np.empty(count)
-        self.x[order] = self.line_x[line]
+        self._by_east: Ints = np.argsort(east, kind="stable")
+        self.x: Floats = np.empty(count)
+        self.line_x, self.line_start, self.x[self._by_east] = _lines(east[self._by_east])
         self.y: Floats = self.points[:, 1].copy()
         self.order: Ints = np.lexsort((self.y, self.x))
-        self.line_start: Ints = np.append(np.flatnonzero(jump), count)
         self._split_pinches()
-        self.corner = self._corners()
+        self.corner = self._corners(place)
+
+    def __len__(self) -> int:
+        """Return how many there are."""
+        return len(self.order)
+
+    def changed(self, gone: Ints, rings: Sequence[Floats], owner: int) -> Vertices | None:
+        """Return the vertices without some holes of free space and with others, the rest with their numbers.
+
+        Parameters
+        ----------
+        gone : (k,) array of int
+            All vertices of the holes that are no more. Their numbers stay without meaning.
+        rings : sequence of (m, 2) array
+            The holes that are new, clockwise, the first point not repeated. Their vertices are numbered on from those that are there.
+        owner : int
+            The polygon that they are in.
+
+        Returns
+        -------
+        Vertices or None
+            The vertices; None if what stays is not the same as before, because vertices come to one vertical line, or to one place, or part there.
+        """
+        before = len(self.x)
+        sizes = np.array([len(ring) for ring in rings], dtype=np.intp)
+        total = before + int(sizes.sum())
+        added = np.arange(before, total)
+        ends = before + np.cumsum(sizes)
+        starts = ends - sizes
+        is_live = np.ones(total, dtype=bool)
+        is_live[gone] = False
+        if (
+            is_live[self.next[gone]].any() or is_live[self.prev[gone]].any()
+        ):  # linked with others where they touch
+            return None
+        after, prior = np.append(self.next, added + 1), np.append(self.prev, added - 1)
+        after[ends - 1], prior[starts] = starts, ends - 1
+        after[gone] = prior[gone] = gone
+        new = copy(self)
+        new.__dict__.pop("fans", None)
+        new.names, new.next, new.prev = np.arange(total), after, prior
+        new.points = np.concatenate((self.points, *rings))
+        new.owner = np.append(self.owner, np.full(len(added), owner))
+        if not new._placed(self, is_live, added):  # noqa: SLF001 - a copy
+            return None
+        new.corner = np.append(self.corner, new._corners(added))  # noqa: SLF001 - a copy
+        return new
+
+    def _placed(self, before: Vertices, is_live: Flags, added: Ints) -> bool:
+        """Find the lines of added vertices and their places on them; return whether what was there is where it was, and nothing new at its places."""
+        easts, norths = self.points[added].T
+        order = np.argsort(easts, kind="stable")
+        kept = before._by_east[is_live[before._by_east]]
+        places = np.searchsorted(self.points[kept, 0], easts[order], side="right")
+        self._by_east = np.insert(kept, places, added[order])
+        self.x, self.y = np.append(before.x, easts), np.append(before.y, norths)
+        self.line_x, self.line_start, self.x[self._by_east] = _lines(self.points[self._by_east, 0])
+        if (self.x[kept] != before.x[kept]).any():
+            return False
+        live = before.order[is_live[before.order]]
+        rising, order = self.x[live], np.lexsort((norths, self.x[added]))
+        easts, norths = self.x[added[order]], norths[order]
+        first, last = np.searchsorted(rising, easts, "left"), np.searchsorted(rising, easts, "right")
+        on_line = [
+            begin + int(np.searchsorted(self.y[live[begin:end]], north, "right"))
+            for begin, end, north in zip(first.tolist(), last.tolist(), norths.tolist(), strict=True)
+        ]
+        self.order = np.insert(live, on_line, added[order])
+        place = np.array(on_line, dtype=np.intp) + np.arange(len(added))
+        place = np.concatenate((place[place > 0] - 1, place[place + 1 < len(self.order)]))
+        one, other = self.order[place], self.order[place + 1]
+        return not ((self.x[one] == self.x[other]) & (self.y[other] - self.y[one] <= TOLERANCE_M)).any()
+
+    def edge_north(self, edge: Ints, east: Floats) -> Floats:
+        """Return the north of edges, each given by the vertex it starts at, at given easts, exact at their ends."""
+        first, second = edge, self.next[edge]
+        swap = self.x[first] > self.x[second]
+        first, second = np.where(swap, second, first), np.where(swap, first, second)
+        share = (east - self.x[first]) / (self.x[second] - self.x[first])
+        north = self.y[first] + share * (self.y[second] - self.y[first])
+        return np.where(share >= 1.0, self.y[second], north)
 
     @cached_property
     def fans(self) -> list[tuple[float, float, float, float, float, float]]:
@@ -181,14 +266,14 @@ class Vertices:
         )
         return _left_of((here, end), other_end) < 0
 
-    def _corners(self) -> npt.NDArray[np.bool_]:
-        """Mark the vertices that a shortest path may turn around: free space fills half a turn or more.
+    def _corners(self, which: Ints) -> npt.NDArray[np.bool_]:
+        """Mark those of some vertices that a shortest path may turn around: free space fills half a turn or more.
 
         Where the boundary turns back on itself within rounding, only the sign tells a spike of an obstacle from a slit in it.
         """
-        x, y = self.x, self.y
-        in_x, in_y = x - x[self.prev], y - y[self.prev]
-        out_x, out_y = x[self.next] - x, y[self.next] - y
+        x, y, before, after = self.x[which], self.y[which], self.prev[which], self.next[which]
+        in_x, in_y = x - self.x[before], y - self.y[before]
+        out_x, out_y = self.x[after] - x, self.y[after] - y
         turn = in_x * out_y - in_y * out_x
         slack = TOLERANCE_M * (np.abs(in_x) + np.abs(in_y) + np.abs(out_x) + np.abs(out_y))
         onwards = in_x * out_x + in_y * out_y >= 0.0
@@ -196,8 +281,7 @@ class Vertices:
             raise ValueError("a spike of the boundary stands on one line")
         corner = (turn < 0.0) | (onwards & (turn <= slack))
         # Edges a rounding apart may have come to lie on each other with their ends on one line: then the points as given decide.
-        for vertex in np.flatnonzero((turn == 0.0) & ~onwards).tolist():
-            before, here, after = self.points[[self.prev[vertex], vertex, self.next[vertex]]]
-            into, out = here - before, after - here
-            corner[vertex] = into[0] * out[1] - into[1] * out[0] < 0.0
+        for place in np.flatnonzero((turn == 0.0) & ~onwards).tolist():
+            into, out = np.diff(self.points[[before[place], which[place], after[place]]], axis=0)
+            corner[place] = into[0] * out[1] - into[1] * out[0] < 0.0
         return corner

@@ -7,7 +7,7 @@ path passes a pinch. A line that meets a vertex on its way is left out: the path
 
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cmp_to_key
+from functools import cached_property, cmp_to_key
 
 import numpy as np
 import shapely
@@ -50,9 +50,9 @@ class ExactReference:
         self._edge = self._b - self._a
         self._edge_m = np.hypot(*self._edge.T)
         self._sectors()
-        self._seen = self._between_nodes()
+        self._seen = {}
 
-    @property
+    @cached_property
     def narrowest_m(self):
         """The least distance between a vertex and an edge that do not touch: the width of the narrowest gap, wall or step."""
         to_a = self._node[:, None] - self._a[None]
@@ -120,18 +120,21 @@ class ExactReference:
         crosses[:, list(skip)] = False
         return ~(meets.any(axis=1) | crosses.any(axis=1))
 
-    def _between_nodes(self):
-        count = len(self._node)
-        lengths = np.full((count, count), np.inf)
-        one, two = np.triu_indices(count, 1)
-        way = self._node[two] - self._node[one]
-        dist = np.hypot(*way.T)
-        may = (dist > 0) & self._in_sector(one, way, dist) & self._in_sector(two, -way, dist)
-        one, two, dist = one[may], two[may], dist[may]
-        clear = self._clear(self._node[one], self._node[two])
-        one, two, dist = one[clear], two[clear], dist[clear]
-        lengths[one, two] = lengths[two, one] = dist
-        return lengths
+    def _from_node(self, node):
+        """Return the lengths from a node to all that it sees; looked for when a search comes there, since few nodes lie on the way."""
+        if node not in self._seen:
+            lengths = np.full(len(self._node), np.inf)
+            others = np.arange(len(self._node))
+            way = self._node - self._node[node]
+            dist = np.hypot(*way.T)
+            here = np.full(len(others), node)
+            may = (dist > 0) & self._in_sector(here, way, dist) & self._in_sector(others, -way, dist)
+            others = others[may]
+            ends = np.sort(np.column_stack((here[may], others)))  # there and back the same line
+            others = others[self._clear(self._node[ends[:, 0]], self._node[ends[:, 1]])]
+            lengths[others] = dist[others]
+            self._seen[node] = lengths
+        return self._seen[node]
 
     def _end(self, point):
         point = np.asarray(point, dtype=float)
@@ -153,7 +156,7 @@ class ExactReference:
         """Return the lengths from an end to all nodes that it sees."""
         lengths = np.full(len(self._node), np.inf)
         for node in end.nodes:
-            lengths = np.minimum(lengths, self._seen[node])
+            lengths = np.minimum(lengths, self._from_node(int(node)))
         lengths[end.nodes] = 0.0
         if len(end.nodes):
             return lengths
@@ -190,14 +193,16 @@ class ExactReference:
             line = shapely.LineString([one.point, two.point])
             if self._sees(one, two):
                 direct = line.length
+        # What is left at least, less than by which an end may stand beside its place.
+        left_m = np.maximum(np.hypot(*(self._node - two.point).T) - 2 * AT_CORNER_M, 0.0)
         done = np.zeros(len(best), dtype=bool)
         while True:
-            open_m = np.where(done, np.inf, best)
+            open_m = np.where(done, np.inf, best + left_m)
             here = int(open_m.argmin())
-            if not np.isfinite(open_m[here]):
+            if not open_m[here] < min(direct, (best + last).min()):
                 break
             done[here] = True
-            best = np.minimum(best, best[here] + self._seen[here])
+            best = np.minimum(best, best[here] + self._from_node(here))
         return float(min(direct, (best + last).min()))
 
     def _sees(self, one, two):

@@ -37,7 +37,9 @@ def test_an_end_beside_an_edge_sees_around_the_edges_tip(off_m):
         assert path.lower_bound_m == path.length_m
 
 
-@pytest.mark.parametrize("part", range(4))
+@pytest.mark.parametrize(
+    "part", [0, *(pytest.param(part, marks=pytest.mark.campaign) for part in range(1, 4))]
+)
 def test_no_length_is_off_and_no_error_comes_one_way_only(part):
     counts = Counter()
     for seed in range(25 * part, 25 * (part + 1)):
@@ -130,3 +132,34 @@ def test_slivers_take_no_path_away(load_case, name):
         assert planner.plan(start, goal, method="pbpp").length_m >= paths[0].length_m * (1.0 - 1e-9)
         # The block methods leave free space as it was.
         assert planner.plan(start, goal).length_m == paths[0].length_m
+
+
+NEEDS_NUMBA = pytest.mark.skipif(find_spec("numba") is None, reason="the extra fast is not installed")
+GAP_M = 6e-11
+CLOSED_POCKETS = {
+    "behind_an_upright_edge": (
+        [(0, 0), (12, 0), (0, 12)],
+        [(2, 1), (6, 1), (6, 6 - GAP_M), (3, 6 - GAP_M), (3, 11), (2, 11)],
+        ((3, 0.5), (4, 7)),
+    ),
+    "behind_a_tip": (
+        [(0, 0), (10, 0), (10, 5 + GAP_M), (0, 5 + GAP_M)],
+        [(5, 5), (11, 4), (11, 3)],
+        ((5, 1), (9, 4.8)),
+    ),
+}
+FLIPS = [
+    np.array(flip)
+    for flip in ([[1, 0], [0, 1]], [[-1, 0], [0, 1]], [[1, 0], [0, -1]], [[0, 1], [1, 0]], [[0, -1], [1, 0]])
+]
+
+
+@pytest.mark.parametrize("compiled", [False, pytest.param(True, marks=NEEDS_NUMBA)])
+@pytest.mark.parametrize("name", CLOSED_POCKETS)
+@pytest.mark.parametrize("flip", FLIPS, ids=str)
+def test_a_closed_gap_lets_nothing_through_from_either_side(name, flip, compiled):
+    inclusion, exclusion, ends = (np.array(points, dtype=float) @ flip for points in CLOSED_POCKETS[name])
+    planner = pbpp.Planner([inclusion], [exclusion], compiled=compiled)
+    for start, goal in (ends, ends[::-1]):
+        with pytest.raises(pbpp.NoPathError, match="no path"):
+            planner.plan(start, goal)

@@ -313,8 +313,9 @@ def test_a_backup_is_restored_by_its_file(rover, tmp_path):
     assert places(rover.vehicle.mission[1:]) == places(OLD[1:])
 
 
-@pytest.mark.parametrize("killed_at", range(20))
-def test_kill_9_at_every_item(killed_at, hasty_rover, tmp_path):
+# Between the first item and the last nothing is written to disk; the campaign breaks transfers after any message, in stepped time.
+@pytest.mark.parametrize("killed_at", [0, 1, 7, 13, 19])
+def test_kill_9_at_an_item(killed_at, hasty_rover, tmp_path):
     rover, vehicle = hasty_rover, hasty_rover.vehicle
     receive = vehicle.receive
     passed = []

@@ -159,6 +159,7 @@ def test_a_drive_ends_with_what_it_was_like(config, tmp_path):
     assert drive["driven_m"] == pytest.approx(document["length_m"], rel=0.1)
     assert drive["least_clearance_m"] >= document["clearance_m"] - 0.1
     assert drive["breaches"] == 0
+    assert "info: HOLD does not brake: from 4 m/s the vehicle rolls on" in result.stderr, "before it drives"
     assert json.loads(again.stdout)["verified"] is True, "it waits in HOLD for the next one"
 
 
@@ -217,9 +218,9 @@ def test_sim_says_where_it_listens_and_ends_when_asked(fields):
         assert process.wait(60) == 0
 
 
-def test_demo_arrives_without_a_breach(tmp_path):
+def test_demo_arrives_without_a_breach_and_its_log_can_be_planned_from(tmp_path):
     begun_s = time.process_time()  # of this process: how busy the machine is does not count
-    result = run("demo", "--out", str(tmp_path / "out"), "--speedup", "10", "--json")
+    result = run("demo", "--out", str(tmp_path / "out"), "--speedup", "10", "--json", "--firmware", "4.5")
     assert time.process_time() - begun_s < 60
     document = json.loads(result.stdout)
     assert result.exit_code == 0
@@ -232,13 +233,9 @@ def test_demo_arrives_without_a_breach(tmp_path):
     mission = read_situation(tmp_path / "out" / "mission.plan")
     assert mission.mission.value.items[-1].position == LatLon(40.0726316, -105.2290497)
     assert len(mission.fence.value.zones) == 9
-
-
-def test_the_log_of_a_demo_can_be_planned_from(tmp_path):
-    run("demo", "--out", str(tmp_path), "--speedup", "10", "--quiet", "--firmware", "4.5")
-    assert str(situation_from_log(tmp_path / "demo.tlog").firmware).startswith("4.5")
-    start = f"{HOME.lat_deg},{HOME.lon_deg}"
-    result = run("plan", "--log", str(tmp_path / "demo.tlog"), "--start", start, "--clearance", "2", "--json")
+    assert str(situation_from_log(tmp_path / "out" / "demo.tlog").firmware).startswith("4.5")
+    start, log = f"{HOME.lat_deg},{HOME.lon_deg}", tmp_path / "out" / "demo.tlog"
+    result = run("plan", "--log", str(log), "--start", start, "--clearance", "2", "--json")
     document = json.loads(result.stdout)
     assert result.exit_code == 0
     assert document["fence"]["exclusion_circles"] == 2

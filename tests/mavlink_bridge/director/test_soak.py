@@ -6,14 +6,16 @@ import pytest
 from director.soak import soak
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0])  # `make soak` of CI goes on for minutes
 def test_a_few_minutes_keep_every_promise(seed):
     run = soak(seed, hours=0.08)
     assert run.violations == []
     assert run.counts["target"] > 1
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize(
+    "seed", [0, *(pytest.param(seed, marks=pytest.mark.campaign) for seed in range(1, 5))]
+)
 def test_everything_at_once_keeps_every_promise(seed):
     """Something new about every second: in the middle of every step of the bridge's own."""
     run = soak(seed, hours=0.05, pace_s=(0.05, 2.5))

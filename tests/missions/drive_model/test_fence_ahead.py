@@ -13,7 +13,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from missions.drive_model.fence_ahead import FenceAhead
+from missions.drive_model.fence_ahead import FenceAhead, FenceEdges
 from missions.vehicle import Vehicle, vehicle_from_parameters
 
 AVOIDING = {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 4.0, "AVOID_ENABLE": 3.0, "FENCE_MARGIN": 2.0}
@@ -56,10 +56,12 @@ def test_the_speed_is_that_of_the_first_edge_ahead(
     vehicle = vehicle_at(speed_mps)
     fence = shapely.union_all([ring(corners, 20.3, 0.0, 0.0), ring(corners, 4.1, 5.0, 30.0)])
     place = complex(east_m, north_m)
-    ahead = FenceAhead(fence, np.array([(-20.0, -20.0), (20.0, 20.0)]), vehicle)
+    ahead = FenceAhead(FenceEdges(fence), np.array([(-20.0, -20.0), (20.0, 20.0)]), vehicle)
     units = [cmath.rect(1.0, way) for way in ways]
     many_mps = ahead.speeds_mps(
-        np.full((len(units), 2), (east_m, north_m)), np.array([(unit.real, unit.imag) for unit in units])
+        np.full((len(units), 2), (east_m, north_m)),
+        np.array([(unit.real, unit.imag) for unit in units]),
+        speed_mps,
     )
     allowed_mps = ahead.speeds_about(speed_mps)
     for unit, one_of_many_mps in zip(units, many_mps, strict=True):
@@ -72,7 +74,7 @@ def test_the_speed_is_that_of_the_first_edge_ahead(
 def test_places_far_apart_look_at_their_own_edges() -> None:
     vehicle = vehicle_at(2.0)
     walls = shapely.MultiLineString([[(10.0, -5.0), (10.0, 5.0)], [(210.0, -5.0), (210.0, 5.0)]])
-    ahead = FenceAhead(walls, np.array([(0.0, 0.0), (200.0, 0.0)]), vehicle)
+    ahead = FenceAhead(FenceEdges(walls), np.array([(0.0, 0.0), (200.0, 0.0)]), vehicle)
     allowed_mps = ahead.speeds_about(2.0)
     for east_m in (0.0, 200.0, 1.0):
         assert allowed_mps(complex(east_m), 1 + 0j) == pytest.approx(
@@ -80,10 +82,21 @@ def test_places_far_apart_look_at_their_own_edges() -> None:
         )
 
 
+def test_many_edges_are_looked_at_by_parts_of_the_way() -> None:
+    vehicle = vehicle_at(2.0)
+    fence = shapely.union_all([ring(500, 5.0, 30.0 * number, 9.0) for number in range(10)])
+    places = np.column_stack([np.linspace(0.0, 270.0, 400), np.zeros(400)])
+    ways = np.tile([0.6, 0.8], (400, 1))
+    ahead = FenceAhead(FenceEdges(fence), places, vehicle)
+    for place, mps in list(zip(places.tolist(), ahead.speeds_mps(places, ways, 2.0), strict=True))[::20]:
+        wanted_mps = expected_mps(fence, complex(*place), 0.6 + 0.8j, vehicle)
+        assert min(mps, 2.0) == pytest.approx(min(wanted_mps, 2.0), abs=1e-6)
+
+
 def test_an_edge_along_the_way_is_met_at_its_neighbour() -> None:
     vehicle = vehicle_at(2.0)
     corner = shapely.LineString([(4.0, 0.0), (8.0, 0.0), (8.0, 3.0)])
-    ahead = FenceAhead(corner, np.array([(0.0, 0.0)]), vehicle)
+    ahead = FenceAhead(FenceEdges(corner), np.array([(0.0, 0.0)]), vehicle)
     left_m = 8.0 - vehicle.fence.margin_m
     assert ahead.speeds_about(2.0)(0j, 1 + 0j) == pytest.approx(vehicle.position_gain_per_s * left_m)
 
@@ -110,8 +123,8 @@ def test_a_measured_rover_slows_for_a_wall_where_it_is_foreseen_or_a_little_late
         wall = shapely.LineString([(40.0, -20.0), (40.0, 20.0)])
         along_m = np.arange(0.0, 40.0, 0.01)
         places = np.stack((along_m, np.zeros_like(along_m)), axis=1)
-        allowed_mps = FenceAhead(wall, places, vehicle).speeds_mps(
-            places, np.broadcast_to((1.0, 0.0), places.shape)
+        allowed_mps = FenceAhead(FenceEdges(wall), places, vehicle).speeds_mps(
+            places, np.broadcast_to((1.0, 0.0), places.shape), speed_mps
         )
         foreseen_m = along_m[np.flatnonzero(allowed_mps < 0.8 * speed_mps)[0]]
         later_s.append((float(row["slow_below_80pct_at_m"]) - foreseen_m) / speed_mps)

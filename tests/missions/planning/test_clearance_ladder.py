@@ -13,6 +13,7 @@ from shapely import Point
 from missions.errors import NoRouteError, RequestError, TargetBlockedError
 from missions.planning.plan import plan
 from missions.request import GoTo, RepairMission, Tour
+from missions.routing import promised_route
 from missions.routing.no_route import NoRoute, NoRouteKind
 from missions.routing.promised_route import PromisedRoute
 from missions.routing.route_search import RouteSearch
@@ -21,7 +22,7 @@ from missions.situation import Known, Pose
 PATH = list(sys.path)
 sys.path.append(str(Path(__file__).parents[3] / "benchmarks"))
 
-from ladder import ladder_of  # noqa: E402
+from ladder import asked_of, ladder_of  # noqa: E402
 
 sys.path[:] = PATH  # modules of the benchmarks have names of rooms of the tests
 
@@ -61,6 +62,16 @@ def test_where_what_is_asked_cannot_be_fitted_more_of_it_serves(monkeypatch: pyt
     assert found.driven_clearance_m >= found.clearance_m
 
 
+def test_a_start_that_refuses_one_route_is_left_by_one_that_begins_otherwise() -> None:
+    """In field 1 a rover that cannot turn faces away: 2 m was planned, leading away first, and all from 0.5 to 1.9 m refused."""
+    situation, request = asked_of("field 1")
+    found = plan(situation, GoTo(**request, clearance_m=1.5))
+    widest = plan(situation, GoTo(**request, widest=True))
+    assert found.clearance_m is not None
+    assert widest.clearance_m is not None
+    assert 1.5 <= found.clearance_m <= widest.clearance_m
+
+
 def test_less_than_was_asked_needs_a_word() -> None:
     asked = replace(THROUGH, clearance_m=4.53)
     with pytest.raises(
@@ -70,8 +81,8 @@ def test_less_than_was_asked_needs_a_word() -> None:
     less = plan(gate(), replace(asked, accepts_less=True))
     widest = plan(gate(), replace(THROUGH, widest=True))
     assert less.clearance_m == widest.clearance_m == caught.value.details["widest_m"]
-    assert any("no route keeps 4.53 m while driving: the widest, with 2." in text for text in less.warnings)
-    assert not any("--accept-less" in text for text in widest.warnings)
+    assert any("no route keeps 4.53 m while driving: the widest, with 2." in text for text in less.info)
+    assert not any("--accept-less" in text for text in (*less.warnings, *widest.warnings, *widest.info))
 
 
 def test_a_target_too_near_a_fence_is_reached_with_less_where_less_is_accepted() -> None:
@@ -123,6 +134,16 @@ def test_the_widest_is_no_less_than_what_was_found_for_more(monkeypatch: pytest.
     assert len(asked) == len(set(asked))
 
 
+def test_the_widest_goes_on_to_what_can_be_asked_above_the_best_level_tried(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """In field 19 it promised 0.94 m, and 1 m could be asked for."""
+    whole = plan(gate(), replace(THROUGH, widest=True)).clearance_m
+    monkeypatch.setattr(promised_route, "_downwards", lambda *_: iter((1.8,)))
+    climbed = plan(gate(), replace(THROUGH, widest=True)).clearance_m
+    assert climbed == pytest.approx(whole, abs=0.1)
+
+
 def test_tours_take_less_too_and_repairs_never_do() -> None:
     tour = Tour(start=place(-50, 0), targets=(place(50, 10), place(50, -10)), clearance_m=4.0, order="best")
     with pytest.raises(NoRouteError, match="no route"):
@@ -132,3 +153,15 @@ def test_tours_take_less_too_and_repairs_never_do() -> None:
     assert 1.5 < less.clearance_m < 2.5
     with pytest.raises(RequestError, match="accepts_less True: expected none"):
         RepairMission(accepts_less=True)
+
+
+@pytest.mark.parametrize("allowance_m", [0.0, 0.3])
+def test_with_a_corner_allowance_the_widest_is_the_most_that_can_be_asked(allowance_m: float) -> None:
+    """It was 97 % of it: more could be asked than the widest kept."""
+    widest = plan(gate(), replace(THROUGH, widest=True, corner_allowance_m=allowance_m))
+    most_m = widest.asked_m - allowance_m
+    assert most_m == pytest.approx(2.5 - allowance_m, abs=0.03)
+    asked = plan(gate(), replace(THROUGH, clearance_m=most_m, corner_allowance_m=allowance_m))
+    assert asked.asked_m == pytest.approx(widest.asked_m)
+    with pytest.raises(NoRouteError, match="no route keeps"):
+        plan(gate(), replace(THROUGH, clearance_m=most_m + 0.03, corner_allowance_m=allowance_m))

@@ -346,7 +346,9 @@ class RouteSearch:
             for number, point in enumerate(drawing)
         )
         measured = fitting.measure(drawing)
-        return (drawing, measured, missed_m, missed_at_start_m) if measured.is_enough else None
+        # Where no leg leads away, the start is one of the points that miss as much.
+        missed = (missed_m, missed_at_start_m if first else missed_m)
+        return (drawing, measured, *missed) if measured.is_enough else None
 
     def _drawing(self, route: Route) -> Drawing:
         """Return a route's lines with what each point has to keep: where the route leads away, no less than the start does."""

@@ -107,6 +107,11 @@ class DrivenRoute:
     is_whole: bool = True
     cost_s: float = 0.0
 
+    @property
+    def is_slow_somewhere(self) -> bool:
+        """Whether a stretch is driven slower than the vehicle's own speed."""
+        return any(point.speed_mps is not None for point in self.drawing)
+
 
 @dataclass(frozen=True, eq=False)
 class _Attempt:
@@ -129,8 +134,8 @@ class Known:
 
     drawn: dict[float, DrawnRoutes] = field(default_factory=dict)
     """By the clearance of the drawn lines."""
-    fitted: dict[tuple[Drawing, int, int], tuple[Drawing, Measured, int]] = field(default_factory=dict)
-    """By the lines, and the measurements taken before and allowed; with those taken after."""
+    fitted: dict[tuple[Drawing, int, int, float], tuple[Drawing, Measured, int]] = field(default_factory=dict)
+    """By the lines, the measurements taken before and allowed, and what ends a round; with those taken after."""
     departures: Departures | None = None
 
 
@@ -152,6 +157,8 @@ class RouteSearch:
         What is enough of it, where what is aimed at cannot be kept all the way. Default: all of it.
     known : Known, optional
         What other searches for the vehicle on the field know already.
+    good_share : float, optional
+        What ends a round of fitting (`fitting.local_search.Fitting`).
     """
 
     sought: Sought
@@ -160,6 +167,7 @@ class RouteSearch:
     heading_deg: float | None
     enough_m: float | None = None
     known: Known = field(default_factory=Known)
+    good_share: float = 0.0
 
     def find(self, *, briefly: bool = False) -> DrivenRoute | NoRoute:
         """Find the quickest of the routes tried whose band keeps enough; ``briefly`` tries the first ones only."""
@@ -283,7 +291,12 @@ class RouteSearch:
 
     def _fitting(self, measurements: int) -> Fitting:
         return Fitting(
-            self.sought.ground, self.vehicle, self.heading_deg, self.sought.should_stop, measurements
+            self.sought.ground,
+            self.vehicle,
+            self.heading_deg,
+            self.sought.should_stop,
+            measurements,
+            self.good_share,
         )
 
     def _drawn_at(self, band_m: float) -> DrawnRoutes:
@@ -295,7 +308,7 @@ class RouteSearch:
 
     def _fit(self, fitting: Fitting, route: Route, speed_mps: float | None = None) -> _Attempt:
         drawn_lines = tuple(replace(point, speed_mps=speed_mps) for point in self._drawing(route))
-        key = (drawn_lines, fitting.measurements, fitting.most_measurements)
+        key = (drawn_lines, fitting.measurements, fitting.most_measurements, fitting.good_share)
         if key not in self.known.fitted:
             self.known.fitted[key] = (*fitting.fit(drawn_lines), fitting.measurements)
         drawing, measured, fitting.measurements = self.known.fitted[key]

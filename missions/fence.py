@@ -125,12 +125,14 @@ def fence_from_items(items: Sequence[MissionItem]) -> Fence:
                 raise FenceError(f"fence item {seq}: second return point; a fence has one at most", item=seq)
             return_point = _position(item, seq)
         else:
-            reason = (
-                "is a circle around home, which ArduPilot Rover does not accept as a fence item"
-                if item.command == _HOME_CIRCLE
-                else "is not a fence item"
-            )
-            raise FenceError(f"fence item {seq}: command {item.command} {reason}", item=seq)
+            what = f"fence item {seq}: command {item.command}"
+            if item.command == _HOME_CIRCLE:
+                raise FenceError(
+                    f"{what} is a circle around home, which ArduPilot Rover does not accept as a fence item",
+                    item=seq,
+                    advice="draw a circle with a centre of its own instead, or set FENCE_RADIUS on the vehicle",
+                )
+            raise FenceError(f"{what} is not a fence item", item=seq)
         seq += 1
     return Fence(tuple(zones), return_point)
 

@@ -35,6 +35,7 @@ from mavlink_bridge.link import ONE_SHOT_IDENTITY, now_s, open_link, parse_conne
 from mavlink_bridge.mavlink.echoes import SentFrames
 from mavlink_bridge.protocol.outcomes import ends_in_words
 from mavlink_bridge.replay.journal import Call
+from missions.checking.holding import hold_info
 from missions.geo import LatLon
 from missions.situation import Situation
 
@@ -316,6 +317,8 @@ class _Shell:
             if event.name is EventName.PLANNED:
                 with self._view.aside() if self._view is not None else contextlib.nullcontext():
                     inform(event.data["info"])  # type: ignore[arg-type]
+                    if self.director.orders.drive and self.director.plan is not None:
+                        inform(hold_info(self.director.plan.hold))
                     warn(event.data["warnings"])  # type: ignore[arg-type]
         self._ask_for_yes()
 

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from mavlink_bridge.cli.failing import telling
 from mavlink_bridge.cli.terminal import say
-from missions.harmless import harmless
+from missions.words import harmless
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -22,6 +22,7 @@ from mavlink_bridge.logbook.document import as_document
 from missions.errors import VehicleError
 from missions.picture.drives import drive_scene
 from missions.vehicle import bits
+from missions.words import counted
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -115,7 +116,9 @@ def _print(book: Logbook, *, messages: bool) -> None:
     if not book.damage.is_clean:
         show(f"Damage skipped: {book.damage}")
     if book.clock_jumps:
-        show(f"The log's clock was set {book.clock_jumps} times while it was written: rates are off")
+        show(
+            f"The log's clock was set {counted(book.clock_jumps, 'time')} while it was written: rates are off"
+        )
     if book.clock_trouble:
         show(f"{book.clock_trouble}: times, rates and speeds below cannot be trusted")
     out.print(_senders(book))

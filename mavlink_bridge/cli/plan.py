@@ -12,6 +12,7 @@ from mavlink_bridge.cli.permissions import check_permissions
 from mavlink_bridge.cli.pictures import check_plots
 from mavlink_bridge.cli.plan_request import request_from_options, with_tour
 from mavlink_bridge.cli.plan_results import Told, arrival_document, report_end
+from mavlink_bridge.cli.planning_progress import planning_shown
 from mavlink_bridge.cli.terminal import print_json
 from mavlink_bridge.cli.timed_plan import timed_plan
 from mavlink_bridge.cli.vehicle_options import (
@@ -36,7 +37,9 @@ def plan(options: PlanOptions) -> None:
     check_permissions(upload=options.upload, drive=options.drive, hold=options.hold)
     request = _request(options)
     _check_options(options)
-    told = Told(options.output, options.plot, blocks=options.blocks, is_silent=options.is_silent)
+    told = Told(
+        options.output, options.plot, blocks=options.blocks, is_silent=options.is_silent, drives=options.drive
+    )
     verified, arrival, backup = False, None, None
     if options.connect is not None:
         from mavlink_bridge.cli.plan_on_link import plan_on_link  # noqa: PLC0415 - pymavlink only with a link
@@ -46,7 +49,9 @@ def plan(options: PlanOptions) -> None:
         backup = result.backup
     else:
         situation = _offline_situation(options, request)
-        told.tell(*timed_plan(situation, request), situation)
+        with planning_shown(request, quiet=options.is_silent) as should_stop:
+            made = timed_plan(situation, request, should_stop=should_stop)
+        told.tell(*made, situation)
     document = {
         **told.document(),
         "source": options.connect or Path(str(options.fence or options.log)).name,

@@ -11,6 +11,7 @@ from mavlink_bridge.cli.common import inform, remarks_document, warn
 from mavlink_bridge.cli.kept_files import write_kept
 from mavlink_bridge.cli.pictures import draw
 from mavlink_bridge.cli.terminal import echo
+from missions.checking.holding import hold_info
 from missions.fence import CircleZone, PolygonZone, ZoneKind
 from missions.picture.plans import plan_scene
 from missions.words import counted
@@ -101,13 +102,18 @@ class Told:
         Draw the blocks of the free space too.
     is_silent : bool
         Print no report.
+    drives : bool
+        Whether the vehicle drives it at once: what HOLD does is told too.
     """
 
-    def __init__(self, outputs: list[Path], plots: list[Path], *, blocks: bool, is_silent: bool) -> None:
+    def __init__(
+        self, outputs: list[Path], plots: list[Path], *, blocks: bool, is_silent: bool, drives: bool = False
+    ) -> None:
         self._outputs = outputs
         self._plots = plots
         self._blocks = blocks
         self._is_silent = is_silent
+        self._drives = drives
         self._plan: Plan | None = None
         self._planning_s = 0.0
         self._remarks: tuple[str, ...] = ()
@@ -115,7 +121,7 @@ class Told:
 
     def tell(self, planned: Plan, planning_s: float, situation: Situation) -> None:
         """Report a plan; a later one is the route made anew."""
-        inform(planned.info)
+        inform((*planned.info, *(hold_info(planned.hold) if self._drives else ())))
         warn(planned.warnings)
         self._written = write_outputs(planned, situation, self._outputs, self._plots, blocks=self._blocks)
         if not self._is_silent:

@@ -1,6 +1,6 @@
 """The one way to the standard output and standard error: whatever comes from outside arrives there harmless.
 
-A line is put out as one line, with every character seen (`missions.harmless`), so that neither a vehicle's text nor a file's name
+A line is put out as one line, with every character seen (`missions.words`), so that neither a vehicle's text nor a file's name
 moves the cursor, names the window or passes for a line of ours. What has several lines is put out line by line. Nothing else in the command line
 prints (a test looks).
 """
@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, TextIO
 
 import typer
 
-from missions.harmless import harmless
+from missions.words import harmless
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

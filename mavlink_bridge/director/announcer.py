@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mavlink_bridge.mavlink.messages import Statustext
-from missions.harmless import harmless
+from missions.words import harmless
 
 _EVERY_S = 1.0  # 50 bytes a second are 1 % of a radio at 57600 baud; chosen, not measured
 _MOST_WAITING = 8  # later than 8 s a text is no news; chosen, not measured

@@ -13,7 +13,7 @@ from shapely.ops import nearest_points
 
 from missions.checking.execution import CIRCLE_M, Course, CourseLeg, follow_mission
 from missions.checking.forecast import forecast_drive, pivot_remarks
-from missions.checking.holding import hold_check, hold_info, hold_warnings
+from missions.checking.holding import hold_check, hold_warnings
 from missions.checking.mission_end import crossed_zones, end_warnings, return_place, return_warnings
 from missions.drive_model import Envelope, extrapolated
 from missions.errors import SituationError, StartBlockedError
@@ -30,7 +30,7 @@ from missions.request import GoTo
 from missions.situation import Known
 from missions.vehicle import real_number
 from missions.vehicle.parameter_remarks import assumed_remarks, parameter_remarks
-from missions.words import HEADING_UNKNOWN, metres
+from missions.words import HEADING_UNKNOWN, start_near_text
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 
     from missions.drive_model.stopping import HoldCheck
     from missions.fence import Fence
+    from missions.promise import Promise
     from missions.request import Request
     from missions.situation import Mission, Situation
     from missions.vehicle import Vehicle
@@ -242,7 +243,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
         *course.notes,
         *hazards,
         *_seam_warnings(vehicle, legs),
-        *_start_warnings(start, heading_deg, legs[0], asked.required_m),
+        *_start_warnings(ground, start, heading_deg, legs[0], asked),
         *_drive_warnings(vehicle, forecast, course),
         *pivot_remarks(ground, vehicle, forecast, _items_of(course)),
         *reasons,
@@ -264,7 +265,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
         extrapolated=reasons,
         trusts_model=request.trusts_model,
         hold=hold,
-        info=(*asked.info, *hold_info(hold)),
+        info=asked.info,
     )
 
 
@@ -484,7 +485,7 @@ def _seam_warnings(vehicle: Vehicle, legs: tuple[CheckedLeg, ...]) -> list[str]:
 
 
 def _start_warnings(
-    start: LatLon | None, heading_deg: float | None, first: CheckedLeg, required_m: float
+    ground: Ground, start: LatLon | None, heading_deg: float | None, first: CheckedLeg, asked: Promise
 ) -> list[str]:
     """Return warnings of what is unknown at the start, and of what its first leg cannot keep."""
     if start is None:
@@ -492,11 +493,9 @@ def _start_warnings(
     warnings = []
     if heading_deg is None:
         warnings.append(HEADING_UNKNOWN)
-    if first.asked_m < required_m and not first.crosses:
-        warnings.append(
-            f"the start is closer to a fence than {metres(required_m)}; the first leg only has to keep {metres(first.asked_m)}, "
-            "the vehicle's clearance now"
-        )
+    if first.asked_m < asked.required_m and not first.breaks:
+        start_m = ground.clearance_m(Point(ground.frame.to_local(start)))
+        warnings.append(start_near_text(start_m, asked.promised_m, first.driven_clearance_m))
     return warnings
 
 

@@ -69,10 +69,9 @@ def hold_check(band: Envelope, vehicle: Vehicle, ground: Ground, stops: Stops) -
 
 
 def with_hold(plan: Plan, situation: Situation) -> Plan:
-    """Return a plan with what HOLD does on its route: a warning where one would end beyond a fence, else so much as info."""
+    """Return a plan with what HOLD does on its route, and a warning where one would end beyond a fence."""
     hold = hold_check(plan.envelope, plan.vehicle, plan.ground, situation.stops)
-    info, warnings = (*plan.info, *hold_info(hold)), (*plan.warnings, *hold_warnings(hold))
-    return replace(plan, hold=hold, info=info, warnings=warnings)
+    return replace(plan, hold=hold, warnings=(*plan.warnings, *hold_warnings(hold)))
 
 
 def hold_warnings(hold: HoldCheck | None) -> list[str]:
@@ -81,7 +80,7 @@ def hold_warnings(hold: HoldCheck | None) -> list[str]:
 
 
 def hold_info(hold: HoldCheck | None) -> list[str]:
-    """Return how far the vehicle rolls on, where every HOLD ends within the fence."""
+    """Return how far the vehicle rolls on, where every HOLD ends within the fence: for those who are about to drive."""
     return [hold.sentence] if hold is not None and hold.worst is None else []
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from missions.geo import distance_m
 from missions.ground.legs import ROUNDING_RESERVE_M
 from missions.vehicle.parameter_remarks import assumed_remarks
-from missions.words import HEADING_UNKNOWN, metres, moved_text
+from missions.words import HEADING_UNKNOWN, metres, moved_text, start_near_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,14 +24,8 @@ def lead_away_remarks(found: DrivenRoute, asked: Promise) -> list[str]:
     if not (found.lead_away or is_limited) or found.start_clearance_m < 0:
         return []
     if found.lead_away_m is None:
-        distance = f"{metres(found.start_clearance_m)} from a fence, nearer than {metres(asked.drawn_m)}"
-        return [f"the start stands {distance}: the route first leads away, never nearer than that"]
-    distance = f"{metres(found.start_clearance_m)} from a fence, too near to leave it with {asked.promised_m:g} m kept"
-    nearest_m = max(found.lead_away_m, 0.0)
-    leads_away = "the route first leads away; " if found.lead_away else ""
-    return [
-        f"the start stands {distance}: {leads_away}turning there the vehicle may come as near as {nearest_m:.2f} m"
-    ]
+        return [start_near_text(found.start_clearance_m, asked.drawn_m, found.start_clearance_m)]
+    return [start_near_text(found.start_clearance_m, asked.promised_m, found.lead_away_m)]
 
 
 def escape_info(found: DrivenRoute) -> list[str]:
@@ -39,7 +33,7 @@ def escape_info(found: DrivenRoute) -> list[str]:
     if not found.lead_away or found.start_clearance_m >= 0:
         return []
     return [
-        f"the start is inside an exclusion or outside the fence, {-found.start_clearance_m:.2f} m from the allowed area: leg 1 drives out of it"
+        f"the start is inside an exclusion or outside the fence, {-found.start_clearance_m:.2f} m from the allowed area: leg 1 drives into it"
     ]
 
 

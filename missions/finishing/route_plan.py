@@ -84,7 +84,6 @@ def plan_route(
     asked, found = _route(sought, request, wanted, vehicle, heading_deg)
     if asked.promised_m < wanted.promised_m:
         warnings += stop_warnings(vehicle, asked)
-        warnings += [] if request.widest else [less_text(wanted.words, asked.promised_m)]
     lines, drawn_m, band = _finished(ground, found, asked, vehicle, heading_deg)
     driven_m = max(0.0, band.clearance_m(ground.edge))
     items, seqs = mission_items(lines, vehicle.speed_mps, request.speed_mps)
@@ -117,8 +116,19 @@ def plan_route(
         vehicle=vehicle,
         home=situation.home.value if situation.home else None,
         warnings=tuple(dict.fromkeys(warnings)),
-        info=(*asked.info, *escape_info(found), *moved_target_info(targets, reached)),
+        info=(
+            *asked.info,
+            *_less_info(request, wanted, asked),
+            *escape_info(found),
+            *moved_target_info(targets, reached),
+        ),
     )
+
+
+def _less_info(request: Request, wanted: Promise, asked: Promise) -> list[str]:
+    """Return that less is promised than was asked, as was allowed."""
+    is_less = asked.promised_m < wanted.promised_m and not request.widest
+    return [less_text(wanted.words, asked.promised_m)] if is_less else []
 
 
 def _route(

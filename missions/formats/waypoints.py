@@ -198,7 +198,10 @@ def _situation(rows: list[_Row], remarks: tuple[str, ...], source: str) -> Situa
         except FenceError as error:
             index = error.details.get("item")
             line = rest[index].line if isinstance(index, int) else None
-            raise MissionFormatError(f"{source}: line {line}: {error}", file=source, line=line) from None
+            advice = {name: value for name, value in error.details.items() if name == "advice"}
+            raise MissionFormatError(
+                f"{source}: line {line}: {error}", file=source, line=line, **advice
+            ) from None
         return replace(known, fence=Known(fence, None, source))
     if listed == {Command.RALLY_POINT}:
         return replace(known, rally=Known(rally_from_items(row.item for row in rest), None, source))

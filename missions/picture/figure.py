@@ -20,12 +20,14 @@ from matplotlib.path import Path as Outline
 from matplotlib.patheffects import Normal, Stroke
 from matplotlib.transforms import Affine2D, ScaledTranslation, Transform
 
-from missions.harmless import harmless
 from missions.picture import style
 from missions.picture.labels import place_labels
 from missions.picture.scene import polygons
+from missions.words import harmless
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
 
@@ -139,7 +141,9 @@ def _draw_route(axes: Any, scene: PictureScene) -> None:  # noqa: ANN401
     long = [leg for leg, ends in enumerate(pairwise(route)) if math.dist(*ends) * px_per_m >= _SHORT_PX]
     for leg in long[:: 1 + len(long) // _MOST_ARROWS]:
         color = style.UNSAFE if leg in scene.unsafe_legs else style.ROUTE
-        _draw_arrow(axes, route[leg], route[leg + 1], color)
+        marks = [mark.point for mark in scene.marks]
+        at = _arrow_at(route[leg], route[leg + 1], marks, _SHORT_PX / 2 / px_per_m)
+        _draw_arrow(axes, at, route[leg + 1] - route[leg], color)
     points = np.array([point for _, point, _ in scene.waypoints])
     axes.plot(*points.T, "o", color="white", mec=style.ROUTE, markersize=4.5, zorder=7, label="waypoint")
     if scene.narrowest is not None:
@@ -147,12 +151,22 @@ def _draw_route(axes: Any, scene: PictureScene) -> None:  # noqa: ANN401
         axes.plot(*scene.narrowest.ends.T, "-|", label="narrowest place", **look)
 
 
-def _draw_arrow(axes: Any, a: NDArray[np.float64], b: NDArray[np.float64], color: str) -> None:  # noqa: ANN401
-    """Show in the middle of a leg which way it is driven."""
-    turned = Affine2D().rotate(math.atan2(b[1] - a[1], b[0] - a[0]) - math.pi / 2)
+def _arrow_at(
+    a: NDArray[np.float64], b: NDArray[np.float64], marks: Sequence[NDArray[np.float64]], away_m: float
+) -> NDArray[np.float64]:
+    """Return the place of a leg's arrow: its middle, or beside it where a mark would cover it."""
+    places = [a + share * (b - a) for share in (0.5, 0.4, 0.6, 0.3, 0.7)]
+    return next(
+        (place for place in places if all(math.dist(place, mark) > away_m for mark in marks)), places[0]
+    )
+
+
+def _draw_arrow(axes: Any, at: NDArray[np.float64], way: NDArray[np.float64], color: str) -> None:  # noqa: ANN401
+    """Show which way a leg is driven."""
+    turned = Affine2D().rotate(math.atan2(way[1], way[0]) - math.pi / 2)
     marker = MarkerStyle(_ARROW.transformed(turned))
     look = {"color": color, "mec": "white", "mew": 0.5, "markersize": _ARROW_PT, "zorder": 6.6}
-    axes.plot(*((a + b) / 2), marker=marker, linestyle="none", gid="direction", **look)
+    axes.plot(*at, marker=marker, linestyle="none", gid="direction", **look)
 
 
 def _draw_tracks(axes: Any, scene: PictureScene) -> None:  # noqa: ANN401

@@ -12,9 +12,9 @@ import numpy as np
 import plotly.graph_objects as go
 
 from missions.fence import ZoneKind
-from missions.harmless import harmless
 from missions.picture import style
 from missions.picture.scene import polygons
+from missions.words import harmless
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

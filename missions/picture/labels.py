@@ -9,8 +9,8 @@ import numpy as np
 import shapely
 from shapely import LineString, Point, Polygon, affinity
 
-from missions.harmless import harmless
 from missions.picture.scene import polygons
+from missions.words import harmless
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

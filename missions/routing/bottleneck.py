@@ -47,7 +47,11 @@ class NarrowestPlace:
         return f", narrowest {between} {fences} at {self.at}" if fences else f", narrowest at {self.at}"
 
     def __str__(self) -> str:
-        return f"the widest keeps {self.clearance_m:.2f} m{self.where}" if self.at else "any width is free"
+        return (
+            f"the widest keeps {self.clearance_m:.2f} m{self.where}"
+            if self.at
+            else "no fence limits the width"
+        )
 
 
 def narrowest_place(

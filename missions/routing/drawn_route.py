@@ -33,6 +33,8 @@ _INSIDE_M = 0.005
 _ROUNDED_EXCESS_M = 0.005
 """What pbpp's round offsets may keep beyond the clearance, and a little."""
 
+_NEAR_M = 0.01  # within which the widest clearance is looked for: promises are whole centimetres
+
 _WIDER = (1, 4, 16, 64)  # multiples of the reach within which free ground is looked for, nearest first
 
 _CHORDS = 64  # in a quarter circle
@@ -120,9 +122,38 @@ class Sought:
             self._narrowest[a, b] = narrowest_place(self.ground, a, b, self.should_stop)
         return self._narrowest[a, b]
 
+    @property
+    def widest_ground_m(self) -> float:
+        """A clearance that no route exceeds once it has left the start."""
+        bounds_m = [self.ground.clearance_m(Point(target)) + self.snap_m for target in self.targets]
+        start_m = self.ground.clearance_m(Point(self.start))
+        for a, b in pairwise((self.start, *self.targets)):
+            place = self.narrowest_place(a, b)
+            if place is not None and (a is not self.start or place.clearance_m < start_m - _NEAR_M):
+                bounds_m.append(place.clearance_m)
+        return min(*bounds_m, self.ground.bounds.bounds[2] - self.ground.bounds.bounds[0])
+
     def narrowest_places(self) -> list[NarrowestPlace | None]:
         """Return those on the way from the start to the first target, and from each to the next."""
         return [self.narrowest_place(a, b) for a, b in pairwise((self.start, *self.targets))]
+
+
+def widest_drawn_m(sought: Sought, beside_m: float = 0.0) -> float | NoRoute:
+    """Return the greatest clearance, beside some room, that routes are drawn at, within a centimetre; why there are none where there are none at all."""
+
+    def drawn(clearance_m: float) -> Route | NoRoute:
+        return DrawnRoutes.at(sought, clearance_m + beside_m).find()
+
+    least = drawn(0.0)
+    if isinstance(least, NoRoute):
+        return least
+    low_m, high_m = 0.0, max(sought.widest_ground_m - beside_m, 0.0)
+    if isinstance(drawn(high_m), Route):
+        return high_m
+    while high_m - low_m > _NEAR_M:
+        middle_m = (low_m + high_m) / 2
+        low_m, high_m = (middle_m, high_m) if isinstance(drawn(middle_m), Route) else (low_m, middle_m)
+    return low_m
 
 
 def simplified(ground: Ground, route: Route, clearance_m: float) -> Route:

@@ -1,8 +1,13 @@
 """A route that keeps what is asked of it, the widest there is, or why there is none: one answer for all that may be asked.
 
-**What holds.** A route that keeps some clearance serves whoever asks for less. So where lines cannot be fitted to what is asked, they are
-fitted to more, step by step up to what the ground leaves, and those count that keep what is asked; only where none do is it refused. The
-widest route is the one that keeps most of all that are looked at, from the widest clearance that lines can be drawn at downwards.
+**What holds.** A route that keeps some clearance serves whoever asks for less. So where lines cannot be fitted to what is asked, or only to
+be driven slowly, they are fitted to more, step by step up to what the ground leaves, and the quickest counts that keeps what is asked; only
+where none do is it refused. The widest route is the one that keeps most of all that are looked at: from the widest clearance that lines can
+be drawn at downwards, and from the first that is found upwards, step by step, as long as more is kept. Where the start refuses, routes that
+begin otherwise are looked for: another way, or leading away first.
+
+That no more can be had than the widest keeps, that all up to it can, and that less clearance never takes longer, does not follow: for that all
+clearances would have to be fitted for each plan. docs/clearance-ladder.md counts the exceptions.
 
 **Why.** Fitting is a heuristic (`routing.route_search`): at one clearance it fails by a centimetre and at the next it succeeds. Without this
 4.53 m were refused and 4.6 m planned, and the widest route kept less than others did.
@@ -15,17 +20,16 @@ What the vehicle keeps on its first legs, as it leaves the place where it stands
 
 from __future__ import annotations
 
+import bisect
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from shapely import Point
-
 from missions.drive_model import corner_forecast
+from missions.fitting.local_search import CRAWL_MEASUREMENTS, FIT_MEASUREMENTS
 from missions.ground.legs import reserve_m
-from missions.routing.drawn_route import DrawnRoutes, Route
+from missions.routing.drawn_route import widest_drawn_m
 from missions.routing.no_route import NoRoute, NoRouteKind
 from missions.routing.route_search import SLOW_MPS, DrivenRoute, Known, RouteSearch
 from missions.words import metres
@@ -40,12 +44,16 @@ if TYPE_CHECKING:
 STEP_M = 0.1
 """Between the clearances that lines are fitted to, where those asked for do not do."""
 
-# Chosen, not measured: steps below the widest that are looked at one after another, and how many of them with all that can be tried; they
-# bound the time until a refusal
+# Chosen, not measured, as they bound the time until a refusal: steps below the widest that are looked at one after another, and how near the
+# best of them has to come to it so that the widest is not aimed at again with all that can be tried
 _STEPS_DOWN = (0, 2, 8, 32)
-_TRIED_WHOLLY = 1
-_STEPS_UP = (1,)
+_NEAR_TOP_M = 0.12
+_STEPS_UP = (1, 3)
 """Steps above what is asked that are looked at first: nearly what is asked, and mostly they do."""
+_OTHERWISE_STEPS = (
+    64  # above a clearance at which the start refuses, within which routes that begin otherwise are sought
+)
+_OTHER_MEASUREMENTS = FIT_MEASUREMENTS + CRAWL_MEASUREMENTS
 _GOOD_SHARE = 0.5  # for fitting in short rounds
 _ALL_M = 0.01  # what keeps so little less than it aims at is as wide as can be
 
@@ -81,8 +89,7 @@ class PromisedRoute:
         """Return a route that keeps at least what is asked, and what is promised for it; else why there is none."""
         direct = self._search(asked.required_m, asked.required_m)
         found = direct.find(briefly=True)
-        is_whole = isinstance(found, DrivenRoute) and found.is_whole
-        if not is_whole and (isinstance(found, DrivenRoute) or found.kind is NoRouteKind.CORNER):
+        if not _is_good(found) and (isinstance(found, DrivenRoute) or found.kind is NoRouteKind.CORNER):
             found = self._with_more(direct, found, asked)
         if isinstance(found, DrivenRoute):
             found = self._quicker(found, asked)
@@ -104,6 +111,7 @@ class PromisedRoute:
             return most_m
         found = self._widest(most_m, asked.error_m, 0.0)
         if isinstance(found, DrivenRoute):
+            found = self._climbed(found, asked.error_m)
             return _promised(asked, found, is_widest=True), found
         return replace(found, advice=_NOTHING_ADVICE) if found.kind is NoRouteKind.CORNER else found
 
@@ -111,49 +119,93 @@ class PromisedRoute:
         """Return the route that keeps most, aimed at the widest that lines can be drawn for and, as far as it is enough, at less."""
         best: DrivenRoute | None = None
         why: NoRoute | None = None
-        for number, required_m in enumerate((*_downwards(most_m, error_m), 0.0)):
+        levels_m = tuple(_downwards(most_m, error_m))
+        top_m = levels_m[0]
+        for required_m in (*levels_m, 0.0):
             if required_m < enough_m or (best is not None and _kept_m(best) >= required_m):
                 break
-            found = self._widest_at(required_m, briefly=required_m > 0 and number >= _TRIED_WHOLLY)
+            found = self._widest_at(required_m, briefly=required_m > 0)
             if isinstance(found, DrivenRoute):
                 best = found if best is None or _kept_m(found) > _kept_m(best) else best
             else:
                 is_first, why = why is None, found
                 least = self._widest_at(0.0) if is_first and found.at_start and not enough_m else None
                 if isinstance(least, NoRoute) and least.at_start:
-                    # Where the least asks too much of the start, what lies between does.
-                    return least
+                    # Where the least asks too much of the start, what begins the same way does.
+                    others = [
+                        self._widest_at(other_m, briefly=True) for other_m in self._begun_otherwise_m(0.0)
+                    ]
+                    return max(
+                        (other for other in others if isinstance(other, DrivenRoute)),
+                        key=_kept_m,
+                        default=least,
+                    )
+        if why is not None and (best is None or _kept_m(best) < top_m - _NEAR_TOP_M):
+            whole = self._widest_at(top_m)
+            best = max(
+                (found for found in (best, whole) if isinstance(found, DrivenRoute)),
+                key=_kept_m,
+                default=None,
+            )
         if best is not None:
             return best
         assert why is not None
         return why
 
+    def _climbed(self, best: DrivenRoute, error_m: float) -> DrivenRoute:
+        """Return a route that keeps more, aimed at the next steps above what one keeps, as far as each keeps more than the last."""
+        failed_m = min((tried_m for tried_m in self._tried if tried_m > _kept_m(best) + _ALL_M), default=0.0)
+        while (
+            required_m := round(error_m + (_steps(_kept_m(best) - error_m) + 1) * STEP_M, 9)
+        ) < failed_m - _ALL_M:
+            found = self._widest_at(required_m, briefly=True)
+            if isinstance(found, NoRoute) or _kept_m(found) <= _kept_m(best):
+                break
+            best = found
+        return best
+
     def _with_more(
         self, direct: RouteSearch, first: DrivenRoute | NoRoute, asked: Promise
     ) -> DrivenRoute | NoRoute:
         """Return a route fitted to what is asked, or to more of it where that does not do; the first lines tried are known."""
-        if isinstance(first, NoRoute) and first.is_held:
-            why = direct.find()
-            if isinstance(why, DrivenRoute) or why.is_held:
-                return why
         enough_m = asked.required_m
-        most_m = self._most_drawn_m
-        assert not isinstance(most_m, NoRoute)  # lines were drawn, and could not be fitted
-        more_m = [rung for step in _STEPS_UP if (rung := round(enough_m + step * STEP_M, 9)) < most_m]
-        quick = [first, *(self._search(required_m, enough_m).find(briefly=True) for required_m in more_m)]
+        is_held = isinstance(first, NoRoute) and first.is_held
+        quick = [first]
+        for required_m in (round(enough_m + step * STEP_M, 9) for step in _STEPS_UP):
+            if is_held or _is_good(quick[-1]):
+                break
+            quick.append(self._other_search(required_m, enough_m).find(briefly=True))
         if driven := [found for found in quick if isinstance(found, DrivenRoute)]:
             return min(driven, key=lambda found: found.cost_s)
         why = direct.find()
         if isinstance(why, DrivenRoute):
             return why
+        if why.at_start:
+            for other_m in self._begun_otherwise_m(enough_m):
+                other = self._other_search(other_m, enough_m).find(briefly=True)
+                if isinstance(other, DrivenRoute):
+                    return other
+        most_m = 0.0 if why.is_held else self._most_drawn_m
+        assert not isinstance(most_m, NoRoute)  # lines were drawn, and could not be fitted
         widest = self._widest(most_m, asked.error_m, enough_m) if most_m > enough_m else why
         return widest if isinstance(widest, DrivenRoute) and _kept_m(widest) >= enough_m else why
 
     def _widest_at(self, required_m: float, *, briefly: bool = False) -> DrivenRoute | NoRoute:
         """Return the route that keeps most where so much is aimed at; each is tried once."""
         if required_m not in self._tried:
-            self._tried[required_m] = self._search(required_m, max(required_m - _ALL_M, 0.0))
+            search = self._other_search(required_m, max(required_m - _ALL_M, 0.0))
+            self._tried[required_m] = replace(search, any_speed=True)
         return self._tried[required_m].widest(briefly=briefly)
+
+    def _begun_otherwise_m(self, from_m: float) -> list[float]:
+        """Return the least steps above a clearance at which drawn routes begin otherwise than at it: another way, or leading away first."""
+        least = self._search(from_m, 0.0)
+
+        def is_other(step: int) -> bool:
+            return self._search(round(from_m + step * STEP_M, 9), 0.0).begins_otherwise(least)
+
+        first = bisect.bisect_left(range(1, _OTHERWISE_STEPS), x=True, key=is_other) + 1
+        return [round(from_m + step * STEP_M, 9) for step in (first, first + 1)]
 
     def _compared(self, why: NoRoute, asked: Promise) -> NoRoute:
         """Return why there is no route, with what the widest one keeps while this vehicle drives it."""
@@ -161,7 +213,7 @@ class PromisedRoute:
             return why
         widest = self.widest(asked)
         if isinstance(widest, NoRoute):
-            text = f"{why.text}, and none of those tried can be driven by this vehicle at any clearance"
+            text = f"{why.text}, and this vehicle can drive none of the routes tried, at any clearance"
             return replace(why, text=text, advice=_NOTHING_ADVICE)
         promised_m = widest[0].promised_m
         facts = {**why.facts, "widest_m": round(promised_m, 3)}
@@ -172,7 +224,7 @@ class PromisedRoute:
             return replace(why, text=text, facts=facts)
         return replace(
             why,
-            text=f"{text} ({metres(place.clearance_m)} drawn){place.where}",
+            text=f"{text} ({metres(place.clearance_m)} along straight legs){place.where}",
             facts={**facts, "widest_drawn_m": round(place.clearance_m, 3)},
         )
 
@@ -182,31 +234,11 @@ class PromisedRoute:
         slow_mps = min(SLOW_MPS, self.vehicle.speed_mps)
         band_m = corner_forecast(0.0, self.vehicle, speed_mps=slow_mps).outside_overshoot_m
         beside_m = band_m + reserve_m(self.sought.ground)
+        return widest_drawn_m(self.sought, beside_m)
 
-        def drawn(required_m: float) -> Route | NoRoute:
-            return DrawnRoutes.at(self.sought, required_m + beside_m).find()
-
-        least = drawn(0.0)
-        if isinstance(least, NoRoute):
-            return least
-        low_m, high_m = 0.0, max(self._widest_ground_m() - beside_m, 0.0)
-        if isinstance(drawn(high_m), Route):
-            return high_m
-        while high_m - low_m > _ALL_M:
-            middle_m = (low_m + high_m) / 2
-            low_m, high_m = (middle_m, high_m) if isinstance(drawn(middle_m), Route) else (low_m, middle_m)
-        return low_m
-
-    def _widest_ground_m(self) -> float:
-        """Return a clearance that no route exceeds once it has left the start."""
-        ground, start = self.sought.ground, self.sought.start
-        bounds_m = [ground.clearance_m(Point(target)) + self.sought.snap_m for target in self.sought.targets]
-        start_m = ground.clearance_m(Point(start))
-        for a, b in pairwise((start, *self.sought.targets)):
-            place = self.sought.narrowest_place(a, b)
-            if place is not None and (a is not start or place.clearance_m < start_m - _ALL_M):
-                bounds_m.append(place.clearance_m)
-        return min(*bounds_m, ground.bounds.bounds[2] - ground.bounds.bounds[0])
+    def _other_search(self, required_m: float, enough_m: float) -> RouteSearch:
+        """Return what looks for a route at a clearance that was not asked for: one route is fitted to it, and given up sooner."""
+        return replace(self._search(required_m, enough_m), measurements=_OTHER_MEASUREMENTS)
 
     def _search(self, required_m: float, enough_m: float) -> RouteSearch:
         return RouteSearch(self.sought, required_m, self.vehicle, self.heading_deg, enough_m, self._known)
@@ -215,9 +247,19 @@ class PromisedRoute:
 def _downwards(most_m: float, error_m: float) -> Iterator[float]:
     """Return what is aimed at for the widest route, most first: the widest, then whole steps of what is promised below it."""
     yield math.floor(100 * most_m) / 100
-    steps = math.floor((most_m - error_m) / STEP_M)
+    steps = _steps(most_m - error_m)
     # Rounded, so that what comes to the same is the same, and is fitted once.
     yield from (round(error_m + (steps - down) * STEP_M, 9) for down in _STEPS_DOWN if steps > down)
+
+
+def _steps(promised_m: float) -> int:
+    """Return how many whole steps a clearance has, rounding aside."""
+    return math.floor(promised_m / STEP_M + 1e-6)
+
+
+def _is_good(found: DrivenRoute | NoRoute) -> bool:
+    """Return whether there is no reason to aim at more: all is kept that was aimed at, and it is not driven slowly."""
+    return isinstance(found, DrivenRoute) and found.is_whole and not found.is_slow
 
 
 def _kept_m(found: DrivenRoute) -> float:

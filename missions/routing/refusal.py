@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from missions.fitting.polyline import Drawing
     from missions.routing.drawn_route import Route, Sought
 
-_START_ADVICE = "the vehicle has no room to turn where it stands: turn it by hand to face its way, or move it, or ask for less with --clearance"
+_START_ADVICE = "the vehicle has no room to turn where it stands: turn it by hand to face the route, or move it, or ask for less with --clearance"
 AT_START = 2
 """Points where most is missing because of how the route begins."""
 
@@ -65,7 +65,7 @@ def refusal(
     return NoRoute(
         NoRouteKind.CORNER,
         f"no route keeps {sought.asked or metres(required_m)} while driving: at {where} this vehicle would come as near as "
-        f"{metres(kept_m)} to {fence}, whatever was tried",
+        f"{metres(kept_m)} to {fence} on the best route tried",
         facts,
         [fence],
         advice=_START_ADVICE if index == 0 or held_at_start else None,

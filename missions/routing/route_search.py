@@ -25,6 +25,7 @@ import numpy as np
 from shapely import Point
 
 from missions.drive_model import corner_forecast
+from missions.fitting import polyline
 from missions.fitting.cost import ENOUGH_M
 from missions.fitting.local_search import MOST_MEASUREMENTS, Fitting
 from missions.fitting.polyline import Drawing, DrawnPoint
@@ -53,6 +54,8 @@ LATER_MEASUREMENTS = 500
 """For each kind of route that is tried after the first ones. Chosen, not measured: it bounds the time until a refusal."""
 
 # Chosen, not measured, but the turn at the end of a first leg.
+_SLOW_SHARE = 1.6  # of the time at full speed: beyond it the lines that leave as they are drawn are tried beside those that turn in the open
+_OTHER_WAY_DEG = 45.0  # between first legs that leave the start another way
 _OTHER_WAYS = 5  # squares laid over refusing places before the search gives up
 # Missing at the start beyond what a slower, narrower band could win back: nothing else is tried
 _HELD_M = 0.05
@@ -95,6 +98,8 @@ class DrivenRoute:
         Whether that is all that was aimed at.
     cost_s : float
         The predicted time, and a little for each waypoint (`fitting.cost`).
+    is_slow : bool
+        Whether it takes much longer than its lines would at full speed, so that others may be quicker.
     """
 
     drawing: Drawing
@@ -106,6 +111,7 @@ class DrivenRoute:
     kept_m: float | None = None
     is_whole: bool = True
     cost_s: float = 0.0
+    is_slow: bool = False
 
     @property
     def is_slow_somewhere(self) -> bool:
@@ -157,6 +163,10 @@ class RouteSearch:
         What is enough of it, where what is aimed at cannot be kept all the way. Default: all of it.
     known : Known, optional
         What other searches for the vehicle on the field know already.
+    any_speed : bool
+        Whether a slow route does, so that no quicker one is sought.
+    measurements : int
+        For the first routes.
     good_share : float, optional
         What ends a round of fitting (`fitting.local_search.Fitting`).
     """
@@ -167,6 +177,8 @@ class RouteSearch:
     heading_deg: float | None
     enough_m: float | None = None
     known: Known = field(default_factory=Known)
+    any_speed: bool = False
+    measurements: int = MOST_MEASUREMENTS
     good_share: float = 0.0
 
     def find(self, *, briefly: bool = False) -> DrivenRoute | NoRoute:
@@ -195,6 +207,15 @@ class RouteSearch:
         attempts = self._first_attempts if briefly else self._attempts
         driven = [one.driven for one in attempts if one.driven is not None]
         return max(driven, key=lambda one: (one.kept_m or 0.0, -one.cost_s), default=found)
+
+    def begins_otherwise(self, other: RouteSearch) -> bool:
+        """Return whether the shortest route leaves the start another way than that of another search, or leads away first where that does not."""
+        here, there = self._first_routes, other._first_routes
+        if isinstance(here, NoRoute) or isinstance(there, NoRoute):
+            return True
+        (route, _), (that, _) = here[0], there[0]
+        turn_deg = abs(_course_deg(route) - _course_deg(that))
+        return route.lead_away != that.lead_away or min(turn_deg, 360.0 - turn_deg) > _OTHER_WAY_DEG
 
     @cached_property
     def _attempts(self) -> list[_Attempt]:
@@ -238,9 +259,9 @@ class RouteSearch:
         if self._is_limited_by_start:
             # Lines that turn in the open are quicker than those that creep away, and to fit.
             attempts = self._until_found(self._departing(self._bands_m[1]))
-            if attempts and attempts[-1].is_enough:
+            if (driven := _found(attempts)) and (self.any_speed or not driven[-1][1].is_slow):
                 return attempts
-        fitting = self._fitting(MOST_MEASUREMENTS)
+        fitting = self._fitting(self.measurements)
         attempts.append(self._fit(fitting, routes[0]))
         is_shorter = routes[-1].length_m < _SHORTER_SHARE * routes[0].length_m
         if len(routes) > 1 and (is_shorter or not _found(attempts)):
@@ -330,6 +351,7 @@ class RouteSearch:
             kept_m,
             measured.is_enough,
             kept.cost_s,
+            kept.cost_s * self.vehicle.speed_mps > _SLOW_SHARE * polyline.distances_m(drawing)[-1],
         )
         enough_m = self.required_m if self.enough_m is None else self.enough_m
         return _Attempt(drawing, measured, driven, is_enough=kept_m >= min(enough_m, self.required_m))
@@ -414,16 +436,15 @@ class RouteSearch:
     def _departing_routes(self, band_m: float) -> Iterator[Route]:
         """Return routes by the first legs that the vehicle can drive as it faces, the shortest first."""
         keeps_m = self.departure_m + self._reserve_m
+        drawn = self._drawn_at(band_m)
         routes = []
         for departure in self._departures.best_first():
             if departure.kept_m < keeps_m:
                 break
-            onward = self._drawn_at(band_m).find(departure.there)
-            if (
-                isinstance(onward, NoRoute)
-                or onward.lead_away
-                or _turn_at_deg(self.sought.start, onward) > _MOST_TURN_DEG
-            ):
+            if not drawn.is_free(departure.there):
+                continue
+            onward = drawn.find(departure.there)
+            if isinstance(onward, NoRoute) or _turn_at_deg(self.sought.start, onward) > _MOST_TURN_DEG:
                 continue
             route = replace(
                 onward,
@@ -453,6 +474,12 @@ class RouteSearch:
 def _found(attempts: Sequence[_Attempt]) -> list[tuple[float, DrivenRoute]]:
     """Return the routes that were found, with what each costs."""
     return [(one.driven.cost_s, one.driven) for one in attempts if one.is_enough and one.driven is not None]
+
+
+def _course_deg(route: Route) -> float:
+    """Return where the first leg leads, clockwise from north."""
+    east_m, north_m = route.points[1] - route.points[0]
+    return math.degrees(math.atan2(east_m, north_m))
 
 
 def _turn_at_deg(start: LocalPoint, onward: Route) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -9,9 +10,8 @@ import numpy as np
 
 from missions.fitting.polyline import DrawnPoint
 from missions.ground.legs import reserve_m
-from missions.routing.bottleneck import kept_m
-from missions.routing.drawn_route import DrawnRoutes, Route, simplified
-from missions.routing.no_route import NoRoute, NoRouteKind
+from missions.routing.drawn_route import DrawnRoutes, Route, simplified, widest_drawn_m
+from missions.routing.no_route import NoRoute
 from missions.routing.route_search import DrivenRoute
 
 if TYPE_CHECKING:
@@ -21,9 +21,6 @@ if TYPE_CHECKING:
 _TINY_LEG_M = 1.5  # two shorter legs mean that the route winds round a corner; chosen, not measured
 # Added to the clearance to draw rounder corners, widest first; chosen, not measured
 _WIDER_M = (0.3, 0.1, 0.03)
-_WIDEST_TRIES = 40  # each takes 2 % off: 40 come down to 45 % of the widest clearance. Chosen, not measured: it bounds the time
-_WIDEST_SHARE = 0.97
-"""What of the widest clearance a route keeps: round corners of the last millimetre would need a waypoint every half metre."""
 
 
 def uniform_route(sought: Sought, asked: Promise) -> tuple[Promise, DrivenRoute] | NoRoute:
@@ -33,17 +30,17 @@ def uniform_route(sought: Sought, asked: Promise) -> tuple[Promise, DrivenRoute]
 
 
 def widest_uniform_route(sought: Sought, asked: Promise) -> tuple[Promise, DrivenRoute] | NoRoute:
-    """Return the widest route, and what can be promised for it; else why there is none."""
-    widest_m = kept_m(sought.narrowest_places())
-    clearance_m, route = _widest_route(sought, widest_m)
-    if isinstance(route, NoRoute):
-        return route
-    simplified_m = _WIDEST_SHARE * clearance_m
-    drawn_m = simplified_m - reserve_m(sought.ground)
-    wanted_m = asked.allowance_m or 0.0
-    promised_m = max(0.0, drawn_m - wanted_m - asked.error_m)
-    promise = replace(asked, promised_m=promised_m, error_m=drawn_m - wanted_m - promised_m)
-    return promise, _driven(simplified(sought.ground, route, simplified_m), drawn_m)
+    """Return the route at the greatest promise that there is one for, to the centimetre, and that promise; else why there is none."""
+    reserved_m = reserve_m(sought.ground)
+    widest_m = widest_drawn_m(sought)
+    if isinstance(widest_m, NoRoute):
+        return widest_m
+    beside_m = reserved_m + (asked.allowance_m or 0.0) + asked.error_m
+    promised_m = math.floor(100 * max(0.0, widest_m - beside_m)) / 100
+    error_m = min(asked.error_m, max(0.0, widest_m - reserved_m - (asked.allowance_m or 0.0)))
+    promise = replace(asked, promised_m=promised_m, error_m=error_m)
+    route = _sparse_route(sought, promise.drawn_m + reserved_m)
+    return route if isinstance(route, NoRoute) else (promise, _driven(route, promise.drawn_m))
 
 
 def _driven(route: Route, drawn_m: float) -> DrivenRoute:
@@ -66,14 +63,3 @@ def _sparse_route(sought: Sought, clearance_m: float) -> Route | NoRoute:
 def _has_tiny_legs(route: Route) -> bool:
     legs_m = np.hypot(*np.diff(route.points, axis=0).T)
     return bool((legs_m[route.lead_away :] < _TINY_LEG_M).sum() > 1)
-
-
-def _widest_route(sought: Sought, clearance_m: float) -> tuple[float, Route | NoRoute]:
-    """Return the route at the widest clearance, and that clearance: a little less where corners are mitred in the narrowest place."""
-    route = DrawnRoutes.at(sought, clearance_m).find()
-    for _ in range(_WIDEST_TRIES):
-        if isinstance(route, Route) or route.kind is NoRouteKind.START_BLOCKED:
-            break
-        clearance_m *= 0.98  # chosen: a try gives away 2 %
-        route = DrawnRoutes.at(sought, clearance_m).find()
-    return clearance_m, route

@@ -51,8 +51,7 @@ def test_houses_with_common_walls_are_united_without_an_overlay(seed, monkeypatc
         assert not len(geometries)
         return shapely.MultiPolygon()
 
-    if shapely.geos_version >= (3, 14, 0):  # older ones do not take these houses for a coverage
-        monkeypatch.setattr(shapely, "disjoint_subset_union_all", not_needed)
+    monkeypatch.setattr(shapely, "disjoint_subset_union_all", not_needed)
     assert subtracted(GROUND, obstacles).equals(expected)
 
 
@@ -74,6 +73,13 @@ def test_sheds_in_courts_and_rings_within_rings():
     sheds = [shapely.box(49, 49, 50, 50), shapely.box(2.5, 2.5, 3.5, 3.5), shapely.box(150, 150, 160, 160)]
     found = assert_same(GROUND, [*rings, *sheds, shapely.box(215, 0, 230, 10)])
     assert len(polygons_only(found)) == 13
+
+
+def test_a_shed_in_a_court_of_touching_houses():
+    corners = [(10 * i, 10 * j) for i in range(4) for j in range(4) if i in {0, 3} or j in {0, 3}]
+    court = [shapely.box(x, y, x + 10, y + 10) for x, y in corners]
+    found = assert_same(GROUND, [*court, shapely.box(18, 18, 22, 22), shapely.box(100, 0, 110, 10)])
+    assert len(polygons_only(found)) == 2
 
 
 def test_nothing_to_take_away_and_nothing_left():

@@ -101,13 +101,16 @@ TrustOption = Annotated[
     bool,
     flag(
         "--trust-model",
-        "Promise a clearance even outside the measured range; without it no such plan is uploaded.",
+        "Promise a clearance even where the drive model was not measured; without this option no such plan is uploaded.",
         VEHICLE_PANEL,
     ),
 ]
 AcceptLessOption = Annotated[
     bool,
-    flag("--accept-less", "If no route keeps the clearance, take the widest; else there is no plan then."),
+    flag(
+        "--accept-less",
+        "If no route keeps the clearance, take the widest route instead of ending with an error.",
+    ),
 ]
 
 

@@ -29,9 +29,9 @@ from mavlink_bridge.director import Event, EventName
 from mavlink_bridge.director.announcer import Announcer
 from mavlink_bridge.mavlink import messages as m
 from missions.geo import LatLon
-from missions.harmless import harmless
 from missions.picture import draw_scene
 from missions.picture.drives import drive_scene
+from missions.words import harmless
 
 FOLDER = Path(mavlink_bridge.cli.__file__).parent
 TITLE = "\x1b]0;PWNED\x07"

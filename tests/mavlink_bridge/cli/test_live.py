@@ -158,6 +158,7 @@ def test_a_drive_ends_with_what_it_was_like(config, tmp_path):
     assert drive["driven_m"] == pytest.approx(document["length_m"], rel=0.1)
     assert drive["least_clearance_m"] >= document["clearance_m"] - 0.1
     assert drive["breaches"] == 0
+    assert "info: HOLD does not brake: from 4 m/s the vehicle rolls on" in result.stderr, "before it drives"
     assert json.loads(again.stdout)["verified"] is True, "it waits in HOLD for the next one"
 
 

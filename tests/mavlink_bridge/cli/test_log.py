@@ -193,7 +193,7 @@ def test_strange_names_and_clocks_are_told_plainly(tmp_path):
     path.write_bytes(path.read_bytes() + b"\xfe\xfe\xfe")
     result = run(str(path))
     assert "[bold]odd.tlog" in result.stdout
-    assert "clock was set 1 times" in result.stdout
+    assert "clock was set 1 time " in result.stdout
     assert "Damage skipped" in result.stdout
 
 

@@ -7,7 +7,7 @@ import random
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from pyproj import Proj
@@ -15,12 +15,19 @@ from shapely import LineString, Point, Polygon
 from typer.testing import CliRunner
 
 from mavlink_bridge.cli import plan as plan_command
+from mavlink_bridge.cli import planning_progress
 from mavlink_bridge.cli.app import app
 from mavlink_bridge.cli.failing import exit_code_of
+from mavlink_bridge.cli.timed_plan import timed_plan
 from missions.errors import FenceError, PlanCheckError
 from missions.fence import CircleZone, Fence, ZoneKind
 from missions.formats import read_fence, read_mission, read_situation
 from missions.geo import LatLon, distance_m
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from missions.planned import Plan
 
 START, TARGET = "40.071374,-105.229930", "40.0720926,-105.2286152"
 KEYS = {
@@ -149,7 +156,7 @@ class TestRecordedLogs:
     def test_a_rover_nearer_than_the_clearance_leads_away(self, logs: Path, drawn: tuple) -> None:
         found = document("--log", logs / "position-target-yard.tlog", "--clearance", 3, *drawn)
         assert 2.68 <= found["drawn_clearance_m"] <= 2.71
-        assert any("first leads away, never nearer" in warning for warning in found["warnings"])
+        assert any("while leaving it, the rover keeps" in warning for warning in found["warnings"])
 
     def test_the_changed_fence_counts(self, logs: Path, drawn: tuple) -> None:
         ends = ("--start", "40.0715,-105.2286", "--target", TARGET)
@@ -210,7 +217,7 @@ class TestRecordedLogs:
     @pytest.mark.parametrize("name", ["guided-maze", "position-target-yard", "fence-change-yard"])
     def test_the_defaults_promise_something(self, logs: Path, name: str) -> None:
         found = document("--log", logs / f"{name}.tlog")
-        leads_away = any("first leads away" in warning for warning in found["warnings"])
+        leads_away = any("while leaving it, the rover keeps" in warning for warning in found["warnings"])
         at_start_m = found["start_clearance_m"]
         assert found["clearance_m"] == 2.5
         assert at_start_m is None or (leads_away and 1.2 < at_start_m < 2.5)
@@ -240,7 +247,7 @@ class TestFiles:
         assert "m in a straight line" in lines[0]
         assert "at least 2.5 m while driving" in lines[1]
         assert lines[2] == f"Wrote {mission}"
-        assert "info: HOLD does not brake: from 2 m/s the vehicle rolls on 4.1 m" in result.stderr
+        assert "HOLD" not in result.stderr  # it is told to those who are about to drive
         assert all(line.startswith(("warning: ", "info: ")) for line in result.stderr.splitlines())
         quiet = run("--fence", fields / "yard-fence.waypoints", "--start", START, "--target", TARGET, "-q")
         assert (quiet.exit_code, quiet.stdout) == (0, "")
@@ -553,7 +560,7 @@ def test_not_a_number_in_a_log_is_still_one_document(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("json_output", [False, True])
 def test_a_defect_says_how_to_report_it(fields: Path, monkeypatch, json_output: bool) -> None:
-    def break_down(*_: object) -> None:
+    def break_down(*_: object, **__: object) -> None:
         raise ZeroDivisionError("by nothing")
 
     monkeypatch.setattr(plan_command, "timed_plan", break_down)
@@ -571,13 +578,35 @@ def test_a_defect_says_how_to_report_it(fields: Path, monkeypatch, json_output: 
 
 
 def test_an_interrupt(fields: Path, monkeypatch) -> None:
-    def interrupt(*_: object) -> None:
+    def interrupt(*_: object, should_stop: Callable[[], bool]) -> None:
+        assert not should_stop()
         raise KeyboardInterrupt
 
     monkeypatch.setattr(plan_command, "timed_plan", interrupt)
     found = failure("--fence", fields / "yard-fence.waypoints")
     assert (found["exit_code"], found["error"]) == (130, "Interrupted")
-    assert "left as it was" in found["message"]
+    assert found["message"] == "interrupted while planning; nothing was written"
+
+
+def test_a_plan_that_takes_long_shows_so(fields: Path, monkeypatch) -> None:
+    def take_long(*given: object, should_stop: Callable[[], bool]) -> tuple[Plan, float]:
+        monkeypatch.setattr(planning_progress, "_AFTER_S", 0.0)
+        return timed_plan(*given, should_stop=should_stop)
+
+    monkeypatch.setattr(plan_command, "timed_plan", take_long)
+    words = (
+        "--fence",
+        fields / "yard-fence.waypoints",
+        "--start",
+        START,
+        "--target",
+        TARGET,
+        "--clearance",
+        "max",
+    )
+    assert "planning the widest route" in run(*words, "-v").stderr
+    assert "planning the widest route" not in run(*words, "-v", "-q").stderr
+    assert "planning" not in run(*words).stderr
 
 
 def test_every_error_has_its_exit_code() -> None:

@@ -177,7 +177,10 @@ def test_a_start_near_a_fence_has_to_keep_what_it_has():
     near = check_mission(mission_of((0.0, 0.0)), situation, Request(place(39.2, 30.0), clearance_m=2.0))
     assert near.holds
     assert 0.4 < near.legs[0].asked_m < 0.8
-    assert any("the first leg only has to keep" in warning for warning in near.warnings)
+    kept_m = near.legs[0].driven_clearance_m
+    assert any(
+        f"while leaving it, the rover keeps at least {kept_m:.2f} m" in warning for warning in near.warnings
+    )
     nearer = check_mission(mission_of((39.6, 60.0)), situation, Request(place(38.8, 10.0), clearance_m=2.0))
     assert [leg.name for leg in nearer.broken] == ["start → 1"]
 

@@ -21,7 +21,7 @@ from missions.situation import Known, Pose
 PATH = list(sys.path)
 sys.path.append(str(Path(__file__).parents[3] / "benchmarks"))
 
-from ladder import ladder_of  # noqa: E402
+from ladder import asked_of, ladder_of  # noqa: E402
 
 sys.path[:] = PATH  # modules of the benchmarks have names of rooms of the tests
 
@@ -61,6 +61,16 @@ def test_where_what_is_asked_cannot_be_fitted_more_of_it_serves(monkeypatch: pyt
     assert found.driven_clearance_m >= found.clearance_m
 
 
+def test_a_start_that_refuses_one_route_is_left_by_one_that_begins_otherwise() -> None:
+    """In field 1 a rover that cannot turn faces away: 2 m was planned, leading away first, and all from 0.5 to 1.9 m refused."""
+    situation, request = asked_of("field 1")
+    found = plan(situation, GoTo(**request, clearance_m=1.5))
+    widest = plan(situation, GoTo(**request, widest=True))
+    assert found.clearance_m is not None
+    assert widest.clearance_m is not None
+    assert 1.5 <= found.clearance_m <= widest.clearance_m
+
+
 def test_less_than_was_asked_needs_a_word() -> None:
     asked = replace(THROUGH, clearance_m=4.53)
     with pytest.raises(
@@ -70,8 +80,8 @@ def test_less_than_was_asked_needs_a_word() -> None:
     less = plan(gate(), replace(asked, accepts_less=True))
     widest = plan(gate(), replace(THROUGH, widest=True))
     assert less.clearance_m == widest.clearance_m == caught.value.details["widest_m"]
-    assert any("no route keeps 4.53 m while driving: the widest, with 2." in text for text in less.warnings)
-    assert not any("--accept-less" in text for text in widest.warnings)
+    assert any("no route keeps 4.53 m while driving: the widest, with 2." in text for text in less.info)
+    assert not any("--accept-less" in text for text in (*less.warnings, *widest.warnings, *widest.info))
 
 
 def test_a_target_too_near_a_fence_is_reached_with_less_where_less_is_accepted() -> None:
@@ -132,3 +142,15 @@ def test_tours_take_less_too_and_repairs_never_do() -> None:
     assert 1.5 < less.clearance_m < 2.5
     with pytest.raises(RequestError, match="accepts_less True: expected none"):
         RepairMission(accepts_less=True)
+
+
+@pytest.mark.parametrize("allowance_m", [0.0, 0.3])
+def test_with_a_corner_allowance_the_widest_is_the_most_that_can_be_asked(allowance_m: float) -> None:
+    """It was 97 % of it: more could be asked than the widest kept."""
+    widest = plan(gate(), replace(THROUGH, widest=True, corner_allowance_m=allowance_m))
+    most_m = widest.asked_m - allowance_m
+    assert most_m == pytest.approx(2.5 - allowance_m, abs=0.03)
+    asked = plan(gate(), replace(THROUGH, clearance_m=most_m, corner_allowance_m=allowance_m))
+    assert asked.asked_m == pytest.approx(widest.asked_m)
+    with pytest.raises(NoRouteError, match="no route keeps"):
+        plan(gate(), replace(THROUGH, clearance_m=most_m + 0.03, corner_allowance_m=allowance_m))

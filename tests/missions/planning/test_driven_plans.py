@@ -127,7 +127,7 @@ def test_where_no_route_can_be_driven_the_error_says_what_the_widest_keeps() -> 
     situation = facing(situation_of(box(IN, -60, -60, 60, 60), *walls, WP_SPEED=5.0), -50, 0, 90.0)
     with pytest.raises(
         NoRouteError,
-        match=r"no route keeps 2.4 m while driving; the widest keeps 2.2\d m \(2.50 m drawn\), narrowest between "
+        match=r"no route keeps 2.4 m while driving; the widest keeps 2.2\d m \(2.50 m along straight legs\), narrowest between "
         "exclusion polygon . and exclusion polygon . at ",
     ) as caught:
         plan(situation, Request(targets=(place(50, 0),), clearance_m=2.4))
@@ -254,7 +254,7 @@ class TestStarts:
             situation_of(FIELD, WALL, WP_SPEED=2.0), -8, 0, 90.0
         )  # 3 m from the wall, facing it
         result = plan(situation, Request(targets=(place(50, 0),), clearance_m=2.5))
-        assert any("first leads away" in warning for warning in result.warnings)
+        assert any("while leaving it, the rover keeps" in warning for warning in result.warnings)
         start_m = result.ground.clearance_m(Point(result.ground.frame.to_local(result.start)))
         assert result.drawn_clearance_m >= min(start_m, 2.5) - 0.02
         assert result.clearance_m == 2.5
@@ -278,7 +278,7 @@ class TestStarts:
         assert len(result.items) == 1
         near_m = band_of(result, heading_deg).distance(fence_line(result))
         assert result.start_clearance_m - 0.02 <= near_m < 2.0
-        assert any("turning there" in warning for warning in result.warnings)
+        assert any("too near to keep" in warning for warning in result.warnings)
         rest = result.envelope.waypoints > 0
         assert result.envelope.clearances_m(result.ground.edge)[rest].min() >= 2.0
 
@@ -314,7 +314,7 @@ class TestEscape:
         assert math.dist(first, second) == pytest.approx(7.3 if allowance_m is None else 7.0, abs=0.1)
         rest = LineString(chart.points(result.path[1:]))
         assert rest.distance(chart.zone_line(block)) >= 2.0 - MERCATOR_TOLERANCE_M
-        assert any("drives out of it" in text for text in result.info)
+        assert any("leg 1 drives into it" in text for text in result.info)
 
     def test_not_across_other_forbidden_ground(self) -> None:
         ring = [
@@ -392,7 +392,7 @@ def test_where_no_clearance_helps_the_advice_is_another(monkeypatch: pytest.Monk
         "less clearance does not help this vehicle: turn it"
     )
     assert asked_m[0] == pytest.approx(1.3, abs=0.05)
-    assert asked_m[-1] == 0.0
+    assert 0.0 in asked_m
 
 
 def test_a_gap_that_no_clearance_lets_this_vehicle_through_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -403,7 +403,7 @@ def test_a_gap_that_no_clearance_lets_this_vehicle_through_is_told(monkeypatch: 
     walls = [box(OUT, -3, -60, 3, -2.5), box(OUT, -3, 2.5, 3, 60)]
     situation = facing(situation_of(box(IN, -60, -60, 60, 60), *walls, WP_SPEED=5.0), -50, 0, 90.0)
     with pytest.raises(
-        NoRouteError, match=r"the widest keeps 2.50 m.*, and none .* at any clearance"
+        NoRouteError, match=r"the widest keeps 2.50 m.*, and this vehicle can drive none .* at any clearance"
     ) as caught:
         plan(situation, Request(targets=(place(50, 0),), clearance_m=2.4))
     assert "widen the narrowest place" in str(caught.value.details["advice"])
@@ -465,14 +465,14 @@ def test_a_place_more_is_added_to_the_free_space_that_is_there(monkeypatch: pyte
 def test_other_ways_and_first_legs_are_drawn_in_the_free_space_that_is_there(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Each once took its own: up to five ways round, and 72 first legs."""
+    """Each once took its own: up to five ways round, and 72 first legs. Seven more clearances are drawn at, to see where routes begin otherwise."""
     counts = counted(monkeypatch)
     lane = box(IN, -2.9, -60, 2.9, 60)
     facing_away = facing(situation_of(lane, **VEHICLES[1]), 0, 40, 0.0)
     with pytest.raises(NoRouteError, match="at the start this vehicle would come as near as"):
         plan(facing_away, Request(targets=(place(0, -50),), clearance_m=1.0))
-    assert counts["whole"] <= 2
-    assert counts["widest"] == 0
+    assert counts["whole"] <= 2 * (1 + 7 + 2)
+    assert counts["widest"] <= 1
 
 
 def test_the_widest_way_is_looked_for_once(monkeypatch: pytest.MonkeyPatch) -> None:

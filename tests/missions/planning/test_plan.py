@@ -396,8 +396,8 @@ class TestStartNearAFence:
         after = result.path[1:]
         assert chart.fence_clearance_m(result.fence, after) >= clearance_m - MERCATOR_TOLERANCE_M
         assert length_m(result.path[:2]) < 2 * clearance_m + 1  # the shortest way off, not along the fence
-        assert result.warnings[-1].startswith(
-            f"the start stands {start_m:.2f} m from a fence, nearer than {clearance_m:.2f} m"
+        assert result.warnings[-1] == (
+            f"the start is {start_m:.2f} m from a fence, too near to keep {clearance_m:g} m: while leaving it, the rover keeps at least {start_m:.2f} m"
         )
 
     def test_out_of_a_corridor_narrower_than_the_clearance(self) -> None:

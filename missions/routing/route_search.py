@@ -113,6 +113,11 @@ class DrivenRoute:
     cost_s: float = 0.0
     is_slow: bool = False
 
+    @property
+    def is_slow_somewhere(self) -> bool:
+        """Whether a stretch is driven slower than the vehicle's own speed."""
+        return any(point.speed_mps is not None for point in self.drawing)
+
 
 @dataclass(frozen=True, eq=False)
 class _Attempt:
@@ -135,8 +140,8 @@ class Known:
 
     drawn: dict[float, DrawnRoutes] = field(default_factory=dict)
     """By the clearance of the drawn lines."""
-    fitted: dict[tuple[Drawing, int, int], tuple[Drawing, Measured, int]] = field(default_factory=dict)
-    """By the lines, and the measurements taken before and allowed; with those taken after."""
+    fitted: dict[tuple[Drawing, int, int, float], tuple[Drawing, Measured, int]] = field(default_factory=dict)
+    """By the lines, the measurements taken before and allowed, and what ends a round; with those taken after."""
     departures: Departures | None = None
 
 
@@ -162,6 +167,8 @@ class RouteSearch:
         Whether a slow route does, so that no quicker one is sought.
     measurements : int
         For the first routes.
+    good_share : float, optional
+        What ends a round of fitting (`fitting.local_search.Fitting`).
     """
 
     sought: Sought
@@ -172,6 +179,7 @@ class RouteSearch:
     known: Known = field(default_factory=Known)
     any_speed: bool = False
     measurements: int = MOST_MEASUREMENTS
+    good_share: float = 0.0
 
     def find(self, *, briefly: bool = False) -> DrivenRoute | NoRoute:
         """Find the quickest of the routes tried whose band keeps enough; ``briefly`` tries the first ones only."""
@@ -304,7 +312,12 @@ class RouteSearch:
 
     def _fitting(self, measurements: int) -> Fitting:
         return Fitting(
-            self.sought.ground, self.vehicle, self.heading_deg, self.sought.should_stop, measurements
+            self.sought.ground,
+            self.vehicle,
+            self.heading_deg,
+            self.sought.should_stop,
+            measurements,
+            self.good_share,
         )
 
     def _drawn_at(self, band_m: float) -> DrawnRoutes:
@@ -316,7 +329,7 @@ class RouteSearch:
 
     def _fit(self, fitting: Fitting, route: Route, speed_mps: float | None = None) -> _Attempt:
         drawn_lines = tuple(replace(point, speed_mps=speed_mps) for point in self._drawing(route))
-        key = (drawn_lines, fitting.measurements, fitting.most_measurements)
+        key = (drawn_lines, fitting.measurements, fitting.most_measurements, fitting.good_share)
         if key not in self.known.fitted:
             self.known.fitted[key] = (*fitting.fit(drawn_lines), fitting.measurements)
         drawing, measured, fitting.measurements = self.known.fitted[key]
@@ -368,7 +381,9 @@ class RouteSearch:
             for number, point in enumerate(drawing)
         )
         measured = fitting.measure(drawing)
-        return (drawing, measured, missed_m, missed_at_start_m) if measured.is_enough else None
+        # Where no leg leads away, the start is one of the points that miss as much.
+        missed = (missed_m, missed_at_start_m if first else missed_m)
+        return (drawing, measured, *missed) if measured.is_enough else None
 
     def _drawing(self, route: Route) -> Drawing:
         """Return a route's lines with what each point has to keep: where the route leads away, no less than the start does."""

@@ -104,7 +104,7 @@ def test_a_route_within_one_inclusion_is_found_where_the_shorter_one_crosses_a_s
     assert chart.line(found.path).crosses(Polygon(chart.points(strip.vertices)).boundary)
     with pytest.raises(
         NoRouteError,
-        match=r"no route keeps 2\.5 m while driving; the widest keeps 0\.\d\d m \(1\.00 m drawn\)",
+        match=r"no route keeps 2\.5 m while driving; the widest keeps 0\.\d\d m \(1\.00 m along straight legs\)",
     ):  # the barn leaves 2 m in the north: only the strip leads round it
         route((field, strip, barn))
     inside = box(IN, 40, 20, 60, 38)

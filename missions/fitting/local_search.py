@@ -84,6 +84,8 @@ class Fitting:
         Asked now and then; True ends the search.
     most_measurements : int
         For all lines that are fitted.
+    good_share : float
+        A round ends soon after a candidate that leaves no more than this share of what its part missed: above 0 rounds are short, and end elsewhere.
     """
 
     ground: Ground
@@ -91,6 +93,7 @@ class Fitting:
     heading_deg: float | None
     should_stop: Callable[[], bool] | None = None
     most_measurements: int = MOST_MEASUREMENTS
+    good_share: float = 0.0
     measurements: int = field(default=0, init=False)
     _until: int = field(default=0, init=False)
 
@@ -267,21 +270,22 @@ class Fitting:
     ) -> tuple[Drawing, Measured] | None:
         """Return the lines that gain most, if any do, judged by the part that changes and then on the whole."""
         trials: list[_Tried] = []
-        known_s: dict[tuple[int, int], float] = {}
+        known: dict[tuple[int, int], Trial] = {}
         solved_at = None
         for number, candidate in enumerate(candidates):
             begin, kept = _changed(drawing, candidate)
             span = (begin, len(drawing) - kept)
-            if span not in known_s:
+            if span not in known:
                 self.measurements += 1
-                known_s[span] = self._gauge.trial(drawing, *span).finish().cost_s
+                known[span] = self._gauge.trial(drawing, *span).finish()
             self.measurements += 1
             trial = self._gauge.trial(candidate, begin, len(candidate) - kept)
-            tried = _Tried(known_s[span], number, trial, candidate)
-            if tried.is_enough() and solved_at is None:
+            tried = _Tried(known[span].cost_s, number, trial, candidate)
+            missing_m = self.good_share * float(known[span].missing_m.sum())
+            if tried.misses_at_most(missing_m) and solved_at is None:
                 solved_at = number
             trials.append(tried)
-            # The moves come with the cheapest first: once one suffices, a few more are looked at.
+            # The moves come with the cheapest first: once one does, a few more are looked at.
             if self._is_over() or (solved_at is not None and number >= solved_at + _MORE_TRIES):
                 break
         for tried in itertools.islice(_best_first(trials), _TRIED_WHOLE):
@@ -343,11 +347,13 @@ class _Tried:
         """What is gained, at most: steps not yet taken can only lower it."""
         return self.known_s - self.trial.cost_s
 
-    def is_enough(self) -> bool:
-        """Measure only as far as needed; return whether the part gains and its band keeps what is required."""
-        while self.gain_s > _LEAST_GAIN_S and self.trial.may_be_enough:
-            if not self.trial.refine():
-                return self.gain_s > _LEAST_GAIN_S and self.trial.may_be_enough
+    def misses_at_most(self, missing_m: float) -> bool:
+        """Measure only as far as needed; return whether the part gains and its band misses no more in all, or keeps what is required."""
+        trial = self.trial
+        while self.gain_s > _LEAST_GAIN_S and (trial.may_be_enough or trial.missing_m.sum() <= missing_m):
+            if trial.is_finished:
+                return True
+            trial.refine()
         return False
 
 

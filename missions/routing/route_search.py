@@ -114,6 +114,11 @@ class DrivenRoute:
     cost_s: float = 0.0
     is_slow: bool = False
 
+    @property
+    def is_slow_somewhere(self) -> bool:
+        """Whether a stretch is driven slower than the vehicle's own speed."""
+        return any(point.speed_mps is not None for point in self.drawing)
+
 
 @dataclass(frozen=True, eq=False)
 class _Attempt:
@@ -136,8 +141,8 @@ class Known:
 
     drawn: dict[float, DrawnRoutes] = field(default_factory=dict)
     """By the clearance of the drawn lines."""
-    fitted: dict[tuple[Drawing, int, int], tuple[Drawing, Measured, int]] = field(default_factory=dict)
-    """By the lines, and the measurements taken before and allowed; with those taken after."""
+    fitted: dict[tuple[Drawing, int, int, float], tuple[Drawing, Measured, int]] = field(default_factory=dict)
+    """By the lines, the measurements taken before and allowed, and what ends a round; with those taken after."""
     departures: Departures | None = None
 
 
@@ -165,6 +170,8 @@ class RouteSearch:
         For the first routes.
     departure_limit_m : float
         What the best first leg keeps that a route leads on from, where that is known.
+    good_share : float, optional
+        What ends a round of fitting (`fitting.local_search.Fitting`).
     """
 
     sought: Sought
@@ -176,6 +183,7 @@ class RouteSearch:
     any_speed: bool = False
     measurements: int = MOST_MEASUREMENTS
     departure_limit_m: float = math.inf
+    good_share: float = 0.0
 
     def find(self, *, briefly: bool = False) -> DrivenRoute | NoRoute:
         """Find the quickest of the routes tried whose band keeps enough; ``briefly`` tries the first ones only."""
@@ -319,7 +327,12 @@ class RouteSearch:
 
     def _fitting(self, measurements: int) -> Fitting:
         return Fitting(
-            self.sought.ground, self.vehicle, self.heading_deg, self.sought.should_stop, measurements
+            self.sought.ground,
+            self.vehicle,
+            self.heading_deg,
+            self.sought.should_stop,
+            measurements,
+            self.good_share,
         )
 
     def _drawn_at(self, band_m: float) -> DrawnRoutes:
@@ -331,7 +344,7 @@ class RouteSearch:
 
     def _fit(self, fitting: Fitting, route: Route, speed_mps: float | None = None) -> _Attempt:
         drawn_lines = tuple(replace(point, speed_mps=speed_mps) for point in self._drawing(route))
-        key = (drawn_lines, fitting.measurements, fitting.most_measurements)
+        key = (drawn_lines, fitting.measurements, fitting.most_measurements, fitting.good_share)
         if key not in self.known.fitted:
             self.known.fitted[key] = (*fitting.fit(drawn_lines), fitting.measurements)
         drawing, measured, fitting.measurements = self.known.fitted[key]
@@ -383,7 +396,9 @@ class RouteSearch:
             for number, point in enumerate(drawing)
         )
         measured = fitting.measure(drawing)
-        return (drawing, measured, missed_m, missed_at_start_m) if measured.is_enough else None
+        # Where no leg leads away, the start is one of the points that miss as much.
+        missed = (missed_m, missed_at_start_m if first else missed_m)
+        return (drawing, measured, *missed) if measured.is_enough else None
 
     def _drawing(self, route: Route) -> Drawing:
         """Return a route's lines with what each point has to keep: where the route leads away, no less than the start does."""

@@ -126,10 +126,14 @@ def test_the_best_first_are_those_that_measuring_all_gives(moves: list[tuple[flo
     assert found == sorted(gaining, key=lambda number: -gains_s[number])
 
 
-@pytest.mark.parametrize(("east_m", "is_enough"), [(12.0, True), (5.5, False)])
-def test_enough_is_told_without_more_steps_than_it_takes(east_m: float, *, is_enough: bool) -> None:
+@pytest.mark.parametrize(
+    ("east_m", "missing_m", "is_good"), [(12.0, 0.0, True), (5.5, 0.0, False), (5.5, 10.0, True)]
+)
+def test_good_is_told_without_more_steps_than_it_takes(
+    east_m: float, missing_m: float, *, is_good: bool
+) -> None:
     gauge = gauge_of(FIELD, box(OUT, -5, -80, 3, 60), **AVOIDING, heading_deg=180.0)
     drawing = lines((east_m, 40), (east_m, -40), required_m=3.0)
     tried = fitting._Tried(1e6, 0, gauge.trial(drawing, 0, 2), drawing)
-    assert tried.is_enough() is is_enough
-    assert tried.trial.is_finished is is_enough
+    assert tried.misses_at_most(missing_m) is is_good
+    assert tried.trial.is_finished is is_good

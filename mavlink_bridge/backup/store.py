@@ -8,25 +8,31 @@ unasked, but the next run on that vehicle says so. Both know their vehicle by it
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import json
-import math
 import os
 import re
-import secrets
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from mavlink_bridge.backup.kept_file import (
+    checksum,
+    item_from_json,
+    item_to_json,
+    mark_from_json,
+    mark_to_json,
+    write_whole,
+)
 from mavlink_bridge.backup.vehicle_mark import Kinship, VehicleMark
 from mavlink_bridge.errors import BackupError
 from mavlink_bridge.mavlink.messages import MissionType
 from mavlink_bridge.user_folders import state_folder
-from missions.items import MissionItem
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
+
+    from missions.items import MissionItem
 
 _FORMAT = 2  # of the file; since 2 it holds the mark of its vehicle
 _KEPT_BACKUPS = 100  # of each list; chosen, not measured: bounds the folder
@@ -112,12 +118,12 @@ class BackupStore:
             "format": _FORMAT,
             "time": now.isoformat(),
             "system": vehicle.system,
-            "vehicle": _mark_to_json(vehicle),
+            "vehicle": mark_to_json(vehicle),
             "mission_type": mission_type.name.lower(),
-            "items": [_item_to_json(item) for item in items],
+            "items": [item_to_json(item) for item in items],
         }
-        content["sha256"] = _checksum(content)
-        self._write(path, content)
+        content["sha256"] = checksum(content)
+        write_whole(path, content)
         self._prune(vehicle.system, mission_type)
         return path
 
@@ -140,9 +146,9 @@ class BackupStore:
             "time": datetime.now(UTC).isoformat(),
             "backup": path.name,
             "process": os.getpid(),
-            "vehicle": _mark_to_json(vehicle),
+            "vehicle": mark_to_json(vehicle),
         }
-        self._write(self._note(vehicle, mission_type), note)
+        write_whole(self._note(vehicle, mission_type), note)
         return path
 
     def end(self, vehicle: VehicleMark, mission_type: MissionType, restored: Path | None = None) -> None:
@@ -227,7 +233,7 @@ class BackupStore:
             content = json.loads(path.read_text(encoding="utf-8"))
             backup = self.folder / Path(content["backup"]).name  # it cannot lead out of the folder
             if "vehicle" in content:
-                vehicle = _mark_from_json(int(name[1]), content["vehicle"])
+                vehicle = mark_from_json(int(name[1]), content["vehicle"])
         except (
             OSError,
             ValueError,
@@ -260,28 +266,6 @@ class BackupStore:
         name = f"upload-under-way-system-{vehicle.system}-{mission_type.name.lower()}-{vehicle.key}.json"
         return self.folder / name
 
-    def _write(self, path: Path, content: dict[str, Any]) -> None:
-        """Write a file so that after a crash there is the whole of it or nothing."""
-        unfinished = path.with_suffix(
-            f".{secrets.token_hex(8)}.part"
-        )  # nobody else's, nor guessed beforehand
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            with unfinished.open("x", encoding="utf-8") as file:
-                json.dump(content, file, allow_nan=False, indent=1)
-                file.flush()
-                os.fsync(file.fileno())
-            unfinished.replace(path)
-            _sync_folder(self.folder)
-        except OSError as error:
-            with contextlib.suppress(OSError):
-                unfinished.unlink(missing_ok=True)
-            raise BackupError(
-                f"the backup cannot be written to {path}: {error.strerror or error}; nothing was written to the vehicle",
-                path=str(path),
-                advice="free some disk space, or set XDG_STATE_HOME to a writable folder",
-            ) from None
-
 
 def read_backup(path: Path) -> Backup:
     """Read a backup file and check its checksum.
@@ -297,11 +281,11 @@ def read_backup(path: Path) -> Backup:
         backup = Backup(
             path,
             datetime.fromisoformat(content["time"]),
-            _mark_from_json(int(content["system"]), content.get("vehicle", {})),
+            mark_from_json(int(content["system"]), content.get("vehicle", {})),
             MissionType[content["mission_type"].upper()],
-            tuple(_item_from_json(item) for item in content["items"]),
+            tuple(item_from_json(item) for item in content["items"]),
         )
-        checksum = _checksum(content)
+        expected = checksum(content)
     except OSError as error:
         raise BackupError(
             f"the backup {path} cannot be read: {error.strerror or error}", path=str(path)
@@ -310,57 +294,6 @@ def read_backup(path: Path) -> Backup:
         raise BackupError(
             f"{path} is not a backup that pbpp wrote; nothing was written to the vehicle", path=str(path)
         ) from None
-    if claimed != checksum:
+    if claimed != expected:
         raise BackupError(f"the backup {path} is damaged: its checksum does not match", path=str(path))
     return backup
-
-
-def _mark_to_json(vehicle: VehicleMark) -> dict[str, Any]:
-    return {"uid": vehicle.uid, "connection": vehicle.connection, "autopilot": vehicle.autopilot}
-
-
-def _mark_from_json(system: int, content: dict[str, Any]) -> VehicleMark:
-    autopilot = content.get("autopilot")
-    return VehicleMark(
-        system,
-        str(content.get("uid", "")),
-        str(content.get("connection", "")),
-        None if autopilot is None else int(autopilot),
-    )
-
-
-def _checksum(content: dict[str, Any]) -> str:
-    return hashlib.sha256(json.dumps(content, sort_keys=True, allow_nan=False).encode()).hexdigest()
-
-
-def _item_to_json(item: MissionItem) -> dict[str, Any]:
-    params = [_number_to_json(value) for value in item.params]
-    return {**asdict(item), "params": params, "alt_m": _number_to_json(item.alt_m)}
-
-
-def _item_from_json(item: dict[str, Any]) -> MissionItem:
-    param1, param2, param3, param4 = (float(value) for value in item["params"])
-    return MissionItem(
-        int(item["command"]),
-        int(item["frame"]),
-        (param1, param2, param3, param4),
-        int(item["lat_e7"]),
-        int(item["lon_e7"]),
-        float(item["alt_m"]),
-        bool(item["current"]),
-        bool(item["autocontinue"]),
-    )
-
-
-def _number_to_json(value: float) -> float | str:
-    return value if math.isfinite(value) else str(value)
-
-
-def _sync_folder(folder: Path) -> None:
-    if os.name != "posix":
-        return
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from mavlink_bridge.backup.drive_note import DriveNotes
+from mavlink_bridge.backup.store import BackupStore
 from mavlink_bridge.cli.bridge_view import LiveView
 from mavlink_bridge.cli.common import inform, warn
 from mavlink_bridge.cli.failing import Level, exit_code_of, telling
@@ -42,6 +44,7 @@ from missions.situation import Situation
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from mavlink_bridge.backup.drive_note import DriveNote
     from mavlink_bridge.cli.options.bridge import BridgeOptions
     from mavlink_bridge.director import Event
     from mavlink_bridge.link import Link
@@ -63,8 +66,10 @@ def bridge(options: BridgeOptions) -> None:
     orders = _orders(options)
     described = described_vehicle(options.vehicle, options.firmware, options.stopping)
     with contextlib.ExitStack() as stack:
-        recorder, journal = _recorders(stack, options.log, orders, described)
-        director = Director(orders, described)
+        notes, troubles = DriveNotes(BackupStore().folder).read()
+        warn(map(str, troubles))
+        recorder, journal = _recorders(stack, options.log, orders, described, notes)
+        director = Director(orders, described, notes)
         view = _view(stack, director, is_wanted=not options.is_silent)
         tell = view.tell if view else _teller(options)
         log_of_run = RunLog(recorder, journal) if recorder is not None and journal is not None else None
@@ -357,11 +362,15 @@ def _tell_people(event: Event) -> None:
 
 
 def _recorders(
-    stack: contextlib.ExitStack, log: Path | None, orders: Orders, described: Situation
+    stack: contextlib.ExitStack,
+    log: Path | None,
+    orders: Orders,
+    described: Situation,
+    notes: tuple[DriveNote, ...],
 ) -> tuple[TlogWriter | None, JournalWriter | None]:
     if log is None:
         return None, None
-    part, recorder, journal = open_recording(stack, log, orders, described)
+    part, recorder, journal = open_recording(stack, log, orders, described, notes)
     if part != log:
         warn((f"{log} exists; recording this run to {part}",))
     return recorder, journal

@@ -10,6 +10,7 @@ from functools import partial
 from threading import Thread
 from typing import TYPE_CHECKING
 
+from mavlink_bridge.backup.drive_note import DriveNotes
 from mavlink_bridge.backup.store import BackupStore
 from mavlink_bridge.backup.upload_note import UploadNote
 from mavlink_bridge.backup.vehicle_lock import VehicleLock
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
+    from mavlink_bridge.backup.drive_note import DriveNote
     from mavlink_bridge.cli.drawing import Shown
     from mavlink_bridge.director.plan_task import PlanTask
     from mavlink_bridge.link import Link
@@ -352,6 +354,9 @@ class BackupKeeper:
         self._hindrance: BridgeError | None = None
         self._note: UploadNote | None = None
         self._settled: object = None
+        self._notes = DriveNotes(self._store.folder)
+        self._noted: DriveNote | None = None
+        self._is_note_known = False  # of what an earlier run has left
 
     @property
     def path(self) -> Path | None:
@@ -380,7 +385,10 @@ class BackupKeeper:
                 self._note.settle(outcome.held)
         if not director.is_uploading:
             self.release()
-        if self._has_warned or director.state in _NOT_KNOWN_YET:
+        if director.state in _NOT_KNOWN_YET:
+            return []
+        self._note_drive(vehicle, now_s)
+        if self._has_warned:
             return []
         self._has_warned = True
         return interrupted_warnings(self._store, vehicle)
@@ -393,6 +401,25 @@ class BackupKeeper:
             self._note.settle(Held.OLD)
         self._lock.free()
         self._lock = None
+
+    def _note_drive(self, vehicle: VehicleMark, now_s: float) -> None:
+        """Have on disk the note of the drive that the director has begun, and no other; who may not drive leaves it alone."""
+        director = self._director
+        note = director.drive_note
+        if not director.orders.drive or (self._is_note_known and note is self._noted):
+            return
+        self._is_note_known, self._noted = True, note
+        if note is None:
+            self._notes.end(vehicle)
+            return
+        try:
+            self._notes.keep(replace(note, vehicle=vehicle))
+        except BackupError as error:
+            self._journal("note_failed", now_s, str(error))
+            director.note_failed(error, now_s)
+        else:
+            self._journal("note_stored", now_s, "")
+            director.note_stored()
 
     def _vehicle(self) -> VehicleMark | None:
         peer = self._director.peer

@@ -14,12 +14,17 @@ if TYPE_CHECKING:
     import contextlib
     from collections.abc import Iterator
 
+    from mavlink_bridge.backup.drive_note import DriveNote
     from mavlink_bridge.director import Orders
     from missions.situation import Situation
 
 
 def open_recording(
-    stack: contextlib.ExitStack, log: Path, orders: Orders, described: Situation
+    stack: contextlib.ExitStack,
+    log: Path,
+    orders: Orders,
+    described: Situation,
+    notes: tuple[DriveNote, ...] = (),
 ) -> tuple[Path, TlogWriter, JournalWriter]:
     """Return the log that is written, and what writes it and its journal.
 
@@ -47,7 +52,7 @@ def open_recording(
             part.unlink()
             raise LogError(f"{journal_path(part)}: {error.strerror}", path=str(part)) from error
         recorder = stack.enter_context(TlogWriter(part))
-        return part, recorder, JournalWriter(journal, orders, described)
+        return part, recorder, JournalWriter(journal, orders, described, notes)
     raise AssertionError  # pragma: no cover - there is always another number
 
 

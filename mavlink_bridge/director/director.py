@@ -22,6 +22,7 @@ in `handlers`.
 `TargetInbox`       targets of all sources, answers to who asked, and a target that waits
 `RouteDesk`         has plans made, drops those nobody waits for, and checks the one that stands
 `MissionWriter`     a plan that stands → a verified mission on the vehicle
+`Adopter`           has drives noted before they begin, and goes on with one that an earlier run has begun
 `Starter`           the last look, arming, AUTO, the first item
 `HandOver`          who else has the vehicle: the operator, or the autopilot by a failsafe
 `IdentityGuard`     who else speaks with our ids
@@ -65,6 +66,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
     from pathlib import Path
 
+    from mavlink_bridge.backup.drive_note import DriveNote
     from mavlink_bridge.director.drive_watch import DriveWatch
     from mavlink_bridge.director.events import Event
     from mavlink_bridge.director.orders import Orders
@@ -89,11 +91,15 @@ class Director:
         What it may do.
     situation : Situation, optional
         What is known beforehand (parameters of a file).
+    notes : tuple of DriveNote
+        The drives that earlier runs have begun; the vehicle's own may be adopted.
     """
 
-    def __init__(self, orders: Orders, situation: Situation | None = None) -> None:
+    def __init__(
+        self, orders: Orders, situation: Situation | None = None, notes: tuple[DriveNote, ...] = ()
+    ) -> None:
         core = self._core = Core(orders, situation or Situation(), self._heed)
-        self._parts = Parts(core)
+        self._parts = Parts(core, notes)
 
     # What is known
 
@@ -202,6 +208,19 @@ class Director:
     def backup_failed(self, trouble: BridgeError, now_s: float) -> None:
         """Take notice that the old mission cannot be stored: the upload is left before anything is written."""
         self._heed(self._parts.writer.backup_failed(trouble, now_s), now_s)
+
+    @property
+    def drive_note(self) -> DriveNote | None:
+        """The note that is to stand on disk for this vehicle, its connection left open; nothing drives before `note_stored`."""
+        return self._parts.adopter.note
+
+    def note_stored(self) -> None:
+        """Take notice that the drive is noted on disk."""
+        self._parts.adopter.is_noted = True
+
+    def note_failed(self, trouble: BridgeError, now_s: float) -> None:
+        """Take notice that the drive cannot be noted: it is not begun."""
+        self._heed(self._parts.starter.note_failed(trouble, now_s), now_s)
 
     @property
     def pending_plan(self) -> PlanTask | None:

@@ -11,6 +11,7 @@ from mavlink_bridge.director.states import Cue, Notice, Signal, State
 from mavlink_bridge.errors import OutcomeError
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.rover import Mode
+from mavlink_bridge.protocol.vehicle_watch import MISSION_COMPLETE
 from missions.items import Command
 
 if TYPE_CHECKING:
@@ -55,8 +56,8 @@ class DriveSupervisor(Part):
         message = frame.message
         if not self.core.is_from_vehicle(frame):
             return []
-        if isinstance(message, m.MissionCurrent) and message.seq:
-            self._item_now = message.seq
+        if isinstance(message, m.MissionCurrent):
+            self._note_item(message)
         if self.core.state is not State.DRIVING or self.drive is None:
             return []
         self.drive.receive(frame, now_s)
@@ -102,6 +103,20 @@ class DriveSupervisor(Part):
         self.core.operator.expect(Mode.AUTO, set(), is_armed=True)
         self._is_our_start = False
         self._watch(self._resumed_text, now_s).item = self._item_now
+
+    def adopt(self, now_s: float, *, is_ours: bool) -> None:
+        """Watch a drive that an earlier run has begun; ours where it may be held at its end."""
+        self.core.operator.expect(Mode.AUTO, set(), is_armed=True)
+        self._is_our_start = is_ours
+        self._watch("AUTO, as before the restart", now_s).join(self._item_now)
+
+    def _note_item(self, message: m.MissionCurrent) -> None:
+        """Remember the item that the vehicle drives to; once its mission is complete, the last one (ArduPilot tells 0 then)."""
+        ours = self.core.ours
+        if message.seq:
+            self._item_now = message.seq
+        elif message.mission_state == MISSION_COMPLETE and ours is not None:
+            self._item_now = len(ours) - 1
 
     def _watch(self, text: str, now_s: float) -> DriveWatch:
         core = self.core

@@ -11,6 +11,7 @@ from shapely import LineString, Point, prepare
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.voice import metres
 from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.protocol.vehicle_watch import MISSION_COMPLETE
 from missions.geo import from_e7
 
 if TYPE_CHECKING:
@@ -25,8 +26,8 @@ OUTSIDE_M = 0.25
 PROGRESS_EVERY_S = 1.0  # as heartbeats; chosen, not measured
 _STANDING_MPS = 0.15  # beyond the noise of a position that stands; chosen, not measured
 _STANDING_S = 3.0  # longer than a pivot's turning point or a change of direction; chosen, not measured
-_ACTIVE, _COMPLETE = 3, 5
-"""MISSION_STATE_ACTIVE and _COMPLETE."""
+_ACTIVE = 3
+"""MISSION_STATE_ACTIVE."""
 
 
 class _Here(NamedTuple):
@@ -92,6 +93,12 @@ class DriveWatch:
         kept = f", least clearance {self.least_clearance_m:.2f} m" if is_fenced else ""
         return f" (after {self.driven_m:.1f} m{kept}, {self.distance_left_m:.0f} m left)"
 
+    def join(self, item: int) -> None:
+        """Take notice that the drive was begun before it was watched, and which item it leads to now."""
+        self.item = item
+        self._point = self._plan.path_index(item)
+        self._is_executing = True
+
     def receive(self, frame: Frame, now_s: float) -> None:
         """Take a frame of the vehicle."""
         message = frame.message
@@ -139,7 +146,9 @@ class DriveWatch:
             self._current_seq = self.item = message.seq
             self._point = self._plan.path_index(message.seq, self._point)
         self._is_executing = self._is_executing or message.mission_state == _ACTIVE
-        self.has_arrived = self.has_arrived or (self._is_executing and message.mission_state == _COMPLETE)
+        self.has_arrived = self.has_arrived or (
+            self._is_executing and message.mission_state == MISSION_COMPLETE
+        )
 
     def _take_reached(self, seq: int) -> None:
         last = len(self._points) - 1

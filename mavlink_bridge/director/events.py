@@ -37,6 +37,8 @@ class EventName(StrEnum):
     UPLOAD_FAILED = auto()
     COMMAND_FAILED = auto()
     DRIVING = auto()
+    ADOPTED = auto()
+    NOT_ADOPTED = auto()
     PROGRESS = auto()
     LEFT_ENVELOPE = auto()
     BREACH_AHEAD = auto()
@@ -73,6 +75,8 @@ SCHEMA: dict[EventName, tuple[Severity, tuple[str, ...]]] = {
     EventName.UPLOAD_FAILED: (Severity.ERROR, ("error", "details")),
     EventName.COMMAND_FAILED: (Severity.ERROR, ("command", "result")),
     EventName.DRIVING: (Severity.INFO, ("mission_items",)),
+    EventName.ADOPTED: (Severity.NOTICE, ("mission_items", "item")),
+    EventName.NOT_ADOPTED: (Severity.WARNING, ("reason",)),
     EventName.PROGRESS: (
         Severity.INFO,
         ("item", "distance_left_m", "time_left_s", "least_clearance_m", "deviation_m", "position"),

@@ -51,6 +51,7 @@ def _on_learnt(parts: Parts, now_s: float) -> Iterable[Signal]:
     parts.lists.settle(now_s)
     core.voice.learnt(now_s, core.situation)
     is_first_time, parts.learner.is_first_time = parts.learner.is_first_time, False
+    is_adopted = is_first_time and parts.adopter.look(now_s)
     targets = core.orders.request.targets
     if not is_first_time:
         if core.orders.once:
@@ -58,9 +59,12 @@ def _on_learnt(parts: Parts, now_s: float) -> Iterable[Signal]:
         inbox.note_lists()
         parts.hand_over.put_back_after_silence(now_s)
         return [*_take_up_again(parts), Notice.TARGET_IS_DUE]
-    if inbox.waiting is not None or targets:
+    if is_adopted and targets and parts.adopter.leads_to(targets[-1]):
+        targets = ()  # that is where it drives
+    if is_adopted or inbox.waiting is not None or targets:
         inbox.note_lists()
-        return inbox.take_waiting() or inbox.take(Target(targets[-1], TargetSource.TYPED))
+        waiting = inbox.take_waiting()
+        return waiting or (inbox.take(Target(targets[-1], TargetSource.TYPED)) if targets else [])
     if core.orders.once:
         return [Notice.ROUTE_WANTED]
     return [Notice.MISSION_HEARD, Notice.RALLY_HEARD]
@@ -69,15 +73,22 @@ def _on_learnt(parts: Parts, now_s: float) -> Iterable[Signal]:
 def _take_up_again(parts: Parts) -> Iterable[Signal]:
     """Go on where a lost link left us: with watching, never with driving; somebody may have had the vehicle meanwhile."""
     core = parts.core
+    if not core.is_driving_ours:
+        parts.adopter.forget()
     if core.plan is None or not core.has_our_mission:
         return []
     core.target = Target(core.plan.targets[-1], TargetSource.TYPED)
     if core.is_driving_ours:
-        return [*parts.driver.resume("still driving our mission"), Notice.FENCE_CHANGED]
+        return [*parts.driver.resume("still driving our mission"), *_look_at_fence(parts)]
     if core.orders.drive:
         core.target = None
         return []
     return [Cue.STILL_THERE]
+
+
+def _look_at_fence(parts: Parts) -> Iterable[Signal]:
+    """Return that the fence changed, where it did while nobody heard of it."""
+    return [Notice.FENCE_CHANGED] if parts.desk.is_in_doubt else []
 
 
 def _on_still_there(parts: Parts, now_s: float) -> Iterable[Signal]:
@@ -105,6 +116,7 @@ def _on_rebooted(parts: Parts, now_s: float) -> None:
     parts.hand_over.was_in_auto_by_us = False  # it starts in another mode
     parts.hand_over.incidents.forget()
     parts.core.ours = None
+    parts.adopter.forget()
     parts.inbox.waiting = None
     parts.learner.learns_later = parts.core.state is State.WITHDRAWING
     if not parts.learner.learns_later:
@@ -153,11 +165,13 @@ def _on_gone_on(parts: Parts, now_s: float) -> Iterable[Signal]:
 
 def _on_target(parts: Parts, _now_s: float) -> None:
     parts.writer.is_confirmed = False
+    parts.adopter.forget()
     parts.driver.stand_by()
 
 
 def _on_target_while_moving(parts: Parts, now_s: float) -> None:
     parts.writer.is_confirmed = False
+    parts.adopter.stop_waiting()
     parts.driver.drive = None
     parts.halter.hold("stopping for a new route", now_s)
 
@@ -175,6 +189,11 @@ def _on_no_plan(parts: Parts, now_s: float) -> Iterable[Signal]:
 
 
 # Missions and drives
+
+
+def _on_adopted(parts: Parts, now_s: float) -> Iterable[Signal]:
+    parts.adopter.adopted(now_s)
+    return _look_at_fence(parts)
 
 
 def _on_upload_ended(parts: Parts, now_s: float) -> Iterable[Signal]:
@@ -216,6 +235,7 @@ def _on_hold_ended(parts: Parts, _now_s: float) -> Iterable[Signal]:
 def _on_drive_ended(parts: Parts, _now_s: float) -> Iterable[Signal]:
     """End a drive that has arrived; a single job is done with it."""
     parts.driver.holds_after_arrival = False
+    parts.adopter.forget()
     _let_loose(parts)
     return [*parts.core.end(), Notice.TARGET_IS_DUE]
 
@@ -225,6 +245,7 @@ def _on_drive_ended(parts: Parts, _now_s: float) -> Iterable[Signal]:
 
 def _on_taken_over(parts: Parts, now_s: float) -> Iterable[Signal]:
     """Leave the vehicle to who took it, or the mission to who changed it, until a new target comes."""
+    parts.adopter.forget()
     taken, was_in_auto = parts.hand_over.taken, parts.halter.may_be_in_auto
     so_far = parts.driver.drive.so_far if parts.driver.drive is not None else ""
     _let_loose(parts)
@@ -237,6 +258,7 @@ def _on_taken_over(parts: Parts, now_s: float) -> Iterable[Signal]:
 
 def _on_clash(parts: Parts, now_s: float) -> Iterable[Signal]:
     halter = parts.halter
+    parts.adopter.forget()
     hold, may_be_in_auto = halter.stopping, halter.may_be_in_auto
     _let_loose(parts)
     parts.inbox.waiting = None
@@ -248,6 +270,8 @@ HANDLERS: dict[Signal, Callable[[Parts, float], Iterable[Signal] | None]] = {
     # Cues: the state has moved as the table says
     Cue.FOUND: _learn,
     Cue.LEARNT: _on_learnt,
+    Cue.ADOPTED: _on_adopted,
+    Cue.HELD: lambda parts, _now_s: parts.adopter.forget(),
     Cue.TARGET: _on_target,
     Cue.TARGET_WHILE_MOVING: _on_target_while_moving,
     Cue.PLANNED: _on_planned,
@@ -265,7 +289,7 @@ HANDLERS: dict[Signal, Callable[[Parts, float], Iterable[Signal] | None]] = {
     Cue.HEARD: _on_heard_again,
     Cue.REBOOTED: _on_rebooted,
     Cue.GIVE_UP: lambda parts, _now_s: parts.core.steps.clear(),
-    # HELD, UPLOAD_VERIFIED, TROUBLE and END move the state, and that is all.
+    # UPLOAD_VERIFIED, TROUBLE and END move the state, and that is all.
     # Notices: the state is as it was
     Notice.TARGET_CAME: _on_target_came,
     Notice.TARGET_WAITS: _on_target_waits,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from mavlink_bridge.director.adopter import Adopter
 from mavlink_bridge.director.drive_supervisor import DriveSupervisor
 from mavlink_bridge.director.halter import Halter
 from mavlink_bridge.director.hand_over import HandOver
@@ -17,6 +18,7 @@ from mavlink_bridge.director.starter import Starter
 from mavlink_bridge.director.target_inbox import TargetInbox
 
 if TYPE_CHECKING:
+    from mavlink_bridge.backup.drive_note import DriveNote
     from mavlink_bridge.director.core import Core, Part
 
 
@@ -27,6 +29,8 @@ class Parts:
     ----------
     core : Core
         What they share.
+    notes : tuple of DriveNote
+        The drives that earlier runs have begun.
 
     Attributes
     ----------
@@ -36,7 +40,7 @@ class Parts:
         Those that have timers. A vehicle that has fallen silent ends what the parts before would go on with, but not what they have done.
     """
 
-    def __init__(self, core: Core) -> None:
+    def __init__(self, core: Core, notes: tuple[DriveNote, ...]) -> None:
         self.core: Core = core
         self.learner: Learner = Learner(core)
         self.lists: ListWatch = ListWatch(core)
@@ -46,7 +50,8 @@ class Parts:
         self.hold_watch: HoldWatch = HoldWatch(core, self.halter, self.driver)
         self.desk: RouteDesk = RouteDesk(core, self.lists, self.driver, self.hold_watch)
         self.writer: MissionWriter = MissionWriter(core, self.lists, self.halter, self.desk)
-        self.starter: Starter = Starter(core, self.lists, self.halter, self.driver, self.desk)
+        self.adopter: Adopter = Adopter(core, self.halter, self.driver, self.desk, notes)
+        self.starter: Starter = Starter(core, self.lists, self.halter, self.driver, self.desk, self.adopter)
         self.hand_over: HandOver = HandOver(core, self.halter, self.driver)
         self.guard: IdentityGuard = IdentityGuard(core, self.learner, self.halter, self.inbox, self.writer)
         self.hearers: tuple[Part, ...] = (
@@ -57,6 +62,7 @@ class Parts:
             self.hold_watch,
             self.lists,
             self.inbox,
+            self.adopter,
         )
         self.timed: tuple[Part, ...] = (
             self.halter,

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.director.list_watch import ListWatch
     from missions.planned import Plan
     from missions.request import Request
+    from missions.situation import Situation
 
 _MAKING_A_ROUTE = frozenset({State.HOLDING, State.PLANNING})
 """States whose plan is yet to come: it is made around the fence as it is then."""
@@ -110,6 +111,15 @@ class RouteDesk(Part):
     def is_stale(self) -> bool:
         """Whether the fence is another one than the plan was made around."""
         return bool(Grounds.of(self.core.situation).changes_since(self._planned_on))
+
+    @property
+    def is_in_doubt(self) -> bool:
+        """Whether the plan may not hold any more: on another fence than it was made around, or on one that is not known."""
+        return self.is_stale or self.core.situation.fence is None
+
+    def take_up(self, planned_in: Situation) -> None:
+        """Take notice of the situation in which the plan that stands was made, where another desk had it made."""
+        self._planned_on = Grounds.of(planned_in)
 
     def recheck(self, item: int) -> Recheck:
         """Return a check of the rest of the route against the fence and its parameters as they are now."""

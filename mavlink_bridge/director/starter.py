@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
-from mavlink_bridge.director.states import Cue, Signal
+from mavlink_bridge.director.states import Cue, Signal, State
 from mavlink_bridge.director.steps import Step, step
 from mavlink_bridge.errors import OutcomeError, RefusedError
 from mavlink_bridge.mavlink import messages as m
@@ -18,10 +18,12 @@ from missions.items import Command
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from mavlink_bridge.director.adopter import Adopter
     from mavlink_bridge.director.drive_supervisor import DriveSupervisor
     from mavlink_bridge.director.halter import Halter
     from mavlink_bridge.director.list_watch import ListWatch
     from mavlink_bridge.director.route_desk import RouteDesk
+    from mavlink_bridge.errors import BridgeError
 
 START_YOURSELF = "arm it, then give the target again (or run the command again); or arm it in HOLD and switch it to AUTO yourself"
 
@@ -33,24 +35,32 @@ class Starter(Part):
     """Looks once more, arms where asked, switches to AUTO and to the first item."""
 
     def __init__(
-        self, core: Core, lists: ListWatch, halter: Halter, driver: DriveSupervisor, desk: RouteDesk
+        self,
+        core: Core,
+        lists: ListWatch,
+        halter: Halter,
+        driver: DriveSupervisor,
+        desk: RouteDesk,
+        adopter: Adopter,
     ) -> None:
         super().__init__(core)
         self._lists = lists
         self._halter = halter
         self._driver = driver
         self._desk = desk
+        self._adopter = adopter
 
     def look_once_more(self, now_s: float) -> None:
         """Read again what somebody may have changed, and wait for a heartbeat: it shows a takeover that was on its way."""
         assert self.core.peer is not None
+        self._adopter.begin()
         self._lists.reread_suspects(now_s)
         self.core.steps.run([step(AwaitHeartbeat(self.core.peer), self._looked)], now_s)
 
     def _looked(self, _machine: AwaitHeartbeat, now_s: float) -> Sequence[Signal]:
         core, situation, halter = self.core, self.core.situation, self._halter
-        is_held = halter.stopping is not None
-        if self._lists.has_suspects or is_held or not core.operator.is_ours(situation.mode):
+        is_waiting = halter.stopping is not None or not self._adopter.is_noted
+        if self._lists.has_suspects or is_waiting or not core.operator.is_ours(situation.mode):
             self.look_once_more(now_s)
             return []
         if not situation.armed and not core.orders.arm:
@@ -70,6 +80,16 @@ class Starter(Part):
             self._switch_to_auto(now_s)
         return []
 
+    def note_failed(self, trouble: BridgeError, now_s: float) -> Sequence[Signal]:
+        """Return that a drive is not begun that cannot be noted."""
+        if self.core.state is not State.STARTING:
+            return []
+        self.core.steps.clear()
+        self._adopter.forget()
+        self._driver.stand_by()
+        self.core.voice.error(now_s, EventName.TROUBLE, trouble, dict(trouble.details))
+        return self.core.fail_step(trouble)
+
     def _refuse_unarmed(self, now_s: float) -> Sequence[Signal]:
         """Leave the mode of a disarmed vehicle alone: in AUTO, arming it would drive off."""
         situation = self.core.situation
@@ -80,6 +100,7 @@ class Starter(Part):
             advice=START_YOURSELF,
             mode=mode,
         )
+        self._adopter.forget()
         self._driver.stand_by()
         self.core.voice.error(now_s, EventName.TROUBLE, trouble, dict(trouble.details))
         return self.core.fail_step(trouble)
@@ -137,6 +158,7 @@ class Starter(Part):
 
     def _failed(self, name: str, result: str, texts: str, now_s: float) -> Sequence[Signal]:
         self.core.steps.clear()
+        self._adopter.forget()
         self.core.voice.tell(now_s, EventName.COMMAND_FAILED, f"{name}: {result}", name, result)
         kind = OutcomeError if result == "no answer" else RefusedError
         return self.core.fail_step(

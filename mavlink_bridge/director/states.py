@@ -48,6 +48,7 @@ class Cue(StrEnum):
     UPLOAD = auto()
     UPLOAD_VERIFIED = auto()
     DRIVE = auto()
+    ADOPTED = auto()  # the vehicle is on a drive that an earlier run has begun
     RESUMED = auto()  # our mission is being driven, though we did not start it just now
     STILL_THERE = auto()  # our mission is on the vehicle as we left it
     STARTED = auto()
@@ -99,7 +100,12 @@ _OURS = {**_ALWAYS, **_WANTED, Cue.TAKEN_OVER: State.LET_GO}
 TRANSITIONS: dict[State, dict[Cue, State]] = {
     State.LISTENING: {Cue.FOUND: State.LEARNING, Cue.GIVE_UP: State.FAILED},
     State.LEARNING: {**_ALWAYS, Cue.LEARNT: State.READY, Cue.TAKEN_OVER: State.LEARNING},
-    State.READY: {**_OURS, Cue.RESUMED: State.DRIVING, Cue.STILL_THERE: State.VERIFIED},
+    State.READY: {
+        **_OURS,
+        Cue.ADOPTED: State.DRIVING,
+        Cue.RESUMED: State.DRIVING,
+        Cue.STILL_THERE: State.VERIFIED,
+    },
     State.HOLDING: {
         **_ALWAYS,
         Cue.TARGET_WHILE_MOVING: State.HOLDING,

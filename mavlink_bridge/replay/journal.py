@@ -10,6 +10,7 @@ import json
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, TextIO
 
+from mavlink_bridge.backup.drive_note import note_from_json, note_to_json
 from mavlink_bridge.director import Event, Orders, TargetSource
 from mavlink_bridge.errors import LogError
 from missions.errors import MissionError
@@ -24,12 +25,14 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
+    from mavlink_bridge.backup.drive_note import DriveNote
+
 _FORMAT = 2  # of the file; others are not read
 
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """A call of the director: ``start``, ``timer``, ``target``, ``confirm``, ``plan_made``, ``backup_stored``, ``backup_failed`` or ``in_use``.
+    """A call of the director.
 
     Parameters
     ----------
@@ -38,11 +41,12 @@ class Call:
     time_s : float
         Its time.
     name : str
-        Which call.
+        Which call: ``start``, ``timer``, ``target``, ``confirm``, ``plan_made``, ``backup_stored``, ``backup_failed``, ``in_use``,
+        ``note_stored`` or ``note_failed``.
     target : LatLon, optional
         The target that was typed.
     text : str
-        Where the backup lies, or why there is none.
+        Where the backup lies, or why there is none, or no note.
     """
 
     frames: int
@@ -60,6 +64,7 @@ class Journal:
     described: Situation
     calls: tuple[Call, ...]
     events: tuple[dict[str, Any], ...]
+    notes: tuple[DriveNote, ...] = ()
 
 
 class JournalWriter:
@@ -73,6 +78,8 @@ class JournalWriter:
         What the director may do.
     described : Situation
         What was known beforehand: parameters, the firmware's version, how far it rolls on.
+    notes : tuple of DriveNote
+        The drives that earlier runs had begun.
 
     Raises
     ------
@@ -80,7 +87,9 @@ class JournalWriter:
         From every method: it cannot be written.
     """
 
-    def __init__(self, file: TextIO, orders: Orders, described: Situation) -> None:
+    def __init__(
+        self, file: TextIO, orders: Orders, described: Situation, notes: tuple[DriveNote, ...] = ()
+    ) -> None:
         self._file = file
         self._write(
             {
@@ -89,6 +98,7 @@ class JournalWriter:
                 "parameters": dict(described.parameters),
                 "firmware": str(described.firmware) if described.firmware else None,
                 "stopping": [[one.speed_mps, one.distance_m] for one in described.stops.given],
+                "drive_notes": [note_to_json(note) for note in notes],
             }
         )
 
@@ -140,6 +150,7 @@ def read_journal(path: Path) -> Journal:
         orders = _orders_from_json(head["orders"])
         firmware = read_firmware(head["firmware"]) if head.get("firmware") else None
         given = tuple(Stop(*one) for one in head.get("stopping", ()))
+        notes = tuple(map(note_from_json, head.get("drive_notes", ())))
         described = Situation(parameters=head["parameters"], firmware=firmware, stops=Stops(given))
         for line in lines[1:]:
             entry = json.loads(line)
@@ -157,7 +168,7 @@ def read_journal(path: Path) -> Journal:
         raise LogError(
             f"{path}: line {line_number} is not a journal entry: {error!r}", file=str(path)
         ) from None
-    return Journal(orders, described, tuple(calls), tuple(events))
+    return Journal(orders, described, tuple(calls), tuple(events), notes)
 
 
 def _orders_to_json(orders: Orders) -> dict[str, Any]:

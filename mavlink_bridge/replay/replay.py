@@ -28,6 +28,7 @@ SENT_LINK = 3
 
 _NO_BACKUP = {"backup_failed": BackupError, "in_use": VehicleInUseError}
 """Calls that report why nothing can be uploaded."""
+_NOTED = ("note_stored", "note_failed")
 _STILL_ADVICE = "its fence, mission and targets can still be used: `pbpp log FILE`, `pbpp plan --log FILE`"
 
 
@@ -64,7 +65,8 @@ def replay_to_json(log: Path, orders: Orders) -> list[dict[str, object]]:
 
 def replay_recorded(entries: Iterable[LogEntry], journal: Journal) -> Iterator[Event]:
     """Repeat a bridge's run from its log and journal; return its events."""
-    director = Director(journal.orders, journal.described)
+    director = Director(journal.orders, journal.described, journal.notes)
+    notes_drives = any(call.name in _NOTED for call in journal.calls)
     calls = iter(journal.calls)
     following = next(calls, None)
     count = 0
@@ -75,6 +77,8 @@ def replay_recorded(entries: Iterable[LogEntry], journal: Journal) -> Iterator[E
             yield from _call(director, following)
             following = next(calls, None)
         director.receive(entry.frame, entry.time_s)
+        if not notes_drives:  # recorded before there were notes of drives, or there was no drive
+            director.note_stored()
         count += 1
         yield from _spoken(director)
     while following is not None:
@@ -146,6 +150,10 @@ def _call(director: Director, call: Call) -> Iterator[Event]:
         director.confirm(call.time_s)
     elif call.name == "backup_stored":
         director.backup_stored(call.time_s, Path(call.text) if call.text else None)
+    elif call.name == "note_stored":
+        director.note_stored()
+    elif call.name == "note_failed":
+        director.note_failed(BackupError(call.text), call.time_s)
     elif call.name in _NO_BACKUP:
         director.backup_failed(_NO_BACKUP[call.name](call.text), call.time_s)
     elif call.name == "plan_made":

@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import processes
 import pytest
@@ -91,6 +92,33 @@ def test_one_job_with_a_log_that_replays_to_the_same_decisions(config, tmp_path)
     different = run("replay", str(log), "--expect", str(expected), "--quiet")
     assert different.exit_code == 8
     assert "lost" in different.stderr
+
+
+def test_a_bridge_killed_while_it_drives_adopts_its_drive_and_replays_so(config, tmp_path, state_folder):
+    log = tmp_path / "run.tlog"
+    options = ("--target", FAR, "--upload", "--drive", "--arm", "--log", str(log))
+    notes = []
+    with Simulator(replace(config, uid=b"rover one"), "tcpin:127.0.0.1:0", speedup=3) as simulator:
+        for name in ("driving", "arrived"):
+            process = start_bridge(simulator.connection, *options)
+            try:
+                if name == "arrived":
+                    assert wait_for(process, "adopted")["mission_items"] == len(simulator.vehicle.mission)
+                wait_for(process, name)
+                notes.append(list(state_folder.rglob("drive-under-way-*.json")))
+            finally:
+                process.kill()
+                process.communicate()
+        assert distance_m(simulator.vehicle.position, LatLon(40.0720926, -105.2286152)) < 4.0
+    assert len(notes[0]) == 1
+    again = run("replay", str(tmp_path / "run.2.tlog"), "--json")
+    names = [json.loads(line)["event"] for line in again.stdout.splitlines()]
+    assert [name for name in names if name in ("learnt", "adopted", "driving", "arrived")] == [
+        "learnt",
+        "adopted",
+        "driving",
+        "arrived",
+    ]
 
 
 def test_a_typed_target_and_a_typed_yes(config):

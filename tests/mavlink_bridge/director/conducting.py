@@ -12,6 +12,7 @@ from missions.planning.plan import plan as make_plan
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from mavlink_bridge.backup.drive_note import DriveNote
     from mavlink_bridge.director import Director, Event, EventName, State
     from mavlink_bridge.director.plan_task import PlanTask
     from mavlink_bridge.mavlink.messages import Message
@@ -37,6 +38,7 @@ class Conductor:
     meddle: Callable[[Conductor], None] | None = None
     planner: Callable[[Situation, Request], Plan] = make_plan
     planning_s: float = 0.0
+    note: DriveNote | None = None
     _task: tuple[float, PlanTask] = (0.0, None)
 
     def __post_init__(self) -> None:
@@ -66,6 +68,9 @@ class Conductor:
         if (old := self.director.pending_backup) is not None:
             self.backups.append(old)
             self.director.backup_stored(self.now_s)
+        if self.director.drive_note is not self.note:
+            self.note = self.director.drive_note
+            self.director.note_stored()
         self.make_plan()
         for message in self.director.messages_to_send():
             self.sent.append(message)

@@ -66,6 +66,7 @@ class Ether:
         for system, one in self.directors.items():
             if one.pending_backup is not None:
                 one.backup_stored(self.now_s)
+            one.note_stored()
             if (task := one.pending_plan) is not None:
                 one.plan_made(task, task.made(), self.now_s)
             for message in one.messages_to_send():
@@ -175,6 +176,7 @@ def serve(link: Link, one: Director, stop: threading.Event) -> None:
     def step() -> None:
         if one.pending_backup is not None:
             one.backup_stored(time.time())
+        one.note_stored()
         if (made := plans.take()) is not None:
             one.plan_made(*made, time.time())
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import os
 import signal
 from pathlib import Path
@@ -33,12 +32,6 @@ def pytest_configure(config: pytest.Config) -> None:
     # nohup ignores SIGHUP, and so would they.
     if os.name == "posix" and signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
         signal.signal(signal.SIGHUP, signal.SIG_DFL)
-
-
-def pytest_collection_finish() -> None:
-    """Let no collection of garbage walk over thousands of tests and their modules, which live to the end."""
-    gc.collect()
-    gc.freeze()
 
 
 def _keep_examples(config: pytest.Config) -> None:

@@ -321,6 +321,8 @@ def test_a_bridge_that_may_not_write_leaves_the_note_of_who_did(state_folder, is
         pending_backup=None,
         upload_outcome=None,
         state=State.UPLOADING,
+        drive_note=None,
+        orders=SimpleNamespace(drive=False),
         backup_failed=lambda error, _now_s: failures.append(error),
     )
     failures: list[BridgeError] = []

@@ -139,7 +139,7 @@ def test_second_names_are_free_ones(tmp_path, monkeypatch, links):
 
 
 ROOT = Path(__file__).parents[3]
-WRITERS = ("missions/formats/files.py", "mavlink_bridge/backup/store.py", "mavlink_bridge/tlog/writer.py")
+WRITERS = ("missions/formats/files.py", "mavlink_bridge/backup/kept_file.py", "mavlink_bridge/tlog/writer.py")
 WRITING = re.compile(
     r"\.write_text\(|\.write_bytes\(|savefig\((?!image)|mkstemp|NamedTemporaryFile|os\.open\(|shutil\.(copy|move)"
     r"|open\([^)]*[\"'][rb]*[wa][b+]*[\"']"

@@ -13,6 +13,7 @@ from .errors import (
     TooManyBlocksError,
 )
 from .geometry import circle_ring
+from .path_tree import PathTree
 from .planned_path import PlannedPath
 from .planner import Planner, plan_path
 from .widest import WidestWay, widest
@@ -21,6 +22,7 @@ __all__ = [
     "GoalBlockedError",
     "InvalidGeometryError",
     "NoPathError",
+    "PathTree",
     "PlannedPath",
     "Planner",
     "PlanningError",

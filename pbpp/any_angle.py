@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from .partition.slabs import Slabs
     from .partition.sweep import PortalView
 
-__all__ = ["SearchResult", "shortest_path"]
+__all__ = ["Everywhere", "SearchResult", "Sight", "shortest_path"]
 
 _GOAL = -1
 _TURN = -2
@@ -364,6 +364,91 @@ class _Query:
             return self._root_g[root] + sqrt(total * total + rise * rise)
         rest = rise - cross
         return self._root_g[root] + sqrt(run * run + cross * cross) + sqrt(beyond * beyond + rest * rest)
+
+
+class _Goalless(_Query):
+    """A search without a goal: it ends where nothing is left to be seen."""
+
+    def __init__(self, slabs: Slabs, swept: Sweep, start: Point) -> None:
+        super().__init__(slabs, swept, start, start)
+        self._goal_blocks = frozenset()
+
+    def _bound(self, root: int, _way: PortalView, _low: float, _high: float) -> float:
+        return self._root_g[root]
+
+
+class Everywhere(_Goalless):
+    """How far all corners of free space are from a point, and by which turns.
+
+    Parameters
+    ----------
+    slabs, swept
+        The partition of free space.
+    start : (east, north)
+        Metres from the scene's origin, in free space or on its boundary.
+    """
+
+    def __init__(self, slabs: Slabs, swept: Sweep, start: Point) -> None:
+        super().__init__(slabs, swept, start)
+        self.run(None)
+        self._root_of: dict[int, int] = {}
+        for root, turn in enumerate(self._root_turn):
+            if root and self._root_g[root] <= self._best[turn]:
+                vertex = turn >> 1
+                known = self._root_of.get(vertex)
+                if known is None or self._root_g[root] < self._root_g[known]:
+                    self._root_of[vertex] = root
+
+    def corners_m(self) -> list[float]:
+        """Return how far each vertex of the partition is; infinite where no shortest path turns at it."""
+        return [
+            self._root_g[self._root_of[vertex]] if vertex in self._root_of else inf
+            for vertex in range(len(self._fans))
+        ]
+
+    def turns_from(self, vertex: int) -> list[int]:
+        """Return the vertices at which the shortest path from a vertex to the point turns, that vertex first."""
+        return list(reversed(self._trace(self._root_of[vertex])))
+
+
+class Sight(_Query):
+    """What a point sees: the corners that a path from it may turn at first, and whether it sees another point.
+
+    Parameters
+    ----------
+    slabs, swept
+        The partition of free space.
+    start : (east, north)
+        Metres from the scene's origin, in free space or on its boundary.
+    goal : (east, north), optional
+        The other point.
+    """
+
+    def __init__(self, slabs: Slabs, swept: Sweep, start: Point, goal: Point | None = None) -> None:
+        super().__init__(slabs, swept, start, start if goal is None else goal)
+        if goal is None:
+            self._goal_blocks = frozenset()
+
+    def corners(self) -> tuple[list[int], list[float]]:
+        """Return the corners, and how far each is in metres."""
+        self._look()
+        turns = self._root_turn[1:]
+        return [turn >> 1 for turn in turns], self._root_g[1:]
+
+    def sees_goal(self) -> bool:
+        """Return whether the goal is seen."""
+        return self._look()
+
+    def _look(self) -> bool:
+        """Follow what the start sees to its end, and no turn; return whether the goal was met."""
+        self._begin()
+        while self._queue:
+            _, _, block, direction, root, low, high = heappop(self._queue)
+            if block == _GOAL and root == 0:
+                return True
+            if block not in (_GOAL, _TURN):
+                self._follow(root, (block, direction, low, high))
+        return False
 
 
 def _quarter(east: float, north: float) -> int:

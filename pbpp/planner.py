@@ -30,6 +30,7 @@ from .field import Field
 from .free_space import Scene, grow_exclusions, parse_scene
 from .funnel import taut_path
 from .geometry import Floats, Point, Ring, parse_point, parse_points
+from .path_tree import PathTree
 from .planned_path import PlannedPath, length_of, straightened
 from .plotting import Drawing
 from .three_cases import crossing_point
@@ -347,6 +348,30 @@ class Planner:
             except PlanningError as error:
                 found.append(error)
         return found
+
+    def tree(self, places: npt.ArrayLike, *, around: npt.ArrayLike = ()) -> PathTree:
+        """Return the shortest ways from anywhere to a few places, searched once for all questions.
+
+        Parameters
+        ----------
+        places : (m, 2) array-like
+            East and north in metres.
+        around : (n, 2) array-like
+            From where ways will be asked for: without inclusions free space is as wide as these, the places and the exclusions need.
+
+        Returns
+        -------
+        PathTree
+            Its ways keep the clearance with mitred corners: where `plan` takes round ones, so that it finds a way at all, a tree finds none.
+
+        Raises
+        ------
+        InvalidGeometryError
+            If a point is not a pair of finite numbers, or the planner is compiled.
+        """
+        points = parse_points(places, "places")
+        self._space = self._space.holding([*points.tolist(), *parse_points(around, "around").tolist()])
+        return PathTree(self._space.mitred, points)
 
     def widest(
         self,

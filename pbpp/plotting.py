@@ -40,10 +40,9 @@ class Drawing:
 
     def draw(self, points: Floats, sequence: Sequence[int], ax: Any, *, show_blocks: bool) -> Any:  # noqa: ANN401 - matplotlib is an extra
         """Draw free space, the blocks, the sequence of blocks, and the path with its crossing points; see `PlannedPath.plot`."""
-        from matplotlib import pyplot as plt  # noqa: PLC0415 - loaded only when a picture is asked for
-        from matplotlib.collections import PolyCollection  # noqa: PLC0415
-        from matplotlib.patches import PathPatch  # noqa: PLC0415
-        from matplotlib.path import Path  # noqa: PLC0415
+        from matplotlib import collections, patches  # noqa: PLC0415 - loaded only when a picture is asked for
+        from matplotlib import pyplot as plt  # noqa: PLC0415 - as above
+        from matplotlib.path import Path  # noqa: PLC0415 - as above
 
         if ax is None:
             _, ax = plt.subplots(figsize=(6, 6))
@@ -54,17 +53,23 @@ class Drawing:
                 for ring in (polygon.exterior, *polygon.interiors)
             ]
             ax.add_patch(
-                PathPatch(Path.make_compound_path(*rings), facecolor=_FREE, edgecolor=_EDGE, linewidth=0.8)
+                patches.PathPatch(
+                    Path.make_compound_path(*rings), facecolor=_FREE, edgecolor=_EDGE, linewidth=0.8
+                )
             )
         partition = field.slabs if self.partition == "slabs" else field.blocks
         origin_m = field.scene.origin_m
         if show_blocks and len(partition) <= _MOST_BLOCKS:
             outlines = [partition.outline(block) + origin_m for block in range(len(partition))]
-            ax.add_collection(PolyCollection(outlines, facecolor="none", edgecolor=_BLOCK, linewidth=0.5))
+            ax.add_collection(
+                collections.PolyCollection(outlines, facecolor="none", edgecolor=_BLOCK, linewidth=0.5)
+            )
         if sequence:
             passed = [partition.outline(block) + origin_m for block in sequence]
             ax.add_collection(
-                PolyCollection(passed, facecolor=_SEQUENCE, edgecolor=_BLOCK, linewidth=0.5, alpha=0.6)
+                collections.PolyCollection(
+                    passed, facecolor=_SEQUENCE, edgecolor=_BLOCK, linewidth=0.5, alpha=0.6
+                )
             )
         crossings_m = self.crossings_m
         ax.plot(crossings_m[:, 0], crossings_m[:, 1], ".", color=_PATH, markersize=4)

@@ -17,13 +17,14 @@ from mavlink_bridge.cli.field_files import read_fence_file, read_file, with_miss
 from mavlink_bridge.cli.pictures import check_plots, draw
 from mavlink_bridge.cli.plan_results import hold_document
 from mavlink_bridge.cli.terminal import echo, print_json
-from mavlink_bridge.cli.values import position_from
+from mavlink_bridge.cli.values import given_places, position_from
 from mavlink_bridge.cli.vehicle_options import (
     described_vehicle,
     with_description,
     with_home_option,
     with_vehicle,
 )
+from mavlink_bridge.cli.way_home import RouteWays
 from mavlink_bridge.errors import UsageError
 from missions.checking.check import check_mission, plan_of
 from missions.formats import mission_of
@@ -40,11 +41,13 @@ if TYPE_CHECKING:
     from missions.checking.check import CheckedLeg, MissionCheck
     from missions.items import MissionItem
     from missions.picture.scene import PictureScene
+    from missions.planned import Plan
 
 
 def check(options: CheckOptions) -> None:
     """Check each leg, and report, draw or print as JSON what was found."""
     _check_options(options)
+    places = given_places(options.place)
     request = with_vehicle(GoTo(clearance_m=options.clearance, trusts_model=options.trust_model), options)
     begin = position_from("--start", options.start) if options.start is not None else None
     situation, unknown = _situation(options)
@@ -53,17 +56,21 @@ def check(options: CheckOptions) -> None:
     if begin is None and options.log is not None and situation.home is not None:
         begin = situation.home.value  # at a log's end the vehicle may stand anywhere on its way
     checked = check_mission(situation.mission.value, situation, replace(request, start=begin))
+    planned = plan_of(checked, situation)
+    ways = RouteWays.of(planned, situation, places)
     warnings = [
         *situation.remarks,
         *unknown,
         *checked.warnings,
+        *(ways.warnings if ways is not None else ()),
         *_storage_warnings(checked.mission.items, situation),
     ]
     inform(checked.info)
     warn(warnings)
-    draw(partial(_scene, checked, situation), options.plot)
+    draw(partial(_scene, checked, planned, ways), options.plot)
     if options.json_output:
-        print_json(_document(checked, warnings, situation.system, options.plot))
+        document = _document(checked, warnings, situation.system, options.plot)
+        print_json({**document, "ways_home": ways.document() if ways is not None else None})
     else:
         _report(checked, options.plot, is_quiet=options.quiet > 0)
     if not checked.is_promised:
@@ -135,7 +142,7 @@ def _with_files(source: Situation | None, options: CheckOptions) -> Situation:
     return found
 
 
-def _scene(checked: MissionCheck, situation: Situation) -> PictureScene:
+def _scene(checked: MissionCheck, planned: Plan, ways: RouteWays | None) -> PictureScene:
     count, broken = len(checked.legs), len(checked.broken)
     verdict = (
         f"FAIL: {broken} of {count} legs {'does' if broken == 1 else 'do'} not keep"
@@ -145,7 +152,8 @@ def _scene(checked: MissionCheck, situation: Situation) -> PictureScene:
     extrapolated = ", extrapolated" if checked.extrapolated else ""
     title = f"{checked.length_m:.1f} m, about {checked.duration_s:.0f} s\n{verdict} {checked.clearance_m:g} m while driving{extrapolated}"
     unsafe = {number: leg.at for number, leg in enumerate(checked.legs) if leg.breaks}
-    return plan_scene(plan_of(checked, situation), title=title, unsafe=unsafe)
+    scene = plan_scene(planned, title=title, unsafe=unsafe)
+    return ways.drawn(scene) if ways is not None else scene
 
 
 def _report(checked: MissionCheck, plots: list[Path], *, is_quiet: bool) -> None:

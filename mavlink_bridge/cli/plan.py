@@ -15,6 +15,7 @@ from mavlink_bridge.cli.plan_results import Told, arrival_document, report_end
 from mavlink_bridge.cli.planning_progress import planning_shown
 from mavlink_bridge.cli.terminal import print_json
 from mavlink_bridge.cli.timed_plan import timed_plan
+from mavlink_bridge.cli.values import given_places
 from mavlink_bridge.cli.vehicle_options import (
     described_vehicle,
     with_description,
@@ -38,7 +39,12 @@ def plan(options: PlanOptions) -> None:
     request = _request(options)
     _check_options(options)
     told = Told(
-        options.output, options.plot, blocks=options.blocks, is_silent=options.is_silent, drives=options.drive
+        options.output,
+        options.plot,
+        given_places(options.place) if options.json_output or options.plot or options.place else None,
+        blocks=options.blocks,
+        is_silent=options.is_silent,
+        drives=options.drive,
     )
     verified, arrival, backup = False, None, None
     if options.connect is not None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,18 +18,32 @@ from missions.words import counted
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from mavlink_bridge.cli.way_home import RouteWays
     from missions.drive_model.stopping import HoldCheck
+    from missions.geo import LatLon
+    from missions.picture.scene import PictureScene
     from missions.planned import Plan
     from missions.situation import Situation
 
 
 def write_outputs(
-    planned: Plan, situation: Situation, outputs: list[Path], plots: list[Path], *, blocks: bool = False
+    planned: Plan,
+    situation: Situation,
+    outputs: list[Path],
+    plots: list[Path],
+    *,
+    blocks: bool = False,
+    ways: RouteWays | None = None,
 ) -> list[Path]:
     """Write the mission and draw the plan; return the files."""
     for path in outputs:
         planned.write(path, situation, write=write_kept)
-    return [*outputs, *draw(partial(plan_scene, planned, blocks=blocks), plots)]
+
+    def scene() -> PictureScene:
+        plain = plan_scene(planned, blocks=blocks)
+        return ways.drawn(plain) if ways is not None else plain
+
+    return [*outputs, *draw(scene, plots)]
 
 
 def plan_document(planned: Plan) -> dict[str, object]:
@@ -98,6 +111,8 @@ class Told:
     ----------
     outputs, plots : list of Path
         Where the mission and its pictures go.
+    places : mapping of str to LatLon, optional
+        Where ways home may lead, beside home and the rally points; None looks for no ways.
     blocks : bool
         Draw the blocks of the free space too.
     is_silent : bool
@@ -107,8 +122,17 @@ class Told:
     """
 
     def __init__(
-        self, outputs: list[Path], plots: list[Path], *, blocks: bool, is_silent: bool, drives: bool = False
+        self,
+        outputs: list[Path],
+        plots: list[Path],
+        places: Mapping[str, LatLon] | None,
+        *,
+        blocks: bool,
+        is_silent: bool,
+        drives: bool = False,
     ) -> None:
+        self._places = places
+        self._ways: RouteWays | None = None
         self._outputs = outputs
         self._plots = plots
         self._blocks = blocks
@@ -121,13 +145,19 @@ class Told:
 
     def tell(self, planned: Plan, planning_s: float, situation: Situation) -> None:
         """Report a plan; a later one is the route made anew."""
+        if self._places is not None:
+            from mavlink_bridge.cli.way_home import RouteWays  # noqa: PLC0415 - only for those who ask for ways home
+
+            self._ways = RouteWays.of(planned, situation, self._places)
         inform((*planned.info, *(hold_info(planned.hold) if self._drives else ())))
         warn(planned.warnings)
-        self._written = write_outputs(planned, situation, self._outputs, self._plots, blocks=self._blocks)
+        self._written = write_outputs(
+            planned, situation, self._outputs, self._plots, blocks=self._blocks, ways=self._ways
+        )
         if not self._is_silent:
             if self._plan is not None:
                 echo("New route:")
-            report_plan(planned, self._written)
+            report_plan(planned, self._written, self._ways)
             sys.stdout.flush()
         self._plan, self._planning_s, self._remarks = planned, planning_s, situation.remarks
 
@@ -137,6 +167,7 @@ class Told:
         return {
             **plan_document(self._plan),
             **remarks_document(self._plan.info, (*self._remarks, *self._plan.warnings)),
+            "ways_home": self._ways.document() if self._ways is not None else None,
             "planning_s": round(self._planning_s, 6),
             "outputs": [str(path) for path in self._written],
         }
@@ -148,7 +179,7 @@ def arrival_document(arrival: Mapping[str, object] | None) -> dict[str, object]:
     return {"arrived": arrival is not None, "drive": arrival and {name: arrival[name] for name in names}}
 
 
-def report_plan(planned: Plan, written: list[Path]) -> None:
+def report_plan(planned: Plan, written: list[Path], ways: RouteWays | None = None) -> None:
     """Print a plan for people, and where it was written."""
     along = f"{planned.drawn_clearance_m:.2f} m along straight legs"
     if planned.clearance_m is None:
@@ -166,6 +197,8 @@ def report_plan(planned: Plan, written: list[Path]) -> None:
         f"about {planned.duration_s:.0f} s, {counted(waypoints, 'waypoint')} ({counted(turns, 'turn')})"
     )
     echo(f"Fence clearance: {promise}")
+    if ways is not None:
+        echo(ways.sentence)
     for path in written:
         echo(f"Wrote {path}")
 

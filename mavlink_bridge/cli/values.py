@@ -13,7 +13,7 @@ from missions.geo import parse_lat_lon
 from missions.stops import Stop
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from missions.geo import LatLon
 
@@ -139,3 +139,25 @@ def position_from(option: str, text: str) -> LatLon:
         return parse_lat_lon(text)
     except InvalidPositionError as error:
         raise UsageError(f"{option}: {error}", **{"advice": _POSITION_ADVICE, **error.details}) from None
+
+
+def given_places(texts: Sequence[str]) -> dict[str, LatLon]:
+    """Return the places that ``--place`` names.
+
+    Raises
+    ------
+    UsageError
+        One is not NAME=LAT,LON, or its name is taken.
+    """
+    places: dict[str, LatLon] = {}
+    for text in texts:
+        name, sign, position = text.partition("=")
+        name = name.strip()
+        if not sign or not name:
+            raise UsageError(f"--place {text!r}: expected NAME=LAT,LON")
+        if name in places or name.lower().startswith(("home", "rally point")):
+            raise UsageError(
+                f"--place {text!r}: the name {name!r} is taken; give each place a name of its own"
+            )
+        places[name] = position_from("--place", position)
+    return places

@@ -15,6 +15,7 @@ from mavlink_bridge.cli.options.shared import (
     HomeOption,
     LinkOptions,
     MapOptions,
+    PlaceOption,
     StoppingOption,
     TrustOption,
     metres,
@@ -46,6 +47,7 @@ class CheckOptions(MapOptions, ClearanceOptions, LinkOptions):
         option("Start position. Default: the vehicle's position; for files and logs, home.", "LAT,LON"),
     ] = None
     home: HomeOption = None
+    place: PlaceOption = field(default_factory=list)
     vehicle: Annotated[
         Path | None,
         option("Parameter file, for what the log or link does not report.", "FILE.parm", panel=VEHICLE_PANEL),

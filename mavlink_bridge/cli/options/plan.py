@@ -16,6 +16,7 @@ from mavlink_bridge.cli.options.shared import (
     HomeOption,
     LinkOptions,
     MapOptions,
+    PlaceOption,
     StoppingOption,
     TrustOption,
     flag,
@@ -74,6 +75,7 @@ class PlanOptions(MapOptions, ClearanceOptions, LinkOptions):
     ] = field(default_factory=list)
     upload: Annotated[bool, flag("--upload", "Upload to the vehicle and verify.")] = False
     home: HomeOption = None
+    place: PlaceOption = field(default_factory=list)
     hold: Annotated[
         bool, flag("--hold", "With --upload: switch a vehicle that drives in AUTO to HOLD first.", _DRIVE)
     ] = False

@@ -106,6 +106,13 @@ StoppingOption = Annotated[
         parser=stop_from,
     ),
 ]
+PlaceOption = Annotated[
+    list[str],
+    option(
+        "A place to go home to, beside home and the rally points; repeatable. The ways home are in --json and pictures.",
+        "NAME=LAT,LON",
+    ),
+]
 TrustOption = Annotated[
     bool,
     flag(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import replace
+from itertools import pairwise
 
 import pytest
 from shapely import LineString, Polygon
@@ -22,7 +23,7 @@ from mavlink_bridge.simulator import Simulator, SimulatorConfig
 from missions.errors import SituationError
 from missions.fence import Fence, PolygonZone, ZoneKind, fence_to_items
 from missions.formats import read_fence, read_mission, read_situation, write_situation
-from missions.geo import LatLon
+from missions.geo import LatLon, distance_m
 from missions.items import Command, CoordinateFrame, MissionItem, waypoint, with_home
 from missions.request import Request
 from missions.situation import Known, Mission, Situation
@@ -126,6 +127,37 @@ def test_what_was_planned_passes(tmp_path, yard):
         "PASS: every leg keeps 2 m while driving"
         in run("check", "--mission", made, "--clearance", "2").stdout
     )
+
+
+def test_ways_home_and_what_has_none(tmp_path, fields, yard):
+    shed, far = "shed=40.0720,-105.2290", "far=40.0800,-105.2299"
+    more = ("--clearance", "0.5", "--place", shed, "--place", far, "--plot", str(tmp_path / "ways.svg"))
+    document = check_yard(yard, *more)
+    ways = document["ways_home"]
+    assert [place["name"] for place in ways["places"]] == ["home", "shed", "far"]
+    assert [way["to"] for way in ways["from"]] == ["home", "home", "shed"]
+    assert [way["item"] for way in ways["from"]] == [0, 1, 2]
+    for way in ways["from"]:
+        whole_m = sum(distance_m(LatLon(*a), LatLon(*b)) for a, b in pairwise(way["path"]))
+        assert whole_m == pytest.approx(way["length_m"], abs=0.01)
+    assert ways["without_m"] == 0
+    reason = "it is outside inclusion polygon 1"
+    assert ways["places"][2]["blocked"] == reason
+    assert f"no way home leads to far: {reason}" in document["warnings"]
+    assert "way home" in (tmp_path / "ways.svg").read_text()
+    options = ("--fence", str(fields / "yard-fence.waypoints"), "--start", TARGETS[0], "--target", TARGETS[1])
+    asked = (*options, "--home", "40.0800,-105.2299")
+    planned = document_of("plan", *asked, "--clearance", "0.5")["ways_home"]
+    assert {way["to"] for way in planned["from"]} == {None}
+    assert planned["without_m"] > 50
+    told = run("plan", *asked, "--clearance", "0.5", "--place", shed).stdout
+    assert re.search(r"Way home from the target: [\d.]+ m to shed, about \d+ s", told)
+    assert document_of("plan", *options, "--clearance", "0.5")["ways_home"] is None
+
+
+@pytest.mark.parametrize("place", ["shed", "=40,-105", "home=40,-105", "Rally point 1=40,-105", "shed=40"])
+def test_places_are_named_once_and_well(yard, place):
+    assert "--place" in check_yard(yard, "--place", place, code=2)["message"]
 
 
 def test_the_recorded_log_tells_it_all(logs):

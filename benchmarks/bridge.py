@@ -26,9 +26,10 @@ import sys
 import tempfile
 import threading
 import time
+from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -44,9 +45,6 @@ from missions.fence import CircleZone, Fence, ZoneKind, fence_to_items
 from missions.formats import read_fence
 from missions.geo import LatLon, to_e7
 from missions.items import Command
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 FIELDS = Path(__file__).parent.parent / "tests" / "fields"
 HOME = LatLon(40.071374, -105.229930)

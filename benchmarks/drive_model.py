@@ -13,8 +13,8 @@ import csv
 import math
 import time
 from collections import defaultdict
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
@@ -23,9 +23,6 @@ from missions.drive_model import Corner, Envelope, envelope
 from missions.geo import LatLon
 from missions.ground.frame import LocalFrame
 from missions.vehicle import Steering, Vehicle
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 HERE = Path(__file__).parent
 DRIVES = HERE.parent / "tests" / "missions" / "drive_model" / "data" / "drives"

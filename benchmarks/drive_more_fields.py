@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import random
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import shapely
 from drive_fields import CENTRE, Field, place_of, polygon_zone
@@ -12,9 +12,6 @@ from shapely import LineString, Point, Polygon, affinity
 
 from missions.fence import CircleZone, Fence, ZoneKind
 from missions.ground.frame import frame_around
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 CLEARANCES_M = (1.0, 1.5, 2.0)
 KINDS = ("near fence", "short", "behind", "corridor", "zigzag", "maze", "many circles", "narrow gate")

@@ -12,18 +12,15 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pymavlink import mavutil
 
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.codec import to_frame
 from mavlink_bridge.tlog import LogEntry, TlogReader, read_columns
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
 
 LOGS = sorted((Path(__file__).parent.parent / "sitl_logs").glob("*.tlog"))
 WANTED = [

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING
 
 from missions.errors import FenceError, InvalidPositionError
 from missions.geo import LatLon, checked_lat_lon, to_e7
 from missions.items import Command, CoordinateFrame, MissionItem
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 
 class ZoneKind(StrEnum):

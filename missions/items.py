@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import TYPE_CHECKING
 
 from missions.geo import LatLon, from_e7, to_e7
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 
 class Command(IntEnum):

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Iterable
+from typing import NamedTuple
 
 from missions.geo import LatLon, to_e7
 from missions.items import Command, CoordinateFrame, MissionItem
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 _RELATIVE_FRAMES = (CoordinateFrame.GLOBAL_RELATIVE_ALT, CoordinateFrame.GLOBAL_RELATIVE_ALT_INT)
 

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 from numbers import Real
-from typing import TYPE_CHECKING, Any, Self, TypeVar
+from typing import Any, Self, TypeVar
 
 from missions.errors import RequestError
 from missions.geo import LatLon, checked_lat_lon
 from missions.situation import Mission
 from missions.vehicle import Footprint
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 _Word = TypeVar("_Word", bound=StrEnum)
 

@@ -6,9 +6,10 @@ local origin, so that map coordinates of thousands of kilometres cost no precisi
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
 import shapely
@@ -19,9 +20,6 @@ from .clearance import Geometries, grow, shrink
 from .errors import InvalidGeometryError
 from .geometry import Floats, Point, Ring, parse_rings, polygons_only
 from .subtract import subtracted
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 __all__ = [
     "FreeSpace",

@@ -7,11 +7,8 @@ A build makes hundreds of thousands of tuples and not one cycle, and meanwhile P
 from __future__ import annotations
 
 import gc
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 __all__ = ["uncollected"]
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
@@ -16,9 +16,6 @@ from missions.fence import CircleZone, Fence, PolygonZone, Zone, ZoneKind
 from missions.firmware import Firmware
 from missions.geo import LatLon, rounded, wrap_lon_deg
 from missions.situation import Known, Situation
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 HOME = LatLon(40.071374, -105.22993)
 IN, OUT = ZoneKind.INCLUSION, ZoneKind.EXCLUSION

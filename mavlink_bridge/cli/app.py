@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from copy import copy
 from difflib import get_close_matches
 from functools import cache
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperArgument, TyperCommand, TyperGroup
@@ -20,9 +21,6 @@ from mavlink_bridge.cli.failing import (
     report_defect,
 )
 from mavlink_bridge.cli.terminal import echo, echo_help, says_no_colour
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 COMMANDS = {
     "plan": "Plan a mission around fences; write it, draw it, upload it.",

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
@@ -13,9 +13,6 @@ from rich.text import Text
 from mavlink_bridge.cli.failing import telling
 from mavlink_bridge.cli.terminal import say
 from missions.words import harmless
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 
 def console(*, err: bool = False) -> Console:

@@ -8,10 +8,7 @@ import queue
 import select
 import sys
 import threading
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
+from collections.abc import Callable
 
 STDIN = 0  # the file descriptor
 

@@ -13,15 +13,12 @@ import os
 import shutil
 import sys
 import textwrap
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, TextIO
+from collections.abc import Iterable, Mapping
+from typing import TextIO
 
 import typer
 
 from missions.words import harmless
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 
 def says_no_colour() -> bool:

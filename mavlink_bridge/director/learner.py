@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from mavlink_bridge.director.changes import RebootWatch
 from mavlink_bridge.director.core import Core, Part
@@ -21,9 +21,6 @@ from mavlink_bridge.mavlink.vehicles import not_ardupilot
 from mavlink_bridge.protocol.find import FindVehicle
 from mavlink_bridge.protocol.peer import Peer
 from missions.situation import ListKind
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
 
 _SILENCE_S = 5.0
 """ArduPilot sends a heartbeat every second: five in a row are lost."""

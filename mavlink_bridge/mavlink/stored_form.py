@@ -10,15 +10,12 @@ from __future__ import annotations
 
 import math
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from mavlink_bridge.mavlink.messages import MissionType
 from missions.items import Command, CoordinateFrame, MissionItem
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 _FRAMES = {
     int(CoordinateFrame.MISSION): int(CoordinateFrame.GLOBAL),

@@ -5,12 +5,9 @@ Measured apart from the drive model: `tests/mavlink_bridge/simulator/test_fideli
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 from missions.firmware import Firmware
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 _NEW_TURNS = Firmware(4, 6, 0, 134)
 """4.6.0-beta6 has SCurve.cpp's change of March 2025: the next leg starts only once the present one brakes."""

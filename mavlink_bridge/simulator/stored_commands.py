@@ -8,14 +8,11 @@ from __future__ import annotations
 
 import math
 import struct
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from mavlink_bridge.simulator.parameters import float32
 from missions.items import Command, MissionItem
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 Params = tuple[float, float, float, float]
 

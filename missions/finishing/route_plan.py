@@ -30,7 +30,7 @@ from missions.vehicle.parameter_remarks import parameter_remarks
 from missions.words import less_text
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from missions.drive_model import Envelope
     from missions.geo import LatLon
@@ -63,26 +63,10 @@ def plan_route(
     plain = ground_for(situation, vehicle, (start, *targets))
     ground = with_seams(plain, vehicle)
     asked = promise(situation, request, vehicle)
-    warnings = [
-        *parameter_remarks(situation),
-        *fence_warnings(vehicle, situation),
-        *ground.warnings,
-        *asked.warnings,
-        *_start_remarks(plain, start, vehicle),
-    ]
+    warnings = [*parameter_remarks(situation), *fence_warnings(vehicle, situation), *ground.warnings]
+    warnings += [*asked.warnings, *_start_remarks(plain, start, vehicle)]
     heading_deg = heading_at(situation, start)
-    local_start, *local_targets = (ground.frame.to_local(position) for position in (start, *targets))
-    sought = Sought(
-        ground,
-        local_start,
-        local_targets,
-        request.method,
-        request.snap_m,
-        request.escape,
-        should_stop,
-        "" if request.widest else asked.words,
-    )
-    wanted = asked
+    sought, wanted = _sought(ground, (start, *targets), request, asked, should_stop), asked
     asked, found = _route(sought, request, wanted, vehicle, heading_deg)
     if asked.promised_m < wanted.promised_m:
         warnings += stop_warnings(vehicle, asked)
@@ -94,6 +78,7 @@ def plan_route(
     warnings += lead_away_remarks(found, asked)
     warnings += drive_remarks(vehicle, heading_deg, asked, driven_m, found)
     warnings += pivot_remarks(plain, vehicle, band, seqs)
+    less = _less_info(request, wanted, asked)
     return Plan(
         items=items,
         path=lines.path,
@@ -118,13 +103,20 @@ def plan_route(
         vehicle=vehicle,
         home=situation.home.value if situation.home else None,
         warnings=tuple(dict.fromkeys(warnings)),
-        info=(
-            *asked.info,
-            *_less_info(request, wanted, asked),
-            *escape_info(found),
-            *moved_target_info(targets, reached),
-        ),
+        info=(*asked.info, *less, *escape_info(found), *moved_target_info(targets, reached)),
     )
+
+
+def _sought(
+    ground: Ground,
+    ends: Sequence[LatLon],
+    request: Request,
+    asked: Promise,
+    should_stop: Callable[[], bool] | None,
+) -> Sought:
+    start, *targets = (ground.frame.to_local(position) for position in ends)
+    words = "" if request.widest else asked.words
+    return Sought(ground, start, targets, request.method, request.snap_m, request.escape, should_stop, words)
 
 
 def _less_info(request: Request, wanted: Promise, asked: Promise) -> list[str]:

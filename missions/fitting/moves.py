@@ -18,15 +18,12 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from missions.fitting import polyline as drawn
 from missions.fitting.polyline import Drawing, shifted
 from missions.geo import LocalPoint, Vector, heading_vector
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 MOVES = (0.5, 1.0, 1.5, 2.5)
 """How far `moved` moves a corner, in multiples of what is missing. Chosen, not measured."""

@@ -7,8 +7,9 @@ A mission's line of seq 0 is home; Mission Planner pads it with command 0. A lis
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from missions.errors import FenceError, InvalidPositionError, MissionFormatError
 from missions.fence import fence_from_items, fence_to_items
@@ -18,9 +19,6 @@ from missions.geo import LatLon
 from missions.items import Command, MissionItem, file_frame, with_home
 from missions.rally import rally_from_items, rally_to_items
 from missions.situation import Known, Mission, Situation
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 _HEADER = "QGC WPL 110"
 _VERSIONS = ("110", "100")

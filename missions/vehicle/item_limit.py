@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 from missions.errors import VehicleError
 from missions.vehicle import whole_number
 from missions.vehicle.asked_parameters import STORAGE_NAMES
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 MISSION_ITEMS = 655
 """Items that ArduPilot holds with 16 KB of storage, home included, as measured."""

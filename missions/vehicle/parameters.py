@@ -13,14 +13,11 @@ Rover-4.7.1 dbe792162d06.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from missions.firmware import Firmware
 from missions.vehicle.model import Autopilot
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 MOST = 10_000.0
 """More metres, metres a second or degrees than any rover's parameter can mean: FENCE_RADIUS, the longest of all, ends there (AC_Fence)."""

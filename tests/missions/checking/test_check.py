@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -27,9 +27,6 @@ from missions.rally import RallyPoint
 from missions.request import Request
 from missions.situation import Known, Mission, Pose, Situation
 from missions.vehicle import Footprint
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 HOME = LatLon(40.071374, -105.22993)
 IN, OUT = ZoneKind.INCLUSION, ZoneKind.EXCLUSION

@@ -33,6 +33,9 @@ if TYPE_CHECKING:
     from missions.items import MissionItem
 
 _FORMAT = 1  # of the file; others are not read
+_MOST_BYTES = 4_000_000
+"""Of a note: 40 times that of a mission of 700 items. Larger ones are not read."""
+
 _NUMBERS = ("clearance_m", "asked_m", "drawn_clearance_m", "driven_clearance_m", "heading_deg")
 _PLACES = ("path", "targets", "asked_targets")
 
@@ -90,6 +93,8 @@ def note_from_json(content: dict[str, Any]) -> DriveNote:
         It is none, or was changed.
     """
     content = dict(content)
+    if not (isinstance(content["vehicle"], dict) and content["path"] and content["targets"]):
+        raise ValueError("it names no vehicle, path or target")
     if content.pop("sha256") != checksum(content):
         raise ValueError("its checksum does not match")
     if content["format"] != _FORMAT:
@@ -148,9 +153,12 @@ class DriveNotes:
         notes, troubles = [], []
         for path in sorted(self._folder.glob("drive-under-way-*.json")) if self._folder.is_dir() else ():
             try:
+                if not path.is_file() or path.stat().st_size > _MOST_BYTES:
+                    raise ValueError(f"it is no file, or larger than {_MOST_BYTES} bytes")  # noqa: TRY301 - told as all else
                 notes.append(note_from_json(json.loads(path.read_text(encoding="utf-8"))))
             except (
                 OSError,
+                IndexError,
                 ValueError,
                 KeyError,
                 TypeError,

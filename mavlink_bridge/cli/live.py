@@ -52,7 +52,7 @@ if TYPE_CHECKING:
 
 # Between two looks at the display, and at a plan in the making; chosen, not measured.
 _IDLE_S, _BUSY_S = 0.25, 0.02
-_NOT_KNOWN_YET = frozenset({State.LISTENING, State.LEARNING})
+_NOT_KNOWN_YET = frozenset({State.LISTENING, State.LEARNING, State.LOST})
 """States in which it is not yet known which vehicle it is."""
 
 _STATE_TEXTS = {

@@ -6,13 +6,15 @@ begins (`backup.drive_note`), and the note goes with the drive's end:
     plan, mission read back, uid ──Starter──► note ──shell──► disk ──(restart)──► notes ──look──► the drive adopted, or why not
 
 A drive is adopted only where nothing speaks against it: the board's uid is the noted one, the vehicle is armed and in AUTO, was not switched off
-since, and its mission, read back whole, is the noted one in every item. Then the director is where it would be without a restart: driving, with the
+since, was in AUTO at each heartbeat heard, and its mission, read back whole, is the noted one in every item; mission and fence are read once more before,
+for changes while all was read. Then the director is where it would be without a restart: driving, with the
 same plan. Who was not heard is not known: an operator who took over and went back to AUTO on the same mission while no bridge ran looks like the drive
 going on. Any change of mode that is seen from then on is a takeover, as ever. Once told to be another's, a note is taken away for good.
 """
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.backup.drive_note import DriveNote
@@ -34,10 +36,14 @@ if TYPE_CHECKING:
 
     from mavlink_bridge.director.drive_supervisor import DriveSupervisor
     from mavlink_bridge.director.halter import Halter
+    from mavlink_bridge.director.list_watch import ListWatch
     from mavlink_bridge.director.route_desk import RouteDesk
     from mavlink_bridge.mavlink.messages import Frame
     from missions.geo import LatLon
     from missions.items import MissionItem
+
+_PATIENCE_S = 10.0
+"""So long an autopilot may take to tell which item it drives to: it tells it about once a second. Chosen, not measured."""
 
 _SAME_M = 0.2
 """As for targets: far more than the rounding of the wire, far less than anybody means by another place."""
@@ -62,34 +68,55 @@ class Adopter(Part):
     def __init__(
         self,
         core: Core,
+        lists: ListWatch,
         halter: Halter,
         driver: DriveSupervisor,
         desk: RouteDesk,
         notes: tuple[DriveNote, ...],
     ) -> None:
         super().__init__(core)
+        self._lists = lists
         self._halter = halter
         self._driver = driver
         self._desk = desk
         self._left = notes
         self._awaits_item = False
+        self._was_in_other_hands = False
+        self._until_s = math.inf
         self._boot_ms = 0
         self.note: DriveNote | None = None
         self.is_noted = False
 
-    def receive(self, frame: Frame, now_s: float) -> Sequence[Signal]:  # noqa: ARG002 - as all parts
-        """Adopt the drive once the vehicle has said which item it drives to."""
-        message = frame.message
-        if not self.core.is_from_vehicle(frame):
+    @property
+    def deadline_s(self) -> float | None:
+        """Until when the vehicle may tell which item it drives to."""
+        return self._until_s if self._awaits_item else None
+
+    def handle_timer(self, now_s: float) -> Sequence[Signal]:
+        """Give up a drive of which the vehicle does not tell where it goes."""
+        if self._awaits_item and now_s >= self._until_s:
+            self._awaits_item = False
+            self._tell_why_not("the vehicle does not tell which item it drives to", now_s)
+        return []
+
+    def receive(self, frame: Frame, now_s: float) -> Sequence[Signal]:
+        """Adopt the drive once the vehicle has said which item it drives to, and nothing has changed meanwhile."""
+        core, message = self.core, frame.message
+        if not core.is_from_vehicle(frame):
             return []
         if isinstance(message, m.GlobalPositionInt):
             self._boot_ms = message.time_boot_ms
+        self._was_in_other_hands |= core.state is State.LEARNING and not self._is_driving
         if not (self._awaits_item and isinstance(message, m.MissionCurrent)):
             return []
         is_told = bool(message.seq) or message.mission_state == MISSION_COMPLETE
-        if self.core.state is not State.READY or not is_told:
+        if core.state is not State.READY or not is_told or core.steps or self._lists.has_suspects:
             return []
         self._awaits_item = False
+        if self.note is not None and (why_not := self._why_not(self.note)):
+            self._tell_why_not(why_not, now_s)
+            self.forget()
+            return []
         return [Cue.ADOPTED]
 
     # Noting
@@ -145,7 +172,8 @@ class Adopter(Part):
         self._awaits_item = True
         self._desk.take_up(situation_of(note.record))
         core.ours = note.mission
-        core.target = Target(core.plan.targets[-1], TargetSource.TYPED)
+        self._until_s = now_s + _PATIENCE_S
+        self._lists.suspect_all()
         core.operator.expect(Mode.AUTO, set(), is_armed=True)
         return True
 
@@ -157,6 +185,8 @@ class Adopter(Part):
     def adopted(self, now_s: float) -> None:
         """Go on with the drive as if it had never been left; without orders to drive, watch it."""
         core, is_ours = self.core, self.core.orders.drive
+        assert core.plan is not None
+        core.target = Target(core.plan.targets[-1], TargetSource.TYPED)
         text = "adopted the drive that pbpp began before it was restarted"
         text += "" if is_ours else "; without --drive it is only watched"
         core.voice.tell(now_s, EventName.ADOPTED, text, len(core.ours or ()), self._driver.item)
@@ -181,6 +211,8 @@ class Adopter(Part):
             return "the vehicle is disarmed"
         if situation.mode != Mode.AUTO:
             return f"the vehicle is in {mode_name(situation.mode)}, not in AUTO"
+        if self._was_in_other_hands:
+            return "it was disarmed, or not in AUTO, while this bridge read its lists"
         if self._boot_ms < note.boot_ms:
             return "the vehicle was switched off and on since"
         if situation.mission is None:

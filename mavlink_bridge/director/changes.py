@@ -72,6 +72,10 @@ class ChangeWatch:
         self._poll_due_s = now_s + POLL_EVERY_S
         self._fence_due_s = now_s + FENCE_EVERY_S
 
+    def suspect_all(self) -> None:
+        """Suspect every list that matters."""
+        self.suspects |= self._kinds
+
     def due(self, now_s: float, *, is_driving: bool) -> set[ListKind]:
         """Return and forget the lists that are to be read again."""
         if now_s >= self._poll_due_s:

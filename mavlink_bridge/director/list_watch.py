@@ -101,6 +101,11 @@ class ListWatch(Part):
             self._changes.settle(now_s)
         self._grounds = Grounds.of(core.situation)
 
+    def suspect_all(self) -> None:
+        """Have all lists read once more."""
+        if self._changes is not None:
+            self._changes.suspect_all()
+
     @property
     def _may_ask(self) -> bool:
         return not self.core.orders.once and not self.core.orders.passive

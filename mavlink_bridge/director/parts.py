@@ -50,7 +50,7 @@ class Parts:
         self.hold_watch: HoldWatch = HoldWatch(core, self.halter, self.driver)
         self.desk: RouteDesk = RouteDesk(core, self.lists, self.driver, self.hold_watch)
         self.writer: MissionWriter = MissionWriter(core, self.lists, self.halter, self.desk)
-        self.adopter: Adopter = Adopter(core, self.halter, self.driver, self.desk, notes)
+        self.adopter: Adopter = Adopter(core, self.lists, self.halter, self.driver, self.desk, notes)
         self.starter: Starter = Starter(core, self.lists, self.halter, self.driver, self.desk, self.adopter)
         self.hand_over: HandOver = HandOver(core, self.halter, self.driver)
         self.guard: IdentityGuard = IdentityGuard(core, self.learner, self.halter, self.inbox, self.writer)
@@ -71,4 +71,5 @@ class Parts:
             self.driver,
             self.learner,
             self.lists,
+            self.adopter,
         )

@@ -75,6 +75,7 @@ class Killed:
     seed: int
     target: LatLon | None = None
     is_clean: bool = False
+    latency_s: float = 0.0
 
     def __post_init__(self) -> None:
         self.random = random.Random(self.seed)
@@ -87,7 +88,7 @@ class Killed:
             parameters={"FENCE_ENABLE": 1.0, "WP_SPEED": self.random.choice((2.0, 3.0))},
             uid=UID,
         )
-        faults = Faults(loss=loss, duplicate=loss / 2, latency_s=2 * loss, jitter_s=loss)
+        faults = Faults(loss=loss, duplicate=loss / 2, latency_s=self.latency_s or 2 * loss, jitter_s=loss)
         self.vehicle = SimulatedVehicle(config)
         self.run = Conductor(Director(self.orders), [self.vehicle], faults)
         self.run.run_until(lambda: self.run.director.state is State.READY, 60)
@@ -111,14 +112,16 @@ class Killed:
         self.run.director = _Nobody()
         self.run.run_until(lambda: self.run.now_s >= until_s, 300)
 
-    def restart(self, *notes: DriveNote, **orders: object) -> None:
-        """Begin anew."""
+    def restart(self, *notes: DriveNote, until: State | None = None, **orders: object) -> None:
+        """Begin anew, and go on until the vehicle is learnt or a state is reached."""
         self.run.sent.clear()
         self.run.events.clear()
         self.run.note = None
         self.run.director = Director(replace(self.orders, **orders), None, notes)
         self.run.is_started = False
-        self.run.run_until(self.run.happened(EventName.LEARNT), 120)
+        director = self.run.director
+        is_there = self.run.happened(EventName.LEARNT) if until is None else lambda: director.state is until
+        self.run.run_until(is_there, 120)
 
     def place_ahead(self) -> LatLon | None:
         """Return a place on what is left of the route, as far off as the vehicle needs to stop; None where there is none."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import replace
 
 import pytest
@@ -16,7 +17,7 @@ from mavlink_bridge.mavlink.rover import Mode
 from missions.checking.drive_record import plan_again, record_of
 from missions.fence import CircleZone, Fence, ZoneKind
 from missions.firmware import Firmware
-from missions.geo import LatLon
+from missions.geo import LatLon, rounded
 from missions.planning.plan import plan
 from missions.request import Request
 from missions.situation import Fix, Known, Pose, Situation
@@ -83,6 +84,54 @@ def test_a_takeover_while_the_item_is_waited_for_is_heeded():
     director.receive(m.Frame(1, 1, m.MissionCurrent(1)), one.run.now_s)
     assert director.state is State.LET_GO
     assert director.drive_note is None
+
+
+def test_a_takeover_while_all_is_read_speaks_against_adopting():
+    one = Killed(1, TARGETS[0], is_clean=True, latency_s=0.4)
+    run = one.run
+    one.drive_on(0.2)
+    one.restart(one.note, until=State.LEARNING)
+    for mode in (0, Mode.AUTO):
+        run.ground_station(m.SetMode(1, 1, mode))
+        until_s = run.now_s + 1.6
+        run.run_until(lambda until_s=until_s: run.now_s >= until_s, 5)
+    assert run.director.state is State.LEARNING
+    run.run_until(run.happened(EventName.NOT_ADOPTED), 30)
+    (told,) = (event.data["reason"] for event in run.events if event.name is EventName.NOT_ADOPTED)
+    assert told == "it was disarmed, or not in AUTO, while this bridge read its lists"
+    assert not run.happened(EventName.ADOPTED)()
+    assert one.switched() == []
+
+
+def test_a_fence_put_across_while_all_is_read_is_known_before_the_drive_is_adopted():
+    one = Killed(1, TARGETS[0], is_clean=True, latency_s=0.4)
+    run = one.run
+    one.drive_on(0.2)
+    place = one.place_ahead()
+    one.restart(one.note, until=State.LEARNING)
+    until_s = run.now_s + 3.0
+    run.run_until(lambda: run.now_s >= until_s, 5)  # the fence is read by then
+    one.put_fence(place)
+    run.run_until(run.happened(EventName.ADOPTED), 30)
+    adopted_s = run.now_s
+    run.run_until(lambda: Mode.HOLD in one.switched(), 3)
+    assert run.now_s - adopted_s < 1.0
+    assert run.director.situation.fence.value.zones[-1].centre == rounded(place)
+
+
+def test_a_drive_whose_item_the_vehicle_does_not_tell_is_not_adopted_and_it_is_said():
+    one = Killed(1, TARGETS[0], is_clean=True)
+    run = one.run
+    one.drive_on(0.2)
+    send = one.vehicle.messages_to_send
+    one.vehicle.messages_to_send = lambda: [
+        message for message in send() if not isinstance(message, m.MissionCurrent)
+    ]
+    one.restart(one.note)
+    run.run_until(run.happened(EventName.NOT_ADOPTED), 15)
+    assert [event.data["reason"] for event in run.events if event.name is EventName.NOT_ADOPTED] == [
+        "the vehicle does not tell which item it drives to"
+    ]
 
 
 def test_an_arrival_while_nobody_was_there_is_told_and_held():
@@ -176,6 +225,16 @@ def test_a_note_that_was_changed_or_broken_is_said_and_not_used(tmp_path):
     found, troubles = DriveNotes(tmp_path).read()
     assert found == ()
     assert len(troubles) == len(broken) + 1
+
+
+def test_what_is_no_file_or_far_too_large_is_no_note(tmp_path):
+    os.mkfifo(tmp_path / "drive-under-way-a.json")
+    with (tmp_path / "drive-under-way-b.json").open("wb") as file:
+        file.truncate(5_000_000)
+    (tmp_path / "drive-under-way-c.json").write_text("[]")
+    notes, troubles = DriveNotes(tmp_path).read()
+    assert notes == ()
+    assert len(troubles) == 3
 
 
 def test_a_single_job_adopts_nothing():

@@ -14,7 +14,7 @@ from missions.drive_model import envelope
 from missions.geo import LocalPoint
 from missions.ground.from_situation import ground_for
 from missions.planning.plan import plan
-from missions.routing.departure import LENGTHS_M, WAYS, Departures
+from missions.routing.departure import LENGTHS_M, WAYS, Departures, least_turning_m
 from missions.vehicle import Steering, Vehicle
 
 PATH = list(sys.path)
@@ -111,3 +111,15 @@ def test_whether_one_keeps_enough_is_told_alike_whatever_was_asked_before() -> N
         assert ways.any_keeps(clearance_m) is one_keeps
     assert len(ways.best_first()) == WAYS * len(LENGTHS_M)
     assert ways.best_first()[0].kept_m == best_m
+
+
+def test_a_quick_rover_may_turn_no_nearer_to_the_margin_than_one_of_2_mps() -> None:
+    """Starts near a margin were measured at 2 m/s; in a corridor a simulated rover of 5 m/s, allowed its own straying, backed into the fence."""
+    ground = ground_of(FIELD, WALL)
+    start = ground.frame.to_local(place(-9, 0))
+    avoiding = replace(Vehicle(), fence=replace(Vehicle().fence, enabled=True), avoid_bits=3)
+    assert avoiding.avoids_fence
+    slow, quick = (
+        least_turning_m(ground, start, replace(avoiding, speed_mps=speed_mps)) for speed_mps in (2.0, 5.0)
+    )
+    assert 0 < quick == slow

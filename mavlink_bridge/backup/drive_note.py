@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from mavlink_bridge.backup.kept_file import (
+    UNREADABLE,
     checksum,
     item_from_json,
     item_to_json,
@@ -154,19 +155,9 @@ class DriveNotes:
         for path in sorted(self._folder.glob("drive-under-way-*.json")) if self._folder.is_dir() else ():
             try:
                 if not path.is_file() or path.stat().st_size > _MOST_BYTES:
-                    raise ValueError(f"it is no file, or larger than {_MOST_BYTES} bytes")  # noqa: TRY301 - told as all else
+                    raise ValueError(f"it is no file, or larger than {_MOST_BYTES} bytes")
                 notes.append(note_from_json(json.loads(path.read_text(encoding="utf-8"))))
-            except (
-                OSError,
-                IndexError,
-                ValueError,
-                KeyError,
-                TypeError,
-                AttributeError,
-                OverflowError,
-                RecursionError,
-                MissionError,
-            ) as error:
+            except (OSError, IndexError, *UNREADABLE, MissionError) as error:
                 troubles.append(
                     BackupError(
                         f"{path}: the note of a drive cannot be read: {error}; that drive is not adopted",

@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
+UNREADABLE = (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError)
+"""What reading a content raises that is not what was written."""
+
+
 def write_whole(path: Path, content: dict[str, Any], what: str = "the backup") -> None:
     """Write a JSON file so that after a crash there is the whole of it or nothing.
 

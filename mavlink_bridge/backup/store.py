@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.backup.kept_file import (
+    UNREADABLE,
     checksum,
     item_from_json,
     item_to_json,
@@ -234,15 +235,7 @@ class BackupStore:
             backup = self.folder / Path(content["backup"]).name  # it cannot lead out of the folder
             if "vehicle" in content:
                 vehicle = mark_from_json(int(name[1]), content["vehicle"])
-        except (
-            OSError,
-            ValueError,
-            KeyError,
-            TypeError,
-            AttributeError,
-            OverflowError,
-            RecursionError,
-        ) as error:
+        except (OSError, *UNREADABLE) as error:
             trouble = BackupError(f"{path}: the note of an interrupted upload cannot be read: {error}")
             return Note(path, vehicle, mission_type, trouble=trouble)
         try:
@@ -290,7 +283,7 @@ def read_backup(path: Path) -> Backup:
         raise BackupError(
             f"the backup {path} cannot be read: {error.strerror or error}", path=str(path)
         ) from None
-    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
+    except UNREADABLE:
         raise BackupError(
             f"{path} is not a backup that pbpp wrote; nothing was written to the vehicle", path=str(path)
         ) from None

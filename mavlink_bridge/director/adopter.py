@@ -23,13 +23,12 @@ from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.orders import TargetSource
 from mavlink_bridge.director.states import Cue, Signal, State
-from mavlink_bridge.director.targets import Target
+from mavlink_bridge.director.targets import Target, is_same_place
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.rover import Mode, mode_name
 from mavlink_bridge.protocol.vehicle_watch import MISSION_COMPLETE
 from missions.checking.drive_record import plan_again, record_of, situation_of
 from missions.errors import MissionError
-from missions.geo import distance_m
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -44,9 +43,6 @@ if TYPE_CHECKING:
 
 _PATIENCE_S = 10.0
 """So long an autopilot may take to tell which item it drives to: it tells it about once a second. Chosen, not measured."""
-
-_SAME_M = 0.2
-"""As for targets: far more than the rounding of the wire, far less than anybody means by another place."""
 
 
 class Adopter(Part):
@@ -180,7 +176,7 @@ class Adopter(Part):
     def leads_to(self, target: LatLon) -> bool:
         """Return whether the noted drive is the one to a target."""
         asked = self.note.record.asked_targets if self.note is not None else ()
-        return bool(asked) and distance_m(asked[-1], target) < _SAME_M
+        return bool(asked) and is_same_place(asked[-1], target)
 
     def adopted(self, now_s: float) -> None:
         """Go on with the drive as if it had never been left; without orders to drive, watch it."""

@@ -106,7 +106,6 @@ class DriveSupervisor(Part):
 
     def adopt(self, now_s: float, *, is_ours: bool) -> None:
         """Watch a drive that an earlier run has begun; ours where it may be held at its end."""
-        self.core.operator.expect(Mode.AUTO, set(), is_armed=True)
         self._is_our_start = is_ours
         self._watch("AUTO, as before the restart", now_s).join(self._item_now)
 

@@ -85,10 +85,7 @@ class Starter(Part):
         if self.core.state is not State.STARTING:
             return []
         self.core.steps.clear()
-        self._adopter.forget()
-        self._driver.stand_by()
-        self.core.voice.error(now_s, EventName.TROUBLE, trouble, dict(trouble.details))
-        return self.core.fail_step(trouble)
+        return self._give_up(trouble, now_s)
 
     def _refuse_unarmed(self, now_s: float) -> Sequence[Signal]:
         """Leave the mode of a disarmed vehicle alone: in AUTO, arming it would drive off."""
@@ -100,6 +97,10 @@ class Starter(Part):
             advice=START_YOURSELF,
             mode=mode,
         )
+        return self._give_up(trouble, now_s)
+
+    def _give_up(self, trouble: BridgeError, now_s: float) -> Sequence[Signal]:
+        """Return that the drive is not begun."""
         self._adopter.forget()
         self._driver.stand_by()
         self.core.voice.error(now_s, EventName.TROUBLE, trouble, dict(trouble.details))

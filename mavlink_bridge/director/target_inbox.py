@@ -11,11 +11,10 @@ from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.orders import TargetSource
 from mavlink_bridge.director.states import Cue, Notice, Signal, State
-from mavlink_bridge.director.targets import Target, TargetWatch
+from mavlink_bridge.director.targets import Target, TargetWatch, is_same_place
 from mavlink_bridge.errors import RefusedError
 from mavlink_bridge.mavlink import messages as m
 from missions.checking.recheck import straight_line
-from missions.geo import distance_m
 from missions.items import Command, last_place
 
 if TYPE_CHECKING:
@@ -28,9 +27,6 @@ _NOT_NOW = frozenset(
     {State.LISTENING, State.LEARNING, State.LOST, State.UPLOADING, State.WITHDRAWING, State.CLASHING}
 )
 """States that have to end before another target is gone into."""
-
-_SAME_M = 0.2
-"""Far more than the rounding of the wire (1 cm), far less than anybody means by another place."""
 
 
 class TargetInbox(Part):
@@ -167,14 +163,14 @@ class TargetInbox(Part):
         core = self.core
         if source not in core.orders.target_sources or not self._note_listed(place, source):
             return []
-        if place is None or _is_same(place, core.target.position if core.target else None):
+        if place is None or is_same_place(place, core.target.position if core.target else None):
             return []
         return self.take(Target(place, source))
 
     def _note_listed(self, place: LatLon | None, source: TargetSource) -> bool:
         """Remember the last place of a list; return whether it is another one than before."""
         before, self._listed[source] = self._listed.get(source), place
-        return not _is_same(place, before)
+        return not is_same_place(place, before)
 
     @property
     def _mission_place(self) -> LatLon | None:
@@ -185,8 +181,3 @@ class TargetInbox(Part):
     def _rally_place(self) -> LatLon | None:
         rally = self.core.situation.rally
         return rally.value[-1].position if rally and rally.value else None
-
-
-def _is_same(a: LatLon | None, b: LatLon | None) -> bool:
-    """Return whether two places are one, but for the rounding of the wire."""
-    return a is b or (a is not None and b is not None and distance_m(a, b) < _SAME_M)

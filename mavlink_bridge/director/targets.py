@@ -87,7 +87,7 @@ class TargetWatch:
         target = self._asked(frame, before, after, identity) or self._echoed(frame, after)
         if target is None or target.source not in self._sources:
             return None
-        is_same = self._newest is not None and distance_m(self._newest, target.position) < _SAME_M
+        is_same = is_same_place(self._newest, target.position)
         is_again = is_same and now_s - self._said_s < _SAID_AGAIN_S
         if target.source is TargetSource.REPOSITION and self._commands_count_anew:
             is_again = self._commands_count_anew = False
@@ -126,3 +126,8 @@ class TargetWatch:
         if self._newest is not None and distance_m(self._newest, position) < _ECHO_MOVED_M:
             return None
         return Target(position, TargetSource.ECHO)
+
+
+def is_same_place(a: LatLon | None, b: LatLon | None) -> bool:
+    """Return whether two places are one, but for the rounding of the wire."""
+    return a is b or (a is not None and b is not None and distance_m(a, b) < _SAME_M)

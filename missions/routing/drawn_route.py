@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from missions.ground.ground import Barrier, Ground
     from missions.routing.bottleneck import NarrowestPlace
 
-_INSIDE_M = 0.005
+INSIDE_M = 0.005
 """Points put on the edge of free space stand this far inside it, so that rounding leaves them there."""
 
 _ROUNDED_EXCESS_M = 0.005
@@ -272,7 +272,7 @@ class DrawnRoutes:
         _NoWayError
             There is no such place.
         """
-        reach_m = self.clearance_m * _CHORD_SHARE + _ROUNDED_EXCESS_M + _INSIDE_M
+        reach_m = self.clearance_m * _CHORD_SHARE + _ROUNDED_EXCESS_M + INSIDE_M
         inner = self.ground.allowed.buffer(-reach_m, quad_segs=_CHORDS)
         parts: list[Polygon] = [part for part in shapely.get_parts(inner) if not part.is_empty]
         if not parts:
@@ -300,7 +300,7 @@ class DrawnRoutes:
         free = self.ground.nearest_point(self.ground.allowed, point)
         distance, bearing, position = self._way(start, free)
         if self.sought.escape:
-            return -max(distance, _INSIDE_M)
+            return -max(distance, INSIDE_M)
         names = [barrier.name for barrier in forbidding]
         raise _blocked(
             NoRouteKind.START_BLOCKED,
@@ -400,7 +400,7 @@ class DrawnRoutes:
             legs = shapely.linestrings([[start, xy] for xy in exits]) if len(exits) else np.array([])
             outside = shapely.difference(legs, ground.allowed)
             # Straight out: forbidden ground ahead is that of the start, in one piece.
-            keeps = (shapely.length(shapely.difference(outside, own)) < _INSIDE_M) & (
+            keeps = (shapely.length(shapely.difference(outside, own)) < INSIDE_M) & (
                 shapely.get_num_geometries(outside) == 1
             )
             if keeps.any():
@@ -453,7 +453,7 @@ class DrawnRoutes:
         areas = {"start": self._component(start), "target": self._component(goal)}
         walled = min(areas, key=lambda end: areas[end].area)
         outline = areas[walled].exterior
-        reach_m = self.clearance_m * 1.01 + 2 * _INSIDE_M + 0.01
+        reach_m = self.clearance_m * 1.01 + 2 * INSIDE_M + 0.01
         names = [b.name for b in self.ground.barriers if self.ground.distance_m(b, outline) <= reach_m]
         other = "choose another target" if walled == "target" else "drive it out manually"
         return NoRoute(

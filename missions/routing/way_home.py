@@ -22,6 +22,7 @@ from missions.geo import LocalPoint, distance_m
 from missions.ground.frame import frame_around
 from missions.ground.from_situation import MAX_FIELD_M, route_ground
 from missions.ground.known_fence import known_fence
+from missions.routing.drawn_route import INSIDE_M
 from missions.words import metres
 
 if TYPE_CHECKING:
@@ -37,9 +38,6 @@ if TYPE_CHECKING:
 
 _AS_LONG = 1.1
 """Ways that differ by less are told apart by the time that they take: corners cost more than a tenth of a short way."""
-
-_INSIDE_M = 0.005
-"""A point put on the edge of free space stands this far inside it, so that rounding leaves it there; as for routes."""
 
 
 class PlaceKind(StrEnum):
@@ -129,7 +127,7 @@ class WaysHome:
     @cached_property
     def _inner(self) -> BaseGeometry:
         """Free ground without its edge."""
-        inner = self._free.buffer(-_INSIDE_M)
+        inner = self._free.buffer(-INSIDE_M)
         return self._free if inner.is_empty else inner
 
     @cached_property
@@ -137,7 +135,7 @@ class WaysHome:
         """The parts of free ground on which a place stands: only from there a way leads to one."""
         open_places = [place.position for place in self._near if place.name not in self.blocked]
         stand = MultiPoint(self.ground.frame.to_local_array(open_places))
-        reached = MultiPolygon([part for part in self._free.geoms if part.dwithin(stand, _INSIDE_M)])
+        reached = MultiPolygon([part for part in self._free.geoms if part.dwithin(stand, INSIDE_M)])
         shapely.prepare(reached)
         return reached
 

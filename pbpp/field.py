@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from copy import copy
 from functools import cached_property
+from itertools import chain
 from math import inf
 from typing import TYPE_CHECKING
 
@@ -15,6 +16,7 @@ from .errors import InvalidGeometryError
 from .free_space import build_free_space, ground_box, loose_lines, snapped
 from .holes import Holes
 from .partition.blocks import Blocks
+from .partition.flat import Spots
 from .partition.slabs import Slabs
 
 if TYPE_CHECKING:
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
     from .clearance import Geometries
     from .errors import GoalBlockedError, StartBlockedError
     from .free_space import FreeSpace, Scene
-    from .geometry import Point
+    from .geometry import Floats, Point
     from .holes import Change
     from .partition.flat import Engine
 
@@ -194,16 +196,56 @@ class Field:
     def require(self, point: Point, error: type[StartBlockedError | GoalBlockedError]) -> frozenset[int]:
         """Return the components that a point of the map lies in; raise the error with the nearest free point if in none."""
         local = self.scene.to_local(point)
-        blocks = self.searched.locate(local)
-        if blocks:
-            return self.searched.components(blocks)
-        components = self.free.components_at(local, BOUNDARY_TOLERANCE_M)
+        components = self._components(local)
         if components:
             return components
         if not self.free.polygons:
             raise error(point, self.free.clearance_m, inf, None)
         nearest, distance_m = self.nearest(local)
         raise error(point, self.free.clearance_m, distance_m, self.scene.from_local(nearest))
+
+    def _components(self, local: Point) -> frozenset[int]:
+        blocks = self.searched.locate(local)
+        if blocks:
+            return self.searched.components(blocks)
+        return self.free.components_at(local, BOUNDARY_TOLERANCE_M)
+
+    def spots(self, ends: Floats) -> Spots:
+        """Return where many queries begin and end, each place looked for once: where `require` and `onto` put them.
+
+        Parameters
+        ----------
+        ends : (n, 2, 2) array
+            Start and goal of each query, east and north in metres on the map.
+
+        Returns
+        -------
+        Spots
+            The spots; none for queries between which there is no way, or with an end outside free space.
+        """
+        points, numbers = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
+        local = [self.scene.to_local((east, north)) for east, north in points.tolist()]
+        components = list(map(self._components, local))
+        spots: dict[tuple[int, frozenset[int]], int] = {}
+        of = np.full((len(ends), 2), -1)
+        for query, pair in enumerate(numbers.reshape(-1, 2).tolist()):
+            common = components[pair[0]] & components[pair[1]]
+            if common:
+                of[query] = [spots.setdefault((point, common), len(spots)) for point in pair]
+        at_m, lists = [], []
+        for point, common in spots:
+            at_m.append(self.onto(local[point], common))
+            blocks = self.searched.locate(at_m[-1])
+            neighbours = (self.searched.line_neighbours(at_m[-1], block) for block in blocks)
+            lists += [blocks, [vertex for found in neighbours for vertex, _ in found]]
+        ends_at = np.cumsum([0, *map(len, lists)])
+        return Spots(
+            of,
+            np.array(at_m, dtype=np.float64).reshape(-1, 2),
+            ends_at[np.arange(0, len(lists), 2)[:, np.newaxis] + np.arange(3)],
+            np.array(list(chain.from_iterable(lists)), dtype=np.int64),
+            max(map(len, lists), default=0),
+        )
 
     def onto(self, point: Point, components: frozenset[int]) -> Point:
         """Return a point that `require` has let pass as the search needs it: moved into free space by as little as puts it there for certain.

@@ -30,6 +30,7 @@ from .field import Field
 from .free_space import Scene, grow_exclusions, parse_scene
 from .funnel import taut_path
 from .geometry import Floats, Point, Ring, parse_point, parse_points
+from .partition.flat import NO_SPOTS
 from .path_tree import PathTree
 from .planned_path import PlannedPath, length_of, straightened
 from .plotting import Drawing
@@ -42,7 +43,7 @@ if TYPE_CHECKING:
 
     from .clearance import Geometries
     from .holes import Change
-    from .partition.flat import Answer, Engine
+    from .partition.flat import Answer, Engine, Spots
 
 __all__ = ["Planner", "plan_path"]
 
@@ -251,9 +252,14 @@ class Planner:
             raise ValueError(f'method must be "optimal", "pbpp-taut" or "pbpp", not {method!r}')
         if cost not in {"metric", "literal"}:
             raise ValueError(f'cost must be "metric" or "literal", not {cost!r}')
+        field = self._space.mitred
+        if method == "optimal" and should_stop is None and (searcher := field.searched.searcher) is not None:
+            answer = searcher.direct(*ends, field.scene.origin_m)
+            if answer is not None:
+                return _direct_path(field, answer, self._partition)
         plan = partial(self._plan_in, ends=ends, method=method, cost=cost, should_stop=should_stop)
         try:
-            return plan(self._space.mitred)
+            return plan(field)
         except (NoPathError, StartBlockedError, GoalBlockedError):
             if self.clearance_m == 0.0:
                 raise
@@ -296,17 +302,17 @@ class Planner:
         count, width = len(from_points), len(to_points)
         one, other = np.triu_indices(count, 1) if goals is None else np.indices((count, width)).reshape(2, -1)
         ends = np.stack((from_points[one], to_points[other]), axis=1)
-        lengths_m = np.full(len(ends), np.inf)
         self._space = self._space.holding([*from_points, *to_points])
-        searcher = self._space.mitred.searched.searcher
-        if searcher is not None:
-            search = partial(searcher.lengths_m, origin_m=self._space.scene.origin_m, should_stop=should_stop)
-            lengths_m = np.concatenate([lengths_m[:0], *spread(search, ends)])
-        for place in np.flatnonzero(np.isinf(lengths_m)).tolist():
-            if should_stop is not None and should_stop():
-                raise SearchStoppedError
-            with suppress(NoPathError, StartBlockedError, GoalBlockedError):
-                lengths_m[place] = self.plan(*ends[place]).length_m
+        lengths_m = _lengths_m(self._space.mitred, ends, should_stop)
+        if lengths_m is None:
+            lengths_m = np.full(len(ends), np.inf)
+            for place, pair in enumerate(ends):
+                if should_stop is not None and should_stop():
+                    raise SearchStoppedError
+                with suppress(NoPathError, StartBlockedError, GoalBlockedError):
+                    lengths_m[place] = self.plan(*pair).length_m
+        elif self.clearance_m > 0.0 and (lost := np.flatnonzero(np.isinf(lengths_m))).size:
+            lengths_m[lost] = _lengths_m(self._space.rounded, ends[lost], should_stop)
         matrix_m = np.zeros((count, width))
         matrix_m[one, other] = lengths_m
         return matrix_m + matrix_m.T if goals is None else matrix_m
@@ -334,11 +340,7 @@ class Planner:
         points = parse_points(np.asarray(ends, dtype=np.float64).reshape(-1, 2), "ends").reshape(-1, 2, 2)
         self._space = self._space.holding(points.reshape(-1, 2))
         field = self._space.mitred
-        searcher = field.searched.searcher
-        answers: Iterable[Answer | None] = [None] * len(points)
-        if searcher is not None:
-            search = partial(searcher.answers, origin_m=field.scene.origin_m)
-            answers = chain.from_iterable(spread(search, points))
+        answers = _answers(field, points)
         found: list[PlannedPath | PlanningError] = []
         for pair, answer in zip(points, answers, strict=True):
             try:
@@ -408,11 +410,6 @@ class Planner:
     def _plan_in(
         self, field: Field, ends: tuple[Point, Point], method: str, cost: str, should_stop: ShouldStop | None
     ) -> PlannedPath:
-        searcher = field.searched.searcher
-        if method == "optimal" and searcher is not None and should_stop is None:
-            answer = searcher.direct(*ends, field.scene.origin_m)
-            if answer is not None:
-                return _direct_path(field, answer, self._partition)
         common = field.require(ends[0], StartBlockedError) & field.require(ends[1], GoalBlockedError)
         if not common:
             raise NoPathError(self.clearance_m)
@@ -497,6 +494,42 @@ class _Found:
     blocks: int
     expanded: int
     sequence: Sequence[int] = ()
+
+
+def _lengths_m(field: Field, ends: Floats, should_stop: ShouldStop | None) -> Floats | None:
+    """Return the lengths of the paths of many queries, infinite where there is none; None if the planner is not compiled."""
+    searcher = field.searched.searcher
+    if searcher is None:
+        return None
+    search = partial(searcher.lengths_m, origin_m=field.scene.origin_m, should_stop=should_stop)
+
+    def searched(ends: Floats, spots: Spots) -> Floats:
+        return search(ends, spots=spots)
+
+    lengths_m = np.concatenate([np.empty(0), *spread(searched, ends, NO_SPOTS)])
+    unusual = np.flatnonzero(np.isinf(lengths_m))
+    if len(unusual):
+        lengths_m[unusual] = np.concatenate([*spread(searched, ends[unusual], field.spots(ends[unusual]))])
+    return lengths_m
+
+
+def _answers(field: Field, ends: Floats) -> list[Answer | None]:
+    """Return the paths of many queries; None where there is none, or if the planner is not compiled."""
+    searcher = field.searched.searcher
+    if searcher is None:
+        return [None] * len(ends)
+    search = partial(searcher.answers, origin_m=field.scene.origin_m)
+
+    def searched(ends: Floats, spots: Spots) -> list[Answer | None]:
+        return search(ends, spots=spots)
+
+    answers = list(chain.from_iterable(spread(searched, ends, NO_SPOTS)))
+    unusual = [place for place, answer in enumerate(answers) if answer is None]
+    if unusual:
+        found = spread(searched, ends[unusual], field.spots(ends[unusual]))
+        for place, answer in zip(unusual, chain.from_iterable(found), strict=True):
+            answers[place] = answer
+    return answers
 
 
 def _direct_path(field: Field, answer: Answer, partition: str | None) -> PlannedPath:

@@ -21,7 +21,7 @@ from pbpp.compiled.jit import released as _released
 from pbpp.compiled.jit import uncounted as _uncounted
 from pbpp.errors import SearchStoppedError
 from pbpp.partition.base import TOLERANCE_M
-from pbpp.partition.flat import Answer, record
+from pbpp.partition.flat import NO_SPOTS, Answer, Spots, record
 from pbpp.planned_path import STRAIGHT_M
 
 if TYPE_CHECKING:
@@ -50,6 +50,8 @@ _ROOT = record("x y g_m", "before turn")
 _NODE = record("f_m low high", "block direction root")  # a cone, or a mark in the place of its block
 _ENTRY = record("f_m", "node")  # of the heap
 _CONE = record("low high", "block direction steps")
+# Of a block the first of its ways out, in one line of the processor's cache. In another order than a way: numba would take the one for the other.
+_STEP = record("south north east", "low_end high_end block count first")
 _WAY = record("low high", "way")  # a way out of a block, as far as it is seen
 # Of a block its sides, east minus infinity if it is closed, what lies above its floor and below its ceiling, and the polygon that it lies in.
 _HALF_PLANES = ("floor_x", "floor_y", "floor_m", "ceiling_x", "ceiling_y", "ceiling_m")
@@ -76,6 +78,7 @@ _RESULT = record(
 ) = range(12)
 # How a search ended, or why it was left.
 _FOUND, _NO_PATH, _FULL, _PAUSED, _UNUSUAL, _LONG = range(6)
+_NUMBER, _STAGE, _WHY = range(3)  # of `_Work.at`
 _NEXT, _GOING, _ENDED = range(3)  # how far a query of many is
 _START_ROW, _GOAL_ROW, _NEIGHBOUR_ROW = 0, 1, 2  # of `_Work.ends`
 
@@ -83,8 +86,7 @@ _START_ROW, _GOAL_ROW, _NEIGHBOUR_ROW = 0, 1, 2  # of `_Work.ends`
 class _Map(NamedTuple):
     """What queries read."""
 
-    first: Ints
-    last: Ints
+    steps: Records  # (2, b): of each block the first of its ways out westwards and eastwards, how many there are and its place among all ways
     ways: Records
     corners: Records
     points: Floats  # of the vertices as given
@@ -106,6 +108,7 @@ class _Work(NamedTuple):
     ends: Ints  # (3, k): the blocks of start and goal, and the vertices next to the start
     goal: Floats
     sizes: Ints
+    at: Ints  # of many queries: the number of the one that is searched, how far it is, and why it was left
 
 
 class Searcher:
@@ -139,9 +142,10 @@ class Searcher:
         _count(of_block, grid, bucket_first)
         bucket = np.empty(int(bucket_first[-1]), np.int64)
         _fill(of_block, grid, bucket_first, bucket)
+        steps = np.empty(flat.first.shape, _STEP)
+        _lay_out(flat.first, flat.last, flat.ways, steps)
         self._map = _Map(
-            flat.first,
-            flat.last,
+            steps,
             flat.ways,
             flat.corners,
             vertices.points,
@@ -179,8 +183,7 @@ class Searcher:
         work = self._take()
         longest = max(map(len, ends))
         if longest > work.ends.shape[1]:
-            cones = np.empty(_MOST_CONES + 2 * longest, _CONE)
-            work = work._replace(ends=np.empty((3, longest), np.int64), cones=cones)
+            work = _wider(work, longest)
         for row, (size, numbers) in enumerate(zip((_STARTS, _GOALS, _NEIGHBOURS), ends, strict=True)):
             work.ends[row, : len(numbers)] = numbers
             work.sizes[size] = len(numbers)
@@ -220,9 +223,9 @@ class Searcher:
         """
         return self.answers(np.array((start, goal)).reshape(1, 2, 2), origin_m)[0]
 
-    def answers(self, ends: Floats, origin_m: Floats) -> list[Answer | None]:
-        """Return the paths of many queries as `direct` does, from an (n, 2, 2) array of starts and goals."""
-        results, turns, points = self._answered(ends, origin_m, keeps=True)
+    def answers(self, ends: Floats, origin_m: Floats, spots: Spots = NO_SPOTS) -> list[Answer | None]:
+        """Return the paths of many queries as `direct` does, from an (n, 2, 2) array of starts and goals; with spots also those that begin or end there."""
+        results, turns, points = self._answered(ends, origin_m, spots, keeps=True)
         found: list[Answer | None] = []
         turned = kept = 0
         for length_m, status, expanded, last_turned, last_kept in results.tolist():
@@ -232,16 +235,20 @@ class Searcher:
         return found
 
     def lengths_m(
-        self, ends: Floats, origin_m: Floats, should_stop: Callable[[], bool] | None = None
+        self,
+        ends: Floats,
+        origin_m: Floats,
+        spots: Spots = NO_SPOTS,
+        should_stop: Callable[[], bool] | None = None,
     ) -> Floats:
-        """Return the lengths in metres of the paths of many queries, infinite where `direct` returns None.
+        """Return the lengths in metres of the paths of many queries, infinite where `answers` has None.
 
         Raises
         ------
         SearchStoppedError
             If the caller stopped it.
         """
-        lengths_m: Floats = self._answered(ends, origin_m, keeps=False, should_stop=should_stop)[0][
+        lengths_m: Floats = self._answered(ends, origin_m, spots, keeps=False, should_stop=should_stop)[0][
             "length_m"
         ]
         return lengths_m
@@ -250,28 +257,33 @@ class Searcher:
         self,
         ends: Floats,
         origin_m: Floats,
+        spots: Spots,
         *,
         keeps: bool,
         should_stop: Callable[[], bool] | None = None,
     ) -> tuple[Records, Floats, Floats]:
         """Return a record for each query, the points of all paths one after the other, and of these those not on a straight way."""
         results, paths = np.empty(len(ends), _RESULT), np.empty((2, _PATH, 2))
-        at = np.array([0, _NEXT, 0])
         chunk = -1 if should_stop is None else _CHUNK
         east, north = origin_m.tolist()
         work = self._take()
+        at = work.at
+        at[_NUMBER], at[_STAGE] = 0, _NEXT
+        if spots.most > work.ends.shape[1]:
+            work = _wider(work, spots.most)
         try:
-            while _many(self._map, work, ends, east, north, results, paths, keeps, at, chunk) < len(ends):
-                if at[2] == _LONG:
+            while _many(self._map, work, ends, east, north, spots, results, paths, keeps, chunk) < len(ends):
+                if at[_WHY] == _LONG:
                     longer = np.empty((2, 2 * paths.shape[1] + len(work.roots), 2))
                     longer[:, : paths.shape[1]] = paths
                     paths = longer
-                elif at[2] == _FULL:
+                elif at[_WHY] == _FULL:
                     work = _longer(work)
                 elif should_stop is not None and should_stop():
                     raise SearchStoppedError
         finally:
-            _clear(work)
+            if at[_NUMBER] < len(ends):
+                _clear(work)
             self._idle.append(work)
         return results, paths[0], paths[1]
 
@@ -289,7 +301,13 @@ class Searcher:
                 np.empty((3, _MOST_CONES // 2), np.int64),
                 np.empty(2),
                 np.zeros(12, np.int64),
+                np.zeros(3, np.int64),
             )
+
+
+def _wider(work: _Work, most: int) -> _Work:
+    """Return arrays for ends that lie in so many blocks."""
+    return work._replace(ends=np.empty((3, most), np.int64), cones=np.empty(_MOST_CONES + 2 * most, _CONE))
 
 
 def _longer(work: _Work) -> _Work:
@@ -340,6 +358,18 @@ def _fill(places: Records, grid: Floats, bucket_first: Ints, bucket: Ints) -> No
 
 
 @_uncounted
+def _lay_out(first: Ints, last: Ints, ways: Records, steps: Records) -> None:
+    for direction in range(2):
+        for block in range(first.shape[1]):
+            step, place = steps[direction, block], first[direction, block]
+            step.count, step.first = last[direction, block] - place, place
+            if step.count > 0:
+                way = ways[direction, place]
+                step.east, step.south, step.north = way.east, way.south, way.north
+                step.low_end, step.high_end, step.block = way.low_end, way.high_end, way.block
+
+
+@_uncounted
 def _locate(the_map: _Map, x: float, y: float) -> int:
     """Return the block that a point lies in; -1 if it lies in none or near any edge: then rounding decides, and `Places` must be asked."""
     found = -1
@@ -365,6 +395,40 @@ def _locate(the_map: _Map, x: float, y: float) -> int:
     return int(found)
 
 
+@_uncounted
+def _find_ends(the_map: _Map, work: _Work, ends: Floats, origin_x: float, origin_y: float) -> bool:
+    """Begin a query that starts and ends well inside of a block each, and return whether it does."""
+    start_x, start_y = ends[0, 0] - origin_x, ends[0, 1] - origin_y
+    goal_x, goal_y = ends[1, 0] - origin_x, ends[1, 1] - origin_y
+    here, there = _locate(the_map, start_x, start_y), _locate(the_map, goal_x, goal_y)
+    if here < 0 or there < 0 or the_map.places[here].owner != the_map.places[there].owner:
+        return False
+    work.ends[_START_ROW, 0], work.ends[_GOAL_ROW, 0] = here, there
+    work.sizes[_STARTS], work.sizes[_GOALS], work.sizes[_NEIGHBOURS] = 1, 1, 0
+    _begin(the_map, work, start_x, start_y, goal_x, goal_y)
+    return True
+
+
+@_uncounted
+def _take_ends(the_map: _Map, work: _Work, spots: Spots, number: int) -> bool:
+    """Begin a query between two spots, and return whether it has them."""
+    start, goal = spots.of[number, 0], spots.of[number, 1]
+    if start < 0 or goal < 0:
+        return False
+    for row, size, spot, column in (
+        (_START_ROW, _STARTS, start, 0),
+        (_GOAL_ROW, _GOALS, goal, 0),
+        (_NEIGHBOUR_ROW, _NEIGHBOURS, start, 1),
+    ):
+        first, last = spots.first[spot, column], spots.first[spot, column + 1]
+        for place in range(first, last):
+            work.ends[row, place - first] = spots.numbers[place]
+        work.sizes[size] = last - first
+    at = spots.at_m
+    _begin(the_map, work, at[start, 0], at[start, 1], at[goal, 0], at[goal, 1])
+    return True
+
+
 @_released
 def _many(
     the_map: _Map,
@@ -372,57 +436,51 @@ def _many(
     ends: Floats,
     origin_x: float,
     origin_y: float,
+    spots: Spots,
     results: Records,
     paths: Floats,
     keeps: bool,  # noqa: FBT001 - compiled
-    at: Ints,
     chunk: int,
 ) -> int:
-    """Answer queries from the one in `at` on; return how many of them are done. If not all are, the last of `at` says why."""
-    sizes = work.sizes
+    """Answer queries from the one in `_Work.at` on; return how many of them are done. If not all are, the last of it says why."""
+    sizes, at = work.sizes, work.at
     left = chunk
-    while at[0] < len(ends):
-        number = at[0]
-        result, start, goal = results[number], ends[number, 0], ends[number, 1]
+    while at[_NUMBER] < len(ends):
+        number = at[_NUMBER]
+        result = results[number]
         turned = kept = 0
         if keeps and number > 0:
             turned, kept = results[number - 1].turned, results[number - 1].kept
         result.turned, result.kept, result.length_m = turned, kept, inf
-        if at[1] == _NEXT:
-            start_x, start_y, goal_x, goal_y = (
-                start[0] - origin_x,
-                start[1] - origin_y,
-                goal[0] - origin_x,
-                goal[1] - origin_y,
-            )
-            here, there = _locate(the_map, start_x, start_y), _locate(the_map, goal_x, goal_y)
-            if here < 0 or there < 0 or the_map.places[here].owner != the_map.places[there].owner:
+        if at[_STAGE] == _NEXT:
+            if len(spots.of) == 0:
+                begun = _find_ends(the_map, work, ends[number], origin_x, origin_y)
+            else:
+                begun = _take_ends(the_map, work, spots, number)
+            if not begun:
                 result.status, result.expanded = _UNUSUAL, 0
-                at[0] += 1
+                at[_NUMBER] += 1
                 continue
-            work.ends[_START_ROW, 0], work.ends[_GOAL_ROW, 0] = here, there
-            sizes[_STARTS], sizes[_GOALS], sizes[_NEIGHBOURS] = 1, 1, 0
-            _begin(the_map, work, start_x, start_y, goal_x, goal_y)
-            at[1] = _GOING
-        if at[1] == _GOING:
+            at[_STAGE] = _GOING
+        if at[_STAGE] == _GOING:
             result.status = _search(the_map, work, left)
             if result.status == _FULL or result.status == _PAUSED:  # noqa: PLR1714 - compiled
-                at[2] = result.status
+                at[_WHY] = result.status
                 return int(number)
-            at[1] = _ENDED
+            at[_STAGE] = _ENDED
             if chunk >= 0:
                 left = max(left - sizes[_EXPANDED], 0)
         if result.status == _FOUND:
             root = work.nodes[sizes[_TAKEN]].root
             if turned + _turns(work, root) + 2 > paths.shape[1]:
-                at[2] = _LONG
+                at[_WHY] = _LONG
                 return int(number)
             result.turned, result.kept, result.length_m = _draw(
-                the_map, work, root, start, goal, origin_x, origin_y, paths, turned, kept
+                the_map, work, root, ends[number], origin_x, origin_y, paths, turned, kept
             )
         result.expanded = sizes[_EXPANDED]
         _clear(work)
-        at[0], at[1] = number + 1, _NEXT
+        at[_NUMBER], at[_STAGE] = number + 1, _NEXT
     return len(ends)
 
 
@@ -452,8 +510,7 @@ def _draw(
     the_map: _Map,
     work: _Work,
     root: int,
-    start: Floats,
-    goal: Floats,
+    ends: Floats,
     origin_x: float,
     origin_y: float,
     paths: Floats,
@@ -461,7 +518,7 @@ def _draw(
     kept: int,
 ) -> tuple[int, int, float]:
     """Write a path's points, and those that `straightened` keeps of them, behind those of the queries before; return where they end, and the length."""
-    turns, points = paths[0], paths[1]
+    turns, points, start, goal = paths[0], paths[1], ends[0], ends[1]
     count = _turns(work, root)
     place = turned + count
     while root > 0:
@@ -590,28 +647,47 @@ def _follow(
 
     Return how many entries it lacks room for: 0, or the cone is left where it has come to, to be followed again.
     """
-    first, last, sizes, nodes = the_map.first, the_map.last, work.sizes, work.nodes
+    sizes, nodes = work.sizes, work.nodes
     block, direction, low, high, steps = cone.block, cone.direction, cone.low, cone.high, cone.steps
+    root_x, root_y = work.roots[root].x, work.roots[root].y
+    low_side = _RIGHT if direction == _EAST else _LEFT
     while True:
-        entries = 4 * (last[direction, block] - first[direction, block])
+        step = the_map.steps[direction, block]
+        entries = 4 * step.count
         if sizes[_NODES] + _MARGIN + entries > len(nodes):
             cone.block, cone.low, cone.high, cone.steps = block, low, high, steps
             return int(entries)
         if _holds_goal(work, block) and _sees_goal(goal_x, goal_y, work.roots[root], low, high):
             _push_goal(work, goal_x, goal_y, root)
-        count = _look(the_map, work, goal_x, goal_y, root, block, direction, low, high)
+        if step.count == 1:
+            low, high = _through(
+                the_map, work, goal_x, goal_y, root, root_x, root_y, step, direction, low_side, low, high
+            )
+            block = step.block
+            steps += 1
+            if not low <= high or _waits(
+                work, goal_x, goal_y, root, step, block, direction, low, high, steps
+            ):
+                return 0
+            continue
+        count = 0
+        for place in range(step.first, step.first + step.count):
+            way = the_map.ways[direction, place]
+            new_low, new_high = _through(
+                the_map, work, goal_x, goal_y, root, root_x, root_y, way, direction, low_side, low, high
+            )
+            if new_low <= new_high:
+                one = work.seen[count]
+                one.way, one.low, one.high = place, new_low, new_high
+                count += 1
         if count != 1:
             break
         low, high = work.seen[0].low, work.seen[0].high
         way = the_map.ways[direction, work.seen[0].way]
         block = way.block
         steps += 1
-        if (
-            steps % 8 == 0
-            and sizes[_HEAP] > 0
-            and _bound(goal_x, goal_y, work.roots[root], way, low, high) > work.heap[0].f_m
-        ):
-            break
+        if _waits(work, goal_x, goal_y, root, way, block, direction, low, high, steps):
+            return 0
     for one in work.seen[:count]:
         way = the_map.ways[direction, one.way]
         f_m = _bound(goal_x, goal_y, work.roots[root], way, one.low, one.high)
@@ -620,50 +696,67 @@ def _follow(
 
 
 @_inlined
-def _look(
+def _waits(
+    work: _Work,
+    goal_x: float,
+    goal_y: float,
+    root: int,
+    way: Any,  # noqa: ANN401 - a record
+    block: int,
+    direction: int,
+    low: float,
+    high: float,
+    steps: int,
+) -> bool:
+    """Queue a cone that runs far ahead of better ones, which is looked at now and then, and return whether it was queued."""
+    if steps % 8 != 0 or work.sizes[_HEAP] == 0:
+        return False
+    f_m = _bound(goal_x, goal_y, work.roots[root], way, low, high)
+    if f_m <= work.heap[0].f_m:
+        return False
+    _push(work, f_m, block, direction, root, low, high)
+    return True
+
+
+@_inlined
+def _through(
     the_map: _Map,
     work: _Work,
     goal_x: float,
     goal_y: float,
     root: int,
-    block: int,
+    root_x: float,
+    root_y: float,
+    way: Any,  # noqa: ANN401 - a record
     direction: int,
+    low_side: int,
     low: float,
     high: float,
-) -> int:
-    """Find the ways out of a block that a cone sees, reach the corners beside them, and return how many there are."""
-    seen = work.seen
-    root_x, root_y = work.roots[root].x, work.roots[root].y
-    low_side = _RIGHT if direction == _EAST else _LEFT
-    count = 0
-    for place in range(the_map.first[direction, block], the_map.last[direction, block]):
-        way = the_map.ways[direction, place]
-        run = way.east - root_x if direction == _EAST else root_x - way.east
-        if run <= 0.0:
-            continue
-        rise_low, ray_high = way.south - root_y, high * run + _SLACK_M
-        if ray_high < rise_low:
-            continue
-        rise_high, ray_low = way.north - root_y, low * run - _SLACK_M
-        if ray_low > rise_high:
-            continue
-        new_low, new_high = low, high
-        if way.low_end != -1 and rise_low >= ray_low:
-            if way.low_end >= 0:
-                _reach(the_map, work, goal_x, goal_y, root, way.low_end, low_side)
-            slope = rise_low / run
-            if slope > low:
-                new_low = slope
-        if way.high_end != -1 and rise_high <= ray_high:
-            if way.high_end >= 0:
-                _reach(the_map, work, goal_x, goal_y, root, way.high_end, 1 - low_side)
-            slope = rise_high / run
-            if slope < high:
-                new_high = slope
-        if new_low <= new_high:
-            seen[count].way, seen[count].low, seen[count].high = place, new_low, new_high
-            count += 1
-    return count
+) -> tuple[float, float]:
+    """Return a cone as a way lets it through, and reach the corners beside it; the wrong way round if nothing is seen."""
+    run = way.east - root_x if direction == _EAST else root_x - way.east
+    if run <= 0.0:
+        return inf, -inf
+    rise_low, ray_high = way.south - root_y, high * run + _SLACK_M
+    if ray_high < rise_low:
+        return inf, -inf
+    rise_high, ray_low = way.north - root_y, low * run - _SLACK_M
+    if ray_low > rise_high:
+        return inf, -inf
+    new_low, new_high = low, high
+    if way.low_end != -1 and rise_low >= ray_low:
+        if way.low_end >= 0:
+            _reach(the_map, work, goal_x, goal_y, root, way.low_end, low_side)
+        slope = rise_low / run
+        if slope > low:
+            new_low = slope
+    if way.high_end != -1 and rise_high <= ray_high:
+        if way.high_end >= 0:
+            _reach(the_map, work, goal_x, goal_y, root, way.high_end, 1 - low_side)
+        slope = rise_high / run
+        if slope < high:
+            new_high = slope
+    return new_low, new_high
 
 
 @_inlined

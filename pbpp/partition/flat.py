@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = [
     "BLOCK",
     "CORNER",
+    "NO_SPOTS",
     "PORTAL",
     "WAY",
     "Answer",
@@ -26,6 +27,7 @@ __all__ = [
     "FlatSearch",
     "FlatSlabs",
     "Records",
+    "Spots",
     "record",
 ]
 
@@ -120,6 +122,36 @@ class FlatSlabs(NamedTuple):
         return FlatSlabs(blocks, part.portals, first, last, ways, corners, self.ends_with)
 
 
+class Spots(NamedTuple):
+    """Where queries begin and end that do not lie well inside of one block, as `pbpp.field.Field.spots` puts them into free space.
+
+    Parameters
+    ----------
+    of : (n, 2) array of int
+        The spots of start and goal of each query; -1 where there is none.
+    at_m : (k, 2) array
+        Where they are, metres from the scene's origin.
+    first : (k, 3) array of int
+        Where in `numbers` the blocks of each begin, where the vertices next to it on the side line of a block, and where these end.
+    numbers : (m,) array of int
+        Blocks and vertices.
+    most : int
+        The most blocks or vertices that one has.
+    """
+
+    of: Ints
+    at_m: Floats
+    first: Ints
+    numbers: Ints
+    most: int
+
+
+NO_SPOTS = Spots(
+    np.empty((0, 2), np.int64), np.empty((0, 2)), np.empty((0, 3), np.int64), np.empty(0, np.int64), 0
+)
+"""Where all ends are looked for by the search itself."""
+
+
 class Answer(NamedTuple):
     """A shortest path.
 
@@ -156,11 +188,15 @@ class FlatSearch(Protocol):
     def direct(self, start: Point, goal: Point, origin_m: Floats) -> Answer | None:
         """Return the shortest path between two points that lie well inside of one block each."""
 
-    def answers(self, ends: Floats, origin_m: Floats) -> list[Answer | None]:
-        """Return the paths of many queries as `direct` does."""
+    def answers(self, ends: Floats, origin_m: Floats, spots: Spots = NO_SPOTS) -> list[Answer | None]:
+        """Return the paths of many queries as `direct` does; with spots also those that begin or end there."""
 
     def lengths_m(
-        self, ends: Floats, origin_m: Floats, should_stop: Callable[[], bool] | None = None
+        self,
+        ends: Floats,
+        origin_m: Floats,
+        spots: Spots = NO_SPOTS,
+        should_stop: Callable[[], bool] | None = None,
     ) -> Floats:
         """Return the lengths of the paths of many queries."""
 

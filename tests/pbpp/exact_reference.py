@@ -136,6 +136,17 @@ class ExactReference:
             self._seen[node] = lengths
         return self._seen[node]
 
+    def places(self, point):
+        """Return where an end may stand: itself in free space, else the nearest place; all of them where several are as near within rounding."""
+        point = np.asarray(point, dtype=float)
+        if self._free.covers(shapely.Point(point)):
+            return [point]
+        share = np.clip(dot(point - self._a, self._edge) / self._edge_m**2, 0, 1)
+        feet = self._a + share[:, None] * self._edge
+        away_m = np.hypot(*(feet - point).T)
+        feet = feet[away_m <= away_m.min() + ON_M]
+        return [foot for one, foot in enumerate(feet) if (np.hypot(*(feet[:one] - foot).T) > ON_M).all()]
+
     def _end(self, point):
         point = np.asarray(point, dtype=float)
         if not self._free.covers(shapely.Point(point)):

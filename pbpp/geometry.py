@@ -175,7 +175,7 @@ def parse_rings(rings: Sequence[Ring], kind: str) -> list[BaseGeometry]:
         polygons = np.asarray(shapely.polygons(shapely.linearrings(points, indices=owner)), dtype=object)
         for place, polygon in zip(places, polygons.tolist(), strict=True):
             found[place] = polygon
-    parts: list[BaseGeometry] = np.array(found, dtype=object).tolist()
+    parts: list[BaseGeometry] = [part for part in found if part is not None]
     for index in np.flatnonzero(~shapely.is_valid(parts)).tolist():
         parts[index] = _repaired(parts[index], kind)
     return parts

@@ -138,7 +138,7 @@ def _within_walls(parts: Geometries, cluster: Ints) -> dict[int, list[Polygon]]:
     is_outer = (count[wall] == 1) & ~np.isin(members, members[is_odd[wall]])
     cluster_at = np.zeros(len(places), dtype=np.intp)
     cluster_at[start] = members
-    loops = _loops(start[is_outer].tolist(), end[is_outer].tolist(), places.tolist())
+    loops = _loops(start[is_outer], end[is_outer], places.tolist())
     if not loops:
         return {}
     sizes = list(map(len, loops))
@@ -151,49 +151,81 @@ def _within_walls(parts: Geometries, cluster: Ints) -> dict[int, list[Polygon]]:
     return _assembled(outlines, cluster_at[corners[first]])
 
 
-def _loops(start: list[int], end: list[int], places: Sequence[complex]) -> list[list[int]]:
+def _loops(start: Ints, end: Ints, places: Sequence[complex]) -> list[list[int]]:
     """Return the walls' loops, none of which comes to a point twice; where houses touch in a point, each has its own."""
-    onwards: dict[int, list[int]] = {}
-    for one, other in zip(start, end, strict=True):
-        onwards.setdefault(one, []).append(other)
+    onwards = np.full(len(places), -1)
+    onwards[start] = end
+    forked = np.flatnonzero(np.bincount(start, minlength=len(places)) > 1)
+    onwards[forked] = -1
+    forks: dict[int, list[int]] = {place: [] for place in forked.tolist()}
+    at_fork = np.isin(start, forked)
+    for one, other in zip(start[at_fork].tolist(), end[at_fork].tolist(), strict=True):
+        forks[one].append(other)
+    ways = onwards.tolist()
+    loops = [loop for fork in forks for loop in _loops_from(fork, forks, ways, places)]
+    for first, here in enumerate(ways):
+        if here >= 0:
+            loop = [first]
+            while here != first:
+                loop.append(here)
+                ways[here], here = -1, ways[here]
+            loops.append(loop)
+    return loops
+
+
+def _loops_from(
+    first: int, forks: dict[int, list[int]], ways: list[int], places: Sequence[complex]
+) -> list[list[int]]:
+    """Return the loops of the walls that lead on from a place where houses touch, and mark the ways that they take as gone."""
     loops = []
-    for first, ways in onwards.items():
-        path, place, before = [first], {first: 0}, first
-        while ways or len(path) > 1:
-            here = path[-1]
-            open_ways = onwards[here]
-            if len(open_ways) > 1 and before != here:
-                back = places[before] - places[here]
-                # The house lies to the left: on the way back from here its other wall comes first, clockwise.
-                open_ways.sort(key=lambda other: -(phase(back / (places[other] - places[here])) % tau))
-            point, before = open_ways.pop(), here
-            since = place.get(point)
-            if since is None:
-                place[point] = len(path)
-                path.append(point)
-                continue
-            loops.append(path[since:])
-            for passed in path[since + 1 :]:
-                del place[passed]
-            del path[since + 1 :]
+    path, at, before = [first], {first: 0}, first
+    while forks[first] or len(path) > 1:
+        here = path[-1]
+        onwards = forks[here]
+        if len(onwards) > 1 and before != here:
+            back = places[before] - places[here]
+            # The house lies to the left: on the way back from here its other wall comes first, clockwise.
+            onwards.sort(key=lambda other: -(phase(back / (places[other] - places[here])) % tau))
+        before, point = here, onwards.pop()
+        while ways[point] >= 0:
+            path.append(point)
+            ways[point], before, point = -1, point, ways[point]
+        since = at.get(point)  # only where houses touch a loop may come twice
+        if since is None:
+            at[point] = len(path)
+            path.append(point)
+            continue
+        loops.append(path[since:])
+        for passed in path[since + 1 :]:
+            at.pop(passed, None)
+        del path[since + 1 :]
     return loops
 
 
 def _assembled(outlines: Geometries, cluster: Ints) -> dict[int, list[Polygon]]:
     """Return the polygons that loops bound, counter-clockwise about them and clockwise about their courts, of those clusters where they are valid."""
     is_shell = np.asarray(shapely.is_ccw(outlines), dtype=bool)
-    is_single = np.bincount(cluster)[cluster] == 1
-    single = is_single & is_shell
-    polygons = np.asarray(shapely.polygons(outlines[single]), dtype=object)
+    shells = np.bincount(cluster, is_shell)
+    is_lone = shells[cluster] == 1  # the shell of its cluster, or a court in it
+    names, courts = cluster[is_shell & is_lone], cluster[~is_shell & is_lone]
+    order = np.argsort(courts, kind="stable")
+    number = np.bincount(courts, minlength=len(shells))
+    first = np.cumsum(number) - number
+    holes = np.full((len(names), int(number.max(initial=0))), None, dtype=object)
+    rows = np.zeros(len(shells), dtype=np.intp)
+    rows[names] = np.arange(len(names))
+    courts = courts[order]
+    holes[rows[courts], np.arange(len(courts)) - first[courts]] = outlines[~is_shell & is_lone][order]
+    polygons = np.asarray(shapely.polygons(outlines[is_shell & is_lone], holes), dtype=object)
     is_valid = shapely.is_valid(polygons)
-    names = cluster[single][is_valid].tolist()
-    found = {name: [polygon] for name, polygon in zip(names, polygons[is_valid].tolist(), strict=True)}
+    valid = zip(names[is_valid].tolist(), polygons[is_valid].tolist(), strict=True)
+    found = {name: [polygon] for name, polygon in valid}
     loops: dict[int, tuple[list[LinearRing], list[LinearRing]]] = {}
-    for place in np.flatnonzero(~is_single).tolist():
+    for place in np.flatnonzero(shells[cluster] > 1).tolist():
         loops.setdefault(int(cluster[place]), ([], []))[not is_shell[place]].append(outlines[place])
-    for name, (shells, courts) in loops.items():
-        several = _each(shells, courts) if len(shells) > 1 else [Polygon(one, courts) for one in shells]
-        if several and shapely.is_valid(MultiPolygon(several)):
+    for name, (rings, within) in loops.items():
+        several = _each(rings, within)
+        if shapely.is_valid(MultiPolygon(several)):
             found[name] = several
     return found
 

@@ -81,7 +81,9 @@ class Scene:
         part = parse_rings([ring], "exclusion")[0]
         if self.origin_m.any():
             part = shapely.transform(part, lambda points: points - self.origin_m)
-        return replace(self, exclusions=np.append(self.exclusions, [part]))
+        exclusions = np.empty(len(self.exclusions) + 1, dtype=object)
+        exclusions[:-1], exclusions[-1] = self.exclusions, part
+        return replace(self, exclusions=exclusions)
 
     def without_exclusion(self, index: int) -> Scene:
         """Return the same fence without one of its exclusions."""

@@ -119,7 +119,7 @@ class Holes:
     def with_obstacle(self, added: Geometries) -> Change | None:
         """Return what a grown exclusion changes that becomes the last one; None if more than holes."""
         return self._changed(
-            np.append(self.free.grown, added), shapely.get_parts(added), shapely.get_parts(added)
+            np.concatenate((self.free.grown, added)), shapely.get_parts(added), shapely.get_parts(added)
         )
 
     def without_obstacle(self, index: int) -> Change | None:
@@ -137,8 +137,10 @@ class Holes:
         if len(around) != 1 or self.has_island[touched].any() or (self.owner[touched] != around[0]).any():
             return None
         if len(touched):
-            parts = shapely.get_parts(grown)
-            added = parts[_meeting(np.append(self.holes[touched], added), parts, shapely.bounds(parts))]
+            united_anew = np.concatenate((self.holes[touched], added))
+            # Their parts are copies: only of those nearby.
+            parts = shapely.get_parts(grown[_near(united_anew, shapely.bounds(grown))])
+            added = parts[_meeting(united_anew, parts, shapely.bounds(parts))]
         try:
             holes = united(added) if len(added) else added
             if shapely.get_num_interior_rings(holes).any():
@@ -156,13 +158,13 @@ class Holes:
         new = np.asarray(shapely.polygons(rings), dtype=object)
         holes = replace(
             self,
-            rings=np.append(self.rings[kept], rings),
-            holes=np.append(self.holes[kept], new),
+            rings=np.concatenate((self.rings[kept], rings)),
+            holes=np.concatenate((self.holes[kept], new)),
             bounds=np.concatenate((self.bounds[kept], shapely.bounds(new))),
-            owner=np.append(self.owner[kept], np.full(len(rings), owner)),
-            has_island=np.append(self.has_island[kept], np.zeros(len(rings), dtype=bool)),
-            first=np.append(self.first[kept], first),
-            size=np.append(self.size[kept], sizes),
+            owner=np.concatenate((self.owner[kept], np.full(len(rings), owner))),
+            has_island=np.concatenate((self.has_island[kept], np.zeros(len(rings), dtype=bool))),
+            first=np.concatenate((self.first[kept], first)),
+            size=np.concatenate((self.size[kept], sizes)),
             vertices=self.vertices + int(sizes.sum()),
         )
         within = holes.rings[holes.owner == owner]
@@ -180,6 +182,15 @@ class Holes:
             clockwise,
             owner,
         )
+
+
+def _near(some: Geometries, bounds: Floats) -> Flags:
+    """Return which of many geometries, given by their bounds, have bounds in common with any of a few."""
+    west, south, east, north = bounds.T
+    is_near = np.zeros(len(bounds), dtype=bool)
+    for one_west, one_south, one_east, one_north in shapely.bounds(some).tolist():
+        is_near |= (west <= one_east) & (east >= one_west) & (south <= one_north) & (north >= one_south)
+    return is_near
 
 
 def _meeting(some: Geometries, others: Geometries, bounds: Floats) -> Ints:

@@ -66,9 +66,12 @@ def united(parts: Geometries) -> Geometries:
 
 def _grouped(parts: Geometries) -> tuple[Geometries, Geometries, Geometries]:
     """Return the obstacles that touch nothing, the unions of clusters that are one polygon, and the polygons of all others, which may touch one another."""
+    none = parts[:0]
+    if len(parts) == 1:
+        return parts, none, none
     cluster, has_common_corners = _clusters(parts)
     is_alone = np.bincount(cluster, minlength=len(parts))[cluster] == 1
-    alone, none = parts[is_alone], parts[:0]
+    alone = parts[is_alone]
     if is_alone.all():
         return alone, none, none
     is_tried = np.zeros(len(parts), dtype=bool)
@@ -163,13 +166,14 @@ def _loops(start: Ints, end: Ints, places: Sequence[complex]) -> list[list[int]]
         forks[one].append(other)
     ways = onwards.tolist()
     loops = [loop for fork in forks for loop in _loops_from(fork, forks, ways, places)]
-    for first, here in enumerate(ways):
-        if here >= 0:
-            loop = [first]
-            while here != first:
-                loop.append(here)
-                ways[here], here = -1, ways[here]
-            loops.append(loop)
+    for first in range(len(ways)):
+        loop = [first]
+        while ways[loop[-1]] >= 0:
+            here = loop[-1]
+            loop.append(ways[here])
+            ways[here] = -1
+        if len(loop) > 1:
+            loops.append(loop[:-1])
     return loops
 
 

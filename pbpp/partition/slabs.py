@@ -127,7 +127,7 @@ class Slabs:
     def _patch(self, vertices: Vertices, patch: Patch, part: Sweep | FlatSlabs) -> None:
         """Take over a window swept anew, before anything but the sides was asked for."""
         more = np.zeros(len(patch.blocks.west) - len(self._blocks.west))
-        sides = [np.append(side, more) for side in self._sides]
+        sides = [np.concatenate((side, more)) for side in self._sides]
         self.vertices, self._blocks, self._dead = vertices, patch.blocks, patch.dead
         if isinstance(self.swept, Sweep):
             assert isinstance(part, Sweep)  # by the same engine
@@ -135,7 +135,7 @@ class Slabs:
         else:
             assert not isinstance(part, Sweep)
             self.swept = self.swept.patched(patch, part)
-        changed = np.append(patch.numbers, patch.dead)
+        changed = np.concatenate((patch.numbers, patch.dead))
         for side, values in zip(sides, self._sides_of(changed), strict=True):
             side[changed] = values
         self._sides = (sides[0], sides[1], sides[2], sides[3])

@@ -164,17 +164,17 @@ class Vertices:
             is_live[self.next[gone]].any() or is_live[self.prev[gone]].any()
         ):  # linked with others where they touch
             return None
-        after, prior = np.append(self.next, added + 1), np.append(self.prev, added - 1)
+        after, prior = np.concatenate((self.next, added + 1)), np.concatenate((self.prev, added - 1))
         after[ends - 1], prior[starts] = starts, ends - 1
         after[gone] = prior[gone] = gone
         new = copy(self)
         new.__dict__.pop("fans", None)
         new.names, new.next, new.prev = np.arange(total), after, prior
         new.points = np.concatenate((self.points, *rings))
-        new.owner = np.append(self.owner, np.full(len(added), owner))
+        new.owner = np.concatenate((self.owner, np.full(len(added), owner)))
         if not new._placed(self, is_live, added):  # noqa: SLF001 - a copy
             return None
-        new.corner = np.append(self.corner, new._corners(added))  # noqa: SLF001 - a copy
+        new.corner = np.concatenate((self.corner, new._corners(added)))  # noqa: SLF001 - a copy
         return new
 
     def _placed(self, before: Vertices, is_live: Flags, added: Ints) -> bool:
@@ -184,7 +184,7 @@ class Vertices:
         kept = before._by_east[is_live[before._by_east]]
         places = np.searchsorted(self.points[kept, 0], easts[order], side="right")
         self._by_east = np.insert(kept, places, added[order])
-        self.x, self.y = np.append(before.x, easts), np.append(before.y, norths)
+        self.x, self.y = np.concatenate((before.x, easts)), np.concatenate((before.y, norths))
         self.line_x, self.line_start, self.x[self._by_east] = _lines(self.points[self._by_east, 0])
         if (self.x[kept] != before.x[kept]).any():
             return False

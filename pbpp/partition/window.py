@@ -225,7 +225,7 @@ def _numbered(opened: Ints, size: int, kept: list[tuple[int, int]], is_free: Fla
     free = np.flatnonzero(is_free)
     unnumbered = np.flatnonzero(numbers < 0)
     count = len(is_free) + max(0, len(unnumbered) - len(free))
-    free = np.append(free, np.arange(len(is_free), count))
+    free = np.concatenate((free, np.arange(len(is_free), count)))
     numbers[unnumbered], dead = np.split(free, [len(unnumbered)])
     return numbers, dead, count
 

@@ -1,25 +1,33 @@
-"""Compare the planner with its peers: ``python benchmarks/planner/run.py``.
+"""Compare the planner with its peers: ``python benchmarks/planner/run.py [--maps DIR]``.
 
-(BENCH_SLOW=1 also runs what takes minutes, whose figures are kept with their date else; ``--ratios`` only measures the ratios anew).
+(BENCH_SLOW=1 also runs what takes minutes, whose figures are kept with their date else; ``--ratios`` only measures the ratios anew, ``--only PEER ...`` runs a few planners anew; ``--maps`` adds the maps of
+a folder, JSON files like the cases in tests/pbpp/data, whose lengths are compared with ours).
 
-Each peer runs in a pinned virtual environment of its own under benchmarks/planner/.venvs, made here when it is missing; each pair of
-planner and case runs in a process of its own, one after the other. Paths are checked by shapely. Writes benchmarks/results/planner.*.
+Each peer runs in a pinned virtual environment of its own under benchmarks/planner/.venvs, or in a folder of npm's there, made here when it is missing; where
+node or npm is missing its peers are left out, with a word. Each pair of planner and case runs in a process of its own, one after the other. Paths are
+checked by shapely. Writes benchmarks/results/planner.*.
 """
 
 from __future__ import annotations
 
+import argparse
 import datetime as dt
 import json
 import os
 import platform
+import shutil
 import statistics
 import subprocess
 import sys
+import tempfile
+import time
 from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 import shapely
+
+import pbpp
 
 HERE = Path(__file__).parent
 DATA = HERE.parents[1] / "tests" / "pbpp" / "data"
@@ -31,6 +39,7 @@ SLOW = ("extremitypathfinder", "rand1000")
 SLOW_S = 3000
 RUNS = 3
 QUICK_S = 5
+NODE = ("node", "npm")
 FEW_QUERIES = {"ompl": 4, "pathplanning": 8}
 INSIDE_M = 1e-6
 
@@ -52,21 +61,66 @@ def python_of(peer: str) -> str:
     return str(home / "bin" / "python")
 
 
-def measure(peer: str, name: str) -> dict:
-    """Return what one planner did on one case."""
+def folder_of(peer: str) -> Path:
+    """Return the folder of a peer that runs in node, filling it when it is not as wanted."""
+    home = HERE / ".venvs" / peer
+    stamp = home / "packages.json"
+    wanted = json.loads((HERE / "peers" / "packages.json").read_text())[peer]
+    if not stamp.exists() or json.loads(stamp.read_text()) != wanted:
+        shutil.rmtree(home, ignore_errors=True)
+        home.mkdir(parents=True)
+        (home / "package.json").write_text("{}")
+        subprocess.run(
+            ["npm", "install", "--silent", "--no-audit", "--no-fund", *wanted], check=True, cwd=home
+        )
+        stamp.write_text(json.dumps(wanted))
+    for script in (HERE / "peers" / "node").glob("*.mjs"):
+        shutil.copy(script, home)  # node looks for packages beside and above the script
+    return home
+
+
+def with_triangles(case_file: Path, target: Path) -> float:
+    """Write a case with the triangles of its free space, as planners over a mesh want it; return what making them took in seconds."""
+    case = json.loads(case_file.read_text())
+    began = time.process_time()
+    blocked = shapely.union_all([shapely.Polygon(ring) for ring in case["exclusions"]])
+    free = shapely.difference(shapely.Polygon(case["inclusion"]), blocked)
+    made = shapely.get_parts(shapely.constrained_delaunay_triangles(free))
+    triangles = shapely.get_coordinates(shapely.orient_polygons(made)).reshape(-1, 4, 2)[:, :3]
+    taken_s = time.process_time() - began
+    bounds = shapely.Polygon(case["inclusion"]).bounds
+    target.write_text(json.dumps({"bounds": bounds, **case, "triangles": triangles.tolist()}))
+    return taken_s
+
+
+def measure(peer: str, name: str, case_file: Path, exact_m: list[float]) -> dict:
+    """Return what one planner did on one case; `exact_m` are the lengths of the shortest paths."""
     slow = os.environ.get("BENCH_SLOW") == "1"
     if (peer, name) == SLOW and not slow:
         return kept_slow()
-    case_file = DATA / f"{name}.json"
-    command = [
-        python_of(peer),
-        "-W",
-        "ignore",
-        str(HERE / "peers" / "drive.py"),
-        peer,
-        str(case_file),
-        str(FEW_QUERIES.get(peer, 20)),
-    ]
+    most = str(FEW_QUERIES.get(peer, 20))
+    if peer not in json.loads((HERE / "peers" / "packages.json").read_text()):
+        drive = str(HERE / "peers" / "drive.py")
+        run = best_of_some(peer, name, [python_of(peer), "-W", "ignore", drive, peer, str(case_file), most])
+    elif not all(map(shutil.which, NODE)):
+        run = {"failed": f"left out: needs {' and '.join(NODE)}"}
+    else:
+        with tempfile.TemporaryDirectory() as folder:
+            meshed = Path(folder) / "case.json"
+            triangles_s = with_triangles(case_file, meshed)
+            run = best_of_some(
+                peer, name, ["node", str(folder_of(peer) / "drive.mjs"), peer, str(meshed), most]
+            )
+        if "failed" not in run:
+            run["build_s"] += triangles_s
+    if "failed" in run:
+        return run
+    row = judge(run, json.loads(case_file.read_text()), exact_m)
+    return {**row, "date": dt.datetime.now(dt.UTC).date().isoformat()} if (peer, name) == SLOW else row
+
+
+def best_of_some(peer: str, name: str, command: list[str]) -> dict:
+    """Return the best of some runs of a planner on a case, or why it failed."""
     limit_s = SLOW_S if (peer, name) == SLOW else LIMIT_S
     best: dict | None = None
     for _ in range(RUNS):
@@ -74,14 +128,18 @@ def measure(peer: str, name: str) -> dict:
         if status is None:
             return {"failed": f"more than {limit_s} s"}
         if status:
-            return {"failed": (err.strip().splitlines() or ["crash"])[-1][:90]}
-        row = judge(json.loads(out.strip().splitlines()[-1]), name)
-        best = row if best is None or row["total_s"] < best["total_s"] else best
-        if row["total_s"] > QUICK_S or peer in FEW_QUERIES:
+            lines = [line for line in err.splitlines() if "Error" in line] or err.split("\n") or ["crash"]
+            return {"failed": lines[-1].strip()[:90]}
+        run = json.loads(out.strip().splitlines()[-1])
+        best = run if best is None or total_s(run) < total_s(best) else best
+        if total_s(run) > QUICK_S or peer in FEW_QUERIES:
             break
-    if (peer, name) == SLOW:
-        best["date"] = dt.datetime.now(dt.UTC).date().isoformat()
     return best
+
+
+def total_s(run: dict) -> float:
+    """Return the time of building and of all queries in seconds."""
+    return run["build_s"] + sum(run["query_s"])
 
 
 def within(command: list[str], limit_s: float) -> tuple[int | None, str, str]:
@@ -107,15 +165,23 @@ def kept_slow() -> dict:
     return row if "date" in row else {"failed": "needs minutes: BENCH_SLOW=1"}
 
 
-def judge(run: dict, name: str) -> dict:
+def exact_lengths_m(name: str, case_file: Path) -> list[float]:
+    """Return the lengths of a case's shortest paths: those kept with the tests, else ours."""
+    kept = json.loads((DATA / "exact.json").read_text())
+    if name in kept and case_file.parent == DATA:
+        return kept[name]
+    case = json.loads(case_file.read_text())
+    planner = pbpp.Planner([case["inclusion"]], case["exclusions"])
+    return [planner.plan(query[:2], query[2:]).length_m for query in case["queries"]]
+
+
+def judge(run: dict, case: dict, exact_m: list[float]) -> dict:
     """Add length ratios and the number of paths that cross an obstacle."""
-    case = json.loads((DATA / f"{name}.json").read_text())
-    exact = json.loads((DATA / "exact.json").read_text())[name]
     inside = shapely.buffer(
         shapely.union_all([shapely.Polygon(ring) for ring in case["exclusions"]]), -INSIDE_M
     )
     ratios, invalid = [], 0
-    for path, length in zip(run["paths"], exact, strict=False):
+    for path, length in zip(run["paths"], exact_m, strict=False):
         if path is not None:
             line = shapely.LineString(path)
             ratios.append(line.length / length)
@@ -123,7 +189,7 @@ def judge(run: dict, name: str) -> dict:
     return {
         "build_ms": 1e3 * run["build_s"],
         "query_ms": 1e3 * statistics.median(run["query_s"]),
-        "total_s": run["build_s"] + sum(run["query_s"]),
+        "total_s": total_s(run),
         "queries": len(run["query_s"]),
         "failures": run["paths"].count(None),
         "invalid": invalid,
@@ -153,7 +219,9 @@ def table(results: dict, ratios: dict) -> str:
     lines += [
         "One process for each planner and case, build then queries one after the other, the best of three where it takes under 5 s; times are",
         "CPU times. Grids have cells of 1 m (200 m maps) or 2 m; OMPL is BIT* with one second a query. An invalid path runs through an obstacle",
-        "by more than 1e-6 m. pbpp_compiled has loaded its compiled search before it builds.",
+        "by more than 1e-6 m. pbpp_compiled has loaded its compiled search before it builds. nav2d and recast_navigation run in node over triangles made by",
+        "shapely, whose time is in their build; Recast puts them into cells of 0.25 m (200 m maps) or 0.5 m, without an agent's radius. On maps of `--maps` the",
+        "lengths are compared with ours.",
         "",
     ]
     for name, rows in results["cases"].items():
@@ -209,7 +277,7 @@ def plot(results: dict, target: Path) -> None:
     mpl.use("Agg")
     from matplotlib import pyplot as plt  # noqa: PLC0415
 
-    names = ("rand10", "rand100", "rand1000")
+    names = CASES[-3:]
     figure, axes = plt.subplots(1, 3, figsize=(12, 4), sharey=True)
     for ax, name in zip(axes, names, strict=True):
         for number, (peer, row) in enumerate(results["cases"][name].items()):
@@ -217,7 +285,7 @@ def plot(results: dict, target: Path) -> None:
                 ax.plot(
                     row["build_ms"] + row["query_ms"],
                     100 * (row["ratio_mean"] - 1),
-                    "ov^sDP*X<>h"[number],
+                    "ov^sDP*X<>hd8"[number],
                     label=peer,
                     markersize=8,
                 )
@@ -234,7 +302,19 @@ def plot(results: dict, target: Path) -> None:
 
 def main() -> None:
     """Run everything and write the results."""
-    pins = json.loads((HERE / "peers" / "requirements.json").read_text())
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--ratios", action="store_true", help="measure the ratios anew and nothing else")
+    parser.add_argument(
+        "--maps", type=Path, help="a folder of more maps; each of their queries must have a path"
+    )
+    parser.add_argument(
+        "--only", nargs="+", help="run these planners anew; the rows of all others stay as they are"
+    )
+    asked = parser.parse_args()
+    pins = {
+        **json.loads((HERE / "peers" / "requirements.json").read_text()),
+        **json.loads((HERE / "peers" / "packages.json").read_text()),
+    }
     results = {
         "date": dt.datetime.now(dt.UTC).date().isoformat(),
         "machine": f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}",
@@ -250,13 +330,19 @@ def main() -> None:
         "load": [os.getloadavg()[2]],
         "cases": {},
     }
-    if "--ratios" in sys.argv:
-        results = json.loads((RESULTS / "planner.json").read_text())
-    for name in () if "--ratios" in sys.argv else CASES:
-        results["cases"][name] = {}
-        for peer in (*OWN, *pins):
-            row = measure(peer, name)
-            results["cases"][name][peer] = row
+    if asked.ratios or asked.only:
+        kept = json.loads((RESULTS / "planner.json").read_text())
+        results = {**kept, "versions": results["versions"]}
+    files = {name: DATA / f"{name}.json" for name in CASES}
+    files |= {path.stem: path for path in sorted(asked.maps.glob("*.json"))} if asked.maps else {}
+    for name, case_file in () if asked.ratios else files.items():
+        rows = results["cases"].setdefault(name, {})
+        exact_m = exact_lengths_m(name, case_file)
+        for peer in asked.only or (*OWN, *pins):
+            row = measure(peer, name, case_file, exact_m)
+            if asked.only:
+                row["date"] = dt.datetime.now(dt.UTC).date().isoformat()
+            rows[peer] = row
             print(name, peer, row, flush=True)
     ratios = json.loads(
         subprocess.run(

@@ -163,6 +163,13 @@ class ExactReference:
             point = foot[edges[0]]
         return _End(point, nodes, edges)
 
+    def beside_m(self, point):
+        """Return how far an end is from the corner both of whose edges it stands on, being as near to either as counts as on it; 0 if it is so near to no two."""
+        end = self._end(point)
+        if len(end.edges) < 2 or len(end.nodes):
+            return 0.0
+        return float(np.hypot(*(self._node - end.point).T).min())
+
     def _from_end(self, end):
         """Return the lengths from an end to all nodes that it sees."""
         lengths = np.full(len(self._node), np.inf)

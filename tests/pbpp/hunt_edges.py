@@ -123,7 +123,8 @@ def _check_pair(planner, inner, reference, ends, twin):
     if there == "none":
         assert expected_m == np.inf, (there, expected_m, ends)
         return there
-    slack_m = RELATIVE * expected_m + 4e-9 + 2.0 * sum(away_m)
+    # In a corner of a few degrees the reference lets an end leave to either side, the planner on its own, around the corner.
+    slack_m = RELATIVE * expected_m + 4e-9 + 2.0 * sum(away_m) + 2.0 * sum(map(reference.beside_m, local))
     assert abs(path.length_m - expected_m) <= slack_m, (path.length_m, expected_m, ends)
     assert abs(path.length_m - returned.length_m) <= slack_m, (path.length_m, returned.length_m, ends)
     assert path.lower_bound_m == path.length_m

@@ -47,6 +47,14 @@ def test_no_length_is_off_and_no_error_comes_one_way_only(part):
     assert counts["path"] > 50
 
 
+@pytest.mark.parametrize("seed", [304_791, 510_924])
+def test_ends_that_may_stand_on_several_sides(seed):
+    # In an obstacle, as near to free space above as beside; on one edge of a corner of 9 degrees, 1e-9 m from the other.
+    counts = Counter()
+    check(seed, counts, compiled=False)
+    assert counts["path"] >= 1
+
+
 @pytest.mark.skipif(find_spec("numba") is None, reason="the extra fast is not installed")
 def test_the_compiled_search_takes_such_ends_as_the_plain_one_does():
     counts = Counter()

@@ -4,6 +4,8 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
+import shapely
+from hunt_edges import ends_of, field_of
 
 import pbpp
 
@@ -71,6 +73,53 @@ def test_many_plans_are_those_of_plan(walled, compiled):
     assert errors > 10
     assert paths > 10
     assert planner.plan_many([]) == []
+
+
+@pytest.mark.skipif(find_spec("numba") is None, reason="the extra fast is not installed")
+def test_ends_on_edges_and_corners_are_found_at_once_as_one_by_one():
+    paths = 0
+    for seed in range(40):
+        field, rng = field_of(seed)
+        try:
+            planner = pbpp.Planner(
+                field.inclusions,
+                field.exclusions,
+                clearance_m=field.clearance_m,
+                union=field.union,
+                compiled=True,
+            )
+        except pbpp.InvalidGeometryError:
+            continue
+        space = planner.free_space
+        rings = [shapely.get_coordinates(ring) for part in space.geoms for ring in shapely.get_rings(part)]
+        if not rings:
+            continue
+        points = [ends_of(rng, rings) for _ in range(5)]
+        points.append(tuple(shapely.get_coordinates(space.representative_point())[0].tolist()))
+        expected_m = [[length_of(planner, start, goal) for goal in points] for start in points]
+        assert planner.lengths(points, points).tolist() == expected_m
+        pairs = [(start, goal) for start in points for goal in points]
+        for pair, found in zip(pairs, planner.plan_many(pairs), strict=True):
+            if not isinstance(found, pbpp.PlanningError):
+                path = planner.plan(*pair)
+                assert found.points.tobytes() == path.points.tobytes()
+                assert (found.length_m, found.expanded) == (path.length_m, path.expanded)
+                paths += 1
+    assert paths > 500
+
+
+@pytest.mark.parametrize("compiled", PLAIN_AND_COMPILED)
+def test_an_end_where_many_blocks_meet(square, compiled):
+    # Four wedges touch in one point: eight blocks and more lie around it.
+    angles = np.arange(8) * np.pi / 4.0 + 0.1
+    rim = 50.0 + 30.0 * np.column_stack((np.cos(angles), np.sin(angles)))
+    wedges = [[(50.0, 50.0), tuple(rim[one]), tuple(rim[one + 1])] for one in range(0, 8, 2)]
+    planner = pbpp.Planner([square], wedges, compiled=compiled)
+    points = [(50.0, 50.0), (5.0, 5.0), (95.0, 50.0), (50.0, 95.0)]
+    assert len(planner._space.mitred.searched.locate((50.0, 50.0))) > 4
+    expected_m = [[length_of(planner, start, goal) for goal in points] for start in points]
+    assert np.isfinite(expected_m).all()
+    assert planner.lengths(points, points).tolist() == expected_m
 
 
 @pytest.mark.parametrize("compiled", PLAIN_AND_COMPILED)

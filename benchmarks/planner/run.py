@@ -1,7 +1,7 @@
 """Compare the planner with its peers: ``python benchmarks/planner/run.py [--maps DIR]``.
 
-(BENCH_SLOW=1 also runs what takes minutes, whose figures are kept with their date else; ``--ratios`` only measures the ratios anew, ``--only PEER ...`` runs a few planners anew; ``--maps`` adds the maps of
-a folder, JSON files like the cases in tests/pbpp/data, whose lengths are compared with ours).
+(BENCH_SLOW=1 also runs what takes minutes, whose figures are kept with their date else; ``--ratios`` only measures the ratios anew, ``--only PEER ...`` runs a few
+planners anew; ``--maps`` adds the maps of a folder, JSON files like the cases in tests/pbpp/data, whose lengths are compared with ours).
 
 Each peer runs in a pinned virtual environment of its own under benchmarks/planner/.venvs, or in a folder of npm's there, made here when it is missing; where
 node or npm is missing its peers are left out, with a word. Each pair of planner and case runs in a process of its own, one after the other. Paths are
@@ -344,11 +344,11 @@ def main() -> None:
                 row["date"] = dt.datetime.now(dt.UTC).date().isoformat()
             rows[peer] = row
             print(name, peer, row, flush=True)
-    ratios = json.loads(
-        subprocess.run(
-            [sys.executable, str(HERE / "ratios.py")], capture_output=True, check=True, text=True
-        ).stdout
-    )
+    if asked.only:
+        ratios = kept["ratios"]
+    else:
+        command = [sys.executable, str(HERE / "ratios.py")]
+        ratios = json.loads(subprocess.run(command, capture_output=True, check=True, text=True).stdout)
     results["load"] = [results["load"][0], os.getloadavg()[2]]
     RESULTS.mkdir(exist_ok=True)
     (RESULTS / "planner.json").write_text(json.dumps({**results, "ratios": ratios}, indent=1) + "\n")

@@ -90,9 +90,7 @@ def _situation(options: CheckOptions) -> tuple[Situation, list[str]]:
 
         situation, unknown = live_situation(options)
     situation = _with_files(situation, options)
-    situation = with_description(
-        situation, described_vehicle(options.vehicle, options.firmware, options.stopping)
-    )
+    situation = with_description(situation, described_vehicle(options))
     return with_home_option(situation, options.home), unknown
 
 

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
 ColumnT = TypeVar("ColumnT", npt.NDArray[np.intp], npt.NDArray[np.float64])
 
-__all__ = ["BlockArrays", "Moved", "Patch", "Window", "patch_of", "window_of"]
-
 
 class BlockArrays(NamedTuple):
     """Blocks: floor and ceiling, each the vertex that its edge starts at, and east of the west and the east side in metres."""

@@ -43,9 +43,7 @@ if TYPE_CHECKING:
 
     from .clearance import Geometries
     from .holes import Change
-    from .partition.flat import Answer, Engine, Spots
-
-__all__ = ["Planner", "plan_path"]
+    from .partition.flat import DirectPath, Engine, Spots
 
 ShouldStop = Callable[[], bool]
 
@@ -513,14 +511,14 @@ def _lengths_m(field: Field, ends: Floats, should_stop: ShouldStop | None) -> Fl
     return lengths_m
 
 
-def _answers(field: Field, ends: Floats) -> list[Answer | None]:
+def _answers(field: Field, ends: Floats) -> list[DirectPath | None]:
     """Return the paths of many queries; None where there is none, or if the planner is not compiled."""
     searcher = field.searched.searcher
     if searcher is None:
         return [None] * len(ends)
     search = partial(searcher.answers, origin_m=field.scene.origin_m)
 
-    def searched(ends: Floats, spots: Spots) -> list[Answer | None]:
+    def searched(ends: Floats, spots: Spots) -> list[DirectPath | None]:
         return search(ends, spots=spots)
 
     answers = list(chain.from_iterable(spread(searched, ends, NO_SPOTS)))
@@ -532,7 +530,7 @@ def _answers(field: Field, ends: Floats) -> list[Answer | None]:
     return answers
 
 
-def _direct_path(field: Field, answer: Answer, partition: str | None) -> PlannedPath:
+def _direct_path(field: Field, answer: DirectPath, partition: str | None) -> PlannedPath:
     return PlannedPath(
         points=answer.points,
         length_m=answer.length_m,

@@ -16,21 +16,6 @@ if TYPE_CHECKING:
     from .vertices import Ints, Vertices
     from .window import Patch, Window
 
-__all__ = [
-    "BLOCK",
-    "CORNER",
-    "NO_SPOTS",
-    "PORTAL",
-    "WAY",
-    "Answer",
-    "Engine",
-    "FlatSearch",
-    "FlatSlabs",
-    "Records",
-    "Spots",
-    "record",
-]
-
 Records = npt.NDArray[Any]
 """An array of records: numba reads their fields as attributes."""
 
@@ -152,7 +137,7 @@ NO_SPOTS = Spots(
 """Where all ends are looked for by the search itself."""
 
 
-class Answer(NamedTuple):
+class DirectPath(NamedTuple):
     """A shortest path.
 
     Parameters
@@ -185,10 +170,10 @@ class FlatSearch(Protocol):
     ) -> tuple[list[int] | None, float, int, bool]:
         """Return the shortest path between two points of free space, wherever in it they lie."""
 
-    def direct(self, start: Point, goal: Point, origin_m: Floats) -> Answer | None:
+    def direct(self, start: Point, goal: Point, origin_m: Floats) -> DirectPath | None:
         """Return the shortest path between two points that lie well inside of one block each."""
 
-    def answers(self, ends: Floats, origin_m: Floats, spots: Spots = NO_SPOTS) -> list[Answer | None]:
+    def answers(self, ends: Floats, origin_m: Floats, spots: Spots = NO_SPOTS) -> list[DirectPath | None]:
         """Return the paths of many queries as `direct` does; with spots also those that begin or end there."""
 
     def lengths_m(

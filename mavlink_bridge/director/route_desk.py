@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
+from mavlink_bridge.director.fixes import no_fix
 from mavlink_bridge.director.grounds import Grounds
-from mavlink_bridge.director.plan_task import PlanTask
+from mavlink_bridge.director.plan_task import HomeTask, PlanTask
 from mavlink_bridge.director.states import Cue, Notice, Signal, State
 from missions.checking.recheck import Recheck, recheck
 from missions.errors import MissionError
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
     from mavlink_bridge.director.drive_supervisor import DriveSupervisor
     from mavlink_bridge.director.hold_watch import HoldWatch
+    from mavlink_bridge.director.home_keeper import HomeKeeper
     from mavlink_bridge.director.list_watch import ListWatch
     from missions.planned import Plan
     from missions.request import Request
@@ -39,8 +41,16 @@ class RouteDesk(Part):
         Whether the route is made because the one before broke, not because somebody asked.
     """
 
-    def __init__(self, core: Core, lists: ListWatch, driver: DriveSupervisor, hold_watch: HoldWatch) -> None:
+    def __init__(
+        self,
+        core: Core,
+        lists: ListWatch,
+        keeper: HomeKeeper,
+        driver: DriveSupervisor,
+        hold_watch: HoldWatch,
+    ) -> None:
         super().__init__(core)
+        self._keeper = keeper
         self._lists = lists
         self._driver = driver
         self._hold_watch = hold_watch
@@ -51,7 +61,7 @@ class RouteDesk(Part):
     @property
     def deadline_s(self) -> float | None:
         """At once where there is something to do for the plan but to wait for it."""
-        is_waiting = self.pending is not None and not self._lists.is_outdated
+        is_waiting = (self.pending is not None or bool(self.awaits_fix)) and not self._lists.is_outdated
         is_due = self.core.state is State.PLANNING and not self.core.steps and not is_waiting
         return -math.inf if is_due else None
 
@@ -82,8 +92,9 @@ class RouteDesk(Part):
         if self._lists.is_outdated:
             self._lists.reread_suspects(now_s)
         elif core.plan_task is None:
-            self._planned_on = Grounds.of(core.situation)
-            core.plan_task = PlanTask(core.situation, self.request())
+            if not self.awaits_fix:
+                self._planned_on = Grounds.of(core.situation)
+                core.plan_task = self._task()
         elif isinstance(self._made, MissionError):
             core.plan = None
             return [Cue.NO_PLAN]
@@ -91,6 +102,22 @@ class RouteDesk(Part):
             core.plan = self._made
             return [Cue.PLANNED]
         return []
+
+    @property
+    def awaits_fix(self) -> str:
+        """Why the plan of a way home waits; empty where it does not."""
+        target = self.core.target
+        if target is None or not target.is_home or self.core.plan_task is not None:
+            return ""
+        return no_fix(self.core.situation, self.core.orders.request)
+
+    def _task(self) -> PlanTask:
+        """Return the plan to be made: to the target, or to the nearest place where the vehicle is called home."""
+        core = self.core
+        if core.target is None or not core.target.is_home:
+            return PlanTask(core.situation, self.request())
+        places, ways = core.orders.homing.places, self._keeper.ways
+        return HomeTask(core.situation, core.orders.request, places=places, ways=ways)
 
     def no_plan(self, now_s: float) -> Sequence[Signal]:
         """Report why there is no plan."""

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from missions.planned import Plan
     from missions.situation import Situation
 
-_NOT_ANNOUNCED = frozenset({EventName.PROGRESS, EventName.FAILSAFE})
+_NOT_ANNOUNCED = frozenset({EventName.PROGRESS, EventName.FAILSAFE, EventName.WAY_HOME})
 """What the ground stations hear from the vehicle itself, or far too often."""
 
 

@@ -168,7 +168,7 @@ class Killed:
 class _Nobody:
     """A bridge that is not there."""
 
-    pending_backup = pending_plan = deadline_s = identity = drive_note = None
+    pending_backup = pending_plan = pending_ways = deadline_s = identity = drive_note = None
     is_done = False
     state = "nobody"
 

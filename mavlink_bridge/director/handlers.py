@@ -212,7 +212,7 @@ def _on_no_plan(parts: Parts, now_s: float) -> Iterable[Signal]:
 def _on_adopted(parts: Parts, now_s: float) -> Iterable[Signal]:
     parts.adopter.adopted(now_s)
     parts.caller.adopted(now_s)
-    return _look_at_fence(parts)
+    return parts.desk.tell_less(now_s) if parts.desk.promises_less else _look_at_fence(parts)
 
 
 def _on_upload_ended(parts: Parts, now_s: float) -> Iterable[Signal]:

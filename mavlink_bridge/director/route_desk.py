@@ -32,6 +32,10 @@ _MAKING_A_ROUTE = frozenset({State.HOLDING, State.PLANNING})
 """States whose plan is yet to come: it is made around the fence as it is then."""
 
 
+_TOLERANCE_M = 0.01
+"""Clearances are given to the centimetre."""
+
+
 class RouteDesk(Part):
     """Makes routes, with the shell's help.
 
@@ -144,6 +148,15 @@ class RouteDesk(Part):
         """Whether the plan may not hold any more: on another fence than it was made around, or on one that is not known."""
         return self.is_stale or self.core.situation.fence is None
 
+    @property
+    def promises_less(self) -> bool:
+        """Whether the plan that stands, of an earlier run, promises less than is asked now."""
+        core, plan = self.core, self.core.plan
+        if plan is None or plan.clearance_m is None or core.orders.request.accepts_less:
+            return False
+        asked_m = core.orders.request.clearance_m
+        return asked_m is not None and asked_m > plan.clearance_m + _TOLERANCE_M
+
     def take_up(self, planned_in: Situation) -> None:
         """Take notice of the situation in which the plan that stands was made, where another desk had it made."""
         self._planned_on = Grounds.of(planned_in)
@@ -183,6 +196,16 @@ class RouteDesk(Part):
             core.voice.rechecked(now_s, EventName.ROUTE_BROKEN, "the rest of the route", found)
         may_mend = is_ours_to_mend and (core.state is not State.DRIVING or core.orders.drive)
         return [Notice.ROUTE_OUTDATED] if may_mend else []
+
+    def tell_less(self, now_s: float) -> Sequence[Signal]:
+        """Report that the adopted plan promises less than is asked now, and have the route made anew."""
+        core, plan = self.core, self.core.plan
+        assert plan is not None
+        assert plan.clearance_m is not None
+        asked_m = core.orders.request.clearance_m or 0.0
+        found = Recheck(plan.clearance_m, asked_m, "--clearance was less when it began")
+        core.voice.rechecked(now_s, EventName.ROUTE_BROKEN, "the adopted route", found)
+        return [Notice.ROUTE_OUTDATED] if core.orders.drive else []
 
     def broke(self, found: Recheck, now_s: float) -> Sequence[Signal]:
         """Report that the route is broken, and have it made anew before it is driven."""

@@ -256,7 +256,9 @@ class CalledHome:
             return seen
         if len(going) > 1:
             seen.what = "home, asked twice"
-        driving = [event for event in self.events if event.name is EventName.DRIVING]
+        driving = [
+            event for event in self.events if event.name is EventName.DRIVING and event.time_s >= called_s
+        ]
         if not self.loses_fix:
             seen.to_drive_s = driving[0].time_s - called_s
             seen.after_rest_s = driving[0].time_s - self.rest_s if self.rest_s is not None else None

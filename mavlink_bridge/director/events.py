@@ -46,6 +46,7 @@ class EventName(StrEnum):
     NO_WAY_HOME = auto()
     CALLED_HOME = auto()
     GOING_HOME = auto()
+    AT_HOME = auto()
     HOME_WAITS = auto()
     CALL_IGNORED = auto()
     TAKEN_OVER = auto()
@@ -99,6 +100,7 @@ SCHEMA: dict[EventName, tuple[Severity, tuple[str, ...]]] = {
     EventName.NO_WAY_HOME: (Severity.WARNING, ("reason", "position")),
     EventName.CALLED_HOME: (Severity.NOTICE, ("call", "detail")),
     EventName.GOING_HOME: (Severity.NOTICE, ("call", "place", "length_m", "duration_s")),
+    EventName.AT_HOME: (Severity.NOTICE, ("call", "place")),
     EventName.HOME_WAITS: (Severity.WARNING, ("call", "reason")),
     EventName.CALL_IGNORED: (Severity.WARNING, ("call", "reason")),
     EventName.TAKEN_OVER: (Severity.NOTICE, ("mode", "by", "reason")),

@@ -34,7 +34,10 @@ def fix_trouble(situation: Situation, plan: Plan | None, request: Request) -> st
     error_m = _error_m(situation.fix.value) if situation.fix is not None else None
     if error_m is None or request.position_error_m is not None:
         return ""
-    room_m = plan.driven_clearance_m - plan.clearance_m - request.reserve_m
+    kept_m = max(
+        plan.asked_m, plan.driven_clearance_m
+    )  # a start near a fence, or in one, keeps less: it was left
+    room_m = kept_m - plan.clearance_m - request.reserve_m
     if error_m <= room_m + _WANDERS_M:
         return ""
     return f"GPS error {metres(error_m)}, the route has room for {metres(max(room_m, 0.0))}"

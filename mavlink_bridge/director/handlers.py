@@ -198,9 +198,9 @@ def _on_planned(parts: Parts, now_s: float) -> Iterable[Signal]:
 
 
 def _on_no_plan(parts: Parts, now_s: float) -> Iterable[Signal]:
-    target = parts.core.target
     parts.inbox.answers.settle(m.MavResult.DENIED)
     signals = parts.desk.no_plan(now_s)
+    target = parts.core.target
     if target is not None and target.is_home:
         parts.caller.refused(now_s)
     return signals

@@ -93,6 +93,7 @@ _IN_HAND = frozenset(
         State.VERIFIED,
         State.STARTING,
         State.DRIVING,
+        State.ARRIVED,  # until its HOLD is taken; who is watched for after that is said by `_arrived_s`
     }
 )
 """States in which an armed vehicle that is watched for takeovers is ours."""
@@ -125,7 +126,7 @@ class HomeCaller(Part):
         )
         self._rtl_s: float | None = None  # when the operator's RTL was answered on this way home
         self._overruled_s = -math.inf
-        self._mode_before: int | None = None
+        self._is_seen = True  # the mode told last was told a moment ago
         self._was_breached = False
         self._bad_fixes = 0
         self._arrived_s: float | None = None  # since when it stands in HOLD after a drive of ours
@@ -206,7 +207,8 @@ class HomeCaller(Part):
 
     def _take_heartbeat(self, heartbeat: m.Heartbeat, now_s: float) -> Sequence[Signal]:
         """Look for an RTL where nobody else looks for takeovers; one from before the first heartbeat is nobody's call."""
-        before, self._mode_before = self._mode_before, heartbeat.custom_mode
+        before = self.core.before.mode if self._is_seen else None
+        self._is_seen = True
         is_armed = bool(heartbeat.base_mode & m.ModeFlag.SAFETY_ARMED)
         is_held = is_armed and heartbeat.custom_mode == Mode.HOLD
         if self._arrived_s is not None and not is_held and now_s > self._arrived_s + _STALE_S:
@@ -286,15 +288,8 @@ class HomeCaller(Part):
         if self._bad_fixes < _BAD_FIXES:
             return []
         self._bad_fixes = 0
-        self.wait(trouble, now_s)
+        core.voice.home_waits(now_s, target.call, trouble)
         return [Notice.ROUTE_WANTED]
-
-    def wait(self, why: str, now_s: float) -> None:
-        """Report why a way home waits; the vehicle is held."""
-        target = self.core.target
-        assert target is not None
-        text = f"the way home waits, the vehicle stays in HOLD: {why}"
-        self.core.voice.tell(now_s, EventName.HOME_WAITS, text, str(target.call), why)
 
     # What others tell
 
@@ -314,7 +309,8 @@ class HomeCaller(Part):
         """Take notice that no way home was found, which was told: the vehicle is held, and nothing drives it straight."""
         fix = self.core.situation.fix
         self._refused_fix, self._refused_s = fix.value if fix is not None else None, now_s
-        self.wait("until another fence, place or fix leaves a way", now_s)
+        call = self.core.target.call if self.core.target is not None else None
+        self.core.voice.home_waits(now_s, call, "until another fence, place or fix leaves a way")
 
     def try_again(self) -> Sequence[Signal]:
         """Return that a way home is wanted again, where none was found on another field than the one now known."""
@@ -348,7 +344,8 @@ class HomeCaller(Part):
     def lose_sight(self) -> None:
         """Take notice that the vehicle is not heard, or was switched off and on: what is seen next is nobody's call."""
         self.begin_anew()
-        self._mode_before = self._station_s = None
+        self._is_seen = False
+        self._station_s = None
         self._was_breached = False
         self._keeper.forget()
 

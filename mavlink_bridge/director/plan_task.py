@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from missions.errors import MissionError, PlanCheckError
-from missions.planning.homeward import home_field, plan_home
+from missions.planning.homeward import at_home, home_field, plan_home
 from missions.planning.plan import plan as make_plan
 
 if TYPE_CHECKING:
@@ -52,6 +52,10 @@ class PlanTask:
         return planner(self.situation, self.request, should_stop=lambda: self.is_dropped)
 
 
+class AtHomeError(MissionError):
+    """The vehicle stands at a place to go home to: nothing is to be driven."""
+
+
 @dataclass(eq=False, slots=True)
 class HomeTask(PlanTask):
     """A plan to the nearest place to go home to.
@@ -69,6 +73,8 @@ class HomeTask(PlanTask):
 
     def _planned(self, planner: Callable[..., Plan]) -> Plan:
         ways = self.ways or home_field(self.situation, self.request, self.places)
+        if (place := at_home(self.situation, ways)) is not None:
+            raise AtHomeError(f"at {place.name} already: nothing is driven", place=place.name)
         return plan_home(
             self.situation, self.request, ways, planner=planner, should_stop=lambda: self.is_dropped
         )

@@ -10,7 +10,7 @@ from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.fixes import no_fix
 from mavlink_bridge.director.grounds import Grounds
-from mavlink_bridge.director.plan_task import HomeTask, PlanTask
+from mavlink_bridge.director.plan_task import AtHomeError, HomeTask, PlanTask
 from mavlink_bridge.director.states import Cue, Notice, Signal, State
 from missions.checking.recheck import Recheck, recheck
 from missions.errors import MissionError
@@ -61,11 +61,13 @@ class RouteDesk(Part):
         self._made: Plan | MissionError | None = None
         self._planned_on = Grounds.of(core.situation)
         self.is_own_idea = False
+        self._has_told_fix = False
 
     @property
     def deadline_s(self) -> float | None:
         """At once where there is something to do for the plan but to wait for it."""
-        is_waiting = (self.pending is not None or bool(self.awaits_fix)) and not self._lists.is_outdated
+        is_at_it = self.pending is not None or (bool(self.awaits_fix) and self._has_told_fix)
+        is_waiting = is_at_it and not self._lists.is_outdated
         is_due = self.core.state is State.PLANNING and not self.core.steps and not is_waiting
         return -math.inf if is_due else None
 
@@ -96,9 +98,7 @@ class RouteDesk(Part):
         if self._lists.is_outdated:
             self._lists.reread_suspects(now_s)
         elif core.plan_task is None:
-            if not self.awaits_fix:
-                self._planned_on = Grounds.of(core.situation)
-                core.plan_task = self._task()
+            self._begin(now_s)
         elif isinstance(self._made, MissionError):
             core.plan = None
             return [Cue.NO_PLAN]
@@ -106,6 +106,17 @@ class RouteDesk(Part):
             core.plan = self._made
             return [Cue.PLANNED]
         return []
+
+    def _begin(self, now_s: float) -> None:
+        """Have the plan made; a way home waits for a fix, which is said once."""
+        core = self.core
+        trouble = self.awaits_fix
+        if not trouble:
+            self._planned_on = Grounds.of(core.situation)
+            core.plan_task = self._task()
+        elif not self._has_told_fix and core.target is not None:
+            core.voice.home_waits(now_s, core.target.call, trouble)
+        self._has_told_fix = bool(trouble)
 
     @property
     def awaits_fix(self) -> str:
@@ -126,8 +137,18 @@ class RouteDesk(Part):
     def no_plan(self, now_s: float) -> Sequence[Signal]:
         """Report why there is no plan."""
         assert isinstance(self._made, MissionError)
+        if isinstance(self._made, AtHomeError):
+            self._end_at_home(self._made, now_s)
+            return []
         self.core.voice.no_plan(now_s, self._made)
         return self.core.give_up(self._made)
+
+    def _end_at_home(self, found: AtHomeError, now_s: float) -> None:
+        """Report that nothing is to be driven home: the vehicle is held where it stands."""
+        core = self.core
+        call = core.target.call if core.target is not None else None
+        core.target = None
+        core.voice.tell(now_s, EventName.AT_HOME, f"{found}; HOLD", str(call), found.details["place"])
 
     def request(self) -> Request:
         """Return what is asked of the next plan: the orders' request, for the newest target, from where the vehicle is."""

@@ -102,6 +102,11 @@ class Voice:
         """Report why there is no plan."""
         self.error(now_s, EventName.NO_PLAN, error, dict(error.details))
 
+    def home_waits(self, now_s: float, call: object, why: str) -> None:
+        """Report why a way home waits; the vehicle is held."""
+        text = f"the way home waits, the vehicle stays in HOLD: {why}"
+        self.tell(now_s, EventName.HOME_WAITS, text, str(call), why)
+
     def rechecked(self, now_s: float, name: EventName, what: str, found: Recheck) -> None:
         """Report that lines do not keep what they have to."""
         text = f"{what} keeps only {metres_text(found.clearance_m)} of the required {metres_text(found.asked_m)} ({found.fence})"

@@ -56,6 +56,18 @@ def home_field(situation: Situation, request: Request, given: Mapping[str, LatLo
     return ways_home(situation, vehicle, promised.drawn_m, places, [situation.pose.value.position])
 
 
+def at_home(situation: Situation, ways: WaysHome) -> Place | None:
+    """Return the place that a vehicle stands at; None where it stands at none.
+
+    It counts as there within its own waypoint radius, as it does to the autopilot: a steered rover that is to drive a hand's breadth back goes round.
+    """
+    if situation.pose is None:
+        return None
+    way = ways.nearest(situation.pose.value.position)
+    is_there = way is not None and way.length_m <= ways.vehicle.waypoint_radius_m
+    return way.place if way is not None and is_there else None
+
+
 def plan_home(
     situation: Situation,
     request: Request,

@@ -226,7 +226,9 @@ class CalledHome:
                 self.vehicle.receiver = None
             names = [event.name for event in run.events[before:]]
             has_answer = EventName.CALLED_HOME in names
-            is_refused = EventName.NO_PLAN in names and director.state is State.READY
+            is_refused = (
+                EventName.NO_PLAN in names or EventName.AT_HOME in names
+            ) and director.state is State.READY
             is_home = EventName.ARRIVED in names and director.state is State.ARRIVED
             return (has_answer and (is_refused or is_home)) or EventName.CALL_IGNORED in names
 
@@ -247,6 +249,15 @@ class CalledHome:
         seen.bad += [f"{vehicle.breaches} breaches"] if vehicle.breaches else []
         if len(self.track) > 1 and not self.allowed.covers(shapely.LineString(self.track)):
             seen.bad.append("its track leaves allowed ground")
+        if EventName.AT_HOME in first:
+            seen.what = "at home already"
+            here = flat(vehicle.position)
+            away_m = shapely.Point(here).distance(
+                shapely.Point(self.all_places[first[EventName.AT_HOME].data["place"]])
+            )
+            seen.bad += [f"{away_m:.1f} m off"] if away_m > 4 else []
+            seen.bad += ["not in HOLD"] if vehicle.mode != Mode.HOLD else []
+            return seen
         going = [event for event in self.events if event.name is EventName.GOING_HOME]
         if not going:
             seen.what = "held: no place can be reached"
@@ -263,6 +274,9 @@ class CalledHome:
             seen.to_drive_s = driving[0].time_s - called_s
             seen.after_rest_s = driving[0].time_s - self.rest_s if self.rest_s is not None else None
         plan = run.director.plan
+        if plan is None:
+            seen.bad.append("left on the way")
+            return seen
         name = going[-1].data["place"]
         off_m = distance_m(vehicle.position, plan.targets[-1])
         seen.bad += [f"ends {off_m:.1f} m off"] if off_m > 4 else []
@@ -284,11 +298,14 @@ class CalledHome:
             if least_m < float("inf"):
                 seen.what += ", though one is connected: every route to it is refused"
             return
-        if most_m[name] > 1.1 * least_m * 1.001 + 0.05:
+        # The planner cuts mitred corners: its way is no shorter than round round ones, and no longer than round whole mitres.
+        wider = self.allowed.buffer(-kept_m, quad_segs=4)
+        chosen_m = lengths(wider, here, [self.all_places[name]])[0]
+        if chosen_m > 1.1 * least_m * 1.001 + 0.05:
             better = min(most_m, key=most_m.__getitem__)
             seen.what += "; the nearest refused"
             if not self._is_refused(better):
-                seen.bad.append(f"{name} {most_m[name]:.1f} m, but {better} {least_m:.1f} m")
+                seen.bad.append(f"{name} {chosen_m:.1f} m, but {better} {least_m:.1f} m")
 
     def _is_refused(self, name: str) -> bool:
         """Return whether a plan to a place is refused from where the way home began."""

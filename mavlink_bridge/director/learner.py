@@ -137,7 +137,8 @@ class Learner(Part):
         assert core.peer is not None
         rally = (ListKind.RALLY,) if core.orders.reads_rally else ()
         kinds = (ListKind.FENCE, ListKind.MISSION, *rally)
-        learning = Learning(core.peer, core.orders.patience_s, kinds)
+        may_lack = frozenset() if core.orders.needs_rally else frozenset({ListKind.RALLY})
+        learning = Learning(core.peer, core.orders.patience_s, kinds, may_lack=may_lack)
         core.steps.run([step(learning, self._take_learnt)], now_s)
 
     def _take_learnt(self, machine: Learning, now_s: float) -> Sequence[Signal]:

@@ -92,7 +92,7 @@ class ListWatch(Part):
         core = self.core
         if core.peer is not None and self._changes is None:
             kinds = {ListKind.FENCE, ListKind.MISSION}
-            if core.orders.reads_rally:
+            if core.orders.needs_rally or (core.orders.reads_rally and core.situation.rally is not None):
                 kinds.add(ListKind.RALLY)
             identity = (core.peer.own_system, core.peer.own_component)
             self._changes = ChangeWatch(identity, frozenset(kinds))

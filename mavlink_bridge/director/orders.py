@@ -121,4 +121,9 @@ class Orders:
     @property
     def reads_rally(self) -> bool:
         """Whether the vehicle's rally points are read: they may be targets, or places to go home to."""
-        return self.homing.is_kept or TargetSource.RALLY in self.target_sources
+        return self.homing.is_kept or self.needs_rally
+
+    @property
+    def needs_rally(self) -> bool:
+        """Whether nothing is done without them."""
+        return TargetSource.RALLY in self.target_sources

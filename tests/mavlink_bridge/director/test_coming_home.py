@@ -637,6 +637,35 @@ def test_an_adopted_drive_that_promises_less_than_is_asked_now_is_held_and_plann
     assert not again.run.happened(EventName.ROUTE_BROKEN)()
 
 
+@pytest.mark.parametrize("refuses", [True, False])
+def test_a_vehicle_without_rally_points_goes_home(refuses):
+    vehicle = rover()
+    receive, asked = vehicle.receive, []
+
+    def without_rally(frame, now_s):
+        is_rally = getattr(frame.message, "mission_type", 0) == m.MissionType.RALLY
+        if not is_rally:
+            receive(frame, now_s)
+            return
+        asked.append(now_s)
+        if refuses:
+            ack = m.MissionAck(
+                frame.system, frame.component, m.MissionResult.UNSUPPORTED, m.MissionType.RALLY
+            )
+            vehicle._outbox.append(ack)
+
+    vehicle.receive = without_rally
+    run = conductor(vehicle)
+    run.run_until(lambda: run.director.state is State.READY, 120)
+    asked_before = len(asked)
+    on_the_way(run)
+    wait(run, 70)
+    assert len(asked) == asked_before
+    unheard(run, RTL)
+    run.run_until(run.happened(EventName.CALLED_HOME), 5)
+    assert home(run)
+
+
 def test_a_single_job_keeps_no_ways_home():
     director = Director(Orders(once=True, request=Request(targets=(FAR,))))
     assert director.pending_ways is None

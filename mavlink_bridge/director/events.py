@@ -44,6 +44,7 @@ class EventName(StrEnum):
     ARRIVED = auto()
     WAY_HOME = auto()
     NO_WAY_HOME = auto()
+    RTL_BY_ROUTE = auto()
     CALLED_HOME = auto()
     GOING_HOME = auto()
     AT_HOME = auto()
@@ -98,6 +99,7 @@ SCHEMA: dict[EventName, tuple[Severity, tuple[str, ...]]] = {
     EventName.ARRIVED: (Severity.NOTICE, ("driven_m", "took_s", "least_clearance_m", "breaches")),
     EventName.WAY_HOME: (Severity.INFO, ("place", "kind", "length_m", "time_s")),
     EventName.NO_WAY_HOME: (Severity.WARNING, ("reason", "position")),
+    EventName.RTL_BY_ROUTE: (Severity.NOTICE, ()),
     EventName.CALLED_HOME: (Severity.NOTICE, ("call", "detail")),
     EventName.GOING_HOME: (Severity.NOTICE, ("call", "place", "length_m", "duration_s")),
     EventName.AT_HOME: (Severity.NOTICE, ("call", "place")),

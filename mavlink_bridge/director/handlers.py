@@ -50,6 +50,7 @@ def _on_learnt(parts: Parts, now_s: float) -> Iterable[Signal]:
     core, inbox = parts.core, parts.inbox
     parts.lists.settle(now_s)
     core.voice.learnt(now_s, core.situation)
+    parts.caller.learnt(now_s)
     is_first_time, parts.learner.is_first_time = parts.learner.is_first_time, False
     is_adopted = is_first_time and parts.adopter.look(now_s)
     targets = core.orders.request.targets

@@ -293,6 +293,12 @@ class HomeCaller(Part):
 
     # What others tell
 
+    def learnt(self, now_s: float) -> None:
+        """Report to those who may press RTL what comes of it: they do not read what is printed beside the vehicle."""
+        if self._is_on:
+            text = "RTL once: round fences; RTL again: straight"
+            self.core.voice.tell(now_s, EventName.RTL_BY_ROUTE, text)
+
     def planned(self, now_s: float) -> None:
         """Report where a way home leads."""
         core = self.core

@@ -71,7 +71,7 @@ def bridge(options: BridgeOptions) -> None:
     orders = _orders(options)
     if orders.homing.by_route:
         inform([_BY_ROUTE])
-    described = described_vehicle(options.vehicle, options.firmware, options.stopping)
+    described = described_vehicle(options)
     with contextlib.ExitStack() as stack:
         notes, troubles = DriveNotes(BackupStore().folder).read()
         warn(map(str, troubles))

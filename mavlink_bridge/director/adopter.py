@@ -23,7 +23,7 @@ from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.orders import TargetSource
 from mavlink_bridge.director.states import Cue, Signal, State
-from mavlink_bridge.director.targets import Call, Target, is_same_place
+from mavlink_bridge.director.targets import HomeCall, Target, is_same_place
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.rover import Mode, mode_name
 from mavlink_bridge.protocol.vehicle_watch import MISSION_COMPLETE
@@ -184,7 +184,7 @@ class Adopter(Part):
         """Go on with the drive as if it had never been left; without orders to drive, watch it."""
         core, is_ours = self.core, self.core.orders.drive
         assert core.plan is not None
-        call = Call(self.note.call) if self.note is not None and self.note.call in set(Call) else None
+        call = HomeCall(self.note.call) if self.note is not None and self.note.call in set(HomeCall) else None
         source = TargetSource.TYPED if call is None else TargetSource.HOME
         core.target = Target(core.plan.targets[-1], source, call=call)
         text = "adopted the drive that pbpp began before it was restarted"

@@ -46,7 +46,7 @@ from mavlink_bridge.director.fixes import fix_trouble, is_better
 from mavlink_bridge.director.orders import TargetSource
 from mavlink_bridge.director.states import Notice, Signal, State
 from mavlink_bridge.director.takeover import Takeover
-from mavlink_bridge.director.targets import Call, Target
+from mavlink_bridge.director.targets import HomeCall, Target
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.rover import Mode, mode_name
 from missions.geo import LatLon
@@ -147,7 +147,7 @@ class HomeCaller(Part):
         if due_s is None or now_s < due_s:
             return []
         self._station_s = None
-        return self._call_in_hand(Call.GCS, f"for {self.core.orders.homing.gcs_timeout_s:g} s", now_s)
+        return self._call_in_hand(HomeCall.GCS, f"for {self.core.orders.homing.gcs_timeout_s:g} s", now_s)
 
     def receive(self, frame: Frame, now_s: float) -> Iterable[Signal]:
         """Take a frame of anybody."""
@@ -164,7 +164,7 @@ class HomeCaller(Part):
         if isinstance(message, m.FenceStatus):
             return self._look_at_breach(message, now_s)
         low = self._battery.receive(message, now_s)
-        return self._call_in_hand(Call.BATTERY, low, now_s) if low else []
+        return self._call_in_hand(HomeCall.BATTERY, low, now_s) if low else []
 
     @property
     def _is_on(self) -> bool:
@@ -203,7 +203,7 @@ class HomeCaller(Part):
             self._rtl_s = now_s
         if self._is_called and by_autopilot:
             return self._hold_again(now_s)
-        return self._call(Call.RTL, mode_name(taken.mode), now_s)
+        return self._call(HomeCall.RTL, mode_name(taken.mode), now_s)
 
     def _take_heartbeat(self, heartbeat: m.Heartbeat, now_s: float) -> Sequence[Signal]:
         """Look for an RTL where nobody else looks for takeovers; one from before the first heartbeat is nobody's call."""
@@ -231,9 +231,9 @@ class HomeCaller(Part):
             return []
         if self._is_called:
             return self._hold_again(now_s)
-        return self._call_in_hand(Call.BREACH, "", now_s)
+        return self._call_in_hand(HomeCall.BREACH, "", now_s)
 
-    def _call_in_hand(self, call: Call, detail: str, now_s: float) -> Sequence[Signal]:
+    def _call_in_hand(self, call: HomeCall, detail: str, now_s: float) -> Sequence[Signal]:
         """Call a vehicle that we have in hand; leave any other to who has it, and say so."""
         core = self.core
         if self._is_called:
@@ -247,7 +247,7 @@ class HomeCaller(Part):
         core.voice.tell(now_s, EventName.CALL_IGNORED, text, str(call), "not on a drive of this bridge")
         return []
 
-    def _call(self, call: Call, detail: str, now_s: float) -> Sequence[Signal]:
+    def _call(self, call: HomeCall, detail: str, now_s: float) -> Sequence[Signal]:
         text = f"called home ({_named(call, detail)}): HOLD, then by a route round the fences"
         self.core.voice.tell(now_s, EventName.CALLED_HOME, text, str(call), detail)
         self._bad_fixes = 0
@@ -338,7 +338,7 @@ class HomeCaller(Part):
     def adopted(self, now_s: float) -> None:
         """Take notice that a way home of an earlier run goes on: the RTL that it answered was the first one."""
         target = self.core.target
-        if target is not None and target.call is Call.RTL:
+        if target is not None and target.call is HomeCall.RTL:
             self._rtl_s = now_s - SAME_PRESS_S
 
     def overruled(self, now_s: float) -> None:
@@ -356,7 +356,7 @@ class HomeCaller(Part):
         self._keeper.forget()
 
 
-def _named(call: Call, detail: str) -> str:
-    if call is Call.RTL and detail == Mode.RTL.name:
+def _named(call: HomeCall, detail: str) -> str:
+    if call is HomeCall.RTL and detail == Mode.RTL.name:
         return detail
     return f"{call}: {detail}" if detail else str(call)

@@ -31,7 +31,7 @@ _SAID_AGAIN_S = 3.0  # ground stations repeat a command that is not acknowledged
 _ECHO_MOVED_M = 0.5  # the vehicle reports the target that it was given a little off; chosen, not measured
 
 
-class Call(StrEnum):
+class HomeCall(StrEnum):
     """Why the vehicle is called home."""
 
     RTL = "RTL"
@@ -56,7 +56,7 @@ class Target:
         System and component id that sent it.
     is_again : bool
         Whether it only says again what was said a moment ago.
-    call : Call, optional
+    call : HomeCall, optional
         Why it is called home: the place is the nearest one once it stands, and the position only a guess until then.
     """
 
@@ -65,7 +65,7 @@ class Target:
     is_to_us: bool = False
     asker: tuple[int, int] | None = None
     is_again: bool = False
-    call: Call | None = None
+    call: HomeCall | None = None
 
     @property
     def is_home(self) -> bool:
@@ -75,7 +75,7 @@ class Target:
     @property
     def has_set_off(self) -> bool:
         """Whether it may have set the vehicle going, off any route of ours: HOLD follows at once."""
-        return self.is_click or self.call in (Call.RTL, Call.BREACH)
+        return self.is_click or self.call in (HomeCall.RTL, HomeCall.BREACH)
 
     @property
     def is_click(self) -> bool:

@@ -15,7 +15,6 @@ from missions.geo import to_e7
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from mavlink_bridge.simulator.config import Battery, Receiver
     from mavlink_bridge.simulator.rover import Rover
     from missions.firmware import Firmware
 
@@ -58,8 +57,6 @@ class TelemetrySource:
     list_ids: tuple[int, int, int] = (0, 0, 0)
     uid: bytes = b""
     firmware: Firmware | None = None
-    battery: Battery | None = None
-    receiver: Receiver | None = None
 
 
 def telemetry(message_id: int, state: TelemetrySource) -> m.Message | None:
@@ -89,7 +86,7 @@ def _sys_status(state: TelemetrySource) -> m.Message:
         health &= ~(_PREARM_OK | _GPS_SENSOR)
     if state.rover.breached:
         health &= ~_FENCE_SENSOR
-    battery = state.battery
+    battery = state.rover.battery
     if battery is None:
         return m.SysStatus(_SENSORS_PRESENT, enabled, health)
     millivolts = round(battery.volts * 1000)
@@ -97,7 +94,7 @@ def _sys_status(state: TelemetrySource) -> m.Message:
 
 
 def _battery_status(state: TelemetrySource) -> m.Message | None:
-    battery = state.battery
+    battery = state.rover.battery
     if battery is None:
         return None
     cells = (round(battery.volts * 1000), *(9 * [_NO_CELL]))
@@ -121,7 +118,7 @@ def _gps_raw(state: TelemetrySource) -> m.Message:
     time_usec = round(state.boot_s * 1e6)
     if not state.is_ready:
         return m.GpsRawInt(time_usec, 0, 0, 0, 0, satellites_visible=0)
-    told = state.receiver
+    told = state.rover.receiver
     fix_type, h_acc = (6, 300) if told is None else (told.fix_type, round(1000 * (told.error_m or 0.0)))
     position = to_e7(state.rover.position)
     return m.GpsRawInt(time_usec, fix_type, *position, 0, eph=121, satellites_visible=10, h_acc=h_acc)

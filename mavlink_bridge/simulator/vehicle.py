@@ -14,7 +14,7 @@ from mavlink_bridge.errors import RefusedError
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.simulator.commands import CommandServer
-from mavlink_bridge.simulator.config import Receiver, SimulatorConfig
+from mavlink_bridge.simulator.config import SimulatorConfig
 from mavlink_bridge.simulator.item_lists import FenceList, MissionList, RallyList, StoredList
 from mavlink_bridge.simulator.mission_server import MissionServer
 from mavlink_bridge.simulator.parameters import ParameterStore, kind
@@ -66,17 +66,11 @@ class SimulatedVehicle:
     ----------
     rover : Rover
         The rover itself, for reading its state.
-    battery : Battery or None
-        What its battery's monitor tells; None: it has no monitor.
-    receiver : Receiver or None
-        What its GPS receiver tells; None: what the simulated one always does. Its position is as good as ever.
     """
 
     def __init__(self, config: SimulatorConfig | None = None) -> None:
         self.config = config or SimulatorConfig()
         self.parameters = ParameterStore(self.config.parameters, self.config.firmware)
-        self.battery = self.config.battery
-        self.receiver: Receiver | None = None
         self._home: LatLon = self.config.home
         self._mission = MissionList(
             lambda: self._home,
@@ -98,6 +92,7 @@ class SimulatedVehicle:
             lambda: self._fence.items,
             turns_early=turns_early(self.config.firmware),
         )
+        self.rover.battery = self.config.battery
         self._home = self.rover.home
         self._outbox: list[m.Message] = []
         self._update_totals(announce=False)
@@ -365,8 +360,6 @@ class SimulatedVehicle:
             (mission_id, fence_id, rally_id),
             self.config.uid,
             self.config.firmware,
-            self.battery,
-            self.receiver,
         )
         return telemetry(message_id, state)
 

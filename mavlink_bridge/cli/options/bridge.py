@@ -8,15 +8,9 @@ from typing import Annotated
 
 from mavlink_bridge.cli.options.shared import (
     AcceptLessOption,
-    AnyVehicleOption,
-    CommonOptions,
-    FirmwareOption,
+    DescriptionOptions,
     RequiredConnectOption,
-    SigningKeyOption,
-    StoppingOption,
-    SystemOption,
-    TimeoutOption,
-    TrustOption,
+    VehicleLinkOptions,
     flag,
     metres,
     option,
@@ -24,55 +18,10 @@ from mavlink_bridge.cli.options.shared import (
 from mavlink_bridge.cli.values import MOST_S, within
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BridgeOptions(CommonOptions):
-    """Run alongside the autopilot: read fence, state and targets from the link, plan, upload and verify missions, watch the drive.
+@dataclass(frozen=True, kw_only=True)
+class HomingOptions:
+    """When the vehicle is brought home, and where home may be."""
 
-    Type targets as `LAT,LON`; `yes` confirms a plan. Without `--upload` it only reports.
-
-    For example:
-
-    `pbpp bridge --connect udpin:0.0.0.0:14550`
-
-    `pbpp bridge --connect /dev/ttyAMA0,921600 --upload --drive --log run.tlog --json`
-    """
-
-    connect: RequiredConnectOption
-    target: Annotated[list[str], option("The first target; more can be typed or clicked.", "LAT,LON")] = (
-        field(default_factory=list)
-    )
-    target_from: Annotated[
-        list[str],
-        option(
-            "Where targets may come from: typed, reposition, position-target, guided-item, mission, rally, echo; repeatable.",
-            "SOURCE",
-        ),
-    ] = field(default_factory=list)
-    clearance: Annotated[
-        str | None, option("Clearance to keep while driving. Default: from FENCE_MARGIN.", "M|max")
-    ] = None
-    accept_less: AcceptLessOption = False
-    corner_allowance: Annotated[str, option("Extra room for cut corners.", "M|auto")] = "auto"
-    snap: Annotated[float, metres("Move a blocked target to the nearest free place within M metres.")] = 0.0
-    vehicle: Annotated[
-        Path | None, option("Parameter file, for what the vehicle does not report.", "FILE.parm")
-    ] = None
-    firmware: FirmwareOption = None
-    stopping: StoppingOption = field(default_factory=list)
-    trust_model: TrustOption = False
-    upload: Annotated[bool, flag("--upload", "Write missions to the vehicle.")] = False
-    drive: Annotated[
-        bool,
-        flag(
-            "--drive",
-            "With --upload: switch modes (HOLD before a new route and after arrival, AUTO for a verified route).",
-        ),
-    ] = False
-    arm: Annotated[bool, flag("--arm", "With --drive: arm before AUTO.")] = False
-    confirm: Annotated[
-        bool,
-        flag("--confirm", "Upload a plan only after you type yes; a way home of --rtl-by-route at once."),
-    ] = False
     rtl_by_route: Annotated[
         bool,
         flag(
@@ -109,6 +58,51 @@ class BridgeOptions(CommonOptions):
         list[str],
         option("A place to go home to, beside home and the rally points; repeatable.", "NAME=LAT,LON"),
     ] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BridgeOptions(HomingOptions, DescriptionOptions, VehicleLinkOptions):
+    """Run alongside the autopilot: read fence, state and targets from the link, plan, upload and verify missions, watch the drive.
+
+    Type targets as `LAT,LON`; `yes` confirms a plan. Without `--upload` it only reports.
+
+    For example:
+
+    `pbpp bridge --connect udpin:0.0.0.0:14550`
+
+    `pbpp bridge --connect /dev/ttyAMA0,921600 --upload --drive --log run.tlog --json`
+    """
+
+    connect: RequiredConnectOption
+    target: Annotated[list[str], option("The first target; more can be typed or clicked.", "LAT,LON")] = (
+        field(default_factory=list)
+    )
+    target_from: Annotated[
+        list[str],
+        option(
+            "Where targets may come from: typed, reposition, position-target, guided-item, mission, rally, echo; repeatable.",
+            "SOURCE",
+        ),
+    ] = field(default_factory=list)
+    clearance: Annotated[
+        str | None, option("Clearance to keep while driving. Default: from FENCE_MARGIN.", "M|max")
+    ] = None
+    accept_less: AcceptLessOption = False
+    corner_allowance: Annotated[str, option("Extra room for cut corners.", "M|auto")] = "auto"
+    snap: Annotated[float, metres("Move a blocked target to the nearest free place within M metres.")] = 0.0
+    upload: Annotated[bool, flag("--upload", "Write missions to the vehicle.")] = False
+    drive: Annotated[
+        bool,
+        flag(
+            "--drive",
+            "With --upload: switch modes (HOLD before a new route and after arrival, AUTO for a verified route).",
+        ),
+    ] = False
+    arm: Annotated[bool, flag("--arm", "With --drive: arm before AUTO.")] = False
+    confirm: Annotated[
+        bool,
+        flag("--confirm", "Upload a plan only after you type yes; a way home of --rtl-by-route at once."),
+    ] = False
     escape: Annotated[
         bool,
         flag("--escape", "Let a vehicle that stands inside an exclusion or outside the fence drive out."),
@@ -121,11 +115,7 @@ class BridgeOptions(CommonOptions):
             "FILE.tlog",
         ),
     ] = None
-    system: SystemOption = None
-    any_vehicle: AnyVehicleOption = False
     source_system: Annotated[
         int | None, option("System id that pbpp uses. Default: the vehicle's own.", "N", min=1, max=255)
     ] = None
     source_component: Annotated[int, option("Component id that pbpp uses.", "N", min=1, max=255)] = 195
-    signing_key: SigningKeyOption = None
-    timeout: TimeoutOption = 30.0

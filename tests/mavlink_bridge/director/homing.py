@@ -192,7 +192,7 @@ class CalledHome:
         run, vehicle = self.run, self.vehicle
         self.called_s = run.now_s
         if self.loses_fix:
-            vehicle.receiver = Receiver(1)
+            vehicle.rover.receiver = Receiver(1)
             self.fix_back_s = run.now_s + self.chance.uniform(1, 15)
         if self.call == "rtl heard":
             run.ground_station(m.SetMode(1, 1, Mode.RTL))
@@ -200,9 +200,9 @@ class CalledHome:
         elif self.call in ("rtl unheard", "smart rtl"):
             self._do(m.SetMode(1, 1, Mode.SMART_RTL if self.call == "smart rtl" else Mode.RTL))
         elif self.call == "percent":
-            vehicle.battery = Battery(15, 11.9)
+            vehicle.rover.battery = Battery(15, 11.9)
         elif self.call == "volts":
-            vehicle.battery = Battery(-1, 10.2)
+            vehicle.rover.battery = Battery(-1, 10.2)
         elif self.call == "battery failsafe":
             vehicle.rover.texts.append((2, "Battery 1 is low 10.20V used 4000 mAh"))
             self._do(m.SetMode(1, 1, Mode.RTL))
@@ -223,7 +223,7 @@ class CalledHome:
 
         def is_over() -> bool:
             if self.loses_fix and run.now_s >= self.fix_back_s:
-                self.vehicle.receiver = None
+                self.vehicle.rover.receiver = None
             names = [event.name for event in run.events[before:]]
             has_answer = EventName.CALLED_HOME in names
             is_refused = (

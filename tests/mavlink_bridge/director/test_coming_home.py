@@ -300,7 +300,7 @@ def test_a_restart_on_the_way_home_counts_the_rtl_that_was_answered():
 
 def test_a_low_battery_brings_it_home_and_only_once():
     run = on_the_way(conductor(homing=replace(BY_ROUTE, battery_percent=20)))
-    run.vehicles[0].battery = LOW
+    run.vehicles[0].rover.battery = LOW
     lowered_s = run.now_s
     run.run_until(run.happened(EventName.CALLED_HOME), 30)
     assert 10.0 <= run.now_s - lowered_s <= 12.0
@@ -335,7 +335,7 @@ def test_what_an_operator_drives_is_not_called_and_it_is_said():
     run = on_the_way(conductor(homing=replace(BY_ROUTE, battery_volts=11.5)))
     unheard(run, m.SetMode(1, 1, MANUAL))
     run.run_until(lambda: run.director.state is State.LET_GO, 3)
-    run.vehicles[0].battery = LOW
+    run.vehicles[0].rover.battery = LOW
     run.run_until(run.happened(EventName.CALL_IGNORED), 30)
     assert left_alone(run, MANUAL, 10)
     assert "low battery" in texts(run, EventName.CALL_IGNORED)[0]
@@ -447,7 +447,7 @@ def test_the_nearest_is_chosen_from_where_it_stands():
 
 def test_without_a_fix_the_way_home_waits_for_one():
     run = on_the_way(conductor())
-    run.vehicles[0].receiver = Receiver(1)
+    run.vehicles[0].rover.receiver = Receiver(1)
     wait(run, 1)
     unheard(run, RTL)
     run.run_until(run.happened(EventName.HOME_WAITS), 10)
@@ -455,7 +455,7 @@ def test_without_a_fix_the_way_home_waits_for_one():
     wait(run, 10)
     assert (run.director.state, run.vehicles[0].mode) == (State.PLANNING, Mode.HOLD)
     assert len(texts(run, EventName.HOME_WAITS)) == 1
-    run.vehicles[0].receiver = None
+    run.vehicles[0].rover.receiver = None
     assert home(run)
 
 
@@ -463,19 +463,19 @@ def test_without_a_fix_the_way_home_waits_for_one():
 def test_a_fix_that_gets_too_bad_on_the_way_home_is_held(receiver):
     run = heading_home(on_the_way(conductor(), seconds=25))
     wait(run, 2)
-    run.vehicles[0].receiver = receiver
+    run.vehicles[0].rover.receiver = receiver
     run.run_until(lambda: run.vehicles[0].mode == Mode.HOLD, 5)
     assert any("GPS" in text for text in texts(run, EventName.HOME_WAITS))
     wait(run, 8)
     assert run.vehicles[0].mode == Mode.HOLD
-    run.vehicles[0].receiver = None
+    run.vehicles[0].rover.receiver = None
     assert home(run)
 
 
 def test_a_worse_fix_that_leaves_a_way_is_planned_with_its_error():
     run = heading_home(on_the_way(conductor(), seconds=25))
     wait(run, 2)
-    run.vehicles[0].receiver = Receiver(3, 3.0)
+    run.vehicles[0].rover.receiver = Receiver(3, 3.0)
     run.run_until(lambda: run.vehicles[0].mode == Mode.HOLD, 5)
     assert home(run)
     assert run.director.plan.asked_m == pytest.approx(5.5)

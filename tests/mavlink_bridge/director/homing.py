@@ -67,6 +67,7 @@ class CalledHome:
     """One run."""
 
     def __init__(self, seed: int) -> None:
+        self.seed = seed
         chance = self.chance = random.Random(seed)
         self.zones, places, points = random_field(seed)
         names = ("home", "rally", "rally", "shed", "gate")
@@ -91,7 +92,7 @@ class CalledHome:
         return len(self.points) >= 2
 
     def prepare(self) -> None:
-        """Make the vehicle and its bridge; the vehicle's own home is where it was switched on, so that home is given by rally point and place only, or is it."""
+        """Make the vehicle and its bridge; in half of the runs home is where it was switched on, in half anywhere, perhaps where no way leads to."""
         start, self.target = self.points[0], self.points[-1]
         rally = tuple(RallyPoint(*at(*point)) for name, point in self.places if name == "rally")
         given = {name: at(*point) for name, point in self.places if name in ("shed", "gate")}
@@ -116,6 +117,10 @@ class CalledHome:
                 battery=Battery(90, 12.5),
             )
         )
+        if self.seed % 2:
+            home = self.places[0][1]
+            self.vehicle.rover.home = self.vehicle._home = at(*home)
+            self.all_places["home"] = home
         homing = Homing(
             is_kept=True,
             places=given,

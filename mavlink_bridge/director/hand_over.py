@@ -74,7 +74,14 @@ class HandOver(Part):
             self._halter.command_hold(now_s)
         elif core.state is State.VERIFIED and not core.orders.drive and core.is_driving_ours:
             return self._driver.resume("somebody else started the mission")
+        if self._caller.sees_rtl(heartbeat.custom_mode):
+            taken = Takeover(heartbeat.custom_mode)
+            return self._caller.answer(taken, now_s, by_autopilot=self._is_by_autopilot(taken, now_s)) or []
         return []
+
+    def _is_by_autopilot(self, taken: Takeover, now_s: float) -> bool:
+        """Return whether the autopilot is known to have done it by a failsafe or a breach."""
+        return taken.asker is None and self.incidents.explains(taken, now_s)
 
     def _overhear(self, frame: Frame, now_s: float) -> Iterable[Signal]:
         peer = self.core.peer
@@ -86,7 +93,7 @@ class HandOver(Part):
     def _let_go(self, taken: Takeover, now_s: float) -> Sequence[Signal]:
         """Return that the vehicle was taken; an RTL may be answered by a way home."""
         core = self.core
-        by_autopilot = taken.asker is None and self.incidents.explains(taken, now_s)
+        by_autopilot = self._is_by_autopilot(taken, now_s)
         if (answer := self._caller.answer(taken, now_s, by_autopilot=by_autopilot)) is not None:
             return answer
         if core.state is State.ARRIVED and core.orders.once:

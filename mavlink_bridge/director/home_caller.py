@@ -45,7 +45,6 @@ from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.fixes import fix_trouble, is_better
 from mavlink_bridge.director.orders import TargetSource
 from mavlink_bridge.director.states import Notice, Signal, State
-from mavlink_bridge.director.takeover import Takeover
 from mavlink_bridge.director.targets import HomeCall, Target
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.rover import Mode, mode_name
@@ -56,6 +55,7 @@ if TYPE_CHECKING:
 
     from mavlink_bridge.director.halter import Halter
     from mavlink_bridge.director.home_keeper import HomeKeeper
+    from mavlink_bridge.director.takeover import Takeover
     from mavlink_bridge.director.target_inbox import TargetInbox
     from mavlink_bridge.mavlink.messages import Frame
     from missions.situation import Fix
@@ -205,18 +205,20 @@ class HomeCaller(Part):
             return self._hold_again(now_s)
         return self._call(HomeCall.RTL, mode_name(taken.mode), now_s)
 
-    def _take_heartbeat(self, heartbeat: m.Heartbeat, now_s: float) -> Sequence[Signal]:
-        """Look for an RTL where nobody else looks for takeovers; one from before the first heartbeat is nobody's call."""
+    def sees_rtl(self, mode: int) -> bool:
+        """Return whether a heartbeat shows an RTL that has just begun, where nobody watches for takeovers; one from before the first heartbeat is nobody's call."""
         before = self.core.before.mode if self._is_seen else None
+        is_new = mode in HOMING and before is not None and before not in HOMING
+        return is_new and self._is_on and not (self.core.operator.is_on or self._is_called)
+
+    def _take_heartbeat(self, heartbeat: m.Heartbeat, now_s: float) -> Sequence[Signal]:
+        """Notice whether a vehicle still stands where it has arrived."""
         self._is_seen = True
         is_armed = bool(heartbeat.base_mode & m.ModeFlag.SAFETY_ARMED)
         is_held = is_armed and heartbeat.custom_mode == Mode.HOLD
         if self._arrived_s is not None and not is_held and now_s > self._arrived_s + _STALE_S:
             self._arrived_s = None
-        is_new = heartbeat.custom_mode in HOMING and before is not None and before not in HOMING
-        if self.core.operator.is_on or not is_new or self._is_called:
-            return []
-        return self.answer(Takeover(heartbeat.custom_mode), now_s, by_autopilot=False) or []
+        return []
 
     def _hear_station(self, frame: Frame, now_s: float) -> None:
         message = frame.message

@@ -231,6 +231,17 @@ def test_an_rtl_of_the_autopilots_own_failsafe_is_nobodys_second_one():
     assert home(run)
 
 
+def test_nor_is_one_after_the_operator_has_taken_over():
+    run = heading_home(on_the_way(conductor()))
+    wait(run, 5)
+    unheard(run, m.SetMode(1, 1, MANUAL))
+    run.run_until(lambda: run.director.state is State.LET_GO, 3)
+    run.vehicles[0].rover.texts.append((2, "Battery 1 is critical 9.80V used 4000 mAh"))
+    unheard(run, RTL)
+    run.run_until(lambda: run.director.state is State.HOLDING, 3)
+    assert home(run)
+
+
 # Whoever takes it keeps it
 
 

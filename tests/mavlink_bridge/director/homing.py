@@ -72,6 +72,10 @@ class CalledHome:
         self.zones, places, points = random_field(seed)
         names = ("home", "rally", "rally", "shed", "gate")
         self.places = list(zip(names, places, strict=False))
+        if seed % 8 == 5:  # the only place lies in an exclusion: there is nowhere to go
+            corners = [flat(place) for place in self.zones[0].vertices]
+            middle = shapely.Polygon(corners).buffer(0).representative_point()
+            self.places = [("home", (middle.x, middle.y))]
         self.speed_mps = chance.choice((1.5, 2.0, 3.0))
         self.is_bad_link = chance.random() < 0.5
         self.call = CALLS[seed % len(CALLS)]
@@ -92,7 +96,7 @@ class CalledHome:
         return len(self.points) >= 2
 
     def prepare(self) -> None:
-        """Make the vehicle and its bridge; in half of the runs home is where it was switched on, in half anywhere, perhaps where no way leads to."""
+        """Make the vehicle and its bridge; in half of the runs home is where it was switched on, in half anywhere, in an eighth in an exclusion."""
         start, self.target = self.points[0], self.points[-1]
         rally = tuple(RallyPoint(*at(*point)) for name, point in self.places if name == "rally")
         given = {name: at(*point) for name, point in self.places if name in ("shed", "gate")}

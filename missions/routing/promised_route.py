@@ -53,6 +53,8 @@ _OTHERWISE_STEPS = (
 )
 _OTHER_MEASUREMENTS = FIT_MEASUREMENTS + CRAWL_MEASUREMENTS
 _GOOD_SHARE = 0.5  # for fitting in short rounds
+_CERTAIN = 1.06
+"""Of the least time that a route can take: no other is quicker by more than a twentieth, a waypoint or two aside."""
 _ALL_M = 0.01  # what keeps so little less than it aims at is as wide as can be
 
 _NOTHING_ADVICE = (
@@ -99,15 +101,23 @@ class PromisedRoute:
         found = direct.find(briefly=True)
         if not _is_good(found) and (isinstance(found, DrivenRoute) or found.kind is NoRouteKind.CORNER):
             found = self._with_more(direct, found, asked)
+        if isinstance(found, NoRoute) and found.kind is NoRouteKind.CORNER:
+            found = direct.combined() or self._in_short_rounds(direct) or found
         return found
 
     def _quicker(self, found: DrivenRoute, asked: Promise) -> DrivenRoute:
-        """Return a route, or a quicker one that fitting in short rounds finds where it is driven slowly somewhere."""
-        if not found.is_slow_somewhere:
+        """Return the quickest of several kinds of routes, or the one found where none can be clearly quicker."""
+        search = self._search(asked.required_m, asked.required_m)
+        if found.cost_s <= _CERTAIN * search.least_s:
             return found
-        search = replace(self._search(asked.required_m, asked.required_m), good_share=_GOOD_SHARE)
-        other = search.find(briefly=True)
-        return other if isinstance(other, DrivenRoute) and other.cost_s < found.cost_s else found
+        other = self._in_short_rounds(search)
+        return other if other is not None and other.cost_s < found.cost_s else found
+
+    def _in_short_rounds(self, search: RouteSearch) -> DrivenRoute | None:
+        """Return the quicker of the routes that are fitted in short rounds, and made of all that were fitted; None where there are none."""
+        fitted = replace(search, good_share=_GOOD_SHARE).find(briefly=True)
+        found = [one for one in (fitted, search.combined()) if isinstance(one, DrivenRoute)]
+        return min(found, key=lambda one: one.cost_s, default=None)
 
     def widest(self, asked: Promise) -> Found | NoRoute:
         """Return the route that keeps most, and what is promised for it; else why there is none."""

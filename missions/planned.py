@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from importlib import import_module
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
 from missions.formats import write_mission
 from missions.formats.files import write_file
+from missions.fence import Obstacles
 from missions.geo import bearing_deg
 from missions.situation import Known, Mission, Situation
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    import numpy as np
+    from numpy.typing import NDArray
 
     from missions.drive_model import Envelope
     from missions.drive_model.stopping import HoldCheck
@@ -26,6 +31,7 @@ if TYPE_CHECKING:
 
 _TURN_DEG: Final = 1.0  # a smaller change of direction is a long line in pieces; chosen
 _NOTHING_ELSE = Situation()
+_NO_OBSTACLES = Obstacles()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -74,6 +80,8 @@ class Plan:
         Promised on the first legs, while it leaves the place where it stands, where that place leaves less; else None.
     hold : HoldCheck or None
         What HOLD does on the route.
+    obstacles : Obstacles
+        What was planned around beside the fence, as large as it was taken to be.
     """
 
     items: tuple[MissionItem, ...]
@@ -102,6 +110,12 @@ class Plan:
     extrapolated: tuple[str, ...] = ()
     start_clearance_m: float | None = None
     hold: HoldCheck | None = None
+    obstacles: Obstacles = _NO_OBSTACLES
+
+    @cached_property
+    def points(self) -> NDArray[np.float64]:
+        """The path in the plane, east and north in metres."""
+        return self.ground.frame.to_local_array(self.path)
 
     @property
     def turn_count(self) -> int:

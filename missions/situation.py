@@ -8,6 +8,7 @@ from enum import StrEnum
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Generic, TypeVar
 
+from missions.fence import Obstacles
 from missions.stops import Stops
 
 if TYPE_CHECKING:
@@ -139,6 +140,8 @@ class Situation:
         Why the newest fence that was seen could not be used.
     stops : Stops
         How far it rolls on after HOLD or disarming, as far as that was said or seen.
+    obstacles : Obstacles
+        What was reported to stand or move in the field, as it may be when a vehicle that is told to stop now stands.
     remarks : tuple of str
         Warnings from reading a file: what was skipped, and what was assumed.
     """
@@ -165,4 +168,5 @@ class Situation:
     )
     fence_trouble: str | None = None
     stops: Stops = field(default_factory=Stops)
+    obstacles: Obstacles = field(default_factory=Obstacles)
     remarks: tuple[str, ...] = ()

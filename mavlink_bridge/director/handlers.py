@@ -184,6 +184,10 @@ def _on_planned(parts: Parts, now_s: float) -> Iterable[Signal]:
 
 
 def _on_no_plan(parts: Parts, now_s: float) -> Iterable[Signal]:
+    """Tell why there is no plan; one that waits for an obstacle to go has not failed."""
+    if parts.desk.is_waiting:
+        parts.inbox.answers.settle(m.MavResult.TEMPORARILY_REJECTED)
+        return ()
     parts.inbox.answers.settle(m.MavResult.DENIED)
     return parts.desk.no_plan(now_s)
 
@@ -299,6 +303,7 @@ HANDLERS: dict[Signal, Callable[[Parts, float], Iterable[Signal] | None]] = {
     Notice.ROUTE_OUTDATED: _on_route_outdated,
     Notice.GONE_ON: _on_gone_on,
     Notice.FENCE_CHANGED: lambda parts, now_s: parts.desk.fence_changed(now_s),
+    Notice.OBSTACLES_CHANGED: lambda parts, now_s: parts.desk.obstacles_changed(now_s),
     Notice.MISSION_READ: lambda parts, _now_s: parts.writer.mission_read(),
     Notice.MISSION_TAKEN: lambda parts, now_s: parts.writer.mission_taken(now_s),
     Notice.MISSION_HEARD: lambda parts, _now_s: parts.inbox.take_mission_target(),

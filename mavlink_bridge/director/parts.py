@@ -13,6 +13,7 @@ from mavlink_bridge.director.identity_guard import IdentityGuard
 from mavlink_bridge.director.learner import Learner
 from mavlink_bridge.director.list_watch import ListWatch
 from mavlink_bridge.director.mission_writer import MissionWriter
+from mavlink_bridge.director.obstacle_watch import ObstacleWatch
 from mavlink_bridge.director.route_desk import RouteDesk
 from mavlink_bridge.director.starter import Starter
 from mavlink_bridge.director.target_inbox import TargetInbox
@@ -44,6 +45,7 @@ class Parts:
         self.core: Core = core
         self.learner: Learner = Learner(core)
         self.lists: ListWatch = ListWatch(core)
+        self.obstacles: ObstacleWatch = ObstacleWatch(core)
         self.inbox: TargetInbox = TargetInbox(core)
         self.halter: Halter = Halter(core, self.lists)
         self.driver: DriveSupervisor = DriveSupervisor(core, self.halter)
@@ -61,6 +63,7 @@ class Parts:
             self.driver,
             self.hold_watch,
             self.lists,
+            self.obstacles,
             self.inbox,
             self.adopter,
         )
@@ -71,5 +74,6 @@ class Parts:
             self.driver,
             self.learner,
             self.lists,
+            self.obstacles,
             self.adopter,
         )

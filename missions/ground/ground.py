@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -50,11 +50,12 @@ _MOST_RADIUS_M = (
 
 @dataclass(frozen=True, eq=False)
 class Barrier:
-    """A fence zone in the plane: its name as people count it, and its area in local metres."""
+    """A fence zone in the plane: its name as people count it, and its area in local metres; or a reported obstacle, of which the vehicle does not know."""
 
     name: str
     kind: ZoneKind
     area: Area
+    is_reported: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +107,17 @@ class Ground:
     def edge(self) -> BaseGeometry:
         """The line the vehicle must keep off, without the bounds."""
         return self.allowed.boundary.difference(self.bounds.boundary.buffer(_WALL_M))
+
+    @cached_property
+    def enforced(self) -> Ground:
+        """What of it the vehicle knows: the fence, without reported obstacles."""
+        fence = tuple(barrier for barrier in self.barriers if not barrier.is_reported)
+        return self if len(fence) == len(self.barriers) else replace(self, barriers=fence)
+
+    @property
+    def avoided_edge(self) -> BaseGeometry:
+        """The edge that the vehicle's own avoidance sees."""
+        return self.enforced.edge
 
     def clearance_m(self, shape: BaseGeometry) -> float:
         """Return a shape's least distance to forbidden ground; 0 where it touches it, infinite without any."""

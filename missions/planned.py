@@ -8,9 +8,9 @@ from importlib import import_module
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
+from missions.fence import Obstacles
 from missions.formats import write_mission
 from missions.formats.files import write_file
-from missions.fence import Obstacles
 from missions.geo import bearing_deg
 from missions.situation import Known, Mission, Situation
 

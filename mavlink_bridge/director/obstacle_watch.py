@@ -54,6 +54,8 @@ _UNKNOWN = 65535  # UINT16_MAX
 _EVERY_S = 0.09  # scans that come quicker than ten a second are left out; chosen
 _POSE_S = 1.0  # how old a position may be for a scan: it comes four times a second; chosen
 _YAW_S = 0.5  # how old an ATTITUDE may be; without one the position's heading stands in for it; chosen
+_EXTRA1, _ATTITUDE_HZ = 10, 10  # MAV_DATA_STREAM_EXTRA1, which holds ATTITUDE; as often as scans
+_ASK_EVERY_S = 5.0  # a request may be lost; chosen
 _MOST = 64  # obstacles that are kept; chosen, bounds memory and planning
 _GATE_M = 1.0  # between the edges of a disc and of the obstacle that it belongs to, beside how far that may have moved; chosen
 _WATCHED_S = 1.5  # so long a movement is measured over; chosen: a sector of 5° is 1.3 m wide at 15 m
@@ -129,6 +131,7 @@ class ObstacleWatch(Part):
         self._scanned_s = -math.inf
         self._laid_out: tuple[Grounds, Ground | None] | None = None
         self._has_refused = False
+        self._asked_s = -math.inf
 
     @property
     def deadline_s(self) -> float | None:
@@ -230,8 +233,17 @@ class ObstacleWatch(Part):
             heard_s, attitude = self._attitude
             yaw = attitude.yaw + attitude.yawspeed * (now_s - heard_s)
             return (here, math.degrees(yaw)) if math.isfinite(yaw) else None
+        self._ask_for_attitude(now_s)
         heading_deg = known.value.heading_deg
         return (here, heading_deg) if heading_deg is not None else None
+
+    def _ask_for_attitude(self, now_s: float) -> None:
+        """Ask for ATTITUDE, which not every link gets unasked."""
+        core = self.core
+        if core.peer is None or core.orders.passive or now_s < self._asked_s + _ASK_EVERY_S:
+            return
+        self._asked_s = now_s
+        core.send(m.RequestDataStream(core.peer.system, core.peer.component, _EXTRA1, _ATTITUDE_HZ, 1))
 
     # Obstacles
 
@@ -257,25 +269,30 @@ class ObstacleWatch(Part):
     def _publish(self, now_s: float) -> Sequence[Signal]:
         """Put what is known into the situation."""
         core = self.core
-        keep_s, unknown_mps = core.orders.obstacle_keep_s, core.orders.obstacle_growth_mps
+        keep_s = core.orders.obstacle_keep_s
         self._tracks = [one for one in self._tracks if now_s < one.seen_s + keep_s][-_MOST:]
         self._typed = [one for one in self._typed if now_s < one.ends_s]
-        ground = self._ground()
-        seen = [
-            Obstacle(
-                ground.frame.to_lat_lon(LocalPoint(*map(float, track.centre))),
-                track.radius_m,
-                track.growth_mps(unknown_mps),
-                track.seen_s,
-                keep_s,
-                str(ObstacleSource.OBSTACLE_DISTANCE),
-                track.reported_s,
-            )
-            for track in (self._tracks if ground is not None else ())
-        ]
-        known = (*self._typed, *seen)
+        known = (*self._typed, *self._seen())
         if not known and not core.situation.obstacles.known:
             return []
         at_s = now_s + stands_after_s(core.situation, core.orders.request)
         core.situation = replace(core.situation, obstacles=Obstacles(known, at_s))
         return [Notice.OBSTACLES_CHANGED]
+
+    def _seen(self) -> list[Obstacle]:
+        """Return what sensors have seen, as obstacles."""
+        orders, ground = self.core.orders, self._ground()
+        if ground is None:
+            return []
+        return [
+            Obstacle(
+                ground.frame.to_lat_lon(LocalPoint(*map(float, track.centre))),
+                track.radius_m,
+                track.growth_mps(orders.obstacle_growth_mps),
+                track.seen_s,
+                orders.obstacle_keep_s,
+                str(ObstacleSource.OBSTACLE_DISTANCE),
+                track.reported_s,
+            )
+            for track in self._tracks
+        ]

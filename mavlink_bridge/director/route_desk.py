@@ -62,8 +62,12 @@ class RouteDesk(Part):
         self._hold_watch = hold_watch
         self._made: Plan | MissionError | None = None
         self._planned_on = Grounds.of(core.situation)
-        self._free_way: Plan | None = None  # the route that obstacles alone stand in, while they are waited for
-        self._refused: MissionError | None = None  # why there is none round them, while it is seen whether there is one without them
+        self._free_way: Plan | None = (
+            None  # the route that obstacles alone stand in, while they are waited for
+        )
+        self._refused: MissionError | None = (
+            None  # why there is none round them, while it is seen whether there is one without them
+        )
         self._tried_s = -math.inf
         self._tried_with = Obstacles()
         self._look_s = -math.inf

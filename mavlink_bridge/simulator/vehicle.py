@@ -159,9 +159,7 @@ class SimulatedVehicle:
     def discs_at(self, now_s: float) -> tuple[tuple[complex, float], ...]:
         """Return middle and radius of the discs that are there, in the rover's frame."""
         frame = self.rover.frame
-        return tuple(
-            (place_at(one, frame, now_s), one.radius_m) for one in self.discs if now_s >= one.from_s
-        )
+        return tuple((place_at(one, frame, now_s), one.radius_m) for one in self.discs if now_s >= one.from_s)
 
     def receive(self, frame: m.Frame, now_s: float) -> None:
         """Take a frame; the next tick looks at it. A vehicle that boots receives nothing."""

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from missions.situation import Situation
 
 _TOLERANCE_M = 0.02  # as a recheck's: more than rounding to degE7 moves a line
+_NEAREST_M = 0.1  # nearer than this to an obstacle's circle nothing leads away from it; chosen
 _STANDS_S = 5.0  # of a vehicle that is not known: more than the 4.6 s that the measured stops of steered rovers come to at 2 m/s
 
 
@@ -79,11 +80,13 @@ def obstacle_across(plan: Plan, situation: Situation, item: int) -> Across | Non
         if not new:
             return None
     rest = np.vstack((plan.ground.frame.to_local(here), plan.points[plan.path_index(item) :]))
-    legs = shapely.linestrings(np.stack((rest[:-1], rest[1:]), axis=1))
-    kept_m = shapely.distance(shapely.points(centres[new])[:, None], legs[None]) - radii_m[new, None]
+    legs = np.asarray(shapely.linestrings(np.stack((rest[:-1], rest[1:]), axis=1)))
+    kept_m = (
+        shapely.distance(np.asarray(shapely.points(centres[new]))[:, None], legs[None]) - radii_m[new, None]
+    )
     here_m = np.hypot(*(centres[new] - rest[0]).T) - radii_m[new]
     asked_m = np.full(kept_m.shape, plan.asked_m)
-    asked_m[:, 0] = np.where(here_m > 0, np.minimum(plan.asked_m, here_m), plan.asked_m)
+    asked_m[:, 0] = np.where(here_m > 0, np.clip(here_m, _NEAREST_M, plan.asked_m), plan.asked_m)
     worst, leg = np.unravel_index(int((kept_m - asked_m).argmin()), kept_m.shape)
     if kept_m[worst, leg] >= asked_m[worst, leg] - _TOLERANCE_M:
         return None

@@ -21,13 +21,14 @@ from mavlink_bridge.cli.options.shared import (
     metres,
     option,
 )
+from mavlink_bridge.cli.values import MOST_MPS, MOST_S, within
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BridgeOptions(CommonOptions):
     """Run alongside the autopilot: read fence, state and targets from the link, plan, upload and verify missions, watch the drive.
 
-    Type targets as `LAT,LON`; `yes` confirms a plan. Without `--upload` it only reports.
+    Type targets as `LAT,LON`; `yes` confirms a plan; `blocked` reports an obstacle. Without `--upload` it only reports.
 
     For example:
 
@@ -59,6 +60,30 @@ class BridgeOptions(CommonOptions):
     firmware: FirmwareOption = None
     stopping: StoppingOption = field(default_factory=list)
     trust_model: TrustOption = False
+    obstacles_from: Annotated[
+        list[str],
+        option(
+            "Plan round reported obstacles, and hold for them with --drive: OBSTACLE_DISTANCE (a sensor's messages), keyboard (type blocked, clear); "
+            "repeatable, or with commas. This protects no person.",
+            "SOURCE",
+        ),
+    ] = field(default_factory=list)
+    obstacle_growth: Annotated[
+        float,
+        option(
+            "How fast an obstacle may move until it was watched for 1.5 s.",
+            "MPS",
+            parser=within(0.0, MOST_MPS, "metres a second"),
+        ),
+    ] = 1.0
+    obstacle_keep: Annotated[
+        float,
+        option(
+            "How long an obstacle is kept after a sensor saw it last.",
+            "S",
+            parser=within(0.5, MOST_S, "seconds"),
+        ),
+    ] = 10.0
     upload: Annotated[bool, flag("--upload", "Write missions to the vehicle.")] = False
     drive: Annotated[
         bool,

@@ -115,7 +115,9 @@ class Obstructed:
                 self.vehicle.discs.append(self._crossing())
             else:
                 self._pop_up_s.append(self._begun_s + chance.uniform(0.05, 0.7) * self._plan_s)
-        self._reported: dict[int, tuple[float, float, float]] = {}  # by disc: when, how far off, how fast we were
+        self._reported: dict[
+            int, tuple[float, float, float]
+        ] = {}  # by disc: when, how far off, how fast we were
         self._across_s: float | None = None
         self._report_s: float | None = None
         self._stood_s: float | None = None
@@ -145,7 +147,9 @@ class Obstructed:
     def _crossing(self) -> MovingDisc:
         """Return a disc that crosses the route when the rover is about there."""
         chance = self.random
-        line = LineString([(p.real, p.imag) for p in map(self.vehicle.rover.frame.to_flat, self.run.director.plan.path)])
+        line = LineString(
+            [(p.real, p.imag) for p in map(self.vehicle.rover.frame.to_flat, self.run.director.plan.path)]
+        )
         share = chance.uniform(0.15, 0.9)
         there = line.interpolate(share, normalized=True)
         in_s = max(5.0, share * self._plan_s + chance.uniform(-4.0, 4.0))
@@ -191,7 +195,12 @@ class Obstructed:
         for number, (centre_m, radius_m) in enumerate(discs):
             gap_m = abs(centre_m - rover.body.position_m) - radius_m - BODY_M
             self.seen.least_gap_m = min(self.seen.least_gap_m, gap_m)
-            if round(now_s / 0.02) % 5 == 0 and number not in self._reported and gap_m + BODY_M < SEES_M and self._is_open(centre_m):
+            if (
+                round(now_s / 0.02) % 5 == 0
+                and number not in self._reported
+                and gap_m + BODY_M < SEES_M
+                and self._is_open(centre_m)
+            ):
                 self._reported[number] = now_s, gap_m, speed_mps
             if gap_m <= 0 and not self.seen.contact:
                 self._touch(number, speed_mps)
@@ -199,7 +208,11 @@ class Obstructed:
         self._look_at_mode(speed_mps, now_s)
 
     def _is_open(self, centre_m: complex) -> bool:
-        place = Point(self.run.director.plan.ground.frame.to_local(self.vehicle.rover.frame.to_lat_lon(centre_m))) if self.run.director.plan else None
+        place = (
+            Point(self.run.director.plan.ground.frame.to_local(self.vehicle.rover.frame.to_lat_lon(centre_m)))
+            if self.run.director.plan
+            else None
+        )
         return place is None or self.run.director.plan.ground.enforced.allowed.covers(place)
 
     def _touch(self, number: int, speed_mps: float) -> None:
@@ -229,7 +242,9 @@ class Obstructed:
         rest = [rover.body.position_m, *map(rover.frame.to_flat, plan.path[plan.path_index(item) :])]
         line = LineString([(one.real, one.imag) for one in rest])
         for centre_m, radius_m in discs:
-            is_seen = abs(centre_m - rover.body.position_m) - radius_m < SEES_M - 0.2 and self._is_open(centre_m)
+            is_seen = abs(centre_m - rover.body.position_m) - radius_m < SEES_M - 0.2 and self._is_open(
+                centre_m
+            )
             if is_seen and line.distance(Point(centre_m.real, centre_m.imag)) - radius_m < plan.asked_m - 0.3:
                 self._across_s = now_s
                 self._across = f"disc {centre_m:.1f} {radius_m:.1f} rest {rest[0]:.1f} item {item} route {[f'{one:.0f}' for one in rest]}, keeps {line.distance(Point(centre_m.real, centre_m.imag)) - radius_m:.2f} of {plan.asked_m:.2f}"
@@ -258,7 +273,9 @@ class Obstructed:
                 self.seen.on_from_report_s.append(now_s - (self._across_s or self._report_s or now_s))
             self._across_s = self._report_s = None
         if self._across_s is not None and mode == Mode.AUTO and now_s > self._across_s + 3.0:
-            self.seen.bad.append(f"no HOLD for a disc across the route at {self._across_s:.1f}: {self._across}")
+            self.seen.bad.append(
+                f"no HOLD for a disc across the route at {self._across_s:.1f}: {self._across}"
+            )
             self._across_s = None
 
 
@@ -284,7 +301,9 @@ def summary(runs: list[dict]) -> None:
     went_on = sum(run["went_on_first"] for run in runs)
     longest_s = max(run["planning_s"] for run in runs)
     bad = sum(bool(run["bad"]) for run in runs)
-    print(f"{len(runs)} runs, {bad} bad; {waited} waited, {went_on} HOLDs after going on first; longest plan {longest_s:.2f} s")
+    print(
+        f"{len(runs)} runs, {bad} bad; {waited} waited, {went_on} HOLDs after going on first; longest plan {longest_s:.2f} s"
+    )
     for name in ("held_s", "on_from_standing_s", "on_from_report_s"):
         for kind in sorted({run["kind"] for run in runs}):
             values = sorted(value for run in runs if run["kind"] == kind for value in run[name])
@@ -301,9 +320,20 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--runs", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--lines", type=Path, nargs="*", default=[], help="a line a run is kept there; with --runs 0 they are summed up")
+    parser.add_argument(
+        "--lines",
+        type=Path,
+        nargs="*",
+        default=[],
+        help="a line a run is kept there; with --runs 0 they are summed up",
+    )
     options = parser.parse_args()
-    runs = [json.loads(line) for path in options.lines if not options.runs for line in path.read_text().splitlines()]
+    runs = [
+        json.loads(line)
+        for path in options.lines
+        if not options.runs
+        for line in path.read_text().splitlines()
+    ]
     for seed in range(options.seed, options.seed + options.runs):
         runs.append(record(seed))
         for path in options.lines:

@@ -101,7 +101,7 @@ class Obstacle:
     source : str
         Who reported it.
     reported_s : float
-        When it was reported first, in seconds since 1970.
+        When it was reported first, in seconds since 1970; None where it is given beside a file, without a clock.
     """
 
     position: LatLon
@@ -110,13 +110,16 @@ class Obstacle:
     seen_s: float
     time_to_live_s: float
     source: str
-    reported_s: float
+    reported_s: float | None
 
     @property
     def name(self) -> str:
         """What it is called: by when it was reported, in local time, by whom, and how large it is."""
+        size = f"{self.radius_m:.1f} m"
+        if self.reported_s is None:
+            return f"{OBSTACLE} from {self.source}, {size}"
         clock = datetime.fromtimestamp(self.reported_s, tz=UTC).astimezone()
-        return f"{OBSTACLE} reported at {clock:%H:%M:%S} by {self.source}, {self.radius_m:.1f} m"
+        return f"{OBSTACLE} reported at {clock:%H:%M:%S} by {self.source}, {size}"
 
     @property
     def ends_s(self) -> float:

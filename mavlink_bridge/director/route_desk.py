@@ -71,8 +71,8 @@ class RouteDesk(Part):
         self._tried_s = -math.inf
         self._tried_with = Obstacles()
         self._look_s = -math.inf
-        self._told_across: tuple[float, str] | None = None  # the obstacles that were told of last
-        self._told_waiting: tuple[float, str] | None = None
+        self._told_across: tuple[float | None, str] | None = None  # the obstacles that were told of last
+        self._told_waiting: tuple[float | None, str] | None = None
         self.is_own_idea = False
 
     @property
@@ -283,6 +283,6 @@ class RouteDesk(Part):
         return [Notice.ROUTE_OUTDATED]
 
 
-def _identity(obstacle: Obstacle | None) -> tuple[float, str] | None:
+def _identity(obstacle: Obstacle | None) -> tuple[float | None, str] | None:
     """Return what tells an obstacle from another; its place and size change."""
     return (obstacle.reported_s, obstacle.source) if obstacle is not None else None

@@ -50,7 +50,8 @@ def distances_cm(
         away_m = (centre_m - here_m) * cmath.exp(-1j * heading_rad)
         if abs(away_m) - radius_m > sees_m:
             continue
-        middle, half = cmath.phase(away_m), math.asin(min(1.0, radius_m / max(abs(away_m), radius_m)))
+        middle = cmath.phase(away_m)
+        half = math.asin(radius_m / abs(away_m)) if abs(away_m) > radius_m else math.pi
         for sector in range(SECTORS):
             if abs(math.remainder(sector * _STEP - middle, 2 * math.pi)) > half + _STEP:
                 continue

@@ -66,6 +66,13 @@ class PlanOptions(MapOptions, ClearanceOptions, LinkOptions):
         ),
     ] = None
     accept_less: AcceptLessOption = False
+    obstacle: Annotated[
+        list[str],
+        option(
+            "With --fence or --log: plan round this too, as the bridge does round what is reported to it; no file and no vehicle gets it. Repeatable.",
+            "LAT,LON,RADIUS",
+        ),
+    ] = field(default_factory=list)
     output: Annotated[
         list[Path],
         option("Write the mission: .waypoints, .plan, .geojson, .kml, .gpx.", "FILE", "-o", "--output"),

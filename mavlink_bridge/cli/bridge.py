@@ -67,7 +67,7 @@ def bridge(options: BridgeOptions) -> None:
     orders = _orders(options)
     if orders.obstacle_sources:
         inform((_OBSTACLES_TEXT,))
-    described = described_vehicle(options.vehicle, options.firmware, options.stopping)
+    described = described_vehicle(options)
     with contextlib.ExitStack() as stack:
         notes, troubles = DriveNotes(BackupStore().folder).read()
         warn(map(str, troubles))

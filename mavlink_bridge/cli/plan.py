@@ -133,7 +133,7 @@ def _offline_situation(options: PlanOptions, request: Request) -> Situation:
             situation = with_mission_home(situation, request.mission, str(options.via_mission))
     situation = replace(situation, obstacles=Obstacles(tuple(map(_obstacle, options.obstacle))))
     return with_home_option(
-        with_description(situation, described_vehicle(options.vehicle, options.firmware, options.stopping)),
+        with_description(situation, described_vehicle(options)),
         options.home,
     )
 

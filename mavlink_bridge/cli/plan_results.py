@@ -76,9 +76,9 @@ def plan_document(planned: Plan) -> dict[str, object]:
                 "name": one.name,
                 "position": list(one.position),
                 "radius_m": round(one.radius_m, 2),
-                "taken_for_m": round(planned.obstacles.radius_m(one), 2),
+                "taken_for_m": round(planned.ground.obstacles.radius_m(one), 2),
             }
-            for one in planned.obstacles.known
+            for one in planned.ground.obstacles.known
         ],
         "stopping": hold_document(planned.hold),
         "blocks": planned.blocks,

@@ -31,7 +31,7 @@ from missions.errors import MissionError
 from missions.fence import Obstacle, Obstacles
 from missions.geo import LatLon, LocalPoint, destination
 from missions.ground.from_situation import ground_for
-from missions.ground.scan import Disc, Scan, discs_seen
+from missions.ground.scan import Disc, RangeScan, discs_seen
 from missions.promise import known_vehicle
 
 if TYPE_CHECKING:
@@ -186,7 +186,7 @@ class ObstacleWatch(Part):
 
     # Scans
 
-    def _scan_of(self, message: m.ObstacleDistance, now_s: float) -> Scan | None:
+    def _scan_of(self, message: m.ObstacleDistance, now_s: float) -> RangeScan | None:
         """Return a scan as ArduPilot reads it; None where it cannot be used."""
         if message.frame != _BODY_FRD:
             self._refuse(
@@ -201,7 +201,7 @@ class ObstacleWatch(Part):
         count = min(int(360.0 / abs(step_deg) + 0.5), len(message.distances))
         cm = np.array(message.distances[:count], dtype=float)
         is_seen = (cm > 0) & (cm < _UNKNOWN) & (cm >= message.min_distance) & (cm <= message.max_distance)
-        return Scan(np.where(is_seen, cm / 100, np.nan), message.angle_offset, step_deg)
+        return RangeScan(np.where(is_seen, cm / 100, np.nan), message.angle_offset, step_deg)
 
     def _refuse(self, text: str, now_s: float) -> None:
         if not self._has_refused:

@@ -18,6 +18,7 @@ from missions.geo import from_e7, to_e7
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from mavlink_bridge.simulator.config import MovingDisc
     from mavlink_bridge.simulator.parameters import ParameterStore
     from missions.geo import LatLon
     from missions.items import MissionItem
@@ -68,9 +69,13 @@ class Rover:
         The numbers of items reached; the caller empties it.
     least_clearance_m : float
         The least distance of the true track to any fence, in true metres; negative on forbidden ground, infinite without fence.
+    discs : list of MovingDisc
+        What is in the field beside fences.
     breaches : int
         How often the vehicle saw itself leave allowed ground with the fence enabled.
     """
+
+    # Many attributes: ArduPilot's own vehicle is one object with mode, arming, fence and drive, and this answers like it.
 
     def __init__(
         self,
@@ -88,6 +93,7 @@ class Rover:
         self._mission = mission
         self.least_clearance_m = math.inf
         self.breaches = 0
+        self.discs: list[MovingDisc] = []
         self._boot(home, heading_deg)
 
     def _boot(self, home: LatLon, heading_deg: float) -> None:

@@ -36,6 +36,7 @@ from missions.items import with_home
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from mavlink_bridge.simulator.config import MovingDisc
     from missions.geo import LatLon
     from missions.items import MissionItem
 
@@ -74,13 +75,10 @@ class SimulatedVehicle:
     ----------
     rover : Rover
         The rover itself, for reading its state.
-    discs : list of MovingDisc
-        What is in the field beside fences, from time 0 on.
     """
 
     def __init__(self, config: SimulatorConfig | None = None) -> None:
         self.config = config or SimulatorConfig()
-        self.discs = list(self.config.discs)
         self.parameters = ParameterStore(self.config.parameters, self.config.firmware)
         self._home: LatLon = self.config.home
         self._mission = MissionList(
@@ -103,6 +101,7 @@ class SimulatedVehicle:
             lambda: self._fence.items,
             turns_early=turns_early(self.config.firmware),
         )
+        self.rover.discs += self.config.discs
         self._home = self.rover.home
         self._outbox: list[m.Message] = []
         self._update_totals(announce=False)
@@ -130,6 +129,11 @@ class SimulatedVehicle:
     def rally(self) -> tuple[MissionItem, ...]:
         """The stored rally points as they read back."""
         return _read(self._rally)
+
+    @property
+    def discs(self) -> list[MovingDisc]:
+        """What is in the field beside fences."""
+        return self.rover.discs
 
     @property
     def mode(self) -> Mode:

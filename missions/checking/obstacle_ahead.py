@@ -73,7 +73,7 @@ def obstacle_across(plan: Plan, situation: Situation, item: int) -> Across | Non
     pose = situation.pose
     here = pose.value.position if pose is not None else plan.start
     centres, radii_m = _circles(plan, obstacles)
-    known, known_m = _circles(plan, plan.obstacles)
+    known, known_m = _circles(plan, plan.ground.obstacles)
     if len(known):
         apart_m = np.hypot(*(centres[:, None] - known[None]).transpose(2, 0, 1))
         new = list(np.flatnonzero((apart_m + radii_m[:, None] > known_m[None]).all(axis=1)))

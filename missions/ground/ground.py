@@ -18,7 +18,7 @@ from shapely import LinearRing, MultiPolygon, Point, Polygon
 from shapely.ops import nearest_points
 
 from missions.errors import FenceError, SituationError
-from missions.fence import CircleZone, PolygonZone, Zone, ZoneKind
+from missions.fence import CircleZone, Obstacles, PolygonZone, Zone, ZoneKind
 from missions.geo import distance_m
 from missions.ground.frame import LocalFrame, autopilot_line, autopilot_scale, bow_m
 
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from missions.geo import LatLon
 
 Area = Polygon | MultiPolygon
+
+_NO_OBSTACLES = Obstacles()
 
 CIRCLE_TOLERANCE_M = 0.05
 """How far a circle's polygon may stand off the circle."""
@@ -74,6 +76,8 @@ class Ground:
         A box around everything, the stand-in for an inclusion where the fence has none.
     warnings : tuple of str
         What was found odd in the fence.
+    obstacles : Obstacles
+        What was reported beside the fence, with the time for which it is laid out.
     """
 
     frame: LocalFrame
@@ -81,6 +85,7 @@ class Ground:
     union: bool
     bounds: Polygon
     warnings: tuple[str, ...]
+    obstacles: Obstacles = _NO_OBSTACLES
 
     def areas(self, kind: ZoneKind) -> list[Area]:
         """Return the areas of one kind; the bounds where there is no inclusion."""

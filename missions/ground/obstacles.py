@@ -42,7 +42,7 @@ def with_obstacles(ground: Ground, obstacles: Obstacles) -> Ground:
         )
         for obstacle in obstacles.known
     )
-    return replace(ground, barriers=(*ground.barriers, *reported))
+    return replace(ground, barriers=(*ground.barriers, *reported), obstacles=obstacles)
 
 
 def _around(middle: LocalPoint, radius_m: float) -> Polygon:

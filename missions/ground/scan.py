@@ -31,7 +31,7 @@ _STEEPEST_DEG = 60.0  # half of the widest angle that a disc is drawn into; chos
 
 
 @dataclass(frozen=True)
-class Scan:
+class RangeScan:
     """Distances by direction.
 
     Parameters
@@ -57,12 +57,12 @@ class Disc(NamedTuple):
     radius_m: float
 
 
-def discs_seen(scan: Scan, here: LocalPoint, heading_deg: float, ground: Ground) -> list[Disc]:
+def discs_seen(scan: RangeScan, here: LocalPoint, heading_deg: float, ground: Ground) -> list[Disc]:
     """Return what a scan sees on allowed ground.
 
     Parameters
     ----------
-    scan : Scan
+    scan : RangeScan
         The distances.
     here : LocalPoint
         Where the sensor is.

@@ -59,23 +59,23 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
     should_stop = PlanStoppedError.when(should_stop)
     if isinstance(request, RepairMission):
         planned = repaired_plan(situation, request, should_stop=should_stop)
-        return _with_obstacles(with_hold(marked(planned, request), situation), situation)
+        return _told_of_obstacles(with_hold(marked(planned, request), situation), situation)
     if isinstance(request, Tour):
         planned = plan_tour(situation, request, should_stop=should_stop)
     else:
         planned = plan_route(situation, request, should_stop=should_stop)
     planned = _with_room(planned, situation, request, should_stop)
-    return _with_obstacles(with_hold(marked(planned, request), situation), situation)
+    return _told_of_obstacles(with_hold(marked(planned, request), situation), situation)
 
 
-def _with_obstacles(planned: Plan, situation: Situation) -> Plan:
-    """Return a plan with the obstacles that it was made around, each told once."""
+def _told_of_obstacles(planned: Plan, situation: Situation) -> Plan:
+    """Return a plan with the obstacles that it was made around told, each once."""
     obstacles = situation.obstacles
     told = [
         f"planned round the {one.name}, taken for {obstacles.radius_m(one):.1f} m; it is not known to the autopilot, and protects no person"
         for one in obstacles.known
     ]
-    return replace(planned, obstacles=obstacles, info=(*planned.info, *told)) if told else planned
+    return replace(planned, info=(*planned.info, *told)) if told else planned
 
 
 def _with_room(
@@ -97,14 +97,14 @@ def _with_room(
     mission = Mission(planned.items, planned.home)
     checked = shortened(mission, own, situation, wanted, most=most, may_slow=True, should_stop=should_stop)
     left_out = len(planned.items) - len(checked.mission.items)
+    short = plan_of(checked, situation, method=planned.method)
+    kept = planned.keeps
     return replace(
-        plan_of(checked, situation, method=planned.method),
+        short,
         targets=planned.targets,
         asked_targets=planned.asked_targets,
         straight_line_m=planned.straight_line_m,
-        clearance_m=planned.clearance_m,
-        start_clearance_m=planned.start_clearance_m,
-        asked_m=planned.asked_m,
+        keeps=replace(kept, drawn_m=short.keeps.drawn_m, driven_m=short.keeps.driven_m),
         blocks=planned.blocks,
         home=planned.home,
         warnings=planned.warnings,

@@ -8,24 +8,53 @@ from typing import Annotated
 
 from mavlink_bridge.cli.options.shared import (
     AcceptLessOption,
-    AnyVehicleOption,
-    CommonOptions,
-    FirmwareOption,
+    DescriptionOptions,
     RequiredConnectOption,
-    SigningKeyOption,
-    StoppingOption,
-    SystemOption,
-    TimeoutOption,
-    TrustOption,
+    VehicleLinkOptions,
     flag,
     metres,
     option,
 )
 from mavlink_bridge.cli.values import MOST_MPS, MOST_S, within
 
+_OBSTACLES = "Obstacles: this protects no person"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ObstacleOptions:
+    """Where obstacles may be reported from, and what is taken of them."""
+
+    obstacles_from: Annotated[
+        list[str],
+        option(
+            "Plan round reported obstacles, and hold for them with --drive: OBSTACLE_DISTANCE (a sensor's messages), keyboard (type blocked, clear); "
+            "repeatable, or with commas. This protects no person.",
+            "SOURCE",
+            panel=_OBSTACLES,
+        ),
+    ] = field(default_factory=list)
+    obstacle_growth: Annotated[
+        float,
+        option(
+            "How fast an obstacle may move until it was watched for 1.5 s.",
+            "MPS",
+            panel=_OBSTACLES,
+            parser=within(0.0, MOST_MPS, "metres a second"),
+        ),
+    ] = 1.0
+    obstacle_keep: Annotated[
+        float,
+        option(
+            "How long an obstacle is kept after a sensor saw it last.",
+            "S",
+            panel=_OBSTACLES,
+            parser=within(0.5, MOST_S, "seconds"),
+        ),
+    ] = 10.0
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BridgeOptions(CommonOptions):
+class BridgeOptions(ObstacleOptions, DescriptionOptions, VehicleLinkOptions):
     """Run alongside the autopilot: read fence, state and targets from the link, plan, upload and verify missions, watch the drive.
 
     Type targets as `LAT,LON`; `yes` confirms a plan; `blocked` reports an obstacle. Without `--upload` it only reports.
@@ -54,36 +83,6 @@ class BridgeOptions(CommonOptions):
     accept_less: AcceptLessOption = False
     corner_allowance: Annotated[str, option("Extra room for cut corners.", "M|auto")] = "auto"
     snap: Annotated[float, metres("Move a blocked target to the nearest free place within M metres.")] = 0.0
-    vehicle: Annotated[
-        Path | None, option("Parameter file, for what the vehicle does not report.", "FILE.parm")
-    ] = None
-    firmware: FirmwareOption = None
-    stopping: StoppingOption = field(default_factory=list)
-    trust_model: TrustOption = False
-    obstacles_from: Annotated[
-        list[str],
-        option(
-            "Plan round reported obstacles, and hold for them with --drive: OBSTACLE_DISTANCE (a sensor's messages), keyboard (type blocked, clear); "
-            "repeatable, or with commas. This protects no person.",
-            "SOURCE",
-        ),
-    ] = field(default_factory=list)
-    obstacle_growth: Annotated[
-        float,
-        option(
-            "How fast an obstacle may move until it was watched for 1.5 s.",
-            "MPS",
-            parser=within(0.0, MOST_MPS, "metres a second"),
-        ),
-    ] = 1.0
-    obstacle_keep: Annotated[
-        float,
-        option(
-            "How long an obstacle is kept after a sensor saw it last.",
-            "S",
-            parser=within(0.5, MOST_S, "seconds"),
-        ),
-    ] = 10.0
     upload: Annotated[bool, flag("--upload", "Write missions to the vehicle.")] = False
     drive: Annotated[
         bool,
@@ -102,11 +101,7 @@ class BridgeOptions(CommonOptions):
             "FILE.tlog",
         ),
     ] = None
-    system: SystemOption = None
-    any_vehicle: AnyVehicleOption = False
     source_system: Annotated[
         int | None, option("System id that pbpp uses. Default: the vehicle's own.", "N", min=1, max=255)
     ] = None
     source_component: Annotated[int, option("Component id that pbpp uses.", "N", min=1, max=255)] = 195
-    signing_key: SigningKeyOption = None
-    timeout: TimeoutOption = 30.0

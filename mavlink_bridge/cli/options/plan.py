@@ -12,13 +12,11 @@ from mavlink_bridge.cli.options.shared import (
     AcceptLessOption,
     ClearanceOptions,
     ConnectOption,
-    FirmwareOption,
+    DescriptionOptions,
     HomeOption,
     LinkOptions,
     MapOptions,
     PlaceOption,
-    StoppingOption,
-    TrustOption,
     flag,
     metres,
     option,
@@ -31,8 +29,51 @@ _DRIVE, _ROUTE = "Upload and drive", "Route"
 _TOURS = "Several targets, and missions to repair"
 
 
+@dataclass(frozen=True, kw_only=True)
+class TourOptions:
+    """How several targets are visited, or which mission is repaired."""
+
+    order: Annotated[
+        str, option("given: as listed; best: in the shortest order.", "|".join(ORDERS), panel=_TOURS)
+    ] = "given"
+    come_back: Annotated[
+        bool, flag("--return", "Return home after the last target (to the start if home is unknown).", _TOURS)
+    ] = False
+    end: Annotated[
+        str,
+        option(
+            "What to do at the end; rtl only if the straight line home is free.", "|".join(ENDS), panel=_TOURS
+        ),
+    ] = "hold"
+    via_mission: Annotated[
+        str | None,
+        option(
+            "Repair this mission: replace the legs that do not keep the clearance; own: the mission in the SOURCE.",
+            "FILE|own",
+            panel=_TOURS,
+        ),
+    ] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class BesideFenceOptions:
+    """What counts beside the fence: home, places to go home to, obstacles."""
+
+    home: HomeOption = None
+    place: PlaceOption = field(default_factory=list)
+    obstacle: Annotated[
+        list[str],
+        option(
+            "With --fence or --log: plan round this too, as the bridge does round what is reported to it; no file and no vehicle gets it. Repeatable.",
+            "LAT,LON,RADIUS",
+        ),
+    ] = field(default_factory=list)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PlanOptions(MapOptions, ClearanceOptions, LinkOptions):
+class PlanOptions(
+    BesideFenceOptions, TourOptions, DescriptionOptions, MapOptions, ClearanceOptions, LinkOptions
+):
     """Plan a mission around the fences of a SOURCE: `--fence FILE`, `--log FILE.tlog` or `--connect CONNECTION`.
 
     For example:
@@ -66,13 +107,6 @@ class PlanOptions(MapOptions, ClearanceOptions, LinkOptions):
         ),
     ] = None
     accept_less: AcceptLessOption = False
-    obstacle: Annotated[
-        list[str],
-        option(
-            "With --fence or --log: plan round this too, as the bridge does round what is reported to it; no file and no vehicle gets it. Repeatable.",
-            "LAT,LON,RADIUS",
-        ),
-    ] = field(default_factory=list)
     output: Annotated[
         list[Path],
         option("Write the mission: .waypoints, .plan, .geojson, .kml, .gpx.", "FILE", "-o", "--output"),
@@ -81,8 +115,6 @@ class PlanOptions(MapOptions, ClearanceOptions, LinkOptions):
         list[Path], option("Draw the plan: .png, .svg, .pdf, .html; - in the terminal.", "FILE")
     ] = field(default_factory=list)
     upload: Annotated[bool, flag("--upload", "Upload to the vehicle and verify.")] = False
-    home: HomeOption = None
-    place: PlaceOption = field(default_factory=list)
     hold: Annotated[
         bool, flag("--hold", "With --upload: switch a vehicle that drives in AUTO to HOLD first.", _DRIVE)
     ] = False
@@ -114,10 +146,6 @@ class PlanOptions(MapOptions, ClearanceOptions, LinkOptions):
             _ROUTE,
         ),
     ] = False
-    vehicle: Annotated[
-        Path | None,
-        option("Parameter file, for what the source does not report.", "FILE.parm", panel=VEHICLE_PANEL),
-    ] = None
     speed: Annotated[
         float | None,
         option(
@@ -125,29 +153,6 @@ class PlanOptions(MapOptions, ClearanceOptions, LinkOptions):
             "M/S",
             panel=VEHICLE_PANEL,
             parser=within(LEAST_MPS, MOST_MPS, "metres a second"),
-        ),
-    ] = None
-    firmware: FirmwareOption = None
-    stopping: StoppingOption = field(default_factory=list)
-    trust_model: TrustOption = False
-    order: Annotated[
-        str, option("given: as listed; best: in the shortest order.", "|".join(ORDERS), panel=_TOURS)
-    ] = "given"
-    come_back: Annotated[
-        bool, flag("--return", "Return home after the last target (to the start if home is unknown).", _TOURS)
-    ] = False
-    end: Annotated[
-        str,
-        option(
-            "What to do at the end; rtl only if the straight line home is free.", "|".join(ENDS), panel=_TOURS
-        ),
-    ] = "hold"
-    via_mission: Annotated[
-        str | None,
-        option(
-            "Repair this mission: replace the legs that do not keep the clearance; own: the mission in the SOURCE.",
-            "FILE|own",
-            panel=_TOURS,
         ),
     ] = None
     blocks: Annotated[bool, flag("--blocks", "Also draw the blocks of the free space.", OUTPUT_PANEL)] = False

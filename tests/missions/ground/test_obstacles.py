@@ -80,10 +80,10 @@ def test_a_route_goes_round_it_says_so_and_keeps_what_was_asked():
     found = plan(situation(one), REQUEST)
     line = LineString(found.ground.frame.to_local_array(found.path))
     assert line.distance(Point(found.ground.frame.to_local(one.position))) - 2.0 >= 2.0
-    assert found.obstacles.known == (one,)
+    assert found.ground.obstacles.known == (one,)
     assert any(one.name in text and "protects no person" in text for text in found.info)
     assert found.fence == FIELD  # what a file and the autopilot get
-    assert plan(situation(), REQUEST).obstacles.known == ()
+    assert plan(situation(), REQUEST).ground.obstacles.known == ()
 
 
 def test_none_round_it_is_said_with_its_name():

@@ -14,7 +14,7 @@ from missions.fence import CircleZone, Fence, PolygonZone, ZoneKind
 from missions.geo import LatLon, LocalPoint
 from missions.ground.frame import frame_around
 from missions.ground.ground import lay_out
-from missions.ground.scan import Scan, discs_seen
+from missions.ground.scan import RangeScan, discs_seen
 
 MIDDLE = LatLon(40.07, -105.23)
 FRAME = frame_around([MIDDLE])
@@ -39,7 +39,7 @@ def scan_of(shapes, here, heading_deg, *, sectors=72, first_deg=0.0, clockwise=1
             if ray.intersects(shape)
         ]
         found.append(min(distances, default=math.nan))
-    return Scan(np.array(found), first_deg, clockwise * step_deg)
+    return RangeScan(np.array(found), first_deg, clockwise * step_deg)
 
 
 def _ray(here, bearing_deg, length_m):
@@ -116,13 +116,13 @@ def test_what_lies_on_the_fence_or_beyond_is_left_out(thing):
 
 def test_nothing_is_seen_in_an_empty_scan_nor_where_no_fence_is_near():
     here = LocalPoint(0.0, -20.0)
-    assert discs_seen(Scan(np.full(72, math.nan), 0.0, 5.0), here, 0.0, FIELD) == []
+    assert discs_seen(RangeScan(np.full(72, math.nan), 0.0, 5.0), here, 0.0, FIELD) == []
     open_ground = lay_out(Fence(()), FRAME, around=[MIDDLE])
-    scan = Scan(np.where(np.arange(72) == 3, 4.0, math.nan), 0.0, 5.0)
+    scan = RangeScan(np.where(np.arange(72) == 3, 4.0, math.nan), 0.0, 5.0)
     assert len(discs_seen(scan, here, 0.0, open_ground)) == 1
 
 
 def test_what_stands_at_the_sensor_is_bounded():
     here = LocalPoint(0.0, -20.0)
-    found = discs_seen(Scan(np.full(72, 0.3), 0.0, 5.0), here, 0.0, FIELD)
+    found = discs_seen(RangeScan(np.full(72, 0.3), 0.0, 5.0), here, 0.0, FIELD)
     assert all(disc.radius_m <= 4.0 for disc in found)

@@ -39,6 +39,8 @@ _WIDER_M = 0.5
 _TRY_AGAIN_S = 3.0
 """So long after a way round was sought in vain it is sought again, where obstacles go on to be reported; chosen."""
 
+_AT_ONCE_S = 1.0  # at the soonest, where nothing seems to stand in it any more: the start may still be too near; chosen
+
 _MAKING_A_ROUTE = frozenset({State.HOLDING, State.PLANNING})
 """States whose plan is yet to come: it is made around the fence as it is then."""
 
@@ -62,12 +64,8 @@ class RouteDesk(Part):
         self._hold_watch = hold_watch
         self._made: Plan | MissionError | None = None
         self._planned_on = Grounds.of(core.situation)
-        self._free_way: Plan | None = (
-            None  # the route that obstacles alone stand in, while they are waited for
-        )
-        self._refused: MissionError | None = (
-            None  # why there is none round them, while it is seen whether there is one without them
-        )
+        self._free_way: Plan | None = None  # in which obstacles alone stand, while they are waited for
+        self._refused: MissionError | None = None  # why none leads round them, while one without is sought
         self._tried_s = -math.inf
         self._tried_with = Obstacles()
         self._look_s = -math.inf
@@ -167,7 +165,7 @@ class RouteDesk(Part):
         """Return that a route is sought again, where obstacles alone stood in it: once none does, and now and then while they move."""
         assert self._free_way is not None
         wider = self._with_wider_obstacles
-        is_free = obstacle_across(self._free_way, wider, 1) is None
+        is_free = now_s >= self._tried_s + _AT_ONCE_S and obstacle_across(self._free_way, wider, 1) is None
         is_due = now_s >= self._tried_s + _TRY_AGAIN_S and wider.obstacles.known != self._tried_with.known
         return [Notice.ROUTE_OUTDATED] if is_free or is_due else []
 

@@ -41,6 +41,22 @@ class MovingDisc:
     from_s: float = 0.0
 
 
+@dataclass(frozen=True, slots=True)
+class Battery:
+    """What the battery's monitor tells: percent left (-1: it does not know) and volts."""
+
+    percent: int = 100
+    volts: float = 12.6
+
+
+@dataclass(frozen=True, slots=True)
+class Receiver:
+    """What the GPS receiver tells: GPS_FIX_TYPE and its own figure for its error, None without one."""
+
+    fix_type: int = 6
+    error_m: float | None = None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulatorConfig:
     """What a simulated rover starts with.
@@ -71,6 +87,8 @@ class SimulatorConfig:
         How far a distance sensor sees all around (OBSTACLE_DISTANCE and ATTITUDE ten times a second); 0: it has none.
     uid : bytes
         The board's own id in AUTOPILOT_VERSION, at most 18 bytes; empty: none.
+    battery : Battery or None
+        What its battery's monitor tells at first; None: it has no monitor.
     """
 
     system: int = 1
@@ -88,3 +106,4 @@ class SimulatorConfig:
     discs: tuple[MovingDisc, ...] = ()
     sensor_m: float = 0.0
     uid: bytes = b""
+    battery: Battery | None = None

@@ -102,6 +102,7 @@ class SimulatedVehicle:
             turns_early=turns_early(self.config.firmware),
         )
         self.rover.discs += self.config.discs
+        self.rover.battery = self.config.battery
         self._home = self.rover.home
         self._outbox: list[m.Message] = []
         self._update_totals(announce=False)

@@ -19,6 +19,29 @@ DEFAULT_HOME = LatLon(40.071374, -105.229930)
 
 
 @dataclass(frozen=True, slots=True)
+class MovingDisc:
+    """Something round in the field, for the rover's distance sensor; the rover drives through it.
+
+    Parameters
+    ----------
+    centre : LatLon
+        Where its middle is at first.
+    radius_m : float
+    speed_mps : float
+    heading_deg : float
+        Where it moves, clockwise from north.
+    from_s : float
+        When it appears and begins to move.
+    """
+
+    centre: LatLon
+    radius_m: float
+    speed_mps: float = 0.0
+    heading_deg: float = 0.0
+    from_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class Battery:
     """What the battery's monitor tells: percent left (-1: it does not know) and volts."""
 
@@ -58,6 +81,10 @@ class SimulatorConfig:
         Whether MISSION_CURRENT carries ids of the lists, as PX4's does and ArduPilot's does not.
     firmware : Firmware or None
         The version it says that it is, and drives like; None: 4.7.0-dev of October 2025, the best measured.
+    discs : tuple of MovingDisc
+        What is in the field beside fences.
+    sensor_m : float
+        How far a distance sensor sees all around (OBSTACLE_DISTANCE and ATTITUDE ten times a second); 0: it has none.
     uid : bytes
         The board's own id in AUTOPILOT_VERSION, at most 18 bytes; empty: none.
     battery : Battery or None
@@ -76,5 +103,7 @@ class SimulatorConfig:
     streams: bool = True
     list_ids: bool = False
     firmware: Firmware | None = None
+    discs: tuple[MovingDisc, ...] = ()
+    sensor_m: float = 0.0
     uid: bytes = b""
     battery: Battery | None = None

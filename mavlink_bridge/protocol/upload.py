@@ -177,7 +177,6 @@ class Upload(TableMachine[UploadState, UploadEvent]):
             self._heard_s = now_s
             self._pace.start(now_s)
             self._announced_s = now_s
-            self._let_go()  # the number of items that an upload left half-way announced would count still
             self._announce(now_s)
 
     def receive(self, frame: Frame, now_s: float) -> None:
@@ -214,7 +213,6 @@ class Upload(TableMachine[UploadState, UploadEvent]):
         else:
             if self._move(UploadEvent.RETRY):
                 self._heard_s = self._announced_s = now_s
-                self._let_go()  # what it is busy with may be ours, of which we lost the end
             self._announce(now_s)
 
     def _rival_stays(self, now_s: float) -> bool:
@@ -358,6 +356,7 @@ class Upload(TableMachine[UploadState, UploadEvent]):
             if self._move(UploadEvent.DENIED) and self.state is UploadState.WAITING:
                 self._rival_since_s = now_s if self._rival_since_s is None else self._rival_since_s
                 self._act_at_s = now_s + _ANNOUNCE_AGAIN_S
+                self._let_go()  # what it is busy with may be ours, of which it did not hear the end
         elif not self._is_in_doubt(result, now_s):
             # After so long a stall the vehicle has given up, and ERROR only means that it waits for no item.
             given_up_s = self._advanced_s + _GIVEN_UP * self._lists.gives_up_after_s

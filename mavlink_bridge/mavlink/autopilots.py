@@ -51,6 +51,8 @@ class ListRules:
         What it holds, where that is known: of a list left out it decides itself (NO_SPACE).
     fence_bytes : int, optional
         Storage for the fence, where that counts, too.
+    has_storage_parameters : bool
+        Whether parameters tell of more storage (BRD_SD_MISSION, BRD_SD_FENCE).
     """
 
     form: StoredForm
@@ -64,6 +66,7 @@ class ListRules:
     has_float_form: bool
     most_items: Mapping[MissionType, int]
     fence_bytes: int | None = None
+    has_storage_parameters: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,6 +124,12 @@ class AutopilotTable:
         Its texts.
     goes_to_position_targets, goes_to_guided_items : bool
         Whether SET_POSITION_TARGET_GLOBAL_INT, or a mission item with ``current`` 2, makes it drive there. DO_REPOSITION does on all.
+    new_fence, new_fence_armed : str
+        What a person should know before a new fence is sent, at any time and to an armed vehicle; empty where there is nothing.
+    is_driven : bool
+        Whether it is set driving and watched: that takes a model of how it drives, and of how it stops.
+    measured_from : Firmware, optional
+        The oldest version of which this was measured; None where versions do not differ here.
     """
 
     name: str
@@ -131,9 +140,18 @@ class AutopilotTable:
     texts: Texts
     goes_to_position_targets: bool
     goes_to_guided_items: bool
+    new_fence: str = ""
+    new_fence_armed: str = ""
+    is_driven: bool = False
+    measured_from: Firmware | None = None
 
-    def __str__(self) -> str:
-        return self.name
+    def remark(self, firmware: Firmware | None) -> str | None:
+        """Return what is to be said of a vehicle's version; None where there is nothing."""
+        if self.measured_from is None or (firmware is not None and firmware >= self.measured_from):
+            return None
+        if firmware is None:
+            return f"the vehicle does not report its version: it is taken for {self.name}"
+        return f"the vehicle reports version {firmware}, which was not measured: it is taken for {self.name}"
 
 
 ARDUPILOT = AutopilotTable(
@@ -152,6 +170,7 @@ ARDUPILOT = AutopilotTable(
         has_float_form=True,
         most_items={MissionType.MISSION: MISSION_ITEMS, MissionType.FENCE: 84},
         fence_bytes=672,
+        has_storage_parameters=True,
     ),
     parameters=ParameterRules(is_bytewise=False),
     texts=Texts(
@@ -168,6 +187,11 @@ ARDUPILOT = AutopilotTable(
     ),
     goes_to_position_targets=True,
     goes_to_guided_items=True,
+    new_fence_armed=(
+        "the vehicle is armed, and a new fence takes effect at once: if it stands outside and FENCE_ENABLE is 1, it does what "
+        "FENCE_ACTION says (1: RTL, it drives straight home)"
+    ),
+    is_driven=True,
 )
 
 
@@ -200,6 +224,11 @@ def _px4(name: str, form: StoredForm) -> AutopilotTable:
         ),
         goes_to_position_targets=False,
         goes_to_guided_items=False,
+        new_fence=(
+            "PX4 accepts a fence and still does not enforce a zone that has home, or the armed rover, on its forbidden side, and none before about 0.1 s a "
+            'vertex have passed; it says so by text only ("Geofence invalid…"), which is not watched here yet'
+        ),
+        measured_from=Firmware(1, 17, 0),
     )
 
 

@@ -212,6 +212,11 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         return min(self._shown_progress, total), total
 
     @property
+    def is_atomic(self) -> bool:
+        """Whether the vehicle replaces a list as a whole: what broke off has left the old list, or the new one."""
+        return self._lists.is_atomic
+
+    @property
     def bound_s(self) -> float:
         """Longest time from the start to the end, whatever the link and the vehicle do; the wait for the backup is left out."""
         return MOST_S

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from mavlink_bridge.mavlink.messages import Autopilot
 from missions.geo import LatLon
 
 if TYPE_CHECKING:
@@ -40,8 +41,10 @@ class SimulatorConfig:
         Whether telemetry flows unasked; without it only HEARTBEAT does.
     list_ids : bool
         Whether MISSION_CURRENT carries ids of the lists, as PX4's does and ArduPilot's does not.
+    autopilot : Autopilot
+        Whose rover it is: ArduPilot's, or PX4's.
     firmware : Firmware or None
-        The version it says that it is, and drives like; None: 4.7.0-dev of October 2025, the best measured.
+        The version it says that it is, and drives like; None: 4.7.0-dev of October 2025, the best measured; of PX4 the line of 1.18.
     uid : bytes
         The board's own id in AUTOPILOT_VERSION, at most 18 bytes; empty: none.
     """
@@ -57,5 +60,6 @@ class SimulatorConfig:
     ready_after_s: float = 0.0
     streams: bool = True
     list_ids: bool = False
+    autopilot: Autopilot = Autopilot.ARDUPILOTMEGA
     firmware: Firmware | None = None
     uid: bytes = b""

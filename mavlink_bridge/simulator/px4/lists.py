@@ -167,9 +167,7 @@ def _command_result(item: MissionItem, mission_type: MissionType, *, checks_unus
             return MissionResult.UNSUPPORTED
     elif command in _PLAIN:
         is_unset = item.lat_e7 in _UNSET_XY[1:] and item.lon_e7 in _UNSET_XY[1:]
-        return (
-            MissionResult.INVALID_PARAM5_X if checks_unused and not is_unset else MissionResult.UNSUPPORTED
-        )
+        return MissionResult.INVALID_PARAM5_X if checks_unused and not is_unset else MissionResult.UNSUPPORTED
     elif command not in _PLACED and not is_list_item:
         return MissionResult.UNSUPPORTED
     if mission_type is MissionType.MISSION and is_list_item:
@@ -216,9 +214,7 @@ def kept(item: MissionItem, mission_type: MissionType, *, delays_as_one: bool) -
     else:
         params = (params[0] if item.command in _CIRCLES else 0.0, 0.0, 0.0, 0.0)
     auto = item.autocontinue if mission_type is not MissionType.FENCE else False
-    return replace(
-        item, frame=frame, params=_four(params), alt_m=z_m, current=False, autocontinue=auto
-    )
+    return replace(item, frame=frame, params=_four(params), alt_m=z_m, current=False, autocontinue=auto)
 
 
 def _kept_of_placed(

@@ -104,7 +104,7 @@ class Vehicle:
 
         stored.read = read_anew
 
-    def telemetry(self, now_s: float) -> list[Message]:  # noqa: ARG002 - PX4's tells more
+    def telemetry(self, now_s: float) -> list[Message]:
         """Return what it sends unasked each second."""
         mode = (129, 10) if self.is_running else (1, 4)
         return [Heartbeat(10, 3, base_mode=mode[0], custom_mode=mode[1])]
@@ -153,9 +153,7 @@ class Px4Vehicle(Vehicle):
 
 def vehicle_of(autopilot: AutopilotTable, **arguments: object) -> Vehicle:
     """Return a vehicle with that autopilot."""
-    return (
-        Vehicle(**arguments) if autopilot is ARDUPILOT else Px4Vehicle(autopilot=autopilot, **arguments)
-    )
+    return Vehicle(**arguments) if autopilot is ARDUPILOT else Px4Vehicle(autopilot=autopilot, **arguments)
 
 
 @dataclass

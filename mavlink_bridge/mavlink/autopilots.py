@@ -153,6 +153,9 @@ class AutopilotTable:
             return f"the vehicle does not report its version: it is taken for {self.name}"
         return f"the vehicle reports version {firmware}, which was not measured: it is taken for {self.name}"
 
+    def __str__(self) -> str:
+        return self.name
+
 
 ARDUPILOT = AutopilotTable(
     name="ArduPilot",
@@ -250,5 +253,12 @@ def autopilot_table(autopilot: int | None, firmware: Firmware | None = None) -> 
     if autopilot == Autopilot.ARDUPILOTMEGA:
         return ARDUPILOT
     if autopilot == Autopilot.PX4:
-        return PX4_1_17 if firmware is not None and firmware < _PX4_SINCE_1_18 else PX4_1_18
+        return autopilot_of(ardupilot=False, firmware=firmware)
     return None
+
+
+def autopilot_of(*, ardupilot: bool | None, firmware: Firmware | None = None) -> AutopilotTable:
+    """Return the table of a vehicle of which a situation knows no more than whether it is ArduPilot; where that is not known, it is taken for it."""
+    if ardupilot is not False:
+        return ARDUPILOT
+    return PX4_1_17 if firmware is not None and firmware < _PX4_SINCE_1_18 else PX4_1_18

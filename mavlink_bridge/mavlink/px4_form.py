@@ -75,6 +75,12 @@ def _sendable(item: MissionItem, mission_type: MissionType) -> MissionItem:
     known = px4_commands().get(command)
     if known is None:
         return item
+    # NaN as a whole number is undefined, and so is what would be stored.
+    one, two, three, four = (
+        0.0 if keep == "whole" and math.isnan(value) else value
+        for keep, value in zip(known.keeps, item.params, strict=True)
+    )
+    item = replace(item, params=(one, two, three, four))
     if known.has_place:
         return _with_unused(item, known.may_be_set | frozenset("xy"))
     return replace(_with_unused(item, known.may_be_set), frame=_MISSION_FRAME)

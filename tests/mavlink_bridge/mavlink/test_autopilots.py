@@ -148,7 +148,9 @@ def test_condition_delay_is_delay_only_since_1_18():
 
 def test_the_first_item_of_a_mission_is_the_current_one_and_circles_come_last():
     form = PX4_1_17.lists.form
-    prepared = form.prepared([change_speed(1.0), replace(waypoint(LatLon(40.0, -105.0)), current=True)], MISSION)
+    prepared = form.prepared(
+        [change_speed(1.0), replace(waypoint(LatLon(40.0, -105.0)), current=True)], MISSION
+    )
     assert [item.current for item in prepared] == [True, False]
     circle = MissionItem(Command.FENCE_CIRCLE_EXCLUSION, 0, (5.0, 0, 0, 0), 1, 1)
     corners = [

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 INT32, REAL32 = 6, 9
 """MAV_PARAM_TYPE."""
 
-NO_INDEX = 65_535
+NO_INDEX = 65_535  # UINT16_MAX: PARAM_VALUE.param_index outside a list
 _GONE_1_18 = frozenset({"GF_PREDICT"})
 
 

@@ -23,13 +23,14 @@ if TYPE_CHECKING:
     from missions.geo import LatLon
     from missions.items import MissionItem
 
-TICK_S = 0.05
-FENCE_LOOK_S = 0.2
+TICK_S = 0.05  # chosen: the simple law has nothing quicker
+FENCE_LOOK_S = 0.2  # five times a second
 FAILSAFE_HOLD_S = 5.0
 """HOLD before a failsafe's RTL or LAND."""
 
-DISARM_AFTER_S = 2.0
+DISARM_AFTER_S = 2.0  # at home after RTL, or in LAND
 
+# Main modes, sub-modes of AUTO, MISSION_STATE and MAV_SEVERITY by their numbers.
 AUTO, MANUAL = 4, 1
 TAKEOFF, HOLD, MISSION, RTL, LAND = 2, 3, 4, 5, 6
 _MAIN_NAMES = {1: "Manual", 2: "Altitude", 3: "Position", 5: "Acro", 6: "Offboard", 7: "Stabilized"}

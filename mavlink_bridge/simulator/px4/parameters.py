@@ -26,7 +26,7 @@ def _rows() -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-class ParameterStore:
+class Px4Parameters:
     """Parameters by name, in a fixed order; nothing is range-checked.
 
     Parameters

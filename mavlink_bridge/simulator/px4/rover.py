@@ -18,8 +18,8 @@ from missions.items import Command
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from mavlink_bridge.simulator.px4.lists import StoredList
-    from mavlink_bridge.simulator.px4.parameters import ParameterStore
+    from mavlink_bridge.simulator.px4.lists import Px4List
+    from mavlink_bridge.simulator.px4.parameters import Px4Parameters
     from missions.geo import LatLon
     from missions.items import MissionItem
 
@@ -73,9 +73,9 @@ class Px4Rover:
 
     Parameters
     ----------
-    parameters : ParameterStore
+    parameters : Px4Parameters
         Read whenever they matter.
-    lists : mapping of MissionType to StoredList
+    lists : mapping of MissionType to Px4List
         Its lists.
     home : LatLon
         Where it stands.
@@ -96,8 +96,8 @@ class Px4Rover:
 
     def __init__(
         self,
-        parameters: ParameterStore,
-        lists: Mapping[MissionType, StoredList],
+        parameters: Px4Parameters,
+        lists: Mapping[MissionType, Px4List],
         home: LatLon,
         heading_deg: float,
         *,
@@ -264,7 +264,7 @@ class Px4Rover:
             self._looked_s = now_s
             self._watch_fence(now_s)
 
-    def _take_mission(self, mission: StoredList) -> None:
+    def _take_mission(self, mission: Px4List) -> None:
         if mission.current is not None:
             self.progress.seq = mission.current
         elif self.progress.seq >= len(mission):

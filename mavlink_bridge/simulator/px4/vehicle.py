@@ -153,6 +153,7 @@ class Px4Vehicle:
                 self._outbox += [
                     self.parameters.message(name, index) for index, name in enumerate(self.parameters)
                 ]
+                self._outbox.append(self.parameters.checksum())
             case m.ParamRequestRead():
                 answer = self.parameters.asked(message)
                 self._outbox += [answer] if answer is not None else []

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from mavlink_bridge.mavlink.messages import Autopilot
 from missions.geo import LatLon
 
 if TYPE_CHECKING:
@@ -79,8 +80,10 @@ class SimulatorConfig:
         Whether telemetry flows unasked; without it only HEARTBEAT does.
     list_ids : bool
         Whether MISSION_CURRENT carries ids of the lists, as PX4's does and ArduPilot's does not.
+    autopilot : Autopilot
+        Whose rover it is: ArduPilot's, or PX4's.
     firmware : Firmware or None
-        The version it says that it is, and drives like; None: 4.7.0-dev of October 2025, the best measured.
+        The version it says that it is, and drives like; None: 4.7.0-dev of October 2025, the best measured; of PX4 the line of 1.18.
     discs : tuple of MovingDisc
         What is in the field beside fences.
     sensor_m : float
@@ -102,6 +105,7 @@ class SimulatorConfig:
     ready_after_s: float = 0.0
     streams: bool = True
     list_ids: bool = False
+    autopilot: Autopilot = Autopilot.ARDUPILOTMEGA
     firmware: Firmware | None = None
     discs: tuple[MovingDisc, ...] = ()
     sensor_m: float = 0.0

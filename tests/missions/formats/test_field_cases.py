@@ -232,7 +232,9 @@ BAD = {
     "31-geojson-habits/geojsonio-poly-and-pin.geojson": ("point 1", "--ignore-points"),
     "31-geojson-habits/names-wp1.geojson": ("'WP1'", "--ignore-points"),
     "31-geojson-habits/line-obstacle.geojson": ("a line has no inside", "draw a polygon around it", "--role 'line 1=ignore'"),
-    "31-geojson-habits/osm-fence-yes.geojson": ("fence 'yes'", "--role 'polygon 1=inclusion'"),
+    "31-geojson-habits/osm-fence-yes.geojson": (
+        "unclear whether polygon 1 is an inclusion or an exclusion (fence 'yes' is not a role)", "--role 'polygon 1=exclusion'", "=inclusion"
+    ),
     "31-geojson-habits/strings.geojson": ("features[0].geometry", "without quotation marks"),
     "32-kml-habits/folders-with-label-pin.kml": ("a point cannot be exclusion", "--ignore-points"),
     "32-kml-habits/ge-boundary-and-tree.kml": ("'Boundary'", "'Tree 1'", "--outermost inclusion"),
@@ -248,6 +250,17 @@ def test_maps_that_are_refused_name_what_settles_it(tmp_path, case, words):
     result = convert(case, tmp_path)
     assert result.exit_code == 3
     assert all(word in result.stderr for word in words), result.stderr
+
+
+def test_a_key_of_openstreetmap_is_skipped_where_the_name_says_the_role(tmp_path):
+    ring = json.loads((CASES / "31-geojson-habits" / "osm-fence-yes.geojson").read_text())["features"][0]
+    ring["properties"] |= {"name": "No-go pond", "fence": "no"}
+    source = tmp_path / "m.geojson"
+    source.write_text(json.dumps(ring))
+    result = convert(str(source), tmp_path)
+    assert result.exit_code == 0, result.stderr
+    assert kinds(tmp_path / "out.plan") == ["exclusion"]
+    assert "fence 'no' of polygon 'No-go pond' is not a role: skipped" in result.stderr
 
 
 def test_paths_of_maps(tmp_path):

@@ -35,7 +35,7 @@ from missions.routing.route_search import SLOW_MPS, DrivenRoute, Known, RouteSea
 from missions.words import metres
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterator
 
     from missions.fitting.cost import Measured
     from missions.promise import Promise
@@ -56,12 +56,15 @@ _OTHER_MEASUREMENTS = FIT_MEASUREMENTS + CRAWL_MEASUREMENTS
 _GOOD_SHARE = 0.5  # for fitting in short rounds
 GRID_M = 0.5
 """Between the clearances that all who ask for less look at too, where a route is hard to fit: the same for all, so that less is not slower."""
-_GRID_FITTED = 6  # chosen, not measured: it bounds the time
+_GRID_FITTED = 4  # chosen, not measured: it bounds the time
 # On the ladder (docs/clearance-ladder.md), 593 rungs of 9 hard places, fitted routes take 0.95 to 1.04 of the time that their lines would as drawn
 # where less than a metre is missing in all, 0.82 to 1.06 where more is: what lost more, or had that much to mend, may be quicker elsewhere
 _LOST, _MUCH_LOST = 1.02, 1.04
 _HARD_M = 1.0
 _HARD_SHARE, _EASY_SHARE = 0.85, 0.98
+_SHARE_SPREAD = (
+    0.08  # between neighbours of the grid on one place: what came out so much better than the last is rare
+)
 _ALL_M = 0.01  # what keeps so little less than it aims at is as wide as can be
 
 _NOTHING_ADVICE = (
@@ -124,23 +127,32 @@ class PromisedRoute:
         if (
             _lost_share(found) > _MUCH_LOST and _kept_m(found) < required_m + STEP_M
         ):  # else a little more was tried
-            more_m = (round(required_m + step * STEP_M, 9) for step in _STEPS_UP)
-            found = _quicker_of(found, (self._other_search(one_m, required_m) for one_m in more_m))
+            for more_m in (round(required_m + step * STEP_M, 9) for step in _STEPS_UP):
+                other = self._other_search(more_m, required_m).find(briefly=True)
+                if isinstance(other, NoRoute):
+                    break
+                found = min(found, other, key=lambda one: one.cost_s)
         if _lost_share(found) > _LOST or _missing_m(found.outlook) > _HARD_M:
-            found = _quicker_of(found, self._promising(found, asked))
+            found = self._quickest_of_grid(found, asked)
         return found
 
-    def _promising(self, found: DrivenRoute, asked: Promise) -> Iterator[RouteSearch]:
-        """Return searches at the grid's next clearances, as long as what is drawn there may come out quicker than a route."""
+    def _quickest_of_grid(self, found: DrivenRoute, asked: Promise) -> DrivenRoute:
+        """Return a route, or a quicker one fitted to the grid's next clearances, as long as what is drawn there may come out quicker."""
         first = math.floor(asked.promised_m / GRID_M + 1e-6) + 1
+        hard_share = _HARD_SHARE
         for number in range(first, first + _GRID_FITTED):
             required_m = round(number * GRID_M + asked.error_m, 9)
-            search = self._search(required_m, required_m)
+            search = replace(self._search(required_m, required_m), measurements=_OTHER_MEASUREMENTS)
             look = search.outlook
-            share = _HARD_SHARE if _missing_m(look) > _HARD_M else _EASY_SHARE
+            share = hard_share if _missing_m(look) > _HARD_M else _EASY_SHARE
             if look is None or share * look.kept_cost_s >= found.cost_s:
-                return
-            yield search
+                break
+            other = search.find(briefly=True)
+            if isinstance(other, NoRoute):
+                break
+            hard_share = max(hard_share, other.cost_s / look.kept_cost_s - _SHARE_SPREAD)
+            found = min(found, other, key=lambda one: one.cost_s)
+        return found
 
     def widest(self, asked: Promise) -> Found | NoRoute:
         """Return the route that keeps most, and what is promised for it; else why there is none."""
@@ -311,16 +323,6 @@ def _lost_share(found: DrivenRoute) -> float:
 
 def _missing_m(outlook: Measured | None) -> float:
     return sum(outlook.missing_m) if outlook is not None else 0.0
-
-
-def _quicker_of(found: DrivenRoute, searches: Iterable[RouteSearch]) -> DrivenRoute:
-    """Return a route, or the quickest that searches find where that is quicker; after one that finds none no more are asked."""
-    for search in searches:
-        other = search.find(briefly=True)
-        if isinstance(other, NoRoute):
-            break
-        found = min(found, other, key=lambda one: one.cost_s)
-    return found
 
 
 def _kept_m(found: DrivenRoute) -> float:

@@ -6,8 +6,11 @@ where none do is it refused. The widest route is the one that keeps most of all 
 be drawn at downwards; then the next steps above the best are asked for as anybody would ask, as long as there is a route. Where the start
 refuses, routes that begin otherwise are looked for: another way, or leading away first.
 
-That no more can be had than the widest keeps, that all up to it can, and that less clearance never takes longer, does not follow: for that all
-clearances would have to be fitted for each plan. docs/clearance-ladder.md counts the exceptions.
+Where a route is hard to fit, that is where much had to be mended or much time was lost, it is fitted at the next clearances of a grid too, which
+is the same for whoever asks, as long as what is drawn there may come out quicker; the quickest is taken.
+
+That no more can be had than the widest keeps, that all up to it can, and that less clearance never takes longer, does not follow all the same: for
+that all clearances would have to be fitted for each plan. docs/clearance-ladder.md counts the exceptions.
 
 **Why.** Fitting is a heuristic (`routing.route_search`): at one clearance it fails by a centimetre and at the next it succeeds. Without this
 4.53 m were refused and 4.6 m planned, and the widest route kept less than others did.

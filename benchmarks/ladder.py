@@ -149,7 +149,7 @@ That no plan promises less than was asked holds by construction. The rest is mea
 and feasibility monotone by construction all greater clearances would have to be fitted for each plan. Where a route does not fit, or is driven
 slowly (1.6 times the time at full speed), the next clearances are fitted too, and the quickest that keeps enough is taken; before a clearance is
 refused, the widest ones are tried, and where the start refuses, those whose routes begin otherwise. Where fitting had to mend more than a metre
-in all, or cost more than 2 % of the time, up to four of the next whole and half metres are fitted as well, the same ones for whoever asks, as long as
+in all, or cost more than 2 % of the time, up to five of the next whole and half metres are fitted as well, the same ones for whoever asks, as long as
 what is drawn there may come out quicker.
 """
 

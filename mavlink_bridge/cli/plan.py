@@ -117,9 +117,10 @@ def _check_options(options: PlanOptions) -> None:
 def _offline_situation(options: PlanOptions, request: Request) -> Situation:
     """Return what the file or the log holds, with what other options add."""
     if options.log is not None:
-        from mavlink_bridge.cli.log_source import situation_of  # noqa: PLC0415 - pymavlink only for logs
+        from mavlink_bridge.cli import log_source  # noqa: PLC0415 - pymavlink only for logs
 
-        situation = situation_of(options.log, options, drives_its_items=request.repairs)
+        situation = log_source.situation_of(options.log, options, drives_its_items=request.repairs)
+        log_source.tell_what_is_taken(options.log, situation, request)
     else:
         assert options.fence is not None
         situation = read_fence_file(options.fence, options)

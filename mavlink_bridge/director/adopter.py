@@ -197,7 +197,9 @@ class Adopter(Part):
         if not notes:
             return "this computer has no note of a drive that pbpp started"
         if not self.core.vehicle_uid:
-            return "the vehicle does not report its board's uid, so it may not be the one whose drive is noted"
+            return (
+                "the vehicle does not report its board's uid, so it may not be the one whose drive is noted"
+            )
         return f"the noted drive is that of another vehicle ({notes[0].vehicle})"
 
     def _why_not(self, note: DriveNote) -> str:

@@ -40,7 +40,7 @@ def situation_of(log: Path, options: LinkOptions, *, drives_its_items: bool) -> 
 
 
 def tell_what_is_taken(log: Path, situation: Situation, request: Request) -> None:
-    """Say which start, target or mission, and fence a plan takes from a log, from what and when; what options give is not said."""
+    """Put on stderr which start, target or mission, and fence a plan takes from a log, from what and when; what options give is not said."""
     begin_s = log_begin(log).time_s
 
     def told(what: str, known: Known[Any]) -> str:

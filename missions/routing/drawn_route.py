@@ -476,7 +476,7 @@ class DrawnRoutes:
 
 
 def _blocked(
-    kind: NoRouteKind, text: str, fences: list[str], *, is_overlap: bool, **facts: object
+    kind: NoRouteKind, text: str, fences: list[str], *, is_overlap: bool = False, **facts: object
 ) -> _NoWayError:
     """Return the end of a search whose start or target is blocked, perhaps because inclusions overlap and it lies in some of them only."""
     why = NoRoute(kind, text, {"fences": fences, **facts}, fences)

@@ -357,6 +357,15 @@ def test_planning_of_the_autopilots_own_is_warned_of(tmp_path):
         )
 
 
+def test_a_position_with_longitude_first_is_recognised_by_where_the_fence_is():
+    fence = ("--fence", CASES / "22-dijkstra-and-simple-avoid" / "f.waypoints")
+    swapped = command("plan", *fence, "--start", "48.1005,11.5005", "--target", "11.5008,48.1008")
+    assert swapped.exit_code == 4
+    assert "latitude comes first: did you mean 48.1008000,11.5008000?" in swapped.stderr
+    far = command("plan", *fence, "--start", "48.1005,11.5005", "--target", "12.5008,58.1008")
+    assert "did you mean" not in far.stderr
+
+
 @pytest.mark.parametrize("log", sorted((CASES / "40-tlog-zero-times").iterdir()), ids=lambda log: log.name)
 def test_logs_with_odd_times_are_read_and_what_was_not_seen_is_not_learnt(log):
     assert command("log", log).exit_code == 0

@@ -15,9 +15,8 @@ import platform
 import statistics
 import sys
 import time
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
-from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -171,7 +170,9 @@ def main() -> None:
     done = read_kept(options.kept)
     with ProcessPoolExecutor(options.jobs) as pool:
         missing = [place for place in places if place not in done]
-        for found in pool.map(partial(ladder_of, step_m=options.step), missing):
+        waiting = [pool.submit(ladder_of, place, options.step) for place in missing]
+        for ended in as_completed(waiting):
+            found = ended.result()
             done[found.place] = found
             if options.kept:
                 with options.kept.open("a", encoding="utf-8") as file:

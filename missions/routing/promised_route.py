@@ -38,8 +38,6 @@ from missions.routing.route_search import SLOW_MPS, DrivenRoute, RouteSearch, Sh
 from missions.words import metres
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from missions.fitting.cost import Measured
     from missions.promise import Promise
     from missions.routing.drawn_route import Sought
@@ -173,7 +171,7 @@ class PromisedRoute:
         best: DrivenRoute | None = None
         why: NoRoute | None = None
         for required_m in (*_downwards(most_m, error_m, enough_m), 0.0):
-            if required_m < enough_m or (best is not None and _kept_m(best) >= required_m):
+            if required_m < enough_m or (best is not None and _kept_m(best) >= (enough_m or required_m)):
                 break
             found = self._widest_at(required_m, briefly=required_m > 0)
             if isinstance(found, DrivenRoute):
@@ -291,13 +289,14 @@ class PromisedRoute:
         return RouteSearch(self.sought, required_m, self.vehicle, self.heading_deg, enough_m, self._known)
 
 
-def _downwards(most_m: float, error_m: float, enough_m: float) -> Iterator[float]:
-    """Return what is aimed at for the widest route, most first: whole steps of what is promised; the widest drawn before them where none is enough."""
+def _downwards(most_m: float, error_m: float, enough_m: float) -> tuple[float, ...]:
+    """Return what is aimed at for the widest route, most first: whole steps of what is promised, and the widest drawn where something is enough."""
     steps = _steps(most_m - error_m)
-    if steps <= 0 or error_m + steps * STEP_M < enough_m:
-        yield _whole_cm(most_m)
     # Rounded, so that what comes to the same is the same, and is fitted once.
-    yield from (round(error_m + (steps - down) * STEP_M, 9) for down in _STEPS_DOWN if steps > down)
+    wholes = [round(error_m + (steps - down) * STEP_M, 9) for down in _STEPS_DOWN if steps > down]
+    if not wholes or wholes[0] < enough_m:
+        return (_whole_cm(most_m), *wholes)
+    return (wholes[0], _whole_cm(most_m), *wholes[1:]) if enough_m else tuple(wholes)
 
 
 def _whole_cm(most_m: float) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from mavlink_bridge.cli.common import inform, warn
+from mavlink_bridge.cli.common import warn
 from mavlink_bridge.cli.log_times import log_begin
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.logbook.log_situation import situation_from_log
@@ -39,8 +39,8 @@ def situation_of(log: Path, options: LinkOptions, *, drives_its_items: bool) -> 
     return situation
 
 
-def tell_what_is_taken(log: Path, situation: Situation, request: Request) -> None:
-    """Put on stderr which start, target or mission, and fence a plan takes from a log, from what and when; what options give is not said."""
+def taken_info(log: Path, situation: Situation, request: Request) -> list[str]:
+    """Return which start, target or mission, and fence a plan takes from a log, from what and when; what options give is not said."""
     begin_s = log_begin(log).time_s
 
     def told(what: str, known: Known[Any]) -> str:
@@ -63,5 +63,4 @@ def tell_what_is_taken(log: Path, situation: Situation, request: Request) -> Non
     if situation.fence is not None:
         zones = counted(len(situation.fence.value.zones), "zone")
         taken.append(told(f"fence of {zones}", situation.fence))
-    if taken:
-        inform([f"taken from {log.name}: {', '.join(taken)}"])
+    return [f"taken from {log.name}: {', '.join(taken)}"] if taken else []

@@ -264,8 +264,10 @@ class TestFiles:
         assert f"{first}{start}, {fence}\n" in given.stderr
         assert "taken from" not in run("--log", maze, "-q").stderr
         end = "target 40.0720926,-105.2286152, the end of the mission (mission read-back at 17.5 s)"
-        assert end in run("--log", yard).stderr
-        own = run("--log", yard, "--via-mission", "own")
+        assert end in run("--log", yard, "--escape").stderr
+        told = document("--log", yard, "--escape")["info"]
+        assert end in told[0]
+        own = run("--log", yard, "--via-mission", "own", "--start", START)
         assert "3 mission items with home (mission read-back at 17.5 s)" in own.stderr
         assert "target" not in own.stderr.splitlines()[0]
 

@@ -92,6 +92,7 @@ class SimulatedVehicle:
             lambda: self._fence.items,
             turns_early=turns_early(self.config.firmware),
         )
+        self.rover.battery = self.config.battery
         self._home = self.rover.home
         self._outbox: list[m.Message] = []
         self._update_totals(announce=False)

@@ -56,10 +56,10 @@ def plan(options: PlanOptions) -> None:
         situation, verified, arrival = result.situation, result.verified, result.arrival
         backup = result.backup
     else:
-        situation = _offline_situation(options, request)
+        situation, taken = _offline_situation(options, request)
         with planning_shown(request, quiet=options.is_silent) as should_stop:
             made = timed_plan(situation, request, should_stop=should_stop)
-        told.tell(*made, situation)
+        told.tell(*made, situation, taken)
     document = {
         **told.document(),
         "source": options.connect or Path(str(options.fence or options.log)).name,
@@ -120,22 +120,25 @@ def _check_options(options: PlanOptions) -> None:
     check_plots(plots, json_output=options.json_output)
 
 
-def _offline_situation(options: PlanOptions, request: Request) -> Situation:
-    """Return what the file or the log holds, with what other options add."""
+def _offline_situation(options: PlanOptions, request: Request) -> tuple[Situation, list[str]]:
+    """Return what the file or the log holds, with what other options add; and what a log gave to the plan."""
+    taken = []
     if options.log is not None:
-        from mavlink_bridge.cli.log_source import situation_of  # noqa: PLC0415 - pymavlink only for logs
+        from mavlink_bridge.cli import log_source  # noqa: PLC0415 - pymavlink only for logs
 
-        situation = situation_of(options.log, options, drives_its_items=request.repairs)
+        situation = log_source.situation_of(options.log, options, drives_its_items=request.repairs)
+        taken = log_source.taken_info(options.log, situation, request)
     else:
         assert options.fence is not None
         situation = read_fence_file(options.fence, options)
         if isinstance(request, RepairMission) and request.mission is not None:
             situation = with_mission_home(situation, request.mission, str(options.via_mission))
     situation = replace(situation, obstacles=Obstacles(tuple(map(_obstacle, options.obstacle))))
-    return with_home_option(
+    described = with_home_option(
         with_description(situation, described_vehicle(options)),
         options.home,
     )
+    return described, taken
 
 
 def _obstacle(text: str) -> Obstacle:

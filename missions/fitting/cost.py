@@ -92,6 +92,11 @@ class Measured:
         """Whether the band keeps what is required."""
         return max(self.missing_m) <= ENOUGH_M
 
+    @property
+    def kept_cost_s(self) -> float:
+        """What the lines would cost if nothing were missing."""
+        return self.cost_s - _MISSING_COST_S_PER_M * sum(self.missing_m)
+
 
 class Gauge:
     """Measures lines on a field; what was measured once, whole lines or one leg of them, is known.

@@ -41,7 +41,9 @@ CIRCLE_TOLERANCE_M = 0.05
 EDGE_BOW_M = 1e-3
 """How far a fence's line may stand off the autopilot's."""
 
-_COMMON_GROUND = "the autopilot allows only the intersection of all inclusions: draw the area as one inclusion polygon (pbpp fence merge makes it)"
+COMMON_GROUND = "the autopilot allows only the intersection of all inclusions"
+COMMON_GROUND_ADVICE = "draw the area as one inclusion polygon (pbpp fence merge makes it)"
+_COMMON_GROUND = f"{COMMON_GROUND}: {COMMON_GROUND_ADVICE}"
 _WALL_M = 1e-3  # thickness of a line made an area: a millimetre, below degE7's 11 mm
 _CIRCLE_PAD_M = 1e-4  # what the autopilot's flat metres lose on a circle of kilometres
 _OPEN_GROUND_M = 500.0  # of ground around everything where no inclusion bounds it; chosen, not measured
@@ -155,11 +157,11 @@ class Ground:
             outside = []
         return [b for b in self.barriers if b.kind is ZoneKind.EXCLUSION and b.area.covers(point)] + outside
 
-    def common_ground_advice(self, point: Point) -> str:
-        """Return why a point is forbidden although an inclusion covers it, after a semicolon; empty where that is not so."""
+    def is_in_some_inclusions_only(self, point: Point) -> bool:
+        """Return whether a point is forbidden although an inclusion covers it, because others do not."""
         inclusions = [b for b in self.barriers if b.kind is ZoneKind.INCLUSION]
         covered = sum(barrier.area.covers(point) for barrier in inclusions)
-        return f"; {_COMMON_GROUND}" if not self.union and 0 < covered < len(inclusions) else ""
+        return not self.union and 0 < covered < len(inclusions)
 
     def nearest_point(self, area: BaseGeometry, point: Point) -> Point:
         """Return the point of an area nearest to a point."""

@@ -252,6 +252,25 @@ class TestFiles:
         quiet = run("--fence", fields / "yard-fence.waypoints", "--start", START, "--target", TARGET, "-q")
         assert (quiet.exit_code, quiet.stdout) == (0, "")
 
+    def test_what_is_taken_from_a_log_is_told_with_its_time(self, logs: Path, tmp_path: Path) -> None:
+        """Which start, target and fence it took, a plan from a log did not say."""
+        maze, yard = logs / "guided-maze.tlog", logs / "mission-yard.tlog"
+        start = "start 40.0714396,-105.2297785 (GLOBAL_POSITION_INT at 70.5 s)"
+        target = "target 40.0726316,-105.2290497 (DO_REPOSITION at 58.2 s)"
+        fence = "fence of 9 zones (fence read-back at 12.2 s)"
+        first = "info: taken from guided-maze.tlog: "
+        assert f"{first}{start}, {target}, {fence}\n" in run("--log", maze).stderr
+        given = run("--log", maze, "--target", "40.0726316,-105.2290497")
+        assert f"{first}{start}, {fence}\n" in given.stderr
+        assert "taken from" not in run("--log", maze, "-q").stderr
+        end = "target 40.0720926,-105.2286152, the end of the mission (mission read-back at 17.5 s)"
+        assert end in run("--log", yard, "--escape").stderr
+        told = document("--log", yard, "--escape")["info"]
+        assert end in told[0]
+        own = run("--log", yard, "--via-mission", "own", "--start", START)
+        assert "3 mission items with home (mission read-back at 17.5 s)" in own.stderr
+        assert "target" not in own.stderr.splitlines()[0]
+
     def test_quiet_leaves_warnings_and_quieter_only_errors(self, fields: Path) -> None:
         words = ("--fence", fields / "yard-fence.waypoints", "--start", START, "--target")
         assert "warning: " in run(*words, TARGET, "-q").stderr

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.cli.common import inform, remarks_document, warn
+from mavlink_bridge.cli.home_parts import parts_document, with_parts
 from mavlink_bridge.cli.kept_files import write_kept
 from mavlink_bridge.cli.pictures import draw
 from mavlink_bridge.cli.terminal import echo
@@ -40,7 +41,7 @@ def write_outputs(
         planned.write(path, situation, write=write_kept)
 
     def scene() -> PictureScene:
-        plain = plan_scene(planned, blocks=blocks)
+        plain = with_parts(plan_scene(planned, blocks=blocks), planned.items)
         return ways.drawn(plain) if ways is not None else plain
 
     return [*outputs, *draw(scene, plots)]
@@ -168,6 +169,7 @@ class Told:
             **plan_document(self._plan),
             **remarks_document(self._plan.info, (*self._remarks, *self._plan.warnings)),
             "ways_home": self._ways.document() if self._ways is not None else None,
+            "way_home_inside": parts_document(self._plan.items),
             "planning_s": round(self._planning_s, 6),
             "outputs": [str(path) for path in self._written],
         }

@@ -15,6 +15,7 @@ from missions.planning.marking import marked
 from missions.request import RepairMission, Tour
 from missions.situation import Mission
 from missions.tour.tour import plan_tour
+from missions.tour.way_home_inside import with_way_home_inside
 from missions.vehicle.item_limit import most_items
 from missions.words import left_out_text
 
@@ -64,7 +65,10 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
         planned = plan_tour(situation, request, should_stop=should_stop)
     else:
         planned = plan_route(situation, request, should_stop=should_stop)
-    return with_hold(marked(_with_room(planned, situation, request, should_stop), request), situation)
+    planned = with_hold(marked(_with_room(planned, situation, request, should_stop), request), situation)
+    if isinstance(request, Tour) and request.way_home_inside:
+        return with_way_home_inside(planned, situation, request, should_stop=should_stop)
+    return planned
 
 
 def _with_room(

@@ -135,12 +135,6 @@ def jump_tag(number: int) -> MissionItem:
     return MissionItem(Command.JUMP_TAG, CoordinateFrame.MISSION, params=(float(number), 0.0, 0.0, 0.0))
 
 
-def loiter_unlimited(position: LatLon) -> MissionItem:
-    """Return a NAV_LOITER_UNLIM at a position: it is driven to, and never done."""
-    lat_e7, lon_e7 = to_e7(position)
-    return MissionItem(Command.NAV_LOITER_UNLIM, lat_e7=lat_e7, lon_e7=lon_e7)
-
-
 def with_home(items: Sequence[MissionItem], home: LatLon) -> tuple[MissionItem, ...]:
     """Put the home item at seq 0, where ArduPilot keeps its own home (what is sent there is not stored)."""
     lat_e7, lon_e7 = to_e7(home)

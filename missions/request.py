@@ -190,7 +190,7 @@ class Tour(Request):
     end : End
         At the end ``hold``, ``loiter`` or ``rtl``.
     way_home_inside : bool
-        Whether the mission holds behind its end, for each leg, a way home to be chosen; it ends in ``loiter`` then.
+        Whether the mission holds behind its end, for each leg, a way home to be chosen; it ends in ``hold`` then.
     places : sequence of pairs of str and LatLon
         Where ways home may lead, beside home and the rally points, each with its name.
     """
@@ -208,8 +208,8 @@ class Tour(Request):
         self._set("order", _word("order", self.order, Order))
         self._set("end", _word("end", self.end, End))
         self._set("places", _named_places(self.places))
-        if self.way_home_inside and self.end is End.RTL:
-            raise _senseless("end", self.end, "hold or loiter beside a way home inside")
+        if self.way_home_inside and self.end is not End.HOLD:
+            raise _senseless("end", self.end, "hold, beside a way home inside")
 
     def to(self, target: LatLon) -> Self:
         """Return the request with one target in place of all of its own."""

@@ -10,7 +10,6 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from missions.checking.home_part import drive_end
 from missions.items import PLACED_COMMANDS as _PLACED
 from missions.items import Command
 
@@ -245,7 +244,7 @@ class _Execution:
             )
         if item.command == Command.NAV_LOITER_UNLIM:
             self.ends_in_loiter = True
-            if index + 1 < len(self.items) and drive_end(self.items) != index:
+            if index + 1 < len(self.items):
                 self._note(index, "loiters forever; later items are never reached")
             return False
         return True

@@ -6,7 +6,9 @@ implement DO_LAND_START" (issue 19055). So somebody chooses: the operator, or a 
 (MISSION_SET_CURRENT, DO_SET_MISSION_CURRENT) while the vehicle is in AUTO. JUMP_TAG (600), which ArduPilot has since 4.4, marks the parts: the tag is the number of
 the item to which the vehicle drives when the part is chosen.
 
-The drive ends in LOITER_UNLIM, which is never done (``verify_loiter_unlimited`` returns false): nothing but a choice leads behind it. Each part ends so too.
+The drive ends with a jump to the last item (DO_JUMP, repeated without end), a tag behind which there is nothing: so the mission is complete, and the vehicle
+stops. Nothing but a choice leads into the parts between; each ends with the same jump. (LOITER_UNLIM would be a simpler end, but a rover goes on steering
+at it: the simulated one, steered at 5 m/s, rocked out of its fence within a minute.)
 """
 
 from __future__ import annotations
@@ -14,13 +16,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from missions.items import Command
+from missions.items import Command, CoordinateFrame, MissionItem
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from missions.geo import LatLon
-    from missions.items import MissionItem
+
+
+FOR_EVER = -1.0
+"""DO_JUMP's count of a jump that is taken each time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +39,7 @@ class HomePart:
     item : int
         The item to choose: the first behind the tag.
     items : tuple of MissionItem
-        What is driven from there, to the LOITER_UNLIM that ends it.
+        What is driven from there, without the jump that ends it.
     """
 
     leg_item: int
@@ -44,15 +49,22 @@ class HomePart:
     @property
     def place(self) -> LatLon:
         """Where it leads."""
-        return self.items[-1].position
+        return next(item.position for item in reversed(self.items) if item.is_placed)
+
+
+def jump_to_end(last_item: int) -> MissionItem:
+    """Return the jump that ends a drive, and each way home, over what stands between it and the last item."""
+    return MissionItem(
+        Command.DO_JUMP, CoordinateFrame.MISSION, params=(float(last_item), FOR_EVER, 0.0, 0.0)
+    )
 
 
 def drive_end(items: Sequence[MissionItem]) -> int | None:
-    """Return the index of the LOITER_UNLIM that ends a drive with ways home behind it; None where there are none."""
-    end = next((i for i, item in enumerate(items) if item.command == Command.NAV_LOITER_UNLIM), None)
-    if end is None or not any(item.command == Command.JUMP_TAG for item in items[end + 1 :]):
+    """Return the index of the jump that ends a drive with ways home behind it; None where there are none."""
+    if not items or items[-1].command != Command.JUMP_TAG:
         return None
-    return end
+    end = next((index for index, item in enumerate(items) if _jumps_to_end(item, len(items))), None)
+    return None if end in (None, len(items) - 2) else end
 
 
 def home_parts(items: Sequence[MissionItem]) -> tuple[HomePart, ...]:
@@ -61,15 +73,18 @@ def home_parts(items: Sequence[MissionItem]) -> tuple[HomePart, ...]:
     if end is None:
         return ()
     parts: dict[int, HomePart] = {}
-    for index in range(end + 1, len(items)):
-        tag = int(items[index].params[0])
-        if items[index].command != Command.JUMP_TAG or not 1 <= tag <= end + 1 or tag in parts:
+    for index in range(end + 1, len(items) - 1):
+        tag = items[index].params[0]
+        if items[index].command != Command.JUMP_TAG or not 1 <= tag <= end or tag in parts:
             continue
-        last = next(
-            (i for i in range(index, len(items)) if items[i].command == Command.NAV_LOITER_UNLIM), None
-        )
-        first = next((i for i in range(index, len(items)) if items[i].command != Command.JUMP_TAG), None)
-        if last is not None and first is not None:
-            driven = tuple(item for item in items[first : last + 1] if item.command != Command.JUMP_TAG)
-            parts[tag] = HomePart(tag, first + 1, driven)
+        rest = range(index, len(items))
+        last = next(i for i in rest if _jumps_to_end(items[i], len(items)) or i == len(items) - 1)
+        first = next((i for i in rest if items[i].command != Command.JUMP_TAG), last)
+        driven = tuple(item for item in items[first:last] if item.command != Command.JUMP_TAG)
+        if any(item.is_placed for item in driven):
+            parts[int(tag)] = HomePart(int(tag), first + 1, driven)
     return tuple(parts[tag] for tag in sorted(parts))
+
+
+def _jumps_to_end(item: MissionItem, count: int) -> bool:
+    return item.command == Command.DO_JUMP and item.params[:2] == (float(count), FOR_EVER)

@@ -1,18 +1,24 @@
 """The ways home inside a mission, checked: from all of the leg from which each may be chosen.
 
-The straight lines from a leg to where its way home begins fill a triangle, which has to keep what the leg has to keep, or what the leg itself keeps. What the
-vehicle is predicted to drive is looked at from five places of the leg, at its course: between them nothing is promised but the drawn lines.
+Chosen in AUTO, while the vehicle drives, a way begins where the vehicle could stop (AR_WPNav.cpp, ``get_stopping_location``): straight ahead of it, by its
+speed. The straight lines from the leg, and from all such places, to where the way begins fill triangles, which have to keep what the leg has to keep, or what the leg itself
+keeps. What the vehicle is predicted to drive is looked at from five of these places, as from a stand at the leg's course: between them nothing is promised
+but the drawn lines.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, Protocol
 
-from shapely import MultiPoint
+import numpy as np
+import shapely
+from shapely import LineString
 
 from missions.checking.home_part import home_parts
-from missions.geo import LatLon, bearing_deg
+from missions.drive_model.stopping import motion
+from missions.geo import LocalPoint, bearing_deg
 from missions.items import Command, change_speed
 from missions.situation import Known, Mission, Pose
 from missions.words import metres
@@ -20,16 +26,24 @@ from missions.words import metres
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from numpy.typing import NDArray
+
     from missions.checking.execution import CourseLeg
     from missions.checking.home_part import HomePart
+    from missions.drive_model import Envelope
+    from missions.geo import LatLon
     from missions.ground.ground import Ground
     from missions.request import Request
     from missions.situation import Situation
+    from missions.vehicle import Vehicle
 
     Check = Callable[[Mission, Situation, Request], "Drive"]
 
-_SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
-"""Of a leg, where it is looked at what the vehicle is predicted to drive. Chosen."""
+_PLACES = 5
+"""Of a leg, from where it is looked at what the vehicle is predicted to drive. Chosen."""
+
+_BESIDE_M, _ALONG = 2.0, 0.7
+"""A vehicle is on a leg within so many metres of its line, with such a share of its speed along it: at corners it is on both. Chosen."""
 
 _TOLERANCE_M = 0.02
 """Rounding to degE7 moves each of a triangle's corners by up to 8 mm."""
@@ -55,6 +69,10 @@ class Drive(Protocol):
     def mission(self) -> Mission: ...  # noqa: D102 - as `MissionCheck`
     @property
     def ground(self) -> Ground: ...  # noqa: D102
+    @property
+    def vehicle(self) -> Vehicle: ...  # noqa: D102
+    @property
+    def envelope(self) -> Envelope: ...  # noqa: D102
     @property
     def legs(self) -> Sequence[Leg]: ...  # noqa: D102
     @property
@@ -130,43 +148,73 @@ def checked_way(
     check: Check,
 ) -> CheckedWay:
     """Check a way home from a leg, whose drawn line keeps ``asked_m`` or less."""
-    heading_deg = bearing_deg(leg.start, leg.end)
     items = part.items
     if leg.speed_mps is not None and items[0].command != Command.DO_CHANGE_SPEED:
         items = (change_speed(leg.speed_mps), *items)
-    troubles, least_m = [], float("inf")
-    for share in _SHARES:
-        place = LatLon(*(a + (b - a) * share for a, b in zip(leg.start, leg.end, strict=True)))
-        pose = Known(Pose(place, heading_deg), None, "on the way")
-        # Nobody knows here how fast it is, or which way it turned: it is taken to stand, looking along the leg.
+    troubles: list[str] = []
+    least_m = float("inf")
+    stops, headings_deg = _stops(leg, found)
+    some = np.unique(np.linspace(0, len(stops) - 1, _PLACES).astype(int))
+    for number in some.tolist():
+        place = found.ground.frame.to_lat_lon(LocalPoint(*stops[number].tolist()))
+        pose = Known(Pose(place, float(headings_deg[number])), None, "on the way")
         way = check(
             Mission(items, found.mission.home), replace(situation, pose=pose), replace(request, start=place)
         )
         least_m = min(least_m, way.driven_clearance_m)
         troubles += [
-            f"from {share:.0%} of the leg it comes within {one.driven_clearance_m:.2f} m of {one.fence or 'a fence'} while driving; "
+            f"from {place} it comes within {one.driven_clearance_m:.2f} m of {one.fence or 'a fence'} while driving; "
             f"{metres(one.asked_m)} is required"
             for one in way.broken
         ]
         troubles += way.troubles
-    if trouble := _triangle_trouble(part, leg, asked_m, found):
+    if trouble := _triangle_trouble(part, leg, asked_m, found, stops):
         troubles.insert(0, trouble)
     return CheckedWay(part, way.length_m, way.duration_s, least_m, way.path, troubles[0] if troubles else "")
 
 
-def _triangle_trouble(part: HomePart, leg: CourseLeg, asked_m: float, found: Drive) -> str:
+def _triangle_trouble(
+    part: HomePart, leg: CourseLeg, asked_m: float, found: Drive, stops: NDArray[np.float64]
+) -> str:
     """Return what is wrong with the straight lines from a leg to where its way home begins; empty where nothing is."""
     ground = found.ground
     first = next((item.position for item in part.items if item.is_placed), None)
     if first is None:
         return "it leads to no place"
-    corners = ground.frame.to_local_array([leg.start, leg.end, first])
-    kept_m = ground.clearance_m(MultiPoint(corners).convex_hull)
-    needed_m = min(asked_m, ground.clearance_m(MultiPoint(corners[:2]).convex_hull))
-    if kept_m >= needed_m - _TOLERANCE_M and ground.allowed.covers(MultiPoint(corners).convex_hull):
+    line = ground.frame.to_local_array([leg.start, leg.end])
+    goal = ground.frame.to_local_array([first])[0]
+    # From one place to the next the lines to the goal fill a triangle; all together they need not be convex.
+    corners = np.array([(p, q, goal) for places in (line, stops) for p, q in pairwise(places)])
+    points = shapely.multipoints(corners.reshape(-1, 2), indices=np.repeat(np.arange(len(corners)), 3))
+    hulls = np.asarray(shapely.convex_hull(points))
+    needed_m = min(asked_m, ground.clearance_m(LineString(line)))
+    away_m = np.full(len(hulls), np.inf) if ground.edge.is_empty else shapely.distance(hulls, ground.edge)
+    away_m = np.where(shapely.covers(ground.allowed, hulls), away_m, 0.0)
+    kept_m = float(away_m.min())
+    if kept_m >= needed_m - _TOLERANCE_M and kept_m > 0:
         return ""
-    nearest, _ = ground.nearest(MultiPoint(corners).convex_hull)
+    nearest, _ = ground.nearest(hulls[away_m.argmin()])
     return (
         f"a straight line from the leg to item {part.item} comes within {kept_m:.2f} m of {nearest.name if nearest else 'a fence'}; "
         f"{metres(needed_m)} is required"
     )
+
+
+def _stops(leg: CourseLeg, found: Drive) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return where the vehicle could stop from the places of a leg, in the order of the drive, and its headings there."""
+    start, end = found.ground.frame.to_local_array([leg.start, leg.end])
+    length_m = float(np.hypot(*(end - start)))
+    course = (end - start) / length_m if length_m else np.array([0.0, 1.0])
+    heading_deg = bearing_deg(leg.start, leg.end)
+    moving = motion(found.envelope, found.vehicle, found.ground.edge)
+    if moving is None or not length_m:
+        return np.array([start, end]), np.full(2, heading_deg)
+    along_m = (moving.places - start) @ course
+    beside_m = np.abs((moving.places - start) @ np.array([-course[1], course[0]]))
+    is_on = (beside_m <= _BESIDE_M) & (along_m >= -_BESIDE_M) & (along_m <= length_m + _BESIDE_M)
+    is_on &= moving.ways @ course >= _ALONG
+    if not is_on.any():
+        return np.array([start, end]), np.full(2, heading_deg)
+    stops_m = moving.speeds_mps**2 / (2 * found.vehicle.accel_max_mps2)
+    stops = (moving.places + moving.ways * stops_m[:, None])[is_on]
+    return stops, np.degrees(np.arctan2(*moving.ways[is_on].T))

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-_BEGINNINGS = 8
-"""Sets from which exchanges begin, for each number of places. Chosen: with 24 none of the fields of benchmarks/rally.py needed fewer places."""
+_BEGINNINGS, _LAST_BEGINNINGS = 8, 40
+"""Sets from which exchanges begin, for each number of places, and for the greatest. Chosen: a set that is found late is better than none."""
 _MOST_ROUNDS = 12  # of exchanges from one beginning; chosen, they mostly end after three
 _WHOLE_M = 1e-9  # of pieces left
 
@@ -97,9 +97,11 @@ def fewest(
     if not candidates.count:
         return best
     for count in range(max(1, len(before)), most + 1):
-        chosen, left_m = (
-            _pair(candidates) if count == 2 else _exchanged(candidates, best[0], count, should_stop)
-        )
+        beginnings = _LAST_BEGINNINGS if count == most else _BEGINNINGS
+        if count == 2:
+            chosen, left_m = _pair(candidates)
+        else:
+            chosen, left_m = _exchanged(candidates, best[0], count, beginnings, should_stop)
         if left_m < best[1] or not best[0]:
             best = (chosen, left_m)
         if best[1] <= _WHOLE_M or (should_stop is not None and should_stop()):
@@ -115,12 +117,16 @@ def _pair(candidates: Candidates) -> tuple[list[int], float]:
 
 
 def _exchanged(
-    candidates: Candidates, before: list[int], count: int, should_stop: Callable[[], bool] | None
+    candidates: Candidates,
+    before: list[int],
+    count: int,
+    beginnings: int,
+    should_stop: Callable[[], bool] | None,
 ) -> tuple[list[int], float]:
     """Return the best so many places that exchanges lead to."""
     chance = np.random.default_rng(count)
     best: tuple[list[int], float] = ([], float("inf"))
-    for beginning in range(_BEGINNINGS if count > 1 else 1):
+    for beginning in range(beginnings if count > 1 else 1):
         chosen = list(before) if beginning == 0 else []
         while len(chosen) < count:
             left_m = candidates.with_each(chosen)

@@ -11,14 +11,13 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from missions.checking.check import check_mission
-from missions.checking.home_part import HomePart, home_parts
+from missions.checking.home_part import HomePart, home_parts, jump_to_end
 from missions.checking.home_ways import checked_way
-from missions.checking.mission_end import ending
 from missions.errors import MissionError, MissionTooLongError, NoRouteError, RouteError
 from missions.finishing.route_plan import plan_route
 from missions.geo import bearing_deg, distance_m
-from missions.items import change_speed, jump_tag, loiter_unlimited, waypoint
-from missions.request import End, GoTo, conditions
+from missions.items import change_speed, jump_tag, waypoint
+from missions.request import GoTo, conditions
 from missions.routing.way_home import places_of, ways_home
 from missions.situation import Known, Mission, Pose
 from missions.vehicle import Autopilot
@@ -68,9 +67,8 @@ class _Chain:
             if has_speeds and (index in self.tags or wanted != now):
                 found.append(change_speed(wanted))
                 now = wanted
-            last = index == len(self.points) - 1
-            item = loiter_unlimited(point) if last else waypoint(point)
-            if index == 0 and self.stops_first and not last:
+            item = waypoint(point)
+            if index == 0 and self.stops_first and len(self.points) > 1:
                 item = replace(item, params=(_WAIT_S, 0.0, 0.0, 0.0))
             found.append(item)
         return found
@@ -95,7 +93,6 @@ def with_way_home_inside(
             "there is no place to go home to: no home, no rally points and no --place",
             advice="give --home LAT,LON or --place NAME=LAT,LON",
         )
-    planned = replace(planned, items=ending(planned.items, End.LOITER))
     builder = _Builder(
         planned,
         situation,
@@ -105,7 +102,7 @@ def with_way_home_inside(
     )
     for leg in reversed(builder.found.legs):  # the farthest have the longest ways, which others can join
         builder.add(leg)
-    items = (*planned.items, *builder.items())
+    items = builder.items()
     if len(items) + 1 > (most := most_items(situation.parameters)):
         raise MissionTooLongError(
             f"the mission with its ways home needs {len(items) + 1} items with home; the vehicle holds {most}",
@@ -199,12 +196,17 @@ class _Builder:
                     return
         self.without.append(f"no way home from the leg to item {number}: {trouble}")
 
-    def items(self) -> list[MissionItem]:
-        """Return the items of all ways."""
+    def items(self) -> tuple[MissionItem, ...]:
+        """Return the whole mission: the drive, the jump to its end, the ways home, the tag at the end."""
         speeds = [*self._planned.speeds, *(speed for chain in self.chains for speed in chain.speeds)]
         has_speeds = any(speed is not None for speed in speeds)
         own_mps = self._planned.vehicle.speed_mps
-        return [item for chain in self.chains for item in chain.items(own_mps, has_speeds=has_speeds)]
+        ways = [chain.items(own_mps, has_speeds=has_speeds) for chain in self.chains]
+        drive = self._planned.items
+        last_item = len(drive) + 1 + sum(len(way) + 1 for way in ways)
+        jump = jump_to_end(last_item)
+        parts = [item for number, way in enumerate(ways) for item in ((jump, *way) if number else way)]
+        return (*drive, jump, *parts, jump_tag(len(drive) + 1))
 
     def _planned_chain(self, leg: CheckedLeg, place: LatLon, *, stops_first: bool) -> _Chain:
         end = leg.leg.end

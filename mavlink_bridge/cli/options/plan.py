@@ -139,7 +139,7 @@ class PlanOptions(MapOptions, ClearanceOptions, LinkOptions):
         bool,
         flag(
             "--way-home-inside",
-            "Add behind the mission's end, for each leg, a way home that you can choose while the vehicle drives that leg; ends in loiter.",
+            "Add behind the mission's end, for each leg, a way home that you can choose while the vehicle drives that leg.",
             _TOURS,
         ),
     ] = False

@@ -12,14 +12,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-PATH = list(sys.path)
-sys.path.append(str(Path(__file__).parents[3] / "benchmarks"))
-from drive_fields import make_field
-from drive_more_fields import make_more
-from rally import judged, one_field
-
-sys.path[:] = PATH  # modules of the benchmarks have names of rooms of the tests
-
 from missions.checking.check import check_mission
 from missions.errors import NoRouteError
 from missions.fence import Fence, PolygonZone, ZoneKind
@@ -30,6 +22,14 @@ from missions.request import GoTo
 from missions.routing.rally_points import choose_rally_points
 from missions.routing.rally_search import Candidates, fewest
 from missions.situation import Known, Mission, Situation
+
+PATH = list(sys.path)
+sys.path.append(str(Path(__file__).parents[3] / "benchmarks"))
+from drive_fields import make_field  # noqa: E402
+from drive_more_fields import make_more  # noqa: E402
+from rally import judged, one_field  # noqa: E402
+
+sys.path[:] = PATH  # modules of the benchmarks have names of rooms of the tests
 
 FRAME = frame_around([LatLon(48.1, 11.5)])
 

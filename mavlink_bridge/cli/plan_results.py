@@ -42,7 +42,7 @@ def write_outputs(
 
     def scene() -> PictureScene:
         plain = with_parts(plan_scene(planned, blocks=blocks), planned.items)
-        return ways.drawn(plain) if ways is not None else plain
+        return plain if ways is None or plain.tracks else ways.drawn(plain)
 
     return [*outputs, *draw(scene, plots)]
 

@@ -145,7 +145,7 @@ def test_a_leg_without_a_way_is_named():
 
 def test_what_does_not_know_tags_is_refused():
     old = replace(WALLED, firmware=Firmware(4, 3))
-    with pytest.raises(RouteError, match="which ArduPilot has since 4.4; the vehicle is ArduPilot 4.3"):
+    with pytest.raises(RouteError, match=r"which ArduPilot has since 4\.4; the vehicle is ArduPilot 4\.3"):
         plan(old, ASKED)
 
 

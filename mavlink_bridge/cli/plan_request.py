@@ -53,9 +53,9 @@ def with_tour(request: Request, options: PlanOptions) -> Request:
         if value not in known:
             raise UsageError(f"{option} {value!r}: expected one of {', '.join(known)}")
     if via is None:
-        if options.way_home_inside and end == "rtl":
+        if options.way_home_inside and end != "hold":
             raise UsageError(
-                "--way-home-inside ends the mission in loiter; it cannot be combined with --end rtl"
+                f"--way-home-inside ends the mission in hold; it cannot be combined with --end {end}"
             )
         words: dict[str, object] = {"order": order, "comes_back": comes_back, "end": end}
         if options.way_home_inside:

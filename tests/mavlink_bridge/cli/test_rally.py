@@ -234,7 +234,7 @@ def test_ways_home_inside_are_written_told_and_checked(fields, tmp_path):
     assert "PASS: every leg and way home keeps 2 m while driving" in checked.output
     found = json.loads(run("check", "--mission", path, "--clearance", "2", "--json", *KNOWN).stdout)
     assert [way["trouble"] for way in found["way_home_inside"]] == [None] * len(document["way_home_inside"])
-    broken = run("check", "--mission", path, "--clearance", "12", *KNOWN, code=8)
+    broken = run("check", "--mission", path, "--clearance", "2.9", *KNOWN, code=8)
     assert "FAIL: the way home from the leg to item" in broken.output
     plain = json.loads(run("plan", *asked, "--json").stdout)
     assert plain["way_home_inside"] is None

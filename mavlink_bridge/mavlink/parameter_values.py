@@ -6,6 +6,7 @@ A signalling NaN's bits do not survive on their way through Python: INT32 values
 
 from __future__ import annotations
 
+import math
 import struct
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,14 @@ if TYPE_CHECKING:
 
 _WHOLE_NUMBERS = {1: "<Bxxx", 2: "<bxxx", 3: "<Hxx", 4: "<hxx", 5: "<I", 6: "<i"}
 """MAV_PARAM_TYPE: UINT8, INT8, UINT16, INT16, UINT32, INT32, as PARAM_VALUE's union lays them out."""
+
+
+def float32(value: float) -> float:
+    """Return the value as it goes over the wire."""
+    try:
+        return float(struct.unpack("<f", struct.pack("<f", value))[0])
+    except OverflowError:
+        return math.copysign(math.inf, value)
 
 
 def parameter_value(message: ParamValue, *, bytewise: bool) -> float:

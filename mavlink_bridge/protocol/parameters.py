@@ -9,11 +9,11 @@ that there is a later one, a parameter that is there is asked for again after ea
 from __future__ import annotations
 
 import math
-import struct
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.mavlink.messages import ParamRequestList, ParamRequestRead, ParamSet, ParamValue
+from mavlink_bridge.mavlink.parameter_values import float32
 from mavlink_bridge.protocol.pace import MOST_S, Pace, bound_s
 from mavlink_bridge.protocol.round_trip import RoundTrip
 from mavlink_bridge.protocol.table_machine import TableMachine
@@ -383,7 +383,7 @@ class SetParameter(TableMachine[ParameterState, ParameterEvent]):
         if not isinstance(message, ParamValue) or message.param_id != self._name:
             return
         self._value = message.param_value
-        if message.param_value == _float32(self._wanted):
+        if message.param_value == float32(self._wanted):
             self._is_confirmed = True
             self._move(ParameterEvent.CONFIRMED)
         elif self._answer_counts:
@@ -407,11 +407,3 @@ class SetParameter(TableMachine[ParameterState, ParameterEvent]):
         self._send_at_s = now_s + _SET_AGAIN_S
         self._answer_counts = True
         self._send(ParamSet(self._peer.system, self._peer.component, self._name, self._wanted, REAL32))
-
-
-def _float32(value: float) -> float:
-    """Return the value as it goes over the wire."""
-    try:
-        return float(struct.unpack("<f", struct.pack("<f", value))[0])
-    except OverflowError:
-        return math.copysign(math.inf, value)

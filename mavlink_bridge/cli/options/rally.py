@@ -8,14 +8,12 @@ from typing import Annotated
 
 from mavlink_bridge.cli.options.shared import (
     OUTPUT_PANEL,
-    VEHICLE_PANEL,
     ClearanceOptions,
     ConnectOption,
-    FirmwareOption,
+    DescriptionOptions,
     HomeOption,
     LinkOptions,
     MapOptions,
-    StoppingOption,
     flag,
     metres,
     option,
@@ -23,7 +21,7 @@ from mavlink_bridge.cli.options.shared import (
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RallyOptions(MapOptions, ClearanceOptions, LinkOptions):
+class RallyOptions(DescriptionOptions, MapOptions, ClearanceOptions, LinkOptions):
     """Choose rally points so that RTL's straight line is free from every point of a mission: for the day on which the companion computer fails.
 
     For example:
@@ -68,12 +66,6 @@ class RallyOptions(MapOptions, ClearanceOptions, LinkOptions):
         option("Start position. Default: the vehicle's position; for files and logs, home.", "LAT,LON"),
     ] = None
     home: HomeOption = None
-    vehicle: Annotated[
-        Path | None,
-        option("Parameter file, for what the log or link does not report.", "FILE.parm", panel=VEHICLE_PANEL),
-    ] = None
-    firmware: FirmwareOption = None
-    stopping: StoppingOption = field(default_factory=list)
     plot: Annotated[
         list[Path],
         option("Draw them: .png, .svg, .pdf, .html; - in the terminal.", "FILE", panel=OUTPUT_PANEL),

@@ -151,26 +151,32 @@ def checked_way(
     items = part.items
     if leg.speed_mps is not None and items[0].command != Command.DO_CHANGE_SPEED:
         items = (change_speed(leg.speed_mps), *items)
-    troubles: list[str] = []
     least_m = float("inf")
+    ways: list[Drive] = []
     stops, headings_deg = _stops(leg, found)
+    trouble = _triangle_trouble(part, leg, asked_m, found, stops)
     some = np.unique(np.linspace(0, len(stops) - 1, _PLACES).astype(int))
-    for number in some.tolist():
+    for number in reversed(some.tolist()):  # the last tells how long the way is from the leg's end
         place = found.ground.frame.to_lat_lon(LocalPoint(*stops[number].tolist()))
         pose = Known(Pose(place, float(headings_deg[number])), None, "on the way")
         way = check(
             Mission(items, found.mission.home), replace(situation, pose=pose), replace(request, start=place)
         )
+        ways.append(way)
         least_m = min(least_m, way.driven_clearance_m)
-        troubles += [
-            f"from {place} it comes within {one.driven_clearance_m:.2f} m of {one.fence or 'a fence'} while driving; "
-            f"{metres(one.asked_m)} is required"
-            for one in way.broken
-        ]
-        troubles += way.troubles
-    if trouble := _triangle_trouble(part, leg, asked_m, found, stops):
-        troubles.insert(0, trouble)
-    return CheckedWay(part, way.length_m, way.duration_s, least_m, way.path, troubles[0] if troubles else "")
+        trouble = trouble or _drive_trouble(way, place)
+        if trouble:  # one is enough, and each place costs a check
+            break
+    first = ways[0]
+    return CheckedWay(part, first.length_m, first.duration_s, least_m, first.path, trouble)
+
+
+def _drive_trouble(way: Drive, place: LatLon) -> str:
+    """Return what is wrong with a way from a place as it is predicted to be driven; empty where nothing is."""
+    for one in way.broken:
+        near = f"{one.driven_clearance_m:.2f} m of {one.fence or 'a fence'}"
+        return f"from {place} it comes within {near} while driving; {metres(one.asked_m)} is required"
+    return next(iter(way.troubles), "")
 
 
 def _triangle_trouble(

@@ -11,6 +11,7 @@ from mavlink_bridge.cli.home_parts import parts_document, with_parts
 from mavlink_bridge.cli.kept_files import write_kept
 from mavlink_bridge.cli.pictures import draw
 from mavlink_bridge.cli.terminal import echo
+from mavlink_bridge.cli.way_home import RouteWays
 from missions.checking.holding import hold_info
 from missions.fence import CircleZone, PolygonZone, ZoneKind
 from missions.picture.plans import plan_scene
@@ -19,7 +20,6 @@ from missions.words import counted
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from mavlink_bridge.cli.way_home import RouteWays
     from missions.drive_model.stopping import HoldCheck
     from missions.geo import LatLon
     from missions.picture.scene import PictureScene
@@ -147,8 +147,6 @@ class Told:
     def tell(self, planned: Plan, planning_s: float, situation: Situation) -> None:
         """Report a plan; a later one is the route made anew."""
         if self._places is not None:
-            from mavlink_bridge.cli.way_home import RouteWays  # noqa: PLC0415 - only for those who ask for ways home
-
             self._ways = RouteWays.of(planned, situation, self._places)
         inform((*planned.info, *(hold_info(planned.hold) if self._drives else ())))
         warn(planned.warnings)

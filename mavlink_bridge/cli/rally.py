@@ -90,7 +90,7 @@ def choice_warnings(choice: RallyChoice, checked: MissionCheck, situation: Situa
             )
     if choice.left_out_m > 0:
         warnings.append(
-            f"{choice.left_out_m:.0f} m of the route lie on forbidden ground: RTL from there is not considered"
+            f"{choice.left_out_m:.0f} m of the route lie outside the allowed area: RTL from there is not considered"
         )
     if not checked.holds:
         warnings.append(

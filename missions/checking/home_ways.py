@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from missions.situation import Situation
     from missions.vehicle import Vehicle
 
-    Check = Callable[[Mission, Situation, Request], "Drive"]
+    Check = Callable[[Mission, Situation, Request], "KeptDrive"]
 
 _PLACES = 5
 """Of a leg, from where it is looked at what the vehicle is predicted to drive. Chosen."""
@@ -49,7 +49,7 @@ _TOLERANCE_M = 0.02
 """Rounding to degE7 moves each of a triangle's corners by up to 8 mm."""
 
 
-class Leg(Protocol):
+class KeptLeg(Protocol):
     """What is read of a checked leg."""
 
     @property
@@ -62,7 +62,7 @@ class Leg(Protocol):
     def fence(self) -> str | None: ...  # noqa: D102
 
 
-class Drive(Protocol):
+class KeptDrive(Protocol):
     """What is read of a checked mission, which stands above this module."""
 
     @property
@@ -74,9 +74,9 @@ class Drive(Protocol):
     @property
     def envelope(self) -> Envelope: ...  # noqa: D102
     @property
-    def legs(self) -> Sequence[Leg]: ...  # noqa: D102
+    def legs(self) -> Sequence[KeptLeg]: ...  # noqa: D102
     @property
-    def broken(self) -> Sequence[Leg]: ...  # noqa: D102
+    def broken(self) -> Sequence[KeptLeg]: ...  # noqa: D102
     @property
     def troubles(self) -> Sequence[str]: ...  # noqa: D102
     @property
@@ -119,7 +119,7 @@ class CheckedWay:
 
 
 def checked_ways(
-    found: Drive, situation: Situation, request: Request, check: Check
+    found: KeptDrive, situation: Situation, request: Request, check: Check
 ) -> tuple[CheckedWay, ...]:
     """Check each way home inside a mission.
 
@@ -142,7 +142,7 @@ def checked_way(
     part: HomePart,
     leg: CourseLeg,
     asked_m: float,
-    found: Drive,
+    found: KeptDrive,
     situation: Situation,
     request: Request,
     check: Check,
@@ -152,7 +152,7 @@ def checked_way(
     if leg.speed_mps is not None and items[0].command != Command.DO_CHANGE_SPEED:
         items = (change_speed(leg.speed_mps), *items)
     least_m = float("inf")
-    ways: list[Drive] = []
+    ways: list[KeptDrive] = []
     stops, headings_deg = _stops(leg, found)
     trouble = _triangle_trouble(part, leg, asked_m, found, stops)
     some = np.unique(np.linspace(0, len(stops) - 1, _PLACES).astype(int))
@@ -171,7 +171,7 @@ def checked_way(
     return CheckedWay(part, first.length_m, first.duration_s, least_m, first.path, trouble)
 
 
-def _drive_trouble(way: Drive, place: LatLon) -> str:
+def _drive_trouble(way: KeptDrive, place: LatLon) -> str:
     """Return what is wrong with a way from a place as it is predicted to be driven; empty where nothing is."""
     for one in way.broken:
         near = f"{one.driven_clearance_m:.2f} m of {one.fence or 'a fence'}"
@@ -180,7 +180,7 @@ def _drive_trouble(way: Drive, place: LatLon) -> str:
 
 
 def _triangle_trouble(
-    part: HomePart, leg: CourseLeg, asked_m: float, found: Drive, stops: NDArray[np.float64]
+    part: HomePart, leg: CourseLeg, asked_m: float, found: KeptDrive, stops: NDArray[np.float64]
 ) -> str:
     """Return what is wrong with the straight lines from a leg to where its way home begins; empty where nothing is."""
     ground = found.ground
@@ -206,7 +206,7 @@ def _triangle_trouble(
     )
 
 
-def _stops(leg: CourseLeg, found: Drive) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _stops(leg: CourseLeg, found: KeptDrive) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return where the vehicle could stop from the places of a leg, in the order of the drive, and its headings there."""
     start, end = found.ground.frame.to_local_array([leg.start, leg.end])
     length_m = float(np.hypot(*(end - start)))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from missions.checking.rtl_lines import Metric, Pieces, ReturnRule, may_choose, swept
+from missions.checking.rtl_lines import Metric, ReturnRule, RoutePieces, may_choose, swept
 from missions.fence import ZoneKind
 from missions.items import Command, MissionItem, waypoint
 from missions.request import End
@@ -111,7 +111,7 @@ def _crossing(
     frame = ground.frame
     rally = [point.position for point in situation.rally.value] if situation.rally else []
     goals = frame.to_local_array([*rally, *([home] if home else [])])
-    pieces = Pieces.of(frame.to_local_array(path), _PIECE_M, _MOST_PIECES)
+    pieces = RoutePieces.of(frame.to_local_array(path), _PIECE_M, _MOST_PIECES)
     spread = np.ptp(np.vstack([goals, pieces.starts, pieces.ends]), axis=0)
     metric = Metric.of(ground, float(np.hypot(*spread)))
     away_m = metric.distances_m(goals, (pieces.starts + pieces.ends) / 2)

@@ -89,7 +89,7 @@ def chosen_place(rally: Sequence[LatLon], here: LatLon, home: LatLon, rule: Retu
 
 
 @dataclass(frozen=True, eq=False)
-class Pieces:
+class RoutePieces:
     """A route in pieces so short that from all of one the same places are nearest, but for few.
 
     Parameters
@@ -105,7 +105,7 @@ class Pieces:
     legs: NDArray[np.intp]
 
     @classmethod
-    def of(cls, route: NDArray[np.float64], length_m: float, most: int) -> Pieces:
+    def of(cls, route: NDArray[np.float64], length_m: float, most: int) -> RoutePieces:
         """Return the pieces of a route through points, none longer than a length, unless there were more than ``most``."""
         route_m = float(np.hypot(*np.diff(route, axis=0).T).sum())
         length_m = max(length_m, route_m / max(1, most - len(route)))
@@ -207,7 +207,7 @@ def may_choose(
 
 
 def swept(
-    pieces: Pieces, goals: NDArray[np.float64], which: NDArray[np.bool_]
+    pieces: RoutePieces, goals: NDArray[np.float64], which: NDArray[np.bool_]
 ) -> tuple[NDArray[np.object_], NDArray[np.intp], NDArray[np.intp]]:
     """Return the triangles that the straight lines from pieces to places fill, with the place and the piece of each."""
     place, piece = np.nonzero(which)

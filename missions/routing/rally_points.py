@@ -23,7 +23,7 @@ import numpy as np
 import shapely
 
 from missions.checking.check import forecast_band_m
-from missions.checking.rtl_lines import Metric, Pieces, swept
+from missions.checking.rtl_lines import Metric, RoutePieces, swept
 from missions.errors import NoRouteError
 from missions.geo import LocalPoint, rounded
 from missions.ground.frame import bow_m
@@ -211,11 +211,11 @@ class _Field:
         self.metric = Metric.of(self.ground, self.span_m)
         self.off_m = band_m + required_m - promised_m
         self.free = _eroded(self.ground.allowed, self.ground.edge, self.keep_m)
-        route = Pieces.of(self.at(checked.path), _PIECE_M, _MOST_PIECES)
+        route = RoutePieces.of(self.at(checked.path), _PIECE_M, _MOST_PIECES)
         lines = np.asarray(shapely.linestrings(np.stack([route.starts, route.ends], axis=1)))
         allowed = shapely.covers(self.ground.allowed, lines)
         self.left_out_m = float(route.lengths_m[~allowed].sum())
-        self.pieces = Pieces(route.starts[allowed], route.ends[allowed], route.legs[allowed])
+        self.pieces = RoutePieces(route.starts[allowed], route.ends[allowed], route.legs[allowed])
         clear_m = _distances_m(self.ground, lines[allowed])
         self.need_m = np.minimum(self.keep_m, np.maximum(clear_m - ROUNDING_RESERVE_M, 0.0))
         speeds_mps = np.array([leg.speed_mps or vehicle.speed_mps for leg in checked.course.legs])
@@ -263,7 +263,7 @@ class _Field:
         free[near] = _distances_m(self.ground, shapes[near]) >= need_m[near]
         return np.asarray(free)
 
-    def _stopping(self, stops_m: NDArray[np.float64]) -> Pieces:
+    def _stopping(self, stops_m: NDArray[np.float64]) -> RoutePieces:
         """Return the pieces with the way to a stop ahead of each, as far as it is free."""
         pieces = self.pieces
         ways = (pieces.ends - pieces.starts) / np.maximum(pieces.lengths_m, 1e-9)[:, None]
@@ -275,7 +275,7 @@ class _Field:
             free = todo & self.are_free(lines, self.need_m)
             ends[free] = ahead[free]
             todo &= ~free
-        return Pieces(pieces.starts, ends, pieces.legs)
+        return RoutePieces(pieces.starts, ends, pieces.legs)
 
 
 class _Search:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import pytest
 from typer.testing import CliRunner
@@ -10,8 +11,15 @@ from typer.testing import CliRunner
 from mavlink_bridge.cli.app import app
 from mavlink_bridge.simulator import Simulator, SimulatorConfig
 from missions.fence import fence_to_items
-from missions.formats import read_fence, read_mission, read_parameters, read_situation
+from missions.formats import (
+    read_fence,
+    read_mission,
+    read_parameters,
+    read_situation,
+    write_situation,
+)
 from missions.geo import LatLon, distance_m
+from missions.items import waypoint
 
 HOME = LatLon(40.071374, -105.229930)
 TARGET = "40.07209265,-105.22861524"
@@ -117,7 +125,7 @@ def test_where_nothing_is_found_it_ends_so(mission, fields, tmp_path):
         f"{HOME}",
         *KNOWN,
     )
-    assert "m of the route lie on forbidden ground" in result.output
+    assert "m of the route lie outside the allowed area" in result.output
     assert "the mission itself does not pass the check" in result.output
     narrow = tmp_path / "narrow.fen"
     narrow.write_text("40.07130 -105.22993\n" + "".join(f"{lat} {lon}\n" for lat, lon in (
@@ -234,7 +242,13 @@ def test_ways_home_inside_are_written_told_and_checked(fields, tmp_path):
     assert "PASS: every leg and way home keeps 2 m while driving" in checked.output
     found = json.loads(run("check", "--mission", path, "--clearance", "2", "--json", *KNOWN).stdout)
     assert [way["trouble"] for way in found["way_home_inside"]] == [None] * len(document["way_home_inside"])
-    broken = run("check", "--mission", path, "--clearance", "2.9", *KNOWN, code=8)
+    spoilt = read_situation(path)
+    items = list(spoilt.mission.value.items)
+    for index in range(last["item"] - 1, len(items)):
+        items[index] = waypoint(HOME) if items[index].is_placed else items[index]
+    known = replace(spoilt.mission, value=replace(spoilt.mission.value, items=tuple(items)))
+    write_situation(replace(spoilt, mission=known), tmp_path / "spoilt.plan")
+    broken = run("check", "--mission", tmp_path / "spoilt.plan", "--clearance", "2", *KNOWN, code=8)
     assert "FAIL: the way home from the leg to item" in broken.output
     plain = json.loads(run("plan", *asked, "--json").stdout)
     assert plain["way_home_inside"] is None

@@ -13,8 +13,8 @@ from missions.checking.mission_end import return_warnings
 from missions.checking.rtl_lines import (
     RALLY_ONLY,
     Metric,
-    Pieces,
     ReturnRule,
+    RoutePieces,
     chosen_place,
     may_choose,
     return_place,
@@ -95,7 +95,7 @@ def test_without_rally_points_it_is_home_and_without_home_the_nearest_point():
 @settings(max_examples=80, deadline=None)
 def test_no_place_that_may_be_chosen_is_overlooked(rally, home, leg, includes_home, limit_m, piece_m):
     rule = ReturnRule(includes_home, limit_m)
-    pieces = Pieces.of(np.array(leg), piece_m, 1000)
+    pieces = RoutePieces.of(np.array(leg), piece_m, 1000)
     ground = ground_for(known(), vehicle_from_parameters({}), [ORIGIN])
     metric = Metric.of(ground, 900.0)
     middles = (pieces.starts + pieces.ends) / 2
@@ -133,11 +133,11 @@ def test_the_planes_distances_differ_from_the_autopilots_by_no_more_than_is_said
 
 def test_pieces_are_the_route_and_no_longer_than_asked():
     route = np.array([(0.0, 0.0), (10.0, 0.0), (10.0, 0.0), (10.0, 3.0)])
-    pieces = Pieces.of(route, 2.0, 1000)
+    pieces = RoutePieces.of(route, 2.0, 1000)
     assert pieces.legs.tolist() == [0] * 5 + [1] + [2] * 2
     assert pieces.lengths_m.max() <= 2.0 + 1e-9
     np.testing.assert_allclose(pieces.starts[1:], pieces.ends[:-1])
-    assert len(Pieces.of(route, 0.001, 50)) <= 50
+    assert len(RoutePieces.of(route, 0.001, 50)) <= 50
     hulls, place, piece = swept(pieces, np.array([(0.0, 9.0)]), np.array([[True] + [False] * 7]))
     assert (place.tolist(), piece.tolist(), hulls[0].area) == ([0], [0], pytest.approx(9.0))
 

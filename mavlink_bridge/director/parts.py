@@ -9,6 +9,8 @@ from mavlink_bridge.director.drive_supervisor import DriveSupervisor
 from mavlink_bridge.director.halter import Halter
 from mavlink_bridge.director.hand_over import HandOver
 from mavlink_bridge.director.hold_watch import HoldWatch
+from mavlink_bridge.director.home_caller import HomeCaller
+from mavlink_bridge.director.home_keeper import HomeKeeper
 from mavlink_bridge.director.identity_guard import IdentityGuard
 from mavlink_bridge.director.learner import Learner
 from mavlink_bridge.director.list_watch import ListWatch
@@ -45,18 +47,21 @@ class Parts:
         self.learner: Learner = Learner(core)
         self.lists: ListWatch = ListWatch(core)
         self.inbox: TargetInbox = TargetInbox(core)
+        self.keeper: HomeKeeper = HomeKeeper(core)
         self.halter: Halter = Halter(core, self.lists)
         self.driver: DriveSupervisor = DriveSupervisor(core, self.halter)
         self.hold_watch: HoldWatch = HoldWatch(core, self.halter, self.driver)
-        self.desk: RouteDesk = RouteDesk(core, self.lists, self.driver, self.hold_watch)
+        self.desk: RouteDesk = RouteDesk(core, self.lists, self.keeper, self.driver, self.hold_watch)
         self.writer: MissionWriter = MissionWriter(core, self.lists, self.halter, self.desk)
         self.adopter: Adopter = Adopter(core, self.lists, self.halter, self.driver, self.desk, notes)
         self.starter: Starter = Starter(core, self.lists, self.halter, self.driver, self.desk, self.adopter)
-        self.hand_over: HandOver = HandOver(core, self.halter, self.driver)
+        self.caller: HomeCaller = HomeCaller(core, self.inbox, self.halter, self.keeper)
+        self.hand_over: HandOver = HandOver(core, self.halter, self.driver, self.caller)
         self.guard: IdentityGuard = IdentityGuard(core, self.learner, self.halter, self.inbox, self.writer)
         self.hearers: tuple[Part, ...] = (
             self.learner,
             self.hand_over,
+            self.caller,
             self.guard,
             self.driver,
             self.hold_watch,
@@ -72,4 +77,6 @@ class Parts:
             self.learner,
             self.lists,
             self.adopter,
+            self.caller,
+            self.keeper,
         )

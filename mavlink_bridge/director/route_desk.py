@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
+from mavlink_bridge.director.fixes import no_fix
 from mavlink_bridge.director.grounds import Grounds
-from mavlink_bridge.director.plan_task import PlanTask
+from mavlink_bridge.director.plan_task import AtHomeError, HomeTask, PlanTask
 from mavlink_bridge.director.states import Cue, Notice, Signal, State
 from missions.checking.recheck import Recheck, recheck
 from missions.errors import MissionError
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
     from mavlink_bridge.director.drive_supervisor import DriveSupervisor
     from mavlink_bridge.director.hold_watch import HoldWatch
+    from mavlink_bridge.director.home_keeper import HomeKeeper
     from mavlink_bridge.director.list_watch import ListWatch
     from missions.planned import Plan
     from missions.request import Request
@@ -28,6 +30,10 @@ if TYPE_CHECKING:
 
 _MAKING_A_ROUTE = frozenset({State.HOLDING, State.PLANNING})
 """States whose plan is yet to come: it is made around the fence as it is then."""
+
+
+_TOLERANCE_M = 0.01
+"""Clearances are given to the centimetre."""
 
 
 class RouteDesk(Part):
@@ -39,19 +45,29 @@ class RouteDesk(Part):
         Whether the route is made because the one before broke, not because somebody asked.
     """
 
-    def __init__(self, core: Core, lists: ListWatch, driver: DriveSupervisor, hold_watch: HoldWatch) -> None:
+    def __init__(
+        self,
+        core: Core,
+        lists: ListWatch,
+        keeper: HomeKeeper,
+        driver: DriveSupervisor,
+        hold_watch: HoldWatch,
+    ) -> None:
         super().__init__(core)
+        self._keeper = keeper
         self._lists = lists
         self._driver = driver
         self._hold_watch = hold_watch
         self._made: Plan | MissionError | None = None
         self._planned_on = Grounds.of(core.situation)
         self.is_own_idea = False
+        self._has_told_fix = False
 
     @property
     def deadline_s(self) -> float | None:
         """At once where there is something to do for the plan but to wait for it."""
-        is_waiting = self.pending is not None and not self._lists.is_outdated
+        is_at_it = self.pending is not None or (bool(self.awaits_fix) and self._has_told_fix)
+        is_waiting = is_at_it and not self._lists.is_outdated
         is_due = self.core.state is State.PLANNING and not self.core.steps and not is_waiting
         return -math.inf if is_due else None
 
@@ -82,8 +98,7 @@ class RouteDesk(Part):
         if self._lists.is_outdated:
             self._lists.reread_suspects(now_s)
         elif core.plan_task is None:
-            self._planned_on = Grounds.of(core.situation)
-            core.plan_task = PlanTask(core.situation, self.request())
+            self._begin(now_s)
         elif isinstance(self._made, MissionError):
             core.plan = None
             return [Cue.NO_PLAN]
@@ -92,11 +107,48 @@ class RouteDesk(Part):
             return [Cue.PLANNED]
         return []
 
+    def _begin(self, now_s: float) -> None:
+        """Have the plan made; a way home waits for a fix, which is said once."""
+        core = self.core
+        trouble = self.awaits_fix
+        if not trouble:
+            self._planned_on = Grounds.of(core.situation)
+            core.plan_task = self._task()
+        elif not self._has_told_fix and core.target is not None:
+            core.voice.home_waits(now_s, core.target.call, trouble)
+        self._has_told_fix = bool(trouble)
+
+    @property
+    def awaits_fix(self) -> str:
+        """Why the plan of a way home waits; empty where it does not."""
+        target = self.core.target
+        if target is None or not target.is_home or self.core.plan_task is not None:
+            return ""
+        return no_fix(self.core.situation, self.core.orders.request)
+
+    def _task(self) -> PlanTask:
+        """Return the plan to be made: to the target, or to the nearest place where the vehicle is called home."""
+        core = self.core
+        if core.target is None or not core.target.is_home:
+            return PlanTask(core.situation, self.request())
+        places, ways = core.orders.homing.places, self._keeper.ways
+        return HomeTask(core.situation, core.orders.request, places=places, ways=ways)
+
     def no_plan(self, now_s: float) -> Sequence[Signal]:
         """Report why there is no plan."""
         assert isinstance(self._made, MissionError)
+        if isinstance(self._made, AtHomeError):
+            self._end_at_home(self._made, now_s)
+            return []
         self.core.voice.no_plan(now_s, self._made)
         return self.core.give_up(self._made)
+
+    def _end_at_home(self, found: AtHomeError, now_s: float) -> None:
+        """Report that nothing is to be driven home: the vehicle is held where it stands."""
+        core = self.core
+        call = core.target.call if core.target is not None else None
+        core.target = None
+        core.voice.tell(now_s, EventName.AT_HOME, f"{found}; HOLD", str(call), found.details["place"])
 
     def request(self) -> Request:
         """Return what is asked of the next plan: the orders' request, for the newest target, from where the vehicle is."""
@@ -116,6 +168,15 @@ class RouteDesk(Part):
     def is_in_doubt(self) -> bool:
         """Whether the plan may not hold any more: on another fence than it was made around, or on one that is not known."""
         return self.is_stale or self.core.situation.fence is None
+
+    @property
+    def promises_less(self) -> bool:
+        """Whether the plan that stands, of an earlier run, promises less than is asked now."""
+        core, plan = self.core, self.core.plan
+        if plan is None or plan.clearance_m is None or core.orders.request.accepts_less:
+            return False
+        asked_m = core.orders.request.clearance_m
+        return asked_m is not None and asked_m > plan.clearance_m + _TOLERANCE_M
 
     def take_up(self, planned_in: Situation) -> None:
         """Take notice of the situation in which the plan that stands was made, where another desk had it made."""
@@ -156,6 +217,16 @@ class RouteDesk(Part):
             core.voice.rechecked(now_s, EventName.ROUTE_BROKEN, "the rest of the route", found)
         may_mend = is_ours_to_mend and (core.state is not State.DRIVING or core.orders.drive)
         return [Notice.ROUTE_OUTDATED] if may_mend else []
+
+    def tell_less(self, now_s: float) -> Sequence[Signal]:
+        """Report that the adopted plan promises less than is asked now, and have the route made anew."""
+        core, plan = self.core, self.core.plan
+        assert plan is not None
+        assert plan.clearance_m is not None
+        asked_m = core.orders.request.clearance_m or 0.0
+        found = Recheck(plan.clearance_m, asked_m, "--clearance was less when it began")
+        core.voice.rechecked(now_s, EventName.ROUTE_BROKEN, "the adopted route", found)
+        return [Notice.ROUTE_OUTDATED] if core.orders.drive else []
 
     def broke(self, found: Recheck, now_s: float) -> Sequence[Signal]:
         """Report that the route is broken, and have it made anew before it is driven."""

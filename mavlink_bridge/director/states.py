@@ -78,6 +78,7 @@ class Notice(StrEnum):
     MISSION_TAKEN = auto()  # it is somebody else's now
     MISSION_HEARD = auto()  # its end may be a target
     RALLY_HEARD = auto()
+    WAYS_KNOWN = auto()  # the ways home were laid out anew
     LEARNING_FAILED = auto()
     GONE_ON = auto()  # on the route, as far as was better than a HOLD at once
     HOLD_ENDED = auto()  # taken, or not

@@ -125,11 +125,13 @@ class Heartbeat(Message):
 
 @dataclass(frozen=True, slots=True)
 class SysStatus(Message):
-    """SYS_STATUS (1), its sensor bits."""
+    """SYS_STATUS (1), its sensor bits and the battery: mV (65535: unknown), % (-1: unknown)."""
 
     onboard_control_sensors_present: int
     onboard_control_sensors_enabled: int
     onboard_control_sensors_health: int
+    voltage_battery: int = 65535
+    battery_remaining: int = -1
 
 
 @dataclass(frozen=True, slots=True)
@@ -450,6 +452,15 @@ class AutopilotVersion(Message):
 
 AUTOPILOT_VERSION_ID = 148
 """For asking for it (MAV_CMD_REQUEST_MESSAGE); it is not sent unasked."""
+
+
+@dataclass(frozen=True, slots=True)
+class BatteryStatus(Message):
+    """BATTERY_STATUS (147): mV of each cell, or of the whole in the first (65535: none), % (-1: unknown)."""
+
+    id: int
+    voltages: tuple[int, ...] = (65535,) * 10
+    battery_remaining: int = -1
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from mavlink_bridge.backup.drive_note import note_from_json, note_to_json
 from mavlink_bridge.director import Event, Orders, TargetSource
+from mavlink_bridge.director.orders import Homing
 from mavlink_bridge.errors import LogError
 from missions.errors import MissionError
 from missions.firmware import read_firmware
@@ -41,7 +42,7 @@ class Call:
     time_s : float
         Its time.
     name : str
-        Which call: ``start``, ``timer``, ``target``, ``confirm``, ``plan_made``, ``backup_stored``, ``backup_failed``, ``in_use``,
+        Which call: ``start``, ``timer``, ``target``, ``confirm``, ``plan_made``, ``ways_made``, ``backup_stored``, ``backup_failed``, ``in_use``,
         ``note_stored`` or ``note_failed``.
     target : LatLon, optional
         The target that was typed.
@@ -181,9 +182,12 @@ def _orders_to_json(orders: Orders) -> dict[str, Any]:
 
 def _orders_from_json(document: dict[str, Any]) -> Orders:
     request = document["request"]
+    homing = document.get("homing", {})
+    places = {name: LatLon(*place) for name, place in homing.get("places", {}).items()}
     return Orders(
         **{
             **document,
+            "homing": Homing(**{**homing, "places": places}),
             "identity": tuple(document["identity"]) if document["identity"] else None,
             "target_sources": frozenset(TargetSource(name) for name in document["target_sources"]),
             "request": request_of(**{**request, "footprint": Footprint(**request.get("footprint", {}))}),

@@ -158,6 +158,8 @@ def _call(director: Director, call: Call) -> Iterator[Event]:
         director.backup_failed(_NO_BACKUP[call.name](call.text), call.time_s)
     elif call.name == "plan_made":
         _make_plan(director, call.time_s)
+    elif call.name == "ways_made" and (ways := director.pending_ways) is not None:
+        director.ways_made(ways, ways.made(), call.time_s)
     yield from _spoken(director)
 
 

@@ -18,6 +18,22 @@ DEFAULT_HOME = LatLon(40.071374, -105.229930)
 """Where the rover stands by default: the home of the recorded logs."""
 
 
+@dataclass(frozen=True, slots=True)
+class Battery:
+    """What the battery's monitor tells: percent left (-1: it does not know) and volts."""
+
+    percent: int = 100
+    volts: float = 12.6
+
+
+@dataclass(frozen=True, slots=True)
+class Receiver:
+    """What the GPS receiver tells: GPS_FIX_TYPE and its own figure for its error, None without one."""
+
+    fix_type: int = 6
+    error_m: float | None = None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulatorConfig:
     """What a simulated rover starts with.
@@ -44,6 +60,8 @@ class SimulatorConfig:
         The version it says that it is, and drives like; None: 4.7.0-dev of October 2025, the best measured.
     uid : bytes
         The board's own id in AUTOPILOT_VERSION, at most 18 bytes; empty: none.
+    battery : Battery or None
+        What its battery's monitor tells at first; None: it has no monitor.
     """
 
     system: int = 1
@@ -59,3 +77,4 @@ class SimulatorConfig:
     list_ids: bool = False
     firmware: Firmware | None = None
     uid: bytes = b""
+    battery: Battery | None = None

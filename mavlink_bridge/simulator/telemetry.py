@@ -39,6 +39,7 @@ _CAPABILITIES = (
 )
 _STANDBY, _ACTIVE, _CALIBRATING = 3, 4, 2
 _NO_MISSION, _NOT_STARTED, _ACTIVE_MISSION, _PAUSED, _COMPLETE = 1, 2, 3, 4, 5
+_NO_CELL = 65_535
 _BOUNDARY = 3  # FENCE_BREACH_BOUNDARY
 
 
@@ -85,7 +86,19 @@ def _sys_status(state: TelemetrySource) -> m.Message:
         health &= ~(_PREARM_OK | _GPS_SENSOR)
     if state.rover.breached:
         health &= ~_FENCE_SENSOR
-    return m.SysStatus(_SENSORS_PRESENT, enabled, health)
+    battery = state.rover.battery
+    if battery is None:
+        return m.SysStatus(_SENSORS_PRESENT, enabled, health)
+    millivolts = round(battery.volts * 1000)
+    return m.SysStatus(_SENSORS_PRESENT, enabled, health, millivolts, battery.percent)
+
+
+def _battery_status(state: TelemetrySource) -> m.Message | None:
+    battery = state.rover.battery
+    if battery is None:
+        return None
+    cells = (round(battery.volts * 1000), *(9 * [_NO_CELL]))
+    return m.BatteryStatus(0, cells, battery.percent)
 
 
 def _global_position(state: TelemetrySource) -> m.Message:
@@ -105,9 +118,10 @@ def _gps_raw(state: TelemetrySource) -> m.Message:
     time_usec = round(state.boot_s * 1e6)
     if not state.is_ready:
         return m.GpsRawInt(time_usec, 0, 0, 0, 0, satellites_visible=0)
-    return m.GpsRawInt(
-        time_usec, 6, *to_e7(state.rover.position), 0, eph=121, satellites_visible=10, h_acc=300
-    )
+    told = state.rover.receiver
+    fix_type, h_acc = (6, 300) if told is None else (told.fix_type, round(1000 * (told.error_m or 0.0)))
+    position = to_e7(state.rover.position)
+    return m.GpsRawInt(time_usec, fix_type, *position, 0, eph=121, satellites_visible=10, h_acc=h_acc)
 
 
 def _mission_current(state: TelemetrySource) -> m.Message:
@@ -199,6 +213,7 @@ _BUILDERS: dict[int, Callable[[TelemetrySource], m.Message | None]] = {
     streams.VFR_HUD: _vfr_hud,
     streams.POSITION_TARGET_GLOBAL_INT: _position_target,
     streams.AUTOPILOT_VERSION: _version,
+    streams.BATTERY_STATUS: _battery_status,
     streams.FENCE_STATUS: _fence_status,
     streams.SIMSTATE: _simstate,
     streams.EKF_STATUS_REPORT: _ekf,

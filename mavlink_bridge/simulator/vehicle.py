@@ -93,6 +93,7 @@ class SimulatedVehicle:
             rally=lambda: self._rally.items,
             turns_early=turns_early(self.config.firmware),
         )
+        self.rover.battery = self.config.battery
         self._home = self.rover.home
         self._outbox: list[m.Message] = []
         self._update_totals(announce=False)

@@ -15,10 +15,53 @@ from mavlink_bridge.cli.options.shared import (
     metres,
     option,
 )
+from mavlink_bridge.cli.values import MOST_S, within
+
+
+@dataclass(frozen=True, kw_only=True)
+class HomingOptions:
+    """When the vehicle is brought home, and where home may be."""
+
+    rtl_by_route: Annotated[
+        bool,
+        flag(
+            "--rtl-by-route",
+            "With --drive: answer RTL with HOLD and a verified way home round the fences, to the nearest of home, rally points and --place. "
+            "RTL again, or any other mode, is yours.",
+        ),
+    ] = False
+    battery_percent: Annotated[
+        float | None,
+        option(
+            "With --rtl-by-route: also bring it home when the battery is at or below P percent.",
+            "P",
+            parser=within(1.0, 99.0, "percent"),
+        ),
+    ] = None
+    battery_volts: Annotated[
+        float | None,
+        option(
+            "With --rtl-by-route: also bring it home when the battery is at or below V volts.",
+            "V",
+            parser=within(0.1, 1000.0, "volts"),
+        ),
+    ] = None
+    gcs_timeout: Annotated[
+        float | None,
+        option(
+            "With --rtl-by-route: also bring it home when no ground station was heard for S seconds, once one was.",
+            "S",
+            parser=within(2.0, MOST_S, "seconds"),
+        ),
+    ] = None
+    place: Annotated[
+        list[str],
+        option("A place to go home to, beside home and the rally points; repeatable.", "NAME=LAT,LON"),
+    ] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BridgeOptions(DescriptionOptions, VehicleLinkOptions):
+class BridgeOptions(HomingOptions, DescriptionOptions, VehicleLinkOptions):
     """Run alongside the autopilot: read fence, state and targets from the link, plan, upload and verify missions, watch the drive.
 
     Type targets as `LAT,LON`; `yes` confirms a plan. Without `--upload` it only reports.
@@ -56,7 +99,14 @@ class BridgeOptions(DescriptionOptions, VehicleLinkOptions):
         ),
     ] = False
     arm: Annotated[bool, flag("--arm", "With --drive: arm before AUTO.")] = False
-    confirm: Annotated[bool, flag("--confirm", "Upload a plan only after you type yes.")] = False
+    confirm: Annotated[
+        bool,
+        flag("--confirm", "Upload a plan only after you type yes; a way home of --rtl-by-route at once."),
+    ] = False
+    escape: Annotated[
+        bool,
+        flag("--escape", "Let a vehicle that stands inside an exclusion or outside the fence drive out."),
+    ] = False
     once: Annotated[bool, flag("--once", "Exit after the first target.")] = False
     log: Annotated[
         Path | None,

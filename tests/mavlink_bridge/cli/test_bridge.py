@@ -13,6 +13,9 @@ import pytest
 from typer.testing import CliRunner
 
 from mavlink_bridge.cli.app import app
+from mavlink_bridge.link import open_link
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.simulator import Simulator, SimulatorConfig
 from missions.fence import fence_to_items
 from missions.formats import read_fence
@@ -121,6 +124,32 @@ def test_a_bridge_killed_while_it_drives_adopts_its_drive_and_replays_so(config,
         "adopted",
         "driving",
         "arrived",
+    ]
+
+
+def test_rtl_is_answered_by_a_way_home_and_replays_so(config, tmp_path):
+    log = tmp_path / "run.tlog"
+    options = ("--target", FAR, "--upload", "--drive", "--arm", "--rtl-by-route", "--log", str(log))
+    with Simulator(config, "tcpin:127.0.0.1:0", speedup=3) as simulator:
+        process = start_bridge(simulator.connection, *options)
+        try:
+            told = [wait_for(process, "way_home")["place"]]
+            wait_for(process, "progress")
+            with open_link(simulator.connection, (255, 190)) as station:
+                wait_for(process, "progress")
+                station.send(m.SetMode(1, 1, Mode.RTL))
+            told += [wait_for(process, name)["event"] for name in ("called_home", "going_home", "driving")]
+        finally:
+            process.terminate()
+            _, errors = process.communicate(timeout=60)
+    assert told == ["home", "called_home", "going_home", "driving"]
+    assert "the first RTL is answered with HOLD and a verified way home" in errors
+    again = run("replay", str(log), "--json")
+    names = [json.loads(line)["event"] for line in again.stdout.splitlines()]
+    assert [name for name in names if name in ("way_home", "called_home", "going_home")] == [
+        "way_home",
+        "called_home",
+        "going_home",
     ]
 
 

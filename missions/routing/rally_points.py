@@ -141,7 +141,7 @@ def choose_rally_points(
     shares = (1.0, *_LESS_SHARES) if request.accepts_less else (1.0,)
     for share in shares:
         promised = replace(asked, promised_m=share * asked.promised_m)
-        field = _Field(checked, situation, promised.promised_m, promised.required_m)
+        field = _RallyField(checked, situation, promised.promised_m, promised.required_m)
         found, chosen, left_m = _searched(field, most, should_stop)
         if left_m == 0.0 and chosen:
             return found.choice(found.best_for_field(chosen), asked.promised_m)
@@ -149,7 +149,7 @@ def choose_rally_points(
 
 
 def _searched(
-    field: _Field, most: int, should_stop: Callable[[], bool] | None
+    field: _RallyField, most: int, should_stop: Callable[[], bool] | None
 ) -> tuple[_Search, list[int], float]:
     """Search among places all over the field, and once more with many about what was found and what is left."""
     found = _Search(field, field.spread())
@@ -186,7 +186,7 @@ def _nothing_found(
     )
 
 
-class _Field:
+class _RallyField:
     """A field at one clearance: the route in pieces, and what lines from each have to keep.
 
     Parameters
@@ -283,13 +283,13 @@ class _Search:
 
     Parameters
     ----------
-    field : _Field
+    field : _RallyField
         The field.
     places : sequence of LatLon
         Where rally points may be; those that stand too near a fence are left out.
     """
 
-    def __init__(self, field: _Field, places: Sequence[LatLon]) -> None:
+    def __init__(self, field: _RallyField, places: Sequence[LatLon]) -> None:
         self.field = field
         found = list(dict.fromkeys(places))
         points = field.at(found)
@@ -369,7 +369,7 @@ class _Search:
         return float(sees[nearest, np.arange(sees.shape[1])].mean()) if sees.shape[1] else 0.0
 
 
-def _borders(field: _Field, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+def _borders(field: _RallyField, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
     """Return the lines on free ground on which two rally points are as near as each other to the autopilot."""
     if len(points) < 2:
         return ()

@@ -160,7 +160,7 @@ class DriveNotes:
         for path in sorted(self._folder.glob("drive-under-way-*.json")) if self._folder.is_dir() else ():
             try:
                 if not path.is_file() or path.stat().st_size > _MOST_BYTES:
-                    raise ValueError(f"it is no file, or larger than {_MOST_BYTES} bytes")
+                    raise ValueError(f"it is not a file, or is larger than {_MOST_BYTES} bytes")
                 notes.append(note_from_json(json.loads(path.read_text(encoding="utf-8"))))
             except (OSError, IndexError, *UNREADABLE, MissionError) as error:
                 troubles.append(

@@ -109,7 +109,10 @@ class Voice:
 
     def rechecked(self, now_s: float, name: EventName, what: str, found: Recheck) -> None:
         """Report that lines do not keep what they have to."""
-        text = f"{what} keeps only {metres_text(found.clearance_m)} of the required {metres_text(found.asked_m)} ({found.fence})"
+        asked = metres_text(found.asked_m)
+        text = f"{what} keeps only {metres_text(found.clearance_m)} of the required {asked} ({found.fence})"
+        if found.clearance_m <= 0:
+            text = f"{what} crosses {found.fence} ({asked} is required)"
         self.tell(now_s, name, text, metres(found.clearance_m), round(found.asked_m, 3), found.fence)
 
 

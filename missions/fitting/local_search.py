@@ -160,6 +160,10 @@ class Fitting:
         # What is made quicker keeps no more than it must, and rounding may break what cannot be mended.
         return quicker if quicker[1].is_enough else self._on_grid(self._eased(drawing))
 
+    def outlook(self, drawing: Drawing) -> Measured:
+        """Return how lines measure before anything is bent; `fit` begins with the same, so it costs nothing beside it."""
+        return self._gauge.measure(_joined(drawing))
+
     def _on_grid(self, drawing: Drawing) -> tuple[Drawing, Measured]:
         """Round lines as the mission's items will be: the model has steps, and a millimetre may be one too many."""
         measured = self.measure(drawing)

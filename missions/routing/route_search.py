@@ -102,6 +102,8 @@ class DrivenRoute:
         The predicted time, and a little for each waypoint (`fitting.cost`).
     is_slow : bool
         Whether it takes much longer than its lines would at full speed, so that others may be quicker.
+    outlook : Measured or None
+        How its lines measured as they were drawn; None where they were not fitted to a vehicle.
     """
 
     drawing: Drawing
@@ -114,6 +116,7 @@ class DrivenRoute:
     is_whole: bool = True
     cost_s: float = 0.0
     is_slow: bool = False
+    outlook: Measured | None = None
 
     @property
     def is_slow_somewhere(self) -> bool:
@@ -142,8 +145,10 @@ class SharedWork:
 
     drawn: dict[float, DrawnRoutes] = field(default_factory=dict)
     """By the clearance of the drawn lines."""
-    fitted: dict[tuple[Drawing, int, int, float], tuple[Drawing, Measured, int]] = field(default_factory=dict)
-    """By the lines, the measurements taken before and allowed, and what ends a round; with those taken after."""
+    fitted: dict[tuple[Drawing, int, int, float], tuple[Drawing, Measured, Measured, int]] = field(
+        default_factory=dict
+    )
+    """By the lines, the measurements taken before and allowed, and what ends a round; with how they measured before, and the measurements taken after."""
     departures: Departures | None = None
 
 
@@ -239,14 +244,14 @@ class RouteSearch:
             return None
         route = routes[0][0]
         lines = {}
-        for drawing, _, _ in self.known.fitted.values():
+        for drawing, *_ in self.known.fitted.values():
             if _meets(drawing, route):
                 asked = self._asked_anew(route, drawing)
                 lines[asked] = asked == drawing
         if not lines:
             return None
         fitting = self._fitting(MOST_MEASUREMENTS)
-        made = self._judged(fitting, route, *fitting.combine(lines))
+        made = self._judged(fitting, route, *fitting.combine(lines), self.outlook)
         return made.driven if made.is_enough else None
 
     def _asked_anew(self, route: Route, drawing: Drawing) -> Drawing:
@@ -275,6 +280,16 @@ class RouteSearch:
         (route, _), (that, _) = here[0], there[0]
         turn_deg = abs(_course_deg(route) - _course_deg(that))
         return route.lead_away != that.lead_away or min(turn_deg, 360.0 - turn_deg) > _OTHER_WAY_DEG
+
+    @cached_property
+    def outlook(self) -> Measured | None:
+        """How the quicker of the first routes measures before it is fitted; None where none is drawn."""
+        routes = self._first_routes
+        if isinstance(routes, NoRoute):
+            return None
+        fitting = self._fitting(self.measurements)
+        looks = (fitting.outlook(self._drawing(route)) for route, _ in routes)
+        return min(looks, key=lambda look: look.kept_cost_s)
 
     @cached_property
     def _attempts(self) -> list[_Attempt]:
@@ -390,11 +405,14 @@ class RouteSearch:
         drawn_lines = tuple(replace(point, speed_mps=speed_mps) for point in self._drawing(route))
         key = (drawn_lines, fitting.measurements, fitting.most_measurements, fitting.good_share)
         if key not in self.known.fitted:
-            self.known.fitted[key] = (*fitting.fit(drawn_lines), fitting.measurements)
-        drawing, measured, fitting.measurements = self.known.fitted[key]
-        return self._judged(fitting, route, drawing, measured)
+            fitted = fitting.fit(drawn_lines)
+            self.known.fitted[key] = (*fitted, fitting.outlook(drawn_lines), fitting.measurements)
+        drawing, measured, outlook, fitting.measurements = self.known.fitted[key]
+        return self._judged(fitting, route, drawing, measured, outlook)
 
-    def _judged(self, fitting: Fitting, route: Route, drawing: Drawing, measured: Measured) -> _Attempt:
+    def _judged(
+        self, fitting: Fitting, route: Route, drawing: Drawing, measured: Measured, outlook: Measured | None
+    ) -> _Attempt:
         """Return what became of a route's lines."""
         departing_m = self._least_departing_m(route)
         kept, kept_m, lead_m = measured, self.required_m, departing_m
@@ -415,6 +433,7 @@ class RouteSearch:
             measured.is_enough,
             kept.cost_s,
             kept.cost_s * self.vehicle.speed_mps > _SLOW_SHARE * polyline.distances_m(drawing)[-1],
+            outlook,
         )
         enough_m = self.required_m if self.enough_m is None else self.enough_m
         return _Attempt(drawing, measured, driven, is_enough=kept_m >= min(enough_m, self.required_m))

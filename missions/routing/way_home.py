@@ -248,5 +248,5 @@ def _why_blocked(ground: Ground, place: Place, clearance_m: float) -> str:
         return f"it is {' and '.join(names or ['outside the allowed area'])}"
     barrier, away_m = ground.nearest(point)
     if away_m >= clearance_m and barrier is not None:
-        return f"it is too near a sharp corner of {barrier.name}, round which a way keeps more than {metres(clearance_m)}"
-    return f"it is {metres(away_m)} from {barrier.name if barrier else 'a fence'}; a way keeps {metres(clearance_m)}"
+        return f"it is too close to a sharp corner of {barrier.name}, around which ways home keep more than {metres(clearance_m)}"
+    return f"it is {metres(away_m)} from {barrier.name if barrier else 'a fence'}, and a way home keeps {metres(clearance_m)}"

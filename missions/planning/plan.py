@@ -65,14 +65,11 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
         planned = plan_tour(situation, request, should_stop=should_stop)
     else:
         planned = plan_route(situation, request, should_stop=should_stop)
-<<<<<<< HEAD
-    planned = with_hold(marked(_with_room(planned, situation, request, should_stop), request), situation)
+    planned = _with_room(planned, situation, request, should_stop)
+    planned = _told_of_obstacles(with_hold(marked(planned, request), situation), situation)
     if isinstance(request, Tour) and request.way_home_inside:
         return with_way_home_inside(planned, situation, request, should_stop=should_stop)
     return planned
-=======
-    planned = _with_room(planned, situation, request, should_stop)
-    return _told_of_obstacles(with_hold(marked(planned, request), situation), situation)
 
 
 def _told_of_obstacles(planned: Plan, situation: Situation) -> Plan:
@@ -83,7 +80,6 @@ def _told_of_obstacles(planned: Plan, situation: Situation) -> Plan:
         for one in obstacles.known
     ]
     return replace(planned, info=(*planned.info, *told)) if told else planned
->>>>>>> main
 
 
 def _with_room(

@@ -34,6 +34,8 @@ class Command(IntEnum):
     NAV_SET_YAW_SPEED = 213
     DO_SET_MISSION_CURRENT = 224
     MISSION_START = 300
+    JUMP_TAG = 600
+    DO_JUMP_TAG = 601
     COMPONENT_ARM_DISARM = 400
     GET_HOME_POSITION = 410
     REQUEST_MESSAGE = 512
@@ -126,6 +128,11 @@ def waypoint(position: LatLon) -> MissionItem:
 def change_speed(speed_mps: float) -> MissionItem:
     """Return a DO_CHANGE_SPEED of the ground speed (param1 1), throttle unchanged (param3 -1)."""
     return MissionItem(Command.DO_CHANGE_SPEED, CoordinateFrame.MISSION, params=(1.0, speed_mps, -1.0, 0.0))
+
+
+def jump_tag(number: int) -> MissionItem:
+    """Return a JUMP_TAG: a mark in a mission, which the autopilot passes over."""
+    return MissionItem(Command.JUMP_TAG, CoordinateFrame.MISSION, params=(float(number), 0.0, 0.0, 0.0))
 
 
 def with_home(items: Sequence[MissionItem], home: LatLon) -> tuple[MissionItem, ...]:

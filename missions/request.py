@@ -189,18 +189,27 @@ class Tour(Request):
         Whether the route leads home after the last target; to the start where home is not known.
     end : End
         At the end ``hold``, ``loiter`` or ``rtl``.
+    way_home_inside : bool
+        Whether the mission holds behind its end, for each leg, a way home to be chosen; it ends in ``hold`` then.
+    places : sequence of pairs of str and LatLon
+        Where ways home may lead, beside home and the rally points, each with its name.
     """
 
     targets: tuple[LatLon, ...] = ()
     order: Order = Order.GIVEN
     comes_back: bool = False
     end: End = End.HOLD
+    way_home_inside: bool = False
+    places: tuple[tuple[str, LatLon], ...] = ()
 
     def __post_init__(self) -> None:
         super().__post_init__()
         self._set("targets", _places(self.targets))
         self._set("order", _word("order", self.order, Order))
         self._set("end", _word("end", self.end, End))
+        self._set("places", _named_places(self.places))
+        if self.way_home_inside and self.end is not End.HOLD:
+            raise _senseless("end", self.end, "hold, beside a way home inside")
 
     def to(self, target: LatLon) -> Self:
         """Return the request with one target in place of all of its own."""
@@ -241,15 +250,18 @@ class RepairMission(Request):
         return {**super().words(), "via": self.mission, "via_own": self.mission is None}
 
 
-_LATER_WORDS = ("trusts_model", "accepts_less")
-_TOUR_WORDS = ("targets", "order", "comes_back", "end")
+_LATER_WORDS = ("trusts_model", "accepts_less", "way_home_inside", "places")
+_TOUR_WORDS = ("targets", "order", "comes_back", "end", "way_home_inside", "places")
 _DEFAULTS: dict[str, Any] = {
     "start": None,
     "targets": (),
     **{one.name: one.default for one in fields(Tour) if one.name not in _LATER_WORDS},
     "via": None,
     "via_own": False,
-    **dict.fromkeys(_LATER_WORDS, False),
+    "trusts_model": False,
+    "accepts_less": False,
+    "way_home_inside": False,
+    "places": (),
 }
 """What `request_of` knows, in the order in which `Request` takes it, as it is where it is left out."""
 
@@ -300,6 +312,13 @@ def _places(values: Iterable[Any]) -> tuple[LatLon, ...]:
         return tuple(_place("targets", value) for value in values)
     except TypeError:
         raise _senseless("targets", values, "a sequence of places") from None
+
+
+def _named_places(values: Iterable[Any]) -> tuple[tuple[str, LatLon], ...]:
+    try:
+        return tuple((str(name), _place("places", position)) for name, position in values)
+    except (TypeError, ValueError):
+        raise _senseless("places", values, "a sequence of pairs of a name and a place") from None
 
 
 def _word(name: str, value: str, words: type[_Word]) -> _Word:

@@ -54,7 +54,12 @@ def draw(page: Path) -> None:
         folder = Path(name)
         practice_folder(folder)
         for words in commands_of(page):
-            if words[1] in ("plan", "check", "log"):  # some of them end with an error, as the page says
+            if words[1] in (
+                "plan",
+                "rally",
+                "check",
+                "log",
+            ):  # some of them end with an error, as the page says
                 subprocess.run(
                     [sys.executable, "-m", "mavlink_bridge.cli", *words[1:], "-q"],
                     cwd=folder,

@@ -13,24 +13,17 @@ from rich.table import Table
 from mavlink_bridge.cli.common import inform, remarks_document, warn
 from mavlink_bridge.cli.drawing import cell, console
 from mavlink_bridge.cli.failing import ExitCode
-from mavlink_bridge.cli.field_files import read_fence_file, read_file, with_mission_home
+from mavlink_bridge.cli.home_parts import ways_document, with_parts
+from mavlink_bridge.cli.mission_source import check_source, mission_situation, start_of
 from mavlink_bridge.cli.pictures import check_plots, draw
 from mavlink_bridge.cli.plan_results import hold_document
 from mavlink_bridge.cli.terminal import echo, print_json
-from mavlink_bridge.cli.values import given_places, position_from
-from mavlink_bridge.cli.vehicle_options import (
-    described_vehicle,
-    with_description,
-    with_home_option,
-    with_vehicle,
-)
+from mavlink_bridge.cli.values import given_places
+from mavlink_bridge.cli.vehicle_options import with_vehicle
 from mavlink_bridge.cli.way_home import RouteWays
-from mavlink_bridge.errors import UsageError
 from missions.checking.check import check_mission, plan_of
-from missions.formats import mission_of
 from missions.picture.plans import plan_scene
 from missions.request import GoTo
-from missions.situation import Situation
 from missions.vehicle.item_limit import most_items
 from missions.words import counted, metres, mission_items
 
@@ -42,20 +35,19 @@ if TYPE_CHECKING:
     from missions.items import MissionItem
     from missions.picture.scene import PictureScene
     from missions.planned import Plan
+    from missions.situation import Situation
 
 
 def check(options: CheckOptions) -> None:
     """Check each leg, and report, draw or print as JSON what was found."""
-    _check_options(options)
+    check_source(options)
+    check_plots(options.plot, json_output=options.json_output)
     places = given_places(options.place)
     request = with_vehicle(GoTo(clearance_m=options.clearance, trusts_model=options.trust_model), options)
-    begin = position_from("--start", options.start) if options.start is not None else None
-    situation, unknown = _situation(options)
-    if situation.mission is None:
-        raise UsageError(f"{options.log or options.connect} contains no mission; give one (--mission FILE)")
-    if begin is None and options.log is not None and situation.home is not None:
-        begin = situation.home.value  # at a log's end the vehicle may stand anywhere on its way
-    checked = check_mission(situation.mission.value, situation, replace(request, start=begin))
+    situation, unknown = mission_situation(options)
+    assert situation.mission is not None
+    request = replace(request, start=start_of(options, situation))
+    checked = check_mission(situation.mission.value, situation, request)
     planned = plan_of(checked, situation)
     ways = RouteWays.of(planned, situation, places)
     warnings = [
@@ -70,39 +62,13 @@ def check(options: CheckOptions) -> None:
     draw(partial(_scene, checked, planned, ways), options.plot)
     if options.json_output:
         document = _document(checked, warnings, situation.system, options.plot)
-        print_json({**document, "ways_home": ways.document() if ways is not None else None})
+        home = ways.document() if ways is not None else None
+        inside = ways_document(checked.home_ways)
+        print_json({**document, "ways_home": home, "way_home_inside": inside})
     else:
         _report(checked, options.plot, is_quiet=options.quiet > 0)
     if not checked.is_promised:
         raise typer.Exit(ExitCode.CHECK)
-
-
-def _situation(options: CheckOptions) -> tuple[Situation, list[str]]:
-    """Return what is known from files, a log or a link, and what the vehicle did not report."""
-    situation: Situation | None = None
-    unknown: list[str] = []
-    if options.log is not None:
-        from mavlink_bridge.cli.log_source import situation_of  # noqa: PLC0415 - pymavlink only for logs
-
-        situation = situation_of(options.log, options, drives_its_items=True)
-    elif options.connect is not None:
-        from mavlink_bridge.cli.check_on_link import live_situation  # noqa: PLC0415 - and for links
-
-        situation, unknown = live_situation(options)
-    situation = _with_files(situation, options)
-    situation = with_description(situation, described_vehicle(options))
-    return with_home_option(situation, options.home), unknown
-
-
-def _check_options(options: CheckOptions) -> None:
-    """Find what cannot work before any work is done."""
-    if options.mission is None and options.log is None and options.connect is None:
-        raise UsageError("give a mission: --mission FILE, --log FILE.tlog or --connect CONNECTION")
-    if options.log is not None and options.connect is not None:
-        raise UsageError("give one of --log and --connect")
-    if options.home is not None and options.connect is not None:
-        raise UsageError("--home goes with files and logs: a live vehicle reports its own home")
-    check_plots(options.plot, json_output=options.json_output)
 
 
 def _storage_warnings(items: Sequence[MissionItem], situation: Situation) -> list[str]:
@@ -110,32 +76,6 @@ def _storage_warnings(items: Sequence[MissionItem], situation: Situation) -> lis
     most = most_items(situation.parameters)
     count = len(items) + 1
     return [f"{mission_items(count)}; the vehicle holds {most}"] if count > most else []
-
-
-def _with_files(source: Situation | None, options: CheckOptions) -> Situation:
-    """Put what files hold in the place of what the log or the link reported."""
-    found = source or Situation()
-    if options.fence is not None:
-        told = read_fence_file(options.fence, options)
-        found = replace(
-            found,
-            fence=told.fence,
-            home=found.home or told.home,
-            reading=replace(found.reading, fence_trouble=None, transfers={}, remarks=told.remarks),
-        )
-    if options.mission is not None:
-        told = read_file(options.mission, options, by_name=options.fence is None)
-        drawn = mission_of(told, options.mission)
-        found = replace(
-            found,
-            mission=told.mission,
-            fence=told.fence if options.fence is None and told.fence else found.fence,
-            rally=found.rally or told.rally,
-            reading=replace(found.reading, remarks=(*found.remarks, *told.remarks)),
-        )
-        if source is None:
-            found = with_mission_home(found, drawn, str(options.mission))
-    return found
 
 
 def _scene(checked: MissionCheck, planned: Plan, ways: RouteWays | None) -> PictureScene:
@@ -150,7 +90,7 @@ def _scene(checked: MissionCheck, planned: Plan, ways: RouteWays | None) -> Pict
     extrapolated = ", extrapolated" if checked.extrapolated else ""
     title = f"{checked.length_m:.1f} m, about {checked.duration_s:.0f} s\n{verdict} {checked.clearance_m:g} m while driving{extrapolated}"
     unsafe = {number: leg.at for number, leg in enumerate(checked.legs) if leg.breaks}
-    scene = plan_scene(planned, title=title, unsafe=unsafe)
+    scene = with_parts(plan_scene(planned, title=title, unsafe=unsafe), planned.items)
     return ways.drawn(scene) if ways is not None else scene
 
 
@@ -163,6 +103,9 @@ def _report(checked: MissionCheck, plots: list[Path], *, is_quiet: bool) -> None
         echo(f"DANGER: {danger}", typer.colors.RED)
     for leg in checked.broken:
         echo(f"FAIL: {_sentence(leg)}", typer.colors.RED)
+    for way in checked.home_ways:
+        if way.trouble:
+            echo(f"FAIL: {way}: {way.trouble}", typer.colors.RED)
     kept = f"{checked.clearance_m:g} m while driving"
     if checked.holds and not checked.is_promised:
         echo(
@@ -173,7 +116,8 @@ def _report(checked: MissionCheck, plots: list[Path], *, is_quiet: bool) -> None
     if not checked.is_promised or is_quiet:
         return
     trusted = "; the drive model is trusted beyond what was measured" if checked.extrapolated else ""
-    echo(f"PASS: every leg keeps {kept}{trusted}")
+    every = "every leg and way home" if checked.home_ways else "every leg"
+    echo(f"PASS: {every} keeps {kept}{trusted}")
 
 
 def _report_legs(checked: MissionCheck, plots: list[Path]) -> None:
@@ -189,6 +133,10 @@ def _report_legs(checked: MissionCheck, plots: list[Path]) -> None:
         f"{counted(len(checked.legs), 'leg')}, {checked.length_m:.1f} m, about {checked.duration_s:.0f} s"
         f"{' for each round' if checked.course.is_endless else ''}; {mission_items(len(checked.mission.items) + 1)}"
     )
+    for way in checked.home_ways:
+        echo(
+            f"{way}: {way.length_m:.1f} m from its end, about {way.time_s:.0f} s, {_metres(way.driven_clearance_m)} driven"
+        )
     for path in plots:
         if str(path) != "-":
             echo(f"Wrote {path}")

@@ -13,14 +13,14 @@ from missions.situation import ListKind, Situation
 from missions.vehicle.asked_parameters import CHECKED_NAMES
 
 if TYPE_CHECKING:
-    from mavlink_bridge.cli.options.check import CheckOptions
+    from mavlink_bridge.cli.options.shared import LinkOptions
     from mavlink_bridge.mavlink.messages import Frame
 
 _TELEMETRY_PATIENCE_S = 5.0
 """A vehicle that reports its position does so at least once a second."""
 
 
-def live_situation(options: CheckOptions) -> tuple[Situation, list[str]]:
+def live_situation(options: LinkOptions, connection: str) -> tuple[Situation, list[str]]:
     """Read mission, fence, rally points and parameters from the vehicle; nothing is written to it. Return also what it did not report.
 
     Raises
@@ -28,8 +28,7 @@ def live_situation(options: CheckOptions) -> tuple[Situation, list[str]]:
     BridgeError
         The vehicle is not there, or does not give them.
     """
-    assert options.connect is not None
-    with session_for(options, options.connect) as (session, _show):
+    with session_for(options, connection) as (session, _show):
         peer, link = session.vehicle, session.link
         heard = Situation(system=peer.system, component=peer.component)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.cli.field_files import read_mission_file
 from mavlink_bridge.cli.options.plan import ENDS, METHODS, ORDERS
-from mavlink_bridge.cli.values import metres_or, position_from
+from mavlink_bridge.cli.values import given_places, metres_or, position_from
 from mavlink_bridge.errors import UsageError
 from missions.request import RepairMission, Request, conditions, request_of
 
@@ -53,10 +53,18 @@ def with_tour(request: Request, options: PlanOptions) -> Request:
         if value not in known:
             raise UsageError(f"{option} {value!r}: expected one of {', '.join(known)}")
     if via is None:
-        return request_of(**{**request.words(), "order": order, "comes_back": comes_back, "end": end})
-    if request.targets or comes_back or (order, end) != ("given", "hold"):
+        if options.way_home_inside and end != "hold":
+            raise UsageError(
+                f"--way-home-inside ends the mission in hold; it cannot be combined with --end {end}"
+            )
+        words: dict[str, object] = {"order": order, "comes_back": comes_back, "end": end}
+        if options.way_home_inside:
+            words |= {"way_home_inside": True, "places": tuple(given_places(options.place).items())}
+        return request_of(**{**request.words(), **words})
+    if request.targets or comes_back or options.way_home_inside or (order, end) != ("given", "hold"):
         raise UsageError(
-            "--via-mission keeps the mission's own places, order and end; it cannot be combined with --target, --order, --return, --end"
+            "--via-mission keeps the mission's own places, order and end; it cannot be combined with --target, --order, --return, --end, "
+            "--way-home-inside"
         )
     if request.widest:
         raise UsageError("--via-mission needs a clearance in metres, not max")

@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.cli.common import inform, remarks_document, warn
+from mavlink_bridge.cli.home_parts import parts_document, with_parts
 from mavlink_bridge.cli.kept_files import write_kept
 from mavlink_bridge.cli.pictures import draw
 from mavlink_bridge.cli.terminal import echo
+from mavlink_bridge.cli.way_home import RouteWays
 from missions.checking.holding import hold_info
 from missions.fence import CircleZone, PolygonZone, ZoneKind
 from missions.picture.plans import plan_scene
@@ -18,7 +20,6 @@ from missions.words import counted
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from mavlink_bridge.cli.way_home import RouteWays
     from missions.drive_model.stopping import HoldCheck
     from missions.geo import LatLon
     from missions.picture.scene import PictureScene
@@ -40,8 +41,8 @@ def write_outputs(
         planned.write(path, situation, write=write_kept)
 
     def scene() -> PictureScene:
-        plain = plan_scene(planned, blocks=blocks)
-        return ways.drawn(plain) if ways is not None else plain
+        plain = with_parts(plan_scene(planned, blocks=blocks), planned.items)
+        return plain if ways is None or plain.tracks else ways.drawn(plain)
 
     return [*outputs, *draw(scene, plots)]
 
@@ -157,8 +158,6 @@ class Told:
         """Report a plan, and what it was taken from; a later one is the route made anew."""
         self._taken = tuple(taken)
         if self._places is not None:
-            from mavlink_bridge.cli.way_home import RouteWays  # noqa: PLC0415 - only for those who ask for ways home
-
             self._ways = RouteWays.of(planned, situation, self._places)
         inform((*self._taken, *planned.info, *(hold_info(planned.hold) if self._drives else ())))
         warn(planned.warnings)
@@ -179,6 +178,7 @@ class Told:
             **plan_document(self._plan),
             **remarks_document((*self._taken, *self._plan.info), (*self._remarks, *self._plan.warnings)),
             "ways_home": self._ways.document() if self._ways is not None else None,
+            "way_home_inside": parts_document(self._plan.items),
             "planning_s": round(self._planning_s, 6),
             "outputs": [str(path) for path in self._written],
         }

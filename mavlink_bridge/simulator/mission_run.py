@@ -29,9 +29,18 @@ class MissionRun:
         The driver.
     frame : FlatFrame
         Where the driver's metres count from.
+    return_place : callable
+        Returns where RTL leads from where the rover is.
     """
 
-    def __init__(self, items: Callable[[], Sequence[MissionItem]], drive: Driver, frame: FlatFrame) -> None:
+    def __init__(
+        self,
+        items: Callable[[], Sequence[MissionItem]],
+        drive: Driver,
+        frame: FlatFrame,
+        return_place: Callable[[], complex],
+    ) -> None:
+        self._return_place = return_place
         self._items = items
         self._drive = drive
         self._frame = frame
@@ -160,7 +169,7 @@ class MissionRun:
 
     def _place(self, item: MissionItem) -> complex | None:
         if item.command == Command.NAV_RETURN_TO_LAUNCH:
-            return self._frame.to_flat(self._items()[0].position)
+            return self._return_place()
         if item.command not in _PLACED:
             return None
         if (item.lat_e7, item.lon_e7) == (0, 0):

@@ -13,6 +13,7 @@ from mavlink_bridge.simulator.drive import Driver
 from mavlink_bridge.simulator.fence_watch import FenceArea, bounded_fence
 from mavlink_bridge.simulator.flat import FlatFrame, TrueFrame
 from mavlink_bridge.simulator.mission_run import MissionRun
+from missions.checking.rtl_lines import ReturnRule, chosen_place
 from missions.geo import from_e7, to_e7
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ class Rover:
         Where it stands.
     heading_deg : float
         Where it looks, clockwise from north.
-    mission, fence : callable
+    mission, fence, rally : callable
         Give the lists as they are stored.
     turns_early : bool
         Whether it begins turns as ArduPilot did before 4.6.
@@ -89,9 +90,11 @@ class Rover:
         mission: Callable[[], Sequence[MissionItem]],
         fence: Callable[[], Sequence[MissionItem]],
         *,
+        rally: Callable[[], Sequence[MissionItem]] = tuple,
         turns_early: bool = False,
     ) -> None:
         self.parameters = parameters
+        self._rally = rally
         self._turns_early = turns_early
         self._fence = fence
         self._mission = mission
@@ -116,7 +119,7 @@ class Rover:
         settings = Settings.from_parameters(self.parameters)
         self.body = Body(0j, math.radians(heading_deg), settings.is_skid)
         self.drive = Driver(settings, self.body, turns_early=self._turns_early)
-        self.mission_run = MissionRun(self._mission, self.drive, self.frame)
+        self.mission_run = MissionRun(self._mission, self.drive, self.frame, self._return_place)
         self._current_before_auto = False
         self.renew_fence()
 
@@ -197,7 +200,9 @@ class Rover:
                 self.texts.append((2, "Internal Errors 0x20000000"))
             self.mission_run.start(now_s)
         elif mode in _HOMING:  # SMART_RTL straight home too: no way is remembered
-            self.drive.go_to(self.frame.to_flat(self.home), None)
+            self.drive.go_to(
+                self._return_place() if mode is Mode.RTL else self.frame.to_flat(self.home), None
+            )
         self._current_before_auto = False
         self._pass_on()
         return True
@@ -211,6 +216,12 @@ class Rover:
         self._current_before_auto = known and self.mode == Mode.HOLD
         self._pass_on()
         return known
+
+    def _return_place(self) -> complex:
+        """Return where RTL leads from here: the nearest rally point, or home."""
+        rally = [item.position for item in self._rally()]
+        rule = ReturnRule(bool(self.parameters["RALLY_INCL_HOME"]), 1000 * self.parameters["RALLY_LIMIT_KM"])
+        return self.frame.to_flat(chosen_place(rally, self.estimate, self.home, rule))
 
     def arm(self) -> None:
         """Let the motors run."""

@@ -99,6 +99,7 @@ class SimulatedVehicle:
             self.config.heading_deg,
             lambda: self._mission.items,
             lambda: self._fence.items,
+            rally=lambda: self._rally.items,
             turns_early=turns_early(self.config.firmware),
         )
         self.rover.discs += self.config.discs

@@ -14,7 +14,9 @@ from shapely.ops import nearest_points
 from missions.checking.execution import CIRCLE_M, Course, CourseLeg, follow_mission
 from missions.checking.forecast import forecast_drive, pivot_remarks
 from missions.checking.holding import hold_check, hold_warnings
-from missions.checking.mission_end import crossed_zones, end_warnings, return_place, return_warnings
+from missions.checking.home_ways import checked_ways
+from missions.checking.mission_end import crossed_zones, end_warnings, return_warnings
+from missions.checking.rtl_lines import return_place
 from missions.drive_model import Envelope, extrapolated
 from missions.errors import SituationError, StartBlockedError
 from missions.geo import LatLon, LocalPoint, distance_m
@@ -36,6 +38,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
 
+    from missions.checking.home_ways import CheckedWay
     from missions.drive_model.stopping import HoldCheck
     from missions.fence import Fence
     from missions.promise import Promise
@@ -134,6 +137,8 @@ class MissionCheck:
         Whether that is promised all the same.
     hold : HoldCheck or None
         What HOLD does on the way.
+    home_ways : tuple of CheckedWay
+        The ways home inside the mission, behind its end; none of them may be unsafe.
     """
 
     mission: Mission
@@ -150,6 +155,7 @@ class MissionCheck:
     trusts_model: bool = False
     info: tuple[str, ...] = ()
     hold: HoldCheck | None = None
+    home_ways: tuple[CheckedWay, ...] = ()
 
     @property
     def broken(self) -> tuple[CheckedLeg, ...]:
@@ -158,8 +164,9 @@ class MissionCheck:
 
     @property
     def holds(self) -> bool:
-        """Whether every leg keeps its clearance, everything was understood, and nothing is known to end in the fence."""
-        return not self.broken and not self.troubles and not self.dangers
+        """Whether every leg and way home keeps its clearance, everything was understood, and nothing is known to end in the fence."""
+        ways_hold = not any(way.trouble for way in self.home_ways)
+        return not self.broken and not self.troubles and not self.dangers and ways_hold
 
     @property
     def is_promised(self) -> bool:
@@ -219,9 +226,15 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
     FenceError, VehicleError, InvalidPositionError
         The fence, a parameter or a position cannot be used.
     """
-    # Long by its docstring and by the warnings, which stand in the order in which they are told.
-    fence = known_fence(situation)
     request = replace(request, widest=False, speed_mps=None, corner_allowance_m=None)
+    found = _check_drive(mission, situation, request)
+    return replace(found, home_ways=checked_ways(found, situation, request, _check_drive))
+
+
+def _check_drive(mission: Mission, situation: Situation, request: Request) -> MissionCheck:
+    """Check what a mission drives by itself, from its first item to its end."""
+    # Long by the warnings, which stand in the order in which they are told.
+    fence = known_fence(situation)
     vehicle = known_vehicle(situation, request)
     asked = promise(situation, request, vehicle)
     situation = _with_home(situation, mission)

@@ -32,7 +32,6 @@ _STRAYING = {
     42703: "holds an attitude (NAV_ATTITUDE_TIME)",
 }
 _CONDITIONS = range(112, 160)
-_JUMP_TAG, _DO_JUMP_TAG = 600, 601
 CIRCLE_M = 20.0
 """ArduPilot Rover's CIRC_RADIUS, for LOITER_TURNS without a radius of its own."""
 
@@ -197,7 +196,7 @@ class _Execution:
         jumps_in_a_row = 0
         while index is not None and index < len(self.items) and len(self.legs) < self.most_legs:
             item = self.items[index]
-            if item.command in (Command.DO_JUMP, _DO_JUMP_TAG):
+            if item.command in (Command.DO_JUMP, Command.DO_JUMP_TAG):
                 jumps_in_a_row += 1
                 if jumps_in_a_row > 2 * len(self.items):
                     self._trouble(index, "jumps in a loop without a waypoint")
@@ -333,7 +332,7 @@ class _Execution:
         item = self.items[index]
         goal = self._jump_goal(item)
         if goal is None:
-            name = "tag" if item.command == _DO_JUMP_TAG else "item"
+            name = "tag" if item.command == Command.DO_JUMP_TAG else "item"
             self._trouble(index, f"jumps to {name} {item.params[0]:g}, which does not exist")
             return index + 1
         repeats = int(item.params[1]) if math.isfinite(item.params[1]) else 0
@@ -358,9 +357,11 @@ class _Execution:
     def _jump_goal(self, item: MissionItem) -> int | None:
         """Return the index that a jump leads to; None where there is no such item."""
         wanted = item.params[0]
-        if item.command == _DO_JUMP_TAG:
+        if item.command == Command.DO_JUMP_TAG:
             tags = (
-                i for i, one in enumerate(self.items) if one.command == _JUMP_TAG and one.params[0] == wanted
+                i
+                for i, one in enumerate(self.items)
+                if one.command == Command.JUMP_TAG and one.params[0] == wanted
             )
             return next(tags, None)
         return int(wanted) - 1 if 1 <= wanted <= len(self.items) else None

@@ -3,29 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from shapely import MultiPoint
+import numpy as np
+import shapely
 
+from missions.checking.rtl_lines import Metric, ReturnRule, RoutePieces, may_choose, swept
 from missions.fence import ZoneKind
-from missions.geo import LatLon, distance_m
 from missions.items import Command, MissionItem, waypoint
 from missions.request import End
-from missions.vehicle import Autopilot, real_number, whole_number
+from missions.vehicle import Autopilot, whole_number
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
 
     from missions.checking.execution import Course
+    from missions.geo import LatLon
     from missions.ground.ground import Ground
     from missions.situation import Situation
     from missions.vehicle import Vehicle
-
-RALLY_LIMIT_M = 500.0
-"""RALLY_LIMIT_KM of ArduPilot Rover: rally points farther away than this lose to a nearer home."""
 
 _RTL_ACTIONS = {
     "FENCE_ACTION": {1, 3},
@@ -34,6 +33,9 @@ _RTL_ACTIONS = {
     "BATT_FS_CRT_ACT": {1, 3},
 }
 """Values that end in RTL, at once or where SmartRTL cannot be had."""
+
+_PIECE_M, _MOST_PIECES = 2.0, 4000
+"""A route is looked at in pieces: near the border between two rally points both count, this far to either side. Chosen; they bound the work."""
 
 _DONE_MODES = {1: "Loiter", 2: "Acro", 3: "Manual"}
 
@@ -54,37 +56,19 @@ def ending(items: Sequence[MissionItem], end: End) -> tuple[MissionItem, ...]:
     return tuple(items)
 
 
-def return_place(situation: Situation, here: LatLon, home: LatLon | None) -> LatLon | None:
-    """Return where RTL leads from a place (AP_Rally::calc_best_rally_or_home_location): the nearest rally point, else home.
-
-    Home takes part where RALLY_INCL_HOME is 1, and where the nearest rally point is farther away than RALLY_LIMIT_KM.
-    """
-    rally = [point.position for point in situation.rally.value] if situation.rally else []
-    if not rally:
-        return home
-    nearest = min(rally, key=lambda place: distance_m(here, place))
-    if home is None:
-        return nearest
-    limit_m = real_number(situation.parameters, "RALLY_LIMIT_KM", RALLY_LIMIT_M / 1000) * 1000
-    away_m = distance_m(here, nearest)
-    counts_home = situation.parameters.get("RALLY_INCL_HOME") == 1 or 0 < limit_m < away_m
-    return home if counts_home and distance_m(here, home) < away_m else nearest
-
-
-def crossed_zones(ground: Ground, shape: BaseGeometry) -> tuple[str, ...]:
-    """Name the zones on whose forbidden ground a shape lies that is not wholly on allowed ground."""
+def crossed_zones(ground: Ground, shapes: BaseGeometry | NDArray[np.object_]) -> tuple[str, ...]:
+    """Name the zones on whose forbidden ground a shape lies that is not wholly on allowed ground, or any of several."""
     names = [
         barrier.name
         for barrier in ground.barriers
         if barrier.kind is ZoneKind.EXCLUSION
-        and barrier.area.intersects(shape)
-        and not barrier.area.touches(shape)
+        and np.any(shapely.intersects(barrier.area, shapes) & ~shapely.touches(barrier.area, shapes))
     ]
-    if not ground.keep_in.covers(shape):
+    if not np.all(shapely.covers(ground.keep_in, shapes)):
         names += [
             barrier.name
             for barrier in ground.barriers
-            if barrier.kind is ZoneKind.INCLUSION and not barrier.area.covers(shape)
+            if barrier.kind is ZoneKind.INCLUSION and not np.all(shapely.covers(barrier.area, shapes))
         ]
     return tuple(names) or ("the edge of the field",)
 
@@ -94,28 +78,17 @@ def return_warnings(
 ) -> list[str]:
     """Warn where RTL, called anywhere on a path, would drive straight through a fence.
 
-    The straight lines home from all places of a leg fill a triangle: it is on allowed ground as a whole, or one of them is not.
+    The straight lines from all places of a piece of a leg to one place fill a triangle: it is on allowed ground as a whole, or one of them is not.
     """
     home = situation.home.value if situation.home else None
     if vehicle.oa_type or (home is None and not situation.rally):
         return []
-    crossed: dict[str, None] = {}
-    legs = 0
-    for a, b in pairwise(path):
-        goals = dict.fromkeys(filter(None, (return_place(situation, place, home) for place in (a, b))))
-        found = {
-            name: None
-            for goal in goals
-            if not ground.allowed.covers(swept := _triangle(ground, goal, a, b))
-            for name in crossed_zones(ground, swept)
-        }
-        legs += bool(found)
-        crossed |= found
+    legs, crossed = _crossing(situation, ground, home, path)
     if not crossed:
         return []
-    to = "to the nearest rally point" if situation.rally else "home"
+    to = "to the nearest rally point or home" if situation.rally and situation.rally.value else "home"
     text = (
-        f"RTL {_causes(situation, vehicle)}drives straight {to}; from {legs} of {len(path) - 1} legs it would cross "
+        f"RTL {_causes(situation, vehicle)}drives straight {to}; from {len(legs)} of {len(path) - 1} legs it would cross "
         f"{', '.join(crossed)}"
     )
     return [text]
@@ -131,8 +104,27 @@ def end_warnings(situation: Situation, vehicle: Vehicle, course: Course) -> list
     )
 
 
-def _triangle(ground: Ground, goal: LatLon, a: LatLon, b: LatLon) -> BaseGeometry:
-    return MultiPoint(ground.frame.to_local_array([goal, a, b])).convex_hull
+def _crossing(
+    situation: Situation, ground: Ground, home: LatLon | None, path: Sequence[LatLon]
+) -> tuple[set[int], tuple[str, ...]]:
+    """Return from which legs RTL would cross a fence, and which zones."""
+    frame = ground.frame
+    rally = [point.position for point in situation.rally.value] if situation.rally else []
+    goals = frame.to_local_array([*rally, *([home] if home else [])])
+    pieces = RoutePieces.of(frame.to_local_array(path), _PIECE_M, _MOST_PIECES)
+    spread = np.ptp(np.vstack([goals, pieces.starts, pieces.ends]), axis=0)
+    metric = Metric.of(ground, float(np.hypot(*spread)))
+    away_m = metric.distances_m(goals, (pieces.starts + pieces.ends) / 2)
+    within_m = pieces.lengths_m * metric.steepest + metric.slack_m
+    rule = ReturnRule.of(situation.parameters)
+    chosen = may_choose(away_m[: len(rally)], away_m[-1] if home else None, rule, within_m)
+    hulls, _, piece = swept(pieces, goals, chosen[: len(goals)])
+    shapely.prepare(ground.allowed)
+    outside = ~shapely.covers(ground.allowed, hulls)
+    if not outside.any():
+        return set(), ()
+    zones = crossed_zones(ground, hulls[outside])
+    return set(pieces.legs[piece[outside]].tolist()), zones
 
 
 def _causes(situation: Situation, vehicle: Vehicle) -> str:

@@ -136,6 +136,13 @@ def autopilot_scale(lat_deg: float) -> AutopilotScale:
     return AutopilotScale(east=equatorial / math.sqrt(w2), north=equatorial * (1 - _WGS84_E2) / w2**1.5)
 
 
+def autopilot_distance_m(a: LatLon, b: LatLon) -> float:
+    """Return the distance that ArduPilot measures (Location::get_distance): flat, longitude shortened by the cosine of the latitude halfway."""
+    middle = math.cos(math.radians((a.lat_deg + b.lat_deg) / 2))
+    east_deg = wrap_lon_deg(b.lon_deg - a.lon_deg) * middle
+    return math.hypot(b.lat_deg - a.lat_deg, east_deg) * _AUTOPILOT_M_PER_DEG
+
+
 def bow_m(leg_m: float, lat_deg: float) -> float:
     """Return how far at most the autopilot's straight line bows off the frame's, on a leg of a length.
 

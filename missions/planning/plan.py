@@ -15,6 +15,7 @@ from missions.planning.marking import marked
 from missions.request import RepairMission, Tour
 from missions.situation import Mission
 from missions.tour.tour import plan_tour
+from missions.tour.way_home_inside import with_way_home_inside
 from missions.vehicle.item_limit import most_items
 from missions.words import left_out_text
 
@@ -65,7 +66,10 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
     else:
         planned = plan_route(situation, request, should_stop=should_stop)
     planned = _with_room(planned, situation, request, should_stop)
-    return _told_of_obstacles(with_hold(marked(planned, request), situation), situation)
+    planned = _told_of_obstacles(with_hold(marked(planned, request), situation), situation)
+    if isinstance(request, Tour) and request.way_home_inside:
+        return with_way_home_inside(planned, situation, request, should_stop=should_stop)
+    return planned
 
 
 def _told_of_obstacles(planned: Plan, situation: Situation) -> Plan:

@@ -45,6 +45,14 @@ class TourOptions:
             "What to do at the end; rtl only if the straight line home is free.", "|".join(ENDS), panel=_TOURS
         ),
     ] = "hold"
+    way_home_inside: Annotated[
+        bool,
+        flag(
+            "--way-home-inside",
+            "Add behind the mission's end, for each leg, a way home that you can choose while the vehicle drives that leg.",
+            _TOURS,
+        ),
+    ] = False
     via_mission: Annotated[
         str | None,
         option(

@@ -16,6 +16,7 @@ from mavlink_bridge.simulator.fence_watch import FenceArea
 from mavlink_bridge.simulator.flat import FlatFrame, TrueFrame
 from missions.geo import LatLon, distance_m
 from missions.items import Command, CoordinateFrame, MissionItem, waypoint
+from missions.rally import RallyPoint, rally_to_items
 
 BLOCK = tuple(square(40, 0))
 AHEAD = (kept(waypoint(at(80, 0))),)
@@ -452,3 +453,34 @@ def test_a_rover_that_stops_has_no_leg_to_be_off():
     bench = bench_of()
     assert bench.vehicle.rover.drive.cross_track_m == 0.0
     assert bench.vehicle.rover.drive.distance_m == 0.0
+
+
+def rally_bench(*rally: LatLon, **parameters) -> Bench:
+    config = SimulatorConfig(
+        mission=(kept(waypoint(at(60, 0))), command(Command.NAV_RETURN_TO_LAUNCH)),
+        rally=rally_to_items(RallyPoint(*place) for place in rally),
+        parameters={"WP_SPEED": 2.0, **parameters},
+    )
+    return Bench(config)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "east_m"),
+    [({}, 40.0), ({"RALLY_LIMIT_KM": 0.02}, 0.0), ({"RALLY_INCL_HOME": 0.0, "RALLY_LIMIT_KM": 0.0}, 40.0)],
+)
+def test_rtl_drives_to_the_rally_point_that_ardupilot_chooses(parameters, east_m):
+    """From 60 m north of home the one 40 m east of there is the nearest; beyond the limit it is home."""
+    bench = rally_bench(at(60, 40), at(-90, 0), **parameters)
+    bench.start_auto()
+    bench.run_until(is_complete(bench), 120.0)
+    north = 60.0 if east_m else 0.0
+    assert distance_m(bench.vehicle.position, at(north, east_m)) < 2.5
+
+
+def test_rtl_as_a_mode_chooses_where_it_begins():
+    bench = rally_bench(at(20, 40), RALLY_INCL_HOME=0.0)
+    bench.start_auto()
+    bench.run_until(lambda: north_m(bench) > 15.0, 60.0)
+    bench.vehicle.rover.set_mode(Mode.RTL, bench.now_s)
+    bench.run(60.0)
+    assert distance_m(bench.vehicle.position, at(20, 40)) < 2.5

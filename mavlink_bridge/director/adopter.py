@@ -23,7 +23,7 @@ from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.orders import TargetSource
 from mavlink_bridge.director.states import Cue, Signal, State
-from mavlink_bridge.director.targets import Target, is_same_place
+from mavlink_bridge.director.targets import HomeCall, Target, is_same_place
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.rover import Mode, mode_name
 from mavlink_bridge.protocol.vehicle_watch import MISSION_COMPLETE
@@ -130,7 +130,9 @@ class Adopter(Part):
             return
         mark = VehicleMark(core.peer.system, core.vehicle_uid)
         self.is_noted = False
-        self.note = DriveNote(mark, core.ours or (), self._boot_ms, record_of(core.plan, core.situation))
+        call = core.target.call if core.target is not None else None
+        record = record_of(core.plan, core.situation)
+        self.note = DriveNote(mark, core.ours or (), self._boot_ms, record, call or "")
 
     def forget(self) -> None:
         """Take notice that no drive of ours is under way any more."""
@@ -182,7 +184,9 @@ class Adopter(Part):
         """Go on with the drive as if it had never been left; without orders to drive, watch it."""
         core, is_ours = self.core, self.core.orders.drive
         assert core.plan is not None
-        core.target = Target(core.plan.targets[-1], TargetSource.TYPED)
+        call = HomeCall(self.note.call) if self.note is not None and self.note.call in set(HomeCall) else None
+        source = TargetSource.TYPED if call is None else TargetSource.HOME
+        core.target = Target(core.plan.targets[-1], source, call=call)
         text = "adopted the drive that pbpp began before it was restarted"
         text += "" if is_ours else "; without --drive it is only watched"
         core.voice.tell(now_s, EventName.ADOPTED, text, len(core.ours or ()), self._driver.item)

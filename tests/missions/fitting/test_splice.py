@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import math
+
+from charts import FIELD, HOME, OUT, box, place, situation_of
 from hypothesis import given
 from hypothesis import strategies as st
 
+from missions.fitting.local_search import Fitting
 from missions.fitting.polyline import DrawnPoint
 from missions.fitting.splice import splices
 from missions.geo import LocalPoint
+from missions.ground.from_situation import ground_for
+from missions.vehicle import vehicle_from_parameters
 
 START, GOAL = LocalPoint(0.0, 0.0), LocalPoint(100.0, 0.0)
 
@@ -45,3 +51,26 @@ def test_begins_with_the_one_and_ends_with_the_other(first, second):
         assert made not in (one, other)
         cut = next(index for index in range(len(made)) if made[: index + 1] != one[: index + 1])
         assert made[cut:] == other[len(other) - (len(made) - cut) :]
+
+
+def test_two_lines_that_fail_at_different_places_make_one_that_keeps_enough():
+    """Each goes through one of two ponds and well round the other."""
+    ponds = (box(OUT, 20, -5, 30, 5), box(OUT, 60, -5, 70, 5))
+    situation = situation_of(FIELD, *ponds, WP_SPEED=2.0, FENCE_ENABLE=1.0, FENCE_TYPE=4.0)
+    vehicle = vehicle_from_parameters(situation.parameters)
+    fitting = Fitting(ground_for(situation, vehicle, (HOME, place(80, 80))), vehicle, 90.0)
+    first, second = (
+        tuple(point.at(LocalPoint(point.place[0] - 5, point.place[1])) for point in one)
+        for one in (
+            lines((15.0, 9.0), (40.0, 9.0), (52.0, 0.0), (75.0, 0.0)),
+            lines((15.0, 0.0), (40.0, 0.0), (52.0, 9.0), (82.0, 9.0)),
+        )
+    )
+    alone = [fitting.measure(one) for one in (first, second)]
+    made, measured = fitting.combine({first: False, second: False})
+    assert not any(one.is_enough for one in alone)
+    assert measured.is_enough
+    assert measured.cost_s < min(one.cost_s for one in alone)
+    for end in (0, -1):  # as rounded into the mission
+        assert math.dist(made[end].place, first[end].place) < 0.01
+    assert fitting.combine({made: True}) == (made, fitting.measure(made))

@@ -26,7 +26,7 @@ from missions.rally import rally_from_items
 from missions.situation import Fix, Known, ListKind, ListTransfer, Mission, Pose, Situation
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from mavlink_bridge.mavlink.messages import Frame, Message
 
@@ -195,7 +195,11 @@ def _refused(situation: Situation, kind: ListKind, transfer: ListTransfer, resul
         return situation
     known = mission_result(result)
     name = known.name if known is not None else str(result)
-    return replace(situation, fence_trouble=f"fence upload: the vehicle refused it ({name})")
+    return _with_fence_trouble(situation, f"fence upload: the vehicle refused it ({name})")
+
+
+def _with_fence_trouble(situation: Situation, trouble: str | None) -> Situation:
+    return replace(situation, reading=replace(situation.reading, fence_trouble=trouble))
 
 
 def _forgotten(situation: Situation, kind: ListKind) -> Situation:
@@ -338,13 +342,19 @@ def _core(item: MissionItem) -> tuple[int, float, int, int]:
 
 
 def _with_transfer(situation: Situation, kind: ListKind, transfer: ListTransfer) -> Situation:
-    transfers = {**situation.transfers, (kind, transfer.to_vehicle): transfer}
-    return replace(situation, transfers=MappingProxyType(transfers))
+    return _with_transfers(situation, {**situation.transfers, (kind, transfer.to_vehicle): transfer})
 
 
 def _without_transfer(situation: Situation, kind: ListKind, *, to_vehicle: bool) -> Situation:
     transfers = {key: value for key, value in situation.transfers.items() if key != (kind, to_vehicle)}
-    return replace(situation, transfers=MappingProxyType(transfers))
+    return _with_transfers(situation, transfers)
+
+
+def _with_transfers(
+    situation: Situation, transfers: Mapping[tuple[ListKind, bool], ListTransfer]
+) -> Situation:
+    reading = replace(situation.reading, transfers=MappingProxyType(transfers))
+    return replace(situation, reading=reading)
 
 
 def _take_over(situation: Situation, kind: ListKind, transfer: ListTransfer, time_s: float) -> Situation:
@@ -393,8 +403,8 @@ def _with_fence(
     try:
         fence = fence_from_items(items)
     except FenceError as error:
-        return replace(situation, fence_trouble=f"{source}: {error}")
-    return replace(situation, fence=Known(fence, time_s, source), fence_trouble=None)
+        return _with_fence_trouble(situation, f"{source}: {error}")
+    return _with_fence_trouble(replace(situation, fence=Known(fence, time_s, source)), None)
 
 
 def _autopilot(situation: Situation) -> AutopilotTable:

@@ -34,11 +34,6 @@ class Firmware:
     patch: int = 0
     stage: int = OFFICIAL
 
-    @property
-    def is_development(self) -> bool:
-        """Whether it is of the line of development, which has one number for more than a year of changes."""
-        return self.stage < _STAGES["alpha"]
-
     def __str__(self) -> str:
         number = f"{self.major}.{self.minor}.{self.patch}"
         if self.stage == OFFICIAL:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from functools import cache
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 from missions.errors import InvalidPositionError
@@ -134,6 +135,11 @@ def rounded(position: LatLon) -> LatLon:
 def distance_m(a: LatLon, b: LatLon) -> float:
     """Return the geodesic distance in metres."""
     return distance_and_bearing(a, b)[0]
+
+
+def path_length_m(path: Sequence[LatLon]) -> float:
+    """Return the length of the lines through positions."""
+    return sum(distance_m(a, b) for a, b in pairwise(path))
 
 
 def bearing_deg(a: LatLon, b: LatLon) -> float:

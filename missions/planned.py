@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 from missions.formats import write_mission
 from missions.formats.files import write_file
-from missions.geo import bearing_deg
+from missions.geo import bearing_deg, path_length_m
 from missions.situation import Known, Mission, Situation
 
 if TYPE_CHECKING:
@@ -28,6 +28,33 @@ _TURN_DEG: Final = 1.0  # a smaller change of direction is a long line in pieces
 _NOTHING_ELSE = Situation()
 
 
+@dataclass(frozen=True, slots=True)
+class Clearances:
+    """What a plan keeps to the fence, metres.
+
+    Parameters
+    ----------
+    promised_m : float or None
+        For the rover as it drives, once it has left the start: what was asked for, or more. None where only drawn lines were asked
+        for, and where the drive is extrapolated.
+    asked_m : float
+        What the drawn lines have to keep (less where the first ones lead away from a fence nearby); where the route is fitted to the
+        drive model, the predicted corridor too: the promise, the position's error and the owner's reserve.
+    drawn_m : float
+        The least distance of the drawn lines, as rounded and as the autopilot draws them, to any fence (infinite without a fence near).
+    driven_m : float
+        The least distance of the predicted corridor to any fence.
+    start_m : float or None
+        Promised on the first legs, while it leaves the place where it stands, where that place leaves less; else None.
+    """
+
+    promised_m: float | None
+    asked_m: float
+    drawn_m: float
+    driven_m: float
+    start_m: float | None = None
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Plan:
     """A mission and what it promises.
@@ -42,16 +69,8 @@ class Plan:
         For each point of the path the seq of its waypoint in the mission (home is 0, and stands for the start).
     speeds : tuple of float or None
         The speed asked for on each leg of the path in m/s; None is the vehicle's own.
-    clearance_m : float or None
-        Promised for the rover as it drives, once it has left the start: what was asked for, or more. None where only drawn lines were asked
-        for, and where the drive is extrapolated.
-    asked_m : float
-        What the drawn lines have to keep (less where the first ones lead away from a fence nearby); where the route is fitted to the
-        drive model, the predicted corridor too: the promise, the position's error and the owner's reserve.
-    drawn_clearance_m : float
-        The least distance of the drawn lines, as rounded and as the autopilot draws them, to any fence (infinite without a fence near).
-    driven_clearance_m : float
-        The least distance of the predicted corridor to any fence.
+    keeps : Clearances
+        What it keeps to the fence, promised, drawn and driven.
     blocks : int
         Blocks of the partition that was searched.
     fence, ground : Fence, Ground
@@ -70,8 +89,6 @@ class Plan:
         The targets as they were asked for, before blocked ones were moved; empty where nobody asked for targets.
     extrapolated : tuple of str
         Why the drive lies outside the measured range; empty where it does not.
-    start_clearance_m : float or None
-        Promised on the first legs, while it leaves the place where it stands, where that place leaves less; else None.
     hold : HoldCheck or None
         What HOLD does on the route.
     """
@@ -83,13 +100,8 @@ class Plan:
     start: LatLon
     targets: tuple[LatLon, ...]
     method: str
-    length_m: float
     straight_line_m: float
-    duration_s: float
-    clearance_m: float | None
-    asked_m: float
-    drawn_clearance_m: float
-    driven_clearance_m: float
+    keeps: Clearances
     blocks: int
     fence: Fence
     ground: Ground
@@ -100,8 +112,42 @@ class Plan:
     info: tuple[str, ...] = ()
     asked_targets: tuple[LatLon, ...] = ()
     extrapolated: tuple[str, ...] = ()
-    start_clearance_m: float | None = None
     hold: HoldCheck | None = None
+
+    @property
+    def length_m(self) -> float:
+        """The drawn length."""
+        return path_length_m(self.path)
+
+    @property
+    def duration_s(self) -> float:
+        """The predicted time."""
+        return self.envelope.duration_s
+
+    @property
+    def clearance_m(self) -> float | None:
+        """`Clearances.promised_m`."""
+        return self.keeps.promised_m
+
+    @property
+    def start_clearance_m(self) -> float | None:
+        """`Clearances.start_m`."""
+        return self.keeps.start_m
+
+    @property
+    def asked_m(self) -> float:
+        """`Clearances.asked_m`."""
+        return self.keeps.asked_m
+
+    @property
+    def drawn_clearance_m(self) -> float:
+        """`Clearances.drawn_m`."""
+        return self.keeps.drawn_m
+
+    @property
+    def driven_clearance_m(self) -> float:
+        """`Clearances.driven_m`."""
+        return self.keeps.driven_m
 
     @property
     def turn_count(self) -> int:

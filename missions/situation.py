@@ -110,6 +110,33 @@ class ListTransfer:
 
 
 @dataclass(frozen=True, slots=True)
+class Reading:
+    """How a situation's facts were read, and what was read that is no fact (yet).
+
+    Parameters
+    ----------
+    bytewise : bool or None
+        Whether the autopilot reports whole-number parameters as the bits of a float (PX4), not as its value.
+    no_numbers : mapping of str to str
+        Parameters that last came as no number (``nan``, ``inf``), and what came; what was known of them before still stands.
+    transfers : mapping
+        Lists on their way, by kind and direction (True: to the vehicle).
+    fence_trouble : str or None
+        Why the newest fence that was seen could not be used.
+    remarks : tuple of str
+        Warnings from reading a file: what was skipped, and what was assumed.
+    """
+
+    bytewise: bool | None = None
+    no_numbers: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    transfers: Mapping[tuple[ListKind, bool], ListTransfer] = field(
+        default_factory=lambda: MappingProxyType({})
+    )
+    fence_trouble: str | None = None
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Situation:
     """What is known, each fact with its time and source; None is not known.
 
@@ -125,28 +152,19 @@ class Situation:
         The autopilot's own mode number (HEARTBEAT.custom_mode).
     target : Known of LatLon
         The newest place somebody asked the vehicle to drive to.
-    bytewise : bool or None
-        Whether the autopilot reports whole-number parameters as the bits of a float (PX4), not as its value.
     firmware : Firmware or None
         The autopilot's version.
     parameters : mapping of str to float
         The autopilot's parameters, as far as they are known; each a number.
-    no_numbers : mapping of str to str
-        Parameters that last came as no number (``nan``, ``inf``), and what came; what was known of them before still stands.
-    transfers : mapping
-        Lists on their way, by kind and direction (True: to the vehicle).
-    fence_trouble : str or None
-        Why the newest fence that was seen could not be used.
     stops : Stops
         How far it rolls on after HOLD or disarming, as far as that was said or seen.
-    remarks : tuple of str
-        Warnings from reading a file: what was skipped, and what was assumed.
+    reading : Reading
+        How all that was read.
     """
 
     system: int | None = None
     component: int | None = None
     ardupilot: bool | None = None
-    bytewise: bool | None = None
     firmware: Firmware | None = None
     vehicle_type: int | None = None
     mode: int | None = None
@@ -159,10 +177,30 @@ class Situation:
     fix: Known[Fix] | None = None
     target: Known[LatLon] | None = None
     parameters: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
-    no_numbers: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
-    transfers: Mapping[tuple[ListKind, bool], ListTransfer] = field(
-        default_factory=lambda: MappingProxyType({})
-    )
-    fence_trouble: str | None = None
     stops: Stops = field(default_factory=Stops)
-    remarks: tuple[str, ...] = ()
+    reading: Reading = field(default_factory=Reading)
+
+    @property
+    def bytewise(self) -> bool | None:
+        """`Reading.bytewise`."""
+        return self.reading.bytewise
+
+    @property
+    def no_numbers(self) -> Mapping[str, str]:
+        """`Reading.no_numbers`."""
+        return self.reading.no_numbers
+
+    @property
+    def transfers(self) -> Mapping[tuple[ListKind, bool], ListTransfer]:
+        """`Reading.transfers`."""
+        return self.reading.transfers
+
+    @property
+    def fence_trouble(self) -> str | None:
+        """`Reading.fence_trouble`."""
+        return self.reading.fence_trouble
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """`Reading.remarks`."""
+        return self.reading.remarks

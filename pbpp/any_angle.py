@@ -35,8 +35,6 @@ if TYPE_CHECKING:
     from .partition.slabs import Slabs
     from .partition.sweep import PortalView
 
-__all__ = ["Everywhere", "SearchResult", "Sight", "shortest_path"]
-
 _GOAL = -1
 _TURN = -2
 _SLACK_M = (

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
     from .partition.base import Partition
 
-__all__ = ["BlockGraph", "Crossing", "block_sequence"]
-
 Crossing = tuple[Point, Point]
 """The common points of two neighbouring blocks, the paper's adj: a portal's two ends, or one corner twice."""
 

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
     from .geometry import Floats
 
-__all__ = ["MITRE_LIMIT", "ROUND_EXCESS_M", "grow", "shrink"]
-
 Geometries = npt.NDArray[np.object_]
 
 MITRE_LIMIT = 2.0

@@ -13,16 +13,6 @@
 
 from __future__ import annotations
 
-__all__ = [
-    "GoalBlockedError",
-    "InvalidGeometryError",
-    "NoPathError",
-    "PlanningError",
-    "SearchStoppedError",
-    "StartBlockedError",
-    "TooManyBlocksError",
-]
-
 
 class PlanningError(Exception):
     """Root of all errors of the planner."""

@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from .holes import Change
     from .partition.flat import Engine
 
-__all__ = ["BOUNDARY_TOLERANCE_M", "Field"]
-
 # Rounding of the two sums of areas: a share, and a strip along all edges; and of a block's height. Chosen, not measured.
 _AREA_SLACK = 1e-9
 _AREA_SLACK_M = 1e-8

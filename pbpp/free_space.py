@@ -21,17 +21,6 @@ from .errors import InvalidGeometryError
 from .geometry import Floats, Point, Ring, parse_rings, polygons_only
 from .subtract import subtracted
 
-__all__ = [
-    "FreeSpace",
-    "Scene",
-    "build_free_space",
-    "ground_box",
-    "loose_lines",
-    "parse_scene",
-    "snapped",
-    "tidied_rings",
-]
-
 GeometryT = TypeVar("GeometryT", bound=BaseGeometry)
 
 _OPEN_MARGIN_M = 100.0  # where no inclusion bounds the plane, so much room lies around all that is drawn; chosen, not measured: any would do

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from .block_search import Crossing
     from .geometry import Point
 
-__all__ = ["taut_path"]
-
 
 def taut_path(
     start: Point, goal: Point, crossings: Sequence[Crossing], centers: Sequence[Point]

@@ -22,17 +22,6 @@ if TYPE_CHECKING:
 
     from shapely.geometry.base import BaseGeometry
 
-__all__ = [
-    "Floats",
-    "Point",
-    "Ring",
-    "circle_ring",
-    "parse_point",
-    "parse_points",
-    "parse_rings",
-    "polygons_only",
-]
-
 Floats = npt.NDArray[np.float64]
 Point = tuple[float, float]
 Ring = npt.ArrayLike | Polygon | MultiPolygon

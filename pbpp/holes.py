@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from .geometry import Floats
     from .partition.vertices import Flags, Ints
 
-__all__ = ["Change", "Holes"]
-
 
 @dataclass(frozen=True)
 class Change:

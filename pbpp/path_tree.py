@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from .field import Field
     from .geometry import Point
 
-__all__ = ["PathTree"]
-
 
 class PathTree:
     """The shortest ways from anywhere in free space to a few places; made by `Planner.tree`.

@@ -11,8 +11,6 @@ if TYPE_CHECKING:
     from .geometry import Floats
     from .plotting import Drawing
 
-__all__ = ["STRAIGHT_M", "PlannedPath", "length_of", "straightened"]
-
 STRAIGHT_M = 1e-9
 """Rounding: a point that lies no farther beside the straight line is on it."""
 

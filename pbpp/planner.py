@@ -42,9 +42,7 @@ if TYPE_CHECKING:
 
     from .clearance import Geometries
     from .holes import Change
-    from .partition.flat import Answer, Engine
-
-__all__ = ["Planner", "plan_path"]
+    from .partition.flat import DirectPath, Engine
 
 ShouldStop = Callable[[], bool]
 
@@ -335,7 +333,7 @@ class Planner:
         self._space = self._space.holding(points.reshape(-1, 2))
         field = self._space.mitred
         searcher = field.searched.searcher
-        answers: Iterable[Answer | None] = [None] * len(points)
+        answers: Iterable[DirectPath | None] = [None] * len(points)
         if searcher is not None:
             search = partial(searcher.answers, origin_m=field.scene.origin_m)
             answers = chain.from_iterable(spread(search, points))
@@ -499,7 +497,7 @@ class _Found:
     sequence: Sequence[int] = ()
 
 
-def _direct_path(field: Field, answer: Answer, partition: str | None) -> PlannedPath:
+def _direct_path(field: Field, answer: DirectPath, partition: str | None) -> PlannedPath:
     return PlannedPath(
         points=answer.points,
         length_m=answer.length_m,

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from .field import Field
     from .geometry import Floats
 
-__all__ = ["Drawing"]
-
 _FREE, _EDGE, _BLOCK, _SEQUENCE, _PATH = "#eef3f7", "#3b4a57", "#b7c4cf", "#f6d58a", "#c0392b"
 _MOST_BLOCKS = 5_000  # more cannot be told apart in a picture
 

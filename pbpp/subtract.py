@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from .clearance import Geometries
     from .partition.vertices import Flags, Ints
 
-__all__ = ["subtracted", "united"]
-
 
 def subtracted(ground: BaseGeometry, obstacles: Sequence[BaseGeometry]) -> BaseGeometry:
     """Return ground without obstacles.

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from .block_search import Crossing
     from .geometry import Point
 
-__all__ = ["crossing_point", "passable"]
-
 
 def crossing_point(crossing: Crossing, goal: Point, range_m: float = 0.0) -> Point:
     """Return where the path crosses from one block to the next.

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
     from shapely.geometry.base import BaseGeometry
 
-__all__ = ["WidestWay", "widest"]
-
 _SAME_PLACE_M = 1e-6  # rounding: places this near are one
 _REACH = 4.0  # clearances within which fences may form the gap; chosen, not measured
 # Places along the piece that are looked at, again about the best of them: three rounds end at an 8192nd of it. Chosen, not measured.

@@ -64,7 +64,7 @@ def bridge(options: BridgeOptions) -> None:
     """Run the director on a link until its single job is done, or for ever."""
     check_permissions(upload=options.upload, drive=options.drive, arm=options.arm)
     orders = _orders(options)
-    described = described_vehicle(options.vehicle, options.firmware, options.stopping)
+    described = described_vehicle(options)
     with contextlib.ExitStack() as stack:
         notes, troubles = DriveNotes(BackupStore().folder).read()
         warn(map(str, troubles))

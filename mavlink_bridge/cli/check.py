@@ -90,9 +90,7 @@ def _situation(options: CheckOptions) -> tuple[Situation, list[str]]:
 
         situation, unknown = live_situation(options)
     situation = _with_files(situation, options)
-    situation = with_description(
-        situation, described_vehicle(options.vehicle, options.firmware, options.stopping)
-    )
+    situation = with_description(situation, described_vehicle(options))
     return with_home_option(situation, options.home), unknown
 
 
@@ -122,10 +120,8 @@ def _with_files(source: Situation | None, options: CheckOptions) -> Situation:
         found = replace(
             found,
             fence=told.fence,
-            fence_trouble=None,
-            transfers={},
             home=found.home or told.home,
-            remarks=told.remarks,
+            reading=replace(found.reading, fence_trouble=None, transfers={}, remarks=told.remarks),
         )
     if options.mission is not None:
         told = read_file(options.mission, options, by_name=options.fence is None)
@@ -135,7 +131,7 @@ def _with_files(source: Situation | None, options: CheckOptions) -> Situation:
             mission=told.mission,
             fence=told.fence if options.fence is None and told.fence else found.fence,
             rally=found.rally or told.rally,
-            remarks=(*found.remarks, *told.remarks),
+            reading=replace(found.reading, remarks=(*found.remarks, *told.remarks)),
         )
         if source is None:
             found = with_mission_home(found, drawn, str(options.mission))

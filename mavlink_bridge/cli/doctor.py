@@ -19,9 +19,9 @@ import typer
 from mavlink_bridge.backup.store import BackupStore
 from mavlink_bridge.cli.config import settings_of
 from mavlink_bridge.cli.failing import ExitCode, Level, telling
+from mavlink_bridge.cli.field_files import read_vehicle_file
 from mavlink_bridge.cli.options_file import is_there, user_file
 from mavlink_bridge.cli.terminal import echo, echo_labelled, print_json
-from mavlink_bridge.cli.vehicle_options import described_vehicle
 from mavlink_bridge.errors import UsageError
 from mavlink_bridge.mavlink.signing import SigningKey
 from missions.drive_model import beyond_measured
@@ -249,12 +249,13 @@ def _vehicle(file: Path | None, firmware: Firmware | None) -> Iterator[_Finding]
         return
 
     try:
-        described = described_vehicle(file, firmware)
-        vehicle = vehicle_from_parameters(described.parameters, firmware=described.firmware)
+        described = read_vehicle_file(file)
+        firmware = firmware or described.firmware
+        vehicle = vehicle_from_parameters(described.parameters, firmware=firmware)
     except MissionError as error:
         yield _Finding(_Verdict.ERROR, "vehicle", str(error))
         return
-    version = described.firmware or "of an unknown version (--firmware)"
+    version = firmware or "of an unknown version (--firmware)"
     verdict = _Verdict.WARNING if vehicle.has_measured_corners is None else _Verdict.OK
     yield _Finding(verdict, "vehicle", f"{vehicle.autopilot} {version}, {vehicle.steering} steering")
     for remark in assumed_remarks(vehicle):

@@ -94,8 +94,6 @@ class InterruptReport:
         What is on it; empty if ``said`` says it, or nothing was written.
     drives : bool
         Whether it drove because of us.
-    was_asked : bool
-        Whether a person was asked.
     is_held : bool, optional
         Whether a HOLD of ours was confirmed; None if none was sent.
     is_link_lost : bool
@@ -108,7 +106,6 @@ class InterruptReport:
     doing: Doing
     on_it: str
     drives: bool = False
-    was_asked: bool = False
     is_held: bool | None = None
     is_link_lost: bool = False
     changed: bool = False
@@ -235,7 +232,6 @@ def _settled(at_hand: AtHand, interrupt: KeyboardInterrupt) -> Interrupted:
         doing=at_hand.watch().doing(at_s),
         on_it=at_hand.on_it(),
         drives=drives,
-        was_asked=was_asked,
         is_held=is_held,
         is_link_lost=is_link_lost,
         changed=at_hand.changed(),

@@ -8,17 +8,16 @@ somebody else's.
 from __future__ import annotations
 
 import hashlib
-import os
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING
 
 from mavlink_bridge.cli.common import warn
 from mavlink_bridge.cli.failing import telling
 from mavlink_bridge.user_folders import state_folder
 from missions.errors import MissionError
 from missions.formats import FORMATS, Part, parts_of
-from missions.formats.files import create_exclusively, keep_aside, mode_of, unwritable, write_file
+from missions.formats.files import keep_aside, mode_of, unwritable, write_file
 
 if TYPE_CHECKING:
     from missions.situation import Situation
@@ -46,21 +45,6 @@ def write_kept(path: Path, data: bytes) -> None:
         return
     write_file(path, data, lambda: _make_way(path, data))
     _remember(checksum)
-
-
-def open_kept(path: Path) -> TextIO:
-    """Open a new text file that is written bit by bit; whatever was there is first kept, with a note.
-
-    Raises
-    ------
-    MissionFormatError
-        The file cannot be created, or the one that is there cannot be kept.
-    """
-    make_room(path)
-    try:
-        return os.fdopen(create_exclusively(path), "w", encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise unwritable(path, error) from None
 
 
 def make_room(path: Path) -> None:

@@ -100,7 +100,7 @@ def _scene(book: Logbook) -> PictureScene:
 def _is_union(vehicle: VehicleLog) -> bool:
     """Return whether one inclusion is enough; the notes name an impossible FENCE_OPTIONS."""
     try:
-        return bool(bits(vehicle.parameters, "FENCE_OPTIONS", 0) & _UNION_BIT)
+        return bool(bits(vehicle.parameters.values, "FENCE_OPTIONS", 0) & _UNION_BIT)
     except VehicleError:
         return False
 
@@ -206,14 +206,14 @@ def _vehicle_tables(vehicle: VehicleLog) -> Iterable[Table]:
                 table, f"{span.begun_s:.1f}", f"{span.ended_s:.1f}", span.name, armed, f"{span.driven_m:.1f}"
             )
         yield table
-    if vehicle.parameters:
+    if vehicle.parameters.values:
         table = _table(
-            f"Parameters that affect the drive (of {vehicle.parameters_seen})", "name", "value", "was"
+            f"Parameters that affect the drive (of {vehicle.parameters.seen})", "name", "value", "was"
         )
         before: dict[str, list[str]] = {}
-        for change in vehicle.parameter_changes:
+        for change in vehicle.parameters.changes:
             before.setdefault(change.name, []).append(f"{change.before:g} until {change.time_s:.1f} s")
-        for name, value in vehicle.parameters.items():
+        for name, value in vehicle.parameters.values.items():
             _add(table, name, f"{value:g}", ", ".join(before.get(name, [])[-3:]))
         yield table
 

@@ -126,6 +126,6 @@ def _offline_situation(options: PlanOptions, request: Request) -> Situation:
         if isinstance(request, RepairMission) and request.mission is not None:
             situation = with_mission_home(situation, request.mission, str(options.via_mission))
     return with_home_option(
-        with_description(situation, described_vehicle(options.vehicle, options.firmware, options.stopping)),
+        with_description(situation, described_vehicle(options)),
         options.home,
     )

@@ -33,7 +33,7 @@ def plan_on_link(options: PlanOptions, request: Request, told: Told) -> LiveResu
     return plan_live(
         options.connect,
         orders,
-        described=described_vehicle(options.vehicle, options.firmware, options.stopping),
+        described=described_vehicle(options),
         key_file=options.signing_key,
         quiet=options.is_silent,
         on_plan=told.tell,

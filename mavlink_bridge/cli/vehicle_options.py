@@ -13,13 +13,8 @@ from missions.stops import Stops
 from missions.vehicle import Footprint
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from mavlink_bridge.cli.options.shared import ClearanceOptions
-    from missions.firmware import Firmware
+    from mavlink_bridge.cli.options.shared import ClearanceOptions, DescriptionOptions
     from missions.request import Request
-    from missions.stops import Stop
 
 
 def with_vehicle(request: Request, options: ClearanceOptions) -> Request:
@@ -60,12 +55,11 @@ def with_home_option(situation: Situation, home: str | None) -> Situation:
     return replace(situation, home=Known(position_from("--home", home), None, "--home"))
 
 
-def described_vehicle(
-    file: Path | None, firmware: Firmware | None, stopping: Sequence[Stop] = ()
-) -> Situation:
+def described_vehicle(options: DescriptionOptions) -> Situation:
     """Return what the user says of the vehicle: a parameter file, the firmware's version (else the one that the file names), how far it rolls on."""
-    described = read_vehicle_file(file) if file else Situation()
-    return replace(described, firmware=firmware or described.firmware, stops=Stops(given=tuple(stopping)))
+    described = read_vehicle_file(options.vehicle) if options.vehicle else Situation()
+    firmware = options.firmware or described.firmware
+    return replace(described, firmware=firmware, stops=Stops(given=tuple(options.stopping)))
 
 
 def with_description(situation: Situation, described: Situation) -> Situation:

@@ -44,18 +44,6 @@ def as_document(book: Logbook) -> dict[str, Any]:
 
 def _vehicle(vehicle: VehicleLog) -> dict[str, Any]:
     situation = vehicle.situation
-    plain = (
-        "transfers",
-        "targets",
-        "modes",
-        "parameters",
-        "parameter_changes",
-        "nearest",
-        "intrusions",
-        "reported_breaches",
-        "grades",
-    )
-    document = {field.name: getattr(vehicle, field.name) for field in fields(vehicle) if field.name in plain}
     home, mission = situation.home, situation.mission
     return {
         "system": vehicle.system,
@@ -75,8 +63,11 @@ def _vehicle(vehicle: VehicleLog) -> dict[str, Any]:
         "positions": vehicle.positions,
         "positions_without_fix": vehicle.positions_without_fix,
         "targets_seen": vehicle.targets_seen,
-        "parameters_seen": vehicle.parameters_seen,
-        **{name: _plain(value) for name, value in document.items() if name != "grades"},
+        "parameters_seen": vehicle.parameters.seen,
+        **{name: _plain(getattr(vehicle, name)) for name in ("transfers", "targets", "modes")},
+        "parameters": _plain(vehicle.parameters.values),
+        "parameter_changes": _plain(vehicle.parameters.changes),
+        **{name: _plain(getattr(vehicle, name)) for name in ("nearest", "intrusions", "reported_breaches")},
         "drives": [_grade(grade) for grade in vehicle.grades],
         "notes": list(vehicle.notes),
     }

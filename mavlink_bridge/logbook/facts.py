@@ -104,6 +104,24 @@ class ParameterChange:
 
 
 @dataclass(frozen=True, slots=True)
+class ParameterLog:
+    """What a log reports of a vehicle's parameters.
+
+    Parameters
+    ----------
+    values : mapping of str to float
+        Those that matter to planning and driving, at the end.
+    seen : int
+        How many the log reports in all.
+    changes : tuple of ParameterChange
+    """
+
+    values: Mapping[str, float]
+    seen: int
+    changes: tuple[ParameterChange, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Nearest:
     """Where the vehicle came nearest to the fence while it was armed.
 
@@ -178,10 +196,7 @@ class VehicleLog:
         What is known at the log's end.
     fences : tuple of (float, Fence)
         Every fence that held for some time, and from when.
-    parameters : mapping of str to float
-        Those that matter to planning and driving, at the end.
-    parameters_seen : int
-        How many parameters the log reports in all.
+    parameters : ParameterLog
     driven_m : float
         The track's length, without the wandering of a standing vehicle's position.
     positions, positions_without_fix : int
@@ -201,9 +216,7 @@ class VehicleLog:
     targets: tuple[TargetSeen, ...]
     targets_seen: int
     modes: tuple[ModeSpan, ...]
-    parameters: Mapping[str, float]
-    parameters_seen: int
-    parameter_changes: tuple[ParameterChange, ...]
+    parameters: ParameterLog
     driven_m: float
     positions: int
     positions_without_fix: int

@@ -32,7 +32,7 @@ def begun(entries: Iterable[LogEntry], vehicle: HeardVehicle) -> Situation:
         if isinstance(entry.frame.message, ABOUT_THE_AUTOPILOT):
             told = fold(situation, entry.frame, entry.time_s)
             situation = replace(
-                situation, ardupilot=told.ardupilot, bytewise=told.bytewise, firmware=told.firmware
+                situation, ardupilot=told.ardupilot, reading=told.reading, firmware=told.firmware
             )
     return situation
 

@@ -7,35 +7,28 @@ from collections import deque
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final, TypeVar
 
-import numpy as np
-
 from mavlink_bridge.fold import FOLDED, fold
 from mavlink_bridge.logbook.drives import Drives
 from mavlink_bridge.logbook.facts import (
-    Intrusion,
     ModeSpan,
-    Nearest,
     ParameterChange,
-    ReportedBreach,
+    ParameterLog,
     TargetSeen,
     TrackPart,
     VehicleLog,
 )
-from mavlink_bridge.logbook.track import FenceMeter, Odometer, TrackFix, pieces
+from mavlink_bridge.logbook.fence_record import FenceRecord
+from mavlink_bridge.logbook.track import Odometer, TrackFix, pieces
 from mavlink_bridge.logbook.transfers import TRANSFER_TYPES, TransferWatch
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.modes import mode_name
-from missions.errors import MissionError
 from missions.geo import distance_m
 from missions.ground.frame import MAX_LATITUDE_DEG, frame_around
-from missions.ground.from_situation import ground_for
-from missions.vehicle import PARAMETER_NAMES, PX4_PREFIXES, Vehicle, vehicle_from_parameters
+from missions.vehicle import PARAMETER_NAMES, PX4_PREFIXES
 from missions.vehicle.parameter_remarks import no_number_remarks
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-
-    from numpy.typing import NDArray
 
     from mavlink_bridge.mavlink.messages import Frame
     from missions.fence import Fence
@@ -49,7 +42,7 @@ RECORDED = FOLDED | TRANSFER_TYPES | {m.MissionCurrent, m.MissionItemReached, m.
 """The message types that a recorder looks at."""
 
 _BATCH: Final = 4096  # positions measured against the fence at once; chosen, it changes no answer
-_MOST_TARGETS, _MOST_INTRUSIONS = 1000, 1000  # the last ones are kept; chosen, bounds memory
+_MOST_TARGETS = 1000  # the last ones are kept; chosen, bounds memory
 _SAME_M, _SAID_AGAIN_S = 0.2, 3.0  # within both a target is the same one repeated; chosen, not measured
 
 
@@ -75,22 +68,15 @@ class VehicleRecorder:
         self._changes: list[ParameterChange] = []
         self._seen_parameters: set[str] = set()
         self._fences: list[tuple[float, Fence]] = []
-        self._breaches: list[ReportedBreach] = []
-        self._breach_count: int | None = None
         self._batch: list[TrackFix] = []
         self._before: TrackFix | None = None
         self._positions = self._without_fix = 0
         self._item = 0
         self._frame: LocalFrame | None = None
         self._odometer = Odometer()
-        self._nearest: Nearest | None = None
-        self._intrusions: deque[Intrusion] = deque(maxlen=_MOST_INTRUSIONS)
-        self._is_inside = False
         self._notes: dict[str, None] = {}
         self._drives = Drives()
-        self._meter: FenceMeter | None = None
-        self._vehicle = Vehicle()
-        self._has_meter = False
+        self._fence = FenceRecord(self._note)
         if situation.fence is not None:
             self._fences.append((0.0, situation.fence.value))
 
@@ -115,7 +101,7 @@ class VehicleRecorder:
         situation = self.situation
         for text in no_number_remarks(situation.no_numbers, situation.parameters):
             self._note(text)
-        if self._nearest is None and not self._fences:
+        if self._fence.nearest is None and not self._fences:
             self._note("no clearance: the log contains no fence")
         return VehicleLog(
             system=situation.system or 0,
@@ -127,17 +113,17 @@ class VehicleRecorder:
             targets=tuple(self._targets),
             targets_seen=self._targets_seen,
             modes=tuple(self._modes),
-            parameters={
-                name: situation.parameters[name] for name in sorted(situation.parameters) if _matters(name)
-            },
-            parameters_seen=len(self._seen_parameters),
-            parameter_changes=tuple(self._changes),
+            parameters=ParameterLog(
+                {name: situation.parameters[name] for name in sorted(situation.parameters) if _matters(name)},
+                len(self._seen_parameters),
+                tuple(self._changes),
+            ),
             driven_m=sum(span.driven_m for span in self._modes if span.armed),
             positions=self._positions,
             positions_without_fix=self._without_fix,
-            nearest=self._nearest,
-            intrusions=tuple(self._intrusions),
-            reported_breaches=tuple(self._breaches),
+            nearest=self._fence.nearest,
+            intrusions=tuple(self._fence.intrusions),
+            reported_breaches=tuple(self._fence.breaches),
             track=tuple(
                 TrackPart(mode, begun_s, tuple(part))
                 for mode, begun_s, part in self._odometer.parts
@@ -160,7 +146,7 @@ class VehicleRecorder:
         if mode_changed or mission_changed:
             self._odometer.begin_part()
         if is_other_ground:
-            self._has_meter = False
+            self._fence.is_laid_out = False
         if mission_changed:
             self._drives.end()
         self.situation = after
@@ -220,7 +206,7 @@ class VehicleRecorder:
             self._flush()
             self._drives.reached(message.seq)
         elif isinstance(message, m.FenceStatus):
-            self._take_fence_status(message, now_s)
+            self._fence.take_status(message, now_s)
 
     def _take_item(self, item: int) -> None:
         if 0 < item < self._item:  # begun anew, or jumped back: another drive
@@ -228,11 +214,6 @@ class VehicleRecorder:
             self._drives.end()
             self._odometer.begin_part()
         self._item = item
-
-    def _take_fence_status(self, message: m.FenceStatus, now_s: float) -> None:
-        known, self._breach_count = self._breach_count, message.breach_count
-        if message.breach_count > (known or 0) and (known is not None or message.breach_status):
-            self._breaches.append(ReportedBreach(now_s, message.breach_count, message.breach_type))
 
     def _take_position(self, message: m.GlobalPositionInt, now_s: float) -> None:
         self._positions += 1
@@ -265,8 +246,9 @@ class VehicleRecorder:
         fixes, self._batch = self._batch, []
         if not fixes or self._frame is None:
             return
-        self._lay_out()
-        frame = self._meter.ground.frame if self._meter else self._frame
+        fence = self._fence
+        fence.lay_out(self.situation)
+        frame = fence.meter.ground.frame if fence.meter else self._frame
         joined = fixes if self._before is None else [self._before, *fixes]
         self._before = fixes[-1]
         driven_m = self._odometer.drive(
@@ -277,82 +259,8 @@ class VehicleRecorder:
         points = frame.to_local_array([fix.position for fix in joined])
         track = pieces(joined, points)[len(joined) - len(fixes) :]
         points = points[len(joined) - len(fixes) :]
-        clearances_m: NDArray[np.float64] | None = None
-        if self._meter is not None:
-            clearances_m, depths_m = self._meter.measure(track, points)
-            if self.situation.armed:
-                self._note_nearest(fixes, track, points, clearances_m)
-                self._note_intrusions(fixes, track, points, np.where(clearances_m > 0, -1.0, depths_m))
-        if not self.situation.armed:
-            self._is_inside = False
-        self._drives.drive(self.situation, fixes, clearances_m, self._vehicle, frame, self._meter)
-
-    def _lay_out(self) -> None:
-        """Lay the fence out that holds now, unless that is done."""
-        if self._has_meter:
-            return
-        self._has_meter = True
-        self._meter = None
-        situation = self.situation
-        try:
-            self._vehicle = vehicle_from_parameters(
-                situation.parameters,
-                mav_type=situation.vehicle_type,
-                firmware=situation.firmware,
-                ardupilot=situation.ardupilot,
-            )
-            if situation.fence is not None and situation.fence.value.zones:
-                self._meter = FenceMeter(ground_for(situation, self._with_known_circle(self._vehicle), ()))
-        except MissionError as error:
-            self._note(f"no clearance: {error}")
-
-    def _with_known_circle(self, vehicle: Vehicle) -> Vehicle:
-        """Leave the home circle out where home is not known."""
-        if not vehicle.fence.enforces_home_circle or self.situation.home is not None:
-            return vehicle
-        self._note(
-            f"the home circle (FENCE_RADIUS {vehicle.fence.radius_m:g} m) is left out: home is not known"
-        )
-        return replace(vehicle, fence=replace(vehicle.fence, radius_m=0.0))
-
-    def _note_nearest(
-        self,
-        fixes: list[TrackFix],
-        track: NDArray[np.object_],
-        points: NDArray[np.float64],
-        clearances_m: NDArray[np.float64],
-    ) -> None:
-        assert self._meter is not None
-        least = int(clearances_m.argmin())
-        clearance_m = float(clearances_m[least])
-        if clearance_m == math.inf or (self._nearest and self._nearest.clearance_m <= clearance_m):
-            return
-        zone = self._meter.zone_near(track[least], points[least])
-        self._nearest = Nearest(clearance_m, fixes[least].time_s, fixes[least].position, zone)
-
-    def _note_intrusions(
-        self,
-        fixes: list[TrackFix],
-        track: NDArray[np.object_],
-        points: NDArray[np.float64],
-        depths_m: NDArray[np.float64],
-    ) -> None:
-        """Note stretches on forbidden ground; a depth of 0 is a line that crossed it from fix to fix, a negative one is outside."""
-        assert self._meter is not None
-        for fix, piece, point, depth_m in zip(fixes, track, points, depths_m.tolist(), strict=True):
-            if depth_m < 0:
-                self._is_inside = False
-                continue
-            if not self._is_inside:
-                zone = self._meter.zone_near(piece, point)
-                self._intrusions.append(
-                    Intrusion(fix.time_s, fix.time_s, depth_m, fix.position, zone, fix.position)
-                )
-                self._is_inside = True
-                continue
-            known = self._intrusions[-1]
-            deeper = {"deepest_m": depth_m, "position": fix.position} if depth_m > known.deepest_m else {}
-            self._intrusions[-1] = replace(known, ended_s=fix.time_s, **deeper)
+        clearances_m = fence.measure(fixes, track, points, is_armed=bool(self.situation.armed))
+        self._drives.drive(self.situation, fixes, clearances_m, fence.vehicle, frame, fence.meter)
 
     def _note(self, text: str) -> None:
         self._notes.setdefault(text)

@@ -28,14 +28,16 @@ def with_parameter(situation: Situation, name: str, value: float) -> Situation:
     if not math.isfinite(value):
         if situation.no_numbers.get(name) == str(value):
             return situation
-        return replace(situation, no_numbers=MappingProxyType({**situation.no_numbers, name: str(value)}))
-    parameters, no_numbers = situation.parameters, situation.no_numbers
-    if name in no_numbers:
-        no_numbers = MappingProxyType({key: came for key, came in no_numbers.items() if key != name})
+        no_numbers = MappingProxyType({**situation.no_numbers, name: str(value)})
+        return replace(situation, reading=replace(situation.reading, no_numbers=no_numbers))
+    parameters, reading = situation.parameters, situation.reading
+    if name in reading.no_numbers:
+        others = {key: came for key, came in reading.no_numbers.items() if key != name}
+        reading = replace(reading, no_numbers=MappingProxyType(others))
     elif parameters.get(name) == value:
         return situation
     known = parameters if isinstance(parameters, Parameters) else Parameters(parameters)
-    return replace(situation, parameters=known.with_one(name, value), no_numbers=no_numbers)
+    return replace(situation, parameters=known.with_one(name, value), reading=reading)
 
 
 class Parameters(Mapping[str, float]):
@@ -90,7 +92,7 @@ def with_autopilot(situation: Situation, autopilot: int) -> Situation:
         bytewise = autopilot == Autopilot.PX4
     if (ardupilot, bytewise) == (situation.ardupilot, situation.bytewise):
         return situation
-    return replace(situation, ardupilot=ardupilot, bytewise=bytewise)
+    return replace(situation, ardupilot=ardupilot, reading=replace(situation.reading, bytewise=bytewise))
 
 
 def with_version(situation: Situation, message: AutopilotVersion) -> Situation:
@@ -99,7 +101,8 @@ def with_version(situation: Situation, message: AutopilotVersion) -> Situation:
     if bytewise is None:
         bytewise = bool(message.capabilities & Capability.PARAM_ENCODE_BYTEWISE)
     firmware = firmware_from_number(message.flight_sw_version)
-    return replace(situation, bytewise=bytewise, firmware=firmware or situation.firmware)
+    reading = replace(situation.reading, bytewise=bytewise)
+    return replace(situation, reading=reading, firmware=firmware or situation.firmware)
 
 
 def with_banner(situation: Situation, text: str) -> Situation:

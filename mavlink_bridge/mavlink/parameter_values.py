@@ -22,6 +22,14 @@ _WHOLE_NUMBERS = {1: "<Bxxx", 2: "<bxxx", 3: "<Hxx", 4: "<hxx", 5: "<I", 6: "<i"
 """MAV_PARAM_TYPE: UINT8, INT8, UINT16, INT16, UINT32, INT32, as PARAM_VALUE's union lays them out."""
 
 
+def float32(value: float) -> float:
+    """Return the value as it goes over the wire."""
+    try:
+        return float(struct.unpack("<f", struct.pack("<f", value))[0])
+    except OverflowError:
+        return math.copysign(math.inf, value)
+
+
 def parameter_value(message: ParamValue, *, bytewise: bool) -> float:
     """Return the value of a PARAM_VALUE; it may be no number.
 
@@ -58,11 +66,3 @@ def encoded_parameter(value: float, param_type: int, *, bytewise: bool) -> tuple
             f"{value:g} is not a whole number of this parameter's type; nothing was sent", value=value
         )
     return float(struct.unpack("<f", packed)[0]), param_type
-
-
-def float32(value: float) -> float:
-    """Return the value as it goes over the wire."""
-    try:
-        return float(struct.unpack("<f", struct.pack("<f", value))[0])
-    except OverflowError:
-        return math.copysign(math.inf, value)

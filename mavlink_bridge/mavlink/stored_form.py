@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mavlink_bridge.mavlink.messages import MissionType
+from mavlink_bridge.mavlink.parameter_values import float32
 from missions.items import Command, CoordinateFrame, MissionItem
 
 _FRAMES = {
@@ -30,12 +31,7 @@ _MOST_EXACT_RADIUS_M = 255.0
 
 
 def _float32(value: float) -> Kept:
-    if math.isnan(value):
-        return "nan"
-    try:
-        return float(struct.unpack("<f", struct.pack("<f", value))[0])
-    except OverflowError:
-        return math.copysign(math.inf, value)
+    return "nan" if math.isnan(value) else float32(value)
 
 
 def _whole(value: float) -> Kept:

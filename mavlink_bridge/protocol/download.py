@@ -119,6 +119,8 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         Whether a vehicle that answers no MISSION_REQUEST_INT is asked by the old MISSION_REQUEST, which gives coarse positions.
     """
 
+    # Many attributes: what the mission protocol has a reader remember: window, items, requests under way, when each is repeated and given up.
+
     def __init__(
         self,
         peer: Peer,

@@ -99,6 +99,8 @@ class Upload(TableMachine[UploadState, UploadEvent]):
         The longest it may take, `pace.MOST_S` if not given.
     """
 
+    # Many attributes: what the mission protocol has a writer remember: window, requests heard, when each is repeated and given up.
+
     def __init__(
         self,
         peer: Peer,

@@ -93,6 +93,8 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         How long another ground station may keep the list busy.
     """
 
+    # Many attributes: what a safe upload has to remember of the old list, the pushes, the reads and others who write.
+
     def __init__(
         self,
         peer: Peer,

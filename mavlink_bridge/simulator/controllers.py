@@ -21,6 +21,8 @@ class Settings:
     ``deceleration`` falls back to the acceleration, the waypoint acceleration and jerk to one another, as ArduPilot does.
     """
 
+    # Many attributes: one for each of the autopilot's parameters that bends the track.
+
     speed_mps: float
     accel_mps2: float
     decel_mps2: float

@@ -72,6 +72,8 @@ class Rover:
         How often the vehicle saw itself leave allowed ground with the fence enabled.
     """
 
+    # Many attributes: ArduPilot's own vehicle is one object with mode, arming, fence and drive, and this answers like it.
+
     def __init__(
         self,
         parameters: ParameterStore,

@@ -24,7 +24,7 @@ from missions.ground.known_fence import fence_warnings, known_fence
 from missions.ground.legs import drawn_leg
 from missions.ground.seams import Seam, first_stop, is_seam, seam_advice, seam_reason, seams_of
 from missions.ground.start_hazard import start_hazard
-from missions.planned import Plan
+from missions.planned import Clearances, Plan
 from missions.promise import known_vehicle, promise
 from missions.request import GoTo
 from missions.situation import Known
@@ -281,13 +281,13 @@ def plan_of(check: MissionCheck, situation: Situation, *, method: str = "optimal
         start=path[0],
         targets=path[-1:],
         method=method,
-        length_m=check.length_m,
         straight_line_m=distance_m(path[0], path[-1]),
-        duration_s=check.duration_s,
-        clearance_m=check.clearance_m,
-        asked_m=max(leg.asked_m for leg in check.legs),
-        drawn_clearance_m=check.drawn_clearance_m,
-        driven_clearance_m=check.driven_clearance_m,
+        keeps=Clearances(
+            check.clearance_m,
+            max(leg.asked_m for leg in check.legs),
+            check.drawn_clearance_m,
+            check.driven_clearance_m,
+        ),
         blocks=0,
         fence=check.fence,
         ground=check.ground,

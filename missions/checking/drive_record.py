@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from missions.checking.check import check_mission, plan_of
 from missions.errors import SituationError
 from missions.ground.seams import with_seams
+from missions.planned import Clearances, Plan
 from missions.request import GoTo
 from missions.situation import Known, Mission, Pose, Situation
 
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from missions.firmware import Firmware
     from missions.geo import LatLon
     from missions.items import MissionItem
-    from missions.planned import Plan
 
 _SOURCE = "the note of the drive"
 
@@ -115,8 +115,7 @@ def plan_again(record: DriveRecord) -> Plan:
         targets=record.targets,
         asked_targets=record.asked_targets,
         ground=with_seams(plan.ground, plan.vehicle),
-        clearance_m=record.clearance_m,
-        asked_m=record.asked_m,
-        drawn_clearance_m=record.drawn_clearance_m,
-        driven_clearance_m=record.driven_clearance_m,
+        keeps=Clearances(
+            record.clearance_m, record.asked_m, record.drawn_clearance_m, record.driven_clearance_m
+        ),
     )

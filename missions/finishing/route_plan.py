@@ -13,13 +13,12 @@ from missions.checking.forecast import forecast_drive, pivot_remarks
 from missions.errors import PlanCheckError, StartBlockedError
 from missions.finishing.mission_lines import Lines, check_lines, finished, mission_items
 from missions.finishing.remarks import drive_remarks, escape_info, lead_away_remarks, moved_target_info
-from missions.geo import rounded
+from missions.geo import path_length_m, rounded
 from missions.ground.from_situation import ground_for, heading_at, route_ends
 from missions.ground.known_fence import fence_warnings, known_fence
-from missions.ground.legs import path_length_m
 from missions.ground.seams import with_seams
 from missions.ground.start_hazard import start_hazard
-from missions.planned import Plan
+from missions.planned import Clearances, Plan
 from missions.promise import known_vehicle, promise, stop_warnings
 from missions.routing.departure import least_turning_m, turning_hazard
 from missions.routing.drawn_route import Sought
@@ -88,14 +87,10 @@ def plan_route(
         targets=reached,
         asked_targets=targets,
         method=request.method,
-        length_m=path_length_m(lines.path),
         straight_line_m=path_length_m((start, *targets)),
-        duration_s=band.duration_s,
-        clearance_m=None if asked.allowance_m == 0 else asked.promised_m,
-        start_clearance_m=start_m,
-        asked_m=asked.drawn_m,
-        drawn_clearance_m=drawn_m,
-        driven_clearance_m=driven_m,
+        keeps=Clearances(
+            None if asked.allowance_m == 0 else asked.promised_m, asked.drawn_m, drawn_m, driven_m, start_m
+        ),
         envelope=band,
         blocks=found.blocks,
         fence=fence,

@@ -17,7 +17,7 @@ from missions.formats.numbers import has_place, xy_from_file
 from missions.geo import to_e7
 from missions.items import Command, CoordinateFrame, MissionItem, waypoint
 from missions.rally import RallyPoint
-from missions.situation import Known, Mission, Situation
+from missions.situation import Known, Mission, Reading, Situation
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -78,7 +78,7 @@ def situation_of(features: Iterable[Feature], source: str, choices: Choices = NO
         mission=Known(Mission(items, home), None, source) if items else None,
         rally=Known(rally, None, source) if rally else None,
         home=Known(home, None, source) if home else None,
-        remarks=tuple(remarks),
+        reading=Reading(remarks=tuple(remarks)),
     )
 
 

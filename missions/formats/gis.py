@@ -17,6 +17,7 @@ from missions.formats.choices import NO_CHOICES
 from missions.formats.feature_reading import situation_of
 from missions.formats.features import Feature, Shape
 from missions.geo import checked_lat_lon
+from missions.situation import Reading
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -68,7 +69,7 @@ def read_path(path: Path, choices: Choices = NO_CHOICES) -> Situation:
             ) from None
     situation = situation_of(features, source, choices)
     remarks = (f"{source}: {warning.message}" for warning in said)
-    return replace(situation, remarks=(*remarks, *situation.remarks))
+    return replace(situation, reading=Reading(remarks=(*remarks, *situation.remarks)))
 
 
 def _features_of_layer(pyogrio: Any, path: Path, layer: str) -> Iterator[Feature]:  # noqa: ANN401 - a module

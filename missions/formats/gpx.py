@@ -12,6 +12,7 @@ from missions.formats.features import Feature, Role, Shape, name_key
 from missions.formats.numbers import number
 from missions.formats.xml_tree import parse_xml
 from missions.geo import checked_lat_lon
+from missions.situation import Reading
 
 if TYPE_CHECKING:
     from missions.formats.choices import Choices
@@ -50,7 +51,8 @@ def read(text: str, source: str, choices: Choices = NO_CHOICES) -> Situation:
         points = [replace(point, fallback=Role.WAYPOINT) for point in points]
         remarks = (f"{source}: {len(places)} waypoints are used as the mission, in file order",)
     situation = situation_of([*drawn, *points], source, choices)
-    return replace(situation, remarks=(*(remarks if situation.mission else ()), *situation.remarks))
+    remarks = (*(remarks if situation.mission else ()), *situation.remarks)
+    return replace(situation, reading=Reading(remarks=remarks))
 
 
 def _line(element: Element, named: Element, point: str, shape: Shape) -> Feature:

@@ -11,7 +11,7 @@ from missions.firmware import firmware_from_remark
 from missions.formats.bounds import lines_of
 from missions.formats.numbers import number as number_of
 from missions.formats.texts import read_text
-from missions.situation import Situation
+from missions.situation import Reading, Situation
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,15}")
 _LINE = re.compile(r"^([A-Za-z][A-Za-z0-9_]*)[\s,=:]+([^\s_]+)(?:\s|$)")
@@ -69,7 +69,7 @@ def read(text: str, source: str) -> Situation:
             )
         else:
             parameters[name] = value
-    return Situation(parameters=parameters, firmware=firmware, remarks=tuple(remarks))
+    return Situation(parameters=parameters, firmware=firmware, reading=Reading(remarks=tuple(remarks)))
 
 
 def write(situation: Situation) -> str:

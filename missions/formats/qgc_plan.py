@@ -14,7 +14,7 @@ from missions.formats.numbers import xy_for_file, xy_from_file
 from missions.geo import LatLon
 from missions.items import Command, MissionItem, file_frame
 from missions.rally import RallyPoint
-from missions.situation import Known, Mission, Situation
+from missions.situation import Known, Mission, Reading, Situation
 
 if TYPE_CHECKING:
     from missions.formats.json_node import JsonNode
@@ -46,7 +46,7 @@ def read(text: str, source: str) -> Situation:
         mission=Known(mission, None, source) if mission and mission.items else None,
         rally=Known(rally, None, source) if rally else None,
         home=Known(mission.home, None, source) if mission and mission.home else None,
-        remarks=tuple(remarks),
+        reading=Reading(remarks=tuple(remarks)),
     )
 
 

@@ -18,7 +18,7 @@ from missions.formats.numbers import number, whole, without_nan, xy_for_file, xy
 from missions.geo import LatLon
 from missions.items import Command, MissionItem, file_frame, with_home
 from missions.rally import rally_from_items, rally_to_items
-from missions.situation import Known, Mission, Situation
+from missions.situation import Known, Mission, Reading, Situation
 
 _HEADER = "QGC WPL 110"
 _VERSIONS = ("110", "100")
@@ -185,11 +185,11 @@ def _seq_remarks(rows: Sequence[_Row], source: str) -> tuple[str, ...]:
 def _situation(rows: list[_Row], remarks: tuple[str, ...], source: str) -> Situation:
     home, rest = _split_home(rows)
     listed = {row.item.command for row in rest}
-    known = Situation(home=Known(home, None, source) if home else None, remarks=remarks)
+    known = Situation(home=Known(home, None, source) if home else None, reading=Reading(remarks=remarks))
     if listed & set(_FENCE_COMMANDS) or Command.RALLY_POINT in listed:
         rest, more = _without_more_homes(rest, home, source)
         listed = {row.item.command for row in rest}
-        known = replace(known, remarks=(*remarks, *more))
+        known = replace(known, reading=Reading(remarks=(*remarks, *more)))
     if listed & set(_FENCE_COMMANDS):
         try:
             fence = fence_from_items([row.item for row in rest])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from shapely import LineString, Point
@@ -12,8 +11,6 @@ from missions.geo import distance_m
 from missions.ground.frame import MAX_LATITUDE_DEG, autopilot_line, bow_m
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from missions.geo import LatLon
     from missions.ground.ground import Ground
 
@@ -40,8 +37,3 @@ def drawn_leg(ground: Ground, a: LatLon, b: LatLon) -> LineString | Point:
     pieces = max(1, math.ceil(distance_m(a, b) / _SAMPLE_M))
     line = ground.frame.to_local_array(autopilot_line(a, b, pieces))
     return Point(line[0]) if a == b else LineString(line)
-
-
-def path_length_m(path: Sequence[LatLon]) -> float:
-    """Return the length of the lines through positions."""
-    return sum(distance_m(a, b) for a, b in pairwise(path))

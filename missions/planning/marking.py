@@ -35,4 +35,5 @@ def marked(plan: Plan, request: Request) -> Plan:
         others = tuple(warning for warning in plan.warnings if warning not in reasons)
         return replace(plan, extrapolated=reasons, warnings=others, info=(*plan.info, *reasons, _TRUSTED))
     warnings = (*dict.fromkeys((*plan.warnings, *reasons)), _NOTHING)
-    return replace(plan, clearance_m=None, start_clearance_m=None, extrapolated=reasons, warnings=warnings)
+    keeps = replace(plan.keeps, promised_m=None, start_m=None)
+    return replace(plan, keeps=keeps, extrapolated=reasons, warnings=warnings)

@@ -86,14 +86,14 @@ def _with_room(
     mission = Mission(planned.items, planned.home)
     checked = shortened(mission, own, situation, wanted, most=most, may_slow=True, should_stop=should_stop)
     left_out = len(planned.items) - len(checked.mission.items)
+    short = plan_of(checked, situation, method=planned.method)
+    kept = planned.keeps
     return replace(
-        plan_of(checked, situation, method=planned.method),
+        short,
         targets=planned.targets,
         asked_targets=planned.asked_targets,
         straight_line_m=planned.straight_line_m,
-        clearance_m=planned.clearance_m,
-        start_clearance_m=planned.start_clearance_m,
-        asked_m=planned.asked_m,
+        keeps=replace(kept, drawn_m=short.keeps.drawn_m, driven_m=short.keeps.driven_m),
         blocks=planned.blocks,
         home=planned.home,
         warnings=planned.warnings,

@@ -31,7 +31,7 @@ from missions.fitting.local_search import CRAWL_MEASUREMENTS, FIT_MEASUREMENTS
 from missions.ground.legs import reserve_m
 from missions.routing.drawn_route import widest_drawn_m
 from missions.routing.no_route import NoRoute, NoRouteKind
-from missions.routing.route_search import SLOW_MPS, DrivenRoute, Known, RouteSearch
+from missions.routing.route_search import SLOW_MPS, DrivenRoute, RouteSearch, SharedWork
 from missions.words import metres
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ class PromisedRoute:
     vehicle: Vehicle
     heading_deg: float | None
     _tried: dict[float, RouteSearch] = field(default_factory=dict, init=False)
-    _known: Known = field(default_factory=Known, init=False)
+    _known: SharedWork = field(default_factory=SharedWork, init=False)
 
     def find(self, asked: Promise) -> Found | NoRoute:
         """Return a route that keeps at least what is asked, and what is promised for it; else why there is none."""

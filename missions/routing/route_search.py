@@ -136,7 +136,7 @@ class _Attempt:
 
 
 @dataclass(eq=False)
-class Known:
+class SharedWork:
     """What searches for one vehicle on one field share, whatever is required: nothing is drawn or fitted twice."""
 
     drawn: dict[float, DrawnRoutes] = field(default_factory=dict)
@@ -162,7 +162,7 @@ class RouteSearch:
         Where it faces at the start, clockwise from north; None is along the first leg.
     enough_m : float, optional
         What is enough of it, where what is aimed at cannot be kept all the way. Default: all of it.
-    known : Known, optional
+    known : SharedWork, optional
         What other searches for the vehicle on the field know already.
     any_speed : bool
         Whether a slow route does, so that no quicker one is sought.
@@ -179,7 +179,7 @@ class RouteSearch:
     vehicle: Vehicle
     heading_deg: float | None
     enough_m: float | None = None
-    known: Known = field(default_factory=Known)
+    known: SharedWork = field(default_factory=SharedWork)
     any_speed: bool = False
     measurements: int = MOST_MEASUREMENTS
     departure_limit_m: float = math.inf

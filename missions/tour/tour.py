@@ -213,10 +213,11 @@ def with_end(planned: Plan, situation: Situation, request: Tour) -> Plan:
         path=(*planned.path, last.leg.end),
         seqs=(*planned.seqs, len(items)),
         speeds=(*planned.speeds, last.leg.speed_mps),
-        length_m=planned.length_m + last.length_m,
-        duration_s=checked.duration_s,
-        drawn_clearance_m=min(planned.drawn_clearance_m, last.drawn_clearance_m),
-        driven_clearance_m=min(planned.driven_clearance_m, last.driven_clearance_m),
+        keeps=replace(
+            planned.keeps,
+            drawn_m=min(planned.keeps.drawn_m, last.drawn_clearance_m),
+            driven_m=min(planned.keeps.driven_m, last.driven_clearance_m),
+        ),
         envelope=checked.envelope,
     )
 

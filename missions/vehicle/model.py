@@ -32,7 +32,7 @@ class Steering(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class FenceParameters:
-    """How the autopilot treats its fence.
+    """How the autopilot treats its fence, and what its avoidance does there.
 
     Parameters
     ----------
@@ -50,6 +50,12 @@ class FenceParameters:
         FENCE_OPTIONS bit 1: inside any inclusion zone is inside; otherwise it must be inside all.
     action : int
         FENCE_ACTION (PX4: GF_ACTION).
+    avoid_bits : int
+        AVOID_ENABLE: 1 keeps off fences.
+    oa_type : int
+        OA_TYPE: 0 none, 1 BendyRuler, 2 Dijkstra, 3 both.
+    backs_away : bool
+        AVOID_BACKUP_SPD above 0: inside the margin its avoidance drives it backwards.
     """
 
     enabled: bool = False
@@ -59,6 +65,9 @@ class FenceParameters:
     radius_m: float = 300.0
     union: bool = False
     action: int = 1
+    avoid_bits: int = 3
+    oa_type: int = 0
+    backs_away: bool = True
 
     @property
     def enforces_zones(self) -> bool:
@@ -111,12 +120,8 @@ class Vehicle:
         The least of ATC_STR_ACC_MAX and ATC_STR_DEC_MAX that is a limit; None where none is known.
     steering : Steering
         From SERVOn_FUNCTION: throttle left and right (73, 74) is skid steer.
-    avoid_bits : int
-        AVOID_ENABLE: 1 keeps off fences.
-    oa_type : int
-        OA_TYPE: 0 none, 1 BendyRuler, 2 Dijkstra, 3 both.
-    backs_away : bool
-        AVOID_BACKUP_SPD above 0: inside the margin its avoidance drives it backwards.
+    fence : FenceParameters
+        How it treats its fence, its avoidance included.
     boat_drift_m : float or None
         LOIT_RADIUS of a boat (FRAME_CLASS 2, or MAV_TYPE_SURFACE_BOAT), which drifts so far where it stops; None on wheels.
     assumed : tuple of Assumed
@@ -141,9 +146,6 @@ class Vehicle:
     steering: Steering = Steering.ACKERMANN
     autopilot: Autopilot = Autopilot.ARDUPILOT
     fence: FenceParameters = field(default_factory=FenceParameters)
-    avoid_bits: int = 3
-    oa_type: int = 0
-    backs_away: bool = True
     assumed: tuple[Assumed, ...] = ()
     mav_type: int | None = None
     firmware: Firmware | None = None
@@ -161,6 +163,21 @@ class Vehicle:
     def can_pivot(self) -> bool:
         """Whether it turns on the spot at sharp corners."""
         return self.steering is Steering.SKID and self.pivot_angle_deg > 0
+
+    @property
+    def avoid_bits(self) -> int:
+        """`FenceParameters.avoid_bits`."""
+        return self.fence.avoid_bits
+
+    @property
+    def oa_type(self) -> int:
+        """`FenceParameters.oa_type`."""
+        return self.fence.oa_type
+
+    @property
+    def backs_away(self) -> bool:
+        """`FenceParameters.backs_away`."""
+        return self.fence.backs_away
 
     @property
     def avoids_fence(self) -> bool:

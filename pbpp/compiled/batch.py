@@ -10,8 +10,6 @@ if TYPE_CHECKING:
 
     from pbpp.geometry import Floats
 
-__all__ = ["spread"]
-
 ResultT = TypeVar("ResultT")
 
 _AT_ONCE = 64  # queries that a thread takes at a time: some 2 ms, so that all threads end at about the same time; chosen, not measured

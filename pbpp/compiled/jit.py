@@ -7,8 +7,6 @@ from typing import Any
 
 import numba
 
-__all__ = ["compiled", "inlined", "released", "uncounted"]
-
 _OPTIONS: dict[str, Any] = {"error_model": "numpy"}
 
 

@@ -21,7 +21,7 @@ from pbpp.compiled.jit import released as _released
 from pbpp.compiled.jit import uncounted as _uncounted
 from pbpp.errors import SearchStoppedError
 from pbpp.partition.base import TOLERANCE_M
-from pbpp.partition.flat import Answer, record
+from pbpp.partition.flat import DirectPath, record
 from pbpp.planned_path import STRAIGHT_M
 
 if TYPE_CHECKING:
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from pbpp.partition.flat import FlatSlabs, Records
     from pbpp.partition.places import Places
     from pbpp.partition.vertices import Ints, Vertices
-
-__all__ = ["Searcher"]
 
 _GOAL, _TURN = -1, -2  # marks in the place of a block's number
 _SLACK_M = 1e-10  # as in `any_angle`: the paths must be the same
@@ -203,7 +201,7 @@ class Searcher:
             _clear(work)
             self._idle.append(work)
 
-    def direct(self, start: Point, goal: Point, origin_m: Floats) -> Answer | None:
+    def direct(self, start: Point, goal: Point, origin_m: Floats) -> DirectPath | None:
         """Return the shortest path between two points that lie well inside of one block each.
 
         Parameters
@@ -215,18 +213,18 @@ class Searcher:
 
         Returns
         -------
-        Answer or None
+        DirectPath or None
             The path; None if there is none, or if an end lies near an edge: then `search` must be asked.
         """
         return self.answers(np.array((start, goal)).reshape(1, 2, 2), origin_m)[0]
 
-    def answers(self, ends: Floats, origin_m: Floats) -> list[Answer | None]:
+    def answers(self, ends: Floats, origin_m: Floats) -> list[DirectPath | None]:
         """Return the paths of many queries as `direct` does, from an (n, 2, 2) array of starts and goals."""
         results, turns, points = self._answered(ends, origin_m, keeps=True)
-        found: list[Answer | None] = []
+        found: list[DirectPath | None] = []
         turned = kept = 0
         for length_m, status, expanded, last_turned, last_kept in results.tolist():
-            answer = Answer(turns[turned:last_turned], points[kept:last_kept], length_m, expanded)
+            answer = DirectPath(turns[turned:last_turned], points[kept:last_kept], length_m, expanded)
             found.append(answer if status == _FOUND else None)
             turned, kept = last_turned, last_kept
         return found

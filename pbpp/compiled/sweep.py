@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from pbpp.geometry import Floats
     from pbpp.partition.vertices import Ints, Vertices
 
-__all__ = ["sweep"]
-
 _NOTHING = BlockArrays(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0), np.empty(0))
 _NONE = -1
 _NEVER = -1  # as a stamp

@@ -11,8 +11,6 @@ if TYPE_CHECKING:
 
     from pbpp.geometry import Floats, Point
 
-__all__ = ["TOLERANCE_M", "Partition", "Portals"]
-
 TOLERANCE_M = 1e-9
 """Lengths up to this are taken as none: gaps so narrow are closed, vertices so near to one line stand on it."""
 

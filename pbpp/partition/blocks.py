@@ -34,8 +34,6 @@ if TYPE_CHECKING:
 
     from .vertices import Ints
 
-__all__ = ["MAX_BLOCKS", "Blocks"]
-
 MAX_BLOCKS = 200_000
 """More blocks than this are refused: they grow much faster than the vertices, and nothing is gained."""
 

@@ -16,19 +16,6 @@ if TYPE_CHECKING:
     from .vertices import Ints, Vertices
     from .window import Patch, Window
 
-__all__ = [
-    "BLOCK",
-    "CORNER",
-    "PORTAL",
-    "WAY",
-    "Answer",
-    "Engine",
-    "FlatSearch",
-    "FlatSlabs",
-    "Records",
-    "record",
-]
-
 Records = npt.NDArray[Any]
 """An array of records: numba reads their fields as attributes."""
 
@@ -120,7 +107,7 @@ class FlatSlabs(NamedTuple):
         return FlatSlabs(blocks, part.portals, first, last, ways, corners, self.ends_with)
 
 
-class Answer(NamedTuple):
+class DirectPath(NamedTuple):
     """A shortest path.
 
     Parameters
@@ -153,10 +140,10 @@ class FlatSearch(Protocol):
     ) -> tuple[list[int] | None, float, int, bool]:
         """Return the shortest path between two points of free space, wherever in it they lie."""
 
-    def direct(self, start: Point, goal: Point, origin_m: Floats) -> Answer | None:
+    def direct(self, start: Point, goal: Point, origin_m: Floats) -> DirectPath | None:
         """Return the shortest path between two points that lie well inside of one block each."""
 
-    def answers(self, ends: Floats, origin_m: Floats) -> list[Answer | None]:
+    def answers(self, ends: Floats, origin_m: Floats) -> list[DirectPath | None]:
         """Return the paths of many queries as `direct` does."""
 
     def lengths_m(

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from .vertices import Ints, Vertices
     from .window import BlockArrays
 
-__all__ = ["Places"]
-
 _REMEMBERED = 64  # points, as a query asks for its ends again and again; chosen, not measured
 _ROUNDINGS = 8.0  # so many last bits of the greatest coordinate a computed distance to an edge may be wrong
 _PUSHES = 4  # each twice as far as the one before; chosen, not measured. What still lies on an edge then is taken to its floor

@@ -34,8 +34,6 @@ if TYPE_CHECKING:
     from .flat import Engine, FlatSearch, FlatSlabs
     from .window import Patch, Window
 
-__all__ = ["Slabs"]
-
 _LIVE = 0.75  # of the numbers of vertices, before slabs are made anew with none without meaning; chosen, not measured
 
 

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from .vertices import Vertices
     from .window import Patch
 
-__all__ = ["DULL_END", "OPEN_END", "PortalView", "Sweep"]
-
 PortalView = tuple[float, float, float, int, int, int]
 """(east, low north, high north, low vertex, high vertex, block behind): how the search sees a portal."""
 
@@ -48,12 +46,13 @@ class Sweep:
         Of free space, or of some lines of it: then it begins and ends with open blocks.
     """
 
+    # Many attributes: the arrays of one algorithm, each read in its inner loop; held by another object each step would cost a look-up more.
+
     def __init__(self, vertices: Vertices | Window) -> None:
         v = vertices
         count = len(v.x)
         self._vertices = v
         east = v.x[v.next] - v.x
-        self._x: list[float] = v.x.tolist()
         self._y: list[float] = v.y.tolist()
         self._next: list[int] = v.next.tolist()
         self._prev: list[int] = v.prev.tolist()

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
     from pbpp.geometry import Floats, Point
 
-__all__ = ["Flags", "Ints", "Vertices"]
-
 Ints = npt.NDArray[np.intp]
 Flags = npt.NDArray[np.bool_]
 

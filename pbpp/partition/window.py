@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
 ColumnT = TypeVar("ColumnT", npt.NDArray[np.intp], npt.NDArray[np.float64])
 
-__all__ = ["BlockArrays", "Moved", "Patch", "Window", "patch_of", "window_of"]
-
 
 class BlockArrays(NamedTuple):
     """Blocks: floor and ceiling, each the vertex that its edge starts at, and east of the west and the east side in metres."""
@@ -157,7 +155,7 @@ def patch_of(
     swept: BlockArrays,
     ends_with: Ints,
 ) -> Patch | None:
-    """Return how the blocks of a window stand among all.
+    """Return how the blocks of a window stand among all; None if they do not end with the blocks that were open there.
 
     Parameters
     ----------
@@ -167,17 +165,10 @@ def patch_of(
         The blocks of the window, the open ones first.
     ends_with : (k,) array of int
         Those that are open at its end.
-
-    Returns
-    -------
-    Patch or None
-        None if they are not the blocks that were open there.
     """
     west, east = ends
-    there, beyond = (
-        (before.west >= west) & (before.west <= east),
-        (before.west <= east) & (before.east > east),
-    )
+    there = (before.west >= west) & (before.west <= east)
+    beyond = (before.west <= east) & (before.east > east)
     there[dead] = beyond[dead] = False
     floor, ceiling = window.names[swept.floor], window.names[swept.ceiling]
     were = {

@@ -8,15 +8,9 @@ from typing import Annotated
 
 from mavlink_bridge.cli.options.shared import (
     AcceptLessOption,
-    AnyVehicleOption,
-    CommonOptions,
-    FirmwareOption,
+    DescriptionOptions,
     RequiredConnectOption,
-    SigningKeyOption,
-    StoppingOption,
-    SystemOption,
-    TimeoutOption,
-    TrustOption,
+    VehicleLinkOptions,
     flag,
     metres,
     option,
@@ -24,7 +18,7 @@ from mavlink_bridge.cli.options.shared import (
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BridgeOptions(CommonOptions):
+class BridgeOptions(DescriptionOptions, VehicleLinkOptions):
     """Run alongside the autopilot: read fence, state and targets from the link, plan, upload and verify missions, watch the drive.
 
     Type targets as `LAT,LON`; `yes` confirms a plan. Without `--upload` it only reports.
@@ -53,12 +47,6 @@ class BridgeOptions(CommonOptions):
     accept_less: AcceptLessOption = False
     corner_allowance: Annotated[str, option("Extra room for cut corners.", "M|auto")] = "auto"
     snap: Annotated[float, metres("Move a blocked target to the nearest free place within M metres.")] = 0.0
-    vehicle: Annotated[
-        Path | None, option("Parameter file, for what the vehicle does not report.", "FILE.parm")
-    ] = None
-    firmware: FirmwareOption = None
-    stopping: StoppingOption = field(default_factory=list)
-    trust_model: TrustOption = False
     upload: Annotated[bool, flag("--upload", "Write missions to the vehicle.")] = False
     drive: Annotated[
         bool,
@@ -77,11 +65,7 @@ class BridgeOptions(CommonOptions):
             "FILE.tlog",
         ),
     ] = None
-    system: SystemOption = None
-    any_vehicle: AnyVehicleOption = False
     source_system: Annotated[
         int | None, option("System id that pbpp uses. Default: the vehicle's own.", "N", min=1, max=255)
     ] = None
     source_component: Annotated[int, option("Component id that pbpp uses.", "N", min=1, max=255)] = 195
-    signing_key: SigningKeyOption = None
-    timeout: TimeoutOption = 30.0

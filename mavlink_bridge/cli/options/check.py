@@ -8,23 +8,20 @@ from typing import Annotated
 
 from mavlink_bridge.cli.options.shared import (
     OUTPUT_PANEL,
-    VEHICLE_PANEL,
     ClearanceOptions,
     ConnectOption,
-    FirmwareOption,
+    DescriptionOptions,
     HomeOption,
     LinkOptions,
     MapOptions,
     PlaceOption,
-    StoppingOption,
-    TrustOption,
     metres,
     option,
 )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CheckOptions(MapOptions, ClearanceOptions, LinkOptions):
+class CheckOptions(DescriptionOptions, MapOptions, ClearanceOptions, LinkOptions):
     """Check every leg of a mission against a fence: the clearance of its straight line and of the predicted track. Exit 8 if a leg fails.
 
     For example:
@@ -48,13 +45,6 @@ class CheckOptions(MapOptions, ClearanceOptions, LinkOptions):
     ] = None
     home: HomeOption = None
     place: PlaceOption = field(default_factory=list)
-    vehicle: Annotated[
-        Path | None,
-        option("Parameter file, for what the log or link does not report.", "FILE.parm", panel=VEHICLE_PANEL),
-    ] = None
-    firmware: FirmwareOption = None
-    trust_model: TrustOption = False
-    stopping: StoppingOption = field(default_factory=list)
     clearance: Annotated[
         float | None, metres("Fence clearance each leg must keep while driving. Default: from FENCE_MARGIN.")
     ] = None

@@ -12,13 +12,11 @@ from mavlink_bridge.cli.options.shared import (
     AcceptLessOption,
     ClearanceOptions,
     ConnectOption,
-    FirmwareOption,
+    DescriptionOptions,
     HomeOption,
     LinkOptions,
     MapOptions,
     PlaceOption,
-    StoppingOption,
-    TrustOption,
     flag,
     metres,
     option,
@@ -31,8 +29,34 @@ _DRIVE, _ROUTE = "Upload and drive", "Route"
 _TOURS = "Several targets, and missions to repair"
 
 
+@dataclass(frozen=True, kw_only=True)
+class TourOptions:
+    """How several targets are visited, or which mission is repaired."""
+
+    order: Annotated[
+        str, option("given: as listed; best: in the shortest order.", "|".join(ORDERS), panel=_TOURS)
+    ] = "given"
+    come_back: Annotated[
+        bool, flag("--return", "Return home after the last target (to the start if home is unknown).", _TOURS)
+    ] = False
+    end: Annotated[
+        str,
+        option(
+            "What to do at the end; rtl only if the straight line home is free.", "|".join(ENDS), panel=_TOURS
+        ),
+    ] = "hold"
+    via_mission: Annotated[
+        str | None,
+        option(
+            "Repair this mission: replace the legs that do not keep the clearance; own: the mission in the SOURCE.",
+            "FILE|own",
+            panel=_TOURS,
+        ),
+    ] = None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PlanOptions(MapOptions, ClearanceOptions, LinkOptions):
+class PlanOptions(TourOptions, DescriptionOptions, MapOptions, ClearanceOptions, LinkOptions):
     """Plan a mission around the fences of a SOURCE: `--fence FILE`, `--log FILE.tlog` or `--connect CONNECTION`.
 
     For example:
@@ -107,10 +131,6 @@ class PlanOptions(MapOptions, ClearanceOptions, LinkOptions):
             _ROUTE,
         ),
     ] = False
-    vehicle: Annotated[
-        Path | None,
-        option("Parameter file, for what the source does not report.", "FILE.parm", panel=VEHICLE_PANEL),
-    ] = None
     speed: Annotated[
         float | None,
         option(
@@ -118,29 +138,6 @@ class PlanOptions(MapOptions, ClearanceOptions, LinkOptions):
             "M/S",
             panel=VEHICLE_PANEL,
             parser=within(LEAST_MPS, MOST_MPS, "metres a second"),
-        ),
-    ] = None
-    firmware: FirmwareOption = None
-    stopping: StoppingOption = field(default_factory=list)
-    trust_model: TrustOption = False
-    order: Annotated[
-        str, option("given: as listed; best: in the shortest order.", "|".join(ORDERS), panel=_TOURS)
-    ] = "given"
-    come_back: Annotated[
-        bool, flag("--return", "Return home after the last target (to the start if home is unknown).", _TOURS)
-    ] = False
-    end: Annotated[
-        str,
-        option(
-            "What to do at the end; rtl only if the straight line home is free.", "|".join(ENDS), panel=_TOURS
-        ),
-    ] = "hold"
-    via_mission: Annotated[
-        str | None,
-        option(
-            "Repair this mission: replace the legs that do not keep the clearance; own: the mission in the SOURCE.",
-            "FILE|own",
-            panel=_TOURS,
         ),
     ] = None
     blocks: Annotated[bool, flag("--blocks", "Also draw the blocks of the free space.", OUTPUT_PANEL)] = False

@@ -46,10 +46,6 @@ SystemOption = Annotated[
     int | None,
     option("Which vehicle, when several are heard.", "N", "--system", panel=LINK_PANEL, min=1, max=255),
 ]
-TimeoutOption = Annotated[
-    float,
-    option("How long to wait for the vehicle.", "S", panel=LINK_PANEL, parser=within(0.1, MOST_S, "seconds")),
-]
 AnyVehicleOption = Annotated[
     bool, flag("--any-vehicle", "Accept vehicles other than rovers and boats.", LINK_PANEL)
 ]
@@ -60,10 +56,6 @@ RequiredConnectOption = Annotated[
         "CONNECTION",
         "--connect",
     ),
-]
-SigningKeyOption = Annotated[
-    Path | None,
-    option("Sign with this key: 32 bytes, hex, base64, or a passphrase.", "FILE", panel=LINK_PANEL),
 ]
 HomeOption = Annotated[
     str | None, option("Home, if the source has none: start, return and centre of FENCE_RADIUS.", "LAT,LON")
@@ -87,7 +79,6 @@ FirmwareOption = Annotated[
         parser=firmware_option,
     ),
 ]
-
 SimulatedFirmwareOption = Annotated[
     Firmware | None,
     option(
@@ -96,29 +87,11 @@ SimulatedFirmwareOption = Annotated[
         parser=firmware_option,
     ),
 ]
-StoppingOption = Annotated[
-    list[Stop],
-    option(
-        "How far your rover rolls on after HOLD: 6@3 is 6 m from 3 m/s. Repeatable. Default: its own stops, where it was seen to stop; else those of "
-        "ArduPilot's simulation.",
-        "M@MPS",
-        panel=VEHICLE_PANEL,
-        parser=stop_from,
-    ),
-]
 PlaceOption = Annotated[
     list[str],
     option(
         "A place to go home to, beside home and the rally points; repeatable. The ways home are in --json and pictures.",
         "NAME=LAT,LON",
-    ),
-]
-TrustOption = Annotated[
-    bool,
-    flag(
-        "--trust-model",
-        "Promise a clearance even where the drive model was not measured; without this option no such plan is uploaded.",
-        VEHICLE_PANEL,
     ),
 ]
 AcceptLessOption = Annotated[
@@ -180,6 +153,35 @@ class ClearanceOptions:
     ] = "0,0"
 
 
+@dataclass(frozen=True, kw_only=True)
+class DescriptionOptions:
+    """What is said of the vehicle itself, and whether its drive is believed beyond what was measured."""
+
+    vehicle: Annotated[
+        Path | None,
+        option("Parameter file, for what the source does not report.", "FILE.parm", panel=VEHICLE_PANEL),
+    ] = None
+    firmware: FirmwareOption = None
+    stopping: Annotated[
+        list[Stop],
+        option(
+            "How far your rover rolls on after HOLD: 6@3 is 6 m from 3 m/s. Repeatable. Default: its own stops, where it was seen to stop; else those of "
+            "ArduPilot's simulation.",
+            "M@MPS",
+            panel=VEHICLE_PANEL,
+            parser=stop_from,
+        ),
+    ] = field(default_factory=list)
+    trust_model: Annotated[
+        bool,
+        flag(
+            "--trust-model",
+            "Promise a clearance even where the drive model was not measured; without this option no such plan is uploaded.",
+            VEHICLE_PANEL,
+        ),
+    ] = False
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommonOptions:
     """What every command has."""
@@ -226,19 +228,33 @@ class CommonOptions:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LinkOptions(CommonOptions):
-    """What commands have that speak to one vehicle, once."""
+class VehicleLinkOptions(CommonOptions):
+    """What commands have that speak to one vehicle."""
 
     system: SystemOption = None
     any_vehicle: AnyVehicleOption = False
+    signing_key: Annotated[
+        Path | None,
+        option("Sign with this key: 32 bytes, hex, base64, or a passphrase.", "FILE", panel=LINK_PANEL),
+    ] = None
+    timeout: Annotated[
+        float,
+        option(
+            "How long to wait for the vehicle.", "S", panel=LINK_PANEL, parser=within(0.1, MOST_S, "seconds")
+        ),
+    ] = 30.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinkOptions(VehicleLinkOptions):
+    """What commands have that speak to one vehicle, once."""
+
     source_system: Annotated[
         int, option("System id that pbpp uses.", "N", panel=LINK_PANEL, min=1, max=255)
     ] = 245
     source_component: Annotated[
         int, option("Component id that pbpp uses.", "N", panel=LINK_PANEL, min=1, max=255)
     ] = 190
-    signing_key: SigningKeyOption = None
-    timeout: TimeoutOption = 30.0
 
     @property
     def identity(self) -> tuple[int, int]:

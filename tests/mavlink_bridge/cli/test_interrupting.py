@@ -91,7 +91,7 @@ def test_what_a_vehicle_does_in_words(doing, text):
          "interrupted; the vehicle was left as it was: HOLD, not armed, 0.0 m/s; nothing was written to it"),
         (InterruptReport("", DRIVING, "the mission on it is ours", drives=True),
          "interrupted; nothing was sent; the vehicle continues the mission that pbpp started: AUTO, armed, 5.0 m/s; the mission on it is ours"),
-        (InterruptReport("", Doing(Mode.HOLD, True, 0.1, age_s=0, speed_age_s=0), "x", drives=True, was_asked=True, is_held=True),
+        (InterruptReport("", Doing(Mode.HOLD, True, 0.1, age_s=0, speed_age_s=0), "x", drives=True, is_held=True),
          "interrupted; the vehicle was switched to HOLD, confirmed by its heartbeat: HOLD, armed, 0.1 m/s; x"),
         (InterruptReport("", DRIVING, "x", drives=True, is_held=False),
          "interrupted; HOLD was sent, but no heartbeat confirms it: AUTO, armed, 5.0 m/s; x"),

@@ -269,13 +269,13 @@ def test_the_list_forgets_its_older_half(tmp_path, own_state_folder, monkeypatch
 def test_files_that_grow_begin_anew_and_keep_what_was_there(tmp_path):
     path = tmp_path / "run.journal.jsonl"
     path.write_text("another run")
-    with kept_files.open_kept(path) as file:
-        file.write("this run")
-    assert path.read_text() == "this run"
+    kept_files.make_room(path)
+    path.write_text("this run")
     assert (tmp_path / "run.journal.jsonl.bak").read_text() == "another run"
     kept_files.remember(path)
-    with kept_files.open_kept(path) as file:
-        file.write("the next")
+    kept_files.make_room(path)
+    assert not path.exists()
+    path.write_text("the next")
     assert names(tmp_path) == ["run.journal.jsonl", "run.journal.jsonl.bak"]
 
 
@@ -285,8 +285,8 @@ def test_a_file_that_grows_follows_no_link(tmp_path):
     precious.write_text("precious")
     path = tmp_path / "run.journal.jsonl"
     path.symlink_to(precious)
-    with kept_files.open_kept(path) as file:
-        file.write("this run")
+    kept_files.make_room(path)
+    path.write_text("this run")
     assert precious.read_text() == "precious"
     assert path.read_text() == "this run"
 

@@ -54,8 +54,8 @@ def test_a_parameter_that_is_told_later_held_before(tmp_path):
     log.parameters({**PARAMETERS, "FENCE_OPTIONS": 2.0})
     log.parameters({"WP_SPEED": 3.0})
     (vehicle,) = book_of(log, tmp_path).vehicles
-    assert vehicle.parameters["FENCE_OPTIONS"] == 2.0
-    assert [(change.name, change.before, change.after) for change in vehicle.parameter_changes] == [
+    assert vehicle.parameters.values["FENCE_OPTIONS"] == 2.0
+    assert [(change.name, change.before, change.after) for change in vehicle.parameters.changes] == [
         ("WP_SPEED", 2.0, 3.0)
     ]
 

@@ -50,7 +50,7 @@ def test_the_facts_of_the_manifest(recording):
         facts["positions"],
         facts["positions_without_fix"],
     )
-    assert vehicle.parameters_seen == facts["parameters"]
+    assert vehicle.parameters.seen == facts["parameters"]
     modes = [span.mode for span in vehicle.modes]
     assert [mode for mode, before in zip(modes, [None, *modes[:-1]], strict=True) if mode != before] == facts[
         "modes"
@@ -125,7 +125,7 @@ def test_what_happened_in_some(recording):
         assert vehicle.intrusions == ()
         assert vehicle.grades == ()
     if name == "union-rally":
-        assert [(change.name, change.after) for change in vehicle.parameter_changes][-2:] == [
+        assert [(change.name, change.after) for change in vehicle.parameters.changes][-2:] == [
             ("FENCE_OPTIONS", 2.0),
             ("FENCE_TYPE", 4.0),
         ]

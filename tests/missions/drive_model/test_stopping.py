@@ -66,7 +66,7 @@ def test_no_stop_that_was_seen_is_told_shorter(own, steering):
 
 
 def test_a_drive_straight_at_a_wall_by_hand():
-    vehicle = Vehicle(speed_mps=3.0, avoid_bits=0)
+    vehicle = Vehicle(speed_mps=3.0, fence=FenceParameters(avoid_bits=0))
     band = envelope([(0.0, 0.0), (0.0, 60.0)], vehicle, heading_deg=0.0)
     moving = motion(band, vehicle)
     assert moving.speeds_mps.max() == pytest.approx(3.0, abs=1e-6)
@@ -83,7 +83,7 @@ def test_a_drive_straight_at_a_wall_by_hand():
 
 def test_avoidance_slows_a_vehicle_before_the_fence_that_it_sees():
     vehicle = Vehicle(
-        speed_mps=3.0, fence=FenceParameters(enabled=True, type_bits=4, margin_m=2.0), avoid_bits=3
+        speed_mps=3.0, fence=FenceParameters(enabled=True, type_bits=4, margin_m=2.0, avoid_bits=3)
     )
     band = envelope([(0.0, 0.0), (0.0, 60.0)], vehicle, heading_deg=0.0)
     wall = box(-50.0, -50.0, 50.0, 63.0).boundary

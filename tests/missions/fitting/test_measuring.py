@@ -69,7 +69,8 @@ def test_each_step_only_adds(places: list[tuple[float, float]], begin: int, cut:
 @given(places=ways)
 def test_what_is_missing_is_what_the_band_lacks(places: list[tuple[float, float]]) -> None:
     gauge = gauge_of(FIELD, WALL, **STEERED, FENCE_MARGIN=0.0)
-    gauge = Gauge(gauge.ground, replace(gauge.vehicle, avoid_bits=0), 0.0)
+    fence = replace(gauge.vehicle.fence, avoid_bits=0)
+    gauge = Gauge(gauge.ground, replace(gauge.vehicle, fence=fence), 0.0)
     measured = gauge.measure(lines(*places))
     band = envelope(places, gauge.vehicle, heading_deg=0.0)
     kept_m = [shapely.distance(core, gauge.ground.edge) for core in band.cores] - band.bands_m

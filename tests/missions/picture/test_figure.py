@@ -225,11 +225,11 @@ def test_titles(plans: dict[str, Plan]) -> None:
         length,
         f"fence clearance: at least 2 m while driving ({plan.drawn_clearance_m:.2f} m along straight legs)",
     )
-    drawn = replace(plan, clearance_m=None)
+    drawn = replace(plan, keeps=replace(plan.keeps, promised_m=None))
     assert plan_scene(drawn).title[1].endswith("none promised while driving")
     extrapolated = replace(drawn, extrapolated=("OA_TYPE 2: not measured",))
     assert plan_scene(extrapolated).title == (f"{length}, extrapolated", plan_scene(drawn).title[1])
-    free = replace(plan, drawn_clearance_m=float("inf"), clearance_m=None)
+    free = replace(plan, keeps=replace(plan.keeps, drawn_m=float("inf"), promised_m=None))
     assert plan_scene(free).title == (f"{length}, no fence near",)
     assert (
         scene_figure(plan_scene(plan, title="A yard\nin a valley")).axes[0].get_title()
@@ -238,12 +238,13 @@ def test_titles(plans: dict[str, Plan]) -> None:
 
 
 def test_the_margin_is_what_the_route_promises(plans: dict[str, Plan]) -> None:
-    plan = replace(plans["yard"], drawn_clearance_m=30.0)
+    plan = plans["yard"]
+    plan = replace(plan, keeps=replace(plan.keeps, drawn_m=30.0))
     margin = plan_scene(plan).margin
     on_its_edge = shapely.get_coordinates(margin)
     distances_m = shapely.distance(shapely.points(on_its_edge), plan.ground.edge)
     assert distances_m.max() == pytest.approx(2.0, abs=0.01)
-    assert plan_scene(replace(plan, clearance_m=None)).margin.area > 5 * margin.area
+    assert plan_scene(replace(plan, keeps=replace(plan.keeps, promised_m=None))).margin.area > 5 * margin.area
 
 
 def test_unsafe_legs_and_where_they_cross_the_fence(plans: dict[str, Plan]) -> None:
@@ -380,7 +381,8 @@ def test_a_fence_without_inclusions_and_too_small_for_names(plans: dict[str, Pla
     dot = CircleZone(ZoneKind.EXCLUSION, plan.path[0], 0.5)
     fence = Fence((dot,))
     ground = lay_out(fence, plan.ground.frame)
-    scene = plan_scene(replace(plan, fence=fence, ground=ground, drawn_clearance_m=float("inf")), blocks=True)
+    keeps = replace(plan.keeps, drawn_m=float("inf"))
+    scene = plan_scene(replace(plan, fence=fence, ground=ground, keeps=keeps), blocks=True)
     figure = scene_figure(scene)
     assert not {"inclusion", "outside the fence"} & legend_of(figure)
     assert list(texts_of(figure, "zone")) == ["zone exclusion\ncircle 1"]

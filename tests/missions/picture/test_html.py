@@ -111,7 +111,7 @@ def test_without_a_fence_near(plans: dict[str, Plan]) -> None:
         plan,
         fence=Fence(),
         ground=lay_out(Fence(), plan.ground.frame, around=plan.path),
-        drawn_clearance_m=float("inf"),
+        keeps=replace(plan.keeps, drawn_m=float("inf")),
     )
     (legs,) = (trace for trace in scene_html_figure(plan_scene(empty)).data if trace.name == "leg")
     assert all("no fence near" in text for text in legs.text)

@@ -48,7 +48,7 @@ from missions.geo import LatLon, rounded
 from missions.items import MissionItem, waypoint
 from missions.planning.plan import plan
 from missions.request import Request
-from missions.situation import Known, ListKind, ListTransfer, Mission, Pose, Situation
+from missions.situation import Known, ListKind, ListTransfer, Mission, Pose, Reading, Situation
 
 if TYPE_CHECKING:
     from missions.planned import Plan
@@ -659,11 +659,13 @@ class TestWhatIsNotKnown:
         ],
     )  # fmt: skip
     def test_a_fence_seen_in_part(self, transfers: list[ListTransfer], problem: str) -> None:
-        situation = Situation(transfers={(ListKind.FENCE, one.to_vehicle): one for one in transfers})
+        situation = Situation(
+            reading=Reading(transfers={(ListKind.FENCE, one.to_vehicle): one for one in transfers})
+        )
         with pytest.raises(FenceMissingError, match=problem):
             plan(situation, Request(HOME, (place(5, 5),)))
         # beside an older fence it is a warning
-        older = Situation(fence=Known(Fence((FIELD,)), 1.0, "old"), transfers=situation.transfers)
+        older = Situation(fence=Known(Fence((FIELD,)), 1.0, "old"), reading=situation.reading)
         result = drawn(older, HOME, place(5, 5))
         assert any(
             "an older fence is used" in warning
@@ -672,14 +674,14 @@ class TestWhatIsNotKnown:
         )
 
     def test_a_fence_that_was_unusable(self) -> None:
-        situation = Situation(fence_trouble="fence upload: fence item 3: circle radius 0 m")
+        situation = Situation(reading=Reading(fence_trouble="fence upload: fence item 3: circle radius 0 m"))
         with pytest.raises(
             FenceMissingError, match=r"a fence was sent but cannot be used \(fence upload: fence item 3"
         ):
             plan(situation, Request(HOME, (place(5, 5),)))
         older = Situation(
             fence=Known(Fence((FIELD,)), 1.0, "old"),
-            fence_trouble=situation.fence_trouble,
+            reading=situation.reading,
             parameters={"FENCE_ENABLE": 0.0},
         )
         warnings = drawn(older, HOME, place(5, 5)).warnings

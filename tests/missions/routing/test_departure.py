@@ -117,7 +117,7 @@ def test_a_quick_rover_may_turn_no_nearer_to_the_margin_than_one_of_2_mps() -> N
     """Starts near a margin were measured at 2 m/s; in a corridor a simulated rover of 5 m/s, allowed its own straying, backed into the fence."""
     ground = ground_of(FIELD, WALL)
     start = ground.frame.to_local(place(-9, 0))
-    avoiding = replace(Vehicle(), fence=replace(Vehicle().fence, enabled=True), avoid_bits=3)
+    avoiding = replace(Vehicle(), fence=replace(Vehicle().fence, enabled=True, avoid_bits=3))
     assert avoiding.avoids_fence
     slow, quick = (
         least_turning_m(ground, start, replace(avoiding, speed_mps=speed_mps)) for speed_mps in (2.0, 5.0)

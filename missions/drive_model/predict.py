@@ -86,7 +86,12 @@ def plan_drive(
 
 
 def _of_known_corners(vehicle: Vehicle) -> Sequence[Vehicle]:
-    """Return the vehicle; where its firmware may be older than 4.6 or not, as either: the worse of both counts."""
+    """Return the vehicle; where its firmware may be older than 4.6 or not, or its RA_ACC_RAD_MAX is not known, as either: the worse of both counts."""
+    steers = vehicle.pursuit
+    if steers is not None and steers.acceptance_max_m is None:
+        return tuple(
+            replace(vehicle, pursuit=replace(steers, acceptance_max_m=most_m)) for most_m in (3.0, -1.0)
+        )
     if vehicle.has_measured_corners is not None:
         return (vehicle,)
     return tuple(replace(vehicle, has_measured_corners=has_them) for has_them in (True, False))

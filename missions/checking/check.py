@@ -15,6 +15,7 @@ from missions.checking.execution import CIRCLE_M, Course, CourseLeg, follow_miss
 from missions.checking.forecast import forecast_drive, pivot_remarks
 from missions.checking.holding import hold_check, hold_warnings
 from missions.checking.mission_end import crossed_zones, end_warnings, return_place, return_warnings
+from missions.checking.px4_waits import with_waits
 from missions.drive_model import Envelope, extrapolated
 from missions.errors import SituationError, StartBlockedError
 from missions.geo import LatLon, LocalPoint, distance_m
@@ -22,6 +23,7 @@ from missions.ground.from_situation import ground_for, heading_at
 from missions.ground.ground import EDGE_BOW_M, Ground
 from missions.ground.known_fence import fence_warnings, known_fence
 from missions.ground.legs import drawn_leg
+from missions.ground.px4_fence import own_promise_info, unenforced_warnings
 from missions.ground.seams import Seam, first_stop, is_seam, seam_advice, seam_reason, seams_of
 from missions.ground.start_hazard import start_hazard
 from missions.planned import Clearances, Plan
@@ -239,6 +241,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
         *parameter_remarks(situation),
         *fence_warnings(vehicle, situation),
         *ground.warnings,
+        *unenforced_warnings(vehicle, situation, ground),
         *asked.warnings,
         *course.notes,
         *hazards,
@@ -265,7 +268,7 @@ def check_mission(mission: Mission, situation: Situation, request: Request = _AN
         extrapolated=reasons,
         trusts_model=request.trusts_model,
         hold=hold,
-        info=asked.info,
+        info=(*asked.info, *own_promise_info(vehicle)),
     )
 
 
@@ -314,6 +317,7 @@ def _course(
     )
     if not course.legs:
         raise SituationError("; ".join(["the mission has no leg to check", *course.troubles]))
+    course = with_waits(course, mission.items, vehicle)
     return _with_drift(course, vehicle) if vehicle.boat_drift_m else course
 
 

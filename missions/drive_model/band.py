@@ -12,7 +12,7 @@ import shapely
 from missions.drive_model import corner as at_corner
 from missions.drive_model import pursuit as at_pursuit
 from missions.drive_model.stray import Stray
-from missions.vehicle import Autopilot, Steering
+from missions.vehicle import Autopilot
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -137,7 +137,7 @@ def add_corner(pieces: Pieces, drive: DrivePlan, number: int) -> None:
     if wide or len(path) == 1:
         pieces.add(_swing_hull(drive, number), band_m, corner.waypoint)
         pieces.add(_swing_strip(drive, number), band_m, corner.waypoint)
-    if drive.vehicle.autopilot is Autopilot.PX4 and drive.vehicle.steering is Steering.SKID:
+    if drive.vehicle.autopilot is Autopilot.PX4 and (corner.pivots or not corner.stops):
         pieces.add(_whole_corner(drive, number), band_m, corner.waypoint)
 
 

@@ -68,6 +68,9 @@ def _beyond_px4s(vehicle: Vehicle, least_mps: float, top_mps: float) -> Iterator
     """Yield what of a PX4 rover was not measured."""
     steers = vehicle.pursuit
     if steers is None:
+        if vehicle.steering is Steering.ACKERMANN:
+            yield "how this PX4 rover steers is not known"
+            return
         yield "skid-steered rovers were not measured with PX4: how they turn on the spot follows from its source only"
         return
     known_mps = vehicle.speed_mps if steers.full_speed_mps is None else steers.full_speed_mps

@@ -43,7 +43,9 @@ class FenceParameters:
     margin_name : str
         Which of the two it is.
     radius_m : float
-        FENCE_RADIUS, of the circle about home (PX4: GF_MAX_HOR_DIST, 0 where there is none).
+        The radius of the circle about home; 0 where there is none.
+    radius_name : str
+        FENCE_RADIUS, on PX4 GF_MAX_HOR_DIST.
     union : bool
         FENCE_OPTIONS bit 1: inside any inclusion zone is inside; otherwise it must be inside all.
     action : int
@@ -61,6 +63,7 @@ class FenceParameters:
     margin_m: float = 2.0
     margin_name: str = "FENCE_MARGIN"
     radius_m: float = 300.0
+    radius_name: str = "FENCE_RADIUS"
     union: bool = False
     action: int = 1
     avoid_bits: int = 3

@@ -43,6 +43,7 @@ def px4_vehicle(read: ParameterReader, mav_type: int | None) -> Vehicle:
             enabled=action > 0,
             margin_m=0.0,
             radius_m=read.value("GF_MAX_HOR_DIST"),
+            radius_name="GF_MAX_HOR_DIST",
             action=action,
             avoid_bits=0,
             backs_away=False,

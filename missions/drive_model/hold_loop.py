@@ -72,7 +72,7 @@ class HoldLoop:
         grounds = self._grounds(moving, more_m)
         count = len(grounds)
         beyond_m = np.full(count, -np.inf)
-        reach_m = np.array(self.distances_m(moving.speeds_mps) + more_m)
+        reach_m: NDArray[np.float64] = np.array(self.distances_m(moving.speeds_mps) + more_m)
         ends = moving.places.copy()
         shapely.prepare(allowed)
         edge = allowed.boundary
@@ -80,7 +80,7 @@ class HoldLoop:
             outside = shapely.get_coordinates(shapely.difference(grounds[one], allowed))
             if not len(outside):
                 continue
-            depths_m = shapely.distance(shapely.points(outside), edge)
+            depths_m = np.asarray(shapely.distance(shapely.points(outside), edge))
             deepest = int(depths_m.argmax())
             ends[one] = outside[deepest]
             reach_m[one] = float(np.hypot(*(outside[deepest] - moving.places[one])))

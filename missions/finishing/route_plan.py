@@ -57,6 +57,7 @@ def plan_route(
     MissionError
         As `missions.planning.plan.plan`.
     """
+    # Long by the warnings, which stand in the order in which they are told.
     fence = known_fence(situation)
     vehicle = known_vehicle(situation, request)
     start, targets = route_ends(situation, request)

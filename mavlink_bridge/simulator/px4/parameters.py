@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 INT32, REAL32 = 6, 9
 """MAV_PARAM_TYPE."""
 
-NO_INDEX = 65_535
+NO_INDEX = 65_535  # as measured of names that are not in use
 _GONE_1_18 = frozenset({"GF_PREDICT"})
 
 

@@ -77,9 +77,12 @@ class ParameterRules:
     ----------
     is_bytewise : bool
         Whether the float's bits hold a whole number; otherwise it is cast. A PARAM_SET of another type than the parameter's is then not answered.
+    left_out : frozenset of str
+        What it sends among its parameters that is none.
     """
 
     is_bytewise: bool
+    left_out: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -216,7 +219,7 @@ def _px4(name: str, form: StoredForm) -> AutopilotTable:
             # Of missions a board holds 500 or 1000, compiled in (read), the simulator 10000: no parameter tells.
             most_items={MissionType.FENCE: 64, MissionType.RALLY: 32},
         ),
-        parameters=ParameterRules(is_bytewise=True),
+        parameters=ParameterRules(is_bytewise=True, left_out=frozenset({"_HASH_CHECK"})),
         texts=Texts(
             noise=(
                 r"mission finished|takeoff detected|landing detected|armed by|disarmed by|gcs connection|ready for takeoff"

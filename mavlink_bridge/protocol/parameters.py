@@ -192,6 +192,8 @@ class ReadParameters(TableMachine[ParameterState, ParameterEvent]):
 
     def _take(self, message: ParamValue) -> None:
         name = message.param_id
+        if name in self._peer.autopilot.parameters.left_out:
+            return
         value = parameter_value(message, bytewise=self._peer.autopilot.parameters.is_bytewise)
         self._types[name] = message.param_type
         if math.isfinite(value):

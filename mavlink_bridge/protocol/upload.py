@@ -277,8 +277,11 @@ class Upload(TableMachine[UploadState, UploadEvent]):
 
     def _is_asked_again(self, seq: int, now_s: float) -> bool:
         """Return whether a request for the item wanted is no echo of one before."""
+        again_s = self._lists.asks_again_s
         last_s = max(self._sent_s.get(seq, -math.inf), self._asked_s)
-        return now_s - last_s >= _ECHO * self._lists.asks_again_s
+        # A vehicle that asks again before an answer can have come asks of an item that is on its way.
+        is_hasty = again_s < self._round_trip.mean_s and now_s < self._answered_at_s()
+        return not is_hasty and now_s - last_s >= _ECHO * again_s
 
     def _probe_after_s(self) -> float:
         """Return the silence after which to ask: shorter when only the final ACK is missing."""

@@ -25,7 +25,7 @@ _CHANGE_MODE = 1  # MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
 _MOST_LAT_E7, _MOST_LON_E7 = 900_000_000, 1_800_000_000
 
 
-class CommandServer:
+class Px4Commands:
     """Does what commands ask for.
 
     Parameters

@@ -78,7 +78,7 @@ _PARAM_RESULTS = (
 )
 
 
-class StoredList:
+class Px4List:
     """One list and the upload that may replace it.
 
     Parameters

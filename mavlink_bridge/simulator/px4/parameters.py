@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import struct
+import zlib
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,10 +15,10 @@ from mavlink_bridge.mavlink import messages as m
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-INT32, REAL32 = 6, 9
+UINT32, INT32, REAL32 = 5, 6, 9
 """MAV_PARAM_TYPE."""
 
-NO_INDEX = 65_535  # as measured of names that are not in use
+NO_INDEX = 65_535  # UINT16_MAX: PARAM_VALUE.param_index outside a list
 _GONE_1_18 = frozenset({"GF_PREDICT"})
 
 
@@ -26,7 +27,7 @@ def _rows() -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-class ParameterStore:
+class Px4Parameters:
     """Parameters by name, in a fixed order; nothing is range-checked.
 
     Parameters
@@ -81,6 +82,12 @@ class ParameterStore:
         packed = struct.pack("<i", int(value)) if kind == INT32 else struct.pack("<f", value)
         told = float(struct.unpack("<f", packed)[0])
         return m.ParamValue(name, told, kind, len(self._names), index)
+
+    def checksum(self) -> m.ParamValue:
+        """Return what ends a list: a checksum of all parameters."""
+        number = zlib.crc32(repr(self._values).encode())
+        told = float(struct.unpack("<f", struct.pack("<I", number))[0])
+        return m.ParamValue("_HASH_CHECK", told, UINT32, len(self._names), NO_INDEX)
 
     def asked(self, message: m.ParamRequestRead) -> m.ParamValue | None:
         """Return the answer to a PARAM_REQUEST_READ; silence for what there is not."""

@@ -14,7 +14,7 @@ from missions.items import CoordinateFrame
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from mavlink_bridge.simulator.px4.lists import StoredList
+    from mavlink_bridge.simulator.px4.lists import Px4List
     from missions.items import MissionItem
 
 REQUEST_AGAIN_S = 0.25
@@ -30,18 +30,18 @@ _COMPONENTS = (0, 1, 190)
 """The components that answer: everybody, the autopilot, and that of missions."""
 
 
-class _State(Enum):
+class _Phase(Enum):
     IDLE = auto()
     TAKING = auto()
     GIVING = auto()
 
 
-class TransferServer:
+class Px4Transfers:
     """The vehicle's side of all transfers on one link.
 
     Parameters
     ----------
-    lists : mapping of MissionType to StoredList
+    lists : mapping of MissionType to Px4List
         What is written to and read from.
     system : int
         The vehicle's system id.
@@ -50,7 +50,7 @@ class TransferServer:
     """
 
     def __init__(
-        self, lists: Mapping[MissionType, StoredList], system: int = 1, *, repeats_count: bool = False
+        self, lists: Mapping[MissionType, Px4List], system: int = 1, *, repeats_count: bool = False
     ) -> None:
         self.lists = lists
         self._by_number = {int(kind): stored for kind, stored in lists.items()}
@@ -62,16 +62,16 @@ class TransferServer:
     @property
     def deadline_s(self) -> float | None:
         """When `handle_timer` wants to be called; None while no transfer is under way."""
-        if self._state is _State.IDLE:
+        if self._state is _Phase.IDLE:
             return None
-        if self._state is _State.TAKING or self._counts_left:
+        if self._state is _Phase.TAKING or self._counts_left:
             return min(self._sent_s + REQUEST_AGAIN_S, self._heard_s + TIMEOUT_S)
         return self._heard_s + TIMEOUT_S
 
     @property
     def is_idle(self) -> bool:
         """Whether no transfer is under way."""
-        return self._state is _State.IDLE
+        return self._state is _Phase.IDLE
 
     def messages_to_send(self) -> list[m.Message]:
         """Return what is to be sent, and forget it."""
@@ -80,7 +80,7 @@ class TransferServer:
 
     def reboot(self) -> None:
         """Forget what is not stored."""
-        self._state = _State.IDLE
+        self._state = _Phase.IDLE
         self._partner = (0, 0)
         self._type = int(MissionType.MISSION)
         self._seq = self._count = 0
@@ -115,22 +115,22 @@ class TransferServer:
 
     def handle_timer(self, now_s: float) -> None:
         """Repeat a request or a count, or give a transfer up."""
-        if self._state is _State.IDLE:
+        if self._state is _Phase.IDLE:
             return
         if now_s >= self._heard_s + TIMEOUT_S:
             self._say(_CRITICAL, "Mission sync timeout" if self._repeats_count else "Operation timeout")
             self._end()
-        elif self._state is _State.TAKING and now_s >= self._sent_s + REQUEST_AGAIN_S:
+        elif self._state is _Phase.TAKING and now_s >= self._sent_s + REQUEST_AGAIN_S:
             self._ask(now_s)
         elif self._counts_left and now_s >= self._sent_s + REQUEST_AGAIN_S:
             self._counts_left -= 1
             self._send_count(now_s)
 
     def _take_count(self, client: tuple[int, int], message: m.MissionCount, now_s: float) -> None:
-        if self._state is _State.GIVING:
+        if self._state is _Phase.GIVING:
             self._say(_CRITICAL, "WPM: IGN MISSION_COUNT: Busy")
             self._ack(client, MissionResult.ERROR, message.mission_type)
-        elif self._state is _State.TAKING:
+        elif self._state is _Phase.TAKING:
             self._heard_s = now_s
             if client != self._partner:
                 self._ack(client, MissionResult.ERROR)
@@ -156,7 +156,7 @@ class TransferServer:
         else:
             assert stored is not None
             stored.begin()
-            self._state, self._is_claimed = _State.TAKING, True
+            self._state, self._is_claimed = _Phase.TAKING, True
             self._seq, self._count = 0, message.count
             self._heard_s = now_s
             self._ask(now_s)
@@ -168,10 +168,10 @@ class TransferServer:
             self._say(_CRITICAL, "REJ. MIS ITEM: partner id mismatch")
         elif message.mission_type != self._type:
             self._ack(client, MissionResult.ERROR)
-        elif self._state is _State.GIVING:
+        elif self._state is _Phase.GIVING:
             self._say(_CRITICAL, "IGN MISSION_ITEM: Busy")
             self._ack(client, MissionResult.ERROR)
-        elif self._state is _State.IDLE:
+        elif self._state is _Phase.IDLE:
             if message.seq + 1 == self._seq:
                 self._ack(client, MissionResult.ACCEPTED)
             else:
@@ -207,12 +207,12 @@ class TransferServer:
         stored = self._by_number.get(self._type)
         if stored is not None and self._seq == len(stored):
             # As read in the source: a transfer at the stored list's end counts as over. An upload that happens to stand there ends, and stays the one under way.
-            self._state = _State.IDLE
-        is_again = self._state is _State.GIVING and (client, mission_type) == (self._partner, self._type)
-        if self._state is not _State.IDLE and not is_again:
+            self._state = _Phase.IDLE
+        is_again = self._state is _Phase.GIVING and (client, mission_type) == (self._partner, self._type)
+        if self._state is not _Phase.IDLE and not is_again:
             self._say(_INFO, "Mission download request ignored, already active")
             return
-        self._state, self._partner, self._type = _State.GIVING, client, mission_type
+        self._state, self._partner, self._type = _Phase.GIVING, client, mission_type
         self._seq = 0
         wanted = self._by_number.get(mission_type)
         self._count = len(wanted) if wanted is not None else 0
@@ -228,8 +228,8 @@ class TransferServer:
         if client != self._partner:
             self._say(_CRITICAL, "WPM: REJ. CMD: partner id mismatch")
             return
-        if self._state is not _State.GIVING:
-            if self._state is _State.TAKING:
+        if self._state is not _Phase.GIVING:
+            if self._state is _Phase.TAKING:
                 self._say(_CRITICAL, "WPM: REJ. CMD: Busy")
             return
         if mission_type != self._type:
@@ -254,14 +254,14 @@ class TransferServer:
     def _take_ack(self, client: tuple[int, int], message: m.MissionAck, now_s: float) -> None:
         if client != self._partner:
             self._say(_CRITICAL, "REJ. WP CMD: partner id mismatch")
-        elif self._state is _State.GIVING and message.mission_type == self._type:
+        elif self._state is _Phase.GIVING and message.mission_type == self._type:
             self._heard_s = now_s
             self._end()
-        elif self._state is _State.TAKING and message.type == MissionResult.OPERATION_CANCELLED:
+        elif self._state is _Phase.TAKING and message.type == MissionResult.OPERATION_CANCELLED:
             self._end()
 
     def _clear(self, client: tuple[int, int], mission_type: int) -> None:
-        if self._state is not _State.IDLE:
+        if self._state is not _Phase.IDLE:
             self._say(_CRITICAL, "WPM: IGN CLEAR CMD: Busy")
             return
         self._type = mission_type
@@ -276,7 +276,7 @@ class TransferServer:
         self._outbox.append(request(*self._partner, self._seq, self._type))
 
     def _end(self) -> None:
-        self._state = _State.IDLE
+        self._state = _Phase.IDLE
         self._is_claimed = False
         self._counts_left = 0
 

@@ -10,11 +10,11 @@ from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.messages import MissionType
 from mavlink_bridge.mavlink.modes import px4_mode
 from mavlink_bridge.simulator import streams
-from mavlink_bridge.simulator.px4.commands import CommandServer
-from mavlink_bridge.simulator.px4.lists import StoredList
-from mavlink_bridge.simulator.px4.parameters import NO_INDEX, ParameterStore
+from mavlink_bridge.simulator.px4.commands import Px4Commands
+from mavlink_bridge.simulator.px4.lists import Px4List
+from mavlink_bridge.simulator.px4.parameters import NO_INDEX, Px4Parameters
 from mavlink_bridge.simulator.px4.rover import AUTO, HOLD, TICK_S, Px4Rover
-from mavlink_bridge.simulator.px4.transfers import TransferServer
+from mavlink_bridge.simulator.px4.transfers import Px4Transfers
 from missions.errors import MissionError
 from missions.firmware import Firmware
 from missions.geo import to_e7
@@ -71,18 +71,18 @@ class Px4Vehicle:
         self.config = config
         self.firmware = config.firmware or Firmware(1, 18, 0, 0)
         self.is_1_18 = self.firmware >= Firmware(1, 18, 0, 0)
-        self.parameters = ParameterStore(config.parameters, is_1_18=self.is_1_18)
+        self.parameters = Px4Parameters(config.parameters, is_1_18=self.is_1_18)
         self.lists = {
-            kind: StoredList(kind, checks_unused=self.is_1_18)
+            kind: Px4List(kind, checks_unused=self.is_1_18)
             for kind in (MissionType.MISSION, MissionType.FENCE, MissionType.RALLY)
         }
         for kind, items in zip(self.lists, (config.mission, config.fence, config.rally), strict=True):
             _store(self.lists[kind], items)
-        self._server = TransferServer(self.lists, config.system, repeats_count=self.is_1_18)
+        self._server = Px4Transfers(self.lists, config.system, repeats_count=self.is_1_18)
         self.rover = Px4Rover(
             self.parameters, self.lists, config.home, config.heading_deg, tells_modes=self.is_1_18
         )
-        self._commands = CommandServer(self.rover, self._report, is_1_18=self.is_1_18)
+        self._commands = Px4Commands(self.rover, self._report, is_1_18=self.is_1_18)
         self._outbox: list[m.Message] = []
         self._ids = (0, 0, 0)
         self._boot_s = self._stepped_s = self._changed_s = 0.0
@@ -153,6 +153,7 @@ class Px4Vehicle:
                 self._outbox += [
                     self.parameters.message(name, index) for index, name in enumerate(self.parameters)
                 ]
+                self._outbox.append(self.parameters.checksum())
             case m.ParamRequestRead():
                 answer = self.parameters.asked(message)
                 self._outbox += [answer] if answer is not None else []
@@ -286,7 +287,7 @@ class Px4Vehicle:
         return m.AutopilotVersion(_CAPABILITIES, number, uid2=tuple(self.config.uid.ljust(18, b"\0")[:18]))
 
 
-def _store(stored: StoredList, items: Sequence[MissionItem]) -> None:
+def _store(stored: Px4List, items: Sequence[MissionItem]) -> None:
     """Write a list the way an upload would."""
     if not items:
         return

@@ -117,6 +117,7 @@ class TestTransfers:
             assert types == {"GF_ACTION": 6, "NAV_ACC_RAD": 9}
             code, found = run(simulator, "download", "parameters")
             assert (found["parameters"]["GF_ACTION"], found["parameters"]["NAV_ACC_RAD"]) == (3.0, 0.75)
+            assert "_HASH_CHECK" not in found["parameters"]
             wanted.write_text("GF_ACTION,2.5\n")
             code, found = run(simulator, "upload", wanted)
             assert (code, found["message"]) == (

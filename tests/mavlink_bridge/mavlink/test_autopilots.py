@@ -15,7 +15,7 @@ from mavlink_bridge.mavlink.modes import ARDUPILOT_MODES, PX4_MODES, px4_mode
 from mavlink_bridge.mavlink.parameter_values import encoded_parameter, parameter_value
 from mavlink_bridge.mavlink.px4_form import px4_commands
 from mavlink_bridge.mavlink.stored_form import differences, is_same_item
-from mavlink_bridge.simulator.px4.lists import StoredList
+from mavlink_bridge.simulator.px4.lists import Px4List
 from missions.errors import MissionFormatError
 from missions.firmware import Firmware
 from missions.geo import LatLon
@@ -59,7 +59,7 @@ def lists_of_items(draw):
 
 def stored(kind, items, table):
     """Store a list in the simulated PX4's rules; return what reads back, or the first refusal."""
-    held = StoredList(kind, checks_unused=table is PX4_1_18)
+    held = Px4List(kind, checks_unused=table is PX4_1_18)
     held.begin()
     for item in items:
         result = held.take(item, current=int(item.current))

@@ -32,8 +32,8 @@ from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.protocol.wire import item_to_message
 from mavlink_bridge.simulator.item_lists import FenceList, MissionList, RallyList
 from mavlink_bridge.simulator.mission_server import MissionServer
-from mavlink_bridge.simulator.px4.lists import StoredList
-from mavlink_bridge.simulator.px4.transfers import TransferServer
+from mavlink_bridge.simulator.px4.lists import Px4List
+from mavlink_bridge.simulator.px4.transfers import Px4Transfers
 from missions.geo import LatLon
 from missions.items import Command, CoordinateFrame
 from missions.items import MissionItem as Item
@@ -125,8 +125,8 @@ class Px4Vehicle(Vehicle):
     def __post_init__(self) -> None:
         is_new = self.autopilot is not PX4_1_17
         kinds = (MissionType.MISSION, MissionType.FENCE, MissionType.RALLY)
-        self.lists = {kind: StoredList(kind, checks_unused=is_new) for kind in kinds}
-        self.server = TransferServer(self.lists, repeats_count=is_new)
+        self.lists = {kind: Px4List(kind, checks_unused=is_new) for kind in kinds}
+        self.server = Px4Transfers(self.lists, repeats_count=is_new)
         self._ids = [(-math.inf, (0, 0, 0))]
 
     def hold(self, mission_type: MissionType, items: list[Item]) -> None:

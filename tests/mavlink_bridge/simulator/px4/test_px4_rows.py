@@ -479,6 +479,7 @@ class TestParameters:
     def test_gf_predict_is_gone_in_1_18(self, bench):
         names = [answer.param_id for answer in bench.ask(m.ParamRequestList(1, 1))]
         assert ("GF_PREDICT" in names) == (not bench.vehicle.is_1_18)
+        assert names[-1] == "_HASH_CHECK"
 
     def test_nothing_is_range_checked(self, bench):
         bench.ask(m.ParamSet(1, 1, "NAV_ACC_RAD", -7.0, 9))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import cmath
 import csv
+import itertools
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -171,7 +172,7 @@ def wait(speed_mps, items, firmware):
         -min(place.real for place in places),
         max(place.real for place in places),
         max(abs(place.imag) for place in places),
-        sum(abs(b - a) for a, b in zip(places, places[1:], strict=False)),
+        sum(abs(b - a) for a, b in itertools.pairwise(places)),
         0.05 * len(standing),
         abs(standing[-1] - 20) if standing else math.nan,
     )

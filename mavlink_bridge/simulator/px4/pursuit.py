@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from mavlink_bridge.simulator.px4.parameters import ParameterStore
+    from mavlink_bridge.simulator.px4.parameters import Px4Parameters
 
 _CIRCLE_M = 0.85
 """The tightest circle of the simulated body; by its parameters it would be 0.56 m. Fitted, with the two below, to the 64 measured corners and the HOLD loop."""
@@ -36,7 +36,7 @@ _LEAST_MPS = 0.05  # below it stands; chosen
 
 
 @dataclass(slots=True)
-class Body:
+class PursuitBody:
     """Where it is (north + east·j, metres), where it looks (clockwise from north), how fast it is, and how it turns (1/m, to the right positive)."""
 
     position_m: complex
@@ -76,11 +76,11 @@ class PursuitDrive:
 
     Parameters
     ----------
-    parameters : ParameterStore or mapping of str to float
+    parameters : Px4Parameters or mapping of str to float
         Read whenever they matter.
     """
 
-    def __init__(self, parameters: ParameterStore | Mapping[str, float]) -> None:
+    def __init__(self, parameters: Px4Parameters | Mapping[str, float]) -> None:
         self._parameters = parameters
 
     def reached_m(self, turned_rad: float | None) -> float:
@@ -102,7 +102,7 @@ class PursuitDrive:
         wanted_mps = p["RO_MAX_THR_SPEED"] * (1 - min(1.0, p["RO_SPEED_RED"] * turned_rad / math.pi))
         return min(cruise_mps, max(wanted_mps, self._least_mps))
 
-    def step(self, body: Body, aim: Aim | None, dt_s: float) -> None:
+    def step(self, body: PursuitBody, aim: Aim | None, dt_s: float) -> None:
         """Let a short time pass; without an aim it brakes."""
         if aim is None:
             self._turn(body, body.heading_rad, 0.0, dt_s)
@@ -111,7 +111,7 @@ class PursuitDrive:
         error_rad = math.remainder(bearing_rad - body.heading_rad, math.tau)
         self._turn(body, bearing_rad, self._wanted_mps(body, aim, error_rad), dt_s)
 
-    def circle(self, body: Body, place_m: complex, cruise_mps: float, dt_s: float) -> None:
+    def circle(self, body: PursuitBody, place_m: complex, cruise_mps: float, dt_s: float) -> None:
         """Drive on about a place for a short time, as it does while it waits."""
         fast_mps = _WAIT_MPS + _WAIT_SHARE * cruise_mps
         self._turn(
@@ -121,7 +121,7 @@ class PursuitDrive:
             dt_s,
         )
 
-    def _turn(self, body: Body, bearing_rad: float, wanted_mps: float, dt_s: float) -> None:
+    def _turn(self, body: PursuitBody, bearing_rad: float, wanted_mps: float, dt_s: float) -> None:
         """Move on, turning to a bearing, with a speed that is wanted."""
         self._change_speed(body, wanted_mps, dt_s)
         rate_radps = _YAW_GAIN_PER_S * math.remainder(bearing_rad - body.heading_rad, math.tau)
@@ -141,7 +141,7 @@ class PursuitDrive:
         p = self._parameters
         return p["RA_WHEEL_BASE"] * math.radians(p["RO_YAW_RATE_LIM"]) / math.tan(p["RA_MAX_STR_ANG"])
 
-    def _wanted_mps(self, body: Body, aim: Aim, error_rad: float) -> float:
+    def _wanted_mps(self, body: PursuitBody, aim: Aim, error_rad: float) -> float:
         p = self._parameters
         away_m = abs(aim.goal_m - body.position_m)
         if aim.arrival_mps == 0 and away_m <= p["NAV_ACC_RAD"]:
@@ -161,7 +161,7 @@ class PursuitDrive:
         half = 2 * decel**2 / jerk
         return max(arrival_mps, math.sqrt(half**2 + 2 * decel * away_m + arrival_mps**2) - half)
 
-    def _change_speed(self, body: Body, wanted_mps: float, dt_s: float) -> None:
+    def _change_speed(self, body: PursuitBody, wanted_mps: float, dt_s: float) -> None:
         up, down = self._parameters["RO_ACCEL_LIM"], self._parameters["RO_DECEL_LIM"]
         most_mps = body.ramped_mps + up * dt_s if up > 0 else math.inf
         least_mps = body.ramped_mps - down * dt_s if down > 0 else 0.0
@@ -170,7 +170,7 @@ class PursuitDrive:
         if wanted_mps == 0 and body.speed_mps < _LEAST_MPS:
             body.speed_mps = body.ramped_mps = 0.0
 
-    def _bearing_rad(self, body: Body, aim: Aim) -> float:
+    def _bearing_rad(self, body: PursuitBody, aim: Aim) -> float:
         """Return where to steer: at the place on the line so far ahead; near the goal, or with no line, at the goal itself."""
         p = self._parameters
         ahead_m = max(p["PP_LOOKAHD_MIN"], min(p["PP_LOOKAHD_MAX"], p["PP_LOOKAHD_GAIN"] * aim.cruise_mps))

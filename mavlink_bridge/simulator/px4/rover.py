@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from mavlink_bridge.mavlink.messages import MissionType
 from mavlink_bridge.simulator.flat import FlatFrame
 from mavlink_bridge.simulator.px4.fence import activation_s, enforced_fence
-from mavlink_bridge.simulator.px4.pursuit import Aim, Body, PursuitDrive, turn_rad
+from mavlink_bridge.simulator.px4.pursuit import Aim, PursuitBody, PursuitDrive, turn_rad
 from missions.items import Command
 
 if TYPE_CHECKING:
@@ -96,6 +96,8 @@ class Px4Rover:
         How often it saw itself leave allowed ground.
     """
 
+    # Many attributes: all that PX4 itself keeps of its state at once, of modes, mission, fence, failsafes and where it drives.
+
     def __init__(
         self,
         parameters: Px4Parameters,
@@ -110,7 +112,7 @@ class Px4Rover:
         self._tells_modes = tells_modes
         self.home = home
         self.frame = FlatFrame(home)
-        self.motion = Body(0j, math.radians(heading_deg))
+        self.motion = PursuitBody(0j, math.radians(heading_deg))
         self._pursuit = PursuitDrive(parameters)
         self._late_ticks = 0
         self._goal_m: complex | None = None  # outside of missions: where it is to go, or to stay
@@ -127,7 +129,7 @@ class Px4Rover:
         self.is_in_failsafe = False
         self.is_outside = False
         self.progress = _Progress()
-        self.motion = Body(self.motion.position_m, self.motion.heading_rad)
+        self.motion = PursuitBody(self.motion.position_m, self.motion.heading_rad)
         self._goal_m = None
         self._known = (-1, -1)
         self._looked_s = -math.inf

@@ -38,7 +38,7 @@ AIRFRAME = {name: rover().vehicle.parameters[name] for name in rover().vehicle.p
 BEYOND_THE_SPREAD = {
     # row: (measured, simulated) where they differ by more than the spread
     ("turn 170", 2.0, "inside_m"): (0.47, 0.17),
-    ("noacc turn 150", 2.0, "inside_m"): (0.53, 0.02),
+    ("noacc turn 150", 2.0, "inside_m"): (0.53, 0.10),
 }
 
 

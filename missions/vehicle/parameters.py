@@ -203,7 +203,7 @@ _PX4 = (
     _px4(
         "RA_ACC_RAD_MAX",
         None,
-        "how far before it at the earliest; -1: NAV_ACC_RAD. Not known: the worse of -1 and 3",
+        "how far before it at the earliest; -1: NAV_ACC_RAD. Measured with both -1 and 3; not known: the worse of them",
         Range(-1.0),
     ),
     _px4("RA_ACC_RAD_GAIN", 2.0, "how early sharp corners are begun", Range(), Range(2, 2)),
@@ -216,7 +216,7 @@ _PX4 = (
         "speed where neither is set; corners are taken with a share of it",
         measured=Range(3.2, 3.2),
     ),
-    _px4("RO_SPEED_RED", -1.0, "how much slower corners are taken; -1 not at all"),
+    _px4("RO_SPEED_RED", -1.0, "how much slower corners are taken; -1 not at all. Measured with -1 and 1"),
     *(
         _px4(name, None, "acceleration; -1 is no limit")
         for name in ("RO_ACCEL_LIM", "RO_DECEL_LIM", "RA_MAX_ACCEL", "RD_MAX_ACCEL")

@@ -67,7 +67,8 @@ def test_every_measured_corner_lies_within(row):
     assert float(row["outside_after_m"]) <= corner.outside_overshoot_m
     assert float(row["switch_m"]) <= corner.reach_m + 0.06  # as computed: measured up to 0.05 m sooner
     assert corner.bounded
-    assert not beyond_measured(of_row(row))
+    # With other NAV_ACC_RAD only turns of 90° were measured: they lie within, and are extrapolated all the same.
+    assert bool(beyond_measured(of_row(row))) is row["run"].startswith("acc")
 
 
 @pytest.mark.parametrize(("turn_deg", "inside_m", "outside_m", "changes"), TABLE)
@@ -211,6 +212,7 @@ def test_the_band_holds_lines_and_both_circles(turn_deg, before_m, after_m, most
         ({"RA_ACC_RAD_MAX": 2}, "RA_ACC_RAD_MAX 2 was not"),
         ({"RA_ACC_RAD_GAIN": 3}, "RA_ACC_RAD_GAIN 3 was not"),
         ({"NAV_ACC_RAD": 0.2}, "NAV_ACC_RAD 0.2 m"),
+        ({"NAV_ACC_RAD": 5}, "NAV_ACC_RAD 5 m"),
         ({"RO_ACCEL_LIM": 1}, "RO_ACCEL_LIM or RO_DECEL_LIM 1 was not"),
         ({"RO_JERK_LIM": 3}, "RO_JERK_LIM 3 was not"),
         ({"RO_MAX_THR_SPEED": 5}, "RO_MAX_THR_SPEED 5 m/s"),

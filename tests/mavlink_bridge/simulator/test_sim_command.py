@@ -12,6 +12,11 @@ from pymavlink import mavutil
 from typer.testing import CliRunner
 
 from mavlink_bridge.cli.app import app
+from mavlink_bridge.cli.options.sim import SimOptions
+from mavlink_bridge.cli.sim import _config
+from mavlink_bridge.simulator.any_vehicle import vehicle_of
+from mavlink_bridge.simulator.px4.vehicle import Px4Vehicle
+from missions.firmware import read_firmware
 
 FIRST_LINE_S = 20.0
 
@@ -79,3 +84,25 @@ def test_wrong_options_are_told(options, code, said):
     result = CliRunner().invoke(app, ["sim", *options], env={"COLUMNS": "200", "NO_COLOR": "1"})
     assert result.exit_code == code
     assert said in result.output
+
+
+def test_whose_rover_it_is(fields):
+    options = SimOptions(
+        autopilot="px4",
+        firmware=read_firmware("1.17"),
+        fence=fields / "maze-fence.waypoints",
+        mission=fields / "yard-mission.waypoints",
+        param=["gf_action=3"],
+    )
+    vehicle = vehicle_of(_config(options))
+    assert isinstance(vehicle, Px4Vehicle)
+    assert (vehicle.is_1_18, vehicle.parameters["GF_ACTION"]) == (False, 3.0)
+    commands = [item.command for item in vehicle.fence]
+    assert commands == sorted(commands)  # polygons before circles, whatever the file has
+    assert {item.frame for item in vehicle.mission} <= {2, 5, 6}
+
+
+def test_an_autopilot_that_is_not_simulated():
+    result = CliRunner().invoke(app, ["sim", "--autopilot", "ardupilots"])
+    assert result.exit_code == 2
+    assert "expected one of ardupilot, px4" in " ".join(result.output.split())

@@ -8,10 +8,12 @@ from dataclasses import replace
 import pytest
 from simulator.station import GCS, HOME, RIVAL, Bench, at, placed, square
 
+from mavlink_bridge.errors import BridgeError
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.messages import MavResult, MissionResult, MissionType
 from mavlink_bridge.mavlink.modes import px4_mode
 from mavlink_bridge.simulator import SimulatorConfig
+from missions.errors import MissionError
 from missions.firmware import Firmware
 from missions.items import Command, CoordinateFrame, MissionItem, change_speed, waypoint
 
@@ -510,3 +512,149 @@ def test_lists_stay_over_a_reboot_and_transfers_do_not():
     assert len(bench.vehicle.mission) == 1
     assert requests(bench.count(2)) == [0]
     assert GCS == (255, 190)
+
+
+class TestTheSimpleLaw:
+    """What the simulated rover makes of a mission; only the answers are PX4's, not how it drives."""
+
+    def test_speeds_waits_and_the_way_home(self):
+        bench = rover(home=HOME, heading_deg=90.0)
+        wait = replace(waypoint(at(6, 0)), command=Command.NAV_LOITER_TIME, params=(3.0, 0, 0, 0))
+        bench.upload(
+            [change_speed(1.5), wait, MissionItem(Command.NAV_DELAY, 2, (2.0, 0, 0, 0)), MissionItem(20, 2)]
+        )
+        assert bench.command(Command.MISSION_START) == MavResult.ACCEPTED
+        bench.run(2.0)
+        bench.command(Command.REQUEST_MESSAGE, 33)
+        bench.command(Command.REQUEST_MESSAGE, 74)
+        assert bench.of(m.GlobalPositionInt)[-1].vx == 150
+        assert bench.of(m.VfrHud)[-1].groundspeed == 1.5
+        bench.run(3.0)
+        assert bench.vehicle.rover.motion.speed_mps == 0
+        bench.run(5.5)
+        assert mode(bench) == RTL
+        bench.run(10.0)
+        assert not armed(bench)
+
+    def test_jumps_and_waiting_without_end(self):
+        bench = rover()
+        stay = replace(waypoint(at(3, 0)), command=Command.NAV_LOITER_UNLIM)
+        bench.upload([*way((2, 0)), MissionItem(Command.DO_JUMP, 2, (3.0, 1.0, 0, 0)), *way((90, 0)), stay])
+        bench.command(Command.MISSION_START)
+        bench.run(10.0)
+        assert mode(bench) == IN_MISSION
+        assert bench.vehicle.rover.progress.seq == 3
+        bench.upload([MissionItem(Command.DO_JUMP, 2, (9.0, 1.0, 0, 0))])  # past the end: it ends there
+        bench.run(1.0)
+        assert mode(bench) == HOLD
+
+    def test_landing_disarms(self):
+        bench = rover()
+        bench.command(Command.COMPONENT_ARM_DISARM, 1)
+        bench.command(Command.DO_SET_MODE, 1, 4, 6)
+        bench.run(3.0)
+        assert not armed(bench)
+
+    def test_set_mode_by_the_message(self, bench):
+        bench.ask(m.SetMode(1, 1, RTL))
+        assert mode(bench) == RTL
+        bench.ask(m.SetMode(1, 1, px4_mode(9)))
+        assert mode(bench) == RTL
+
+    def test_a_mode_that_is_none(self):
+        bench = rover(NEW)
+        assert bench.command(Command.DO_SET_MODE, 1, 4, 99) == MavResult.TEMPORARILY_REJECTED
+        assert bench.texts()[-1].strip() == "Unsupported auto mode"
+        assert bench.command(Command.DO_SET_MODE, 1, math.nan) == MavResult.DENIED
+
+    def test_a_goal_outside_the_fence(self):
+        bench = rover()
+        bench.upload(square(20, 0), FENCE)
+        bench.run(1.0)
+        bench.command(Command.COMPONENT_ARM_DISARM, 1)
+        goal = waypoint(at(20, 0))
+        bench.command(Command.DO_REPOSITION, -1, 1, as_int=True, x=goal.lat_e7, y=goal.lon_e7)
+        assert bench.texts()[-1].strip() == "Reposition is outside geofence"
+
+    def test_arming_by_another_number(self, bench):
+        assert bench.command(Command.COMPONENT_ARM_DISARM, 2) == MavResult.DENIED
+        assert bench.command(Command.COMPONENT_ARM_DISARM, 0) == MavResult.ACCEPTED
+        assert bench.command(Command.REQUEST_MESSAGE, 9999) == MavResult.DENIED
+
+    def test_telemetry_flows(self):
+        bench = Bench(SimulatorConfig(autopilot=m.Autopilot.PX4))
+        bench.run(2.0)
+        kinds = {type(message) for _, message in bench.heard}
+        assert {m.SysStatus, m.GpsRawInt, m.GlobalPositionInt, m.MissionCurrent, m.HomePosition} <= kinds
+        assert (bench.of(m.MissionCurrent)[-1].total, bench.of(m.MissionCurrent)[-1].mission_state) == (
+            65_535,
+            1,
+        )
+        assert not bench.vehicle.is_armed
+        assert bench.vehicle.mode == HOLD
+        assert bench.vehicle.rally == ()
+        assert abs(bench.vehicle.position.lat_deg - HOME.lat_deg) < 1e-7
+        assert bench.ask(m.ParamRequestRead(1, 1, "", 999)) == []
+        assert bench.ask(m.ParamRequestRead(1, 1, "", 0))[0].param_id == "CA_AIRFRAME"
+        bench.vehicle.receive(m.Frame(1, 1, m.ParamRequestList(1, 1)), bench.now_s)  # its own: not answered
+        assert bench.vehicle.messages_to_send() == []
+
+    def test_reached_items_are_told_again(self, bench):
+        bench.upload(way((5, 0)))
+        bench.command(Command.MISSION_START)
+        bench.run(4.0)
+        assert bench.of(m.MissionItemReached)
+        vehicle = rover(OLD, mission=tuple(way((5, 0))), fence=tuple(square(50, 50))).vehicle
+        assert (len(vehicle.mission), len(vehicle.fence)) == (1, 4)
+
+
+@pytest.mark.parametrize(
+    ("options", "error"),
+    [
+        ({"parameters": {"WP_SPEED": 1.0}}, "the simulated PX4 rover has no parameter WP_SPEED"),
+        ({"fence": tuple(square(5, 5)) * 17}, "68 items; the simulated PX4 rover holds 64"),
+        ({"mission": (MissionItem(18),)}, "item 0 is refused: UNSUPPORTED"),
+    ],
+)
+def test_what_it_cannot_start_with(options, error):
+    with pytest.raises((BridgeError, MissionError), match=error):
+        rover(NEW, **options)
+
+
+def test_a_fence_that_nobody_knows_what_to_make_of_is_taken(bench):
+    box = square(20, 0)
+    assert bench.upload(box[:3], FENCE)[0] == MissionResult.ACCEPTED  # one vertex is missing
+    point = placed(Command.FENCE_RETURN_POINT, at(1, 1))
+    assert bench.upload([point, *square(20, 0)], FENCE)[0] == MissionResult.ACCEPTED
+    bench.run(1.0)
+    assert [t.strip() for t in bench.upload(way((20, 0)))[1]] == ["Geofence violation for waypoint 1"]
+
+
+def test_a_float_read_back(bench):
+    bench.upload([waypoint(at(5, 5)), MissionItem(Command.DO_SET_HOME, 2, (0, 0, 0, 0), 7, 0)])
+    bench.ask(m.MissionRequestList(1, 1))
+    first, second = bench.ask(m.MissionRequest(1, 1, 0), m.MissionRequest(1, 1, 1))
+    assert (type(first), first.frame) == (m.MissionItem, 6)
+    assert first.x == pytest.approx(at(5, 5).lat_deg, abs=1e-5)
+    assert second.x == 7.0
+    old = m.MissionItem(1, 1, 0, 2, 179, 0, 1, 0, 0, 0, 0, 9.0, 0.0, 0.0)
+    bench.ask(m.MissionAck(1, 1, 0))
+    bench.count(1)
+    assert acks(bench.ask(old)) == [MissionResult.ACCEPTED]
+    assert bench.vehicle.mission[0].lat_e7 == 9
+
+
+def test_requests_of_strangers(bench):
+    bench.upload(way((1, 0)))
+    bench.ask(m.MissionRequestList(1, 1))
+    bench.ask(m.MissionRequestInt(1, 1, 0), m.MissionAck(1, 1, 0), sender=RIVAL)
+    texts = [text.strip() for text in bench.texts()]
+    assert texts[-2:] == ["WPM: REJ. CMD: partner id mismatch", "REJ. WP CMD: partner id mismatch"]
+    assert bench.ask(m.MissionRequestInt(1, 1, 0, FENCE)) == []
+    assert acks(bench.ask(bench.item(0, waypoint(HOME)))) == [MissionResult.ERROR]
+    assert bench.texts()[-1].strip() == "IGN MISSION_ITEM: Busy"
+    bench.ask(m.MissionAck(1, 1, 0))
+    bench.count(2)
+    bench.ask(bench.item(0, waypoint(HOME)))
+    bench.ask(m.MissionRequestInt(1, 1, 0))
+    assert bench.texts()[-1].strip() == "WPM: REJ. CMD: Busy"

@@ -105,14 +105,14 @@ STANDSTILL = Blend(0.0, 0.0)
 
 def band_m(vehicle: Vehicle, speed_mps: float) -> float:
     """Return how far a rover strays to either side of the path that its autopilot aims for."""
-    if vehicle.pursuit is not None:
+    if vehicle.autopilot is Autopilot.PX4:
         return pursuit.BAND_M
     return BAND_AT_REST_M + BAND_HEADING_ERROR * speed_mps / vehicle.position_gain_per_s
 
 
 def inside_band_m(vehicle: Vehicle, speed_mps: float, band_m: float) -> float:
     """Return how far a rover strays to the inside of a cut, of the path that its autopilot aims for."""
-    if vehicle.pursuit is not None:
+    if vehicle.autopilot is Autopilot.PX4:
         return band_m
     return before_4_6.inside_band_m(speed_mps) if is_early(vehicle) else min(band_m, INSIDE_BAND_M)
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from missions.drive_model import corner as at_corner
+from missions.drive_model import pursuit
 from missions.drive_model.band import Pieces, add_corner, add_end, add_leg, add_start
 from missions.drive_model.envelope import Envelope
 from missions.drive_model.from_points import SAME_PLACE_M, drive_plan
@@ -261,6 +262,9 @@ def _start(array: NDArray[np.float64], vehicle: Vehicle, heading_deg: float | No
     stray = Stray(
         swing_m if error_deg < 0 or either_side else 0.0, swing_m if error_deg >= 0 or either_side else 0.0
     )
+    if vehicle.pursuit is not None:
+        back_m = pursuit.start_back_swing_m(vehicle, vehicle.pursuit, error_deg)
+        stray = stray.wider(Stray(back_m, back_m))
     return stray, at_corner.start_behind_m(vehicle, error_deg)
 
 

@@ -198,7 +198,7 @@ _PX4 = (
         10.0,
         "how near to a waypoint the next leg begins at the latest",
         Range(),
-        Range(0.5, 5),
+        Range(0.5, 0.5),
     ),
     _px4(
         "RA_ACC_RAD_MAX",

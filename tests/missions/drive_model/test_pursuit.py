@@ -237,3 +237,26 @@ def test_unmeasured_turns_are_said():
     track = envelope([(0, 0), (0, 10), (5, 2)], vehicle, heading_deg=0.0)
     assert not track.corners[0].bounded
     assert "turns like those of this drive" in extrapolated(vehicle, track)[0]
+
+
+def drives():
+    """Return the 14 drives of planned routes that were recorded of v1.17.0: speed, heading, waypoints and track."""
+    with (Path(__file__).parent / "data" / "px4_drives.csv").open(encoding="ascii", newline="") as file:
+        found = list(csv.DictReader(file))
+    for drive in sorted({int(row["drive"]) for row in found}):
+        mine = [row for row in found if int(row["drive"]) == drive]
+        places = {
+            kind: [(float(row["east_m"]), float(row["north_m"])) for row in mine if row["kind"] == kind]
+            for kind in ("waypoint", "track")
+        }
+        yield float(mine[0]["speed_mps"]), float(mine[0]["heading_deg"]), places["waypoint"], places["track"]
+
+
+@pytest.mark.parametrize(
+    "drive", list(drives()), ids=lambda drive: f"{drive[0]:g} m/s, {len(drive[2])} points"
+)
+def test_recorded_drives_stay_in_the_corridor(drive):
+    speed_mps, heading_deg, waypoints, track = drive
+    band = envelope(waypoints, rover(RO_SPEED_LIM=speed_mps), heading_deg=heading_deg)
+    assert len(track) > 30
+    assert all(band.area.covers(Point(place)) for place in track)

@@ -83,8 +83,10 @@ class HoldLoop:
             depths_m = np.asarray(shapely.distance(shapely.points(outside), edge))
             deepest = int(depths_m.argmax())
             ends[one] = outside[deepest]
-            reach_m[one] = float(np.hypot(*(outside[deepest] - moving.places[one])))
             beyond_m[one] = depths_m[deepest]
+            # What is told is how far away the fence is, whichever way the loop comes to it.
+            place = shapely.Point(moving.places[one])
+            reach_m[one] = beyond_m[one] + (edge.distance(place) if allowed.covers(place) else 0.0)
         return Leaving(reach_m, beyond_m, ends)
 
     def _grounds(self, moving: Motion, more_m: NDArray[np.float64] | float) -> NDArray[np.object_]:

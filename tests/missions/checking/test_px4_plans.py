@@ -172,3 +172,17 @@ def test_a_hold_beside_a_fence_is_warned_of():
     checked = check_mission(Mission(way((0, 13.5), (15, 13.5))), field(), GoTo(clearance_m=0.5))
     assert checked.hold.worst is not None
     assert any("HOLD drives a loop" in text for text in checked.warnings)
+
+
+def test_other_ends_of_a_wait():
+    unlimited = replace(way((0, -20))[0], command=Command.NAV_LOITER_UNLIM)
+    assert check_mission(Mission((unlimited,)), field()).legs[0].leg.circle_m == WAIT_M
+    home = MissionItem(Command.NAV_RETURN_TO_LAUNCH, frame=CoordinateFrame.MISSION)
+    back = check_mission(Mission((*way((0, -20)), home)), field())
+    assert [leg.leg.circle_m for leg in back.legs] == [0.0, 0.0]
+    # A DELAY behind a jump belongs to another place; one of no number waits for no time, and stops all the same.
+    jump = MissionItem(Command.DO_JUMP, params=(1.0, 1.0, 0.0, 0.0), frame=CoordinateFrame.MISSION)
+    items = (*way((0, -20), (0, -30)), jump, delay(5.0), *way((0, -40)), delay(float("nan")))
+    legs = check_mission(Mission(items), field(firmware=NEW)).legs
+    assert {leg.leg.stop_s for leg in legs if leg.leg.last_item == 2} == {None}
+    assert legs[-1].leg.stop_s == 0.0

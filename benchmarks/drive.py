@@ -288,7 +288,7 @@ def _planned_and_driven(
     shortest_m = (
         math.nan if trusts_model else plan(situation, replace(request, corner_allowance_m=0.0)).length_m
     )
-    driven_s, rover, arrived = _drive(field, planned, parameters, firmware)
+    driven_s, rover, arrived = drive_plan(field, planned, parameters, firmware)
     return Run(
         **known,  # type: ignore[arg-type]
         planning_s=planning_s,
@@ -307,7 +307,7 @@ def _planned_and_driven(
     )
 
 
-def _drive(
+def drive_plan(
     field: Field, planned: Plan, parameters: dict[str, float], firmware: Firmware
 ) -> tuple[float, SimulatedVehicle, bool]:
     """Drive a plan in AUTO until it is complete, or much longer than foreseen."""

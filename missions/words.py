@@ -18,6 +18,11 @@ def counted(count: int, name: str) -> str:
     return f"{count} {name}" if count == 1 else f"{count} {name}s"
 
 
+def mission_items(count: int) -> str:
+    """Return how many items a mission has, home included, as the autopilot counts them."""
+    return f"{counted(count, 'mission item')} with home"
+
+
 HEADING_UNKNOWN = "heading unknown; assuming the rover faces waypoint 1"
 
 

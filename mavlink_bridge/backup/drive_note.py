@@ -55,12 +55,15 @@ class DriveNote:
         How long the autopilot had been on, in milliseconds: later less says that it was switched off and on since.
     record : DriveRecord
         What was planned.
+    call : str
+        What the vehicle was called home by; empty where it was not.
     """
 
     vehicle: VehicleMark
     mission: tuple[MissionItem, ...]
     boot_ms: int
     record: DriveRecord
+    call: str = ""
 
 
 def note_to_json(note: DriveNote) -> dict[str, Any]:
@@ -75,6 +78,7 @@ def note_to_json(note: DriveNote) -> dict[str, Any]:
         "vehicle": mark_to_json(note.vehicle),
         "mission": [item_to_json(item) for item in note.mission],
         "boot_ms": note.boot_ms,
+        "call": note.call,
         **kept,
         "items": [item_to_json(item) for item in record.items],
         "home": list(record.home) if record.home is not None else None,
@@ -117,7 +121,8 @@ def note_from_json(content: dict[str, Any]) -> DriveNote:
         firmware=read_firmware(firmware) if firmware is not None else None,
     )
     mark = mark_from_json(int(content["system"]), content["vehicle"])
-    return DriveNote(mark, tuple(map(item_from_json, content["mission"])), int(content["boot_ms"]), record)
+    mission = tuple(map(item_from_json, content["mission"]))
+    return DriveNote(mark, mission, int(content["boot_ms"]), record, str(content.get("call", "")))
 
 
 class DriveNotes:
@@ -155,7 +160,7 @@ class DriveNotes:
         for path in sorted(self._folder.glob("drive-under-way-*.json")) if self._folder.is_dir() else ():
             try:
                 if not path.is_file() or path.stat().st_size > _MOST_BYTES:
-                    raise ValueError(f"it is no file, or larger than {_MOST_BYTES} bytes")
+                    raise ValueError(f"it is not a file, or is larger than {_MOST_BYTES} bytes")
                 notes.append(note_from_json(json.loads(path.read_text(encoding="utf-8"))))
             except (OSError, IndexError, *UNREADABLE, MissionError) as error:
                 troubles.append(

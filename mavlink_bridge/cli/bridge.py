@@ -20,7 +20,7 @@ from mavlink_bridge.cli.failing import Level, exit_code_of, telling
 from mavlink_bridge.cli.interrupting import AtHand, interruptible, terminable
 from mavlink_bridge.cli.keyboard import Keyboard
 from mavlink_bridge.cli.link_notes import tell_echoes
-from mavlink_bridge.cli.live import BackupKeeper, PlanMaker, director_at_hand
+from mavlink_bridge.cli.live import BackupKeeper, PlanMaker, WaysMaker, director_at_hand
 from mavlink_bridge.cli.opening import Opening
 from mavlink_bridge.cli.permissions import check_permissions
 from mavlink_bridge.cli.plan_request import request_from_options
@@ -29,9 +29,10 @@ from mavlink_bridge.cli.run_log import RunLog, SafeTeller
 from mavlink_bridge.cli.session import signing_of
 from mavlink_bridge.cli.terminal import echo, print_json, say
 from mavlink_bridge.cli.typed import CONFIRM, understood
+from mavlink_bridge.cli.values import given_places
 from mavlink_bridge.cli.vehicle_options import described_vehicle
 from mavlink_bridge.director import AT_WORK, Director, EventName, Orders, Severity
-from mavlink_bridge.director.orders import DEFAULT_SOURCES, TargetSource
+from mavlink_bridge.director.orders import DEFAULT_SOURCES, Homing, ObstacleSource, TargetSource
 from mavlink_bridge.errors import LinkError, UsageError
 from mavlink_bridge.link import ONE_SHOT_IDENTITY, now_s, open_link, parse_connection
 from mavlink_bridge.mavlink.echoes import SentFrames
@@ -56,7 +57,12 @@ if TYPE_CHECKING:
 
 # Between attempts to open a link anew: doubled up to half a minute. Chosen, not measured.
 _BACKOFF_S = (0.5, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0)
+_OBSTACLES_TEXT = "reported obstacles are planned round; this protects no person: a sensor may see nothing, and the rover rolls on after HOLD"
 _LINK_LOOK_S = 0.25  # how soon an interrupt is seen while waiting for that
+_BY_ROUTE = (
+    "--rtl-by-route: the first RTL is answered with HOLD and a verified way home round the fences in AUTO. RTL again 4 s or more later, or any other mode, "
+    "is yours at once: then RTL drives straight, through whatever lies between"
+)
 _OPENING_LOOK_S = 0.05  # and while a link is being opened
 
 
@@ -64,6 +70,10 @@ def bridge(options: BridgeOptions) -> None:
     """Run the director on a link until its single job is done, or for ever."""
     check_permissions(upload=options.upload, drive=options.drive, arm=options.arm)
     orders = _orders(options)
+    if orders.obstacle_sources:
+        inform((_OBSTACLES_TEXT,))
+    if orders.homing.by_route:
+        inform([_BY_ROUTE])
     described = described_vehicle(options)
     with contextlib.ExitStack() as stack:
         notes, troubles = DriveNotes(BackupStore().folder).read()
@@ -85,10 +95,10 @@ def bridge(options: BridgeOptions) -> None:
 
 
 def _orders(options: BridgeOptions) -> Orders:
-    try:
-        sources = frozenset(map(TargetSource, options.target_from)) or DEFAULT_SOURCES
-    except ValueError as error:
-        raise UsageError(f"--target-from: {error}; expected one of {', '.join(TargetSource)}") from None
+    choices = [source for source in TargetSource if source is not TargetSource.HOME]
+    if unknown := set(options.target_from) - set(choices):
+        raise UsageError(f"--target-from {min(unknown)!r}: expected one of {', '.join(choices)}")
+    sources = frozenset(map(TargetSource, options.target_from)) or DEFAULT_SOURCES
     return Orders(
         identity=(options.source_system, options.source_component) if options.source_system else None,
         own_component=options.source_component,
@@ -100,6 +110,7 @@ def _orders(options: BridgeOptions) -> Orders:
             ),
             trusts_model=options.trust_model,
             accepts_less=options.accept_less,
+            escape=options.escape,
         ),
         upload=options.upload,
         drive=options.drive,
@@ -108,8 +119,49 @@ def _orders(options: BridgeOptions) -> Orders:
         once=options.once,
         announce=True,
         target_sources=sources,
+        obstacle_sources=_obstacle_sources(options.obstacles_from),
+        obstacle_growth_mps=options.obstacle_growth,
+        obstacle_keep_s=options.obstacle_keep,
         patience_s=options.timeout,
+        homing=_homing(options),
     )
+
+
+def _homing(options: BridgeOptions) -> Homing:
+    """Return what is known of ways home, and when one is driven.
+
+    Raises
+    ------
+    UsageError
+        An option without those that it rests on.
+    """
+    if options.rtl_by_route and not options.drive:
+        raise UsageError("--rtl-by-route needs --upload --drive: it switches the vehicle to HOLD and AUTO")
+    if options.rtl_by_route and options.once:
+        raise UsageError("--rtl-by-route does not go with --once: a bridge that has ended brings nobody home")
+    for name, value in (
+        ("--battery-percent", options.battery_percent),
+        ("--battery-volts", options.battery_volts),
+        ("--gcs-timeout", options.gcs_timeout),
+    ):
+        if value is not None and not options.rtl_by_route:
+            raise UsageError(f"{name} needs --rtl-by-route: it says when the vehicle is brought home")
+    return Homing(
+        is_kept=not options.once,
+        places=given_places(options.place),
+        by_route=options.rtl_by_route,
+        battery_percent=options.battery_percent,
+        battery_volts=options.battery_volts,
+        gcs_timeout_s=options.gcs_timeout,
+    )
+
+
+def _obstacle_sources(texts: list[str]) -> frozenset[ObstacleSource]:
+    names = [name for text in texts for name in text.split(",")]
+    try:
+        return frozenset(map(ObstacleSource, names))
+    except ValueError as error:
+        raise UsageError(f"--obstacles-from: {error}; expected one of {', '.join(ObstacleSource)}") from None
 
 
 @dataclass(eq=False)
@@ -177,6 +229,7 @@ class _Shell:
             journal=lambda name, now, text: self._written.call(name, now, text=text),
         )
         self._plans = PlanMaker(self.director)
+        self._ways = WaysMaker(self.director)
         self._keyboard = Keyboard()
         self._asked_for: Plan | None = None  # the plan that waits for a yes, as was printed
 
@@ -283,6 +336,9 @@ class _Shell:
         if (made := self._plans.take()) is not None:
             self._written.call("plan_made", now)
             self.director.plan_made(*made, now)
+        if (ways := self._ways.take()) is not None:
+            self._written.call("ways_made", now)
+            self.director.ways_made(*ways, now)
 
     def _listen_to_keyboard(self, now: float) -> None:
         line = self._keyboard.line()
@@ -299,6 +355,13 @@ class _Shell:
         elif typed.target is not None:
             self._written.call("target", now, typed.target)
             self.director.take_target(typed.target, now)
+        elif typed.obstacle is not None:
+            position, radius_m = typed.obstacle.position, typed.obstacle.radius_m
+            self._written.call("obstacle", now, position, str(radius_m))
+            self.director.take_obstacle(position, radius_m, now)
+        elif typed.clears:
+            self._written.call("clear", now)
+            self.director.clear_obstacles(now)
 
     def _note(self, text: str, *, is_warning: bool) -> None:
         """Print a note that is not an event, where it does not disturb: above the view, else on stderr."""

@@ -142,6 +142,10 @@ class LiveView:
             rows.append(("clearance", f"{drive.least_clearance_m:.1f} m, the least so far"))
         elif director.plan is not None:
             rows.append(("route", f"{director.plan.length_m:.0f} m, {len(director.plan.items) + 1} items"))
+        if (way := director.way_home) is not None:
+            rows.append(("way home", f"{way.place.name}, {way.length_m:.0f} m, about {way.time_s:.0f} s"))
+        elif director.no_way_home:
+            rows.append(("way home", cell(f"none: {director.no_way_home}", "yellow")))
         if director.awaits_confirmation:
             rows.append(("plan", cell(CONFIRM, "bold")))
         if self._answer is not None:

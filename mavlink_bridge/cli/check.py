@@ -32,7 +32,7 @@ from missions.picture.plans import plan_scene
 from missions.request import GoTo
 from missions.situation import Situation
 from missions.vehicle.item_limit import most_items
-from missions.words import metres
+from missions.words import counted, metres, mission_items
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -109,7 +109,7 @@ def _storage_warnings(items: Sequence[MissionItem], situation: Situation) -> lis
     """Warn of a mission (its items without home) that the vehicle cannot hold."""
     most = most_items(situation.parameters)
     count = len(items) + 1
-    return [f"{count} mission items with home; the vehicle holds {most}"] if count > most else []
+    return [f"{mission_items(count)}; the vehicle holds {most}"] if count > most else []
 
 
 def _with_files(source: Situation | None, options: CheckOptions) -> Situation:
@@ -141,9 +141,11 @@ def _with_files(source: Situation | None, options: CheckOptions) -> Situation:
 def _scene(checked: MissionCheck, planned: Plan, ways: RouteWays | None) -> PictureScene:
     count, broken = len(checked.legs), len(checked.broken)
     verdict = (
-        f"FAIL: {broken} of {count} legs {'does' if broken == 1 else 'do'} not keep"
+        f"FAIL: {broken} of {counted(count, 'leg')} {'does' if broken == 1 else 'do'} not keep"
         if broken
         else f"all {count} legs keep"
+        if count > 1
+        else "the leg keeps"
     )
     extrapolated = ", extrapolated" if checked.extrapolated else ""
     title = f"{checked.length_m:.1f} m, about {checked.duration_s:.0f} s\n{verdict} {checked.clearance_m:g} m while driving{extrapolated}"
@@ -184,8 +186,8 @@ def _report_legs(checked: MissionCheck, plots: list[Path]) -> None:
         table.add_row(*map(cell, _row(leg)), style="red" if leg.breaks else None)
     console().print(table)
     echo(
-        f"{len(checked.legs)} legs, {checked.length_m:.1f} m, about {checked.duration_s:.0f} s"
-        f"{' for each round' if checked.course.is_endless else ''}; {len(checked.mission.items) + 1} mission items with home"
+        f"{counted(len(checked.legs), 'leg')}, {checked.length_m:.1f} m, about {checked.duration_s:.0f} s"
+        f"{' for each round' if checked.course.is_endless else ''}; {mission_items(len(checked.mission.items) + 1)}"
     )
     for path in plots:
         if str(path) != "-":

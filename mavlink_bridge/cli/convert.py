@@ -13,6 +13,7 @@ from mavlink_bridge.cli.terminal import echo, print_json
 from mavlink_bridge.cli.values import position_from
 from mavlink_bridge.errors import UsageError
 from missions.formats import Part, format_of, parts_of, write_situation
+from missions.words import counted, mission_items
 
 if TYPE_CHECKING:
     from mavlink_bridge.cli.options.convert import ConvertOptions
@@ -84,7 +85,7 @@ def _left_out(situation: Situation, written: tuple[Part, ...], output: Path) -> 
         placeless = sum(not item.is_placed for item in mission.value.items)
         if placeless:
             texts.append(
-                f"{placeless} mission items without a place left out: a {output.suffix} file holds the route only"
+                f"{counted(placeless, 'mission item')} without a place left out: a {output.suffix} file holds the route only"
             )
     fence = situation.fence
     if fence is not None and fence.value.return_point and output.suffix.lower() == ".poly":
@@ -96,10 +97,9 @@ def _count(situation: Situation, part: Part) -> str:
     """Return how much of a part there is, in words."""
     mission, fence, rally = situation.mission, situation.fence, situation.rally
     counts = {
-        "mission": (mission.value.item_count() if mission else 0, "mission item"),
-        "fence": (len(fence.value.zones) if fence else 0, "fence zone"),
-        "rally": (len(rally.value) if rally else 0, "rally point"),
-        "parameters": (len(situation.parameters), "parameter"),
+        "mission": mission_items(mission.value.item_count() if mission else 0),
+        "fence": counted(len(fence.value.zones) if fence else 0, "fence zone"),
+        "rally": counted(len(rally.value) if rally else 0, "rally point"),
+        "parameters": counted(len(situation.parameters), "parameter"),
     }
-    count, word = counts[part]
-    return f"{count} {word}{'s' * (count != 1)}"
+    return counts[part]

@@ -145,7 +145,7 @@ def _write(
     items: tuple[MissionItem, ...],
     parameters: Mapping[str, float],
     *,
-    has_home: bool,
+    has_home: bool = True,
 ) -> None:
     if path.suffix.lower() == ".plan":
         _write_plan(path, what, items, has_home=has_home)

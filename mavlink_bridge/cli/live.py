@@ -8,7 +8,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from threading import Thread
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 from mavlink_bridge.backup.drive_note import DriveNotes
 from mavlink_bridge.backup.store import BackupStore
@@ -23,6 +23,7 @@ from mavlink_bridge.cli.restoring import interrupted_warnings
 from mavlink_bridge.cli.session import signing_of
 from mavlink_bridge.cli.timed_plan import timed_plan
 from mavlink_bridge.director import Director, EventName, Orders, State
+from mavlink_bridge.director.plan_task import HomeWays, PlanTask, WaysTask
 from mavlink_bridge.errors import BackupError, BridgeError, LinkError, VehicleInUseError
 from mavlink_bridge.link import ONE_SHOT_IDENTITY, open_link, parse_connection
 from mavlink_bridge.mavlink.messages import Autopilot, MissionType
@@ -30,7 +31,7 @@ from mavlink_bridge.protocol.outcomes import Writing, ends_in_words, held_text
 from mavlink_bridge.protocol.vehicle_watch import Doing
 from mavlink_bridge.protocol.verified_upload import Held
 from missions.checking.execution import follow_mission
-from missions.errors import SituationError
+from missions.errors import MissionError, SituationError
 from missions.items import Command
 from missions.planned import Plan
 from missions.planning.plan import plan as make_plan
@@ -42,13 +43,14 @@ if TYPE_CHECKING:
 
     from mavlink_bridge.backup.drive_note import DriveNote
     from mavlink_bridge.cli.drawing import Shown
-    from mavlink_bridge.director.plan_task import PlanTask
     from mavlink_bridge.link import Link
     from mavlink_bridge.mavlink.messages import Frame
     from mavlink_bridge.protocol.verified_upload import VerifiedUpload
-    from missions.errors import MissionError
     from missions.items import MissionItem
     from missions.request import Request
+
+TaskT = TypeVar("TaskT")
+MadeT = TypeVar("MadeT")
 
 # Between two looks at the display, and at a plan in the making; chosen, not measured.
 _IDLE_S, _BUSY_S = 0.25, 0.02
@@ -273,8 +275,55 @@ def _check_drivable(planned: Plan) -> None:
             )
 
 
-class PlanMaker:
-    """Makes the plans a director waits for, beside the link, so that messages go on meanwhile.
+class _Beside(Generic[TaskT, MadeT]):
+    """Does the tasks that a director waits for, one at a time, in a thread beside the link, so that messages go on meanwhile.
+
+    Parameters
+    ----------
+    waiting : callable
+        Returns the task that is waited for, None where none is.
+    make : callable
+        Does one.
+    """
+
+    def __init__(self, waiting: Callable[[], TaskT | None], make: Callable[[TaskT], MadeT]) -> None:
+        self._waiting = waiting
+        self._make = make
+        self._task: TaskT | None = None  # under way, also when nobody waits for it any more
+        self._made: Future[MadeT] = Future()
+
+    def longest_wait_s(self) -> float:
+        """Return how long the shell may wait for messages before it calls again."""
+        return _IDLE_S if self._task is None else _BUSY_S
+
+    def take(self) -> tuple[TaskT, MadeT] | None:
+        """Return what was made for the director since the last call; begin what it waits for."""
+        task = self._task
+        if task is not None and self._made.done():
+            self._task = None
+            made = self._made.result()  # also raises what nobody expected
+            if task is self._waiting():
+                return task, made
+        if self._task is None:
+            self._begin(self._waiting())
+        return None
+
+    def _begin(self, task: TaskT | None) -> None:
+        if task is None:
+            return
+        self._task, self._made = task, Future()
+        # No executor: its threads are waited for when the program is interrupted.
+        Thread(target=self._run, args=(task, self._made), name="planner", daemon=True).start()
+
+    def _run(self, task: TaskT, future: Future[MadeT]) -> None:
+        try:
+            future.set_result(self._make(task))
+        except BaseException as error:  # noqa: BLE001 - raised again where the result is taken
+            future.set_exception(error)
+
+
+class PlanMaker(_Beside[PlanTask, Plan | MissionError]):
+    """Makes the plans a director waits for.
 
     Parameters
     ----------
@@ -285,39 +334,14 @@ class PlanMaker:
     """
 
     def __init__(self, director: Director, planner: Callable[..., Plan] = make_plan) -> None:
-        self._director = director
-        self._planner = planner
-        self._task: PlanTask | None = None  # in the making, also when nobody waits for it any more
-        self._made: Future[Plan | MissionError] = Future()
+        super().__init__(lambda: director.pending_plan, lambda task: task.made(planner))
 
-    def longest_wait_s(self) -> float:
-        """Return how long the shell may wait for messages before it calls again."""
-        return _IDLE_S if self._task is None else _BUSY_S
 
-    def take(self) -> tuple[PlanTask, Plan | MissionError] | None:
-        """Return what was made for the director since the last call; begin what it waits for."""
-        task = self._task
-        if task is not None and self._made.done():
-            self._task = None
-            made = self._made.result()  # also raises what nobody expected
-            if task is self._director.pending_plan:
-                return task, made
-        if self._task is None:
-            self._begin(self._director.pending_plan)
-        return None
+class WaysMaker(_Beside[WaysTask, HomeWays | MissionError]):
+    """Makes the ways home that a director keeps; no plan waits for them."""
 
-    def _begin(self, task: PlanTask | None) -> None:
-        if task is None:
-            return
-        self._task, self._made = task, Future()
-        # No executor: its threads are waited for when the program is interrupted.
-        Thread(target=self._make, args=(task, self._made), name="planner", daemon=True).start()
-
-    def _make(self, task: PlanTask, future: Future[Plan | MissionError]) -> None:
-        try:
-            future.set_result(task.made(self._planner))
-        except BaseException as error:  # noqa: BLE001 - raised again where the result is taken
-            future.set_exception(error)
+    def __init__(self, director: Director) -> None:
+        super().__init__(lambda: director.pending_ways, lambda task: task.made())
 
 
 class BackupKeeper:

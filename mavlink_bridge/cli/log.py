@@ -112,7 +112,9 @@ def _print(book: Logbook, *, messages: bool) -> None:
     out = console()
 
     def show(line: str, title: str = "", style: str = "bold") -> None:
-        out.print(cell("").append_text(cell(title, style)).append_text(cell(line)), soft_wrap=True)
+        out.print(
+            cell("").append_text(cell(title, style)).append_text(cell(line)), soft_wrap=not out.is_terminal
+        )
 
     show(f": {_length(book)}", title=book.name)
     if not book.damage.is_clean:
@@ -199,7 +201,7 @@ def _vehicle_tables(vehicle: VehicleLog) -> Iterable[Table]:
             )
         yield table
     if vehicle.modes:
-        table = _table("Modes", "from (s)", "to (s)", "mode", "armed", "driven (m)")
+        table = _table("Modes", "from (s)", "to (s)", "mode", "armed", "moved (m)")
         for span in _rows(table, vehicle.modes):
             armed = "yes" if span.armed else "no"
             _add(

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mavlink_bridge.cli.common import warn
+from mavlink_bridge.cli.log_times import log_begin
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.logbook.log_situation import situation_from_log
 from mavlink_bridge.mavlink.vehicles import not_ardupilot
+from missions.items import last_place
+from missions.words import counted, mission_items
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from mavlink_bridge.cli.options.shared import LinkOptions
-    from missions.situation import Situation
+    from missions.request import Request
+    from missions.situation import Known, Situation
 
 
 def situation_of(log: Path, options: LinkOptions, *, drives_its_items: bool) -> Situation:
@@ -33,3 +37,30 @@ def situation_of(log: Path, options: LinkOptions, *, drives_its_items: bool) -> 
     if drives_its_items and situation.ardupilot is False:
         raise LogError(f"{log}: {not_ardupilot(situation.system, None)}", file=str(log))
     return situation
+
+
+def taken_info(log: Path, situation: Situation, request: Request) -> list[str]:
+    """Return which start, target or mission, and fence a plan takes from a log, from what and when; what options give is not said."""
+    begin_s = log_begin(log).time_s
+
+    def told(what: str, known: Known[Any]) -> str:
+        at = f" at {known.time_s - begin_s:.1f} s" if known.time_s is not None else ""
+        return f"{what} ({known.source}{at})"
+
+    taken = []
+    if request.start is None and situation.pose is not None:
+        taken.append(told(f"start {situation.pose.value.position}", situation.pose))
+    elif request.start is None and situation.home is not None:
+        taken.append(told(f"start {situation.home.value}", situation.home))
+    if request.repairs:
+        if situation.mission is not None:
+            taken.append(told(mission_items(situation.mission.value.item_count()), situation.mission))
+    elif not request.targets and situation.target is not None:
+        taken.append(told(f"target {situation.target.value}", situation.target))
+    elif not request.targets and situation.mission is not None:
+        place = last_place(situation.mission.value.items)
+        taken.append(told(f"target {place}, the end of the mission", situation.mission))
+    if situation.fence is not None:
+        zones = counted(len(situation.fence.value.zones), "zone")
+        taken.append(told(f"fence of {zones}", situation.fence))
+    return [f"taken from {log.name}: {', '.join(taken)}"] if taken else []

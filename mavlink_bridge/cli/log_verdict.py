@@ -55,6 +55,8 @@ def verdict(vehicle: VehicleLog) -> tuple[str, bool]:
         told = f"stayed inside the fence; least clearance {near.clearance_m:.2f} m, from {near.zone}"
     elif vehicle.fences:
         told = "the track was not compared with the fence"
+        if not vehicle.driven_m:
+            told = f"never drove while armed: {told}"
     else:
         told = "no fence in the log, so no clearance was measured"
     reported = len(vehicle.reported_breaches)

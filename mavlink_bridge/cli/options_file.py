@@ -15,7 +15,17 @@ from mavlink_bridge.user_folders import config_folder
 
 FILE_NAME = "pbpp.toml"
 FOR_ALL = "all"
-DARING = ("upload", "drive", "arm", "replace_active", "hold", "restore", "other_vehicle", "forget")
+DARING = (
+    "upload",
+    "drive",
+    "arm",
+    "replace_active",
+    "hold",
+    "restore",
+    "other_vehicle",
+    "forget",
+    "rtl_by_route",
+)
 """Options that change a vehicle: never from a file that is read unasked."""
 
 

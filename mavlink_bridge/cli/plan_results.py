@@ -16,7 +16,7 @@ from missions.picture.plans import plan_scene
 from missions.words import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
     from mavlink_bridge.cli.way_home import RouteWays
     from missions.drive_model.stopping import HoldCheck
@@ -71,6 +71,15 @@ def plan_document(planned: Plan) -> dict[str, object]:
             "vertices": fence.vertex_count,
             "union": planned.ground.union,
         },
+        "obstacles": [
+            {
+                "name": one.name,
+                "position": list(one.position),
+                "radius_m": round(one.radius_m, 2),
+                "taken_for_m": round(planned.ground.obstacles.radius_m(one), 2),
+            }
+            for one in planned.ground.obstacles.known
+        ],
         "stopping": hold_document(planned.hold),
         "blocks": planned.blocks,
         "mission_items": len(planned.items) + 1,
@@ -142,15 +151,17 @@ class Told:
         self._plan: Plan | None = None
         self._planning_s = 0.0
         self._remarks: tuple[str, ...] = ()
+        self._taken: tuple[str, ...] = ()
         self._written: list[Path] = []
 
-    def tell(self, planned: Plan, planning_s: float, situation: Situation) -> None:
-        """Report a plan; a later one is the route made anew."""
+    def tell(self, planned: Plan, planning_s: float, situation: Situation, taken: Iterable[str] = ()) -> None:
+        """Report a plan, and what it was taken from; a later one is the route made anew."""
+        self._taken = tuple(taken)
         if self._places is not None:
             from mavlink_bridge.cli.way_home import RouteWays  # noqa: PLC0415 - only for those who ask for ways home
 
             self._ways = RouteWays.of(planned, situation, self._places)
-        inform((*planned.info, *(hold_info(planned.hold) if self._drives else ())))
+        inform((*self._taken, *planned.info, *(hold_info(planned.hold) if self._drives else ())))
         warn(planned.warnings)
         self._written = write_outputs(
             planned, situation, self._outputs, self._plots, blocks=self._blocks, ways=self._ways
@@ -167,7 +178,7 @@ class Told:
         assert self._plan is not None
         return {
             **plan_document(self._plan),
-            **remarks_document(self._plan.info, (*self._remarks, *self._plan.warnings)),
+            **remarks_document((*self._taken, *self._plan.info), (*self._remarks, *self._plan.warnings)),
             "ways_home": self._ways.document() if self._ways is not None else None,
             "planning_s": round(self._planning_s, 6),
             "outputs": [str(path) for path in self._written],

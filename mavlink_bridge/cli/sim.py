@@ -11,21 +11,25 @@ import typer
 
 from mavlink_bridge.cli.field_files import read_file, read_mission_file
 from mavlink_bridge.cli.terminal import echo, print_json
-from mavlink_bridge.cli.values import MOST_FLOAT32, checked_number, position_from
+from mavlink_bridge.cli.values import MOST_FLOAT32, MOST_MPS, MOST_VEHICLE_M, checked_number, position_from
 from mavlink_bridge.errors import LinkError, UsageError
 from mavlink_bridge.mavlink.autopilots import autopilot_table
 from mavlink_bridge.mavlink.messages import Autopilot, MissionType
-from mavlink_bridge.simulator.config import SimulatorConfig
+from mavlink_bridge.simulator.config import MovingDisc, SimulatorConfig
 from mavlink_bridge.simulator.faults import Faults
 from mavlink_bridge.simulator.parameters import DEFAULTS
 from mavlink_bridge.simulator.shell import Simulator
+from missions.errors import InvalidPositionError
 from missions.fence import fence_to_items
 from missions.formats import fence_of
+from missions.geo import parse_lat_lon
 
 if TYPE_CHECKING:
     from mavlink_bridge.cli.options.sim import SimOptions
     from missions.geo import LatLon
 
+_SEES_M = 15.0
+"""How far the distance sensor sees; chosen, as usual ones see outdoors."""
 _AUTOPILOTS = {"ardupilot": Autopilot.ARDUPILOTMEGA, "px4": Autopilot.PX4}
 
 
@@ -56,6 +60,8 @@ def sim(options: SimOptions) -> None:
 def _config(options: SimOptions) -> SimulatorConfig:
     position, heading_deg = _parse_home(options.home)
     autopilot = _AUTOPILOTS[options.autopilot]
+    if options.disc and autopilot is Autopilot.PX4:
+        raise UsageError("--disc: the simulated PX4 rover has no distance sensor; use --autopilot ardupilot")
     table = autopilot_table(autopilot, options.firmware)
     assert table is not None
     form = table.lists.form
@@ -74,7 +80,25 @@ def _config(options: SimOptions) -> SimulatorConfig:
         parameters=dict(_parse_parameter(text, autopilot) for text in options.param),
         autopilot=autopilot,
         firmware=options.firmware,
+        discs=tuple(map(_parse_disc, options.disc)),
+        sensor_m=_SEES_M if options.disc else 0.0,
     )
+
+
+def _parse_disc(text: str) -> MovingDisc:
+    parts = text.split(",")
+    speed, heading = parts[3:] if len(parts) == 5 else ("0", "0")
+    if len(parts) not in (3, 5):
+        raise UsageError(f"--disc {text!r}: expected LAT,LON,RADIUS[,SPEED,HEADING]")
+    try:
+        return MovingDisc(
+            parse_lat_lon(",".join(parts[:2])),
+            checked_number(parts[2], 0.0, MOST_VEHICLE_M, "metres", above=True),
+            checked_number(speed, 0.0, MOST_MPS, "metres a second"),
+            checked_number(heading, -360.0, 360.0, "degrees"),
+        )
+    except (UsageError, InvalidPositionError) as error:
+        raise UsageError(f"--disc {text!r}: expected LAT,LON,RADIUS[,SPEED,HEADING]; {error}") from None
 
 
 def _parse_home(text: str) -> tuple[LatLon, float]:

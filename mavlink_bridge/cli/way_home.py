@@ -71,7 +71,9 @@ class RouteWays:
         """The way home from where the route ends."""
         last = self.found[-1]
         if last is None:
-            return f"Way home from the target: none that keeps {metres(self.ways.clearance_m)} to every fence"
+            return (
+                f"Way home from the target: none that keeps {metres(self.ways.clearance_m)} from every fence"
+            )
         return (
             f"Way home from the target: {last.length_m:.1f} m to {last.place.name}, about {last.time_s:.0f} s"
         )

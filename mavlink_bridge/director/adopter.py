@@ -23,7 +23,7 @@ from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.orders import TargetSource
 from mavlink_bridge.director.states import Cue, Signal, State
-from mavlink_bridge.director.targets import Target, is_same_place
+from mavlink_bridge.director.targets import HomeCall, Target, is_same_place
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.rover import Mode, mode_name
 from mavlink_bridge.protocol.vehicle_watch import MISSION_COMPLETE
@@ -92,7 +92,7 @@ class Adopter(Part):
         """Give up a drive of which the vehicle does not tell where it goes."""
         if self._awaits_item and now_s >= self._until_s:
             self._awaits_item = False
-            self._tell_why_not("the vehicle does not tell which item it drives to", now_s)
+            self._tell_why_not("the vehicle does not report which item it drives to", now_s)
         return []
 
     def receive(self, frame: Frame, now_s: float) -> Sequence[Signal]:
@@ -130,7 +130,9 @@ class Adopter(Part):
             return
         mark = VehicleMark(core.peer.system, core.vehicle_uid)
         self.is_noted = False
-        self.note = DriveNote(mark, core.ours or (), self._boot_ms, record_of(core.plan, core.situation))
+        call = core.target.call if core.target is not None else None
+        record = record_of(core.plan, core.situation)
+        self.note = DriveNote(mark, core.ours or (), self._boot_ms, record, call or "")
 
     def forget(self) -> None:
         """Take notice that no drive of ours is under way any more."""
@@ -182,8 +184,10 @@ class Adopter(Part):
         """Go on with the drive as if it had never been left; without orders to drive, watch it."""
         core, is_ours = self.core, self.core.orders.drive
         assert core.plan is not None
-        core.target = Target(core.plan.targets[-1], TargetSource.TYPED)
-        text = "adopted the drive that pbpp began before it was restarted"
+        call = HomeCall(self.note.call) if self.note is not None and self.note.call in set(HomeCall) else None
+        source = TargetSource.TYPED if call is None else TargetSource.HOME
+        core.target = Target(core.plan.targets[-1], source, call=call)
+        text = "adopted the drive that pbpp started before it was restarted"
         text += "" if is_ours else "; without --drive it is only watched"
         core.voice.tell(now_s, EventName.ADOPTED, text, len(core.ours or ()), self._driver.item)
         self._halter.may_be_in_auto = is_ours
@@ -195,9 +199,11 @@ class Adopter(Part):
 
     def _why_not_known(self, notes: tuple[DriveNote, ...]) -> str:
         if not notes:
-            return "no drive that pbpp has begun is noted on this computer"
+            return "this computer has no note of a drive that pbpp started"
         if not self.core.vehicle_uid:
-            return "the vehicle does not tell the uid of its board, so it may not be the one whose drive is noted"
+            return (
+                "the vehicle does not report its board's uid, so it may not be the one whose drive is noted"
+            )
         return f"the noted drive is that of another vehicle ({notes[0].vehicle})"
 
     def _why_not(self, note: DriveNote) -> str:
@@ -210,13 +216,13 @@ class Adopter(Part):
         if self._was_in_other_hands:
             return "it was disarmed, or not in AUTO, while this bridge read its lists"
         if self._boot_ms < note.boot_ms:
-            return "the vehicle was switched off and on since"
+            return "the vehicle has been rebooted since"
         if situation.mission is None:
             return "the vehicle's mission is not known"
         return _difference(situation.mission.value.items, note.mission[1:])
 
     def _tell_why_not(self, why_not: str, now_s: float) -> None:
-        text = f"the vehicle's drive is not adopted, and not watched: {why_not}"
+        text = f"the vehicle's drive is neither adopted nor watched: {why_not}"
         self.core.voice.tell(now_s, EventName.NOT_ADOPTED, text, why_not)
 
 

@@ -15,6 +15,7 @@ in `handlers`.
 
 ==================  ===================================================================================================
 `Learner`           finds the vehicle, learns it, notices silence and reboots
+`ObstacleWatch`     knows which obstacles were reported, and forgets them
 `ListWatch`         knows which of the vehicle's lists are as they were read, and reads the others again
 `Halter`            HOLD, and whether the vehicle stands
 `DriveSupervisor`   watches a drive until it has arrived
@@ -24,6 +25,8 @@ in `handlers`.
 `MissionWriter`     a plan that stands → a verified mission on the vehicle
 `Adopter`           has drives noted before they begin, and goes on with one that an earlier run has begun
 `Starter`           the last look, arming, AUTO, the first item
+`HomeKeeper`        the way to the nearest place to go home to, from where the vehicle is
+`HomeCaller`        what calls the vehicle home by a route: RTL, a low battery, no ground station, a breach
 `HandOver`          who else has the vehicle: the operator, or the autopilot by a failsafe
 `IdentityGuard`     who else speaks with our ids
 ==================  ===================================================================================================
@@ -46,6 +49,9 @@ sent; an upload is finished or undone first, and nothing follows it. From LET_GO
 `TargetInbox` does, and before the machine that runs: what would go on is dropped before it can. A link that was lost, or a vehicle switched off and
 on, leads to watching, and to driving only by a target given since: somebody may have had the vehicle meanwhile. When somebody else speaks with our ids,
 not even targets by message count: only the keyboard does.
+
+The one exception, where it was allowed (`--rtl-by-route`): the first RTL, which drives straight home, is answered by HOLD and a way home round the fences.
+The second one is the operator's, and any other mode at any time (`home_caller`).
 """
 
 from __future__ import annotations
@@ -70,7 +76,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.director.drive_watch import DriveWatch
     from mavlink_bridge.director.events import Event
     from mavlink_bridge.director.orders import Orders
-    from mavlink_bridge.director.plan_task import PlanTask
+    from mavlink_bridge.director.plan_task import HomeWays, PlanTask, WaysTask
     from mavlink_bridge.errors import BridgeError
     from mavlink_bridge.mavlink.messages import Frame, Message
     from mavlink_bridge.protocol.peer import Peer
@@ -80,6 +86,7 @@ if TYPE_CHECKING:
     from missions.geo import LatLon
     from missions.items import MissionItem
     from missions.planned import Plan
+    from missions.routing.way_home import WayHome
 
 
 class Director:
@@ -232,6 +239,25 @@ class Director:
         self._heed(self._parts.desk.plan_made(task, made, now_s), now_s)
 
     @property
+    def pending_ways(self) -> WaysTask | None:
+        """The ways home that are waited for; nothing else waits for them."""
+        return self._parts.keeper.pending
+
+    def ways_made(self, task: WaysTask, made: HomeWays | MissionError, now_s: float) -> None:
+        """Take ways home, or why there are none; what nobody waits for any more is ignored."""
+        self._heed(self._parts.keeper.ways_made(task, made, now_s), now_s)
+
+    @property
+    def way_home(self) -> WayHome | None:
+        """The way to the nearest place from where the vehicle was a moment ago."""
+        return self._parts.keeper.way
+
+    @property
+    def no_way_home(self) -> str:
+        """Why there is no way home; empty where there is one, and where that is not known."""
+        return self._parts.keeper.trouble
+
+    @property
     def awaits_confirmation(self) -> bool:
         """Whether a plan waits for `confirm` before it is uploaded."""
         return self._parts.writer.awaits_confirmation
@@ -243,6 +269,14 @@ class Director:
     def take_target(self, position: LatLon, now_s: float) -> None:
         """Take a target that was typed."""
         self._heed(self._parts.inbox.take_typed(position, now_s), now_s)
+
+    def take_obstacle(self, position: LatLon | None, radius_m: float, now_s: float) -> None:
+        """Take an obstacle that was typed; without a position it is right before the vehicle. Ignored where the orders do not list the keyboard."""
+        self._heed(self._parts.obstacles.take_typed(position, radius_m, now_s), now_s)
+
+    def clear_obstacles(self, now_s: float) -> None:
+        """Forget all obstacles that were reported."""
+        self._heed(self._parts.obstacles.clear(now_s), now_s)
 
     def take_events(self) -> list[Event]:
         """Return and forget what happened."""

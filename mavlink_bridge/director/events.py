@@ -29,6 +29,8 @@ class EventName(StrEnum):
     PLANNED = auto()
     NO_PLAN = auto()
     ROUTE_BROKEN = auto()
+    OBSTACLE_ACROSS = auto()
+    WAITING = auto()
     UPLOADING = auto()
     VERIFIED = auto()
     UPLOAD_FAILED = auto()
@@ -42,6 +44,14 @@ class EventName(StrEnum):
     BREACH = auto()
     FAILSAFE = auto()
     ARRIVED = auto()
+    WAY_HOME = auto()
+    NO_WAY_HOME = auto()
+    RTL_BY_ROUTE = auto()
+    CALLED_HOME = auto()
+    GOING_HOME = auto()
+    AT_HOME = auto()
+    HOME_WAITS = auto()
+    CALL_IGNORED = auto()
     TAKEN_OVER = auto()
     IDENTITY_CLASH = auto()
     MISSION_CHANGED = auto()
@@ -67,6 +77,8 @@ SCHEMA: dict[EventName, tuple[Severity, tuple[str, ...]]] = {
     ),
     EventName.NO_PLAN: (Severity.WARNING, ("error", "details")),
     EventName.ROUTE_BROKEN: (Severity.CRITICAL, ("clearance_m", "asked_m", "fence")),
+    EventName.OBSTACLE_ACROSS: (Severity.WARNING, ("obstacle", "clearance_m", "asked_m")),
+    EventName.WAITING: (Severity.WARNING, ("obstacle", "forgotten_in_s")),
     EventName.UPLOADING: (Severity.INFO, ("mission_items",)),
     EventName.VERIFIED: (Severity.INFO, ("mission_items", "pushes")),
     EventName.UPLOAD_FAILED: (Severity.ERROR, ("error", "details")),
@@ -89,6 +101,14 @@ SCHEMA: dict[EventName, tuple[Severity, tuple[str, ...]]] = {
     ),
     EventName.FAILSAFE: (Severity.ERROR, ("reason", "mode")),
     EventName.ARRIVED: (Severity.NOTICE, ("driven_m", "took_s", "least_clearance_m", "breaches")),
+    EventName.WAY_HOME: (Severity.INFO, ("place", "kind", "length_m", "time_s")),
+    EventName.NO_WAY_HOME: (Severity.WARNING, ("reason", "position")),
+    EventName.RTL_BY_ROUTE: (Severity.NOTICE, ()),
+    EventName.CALLED_HOME: (Severity.NOTICE, ("call", "detail")),
+    EventName.GOING_HOME: (Severity.NOTICE, ("call", "place", "length_m", "duration_s")),
+    EventName.AT_HOME: (Severity.NOTICE, ("call", "place")),
+    EventName.HOME_WAITS: (Severity.WARNING, ("call", "reason")),
+    EventName.CALL_IGNORED: (Severity.WARNING, ("call", "reason")),
     EventName.TAKEN_OVER: (Severity.NOTICE, ("mode", "by", "reason")),
     EventName.IDENTITY_CLASH: (Severity.CRITICAL, ("system", "component", "held")),
     EventName.MISSION_CHANGED: (Severity.WARNING, ("mission_items",)),

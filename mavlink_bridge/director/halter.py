@@ -109,10 +109,10 @@ class Halter(Part):
         return not core.orders.once and self._may_move(core.target)
 
     def _may_move(self, target: Target | None) -> bool:
-        """Return whether the vehicle may be on its way; a click sets it going before any heartbeat says so."""
-        was_clicked = target is not None and target.is_click
+        """Return whether the vehicle may be on its way; a click, or an RTL, sets it going before any heartbeat says so."""
+        has_set_off = target is not None and target.has_set_off
         situation = self.core.situation
-        return was_clicked or (bool(situation.armed) and situation.mode != Mode.HOLD)
+        return has_set_off or (bool(situation.armed) and situation.mode != Mode.HOLD)
 
     # Stopping
 
@@ -132,7 +132,11 @@ class Halter(Part):
         core = self.core
         is_heard = core.peer is not None and core.state is not State.LOST
         if core.orders.drive and is_heard and self._may_move(target) and not core.orders.once:
-            reason = "a target was received; it is handled next"
+            reason = (
+                "called home; it is handled next"
+                if target.is_home
+                else "a target was received; it is handled next"
+            )
             core.voice.tell(now_s, EventName.HOLDING, f"HOLD: {reason}", reason)
             self.command_hold(now_s)
 

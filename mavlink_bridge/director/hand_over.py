@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from mavlink_bridge.director.drive_supervisor import DriveSupervisor
     from mavlink_bridge.director.halter import Halter
+    from mavlink_bridge.director.home_caller import HomeCaller
     from mavlink_bridge.mavlink.messages import Frame
 
 
@@ -39,8 +40,9 @@ class HandOver(Part):
         Whether it was in AUTO by our doing when it was last heard, before the link was lost.
     """
 
-    def __init__(self, core: Core, halter: Halter, driver: DriveSupervisor) -> None:
+    def __init__(self, core: Core, halter: Halter, driver: DriveSupervisor, caller: HomeCaller) -> None:
         super().__init__(core)
+        self._caller = caller
         self._halter = halter
         self._driver = driver
         self.incidents = Incidents(core.voice, core.orders.request)
@@ -67,22 +69,33 @@ class HandOver(Part):
         if taken is None and self._driver.is_unarmed(now_s):
             taken = Takeover(None)
         if taken is not None:
-            return self._let_go(taken)
+            return self._let_go(taken, now_s)
         if core.operator.is_late_click(heartbeat, now_s) and self._halter.stopping is None:
             self._halter.command_hold(now_s)
         elif core.state is State.VERIFIED and not core.orders.drive and core.is_driving_ours:
             return self._driver.resume("somebody else started the mission")
+        if self._caller.sees_rtl(heartbeat.custom_mode):
+            taken = Takeover(heartbeat.custom_mode)
+            return self._caller.answer(taken, now_s, by_autopilot=self._is_by_autopilot(taken, now_s)) or []
         return []
+
+    def _is_by_autopilot(self, taken: Takeover, now_s: float) -> bool:
+        """Return whether the autopilot is known to have done it by a failsafe or a breach."""
+        return taken.asker is None and self.incidents.explains(taken, now_s)
 
     def _overhear(self, frame: Frame, now_s: float) -> Iterable[Signal]:
         peer = self.core.peer
         if peer is None or (frame.system, frame.component) == self.core.identity:
             return []
         taken = self.core.operator.overhear(frame, peer.system, peer.component, now_s)
-        return self._let_go(taken) if taken is not None else []
+        return self._let_go(taken, now_s) if taken is not None else []
 
-    def _let_go(self, taken: Takeover) -> Sequence[Signal]:
+    def _let_go(self, taken: Takeover, now_s: float) -> Sequence[Signal]:
+        """Return that the vehicle was taken; an RTL may be answered by a way home."""
         core = self.core
+        by_autopilot = self._is_by_autopilot(taken, now_s)
+        if (answer := self._caller.answer(taken, now_s, by_autopilot=by_autopilot)) is not None:
+            return answer
         if core.state is State.ARRIVED and core.orders.once:
             return [Notice.DRIVE_ENDED]  # it has arrived; whoever has it now
         if not core.heeds(Cue.TAKEN_OVER):

@@ -50,6 +50,7 @@ def _on_learnt(parts: Parts, now_s: float) -> Iterable[Signal]:
     core, inbox = parts.core, parts.inbox
     parts.lists.settle(now_s)
     core.voice.learnt(now_s, core.situation)
+    parts.caller.learnt(now_s)
     is_first_time, parts.learner.is_first_time = parts.learner.is_first_time, False
     is_adopted = is_first_time and parts.adopter.look(now_s)
     targets = core.orders.request.targets
@@ -91,6 +92,11 @@ def _look_at_fence(parts: Parts) -> Iterable[Signal]:
     return [Notice.FENCE_CHANGED] if parts.desk.is_in_doubt else []
 
 
+def _on_fence_changed(parts: Parts, now_s: float) -> Iterable[Signal]:
+    parts.keeper.hurry()
+    return parts.desk.fence_changed(now_s)
+
+
 def _on_still_there(parts: Parts, now_s: float) -> Iterable[Signal]:
     return parts.desk.fence_changed(now_s) if parts.desk.is_stale else ()
 
@@ -102,6 +108,7 @@ def _on_heard_again(parts: Parts, now_s: float) -> None:
 
 
 def _on_silence(parts: Parts, now_s: float) -> Iterable[Signal]:
+    parts.caller.lose_sight()
     parts.hand_over.note_silence()
     parts.core.steps.clear()
     _let_loose(parts)
@@ -112,6 +119,7 @@ def _on_silence(parts: Parts, now_s: float) -> Iterable[Signal]:
 def _on_rebooted(parts: Parts, now_s: float) -> None:
     text = "the vehicle rebooted; reading everything again"
     parts.core.voice.tell(now_s, EventName.REBOOTED, text)
+    parts.caller.lose_sight()
     _let_loose(parts)
     parts.hand_over.was_in_auto_by_us = False  # it starts in another mode
     parts.hand_over.incidents.forget()
@@ -148,9 +156,11 @@ def _on_route_outdated(parts: Parts, now_s: float) -> Iterable[Signal]:
 
 
 def _on_target_came(parts: Parts, now_s: float) -> Iterable[Signal]:
-    """Go into a target; one that was not clicked waits where the vehicle is to go on before its HOLD."""
+    """Go into a target; one that has not set the vehicle going waits where that is to go on before its HOLD."""
     core, inbox = parts.core, parts.inbox
-    if inbox.came.is_click or not parts.halter.may_stop_it or not parts.hold_watch.goes_on_first(now_s):
+    if not inbox.came.is_home:
+        parts.caller.begin_anew()
+    if inbox.came.has_set_off or not parts.halter.may_stop_it or not parts.hold_watch.goes_on_first(now_s):
         return inbox.go_into(now_s)
     core.operator.take_target(now_s, is_click=False)
     inbox.waiting = inbox.came
@@ -173,19 +183,32 @@ def _on_target_while_moving(parts: Parts, now_s: float) -> None:
     parts.writer.is_confirmed = False
     parts.adopter.stop_waiting()
     parts.driver.drive = None
-    parts.halter.hold("stopping for a new route", now_s)
+    target = parts.core.target
+    is_home = target is not None and target.is_home
+    parts.halter.hold("stopping for the way home" if is_home else "stopping for a new route", now_s)
 
 
 def _on_planned(parts: Parts, now_s: float) -> Iterable[Signal]:
-    assert parts.core.plan is not None
+    core = parts.core
+    assert core.plan is not None
     parts.inbox.answers.settle(m.MavResult.ACCEPTED)
-    parts.core.voice.planned(now_s, parts.core.plan)
+    if core.target is not None and core.target.is_home:
+        parts.caller.planned(now_s)
+    core.voice.planned(now_s, core.plan)
     return parts.writer.go_on()
 
 
 def _on_no_plan(parts: Parts, now_s: float) -> Iterable[Signal]:
+    """Tell why there is no plan; one that waits for an obstacle to go has not failed."""
+    if parts.desk.is_waiting:
+        parts.inbox.answers.settle(m.MavResult.TEMPORARILY_REJECTED)
+        return ()
     parts.inbox.answers.settle(m.MavResult.DENIED)
-    return parts.desk.no_plan(now_s)
+    signals = parts.desk.no_plan(now_s)
+    target = parts.core.target
+    if target is not None and target.is_home:
+        parts.caller.refused(now_s)
+    return signals
 
 
 # Missions and drives
@@ -193,7 +216,8 @@ def _on_no_plan(parts: Parts, now_s: float) -> Iterable[Signal]:
 
 def _on_adopted(parts: Parts, now_s: float) -> Iterable[Signal]:
     parts.adopter.adopted(now_s)
-    return _look_at_fence(parts)
+    parts.caller.adopted(now_s)
+    return parts.desk.tell_less(now_s) if parts.desk.promises_less else _look_at_fence(parts)
 
 
 def _on_upload_ended(parts: Parts, now_s: float) -> Iterable[Signal]:
@@ -232,9 +256,10 @@ def _on_hold_ended(parts: Parts, _now_s: float) -> Iterable[Signal]:
     return ()
 
 
-def _on_drive_ended(parts: Parts, _now_s: float) -> Iterable[Signal]:
+def _on_drive_ended(parts: Parts, now_s: float) -> Iterable[Signal]:
     """End a drive that has arrived; a single job is done with it."""
     parts.driver.holds_after_arrival = False
+    parts.caller.arrived(now_s)
     parts.adopter.forget()
     _let_loose(parts)
     return [*parts.core.end(), Notice.TARGET_IS_DUE]
@@ -246,6 +271,7 @@ def _on_drive_ended(parts: Parts, _now_s: float) -> Iterable[Signal]:
 def _on_taken_over(parts: Parts, now_s: float) -> Iterable[Signal]:
     """Leave the vehicle to who took it, or the mission to who changed it, until a new target comes."""
     parts.adopter.forget()
+    parts.caller.overruled(now_s)
     taken, was_in_auto = parts.hand_over.taken, parts.halter.may_be_in_auto
     so_far = parts.driver.drive.so_far if parts.driver.drive is not None else ""
     _let_loose(parts)
@@ -298,7 +324,9 @@ HANDLERS: dict[Signal, Callable[[Parts, float], Iterable[Signal] | None]] = {
     Notice.ROUTE_WANTED: _on_route_wanted,
     Notice.ROUTE_OUTDATED: _on_route_outdated,
     Notice.GONE_ON: _on_gone_on,
-    Notice.FENCE_CHANGED: lambda parts, now_s: parts.desk.fence_changed(now_s),
+    Notice.OBSTACLES_CHANGED: lambda parts, now_s: parts.desk.obstacles_changed(now_s),
+    Notice.FENCE_CHANGED: _on_fence_changed,
+    Notice.WAYS_KNOWN: lambda parts, _now_s: parts.caller.try_again(),
     Notice.MISSION_READ: lambda parts, _now_s: parts.writer.mission_read(),
     Notice.MISSION_TAKEN: lambda parts, now_s: parts.writer.mission_taken(now_s),
     Notice.MISSION_HEARD: lambda parts, _now_s: parts.inbox.take_mission_target(),

@@ -127,6 +127,10 @@ class Incidents:
         self._unexplained = (takeover, now_s) if not found and takeover.asker is None else None
         return min(found, key=lambda cause: cause.heard_s, default=None)
 
+    def explains(self, takeover: Takeover, now_s: float) -> bool:
+        """Return whether something was heard just before that the autopilot answers so."""
+        return any(cause.explains(takeover) for cause in self._fresh(now_s))
+
     def heard_before(self, now_s: float) -> Cause | None:
         """Return the newest thing heard that the autopilot may answer, if it was just now."""
         return max(self._fresh(now_s), key=lambda cause: cause.heard_s, default=None)

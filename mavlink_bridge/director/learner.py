@@ -10,7 +10,6 @@ from mavlink_bridge.director.changes import RebootWatch
 from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.learning import Learning
-from mavlink_bridge.director.orders import TargetSource
 from mavlink_bridge.director.states import Cue, Notice, Signal, State
 from mavlink_bridge.director.steps import step
 from mavlink_bridge.errors import LinkError
@@ -136,9 +135,10 @@ class Learner(Part):
         if core.orders.passive:
             return
         assert core.peer is not None
-        rally = (ListKind.RALLY,) if TargetSource.RALLY in core.orders.target_sources else ()
+        rally = (ListKind.RALLY,) if core.orders.reads_rally else ()
         kinds = (ListKind.FENCE, ListKind.MISSION, *rally)
-        learning = Learning(core.peer, core.orders.patience_s, kinds)
+        may_lack = frozenset() if core.orders.needs_rally else frozenset({ListKind.RALLY})
+        learning = Learning(core.peer, core.orders.patience_s, kinds, may_lack=may_lack)
         core.steps.run([step(learning, self._take_learnt)], now_s)
 
     def _take_learnt(self, machine: Learning, now_s: float) -> Sequence[Signal]:

@@ -57,6 +57,8 @@ class Learning(Outbox):
         Whether it is a trouble where the vehicle tells no position.
     names : sequence of str
         The parameters that are asked for.
+    may_lack : frozenset of ListKind
+        Lists that a vehicle may not have, or not tell; they are not known then.
 
     Attributes
     ----------
@@ -77,6 +79,7 @@ class Learning(Outbox):
         *,
         needs_position: bool = True,
         names: Sequence[str] = ASKED_NAMES,
+        may_lack: frozenset[ListKind] = frozenset(),
     ) -> None:
         super().__init__()
         self.trouble: BridgeError | None = None
@@ -87,6 +90,7 @@ class Learning(Outbox):
         self._read = read
         self._needs_position = needs_position
         self._names = tuple(names)
+        self._may_lack = may_lack
         self.coarse: list[ListKind] = []
         self._steps = Steps()
         self._parameters: dict[str, float] = {}
@@ -193,7 +197,8 @@ class Learning(Outbox):
     def _take_list(self, kind: ListKind, machine: Download | UndisturbedRead, _now_s: float) -> None:
         items = list_read(machine, kind)
         if isinstance(items, BridgeError):
-            self._fail(items)
+            if kind not in self._may_lack:
+                self._fail(items)
             return
         self._lists[kind] = items
         if machine.outcome is not None and machine.outcome.is_coarse:

@@ -11,7 +11,6 @@ from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.grounds import Grounds
 from mavlink_bridge.director.learning import MISSION_TYPES, with_read_list
-from mavlink_bridge.director.orders import TargetSource
 from mavlink_bridge.director.states import Notice, Signal, State
 from mavlink_bridge.director.steps import step
 from mavlink_bridge.errors import BridgeError
@@ -93,7 +92,7 @@ class ListWatch(Part):
         core = self.core
         if core.peer is not None and self._changes is None:
             kinds = {ListKind.FENCE, ListKind.MISSION}
-            if TargetSource.RALLY in core.orders.target_sources:
+            if core.orders.needs_rally or (core.orders.reads_rally and core.situation.rally is not None):
                 kinds.add(ListKind.RALLY)
             identity = (core.peer.own_system, core.peer.own_component)
             self._changes = ChangeWatch(identity, frozenset(kinds))

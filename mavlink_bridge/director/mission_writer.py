@@ -77,8 +77,14 @@ class MissionWriter(Part):
     def awaits_confirmation(self) -> bool:
         """Whether a plan stands that is uploaded only after a yes."""
         orders = self.core.orders
-        is_asked = orders.upload and orders.confirm
-        return self.core.state is State.PROPOSED and is_asked and not self.is_confirmed
+        is_asked = orders.upload and orders.confirm and not self._is_confirmed
+        return self.core.state is State.PROPOSED and is_asked
+
+    @property
+    def _is_confirmed(self) -> bool:
+        """Whether the plan that stands may be written: a way home, which nobody may be there to confirm, was allowed with `--rtl-by-route`."""
+        target = self.core.target
+        return self.is_confirmed or (target is not None and target.is_home)
 
     def confirm(self) -> Sequence[Signal]:
         """Take the operator's yes to the plan that stands; a yes to none is forgotten."""
@@ -109,7 +115,7 @@ class MissionWriter(Part):
             return []
         if not core.orders.upload:
             return core.end()
-        return [] if core.orders.confirm and not self.is_confirmed else [Cue.UPLOAD]
+        return [] if core.orders.confirm and not self._is_confirmed else [Cue.UPLOAD]
 
     def begin(self, now_s: float) -> Sequence[Signal]:
         """Begin to write the plan that stands."""

@@ -9,10 +9,13 @@ from mavlink_bridge.director.drive_supervisor import DriveSupervisor
 from mavlink_bridge.director.halter import Halter
 from mavlink_bridge.director.hand_over import HandOver
 from mavlink_bridge.director.hold_watch import HoldWatch
+from mavlink_bridge.director.home_caller import HomeCaller
+from mavlink_bridge.director.home_keeper import HomeKeeper
 from mavlink_bridge.director.identity_guard import IdentityGuard
 from mavlink_bridge.director.learner import Learner
 from mavlink_bridge.director.list_watch import ListWatch
 from mavlink_bridge.director.mission_writer import MissionWriter
+from mavlink_bridge.director.obstacle_watch import ObstacleWatch
 from mavlink_bridge.director.route_desk import RouteDesk
 from mavlink_bridge.director.starter import Starter
 from mavlink_bridge.director.target_inbox import TargetInbox
@@ -44,23 +47,28 @@ class Parts:
         self.core: Core = core
         self.learner: Learner = Learner(core)
         self.lists: ListWatch = ListWatch(core)
+        self.obstacles: ObstacleWatch = ObstacleWatch(core)
         self.inbox: TargetInbox = TargetInbox(core)
+        self.keeper: HomeKeeper = HomeKeeper(core)
         self.halter: Halter = Halter(core, self.lists)
         self.driver: DriveSupervisor = DriveSupervisor(core, self.halter)
         self.hold_watch: HoldWatch = HoldWatch(core, self.halter, self.driver)
-        self.desk: RouteDesk = RouteDesk(core, self.lists, self.driver, self.hold_watch)
+        self.desk: RouteDesk = RouteDesk(core, self.lists, self.keeper, self.driver, self.hold_watch)
         self.writer: MissionWriter = MissionWriter(core, self.lists, self.halter, self.desk)
         self.adopter: Adopter = Adopter(core, self.lists, self.halter, self.driver, self.desk, notes)
         self.starter: Starter = Starter(core, self.lists, self.halter, self.driver, self.desk, self.adopter)
-        self.hand_over: HandOver = HandOver(core, self.halter, self.driver)
+        self.caller: HomeCaller = HomeCaller(core, self.inbox, self.halter, self.keeper)
+        self.hand_over: HandOver = HandOver(core, self.halter, self.driver, self.caller)
         self.guard: IdentityGuard = IdentityGuard(core, self.learner, self.halter, self.inbox, self.writer)
         self.hearers: tuple[Part, ...] = (
             self.learner,
             self.hand_over,
+            self.caller,
             self.guard,
             self.driver,
             self.hold_watch,
             self.lists,
+            self.obstacles,
             self.inbox,
             self.adopter,
         )
@@ -71,5 +79,8 @@ class Parts:
             self.driver,
             self.learner,
             self.lists,
+            self.obstacles,
             self.adopter,
+            self.caller,
+            self.keeper,
         )

@@ -81,8 +81,10 @@ class Starter(Part):
         return []
 
     def note_failed(self, trouble: BridgeError, now_s: float) -> Sequence[Signal]:
-        """Return that a drive is not begun that cannot be noted."""
+        """Return that a drive is not begun that cannot be noted; one that was adopted goes on, and it is said."""
         if self.core.state is not State.STARTING:
+            details = dict(trouble.details)
+            self.core.voice.error(now_s, EventName.TROUBLE, trouble, details)
             return []
         self.core.steps.clear()
         return self._give_up(trouble, now_s)

@@ -74,10 +74,12 @@ class Notice(StrEnum):
     ROUTE_WANTED = auto()  # by somebody
     ROUTE_OUTDATED = auto()  # by nobody: what it rests on was changed
     FENCE_CHANGED = auto()
+    OBSTACLES_CHANGED = auto()
     MISSION_READ = auto()  # the vehicle's mission was read again
     MISSION_TAKEN = auto()  # it is somebody else's now
     MISSION_HEARD = auto()  # its end may be a target
     RALLY_HEARD = auto()
+    WAYS_KNOWN = auto()  # the ways home were laid out anew
     LEARNING_FAILED = auto()
     GONE_ON = auto()  # on the route, as far as was better than a HOLD at once
     HOLD_ENDED = auto()  # taken, or not

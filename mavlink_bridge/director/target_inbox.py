@@ -88,6 +88,11 @@ class TargetInbox(Part):
         self._came = target
         return [Cue.TYPED, Notice.TARGET_CAME]
 
+    def take_call(self, target: Target) -> Sequence[Signal]:
+        """Return that the vehicle is called home; that ends no clash of identities."""
+        self._came = target
+        return [Notice.TARGET_CAME]
+
     def go_into(self, now_s: float) -> Sequence[Signal]:
         """Go into the target that came, or let it wait."""
         core, target = self.core, self.came
@@ -96,13 +101,14 @@ class TargetInbox(Part):
             self.waiting = target
             return [Notice.TARGET_WAITS]
         core.target = target
-        core.voice.tell(
-            now_s,
-            EventName.TARGET,
-            f"target {target.position} from {target.source}",
-            list(target.position),
-            str(target.source),
-        )
+        if not target.is_home:
+            core.voice.tell(
+                now_s,
+                EventName.TARGET,
+                f"target {target.position} from {target.source}",
+                list(target.position),
+                str(target.source),
+            )
         self.answers.begin(target)
         if not core.orders.drive:
             self._warn_of_straight_line(target, now_s)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.director.addressed import is_command_to
@@ -30,6 +31,15 @@ _SAID_AGAIN_S = 3.0  # ground stations repeat a command that is not acknowledged
 _ECHO_MOVED_M = 0.5  # the vehicle reports the target that it was given a little off; chosen, not measured
 
 
+class HomeCall(StrEnum):
+    """Why the vehicle is called home."""
+
+    RTL = "RTL"
+    BATTERY = "low battery"
+    GCS = "no ground station heard"
+    BREACH = "fence breach"
+
+
 @dataclass(frozen=True, slots=True)
 class Target:
     """A place somebody wants the vehicle at.
@@ -46,6 +56,8 @@ class Target:
         System and component id that sent it.
     is_again : bool
         Whether it only says again what was said a moment ago.
+    call : HomeCall, optional
+        Why it is called home: the place is the nearest one once it stands, and the position only a guess until then.
     """
 
     position: LatLon
@@ -53,6 +65,17 @@ class Target:
     is_to_us: bool = False
     asker: tuple[int, int] | None = None
     is_again: bool = False
+    call: HomeCall | None = None
+
+    @property
+    def is_home(self) -> bool:
+        """Whether the vehicle is called home."""
+        return self.call is not None
+
+    @property
+    def has_set_off(self) -> bool:
+        """Whether it may have set the vehicle going, off any route of ours: HOLD follows at once."""
+        return self.is_click or self.call in (HomeCall.RTL, HomeCall.BREACH)
 
     @property
     def is_click(self) -> bool:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from missions.planned import Plan
     from missions.situation import Situation
 
-_NOT_ANNOUNCED = frozenset({EventName.PROGRESS, EventName.FAILSAFE})
+_NOT_ANNOUNCED = frozenset({EventName.PROGRESS, EventName.FAILSAFE, EventName.WAY_HOME})
 """What the ground stations hear from the vehicle itself, or far too often."""
 
 
@@ -102,9 +102,17 @@ class Voice:
         """Report why there is no plan."""
         self.error(now_s, EventName.NO_PLAN, error, dict(error.details))
 
+    def home_waits(self, now_s: float, call: object, why: str) -> None:
+        """Report why a way home waits; the vehicle is held."""
+        text = f"the way home waits, the vehicle stays in HOLD: {why}"
+        self.tell(now_s, EventName.HOME_WAITS, text, str(call), why)
+
     def rechecked(self, now_s: float, name: EventName, what: str, found: Recheck) -> None:
         """Report that lines do not keep what they have to."""
-        text = f"{what} keeps only {metres_text(found.clearance_m)} of the required {metres_text(found.asked_m)} ({found.fence})"
+        asked = metres_text(found.asked_m)
+        text = f"{what} keeps only {metres_text(found.clearance_m)} of the required {asked} ({found.fence})"
+        if found.clearance_m <= 0:
+            text = f"{what} crosses {found.fence} ({asked} is required)"
         self.tell(now_s, name, text, metres(found.clearance_m), round(found.asked_m, 3), found.fence)
 
 

@@ -125,11 +125,13 @@ class Heartbeat(Message):
 
 @dataclass(frozen=True, slots=True)
 class SysStatus(Message):
-    """SYS_STATUS (1), its sensor bits."""
+    """SYS_STATUS (1), its sensor bits and the battery: mV (65535: unknown), % (-1: unknown)."""
 
     onboard_control_sensors_present: int
     onboard_control_sensors_enabled: int
     onboard_control_sensors_health: int
+    voltage_battery: int = 65535
+    battery_remaining: int = -1
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,6 +188,19 @@ class GpsRawInt(Message):
     eph: int = 65535
     satellites_visible: int = 255
     h_acc: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Attitude(Message):
+    """ATTITUDE (30): rad, rad/s."""
+
+    time_boot_ms: int
+    roll: float
+    pitch: float
+    yaw: float
+    rollspeed: float = 0.0
+    pitchspeed: float = 0.0
+    yawspeed: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -453,6 +468,15 @@ AUTOPILOT_VERSION_ID = 148
 
 
 @dataclass(frozen=True, slots=True)
+class BatteryStatus(Message):
+    """BATTERY_STATUS (147): mV of each cell, or of the whole in the first (65535: none), % (-1: unknown)."""
+
+    id: int
+    voltages: tuple[int, ...] = (65535,) * 10
+    battery_remaining: int = -1
+
+
+@dataclass(frozen=True, slots=True)
 class FenceStatus(Message):
     """FENCE_STATUS (162)."""
 
@@ -486,6 +510,21 @@ class HomePosition(Message):
     latitude: int
     longitude: int
     altitude: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class ObstacleDistance(Message):
+    """OBSTACLE_DISTANCE (330): cm by direction, clockwise (65535: not known, ``max_distance`` + 1: nothing there); degrees."""
+
+    time_usec: int
+    sensor_type: int
+    distances: tuple[int, ...]
+    increment: int
+    min_distance: int
+    max_distance: int
+    increment_f: float = 0.0
+    angle_offset: float = 0.0
+    frame: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -146,6 +146,10 @@ def _call(director: Director, call: Call) -> Iterator[Event]:
         director.handle_timer(call.time_s)
     elif call.name == "target" and call.target is not None:
         director.take_target(call.target, call.time_s)
+    elif call.name == "obstacle":
+        director.take_obstacle(call.target, float(call.text), call.time_s)
+    elif call.name == "clear":
+        director.clear_obstacles(call.time_s)
     elif call.name == "confirm":
         director.confirm(call.time_s)
     elif call.name == "backup_stored":
@@ -158,6 +162,8 @@ def _call(director: Director, call: Call) -> Iterator[Event]:
         director.backup_failed(_NO_BACKUP[call.name](call.text), call.time_s)
     elif call.name == "plan_made":
         _make_plan(director, call.time_s)
+    elif call.name == "ways_made" and (ways := director.pending_ways) is not None:
+        director.ways_made(ways, ways.made(), call.time_s)
     yield from _spoken(director)
 
 

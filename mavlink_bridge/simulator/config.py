@@ -19,6 +19,45 @@ DEFAULT_HOME = LatLon(40.071374, -105.229930)
 """Where the rover stands by default: the home of the recorded logs."""
 
 
+@dataclass(frozen=True, slots=True)
+class MovingDisc:
+    """Something round in the field, for the rover's distance sensor; the rover drives through it.
+
+    Parameters
+    ----------
+    centre : LatLon
+        Where its middle is at first.
+    radius_m : float
+    speed_mps : float
+    heading_deg : float
+        Where it moves, clockwise from north.
+    from_s : float
+        When it appears and begins to move.
+    """
+
+    centre: LatLon
+    radius_m: float
+    speed_mps: float = 0.0
+    heading_deg: float = 0.0
+    from_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Battery:
+    """What the battery's monitor tells: percent left (-1: it does not know) and volts."""
+
+    percent: int = 100
+    volts: float = 12.6
+
+
+@dataclass(frozen=True, slots=True)
+class Receiver:
+    """What the GPS receiver tells: GPS_FIX_TYPE and its own figure for its error, None without one."""
+
+    fix_type: int = 6
+    error_m: float | None = None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulatorConfig:
     """What a simulated rover starts with.
@@ -45,8 +84,14 @@ class SimulatorConfig:
         Whose rover it is: ArduPilot's, or PX4's.
     firmware : Firmware or None
         The version it says that it is, and drives like; None: 4.7.0-dev of October 2025, the best measured; of PX4 the line of 1.18.
+    discs : tuple of MovingDisc
+        What is in the field beside fences.
+    sensor_m : float
+        How far a distance sensor sees all around (OBSTACLE_DISTANCE and ATTITUDE ten times a second); 0: it has none.
     uid : bytes
         The board's own id in AUTOPILOT_VERSION, at most 18 bytes; empty: none.
+    battery : Battery or None
+        What its battery's monitor tells at first; None: it has no monitor.
     """
 
     system: int = 1
@@ -62,4 +107,7 @@ class SimulatorConfig:
     list_ids: bool = False
     autopilot: Autopilot = Autopilot.ARDUPILOTMEGA
     firmware: Firmware | None = None
+    discs: tuple[MovingDisc, ...] = ()
+    sensor_m: float = 0.0
     uid: bytes = b""
+    battery: Battery | None = None

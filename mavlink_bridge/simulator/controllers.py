@@ -83,6 +83,11 @@ class Settings:
         )
 
 
+_COMPASS_RAD = 1e-3
+"""No compass is more exact (chosen, not measured). AR_PosControl turns by what the target lies aside, so that facing exactly away is a balance that
+a real vehicle does not keep; a simulated skid-steered rover without pivot stood there for ever."""
+
+
 class KeepsOff(Protocol):
     """What keeps a rover off a fence."""
 
@@ -222,8 +227,13 @@ class Position:
             filter_s = 1 / (2 * math.pi * limits.velocity_filter_hz)
             error_mps = self._velocity_error + (error_mps - self._velocity_error) * dt_s / (dt_s + filter_s)
         self._velocity_error = error_mps
-        wanted = (limits.velocity_p * error_mps + accel_mps2) * body.direction.conjugate()
-        ahead = velocity_mps * body.direction.conjugate()
+        facing = body.direction
+        if (velocity_mps * facing.conjugate()).real < 0 and abs((velocity_mps * facing.conjugate()).imag) < (
+            _COMPASS_RAD * abs(velocity_mps)
+        ):
+            facing *= cmath.rect(1.0, _COMPASS_RAD)
+        wanted = (limits.velocity_p * error_mps + accel_mps2) * facing.conjugate()
+        ahead = velocity_mps * facing.conjugate()
         turn_speed_mps = math.sqrt(limits.lateral_accel_mps2 * 0.5 * self._turn_radius())
         least_mps = min(abs(velocity_mps), turn_speed_mps)
         # Backing away is always backwards, as if the fence lay ahead.

@@ -8,16 +8,19 @@ from collections.abc import Mapping
 HEARTBEAT = 0
 SYS_STATUS = 1
 GPS_RAW_INT = 24
+ATTITUDE = 30
 GLOBAL_POSITION_INT = 33
 MISSION_CURRENT = 42
 NAV_CONTROLLER_OUTPUT = 62
 VFR_HUD = 74
 POSITION_TARGET_GLOBAL_INT = 87
+BATTERY_STATUS = 147
 AUTOPILOT_VERSION = 148
 FENCE_STATUS = 162
 SIMSTATE = 164
 EKF_STATUS_REPORT = 193
 HOME_POSITION = 242
+OBSTACLE_DISTANCE = 330
 
 DEFAULT_RATES_HZ: Mapping[int, float] = {
     SYS_STATUS: 2.0,
@@ -27,11 +30,15 @@ DEFAULT_RATES_HZ: Mapping[int, float] = {
     NAV_CONTROLLER_OUTPUT: 2.0,
     VFR_HUD: 2.0,
     POSITION_TARGET_GLOBAL_INT: 2.0,
+    BATTERY_STATUS: 1.0,
     FENCE_STATUS: 2.0,
     EKF_STATUS_REPORT: 2.0,
     HOME_POSITION: 0.2,
 }
 """What flows unasked."""
+
+SENSOR_RATES_HZ: Mapping[int, float] = {ATTITUDE: 10.0, OBSTACLE_DISTANCE: 10.0}
+"""What flows beside that where the rover has a distance sensor."""
 
 MAX_RATE_HZ = 40.0
 """0.8 of the loop's rate; faster is refused."""
@@ -48,7 +55,7 @@ _GROUPS = {
     ),
     6: (GLOBAL_POSITION_INT,),
     11: (VFR_HUD,),
-    12: (EKF_STATUS_REPORT, SIMSTATE),
+    12: (EKF_STATUS_REPORT, SIMSTATE, BATTERY_STATUS),
 }
 _STREAMED = frozenset(message_id for group in _GROUPS.values() for message_id in group) | {HOME_POSITION}
 

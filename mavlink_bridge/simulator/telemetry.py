@@ -10,6 +10,7 @@ from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.simulator import streams
 from mavlink_bridge.simulator.personality import version_number
+from mavlink_bridge.simulator.sensor import distances_cm, obstacle_distance
 from missions.geo import to_e7
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ _CAPABILITIES = (
 )
 _STANDBY, _ACTIVE, _CALIBRATING = 3, 4, 2
 _NO_MISSION, _NOT_STARTED, _ACTIVE_MISSION, _PAUSED, _COMPLETE = 1, 2, 3, 4, 5
+_NO_CELL = 65_535
 _BOUNDARY = 3  # FENCE_BREACH_BOUNDARY
 
 
@@ -46,7 +48,7 @@ _BOUNDARY = 3  # FENCE_BREACH_BOUNDARY
 class TelemetrySource:
     """What telemetry is about: the rover, the items in its mission (home included), its time since boot, whether it has a position.
 
-    The ids are those of mission, fence and rally points, 0 where none are known; the uid is the board's own, the firmware its version.
+    Discs are the middle and radius of each in the rover's frame, for a sensor that sees so far. The ids are those of mission, fence and rally points, 0 where none are known; the uid is the board's own, the firmware its version.
     """
 
     rover: Rover
@@ -56,6 +58,8 @@ class TelemetrySource:
     list_ids: tuple[int, int, int] = (0, 0, 0)
     uid: bytes = b""
     firmware: Firmware | None = None
+    discs: tuple[tuple[complex, float], ...] = ()
+    sensor_m: float = 0.0
 
 
 def telemetry(message_id: int, state: TelemetrySource) -> m.Message | None:
@@ -85,7 +89,19 @@ def _sys_status(state: TelemetrySource) -> m.Message:
         health &= ~(_PREARM_OK | _GPS_SENSOR)
     if state.rover.breached:
         health &= ~_FENCE_SENSOR
-    return m.SysStatus(_SENSORS_PRESENT, enabled, health)
+    battery = state.rover.battery
+    if battery is None:
+        return m.SysStatus(_SENSORS_PRESENT, enabled, health)
+    millivolts = round(battery.volts * 1000)
+    return m.SysStatus(_SENSORS_PRESENT, enabled, health, millivolts, battery.percent)
+
+
+def _battery_status(state: TelemetrySource) -> m.Message | None:
+    battery = state.rover.battery
+    if battery is None:
+        return None
+    cells = (round(battery.volts * 1000), *(9 * [_NO_CELL]))
+    return m.BatteryStatus(0, cells, battery.percent)
 
 
 def _global_position(state: TelemetrySource) -> m.Message:
@@ -101,13 +117,25 @@ def _global_position(state: TelemetrySource) -> m.Message:
     )
 
 
+def _attitude(state: TelemetrySource) -> m.Message:
+    yaw_rad = math.remainder(state.rover.body.heading_rad, 2 * math.pi)
+    return m.Attitude(_boot_ms(state.boot_s), 0.0, 0.0, yaw_rad)
+
+
+def _obstacle_distance(state: TelemetrySource) -> m.Message | None:
+    body, sees_m = state.rover.body, state.sensor_m
+    seen = distances_cm(state.discs, body.position_m, body.heading_rad, sees_m)
+    return obstacle_distance(seen, state.boot_s, sees_m) if sees_m else None
+
+
 def _gps_raw(state: TelemetrySource) -> m.Message:
     time_usec = round(state.boot_s * 1e6)
     if not state.is_ready:
         return m.GpsRawInt(time_usec, 0, 0, 0, 0, satellites_visible=0)
-    return m.GpsRawInt(
-        time_usec, 6, *to_e7(state.rover.position), 0, eph=121, satellites_visible=10, h_acc=300
-    )
+    told = state.rover.receiver
+    fix_type, h_acc = (6, 300) if told is None else (told.fix_type, round(1000 * (told.error_m or 0.0)))
+    position = to_e7(state.rover.position)
+    return m.GpsRawInt(time_usec, fix_type, *position, 0, eph=121, satellites_visible=10, h_acc=h_acc)
 
 
 def _mission_current(state: TelemetrySource) -> m.Message:
@@ -193,14 +221,17 @@ _BUILDERS: dict[int, Callable[[TelemetrySource], m.Message | None]] = {
     streams.HEARTBEAT: _heartbeat,
     streams.SYS_STATUS: _sys_status,
     streams.GPS_RAW_INT: _gps_raw,
+    streams.ATTITUDE: _attitude,
     streams.GLOBAL_POSITION_INT: _global_position,
     streams.MISSION_CURRENT: _mission_current,
     streams.NAV_CONTROLLER_OUTPUT: _nav_controller,
     streams.VFR_HUD: _vfr_hud,
     streams.POSITION_TARGET_GLOBAL_INT: _position_target,
     streams.AUTOPILOT_VERSION: _version,
+    streams.BATTERY_STATUS: _battery_status,
     streams.FENCE_STATUS: _fence_status,
     streams.SIMSTATE: _simstate,
     streams.EKF_STATUS_REPORT: _ekf,
     streams.HOME_POSITION: _home,
+    streams.OBSTACLE_DISTANCE: _obstacle_distance,
 }

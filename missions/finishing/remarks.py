@@ -33,7 +33,7 @@ def escape_info(found: DrivenRoute) -> list[str]:
     if not found.lead_away or found.start_clearance_m >= 0:
         return []
     return [
-        f"the start is inside an exclusion or outside the fence, {-found.start_clearance_m:.2f} m from the allowed area: leg 1 drives into it"
+        f"the start is inside an exclusion or outside the fence, {-found.start_clearance_m:.2f} m from the allowed area: only leg 1, which leads there, is unsafe"
     ]
 
 

@@ -92,6 +92,11 @@ class Measured:
         """Whether the band keeps what is required."""
         return max(self.missing_m) <= ENOUGH_M
 
+    @property
+    def kept_cost_s(self) -> float:
+        """What the lines would cost if nothing were missing."""
+        return self.cost_s - _MISSING_COST_S_PER_M * sum(self.missing_m)
+
 
 class Gauge:
     """Measures lines on a field; what was measured once, whole lines or one leg of them, is known.
@@ -108,7 +113,7 @@ class Gauge:
 
     def __init__(self, ground: Ground, vehicle: Vehicle, heading_deg: float | None) -> None:
         self.ground, self.vehicle = ground, vehicle
-        self.edges = FenceEdges(ground.edge)
+        self.edges = FenceEdges(ground.avoided_edge)
         self._heading_deg = heading_deg
         self._trials: dict[tuple[Drawing, bool, bool], Trial] = {}
         self._legs_m: dict[tuple[LocalPoint, LocalPoint], float] = {}

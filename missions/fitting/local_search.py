@@ -35,11 +35,12 @@ from missions.fitting import moves
 from missions.fitting import polyline as drawn
 from missions.fitting.cost import ENOUGH_M, Gauge
 from missions.fitting.gap import find_gap, straight_through
+from missions.fitting.splice import splices
 from missions.geo import rounded
 from missions.vehicle import Autopilot
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from missions.fitting.cost import Measured, Trial
     from missions.fitting.polyline import Drawing
@@ -54,6 +55,9 @@ FIT_MEASUREMENTS, CRAWL_MEASUREMENTS, QUICKEN_MEASUREMENTS, MOST_MEASUREMENTS = 
 Chosen, not measured: they bound the planning time, which docs/drive-bench.md reports.
 """
 
+COMBINE_MEASUREMENTS = 300
+"""Taken to make one route of several, and as many to mend it. Chosen, not measured, as those above."""
+
 # Chosen, not measured: no experiment is recorded for any of these. They bound the search; whether lines are enough is always measured.
 _SHORT_LEG_M = 12.0  # corners farther apart are not merged to save a point
 _LEAST_GAIN_S = 0.05  # what a change must gain to be kept: it ends the descent
@@ -66,6 +70,9 @@ _EASING_STEPS_M = (6.0, 1.6, 0.5)  # coarse to fine; what is left over is at mos
 # 2.5 m five routes crept (more than twice the time of wider ones), with 3 m three, with 4 m one, with 5 m four
 _TINY_LEG_M = 4.0
 _JOINED_TURN_DEG = 80.0  # both corners together; sharper ones stay two
+# What slows a rover most is made two corners, or moved so far at the most, in `moves.MOVES`, for what it gains. A skid-steered one stops for turns
+# above WP_PIVOT_ANGLE, 60° mostly: on four of 264 routes one such turn more or less was 6 to 13 % of the time
+_SHARP_DEG, _ASIDE_M = 45.0, 1.5
 _GRID_TRIES, _GRID_MEASUREMENTS = 4, 150  # to mend what rounding to degE7 (at most 5.6 mm) broke
 
 
@@ -117,11 +124,46 @@ class Fitting:
             other, found = self._fitted(slow)
             if sum(found.missing_m) < sum(measured.missing_m):
                 drawing, measured = other, found
-        if not measured.is_enough:
+        return self._finished(drawing) if measured.is_enough else (drawing, measured)
+
+    def combine(self, drawings: Mapping[Drawing, bool]) -> tuple[Drawing, Measured]:
+        """Return the best lines that are made of several, improved as any others are, and how they measure.
+
+        Parameters
+        ----------
+        drawings : mapping of Drawing to bool
+            The lines, and whether they were improved for what is asked of them now.
+        """
+        ranked = sorted(drawings, key=lambda lines: self.measure(lines).cost_s)
+        self._allow(COMBINE_MEASUREMENTS)
+        drawing, measured = ranked[0], self.measure(ranked[0])
+        while True:
+            spliced = (
+                lines
+                for other in ranked
+                if other != drawing
+                for lines in (*splices(drawing, other), *splices(other, drawing))
+            )
+            better = self._best(drawing, measured, spliced)
+            if better is None:
+                break
+            drawing, measured = better
+        if measured.is_enough and drawings.get(drawing):
             return drawing, measured
+        if not measured.is_enough:
+            self._allow(FIT_MEASUREMENTS)
+            drawing, measured = self._fitted(drawing)
+        return self._finished(drawing) if measured.is_enough else (drawing, measured)
+
+    def _finished(self, drawing: Drawing) -> tuple[Drawing, Measured]:
+        """Return lines that are enough made quicker, and on the grid."""
         quicker = self._on_grid(self._eased(self._quickened(drawing)))
         # What is made quicker keeps no more than it must, and rounding may break what cannot be mended.
         return quicker if quicker[1].is_enough else self._on_grid(self._eased(drawing))
+
+    def outlook(self, drawing: Drawing) -> Measured:
+        """Return how lines measure before anything is bent; `fit` begins with the same, so it costs nothing beside it."""
+        return self._gauge.measure(_joined(drawing))
 
     def _on_grid(self, drawing: Drawing) -> tuple[Drawing, Measured]:
         """Round lines as the mission's items will be: the model has steps, and a millimetre may be one too many."""
@@ -243,10 +285,13 @@ class Fitting:
         self._until += QUICKEN_MEASUREMENTS
         index, without = 1, 0
         while without < len(drawing) - 1 and not self._is_over():
-            candidates = (
+            candidates = [
                 *moves.quickened(drawing, index, self.vehicle.speed_mps),
                 *moves.rejoined(drawing, index),
-            )
+            ]
+            if _is_corner(drawing, index) and abs(drawn.turn_deg(drawing, index)) > _SHARP_DEG:
+                candidates += moves.split(drawing, index, moves.NEAR_SPACINGS_M)
+                candidates += moves.moved(drawing, index, _ASIDE_M)
             better = self._best(drawing, measured, candidates)
             if better is not None:
                 drawing, measured = better

@@ -31,6 +31,7 @@ MOVES = (0.5, 1.0, 1.5, 2.5)
 # How far a turn is put off; chosen, not measured: bounds the candidates to 20 a corner
 PROLONGED_M = (3.0, 6.0, 10.0, 15.0)
 SPACINGS_M = (6.0, 10.0, 15.0, 20.0)  # between the corners that one is split into; chosen, not measured
+NEAR_SPACINGS_M = (4.0, 6.0, 10.0)  # where there is a corner that keeps enough already; chosen, not measured
 SLOW_MPS = (3.0, 2.0, 1.0)
 SLOW_BEFORE_M = {3.0: 10.0, 2.0: 10.0, 1.0: 5.0}
 SLOW_AFTER_M = (6.0, 15.0)
@@ -212,7 +213,7 @@ def quickened(drawing: Drawing, index: int, speed_mps: float) -> Iterator[Drawin
                 yield (*drawing[:index], *slow, replace(last, speed_mps=quick_mps), *drawing[rest:])
 
 
-def split(drawing: Drawing, index: int) -> Iterator[Drawing]:
+def split(drawing: Drawing, index: int, spacings_m: tuple[float, ...] = SPACINGS_M) -> Iterator[Drawing]:
     """Make two gentler corners of one, or three: round the outside of it."""
     out = None if drawn.is_end_or_fixed(drawing, index) else drawn.outward(drawing, index)
     if out is None:
@@ -222,7 +223,7 @@ def split(drawing: Drawing, index: int) -> Iterator[Drawing]:
     middle = _between(before, after) if turn_deg < 175 else (-out[1], out[0])
     here = drawing[index]
     # The shares of a spacing below are chosen, not measured: shapes to try.
-    for spacing_m in SPACINGS_M:
+    for spacing_m in spacings_m:
         for out_m in (0.0, 0.35 * spacing_m):
             first = shifted(shifted(here.place, out, out_m), middle, -spacing_m / 2)
             second = shifted(shifted(here.place, out, out_m), middle, spacing_m / 2)

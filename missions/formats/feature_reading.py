@@ -10,7 +10,7 @@ from missions.errors import InvalidPositionError, MissionFormatError
 from missions.fence import Fence
 from missions.formats.bounds import MOST_FEATURES, check_bound
 from missions.formats.choices import NO_CHOICES
-from missions.formats.feature_roles import role_of
+from missions.formats.feature_roles import foreign_property, role_of
 from missions.formats.feature_zones import roles_of_zones, zones_of
 from missions.formats.features import Role, Shape, numbered
 from missions.formats.numbers import has_place, xy_from_file
@@ -65,6 +65,8 @@ def situation_of(features: Iterable[Feature], source: str, choices: Choices = NO
             unknown_points.append(feature)
         if feature.is_hidden and role is Role.DRAWING and choices.role_for(feature) is None:
             remarks.append(f"{feature.where}: {feature} is hidden (visibility 0): skipped")
+        elif (foreign := foreign_property(feature)) and choices.role_for(feature) is None:
+            remarks.append(f"{feature.where}: {foreign} of {feature} is not a role: skipped")
     sorted_zones, taken = roles_of_zones(zones, choices, unknown_points)
     fence = Fence(
         tuple(zone for pair in sorted_zones for zone in zones_of(*pair)), _lone(found[Role.RETURN_POINT])

@@ -35,6 +35,8 @@ _PROPERTY_ROLES = _ROLES | {"inclusive": Role.INCLUSION, "exclusive": Role.EXCLU
 _SURE_KEYS = ("role", "fence")
 _LIKELY_KEYS = ("fence_type", "zone", "kind", "type")
 _TRUE, _FALSE = ("true", "1", "yes"), ("false", "0", "no")
+_FOREIGN_KEY = "fence"
+"""Also a key of OpenStreetMap, where yes and no say whether there is one."""
 _WHOLE_NAMES = frozenset({Role.HOME, Role.RETURN_POINT, Role.DRAWING})
 """A field called "Home meadow" is not a home; and a feature is left out only by that one word as its role."""
 
@@ -133,7 +135,7 @@ def _said_roles(feature: Feature) -> set[Role]:
     roles = set()
     for key, value in feature.properties.items():
         word, lower = _plain(str(value)), key.lower()
-        if value is None or not word:
+        if value is None or not word or _is_foreign(lower, word):
             continue
         if lower in _SURE_KEYS or (lower in _LIKELY_KEYS and word in _PROPERTY_ROLES):
             found = _PROPERTY_ROLES.get(word) or _named_role((str(value),), feature, _ZONES)
@@ -150,6 +152,18 @@ def _said_roles(feature: Feature) -> set[Role]:
                 )
             roles.add(Role.INCLUSION if (lower == "inclusion") == (word in _TRUE) else Role.EXCLUSION)
     return roles
+
+
+def foreign_property(feature: Feature) -> str | None:
+    """Return a property that bears the name of one of ours and says no role, such as OpenStreetMap's fence=yes; None without one."""
+    said = ((key, value) for key, value in feature.properties.items() if value is not None)
+    return next(
+        (f"{key} {value!r}" for key, value in said if _is_foreign(key.lower(), _plain(str(value)))), None
+    )
+
+
+def _is_foreign(key: str, word: str) -> bool:
+    return key == _FOREIGN_KEY and word in ("yes", "no")
 
 
 def _named_role(names: Iterable[str], feature: Feature, possible: Iterable[Role]) -> Role | None:
@@ -178,8 +192,10 @@ def may_be_inclusion(feature: Feature) -> bool:
     """Return whether a lone zone without a role may be taken for an inclusion.
 
     Its name says nothing (it has no word of three letters or more, or only such as programs give), or it is one of a field; and nothing that
-    is said of it is a thing that rovers keep away from.
+    is said of it is a thing that rovers keep away from, or says yes or no to a fence.
     """
+    if foreign_property(feature) is not None:
+        return False
     own = _ESCAPED.sub(lambda found: chr(int(found[1], 16)), feature.names[0] if feature.names else "")
     texts = [*feature.names, *(f"{key} {value}" for key, value in feature.properties.items())]
     if any(_THING.search(_plain(text)) for text in texts if isinstance(text, str)):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from missions.fence import CircleZone, PolygonZone, Zone, ZoneKind
-from missions.formats.feature_roles import may_be_inclusion
+from missions.formats.feature_roles import foreign_property, may_be_inclusion
 from missions.formats.features import Role
 
 if TYPE_CHECKING:
@@ -53,8 +53,10 @@ def _uncertain(
 ) -> MissionFormatError:
     problems = []
     if zones:
+        foreign = next(filter(None, map(foreign_property, zones)), None)
         problems.append(
             f"unclear whether {_listed(zones)} {'are inclusions or exclusions' if len(zones) > 1 else 'is an inclusion or an exclusion'}"
+            f"{f' ({foreign} is not a role)' if foreign else ''}"
         )
     if points:
         problems.append(f"unclear what {_listed(points)} {'are' if len(points) > 1 else 'is'}")

@@ -5,17 +5,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from missions.errors import NoRouteError, SituationError
-from missions.geo import distance_m
+from missions.geo import LatLon, distance_m
 from missions.ground.frame import check_latitude, frame_around
 from missions.ground.ground import Ground, check_ground, lay_out
 from missions.ground.known_fence import known_fence
+from missions.ground.obstacles import with_obstacles
 from missions.ground.seams import with_seams
 from missions.items import last_place
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from missions.geo import LatLon
     from missions.request import Request
     from missions.situation import Situation
     from missions.vehicle import Vehicle
@@ -57,7 +57,7 @@ def heading_at(situation: Situation, start: LatLon) -> float | None:
 
 
 def ground_for(situation: Situation, vehicle: Vehicle, ends: Sequence[LatLon]) -> Ground:
-    """Lay the situation's fence out in the plane as the vehicle's parameters require.
+    """Lay the situation's fence out in the plane as the vehicle's parameters require, with the obstacles that were reported.
 
     Raises
     ------
@@ -85,6 +85,8 @@ def ground_for(situation: Situation, vehicle: Vehicle, ends: Sequence[LatLon]) -
         around=near,
     )
     check_ground(ground)
+    ground = with_obstacles(ground, situation.obstacles)
+    check_ground(ground)
     for end in ends:  # last: a fence that cannot be used is no matter of the target
         _check_reach(end, frame.origin)
     return ground
@@ -104,11 +106,16 @@ def _check_reach(end: LatLon, centre: LatLon) -> None:
         It is too far away.
     """
     if (away_m := distance_m(centre, end)) > MAX_FIELD_M:
-        raise NoRouteError(
-            f"no route: {_too_far(end, centre, away_m)}",
-            distance_m=away_m,
-            advice="check the position (LAT,LON, latitude first) and the fence file",
-        )
+        advice = "check the position (LAT,LON, latitude first) and the fence file"
+        if (swapped := _swapped(end)) is not None and distance_m(centre, swapped) <= MAX_FIELD_M:
+            advice = f"latitude comes first: did you mean {swapped}?"
+        raise NoRouteError(f"no route: {_too_far(end, centre, away_m)}", distance_m=away_m, advice=advice)
+
+
+def _swapped(position: LatLon) -> LatLon | None:
+    """Return a position with latitude and longitude exchanged; None where that is none."""
+    lat_deg, lon_deg = position.lon_deg, position.lat_deg
+    return LatLon(lat_deg, lon_deg) if abs(lat_deg) <= 90.0 else None
 
 
 def _too_far(position: LatLon, centre: LatLon, away_m: float) -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -18,7 +18,7 @@ from shapely import LinearRing, MultiPolygon, Point, Polygon
 from shapely.ops import nearest_points
 
 from missions.errors import FenceError, SituationError
-from missions.fence import CircleZone, PolygonZone, Zone, ZoneKind
+from missions.fence import CircleZone, Obstacles, PolygonZone, Zone, ZoneKind
 from missions.geo import distance_m
 from missions.ground.frame import LocalFrame, autopilot_line, autopilot_scale, bow_m
 
@@ -33,13 +33,17 @@ if TYPE_CHECKING:
 
 Area = Polygon | MultiPolygon
 
+_NO_OBSTACLES = Obstacles()
+
 CIRCLE_TOLERANCE_M = 0.05
 """How far a circle's polygon may stand off the circle."""
 
 EDGE_BOW_M = 1e-3
 """How far a fence's line may stand off the autopilot's."""
 
-_COMMON_GROUND = "the autopilot allows only the intersection of all inclusions: draw the area as one inclusion polygon (pbpp fence merge makes it)"
+COMMON_GROUND = "the autopilot allows only the intersection of all inclusions"
+COMMON_GROUND_ADVICE = "draw the area as one inclusion polygon (pbpp fence merge makes it)"
+_COMMON_GROUND = f"{COMMON_GROUND}: {COMMON_GROUND_ADVICE}"
 _WALL_M = 1e-3  # thickness of a line made an area: a millimetre, below degE7's 11 mm
 _CIRCLE_PAD_M = 1e-4  # what the autopilot's flat metres lose on a circle of kilometres
 _OPEN_GROUND_M = 500.0  # of ground around everything where no inclusion bounds it; chosen, not measured
@@ -50,11 +54,12 @@ _MOST_RADIUS_M = (
 
 @dataclass(frozen=True, eq=False)
 class Barrier:
-    """A fence zone in the plane: its name as people count it, and its area in local metres."""
+    """A fence zone in the plane: its name as people count it, and its area in local metres; or a reported obstacle, of which the vehicle does not know."""
 
     name: str
     kind: ZoneKind
     area: Area
+    is_reported: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +78,8 @@ class Ground:
         A box around everything, the stand-in for an inclusion where the fence has none.
     warnings : tuple of str
         What was found odd in the fence.
+    obstacles : Obstacles
+        What was reported beside the fence, with the time for which it is laid out.
     """
 
     frame: LocalFrame
@@ -80,6 +87,7 @@ class Ground:
     union: bool
     bounds: Polygon
     warnings: tuple[str, ...]
+    obstacles: Obstacles = _NO_OBSTACLES
 
     def areas(self, kind: ZoneKind) -> list[Area]:
         """Return the areas of one kind; the bounds where there is no inclusion."""
@@ -106,6 +114,17 @@ class Ground:
     def edge(self) -> BaseGeometry:
         """The line the vehicle must keep off, without the bounds."""
         return self.allowed.boundary.difference(self.bounds.boundary.buffer(_WALL_M))
+
+    @cached_property
+    def enforced(self) -> Ground:
+        """What of it the vehicle knows: the fence, without reported obstacles."""
+        fence = tuple(barrier for barrier in self.barriers if not barrier.is_reported)
+        return self if len(fence) == len(self.barriers) else replace(self, barriers=fence)
+
+    @property
+    def avoided_edge(self) -> BaseGeometry:
+        """The edge that the vehicle's own avoidance sees."""
+        return self.enforced.edge
 
     def clearance_m(self, shape: BaseGeometry) -> float:
         """Return a shape's least distance to forbidden ground; 0 where it touches it, infinite without any."""
@@ -138,11 +157,11 @@ class Ground:
             outside = []
         return [b for b in self.barriers if b.kind is ZoneKind.EXCLUSION and b.area.covers(point)] + outside
 
-    def common_ground_advice(self, point: Point) -> str:
-        """Return why a point is forbidden although an inclusion covers it, after a semicolon; empty where that is not so."""
+    def is_in_some_inclusions_only(self, point: Point) -> bool:
+        """Return whether a point is forbidden although an inclusion covers it, because others do not."""
         inclusions = [b for b in self.barriers if b.kind is ZoneKind.INCLUSION]
         covered = sum(barrier.area.covers(point) for barrier in inclusions)
-        return f"; {_COMMON_GROUND}" if not self.union and 0 < covered < len(inclusions) else ""
+        return not self.union and 0 < covered < len(inclusions)
 
     def nearest_point(self, area: BaseGeometry, point: Point) -> Point:
         """Return the point of an area nearest to a point."""

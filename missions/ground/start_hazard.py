@@ -54,9 +54,9 @@ def start_hazard(ground: Ground, start: LocalPoint, vehicle: Vehicle) -> StartBl
     is_steered = vehicle.steering is Steering.ACKERMANN
     if vehicle.backs_away:
         there = (
-            "the vehicle backs up there, and in tests rovers backed into the fence (29 of 42 starts, at any heading)"
+            "the vehicle backs up there: in tests, rovers backed into the fence (29 of 42 starts, at any heading)"
             if is_steered
-            else "in tests skid-steered rovers did not move from there (41 of 42 starts)"
+            else "in tests, skid-steered rovers did not move from there (41 of 42 starts)"
         )
         return StartBlockedError(
             f"{where}: {there}{_few_rows(vehicle)}",
@@ -90,6 +90,6 @@ def nearest_avoided(ground: Ground, point: Point) -> tuple[float, str]:
             barrier.name,
         )
         for barrier in ground.barriers
-        if barrier.kind is ZoneKind.EXCLUSION or barrier.area.covers(point)
+        if not barrier.is_reported and (barrier.kind is ZoneKind.EXCLUSION or barrier.area.covers(point))
     ]
     return min(distances, default=(float("inf"), "no fence"))

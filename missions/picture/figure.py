@@ -22,12 +22,10 @@ from matplotlib.transforms import Affine2D, ScaledTranslation, Transform
 
 from missions.picture import style
 from missions.picture.labels import place_labels
-from missions.picture.scene import polygons
+from missions.picture.scene import arrow_place, polygons
 from missions.words import harmless
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
 
@@ -142,23 +140,13 @@ def _draw_route(axes: Any, scene: PictureScene) -> None:  # noqa: ANN401
     for leg in long[:: 1 + len(long) // _MOST_ARROWS]:
         color = style.UNSAFE if leg in scene.unsafe_legs else style.ROUTE
         marks = [mark.point for mark in scene.marks]
-        at = _arrow_at(route[leg], route[leg + 1], marks, _SHORT_PX / 2 / px_per_m)
+        at = arrow_place(route[leg], route[leg + 1], marks, _SHORT_PX / 2 / px_per_m)
         _draw_arrow(axes, at, route[leg + 1] - route[leg], color)
     points = np.array([point for _, point, _ in scene.waypoints])
     axes.plot(*points.T, "o", color="white", mec=style.ROUTE, markersize=4.5, zorder=7, label="waypoint")
     if scene.narrowest is not None:
         look = {"color": "black", "linewidth": 1.0, "zorder": 6.8, "markersize": 7, "mew": 1.0}
         axes.plot(*scene.narrowest.ends.T, "-|", label="narrowest place", **look)
-
-
-def _arrow_at(
-    a: NDArray[np.float64], b: NDArray[np.float64], marks: Sequence[NDArray[np.float64]], away_m: float
-) -> NDArray[np.float64]:
-    """Return the place of a leg's arrow: its middle, or beside it where a mark would cover it."""
-    places = [a + share * (b - a) for share in (0.5, 0.4, 0.6, 0.3, 0.7)]
-    return next(
-        (place for place in places if all(math.dist(place, mark) > away_m for mark in marks)), places[0]
-    )
 
 
 def _draw_arrow(axes: Any, at: NDArray[np.float64], way: NDArray[np.float64], color: str) -> None:  # noqa: ANN401

@@ -13,7 +13,7 @@ import plotly.graph_objects as go
 
 from missions.fence import ZoneKind
 from missions.picture import style
-from missions.picture.scene import polygons
+from missions.picture.scene import arrow_place, polygons
 from missions.words import harmless
 
 if TYPE_CHECKING:
@@ -24,7 +24,10 @@ if TYPE_CHECKING:
 
     from missions.picture.scene import PictureScene
 
+_ARROW_SHARE = 0.02  # of the width: half an arrow's length on a page
 _HOVERS_PER_LEG = 25  # so that any place of a leg answers the pointer
+_BESIDE_SIGN = "\u00a0" * 4
+_SAME_M = 0.02  # rounding to degE7
 _DASHES = {"-": "solid", "--": "dash", "-.": "dashdot", ":": "dot"}
 _HATCH = {
     "shape": "/",
@@ -154,16 +157,19 @@ def _route(scene: PictureScene) -> Iterator[go.Scatter]:
         yield _line(unsafe, "unsafe leg", color=style.UNSAFE, width=4.5)
     yield from _legs(scene)
     if waypoints := scene.waypoints:
-        points, numbers = (
-            np.array([point for _, point, _ in waypoints]),
-            [str(number) for number, _, _ in waypoints],
-        )
+        points = np.array([point for _, point, _ in waypoints])
+        at_target = [any(math.dist(point, target) < _SAME_M for target in scene.targets) for point in points]
+        # Beside a target's sign, which would cover it.
+        numbers = [
+            f"{_BESIDE_SIGN if covered else ''}{number}"
+            for (number, _, _), covered in zip(waypoints, at_target, strict=True)
+        ]
         yield _points(
             points, "waypoint", [_lines(text) for _, _, text in waypoints], _marker("circle", "white", 8)
         )
         look: dict[str, Any] = {
             "mode": "text",
-            "textposition": "top right",
+            "textposition": ["middle right" if covered else "top right" for covered in at_target],
             "hoverinfo": "skip",
             "showlegend": False,
         }
@@ -185,9 +191,15 @@ def _legs(scene: PictureScene) -> Iterator[go.Scatter]:
     a, b = scene.route[:-1], scene.route[1:]
     colors = [style.UNSAFE if leg in scene.unsafe_legs else style.ROUTE for leg in range(len(a))]
     headings_deg = np.degrees(np.arctan2(*(b - a).T)).round(1).tolist()
-    marker = {"symbol": "arrow", "angle": headings_deg, "size": 11, "color": colors}
+    edge = {"color": "white", "width": 1}
+    marker = {"symbol": "arrow", "angle": headings_deg, "size": 13, "color": colors, "line": edge}
     look: dict[str, Any] = {"mode": "markers", "showlegend": False}
-    yield go.Scatter(**_east_north((a + b) / 2), name="direction", marker=marker, hoverinfo="skip", **look)
+    west, _, east, _ = scene.bounds_m
+    marks = [mark.point for mark in scene.marks]
+    places = [arrow_place(*leg, marks, _ARROW_SHARE * (east - west)) for leg in zip(a, b, strict=True)]
+    yield go.Scatter(
+        **_east_north(np.array(places)), name="direction", marker=marker, hoverinfo="skip", **look
+    )
     shares = np.linspace(0, 1, _HOVERS_PER_LEG + 2)[1:-1, None]
     points = np.concatenate([begin + shares * (end - begin) for begin, end in zip(a, b, strict=True)])
     texts = [_lines(text) for text in scene.leg_texts for _ in range(_HOVERS_PER_LEG)]

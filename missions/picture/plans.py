@@ -100,7 +100,10 @@ def plan_title(plan: Plan, crossing: tuple[int, ...]) -> tuple[str, ...]:
             return length, f"{len(crossing)} legs are unsafe: they cross the fence"
         names = ", ".join(str(leg + 1) for leg in crossing)
         others_m = [m for leg, m in enumerate(leg_clearances_m(plan)) if leg > max(crossing)]
-        kept = f"; the others keep {min(others_m):.2f} m" if others_m else ""
+        along = f"{min(others_m):.2f} m along straight legs" if others_m else ""
+        if along and plan.clearance_m is not None:
+            along = f"at least {plan.clearance_m:g} m while driving ({along})"
+        kept = f"; the others keep {along}" if along else ""
         return length, f"only leg {names} is unsafe: it begins {_begins(plan)}{kept}"
     if not math.isfinite(drawn_m):
         return (f"{length}, no fence near",)

@@ -14,7 +14,7 @@ from shapely import LineString, Point, Polygon
 from missions.fence import ZoneKind
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
@@ -253,6 +253,16 @@ def crossings(
             own = shapely.get_coordinates(legs[number])
             found += [end for end in ends if np.hypot(*(own - end).T).min() > _AWAY_M]
     return found
+
+
+def arrow_place(
+    a: NDArray[np.float64], b: NDArray[np.float64], marks: Sequence[NDArray[np.float64]], away_m: float
+) -> NDArray[np.float64]:
+    """Return the place of a leg's arrow: its middle, or beside it where a mark would cover it."""
+    places = [a + share * (b - a) for share in (0.5, 0.4, 0.6, 0.3, 0.7)]
+    return next(
+        (place for place in places if all(math.dist(place, mark) > away_m for mark in marks)), places[0]
+    )
 
 
 def polygons(area: BaseGeometry) -> list[Polygon]:

@@ -14,6 +14,7 @@ from shapely import LineString, MultiPolygon, Point, Polygon
 import pbpp
 from missions.fence import ZoneKind
 from missions.geo import LocalPoint, bearing_deg, distance_m
+from missions.ground.ground import COMMON_GROUND, COMMON_GROUND_ADVICE
 from missions.routing.bottleneck import narrowest_place
 from missions.routing.no_route import NoRoute, NoRouteKind
 from missions.words import metres
@@ -305,9 +306,9 @@ class DrawnRoutes:
         raise _blocked(
             NoRouteKind.START_BLOCKED,
             f"the start is {_standing(forbidding)} ({self._position(start)}); "
-            f"the allowed area is {distance:.2f} m away, bearing {round(bearing) % 360}°, at {position}"
-            f"{self.ground.common_ground_advice(point)}",
+            f"the allowed area is {distance:.2f} m away, bearing {round(bearing) % 360}°, at {position}",
             names,
+            is_overlap=self.ground.is_in_some_inclusions_only(point),
             distance_m=round(distance, 3),
             bearing_deg=round(bearing, 1),
             nearest_free=list(position),
@@ -342,9 +343,9 @@ class DrawnRoutes:
             problem = f"the target is {metres(gap_m)} from {_names(names)}, closer than {self.asked}"
         raise _blocked(
             NoRouteKind.TARGET_BLOCKED,
-            f"{problem}; the nearest free point is {distance:.2f} m away, bearing {round(bearing) % 360}°, at {position}"
-            f"{self.ground.common_ground_advice(point)}",
+            f"{problem}; the nearest free point is {distance:.2f} m away, bearing {round(bearing) % 360}°, at {position}",
             names,
+            is_overlap=self.ground.is_in_some_inclusions_only(point),
             clearance_m=round(self.clearance_m, 3),
             distance_m=round(distance, 3),
             bearing_deg=round(bearing, 1),
@@ -474,9 +475,14 @@ class DrawnRoutes:
         return self.ground.frame.to_lat_lon(point)
 
 
-def _blocked(kind: NoRouteKind, text: str, fences: list[str], **facts: object) -> _NoWayError:
-    """Return the end of a search whose start or target is blocked."""
-    return _NoWayError(NoRoute(kind, text, {"fences": fences, **facts}, fences))
+def _blocked(
+    kind: NoRouteKind, text: str, fences: list[str], *, is_overlap: bool = False, **facts: object
+) -> _NoWayError:
+    """Return the end of a search whose start or target is blocked, perhaps because inclusions overlap and it lies in some of them only."""
+    why = NoRoute(kind, text, {"fences": fences, **facts}, fences)
+    if is_overlap:
+        why = replace(why, text=f"{text}; {COMMON_GROUND}", advice=COMMON_GROUND_ADVICE)
+    return _NoWayError(why)
 
 
 def _standing(forbidding: list[Barrier]) -> str:

@@ -6,13 +6,19 @@ where none do is it refused. The widest route is the one that keeps most of all 
 be drawn at downwards; then the next steps above the best are asked for as anybody would ask, as long as there is a route. Where the start
 refuses, routes that begin otherwise are looked for: another way, or leading away first.
 
-That no more can be had than the widest keeps, that all up to it can, and that less clearance never takes longer, does not follow: for that all
-clearances would have to be fitted for each plan. docs/clearance-ladder.md counts the exceptions.
+Where a route is hard to fit, that is where much had to be mended or much time was lost, it is fitted at the next clearances of a grid too, which
+is the same for whoever asks, as long as what is drawn there may come out quicker; the quickest is taken.
+
+That no more can be had than the widest keeps, that all up to it can, and that less clearance never takes longer, does not follow all the same: for
+that all clearances would have to be fitted for each plan. docs/clearance-ladder.md counts the exceptions.
 
 **Why.** Fitting is a heuristic (`routing.route_search`): at one clearance it fails by a centimetre and at the next it succeeds. Without this
 4.53 m were refused and 4.6 m planned, and the widest route kept less than others did.
 A route that is driven slowly somewhere is fitted once more, in short rounds that end elsewhere (`fitting.local_search.Fitting`): on four of
 seven such plans of `benchmarks/drive.py` it became 13 to 33 % quicker.
+Fits that begin millimetres apart may end far apart, each with another place where it fails or is slow. So where no fit keeps enough, or the
+quickest is not certain to win, lines are made that follow one of them and then another (`fitting.splice`): of five starts within 0.3 m that took
+31 to 49 s, and one that was refused, all took 29 to 35 s.
 
 What the vehicle keeps on its first legs, as it leaves the place where it stands, no clearance that is asked for can change: it is told apart
 (`DrivenRoute.lead_away_m`).
@@ -35,8 +41,7 @@ from missions.routing.route_search import SLOW_MPS, DrivenRoute, RouteSearch, Sh
 from missions.words import metres
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
+    from missions.fitting.cost import Measured
     from missions.promise import Promise
     from missions.routing.drawn_route import Sought
     from missions.vehicle import Vehicle
@@ -53,6 +58,19 @@ _OTHERWISE_STEPS = (
 )
 _OTHER_MEASUREMENTS = FIT_MEASUREMENTS + CRAWL_MEASUREMENTS
 _GOOD_SHARE = 0.5  # for fitting in short rounds
+GRID_M = 0.5
+"""Between the clearances that all who ask for less look at too, where a route is hard to fit: the same for all, so that less is not slower."""
+_GRID_FITTED = 5  # chosen, not measured: it bounds the time
+# On the ladder (docs/clearance-ladder.md), 593 rungs of 9 hard places, fitted routes take 0.95 to 1.04 of the time that their lines would as drawn
+# where less than a metre is missing in all, 0.82 to 1.06 where more is: what lost more, or had that much to mend, may be quicker elsewhere
+_LOST, _MUCH_LOST = 1.02, 1.04
+_HARD_M = 1.0
+_HARD_SHARE, _EASY_SHARE = 0.85, 0.98
+_SHARE_SPREAD = (
+    0.08  # between neighbours of the grid on one place: what came out so much better than the last is rare
+)
+_CERTAIN = 1.06
+"""Of the least time that a route can take: no other is quicker by more than a twentieth, a waypoint or two aside."""
 _ALL_M = 0.01  # what keeps so little less than it aims at is as wide as can be
 
 _NOTHING_ADVICE = (
@@ -89,7 +107,7 @@ class PromisedRoute:
         if isinstance(found, NoRoute) and found.at_start:
             found = self._search(asked.required_m, asked.required_m).nearer_start() or found
         if isinstance(found, DrivenRoute):
-            found = self._quicker(found, asked)
+            found = self._quickest_of_more(self._quicker(found, asked), asked)
             return _promised(asked, found), found
         return found if found.is_held else self._compared(found, asked)
 
@@ -99,15 +117,57 @@ class PromisedRoute:
         found = direct.find(briefly=True)
         if not _is_good(found) and (isinstance(found, DrivenRoute) or found.kind is NoRouteKind.CORNER):
             found = self._with_more(direct, found, asked)
+        if isinstance(found, NoRoute) and found.kind is NoRouteKind.CORNER:
+            found = direct.combined() or found
         return found
 
     def _quicker(self, found: DrivenRoute, asked: Promise) -> DrivenRoute:
-        """Return a route, or a quicker one that fitting in short rounds finds where it is driven slowly somewhere."""
-        if not found.is_slow_somewhere:
+        """Return the quickest of several kinds of routes, or the one found where none can be clearly quicker.
+
+        Where it is driven slowly somewhere they are fitted in short rounds too; of all that were fitted another one is made.
+        """
+        search = self._search(asked.required_m, asked.required_m)
+        if found.cost_s <= _CERTAIN * search.least_s:
             return found
-        search = replace(self._search(asked.required_m, asked.required_m), good_share=_GOOD_SHARE)
-        other = search.find(briefly=True)
-        return other if isinstance(other, DrivenRoute) and other.cost_s < found.cost_s else found
+        others: list[DrivenRoute | NoRoute | None] = []
+        if found.is_slow_somewhere:
+            others.append(replace(search, good_share=_GOOD_SHARE).find(briefly=True))
+        others.append(search.combined())
+        driven = [one for one in (found, *others) if isinstance(one, DrivenRoute)]
+        return min(driven, key=lambda one: one.cost_s)
+
+    def _quickest_of_more(self, found: DrivenRoute, asked: Promise) -> DrivenRoute:
+        """Return a route, or a quicker one fitted to more clearance, where it is hard to fit: to a little more, and to the grid's next clearances."""
+        required_m = asked.required_m
+        if (
+            _lost_share(found) > _MUCH_LOST and _kept_m(found) < required_m + STEP_M
+        ):  # else a little more was tried
+            for more_m in (round(required_m + step * STEP_M, 9) for step in _STEPS_UP):
+                other = self._other_search(more_m, required_m).find(briefly=True)
+                if isinstance(other, NoRoute):
+                    break
+                found = min(found, other, key=lambda one: one.cost_s)
+        if _lost_share(found) > _LOST or _missing_m(found.outlook) > _HARD_M:
+            found = self._quickest_of_grid(found, asked)
+        return found
+
+    def _quickest_of_grid(self, found: DrivenRoute, asked: Promise) -> DrivenRoute:
+        """Return a route, or a quicker one fitted to the grid's next clearances, as long as what is drawn there may come out quicker."""
+        first = math.floor(asked.promised_m / GRID_M + 1e-6) + 1
+        hard_share = _HARD_SHARE
+        for number in range(first, first + _GRID_FITTED):
+            required_m = round(number * GRID_M + asked.error_m, 9)
+            search = replace(self._search(required_m, required_m), measurements=_OTHER_MEASUREMENTS)
+            look = search.outlook
+            share = hard_share if _missing_m(look) > _HARD_M else _EASY_SHARE
+            if look is None or share * look.kept_cost_s >= found.cost_s:
+                break
+            other = search.find(briefly=True)
+            if isinstance(other, NoRoute):
+                break
+            hard_share = max(hard_share, other.cost_s / look.kept_cost_s - _SHARE_SPREAD)
+            found = min(found, other, key=lambda one: one.cost_s)
+        return found
 
     def widest(self, asked: Promise) -> Found | NoRoute:
         """Return the route that keeps most, and what is promised for it; else why there is none."""
@@ -124,8 +184,8 @@ class PromisedRoute:
         """Return the route that keeps most, aimed at the widest that lines can be drawn for and, as far as it is enough, at less."""
         best: DrivenRoute | None = None
         why: NoRoute | None = None
-        for required_m in (*_downwards(most_m, error_m), 0.0):
-            if required_m < enough_m or (best is not None and _kept_m(best) >= required_m):
+        for required_m in (*_downwards(most_m, error_m, enough_m), 0.0):
+            if required_m < enough_m or (best is not None and _kept_m(best) >= (enough_m or required_m)):
                 break
             found = self._widest_at(required_m, briefly=required_m > 0)
             if isinstance(found, DrivenRoute):
@@ -149,13 +209,19 @@ class PromisedRoute:
         return why
 
     def _climbed(self, best: DrivenRoute, asked: Promise, most_m: float) -> DrivenRoute:
-        """Return a route that keeps more, asked for as anybody would ask for the next steps, as far as there is one."""
+        """Return a route that keeps more, asked for as anybody would ask for the next steps, as far as there is one; at last the widest drawn.
+
+        Where the best so far creeps the widest drawn is not tried: it is harder still, and trying it was half the time of a refusal.
+        """
         while (required_m := _next_step_m(best, asked.error_m)) <= most_m:
             found = self._fitted(replace(asked, promised_m=required_m - asked.error_m))
             if isinstance(found, NoRoute) or _kept_m(found) <= _kept_m(best):
                 break
             best = found
-        return best
+        if best.is_slow or _kept_m(best) >= _whole_cm(most_m):
+            return best
+        found = self._widest_at(_whole_cm(most_m), briefly=True)
+        return found if isinstance(found, DrivenRoute) and _kept_m(found) > _kept_m(best) else best
 
     def _with_more(
         self, direct: RouteSearch, first: DrivenRoute | NoRoute, asked: Promise
@@ -237,12 +303,18 @@ class PromisedRoute:
         return RouteSearch(self.sought, required_m, self.vehicle, self.heading_deg, enough_m, self._known)
 
 
-def _downwards(most_m: float, error_m: float) -> Iterator[float]:
-    """Return what is aimed at for the widest route, most first: the widest, then whole steps of what is promised below it."""
-    yield math.floor(100 * most_m) / 100
+def _downwards(most_m: float, error_m: float, enough_m: float) -> tuple[float, ...]:
+    """Return what is aimed at for the widest route, most first: whole steps of what is promised, and the widest drawn where something is enough."""
     steps = _steps(most_m - error_m)
     # Rounded, so that what comes to the same is the same, and is fitted once.
-    yield from (round(error_m + (steps - down) * STEP_M, 9) for down in _STEPS_DOWN if steps > down)
+    wholes = [round(error_m + (steps - down) * STEP_M, 9) for down in _STEPS_DOWN if steps > down]
+    if not wholes or wholes[0] < enough_m:
+        return (_whole_cm(most_m), *wholes)
+    return (wholes[0], _whole_cm(most_m), *wholes[1:]) if enough_m else tuple(wholes)
+
+
+def _whole_cm(most_m: float) -> float:
+    return math.floor(100 * most_m) / 100
 
 
 def _steps(promised_m: float) -> int:
@@ -258,6 +330,15 @@ def _next_step_m(found: DrivenRoute, error_m: float) -> float:
 def _is_good(found: DrivenRoute | NoRoute) -> bool:
     """Return whether there is no reason to aim at more: all is kept that was aimed at, and it is not driven slowly."""
     return isinstance(found, DrivenRoute) and found.is_whole and not found.is_slow
+
+
+def _lost_share(found: DrivenRoute) -> float:
+    """Return what a route costs, as a share of what its lines would as they were drawn."""
+    return found.cost_s / found.outlook.kept_cost_s if found.outlook is not None else 1.0
+
+
+def _missing_m(outlook: Measured | None) -> float:
+    return sum(outlook.missing_m) if outlook is not None else 0.0
 
 
 def _kept_m(found: DrivenRoute) -> float:

@@ -71,6 +71,7 @@ _MISSED_AT_START_M = 0.05  # so much less the first legs may keep, where no line
 _TURN_COST_M_PER_DEG = 0.1  # orders the departures: a turn of 90° counts as 9 m
 _MOST_TURN_DEG = 100.0
 """At the end of a first leg: tried with more, rovers that came back the way they went left the band."""
+_SAME_M = 0.02  # rounding to degE7 moves a target by 5.6 mm at the most
 # The slow speed's path is fitted too where it is shorter than this share of the fast one's
 _SHORTER_SHARE = 0.97
 
@@ -101,6 +102,8 @@ class DrivenRoute:
         The predicted time, and a little for each waypoint (`fitting.cost`).
     is_slow : bool
         Whether it takes much longer than its lines would at full speed, so that others may be quicker.
+    outlook : Measured or None
+        How its lines measured as they were drawn; None where they were not fitted to a vehicle.
     """
 
     drawing: Drawing
@@ -113,6 +116,7 @@ class DrivenRoute:
     is_whole: bool = True
     cost_s: float = 0.0
     is_slow: bool = False
+    outlook: Measured | None = None
 
     @property
     def is_slow_somewhere(self) -> bool:
@@ -141,8 +145,10 @@ class SharedWork:
 
     drawn: dict[float, DrawnRoutes] = field(default_factory=dict)
     """By the clearance of the drawn lines."""
-    fitted: dict[tuple[Drawing, int, int, float], tuple[Drawing, Measured, int]] = field(default_factory=dict)
-    """By the lines, the measurements taken before and allowed, and what ends a round; with those taken after."""
+    fitted: dict[tuple[Drawing, int, int, float], tuple[Drawing, Measured, Measured, int]] = field(
+        default_factory=dict
+    )
+    """By the lines, the measurements taken before and allowed, and what ends a round; with how they measured before, and the measurements taken after."""
     departures: Departures | None = None
 
 
@@ -223,6 +229,49 @@ class RouteSearch:
         found = nearer.find(briefly=True) if nearer._is_limited_by_start else None  # noqa: SLF001 - of its own kind
         return found if isinstance(found, DrivenRoute) else None
 
+    @property
+    def least_s(self) -> float:
+        """What the shortest route takes at full speed and without corners, from standing to standing; 0 where there is none."""
+        if isinstance(self._first_routes, NoRoute):
+            return 0.0
+        length_m = min(route.length_m for route, _ in self._first_routes)
+        return length_m / self.vehicle.speed_mps + self.vehicle.speed_mps / self.vehicle.accel_max_mps2
+
+    def combined(self) -> DrivenRoute | None:
+        """Return a route that is made of those which were fitted for the vehicle so far, whatever they aimed at; None where none keeps enough."""
+        routes = self._first_routes
+        if isinstance(routes, NoRoute) or routes[0][0].start_clearance_m < 0:
+            return None
+        route = routes[0][0]
+        lines = {}
+        for drawing, *_ in self.known.fitted.values():
+            if _meets(drawing, route):
+                asked = self._asked_anew(route, drawing)
+                lines[asked] = asked == drawing
+        if not lines:
+            return None
+        fitting = self._fitting(MOST_MEASUREMENTS)
+        made = self._judged(fitting, route, *fitting.combine(lines), self.outlook)
+        return made.driven if made.is_enough else None
+
+    def _asked_anew(self, route: Route, drawing: Drawing) -> Drawing:
+        """Return lines that were fitted to something else with what this search asks of them."""
+        required_m = self.required_m + self._reserve_m
+        near_m = self._least_departing_m(route) + self._reserve_m
+        line_m = min(required_m, route.start_clearance_m) if route.start_clearance_m >= 0 else -math.inf
+        leads = max(self._lead_away(drawing), 1)
+        near = [
+            not number or (number <= leads and not point.is_fixed) for number, point in enumerate(drawing)
+        ]
+        return tuple(
+            replace(
+                point,
+                required_m=near_m if is_near else required_m,
+                line_m=line_m if is_near else required_m,
+            )
+            for point, is_near in zip(drawing, near, strict=True)
+        )
+
     def begins_otherwise(self, other: RouteSearch) -> bool:
         """Return whether the shortest route leaves the start another way than that of another search, or leads away first where that does not."""
         here, there = self._first_routes, other._first_routes
@@ -231,6 +280,16 @@ class RouteSearch:
         (route, _), (that, _) = here[0], there[0]
         turn_deg = abs(_course_deg(route) - _course_deg(that))
         return route.lead_away != that.lead_away or min(turn_deg, 360.0 - turn_deg) > _OTHER_WAY_DEG
+
+    @cached_property
+    def outlook(self) -> Measured | None:
+        """How the quicker of the first routes measures before it is fitted; None where none is drawn."""
+        routes = self._first_routes
+        if isinstance(routes, NoRoute):
+            return None
+        fitting = self._fitting(self.measurements)
+        looks = (fitting.outlook(self._drawing(route)) for route, _ in routes)
+        return min(looks, key=lambda look: look.kept_cost_s)
 
     @cached_property
     def _attempts(self) -> list[_Attempt]:
@@ -346,8 +405,15 @@ class RouteSearch:
         drawn_lines = tuple(replace(point, speed_mps=speed_mps) for point in self._drawing(route))
         key = (drawn_lines, fitting.measurements, fitting.most_measurements, fitting.good_share)
         if key not in self.known.fitted:
-            self.known.fitted[key] = (*fitting.fit(drawn_lines), fitting.measurements)
-        drawing, measured, fitting.measurements = self.known.fitted[key]
+            fitted = fitting.fit(drawn_lines)
+            self.known.fitted[key] = (*fitted, fitting.outlook(drawn_lines), fitting.measurements)
+        drawing, measured, outlook, fitting.measurements = self.known.fitted[key]
+        return self._judged(fitting, route, drawing, measured, outlook)
+
+    def _judged(
+        self, fitting: Fitting, route: Route, drawing: Drawing, measured: Measured, outlook: Measured | None
+    ) -> _Attempt:
+        """Return what became of a route's lines."""
         departing_m = self._least_departing_m(route)
         kept, kept_m, lead_m = measured, self.required_m, departing_m
         if not measured.is_enough:
@@ -367,6 +433,7 @@ class RouteSearch:
             measured.is_enough,
             kept.cost_s,
             kept.cost_s * self.vehicle.speed_mps > _SLOW_SHARE * polyline.distances_m(drawing)[-1],
+            outlook,
         )
         enough_m = self.required_m if self.enough_m is None else self.enough_m
         return _Attempt(drawing, measured, driven, is_enough=kept_m >= min(enough_m, self.required_m))
@@ -501,6 +568,14 @@ class RouteSearch:
 def _found(attempts: Sequence[_Attempt]) -> list[tuple[float, DrivenRoute]]:
     """Return the routes that were found, with what each costs."""
     return [(one.driven.cost_s, one.driven) for one in attempts if one.is_enough and one.driven is not None]
+
+
+def _meets(drawing: Drawing, route: Route) -> bool:
+    """Return whether lines meet the same targets as a route, which a blocked target's may not at another clearance."""
+    fixed = [point.place for point in drawing[1:] if point.is_fixed]
+    return len(fixed) == len(route.targets) and all(
+        math.dist(*ends) < _SAME_M for ends in zip(fixed, route.targets, strict=True)
+    )
 
 
 def _course_deg(route: Route) -> float:

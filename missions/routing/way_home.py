@@ -26,7 +26,7 @@ from missions.routing.drawn_route import INSIDE_M
 from missions.words import metres
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
@@ -102,18 +102,31 @@ class WaysHome:
 
     def nearest(self, position: LatLon) -> WayHome | None:
         """Return the way to the nearest place; None where none can be reached."""
+        return next(self.in_order(position), None)
+
+    def in_order(self, position: LatLon, *, may_escape: bool = False) -> Iterator[WayHome]:
+        """Return the ways to all places that can be reached, the nearest first.
+
+        Parameters
+        ----------
+        position : LatLon
+            Where they begin.
+        may_escape : bool
+            Whether they may lead out of forbidden ground first, straight to the nearest free ground.
+        """
         here = LocalPoint(*self.ground.frame.to_local(position))
-        begin = self._free_start(here)
+        begin = self._free_start(here, may_escape=may_escape)
         if begin is None:
-            return None
+            return
         lengths_m = self._tree.lengths([begin])[0]
         least_m = float(lengths_m.min(initial=np.inf))
-        if not np.isfinite(least_m):
-            return None
-        numbers = np.flatnonzero(lengths_m <= least_m * _AS_LONG).tolist()
-        return min(
-            (self._way(here, begin, number) for number in numbers), key=lambda way: (way.time_s, way.length_m)
-        )
+        near = lengths_m <= least_m * _AS_LONG
+        alike = np.flatnonzero(near & np.isfinite(lengths_m)).tolist()
+        rest = np.flatnonzero(~near & np.isfinite(lengths_m)).tolist()
+        ways = (self._way(here, begin, number) for number in alike)
+        yield from sorted(ways, key=lambda way: (way.time_s, way.length_m))
+        for number in sorted(rest, key=lambda number: float(lengths_m[number])):
+            yield self._way(here, begin, number)
 
     def is_allowed(self, position: LatLon) -> bool:
         """Return whether the fence allows a position."""
@@ -156,15 +169,16 @@ class WaysHome:
         legs: list[float | None] = [None] * (len(points) - 1)
         return envelope(points, self.vehicle, heading_deg=heading_deg, speeds=legs, stops={}).duration_s
 
-    def _free_start(self, here: LocalPoint) -> LocalPoint | None:
-        """Return where free ground begins, straight from a position on allowed ground; None on forbidden ground."""
+    def _free_start(self, here: LocalPoint, *, may_escape: bool = False) -> LocalPoint | None:
+        """Return where free ground begins, straight from a position; None on forbidden ground that it may not escape from."""
         point = Point(here)
         if self._free.covers(point):
             return here
-        if self._free.is_empty or not self.ground.allowed.covers(point):
+        is_outside = not self.ground.allowed.covers(point)
+        if self._free.is_empty or (is_outside and not may_escape):
             return None
         line = shapely.shortest_line(point, self._inner)
-        if not self.ground.allowed.covers(line):
+        if not is_outside and not self.ground.allowed.covers(line):
             return None
         east, north = shapely.get_coordinates(line)[-1].tolist()
         return LocalPoint(east, north)
@@ -234,5 +248,5 @@ def _why_blocked(ground: Ground, place: Place, clearance_m: float) -> str:
         return f"it is {' and '.join(names or ['outside the allowed area'])}"
     barrier, away_m = ground.nearest(point)
     if away_m >= clearance_m and barrier is not None:
-        return f"it is too near a sharp corner of {barrier.name}, round which a way keeps more than {metres(clearance_m)}"
-    return f"it is {metres(away_m)} from {barrier.name if barrier else 'a fence'}; a way keeps {metres(clearance_m)}"
+        return f"it is too close to a sharp corner of {barrier.name}, around which ways home keep more than {metres(clearance_m)}"
+    return f"it is {metres(away_m)} from {barrier.name if barrier else 'a fence'}, and a way home keeps {metres(clearance_m)}"

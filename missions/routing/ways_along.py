@@ -79,6 +79,6 @@ def way_remarks(ways: WaysHome, route: AlongRoute, items: Sequence[int]) -> list
             f"no way home from {route.without_m:.0f} m of the route's {route.length_m:.0f} m, "
             f"first on the leg to item {items[route.first_leg]} at {route.first_without}: "
             f"none of {counted(len(ways.places), 'place')} (home, rally points, --place) can be reached "
-            f"with {metres(ways.clearance_m)} to every fence"
+            f"at {metres(ways.clearance_m)} from every fence"
         )
     return remarks

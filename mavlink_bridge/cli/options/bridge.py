@@ -15,13 +15,91 @@ from mavlink_bridge.cli.options.shared import (
     metres,
     option,
 )
+from mavlink_bridge.cli.values import MOST_MPS, MOST_S, within
+
+_OBSTACLES = "Obstacles: this protects no person"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ObstacleOptions:
+    """Where obstacles may be reported from, and what is taken of them."""
+
+    obstacles_from: Annotated[
+        list[str],
+        option(
+            "Plan round reported obstacles, and hold for them with --drive: OBSTACLE_DISTANCE (a sensor's messages), keyboard (type blocked, clear); "
+            "repeatable, or with commas. This protects no person.",
+            "SOURCE",
+            panel=_OBSTACLES,
+        ),
+    ] = field(default_factory=list)
+    obstacle_growth: Annotated[
+        float,
+        option(
+            "How fast an obstacle may move until it was watched for 1.5 s.",
+            "MPS",
+            panel=_OBSTACLES,
+            parser=within(0.0, MOST_MPS, "metres a second"),
+        ),
+    ] = 1.0
+    obstacle_keep: Annotated[
+        float,
+        option(
+            "How long an obstacle is kept after a sensor saw it last.",
+            "S",
+            panel=_OBSTACLES,
+            parser=within(0.5, MOST_S, "seconds"),
+        ),
+    ] = 10.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class HomingOptions:
+    """When the vehicle is brought home, and where home may be."""
+
+    rtl_by_route: Annotated[
+        bool,
+        flag(
+            "--rtl-by-route",
+            "With --drive: answer RTL with HOLD and a verified way home round the fences, to the nearest of home, rally points and --place. "
+            "RTL again, or any other mode, is yours.",
+        ),
+    ] = False
+    battery_percent: Annotated[
+        float | None,
+        option(
+            "With --rtl-by-route: also bring it home when the battery is at or below P percent.",
+            "P",
+            parser=within(1.0, 99.0, "percent"),
+        ),
+    ] = None
+    battery_volts: Annotated[
+        float | None,
+        option(
+            "With --rtl-by-route: also bring it home when the battery is at or below V volts.",
+            "V",
+            parser=within(0.1, 1000.0, "volts"),
+        ),
+    ] = None
+    gcs_timeout: Annotated[
+        float | None,
+        option(
+            "With --rtl-by-route: also bring it home when no ground station was heard for S seconds, once one was.",
+            "S",
+            parser=within(2.0, MOST_S, "seconds"),
+        ),
+    ] = None
+    place: Annotated[
+        list[str],
+        option("A place to go home to, beside home and the rally points; repeatable.", "NAME=LAT,LON"),
+    ] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BridgeOptions(DescriptionOptions, VehicleLinkOptions):
+class BridgeOptions(ObstacleOptions, HomingOptions, DescriptionOptions, VehicleLinkOptions):
     """Run alongside the autopilot: read fence, state and targets from the link, plan, upload and verify missions, watch the drive.
 
-    Type targets as `LAT,LON`; `yes` confirms a plan. Without `--upload` it only reports.
+    Type targets as `LAT,LON`; `yes` confirms a plan; `blocked` reports an obstacle. Without `--upload` it only reports.
 
     For example:
 
@@ -56,7 +134,14 @@ class BridgeOptions(DescriptionOptions, VehicleLinkOptions):
         ),
     ] = False
     arm: Annotated[bool, flag("--arm", "With --drive: arm before AUTO.")] = False
-    confirm: Annotated[bool, flag("--confirm", "Upload a plan only after you type yes.")] = False
+    confirm: Annotated[
+        bool,
+        flag("--confirm", "Upload a plan only after you type yes; a way home of --rtl-by-route at once."),
+    ] = False
+    escape: Annotated[
+        bool,
+        flag("--escape", "Let a vehicle that stands inside an exclusion or outside the fence drive out."),
+    ] = False
     once: Annotated[bool, flag("--once", "Exit after the first target.")] = False
     log: Annotated[
         Path | None,

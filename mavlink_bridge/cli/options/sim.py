@@ -38,6 +38,13 @@ class SimOptions(MapOptions, CommonOptions):
     mission: Annotated[
         Path | None, option("Mission file stored in the rover; its home, if it has one, is not used.", "FILE")
     ] = None
+    disc: Annotated[
+        list[str],
+        option(
+            "Something round in the field that the rover's distance sensor sees, 15 m far; it may move. Repeatable.",
+            "LAT,LON,RADIUS[,SPEED,HEADING]",
+        ),
+    ] = field(default_factory=list)
     autopilot: Annotated[
         str, option("Whose rover it is: ardupilot or px4.", "AUTOPILOT", parser=autopilot_from)
     ] = "ardupilot"

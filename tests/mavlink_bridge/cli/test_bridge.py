@@ -13,7 +13,10 @@ import pytest
 from typer.testing import CliRunner
 
 from mavlink_bridge.cli.app import app
-from mavlink_bridge.simulator import Simulator, SimulatorConfig
+from mavlink_bridge.link import open_link
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.rover import Mode
+from mavlink_bridge.simulator import MovingDisc, Simulator, SimulatorConfig
 from missions.fence import fence_to_items
 from missions.formats import read_fence
 from missions.geo import LatLon, distance_m
@@ -124,6 +127,32 @@ def test_a_bridge_killed_while_it_drives_adopts_its_drive_and_replays_so(config,
     ]
 
 
+def test_rtl_is_answered_by_a_way_home_and_replays_so(config, tmp_path):
+    log = tmp_path / "run.tlog"
+    options = ("--target", FAR, "--upload", "--drive", "--arm", "--rtl-by-route", "--log", str(log))
+    with Simulator(config, "tcpin:127.0.0.1:0", speedup=3) as simulator:
+        process = start_bridge(simulator.connection, *options)
+        try:
+            told = [wait_for(process, "way_home")["place"]]
+            wait_for(process, "progress")
+            with open_link(simulator.connection, (255, 190)) as station:
+                wait_for(process, "progress")
+                station.send(m.SetMode(1, 1, Mode.RTL))
+            told += [wait_for(process, name)["event"] for name in ("called_home", "going_home", "driving")]
+        finally:
+            process.terminate()
+            _, errors = process.communicate(timeout=60)
+    assert told == ["home", "called_home", "going_home", "driving"]
+    assert "the first RTL is answered with HOLD and a verified way home" in errors
+    again = run("replay", str(log), "--json")
+    names = [json.loads(line)["event"] for line in again.stdout.splitlines()]
+    assert [name for name in names if name in ("way_home", "called_home", "going_home")] == [
+        "way_home",
+        "called_home",
+        "going_home",
+    ]
+
+
 def test_a_typed_target_and_a_typed_yes(config):
     with Simulator(config, "tcpin:127.0.0.1:0") as simulator:
         process = start_bridge(simulator.connection, "--upload", "--confirm")
@@ -141,6 +170,35 @@ def test_a_typed_target_and_a_typed_yes(config):
             process.terminate()
             _, errors = process.communicate(timeout=60)
     assert "nonsense" in errors
+
+
+def test_obstacles_typed_and_seen_are_held_for_and_replay_so(config, tmp_path):
+    log = tmp_path / "run.tlog"
+    beside = MovingDisc(LatLon(40.07150, -105.22960), 0.8)
+    seen = replace(config, sensor_m=15.0, discs=(beside,), parameters={"FENCE_ENABLE": 1.0, "WP_SPEED": 2.0})
+    with Simulator(seen, "tcpin:127.0.0.1:0", speedup=2) as simulator:
+        options = ("--target", FAR, "--upload", "--drive", "--arm", "--log", str(log))
+        process = start_bridge(
+            simulator.connection, *options, "--obstacles-from", "OBSTACLE_DISTANCE,keyboard"
+        )
+        try:
+            wait_for(process, "driving")
+            process.stdin.write("blocked here 1.5\n")
+            process.stdin.flush()
+            across = wait_for(process, "obstacle_across")
+            assert "keyboard" in across["obstacle"]
+            wait_for(process, "holding")
+            process.stdin.write("clear\n")
+            process.stdin.flush()
+            wait_for(process, "driving")
+        finally:
+            process.terminate()
+            _, errors = process.communicate(timeout=60)
+    assert "this protects no person" in errors
+    again = run("replay", str(log), "--json")
+    names = [json.loads(line)["event"] for line in again.stdout.splitlines()]
+    assert names.index("obstacle_across") < names.index("holding")
+    assert names.count("driving") == 2
 
 
 def test_a_link_that_breaks_is_opened_again(config):
@@ -169,6 +227,8 @@ def test_no_vehicle_for_a_single_job():
         (["bridge", "--connect", "nonsense"], 5),
         (["bridge", "--connect", "tcp:127.0.0.1:9", "--target-from", "dreams"], 2),
         (["bridge", "--connect", "tcp:127.0.0.1:9", "--clearance", "-1"], 2),
+        (["bridge", "--connect", "tcp:127.0.0.1:9", "--obstacles-from", "keyboard,dreams"], 2),
+        (["bridge", "--connect", "tcp:127.0.0.1:9", "--obstacle-growth", "-1"], 2),
         (["bridge"], 2),
         (["replay"], 2),
         (["replay", "missing.tlog"], 3),

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import io
 
+import pytest
 from director.test_bridge_director import FAR, driving
 from rich.console import Console
 
 from mavlink_bridge.cli.bridge_view import LiveView
 from mavlink_bridge.director import Event, EventName
+from mavlink_bridge.director.orders import Homing
+from missions.geo import LatLon
 
 
 def test_shows_state_vehicle_route_and_map():
@@ -34,13 +37,26 @@ def test_shows_state_vehicle_route_and_map():
         assert part in shown
 
 
-def driving_for(metres):
-    run = driving(conductor_of())
+@pytest.mark.parametrize(("places", "shown"), [({}, "home, "), ({"shed": LatLon(50.0, 10.0)}, "none: ")])
+def test_shows_the_way_home(places, shown):
+    run = driving_for(5, homing=Homing(is_kept=True, places=places))
+    if places:
+        run.vehicles[0].rover.home = run.vehicles[0]._home = places["shed"]
+        run.run_until(lambda: run.director.no_way_home, 30)
+    text = io.StringIO()
+    with LiveView(run.director, Console(file=text, force_terminal=True, width=150, height=60)) as view:
+        view.show(run.now_s)
+    (line,) = {line for line in text.getvalue().splitlines() if "way home" in line}
+    assert shown in line
+
+
+def driving_for(metres, **orders):
+    run = driving(conductor_of(**orders))
     run.run_until(lambda: run.director.drive is not None and run.director.drive.driven_m > metres)
     return run
 
 
-def conductor_of():
+def conductor_of(**orders):
     from director.test_bridge_director import conductor
 
-    return conductor()
+    return conductor(**orders)

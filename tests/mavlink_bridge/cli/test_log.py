@@ -6,9 +6,13 @@ import json
 
 import pytest
 from logbook.making import BEGIN_S, FIELD, Log
+from rich.console import Console
+from rich.text import Text
 from typer.testing import CliRunner
 
+from mavlink_bridge.cli import log as log_module
 from mavlink_bridge.cli.app import app
+from mavlink_bridge.cli.options.log import LogOptions
 from missions.errors import MissionFormatError
 from missions.fence import Fence
 from missions.geo import LatLon
@@ -43,6 +47,21 @@ def test_tells_people_what_happened(logs):
     assert "nearest" not in result.stdout
     last = result.stdout.splitlines()[-1]
     assert last == "Verdict on vehicle 1: left the fence once: 5.41 m inside exclusion polygon 1"
+
+
+def test_a_vehicle_that_never_drove_is_told(logs):
+    told = run(str(logs / "union-rally.tlog")).stdout.splitlines()[-1]
+    assert told == "Verdict on vehicle 1: never drove while armed: the track was not compared with the fence"
+
+
+def test_a_terminal_of_80_columns_breaks_no_word(logs, monkeypatch, capsys):
+    wide = run(str(logs / "mission-yard.tlog")).stdout
+    assert max(map(len, wide.splitlines())) > 80
+    monkeypatch.setattr(log_module, "console", lambda: Console(force_terminal=True, width=80))
+    log_module.log(LogOptions(files=[logs / "mission-yard.tlog"]))
+    told = Text.from_ansi(capsys.readouterr().out).plain
+    assert max(map(len, told.splitlines())) <= 80
+    assert set(told.split()) == set(wide.split())
 
 
 def test_the_messages_are_told_on_request(logs):

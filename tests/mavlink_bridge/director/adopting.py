@@ -46,6 +46,9 @@ RADIUS_M = 2.0
 AHEAD_M = 16.0
 """A rover of 3 m/s rolls on for 6 m, and on a bad link HOLD and fence take a second or two."""
 
+HELD_S: dict[str, list[float]] = {"fence while away": [], "fence after": []}
+"""How long each run took to HOLD: from when the drive was adopted, or from when the fence was complete on the vehicle."""
+
 FOREIGN = (
     "no note",
     "other board",
@@ -168,7 +171,7 @@ class Killed:
 class _Nobody:
     """A bridge that is not there."""
 
-    pending_backup = pending_plan = deadline_s = identity = drive_note = None
+    pending_backup = pending_plan = pending_ways = deadline_s = identity = drive_note = None
     is_done = False
     state = "nobody"
 
@@ -208,9 +211,11 @@ def adopted_run(seed: int) -> str:
             place = None
         else:
             one.put_fence(ahead)
-    begun_s = run.now_s
+    adopted_s = next(event.time_s for event in run.events if event.name is EventName.ADOPTED)
+    begun_s = run.now_s if when == "after" else adopted_s
     if place is not None:
         run.run_until(lambda: Mode.HOLD in one.switched(), 15)
+        HELD_S[f"fence {when}"].append(run.now_s - begun_s)
         run.run_until(lambda: vehicle.mode == Mode.HOLD, 5)
     held_s = run.now_s - begun_s
     run.run_until(lambda: run.director.state is State.ARRIVED or run.happened(EventName.NO_PLAN)(), 300)
@@ -290,6 +295,13 @@ def main() -> None:
             what = "bad"
         seen[what] += 1
     print("\n".join(f"{count:5d} {what}" for what, count in sorted(seen.items())))
+    for name, held_s in HELD_S.items():
+        held_s.sort()
+        if held_s:
+            middle_s, late_s = held_s[len(held_s) // 2], held_s[int(0.95 * (len(held_s) - 1))]
+            print(
+                f"{name}, to HOLD: {len(held_s)}, median {middle_s:.2f} s, 95 of 100 {late_s:.2f} s, most {held_s[-1]:.2f} s"
+            )
     raise SystemExit(bool(seen["bad"]))
 
 

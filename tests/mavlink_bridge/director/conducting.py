@@ -100,6 +100,8 @@ class Conductor:
             self._task = (self.now_s + self.planning_s, task)
         if task is not None and self.now_s >= self._task[0]:
             self.director.plan_made(task, task.made(self.planner), self.now_s)
+        if (ways := self.director.pending_ways) is not None:
+            self.director.ways_made(ways, ways.made(), self.now_s)
 
     def ground_station(self, message: Message) -> None:
         """Let a ground station send to the vehicles; the director hears it too, as on a shared radio."""

@@ -130,7 +130,7 @@ def test_a_drive_whose_item_the_vehicle_does_not_tell_is_not_adopted_and_it_is_s
     one.restart(one.note)
     run.run_until(run.happened(EventName.NOT_ADOPTED), 15)
     assert [event.data["reason"] for event in run.events if event.name is EventName.NOT_ADOPTED] == [
-        "the vehicle does not tell which item it drives to"
+        "the vehicle does not report which item it drives to"
     ]
 
 

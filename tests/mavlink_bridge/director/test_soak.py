@@ -5,6 +5,8 @@ from __future__ import annotations
 import pytest
 from director.soak import soak
 
+from mavlink_bridge.director.orders import Homing
+
 
 @pytest.mark.parametrize("seed", [0])  # `make soak` of CI goes on for minutes
 def test_a_few_minutes_keep_every_promise(seed):
@@ -28,3 +30,10 @@ def test_nothing_is_done_beyond_the_orders(orders):
     run = soak(7, hours=0.04, pace_s=(0.05, 2.5), **orders)
     assert run.violations == []
     assert run.counts["target"] > 10
+
+
+def test_coming_home_breaks_no_promise():
+    homing = Homing(is_kept=True, by_route=True, gcs_timeout_s=20.0)
+    run = soak(3, hours=0.08, pace_s=(0.3, 6.0), homing=homing)
+    assert run.violations == []
+    assert run.counts["called_home"] > 0

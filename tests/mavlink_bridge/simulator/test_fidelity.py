@@ -191,6 +191,15 @@ def test_a_skid_steered_rover_that_does_not_pivot_turns_where_it_stands(wrong_de
     assert track.points_m.real.min() >= -0.1
 
 
+@pytest.mark.parametrize("wrong_deg", [179.9999, 180, -180])
+def test_a_skid_steered_rover_that_does_not_pivot_turns_round_though_it_faces_exactly_away(wrong_deg):
+    """In ArduPilot's AR_PosControl that is a balance, which noise ends; here it stood for ever."""
+    limits = settings("skid", WP_SPEED=2.0, WP_PIVOT_ANGLE=0.0)
+    track = drive([0j, 20 + 0j], limits, heading_rad=math.radians(wrong_deg))
+    assert len(track.points_m) * TICK_S < 30.0
+    assert abs(track.points_m.imag).max() <= 0.4
+
+
 @pytest.mark.parametrize("vehicle", ["ackermann", "skid"])
 def test_a_straight_line_is_driven_a_little_to_the_left(vehicle):
     track = drive([0j, 100 + 0j], settings(vehicle, WP_SPEED=3.0))

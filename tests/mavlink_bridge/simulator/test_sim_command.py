@@ -33,6 +33,8 @@ def test_it_runs_until_told_to_stop(stop, fields):
         f"--fence={fields / 'maze-fence.waypoints'}",
         f"--mission={fields / 'yard-mission.waypoints'}",
         "--param=WP_SPEED=2",
+        "--disc=40.0715,-105.22985,1,0.5,90",
+        "--disc=40.0715,-105.2295,1",
         "--param=fence_enable=1",
         "--system=7",
     ]
@@ -56,6 +58,9 @@ def test_it_runs_until_told_to_stop(stop, fields):
             assert link.recv_match(type="PARAM_VALUE", blocking=True, timeout=FIRST_LINE_S).param_value == 2.0
             position = link.recv_match(type="GLOBAL_POSITION_INT", blocking=True, timeout=FIRST_LINE_S)
             assert (position.lat, position.lon, position.hdg) == (400715000, -1052299000, 9000)
+            seen = link.recv_match(type="OBSTACLE_DISTANCE", blocking=True, timeout=FIRST_LINE_S)
+            assert (seen.frame, seen.increment, seen.max_distance) == (12, 5, 1500)
+            assert min(seen.distances) < 1500
             link.close()
         finally:
             run.send_signal(stop)
@@ -78,6 +83,11 @@ def test_it_runs_until_told_to_stop(stop, fields):
         (["--loss=1.5"], 2, "loss"),
         (["--speedup=0"], 2, "speedup"),
         (["--system=0"], 2, "system"),
+        (["--disc=40,-105"], 2, "LAT,LON,RADIUS"),
+        (["--disc=91,-105,1"], 2, "latitude"),
+        (["--disc=40,-105,1,2"], 2, "LAT,LON,RADIUS"),
+        (["--disc=40,-105,0"], 2, "metres"),
+        (["--disc=40,-105,1,2,north"], 2, "degrees"),
     ],
 )
 def test_wrong_options_are_told(options, code, said):

@@ -105,7 +105,7 @@ def test_what_is_left_out_is_told(plan: Path, tmp_path: Path) -> None:
     assert document["warnings"] == [
         "1 fence zone left out: a .gpx file holds no fence",
         "1 rally point left out: a .gpx file holds no rally",
-        "1 mission items without a place left out: a .gpx file holds the route only",
+        "1 mission item without a place left out: a .gpx file holds the route only",
     ]
     assert [f"warning: {text}" for text in document["warnings"]] == result.stderr.splitlines()
 

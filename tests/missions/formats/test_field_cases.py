@@ -232,7 +232,9 @@ BAD = {
     "31-geojson-habits/geojsonio-poly-and-pin.geojson": ("point 1", "--ignore-points"),
     "31-geojson-habits/names-wp1.geojson": ("'WP1'", "--ignore-points"),
     "31-geojson-habits/line-obstacle.geojson": ("a line has no inside", "draw a polygon around it", "--role 'line 1=ignore'"),
-    "31-geojson-habits/osm-fence-yes.geojson": ("fence 'yes'", "--role 'polygon 1=inclusion'"),
+    "31-geojson-habits/osm-fence-yes.geojson": (
+        "unclear whether polygon 1 is an inclusion or an exclusion (fence 'yes' is not a role)", "--role 'polygon 1=exclusion'", "=inclusion"
+    ),
     "31-geojson-habits/strings.geojson": ("features[0].geometry", "without quotation marks"),
     "32-kml-habits/folders-with-label-pin.kml": ("a point cannot be exclusion", "--ignore-points"),
     "32-kml-habits/ge-boundary-and-tree.kml": ("'Boundary'", "'Tree 1'", "--outermost inclusion"),
@@ -248,6 +250,17 @@ def test_maps_that_are_refused_name_what_settles_it(tmp_path, case, words):
     result = convert(case, tmp_path)
     assert result.exit_code == 3
     assert all(word in result.stderr for word in words), result.stderr
+
+
+def test_a_key_of_openstreetmap_is_skipped_where_the_name_says_the_role(tmp_path):
+    ring = json.loads((CASES / "31-geojson-habits" / "osm-fence-yes.geojson").read_text())["features"][0]
+    ring["properties"] |= {"name": "No-go pond", "fence": "no"}
+    source = tmp_path / "m.geojson"
+    source.write_text(json.dumps(ring))
+    result = convert(str(source), tmp_path)
+    assert result.exit_code == 0, result.stderr
+    assert kinds(tmp_path / "out.plan") == ["exclusion"]
+    assert "fence 'no' of polygon 'No-go pond' is not a role: skipped" in result.stderr
 
 
 def test_paths_of_maps(tmp_path):
@@ -300,6 +313,79 @@ def test_positions_of_other_programs_are_a_mission(name):
         LatLon(48.1, 11.5),
         LatLon(48.101, 11.501),
     ]
+
+
+# Vehicles, as plans, checks and replays take them
+
+
+def command(name: str, *words: object):
+    load(name)
+    return CliRunner().invoke(app, [name, *map(str, words)])
+
+
+def test_whole_numbers_of_px4_come_bytewise():
+    """CA_AIRFRAME 6 and GF_ACTION 2 were read as tiny floats."""
+    log = CASES / "20-px4-int-params" / "px4.tlog"
+    planned = command("plan", "--log", log, "--target", "48.1008,11.5008")
+    assert planned.exit_code == 0, planned.stderr
+    assert "FENCE_ENABLE" not in planned.stderr
+    assert "CA_AIRFRAME" not in planned.stderr
+
+
+def test_a_boat_drifts_beside_the_fence():
+    folder = CASES / "21-loit-radius-near-fence"
+    checked = command(
+        "check",
+        "--mission", folder / "m.waypoints", "--fence", folder / "f.waypoints", "--vehicle", folder / "boat.parm",
+    )  # fmt: skip
+    assert checked.exit_code == 8
+    assert "a boat (FRAME_CLASS 2) drifts within LOIT_RADIUS 10 m of item 1 for 60 s" in checked.stderr
+    assert "crosses inclusion polygon 1" in checked.stdout
+
+
+def test_planning_of_the_autopilots_own_is_warned_of(tmp_path):
+    folder = CASES / "22-dijkstra-and-simple-avoid"
+    fence = ("--fence", folder / "f.waypoints", "--vehicle", folder / "v.parm")
+    out = tmp_path / "m.waypoints"
+    planned = command("plan", *fence, "--start", "48.1005,11.5005", "--target", "48.1008,11.5008", "-o", out)
+    assert planned.exit_code == 0, planned.stderr
+    checked = command("check", "--mission", out, *fence)
+    for result in (planned, checked):
+        assert (
+            "warning: OA_TYPE 2: ArduPilot plans its own way around fences and may leave the route"
+            in result.stderr
+        )
+
+
+def test_a_position_with_longitude_first_is_recognised_by_where_the_fence_is():
+    fence = ("--fence", CASES / "22-dijkstra-and-simple-avoid" / "f.waypoints")
+    swapped = command("plan", *fence, "--start", "48.1005,11.5005", "--target", "11.5008,48.1008")
+    assert swapped.exit_code == 4
+    assert "latitude comes first: did you mean 48.1008000,11.5008000?" in swapped.stderr
+    far = command("plan", *fence, "--start", "48.1005,11.5005", "--target", "12.5008,58.1008")
+    assert "did you mean" not in far.stderr
+
+
+@pytest.mark.parametrize("log", sorted((CASES / "40-tlog-zero-times").iterdir()), ids=lambda log: log.name)
+def test_logs_with_odd_times_are_read_and_what_was_not_seen_is_not_learnt(log):
+    assert command("log", log).exit_code == 0
+    replayed = command("replay", log)
+    assert replayed.exit_code == 0
+    assert "learnt: no fence seen, no mission seen" in replayed.stdout
+    assert "0 zones" not in replayed.stdout
+
+
+def test_a_skid_steered_rover_is_not_made_to_pivot_beside_a_fence():
+    """On the real autopilot it stood 0.7 m short of such a pivot (tests/missions/ground/test_start_hazard.py has the warning)."""
+    folder = CASES / "90-pivot-stall"
+    planned = command(
+        "plan",
+        "--fence", folder / "fence.waypoints", "--vehicle", folder / "skid.parm", "--firmware", "4.6",
+        "--start", "52.1000000,9.7000000", "--target", "52.1015367,9.7004038", "--clearance", "2",
+    )  # fmt: skip
+    assert planned.exit_code == 0, planned.stderr
+    assert "at least 2.1 m while driving" in planned.stdout
+    assert "turns on the spot" not in planned.stderr
 
 
 # Start and home of a mission that is repaired or checked

@@ -45,7 +45,7 @@ def said(warnings, word):
 def test_a_steered_rover_is_not_sent_from_there(away_m) -> None:
     reason = (
         f"the start is {away_m:.2f} m from exclusion polygon 1, where fence avoidance acts (within FENCE_MARGIN 2 m plus 0.05 m): "
-        "the vehicle backs up there, and in tests rovers backed into the fence (29 of 42 starts, at any heading)"
+        "the vehicle backs up there: in tests, rovers backed into the fence (29 of 42 starts, at any heading)"
     )
     with pytest.raises(StartBlockedError, match=f"^{re.escape(reason)}$") as caught:
         route(10 - away_m)

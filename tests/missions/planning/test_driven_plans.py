@@ -314,7 +314,7 @@ class TestEscape:
         assert math.dist(first, second) == pytest.approx(7.3 if allowance_m is None else 7.0, abs=0.1)
         rest = LineString(chart.points(result.path[1:]))
         assert rest.distance(chart.zone_line(block)) >= 2.0 - MERCATOR_TOLERANCE_M
-        assert any("leg 1 drives into it" in text for text in result.info)
+        assert any("only leg 1, which leads there, is unsafe" in text for text in result.info)
 
     def test_not_across_other_forbidden_ground(self) -> None:
         ring = [

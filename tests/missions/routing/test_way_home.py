@@ -132,7 +132,7 @@ def test_places_that_are_no_way_home_are_named_with_the_reason():
     assert ways.blocked["home"] == "it is inside exclusion polygon 1"
     assert ways.blocked["rally point 1"] == "it is outside inclusion polygon 1"
     assert ways.blocked["rally point 2"].startswith("it is 1.2")
-    assert "exclusion polygon 1; a way keeps 2.00 m" in ways.blocked["rally point 2"]
+    assert "exclusion polygon 1, and a way home keeps 2.00 m" in ways.blocked["rally point 2"]
     assert ways.blocked["abroad"] == "it is too far from the fence"
     assert "inclusion polygon 1" in ways.blocked["shed"]
     assert ways.nearest(at(5, 5)).place.name == "rally point 3"

@@ -366,7 +366,7 @@ class Px4Rover:
         if self.progress.wait_until_s is None:
             self.progress.wait_until_s = now_s + item.params[0]
         here_m = self.frame.to_flat(item.position) if item.command in _PLACED else self.progress.start_m
-        if item.command == Command.NAV_DELAY and self._tells_modes:
+        if item.command == Command.NAV_DELAY and self._tells_modes and not self._is_skid:
             self._approach(here_m, nearest_m=_STANDS_M)
         else:
             self._wait_about(here_m)

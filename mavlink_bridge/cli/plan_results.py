@@ -97,6 +97,7 @@ def hold_document(hold: HoldCheck | None) -> dict[str, object] | None:
     return {
         "speed_mps": round(hold.speed_mps, 2),
         "distance_m": round(hold.stopping_m, 2),
+        **({} if hold.aside_m is None else {"aside_m": round(hold.aside_m, 2)}),
         "source": hold.source,
         "leaves_fence": worst
         and {

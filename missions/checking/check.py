@@ -16,6 +16,7 @@ from missions.checking.forecast import forecast_drive, pivot_remarks
 from missions.checking.holding import hold_check, hold_warnings
 from missions.checking.home_ways import checked_ways
 from missions.checking.mission_end import crossed_zones, end_warnings, return_warnings
+from missions.checking.px4_waits import with_waits
 from missions.checking.rtl_lines import return_place
 from missions.drive_model import Envelope, extrapolated
 from missions.errors import SituationError, StartBlockedError
@@ -24,6 +25,7 @@ from missions.ground.from_situation import ground_for, heading_at
 from missions.ground.ground import EDGE_BOW_M, Ground
 from missions.ground.known_fence import fence_warnings, known_fence
 from missions.ground.legs import drawn_leg
+from missions.ground.px4_fence import own_promise_info, unenforced_warnings
 from missions.ground.seams import Seam, first_stop, is_seam, seam_advice, seam_reason, seams_of
 from missions.ground.start_hazard import start_hazard
 from missions.planned import Clearances, Plan
@@ -252,6 +254,7 @@ def _check_drive(mission: Mission, situation: Situation, request: Request) -> Mi
         *parameter_remarks(situation),
         *fence_warnings(vehicle, situation),
         *ground.warnings,
+        *unenforced_warnings(vehicle, situation, ground),
         *asked.warnings,
         *course.notes,
         *hazards,
@@ -278,7 +281,7 @@ def _check_drive(mission: Mission, situation: Situation, request: Request) -> Mi
         extrapolated=reasons,
         trusts_model=request.trusts_model,
         hold=hold,
-        info=asked.info,
+        info=(*asked.info, *own_promise_info(vehicle)),
     )
 
 
@@ -327,6 +330,7 @@ def _course(
     )
     if not course.legs:
         raise SituationError("; ".join(["the mission has no leg to check", *course.troubles]))
+    course = with_waits(course, mission.items, vehicle)
     return _with_drift(course, vehicle) if vehicle.boat_drift_m else course
 
 

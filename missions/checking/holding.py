@@ -9,7 +9,8 @@ import numpy as np
 import shapely
 from shapely import Point
 
-from missions.drive_model.stopping import HoldCheck, Motion, RollOut, Stopping, motion, roll_out_m
+from missions.drive_model.hold_loop import HoldLoop, ending_of
+from missions.drive_model.stopping import HoldCheck, Motion, RollOut, motion
 from missions.errors import MissionError
 from missions.geo import LocalPoint
 from missions.ground.from_situation import ground_for
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from missions.drive_model import Envelope
+    from missions.drive_model.stopping import Leaving, Stopping
     from missions.ground.ground import Ground
     from missions.planned import Plan
     from missions.request import Request
@@ -55,16 +57,16 @@ def hold_check(band: Envelope, vehicle: Vehicle, ground: Ground, stops: Stops) -
     if moving is None or not len(moving.places):
         return None
     ground = _without_seams(ground)
-    stopping = Stopping(stops, vehicle.steering)
-    rolls_m = stopping.distances_m(moving.speeds_mps)
-    beyond_m = rolls_m - roll_out_m(moving, rolls_m, ground.allowed)
+    stopping = ending_of(vehicle, stops)
+    leaving = stopping.leaves(moving, ground.allowed)
     fastest_mps = float(moving.speeds_mps.max())
-    worst = int(beyond_m.argmax())
+    worst = int(leaving.beyond_m.argmax())
     return HoldCheck(
         fastest_mps,
         stopping.distance_m(fastest_mps),
         stopping.source(fastest_mps),
-        _roll_out(moving, worst, rolls_m, beyond_m, ground) if beyond_m[worst] > _NEGLIGIBLE_M else None,
+        _roll_out(moving, worst, leaving, ground) if leaving.beyond_m[worst] > _NEGLIGIBLE_M else None,
+        stopping.aside_m(fastest_mps) if isinstance(stopping, HoldLoop) else None,
     )
 
 
@@ -84,18 +86,17 @@ def hold_info(hold: HoldCheck | None) -> list[str]:
     return [hold.sentence] if hold is not None and hold.worst is None else []
 
 
-def _roll_out(
-    moving: Motion, at: int, rolls_m: NDArray[np.float64], beyond_m: NDArray[np.float64], ground: Ground
-) -> RollOut:
-    to_fence_m = max(0.0, float(rolls_m[at] - beyond_m[at]))
-    behind = Point(moving.places[at] + moving.ways[at] * (to_fence_m + _BEHIND_M))
+def _roll_out(moving: Motion, at: int, leaving: Leaving, ground: Ground) -> RollOut:
+    to_fence_m = max(0.0, float(leaving.reach_m[at] - leaving.beyond_m[at]))
+    ahead = moving.places[at] + moving.ways[at] * (to_fence_m + _BEHIND_M)
+    behind = Point(ahead if leaving.ends is None else leaving.ends[at])
     forbidding = ground.forbidding(behind)
     nearest, _ = ground.nearest(behind)
     zone = forbidding[0] if forbidding else nearest
     return RollOut(
         at=ground.frame.to_lat_lon(LocalPoint(*moving.places[at].tolist())),
         speed_mps=float(moving.speeds_mps[at]),
-        stopping_m=float(rolls_m[at]),
+        stopping_m=float(leaving.reach_m[at]),
         to_fence_m=to_fence_m,
         fence=zone.name if zone is not None else None,
     )
@@ -151,15 +152,14 @@ def hold_now(
         ground = ground_for(situation, vehicle, (pose.position,))
     except MissionError:
         return None
-    stopping = Stopping(situation.stops, vehicle.steering)
+    stopping = ending_of(vehicle, situation.stops)
     moving = _moving(pose, ground)
-    rolls_m = stopping.distances_m(moving.speeds_mps) + (TAKES_S + age_s) * moving.speeds_mps
-    beyond_m = rolls_m - roll_out_m(moving, rolls_m, ground.allowed)
-    if beyond_m[0] <= _NEGLIGIBLE_M:
+    leaving = stopping.leaves(moving, ground.allowed, (TAKES_S + age_s) * moving.speeds_mps)
+    if leaving.beyond_m[0] <= _NEGLIGIBLE_M:
         return None
     ahead = _ahead(plan, pose, item, ground, vehicle) if plan is not None else None
     return HoldNow(
-        _roll_out(moving, 0, rolls_m, beyond_m, ground),
+        _roll_out(moving, 0, leaving, ground),
         stopping.source(pose.speed_mps),
         _go_on_m(ahead, plan.envelope, stopping, ground) if ahead is not None and plan is not None else None,
     )
@@ -196,7 +196,7 @@ def _along_m(places: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.cumsum(np.hypot(*np.diff(places, axis=0, prepend=places[:1]).T))
 
 
-def _go_on_m(ahead: Motion, band: Envelope, stopping: Stopping, ground: Ground) -> float | None:
+def _go_on_m(ahead: Motion, band: Envelope, stopping: Stopping | HoldLoop, ground: Ground) -> float | None:
     """Return how far the vehicle has to go on until a HOLD ends within the fence; None where it leaves the fence before.
 
     The way is predicted; the room that the prediction needs beside it is kept too.
@@ -206,8 +206,6 @@ def _go_on_m(ahead: Motion, band: Envelope, stopping: Stopping, ground: Ground) 
     )
     places = np.asarray(shapely.points(ahead.places))
     strays = ~shapely.covers(ground.allowed, places) | (shapely.distance(ground.edge, places) < room_m)
-    rolls_m = stopping.distances_m(ahead.speeds_mps) + TAKES_S * ahead.speeds_mps
-    safe = np.flatnonzero(
-        np.isinf(roll_out_m(ahead, rolls_m, ground.allowed)) & ~np.maximum.accumulate(strays)
-    )
+    leaving = stopping.leaves(ahead, ground.allowed, TAKES_S * ahead.speeds_mps)
+    safe = np.flatnonzero(np.isneginf(leaving.beyond_m) & ~np.maximum.accumulate(strays))
     return float(_along_m(ahead.places)[safe[0]]) if len(safe) else None

@@ -10,6 +10,7 @@ import numpy as np
 import shapely
 
 from missions.drive_model import corner as at_corner
+from missions.drive_model import pursuit as at_pursuit
 from missions.drive_model.stray import Stray
 from missions.vehicle import Autopilot
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
     from missions.drive_model.legs_and_corners import DrivePlan
     from missions.geo import Vector
+    from missions.vehicle import Pursuit
 
 BLEND_SAMPLES = 6  # straight pieces of a blend; chosen, not measured
 _BLEND_SHARES = [(sample / BLEND_SAMPLES, 1 - sample / BLEND_SAMPLES) for sample in range(BLEND_SAMPLES + 1)]
@@ -91,7 +93,8 @@ def add_start(pieces: Pieces, drive: DrivePlan, array: NDArray[np.float64], behi
 def add_leg(pieces: Pieces, drive: DrivePlan, number: int) -> None:
     """Add a leg from one blend to the next, as wide as the tails of earlier swings make it."""
     leg = drive.legs[number]
-    begin_s, end_s = drive.span_s(number)
+    # Pure pursuit follows no motion that blends: its corners lie beside whole legs.
+    begin_s, end_s = drive.span_s(number) if drive.vehicle.pursuit is None else (0.0, leg.profile.duration_s)
     times_s = [begin_s]
     if drive.stray_at(number, begin_s).widest_m >= NEGLIGIBLE_M:
         times_s += [begin_s + time_s for time_s in TAIL_TIMES_S if begin_s + time_s < end_s]
@@ -110,6 +113,9 @@ def waypoint_after(drive: DrivePlan, leg: int) -> int:
 def add_corner(pieces: Pieces, drive: DrivePlan, number: int) -> None:
     """Add the blend of two legs, and the area of a swing that does not follow it."""
     corner, before, after = drive.corners[number], drive.legs[number], drive.legs[number + 1]
+    if drive.vehicle.pursuit is not None and not corner.stops:
+        _add_pursuit_corner(pieces, drive, number, drive.vehicle.pursuit)
+        return
     band_m = max(before.band_m, after.band_m)
     path = _blend_path(drive, number)
     left = drive.stray_at(number, before.profile.duration_s - corner.blend.duration_s).widest_m
@@ -131,8 +137,33 @@ def add_corner(pieces: Pieces, drive: DrivePlan, number: int) -> None:
     if wide or len(path) == 1:
         pieces.add(_swing_hull(drive, number), band_m, corner.waypoint)
         pieces.add(_swing_strip(drive, number), band_m, corner.waypoint)
-    if drive.vehicle.autopilot is Autopilot.PX4 and not corner.stops:
+    if drive.vehicle.autopilot is Autopilot.PX4 and (corner.pivots or not corner.stops):
         pieces.add(_whole_corner(drive, number), band_m, corner.waypoint)
+
+
+def _add_pursuit_corner(pieces: Pieces, drive: DrivePlan, number: int, steers: Pursuit) -> None:
+    """Add the ground between the waypoint and the arc about it, and that of a turn which it cannot make in time."""
+    corner, before, after = drive.corners[number], drive.legs[number], drive.legs[number + 1]
+    band_m = max(before.band_m, after.band_m)
+    radius_m = min(at_pursuit.switch_radius_m(steers, corner.turn_deg), before.profile.length_m)
+    left = drive.stray_at(number, before.profile.duration_s - corner.blend.duration_s).widest_m
+    arc = at_pursuit.cut_arc(before.end, before.direction, after.direction, corner.turn_deg, radius_m)
+    strip = Stray(left, left)
+    for place, following in itertools.pairwise(arc):
+        rungs = [*_beside(place, before.direction, strip), *_beside(following, after.direction, strip)]
+        pieces.add([*rungs, *corner.places], band_m, corner.waypoint)
+    along_m = radius_m
+    if corner.swing_m >= NEGLIGIBLE_M:
+        circle_m = at_pursuit.turning_circle_m(drive.vehicle, steers)
+        along_m = at_pursuit.swing_length_m(drive.vehicle, steers, corner.turn_deg)
+        is_back = abs(corner.turn_deg) > at_pursuit.EITHER_SIDE_DEG
+        for turn_deg in (corner.turn_deg, -corner.turn_deg)[: 1 + is_back]:
+            late = at_pursuit.late_arc(before.end, before.direction, turn_deg, radius_m, circle_m)
+            pieces.add([*late, *corner.places], band_m, corner.waypoint)
+    ends = (0.0, min(along_m, after.profile.length_m))
+    rows = [_shifted(after.start, after.direction, end_m) for end_m in ends]
+    stray = drive.stray_after(number)
+    pieces.add([one for row in rows for one in _beside(row, after.direction, stray)], band_m, corner.waypoint)
 
 
 def _blend_path(drive: DrivePlan, number: int) -> list[tuple[Vector, Vector]]:
@@ -202,9 +233,10 @@ def add_end(pieces: Pieces, drive: DrivePlan) -> None:
     """Add the last place, and how far a rover runs past it."""
     if not drive.legs:
         return
+    overrun_m = at_corner.overrun_m(drive.vehicle)
     leg = drive.legs[-1]
     stray = drive.stray_at(len(drive.legs) - 1, leg.profile.duration_s)
-    past = _shifted(leg.end, leg.direction, max(at_corner.END_OVERRUN_M - leg.band_m, 0.0))
+    past = _shifted(leg.end, leg.direction, max(overrun_m - leg.band_m, 0.0))
     waypoint = waypoint_after(drive, len(drive.legs) - 1)
     pieces.add(
         [*_beside(leg.end, leg.direction, stray), *_beside(past, leg.direction, stray)], leg.band_m, waypoint

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 LEAST_MARGIN_M = PARAMETERS["FENCE_MARGIN"].measured.least if PARAMETERS["FENCE_MARGIN"].measured else 0.0
 """With less FENCE_MARGIN measured rovers stopped at the fence or past it (0: 0.02 to 0.04 m past, 0.05: 0.02 m before)."""
 
+_PX4_ACCEL_MPS2, _PX4_JERK_MPS3 = 3.0, 10.0
+"""RO_ACCEL_LIM and RO_DECEL_LIM, and RO_JERK_LIM, of the PX4 rover that was measured."""
+
 SAME_TURN_DEG = 20.0
 SAME_MPS = 3.0
 """Up to such a turn and speed firmware before 4.6 kept within the later corners too (162 corners on long legs, within 0.04 m); so it did where it pivots."""
@@ -45,9 +48,9 @@ def beyond_measured(vehicle: Vehicle, *speeds_mps: float | None) -> tuple[str, .
     tuple of str
         One sentence each; empty where the vehicle is of the measured kind.
     """
-    if vehicle.autopilot is not Autopilot.ARDUPILOT:
-        return (f"the drive model was measured on ArduPilot Rover, not on {vehicle.autopilot}",)
     speeds = {vehicle.speed_mps, *filter(None, speeds_mps)}
+    if vehicle.autopilot is not Autopilot.ARDUPILOT:
+        return tuple(_beyond_px4s(vehicle, min(speeds), max(speeds)))
     return (
         *_beyond_kinds(vehicle, min(speeds)),
         *_beyond_ranges(vehicle, min(speeds), max(speeds)),
@@ -59,6 +62,47 @@ def extrapolated(vehicle: Vehicle, band: Envelope, *speeds_mps: float | None) ->
     """Return in what a drive lies outside the measurements: its vehicle (`beyond_measured`), and corners that its firmware may drive otherwise."""
     speeds = {vehicle.speed_mps, *filter(None, speeds_mps)}
     return (*beyond_measured(vehicle, *speeds_mps), *_beyond_corners(vehicle, band, speeds))
+
+
+def _beyond_px4s(vehicle: Vehicle, least_mps: float, top_mps: float) -> Iterator[str]:
+    """Yield what of a PX4 rover was not measured."""
+    steers = vehicle.pursuit
+    if steers is None:
+        if vehicle.steering is Steering.ACKERMANN:
+            yield "how this PX4 rover steers is not known"
+            return
+        yield "skid-steered rovers were not measured with PX4: how they turn on the spot follows from its source only"
+        return
+    known_mps = vehicle.speed_mps if steers.full_speed_mps is None else steers.full_speed_mps
+    told = (
+        ("RO_SPEED_LIM", least_mps, "m/s", "the drive"),
+        ("RO_SPEED_LIM", top_mps, "m/s", "the drive"),
+        ("NAV_ACC_RAD", steers.acceptance_m, "m", "corners"),
+        ("RA_ACC_RAD_GAIN", steers.acceptance_gain, "", "corners"),
+        ("RA_WHEEL_BASE", steers.wheel_base_m, "m", "swings"),
+        ("RA_MAX_STR_ANG", steers.steering_angle_rad, "rad", "swings"),
+        ("RO_MAX_THR_SPEED", known_mps, "m/s", "corners"),
+        ("PP_LOOKAHD_GAIN", steers.lookahead_gain_s, "s", "tracking"),
+        ("PP_LOOKAHD_MIN", steers.lookahead_least_m, "m", "tracking"),
+        ("PP_LOOKAHD_MAX", steers.lookahead_most_m, "m", "tracking"),
+    )
+    found = {
+        f"{name} {value:g} {unit}".rstrip()
+        + f" was not measured with PX4 (only {PARAMETERS[name].measured}): {what} may differ": None
+        for name, value, unit, what in told
+        if (measured := PARAMETERS[name].measured) is not None and value not in measured
+    }
+    yield from dict.fromkeys(found)
+    choices = (
+        ("RA_ACC_RAD_MAX", steers.acceptance_max_m, (-1.0, 3.0, None), "corners"),
+        ("RO_SPEED_RED", steers.speed_reduction, (-1.0, 1.0), "corners"),
+        ("RO_ACCEL_LIM or RO_DECEL_LIM", vehicle.accel_max_mps2, (_PX4_ACCEL_MPS2,), "corners"),
+        ("RO_JERK_LIM", vehicle.jerk_mps3, (_PX4_JERK_MPS3,), "corners"),
+    )
+    for name, chosen, measured_ones, what in choices:
+        if chosen not in measured_ones:
+            only = " and ".join(f"{one:g}" for one in measured_ones if one is not None)
+            yield f"{name} {chosen:g} was not measured with PX4 (only {only}): {what} may differ"
 
 
 def _beyond_kinds(vehicle: Vehicle, least_mps: float) -> Iterator[str]:
@@ -76,7 +120,17 @@ def _beyond_kinds(vehicle: Vehicle, least_mps: float) -> Iterator[str]:
 
 
 def _beyond_corners(vehicle: Vehicle, band: Envelope, speeds_mps: set[float]) -> Iterator[str]:
-    """Yield which corners firmware before 4.6 was not measured at; where the version is not known, in what it would matter."""
+    """Yield which corners firmware before 4.6 was not measured at; where the version is not known, in what it would matter; and which PX4 was not."""
+    if vehicle.pursuit is not None:
+        sharpest_deg = max(
+            (abs(corner.turn_deg) for corner in band.corners if not corner.bounded), default=0.0
+        )
+        if sharpest_deg:
+            yield (
+                f"turns like those of this drive (up to {sharpest_deg:.0f}°) were not measured with PX4: "
+                "only between legs of 15 m and more, up to 90° of 4 m, at one speed"
+            )
+        return
     if vehicle.has_measured_corners or vehicle.autopilot is not Autopilot.ARDUPILOT:
         return
     turns_deg = [abs(corner.turn_deg) for corner in band.corners if not corner.bounded]

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from missions.drive_model import before_4_6
+from missions.drive_model import before_4_6, pursuit
+from missions.drive_model.blend import Blend
 from missions.vehicle import Autopilot, Steering
 
 if TYPE_CHECKING:
@@ -100,32 +100,20 @@ PIVOT_DOUBT_DEG = 2.0
 _Table = tuple[tuple[float, float], ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Blend:
-    """How the motions of two legs overlap at a corner.
-
-    Parameters
-    ----------
-    duration_s : float
-        How long both run at once; 0 where the rover stops at the waypoint.
-    reach_m : float
-        How far before (and after) the waypoint its middle lies along each leg.
-    """
-
-    duration_s: float
-    reach_m: float
-
-
 STANDSTILL = Blend(0.0, 0.0)
 
 
 def band_m(vehicle: Vehicle, speed_mps: float) -> float:
     """Return how far a rover strays to either side of the path that its autopilot aims for."""
+    if vehicle.autopilot is Autopilot.PX4:
+        return pursuit.BAND_M
     return BAND_AT_REST_M + BAND_HEADING_ERROR * speed_mps / vehicle.position_gain_per_s
 
 
 def inside_band_m(vehicle: Vehicle, speed_mps: float, band_m: float) -> float:
     """Return how far a rover strays to the inside of a cut, of the path that its autopilot aims for."""
+    if vehicle.autopilot is Autopilot.PX4:
+        return band_m
     return before_4_6.inside_band_m(speed_mps) if is_early(vehicle) else min(band_m, INSIDE_BAND_M)
 
 
@@ -140,6 +128,8 @@ def blend(vehicle: Vehicle, before: LegProfile, after: LegProfile, turn_deg: flo
     The next leg starts as early as the middle of the turn lies within the waypoint radius and its acceleration within
     ATC_TURN_MAX_G, at the earliest when the present leg begins to brake (SCurve::advance_target_along_track), and sooner before 4.6.
     """
+    if vehicle.pursuit is not None:
+        return pursuit.blend(vehicle.pursuit, before, after, turn_deg)
     ramp = before.ramp if before.ramp.duration_s <= after.ramp.duration_s else after.ramp
     half_s = ramp.duration_s / 2
     sine = math.sin(math.radians(abs(turn_deg)) / 2)
@@ -165,6 +155,8 @@ def corner_swing_m(vehicle: Vehicle, bend: Bend, reach_m: float) -> float:
     Steered wheels cannot follow a sharp blend; a blend that starts early gives room back. On short legs a rover is still swinging from
     one corner when the next begins.
     """
+    if vehicle.pursuit is not None:
+        return pursuit.corner_swing_m(vehicle, vehicle.pursuit, bend.widest_deg)
     slow_m = 0.0
     if vehicle.steering is Steering.SKID and bend.speed_mps < SLOW_MPS:
         slow_m = SLOW_SKID_SWING_M * min(bend.widest_deg / SLOW_SKID_TURN_DEG, 1.0)
@@ -183,6 +175,8 @@ def corner_swing_m(vehicle: Vehicle, bend: Bend, reach_m: float) -> float:
 
 def swing_length_m(vehicle: Vehicle) -> float:
     """Return how far along its next leg a rover comes before a swing is at its widest."""
+    if vehicle.pursuit is not None:
+        return 2 * pursuit.turning_circle_m(vehicle, vehicle.pursuit)
     return SWING_LENGTHS * _swing_radius_m(vehicle)
 
 
@@ -204,11 +198,15 @@ def early_swing(vehicle: Vehicle, bend: Bend) -> before_4_6.Swing:
 
 def start_swing_m(vehicle: Vehicle, error_deg: float) -> float:
     """Return how far off its line, beyond its band, a rover swings that starts with its heading wrong."""
+    if vehicle.pursuit is not None:
+        return pursuit.start_swing_m(vehicle, vehicle.pursuit, error_deg)
     return _start(vehicle, error_deg, START_SWING_M, SKID_START_SWING_M)
 
 
 def start_behind_m(vehicle: Vehicle, error_deg: float) -> float:
     """Return how far behind its start a rover comes that starts with its heading wrong."""
+    if vehicle.pursuit is not None:
+        return pursuit.start_behind_m(vehicle, vehicle.pursuit, error_deg)
     return _start(vehicle, error_deg, START_BEHIND_M, SKID_START_BEHIND_M)
 
 
@@ -219,6 +217,8 @@ def pivots(vehicle: Vehicle, turn_deg: float) -> bool:
 
 def is_bounded(vehicle: Vehicle, turn_deg: float, shorter_leg_m: float, *, stops: bool) -> bool:
     """Whether corners like this kept within the model when measured; steered wheels between sharp turns on short legs did not."""
+    if vehicle.pursuit is not None:
+        return stops or pursuit.is_bounded(turn_deg, shorter_leg_m)
     if is_early(vehicle):
         is_steered = vehicle.steering is Steering.ACKERMANN
         if pivots(vehicle, turn_deg):
@@ -237,6 +237,11 @@ def pivot_time_s(vehicle: Vehicle, turn_deg: float) -> float:
 def may_pivot_or_cut(vehicle: Vehicle, turn_deg: float) -> bool:
     """Whether the corner is so near to the pivot angle that either may happen."""
     return vehicle.can_pivot and abs(abs(turn_deg) - vehicle.pivot_angle_deg) < PIVOT_DOUBT_DEG
+
+
+def overrun_m(vehicle: Vehicle) -> float:
+    """Return how far past the last waypoint it may stop."""
+    return END_OVERRUN_M if vehicle.pursuit is None else pursuit.END_OVERRUN_M
 
 
 def swing_time_s(swing_m: float, speed_mps: float) -> float:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from missions.drive_model import before_4_6
 from missions.drive_model import corner as at_corner
+from missions.drive_model import pursuit as at_pursuit
 from missions.drive_model.legs_and_corners import CornerPlan, DrivePlan, LegPlan
 from missions.drive_model.motion import leg_profile
 from missions.drive_model.stray import Bend, Stray
@@ -61,7 +62,11 @@ def drive_plan(
         passed_s = leg.profile.duration_s - middle_s - corner.blend.duration_s / 2
         middle_s = corner.blend.duration_s / 2
         left = strays[-1].after(passed_s, vehicle.position_gain_per_s)
-        stray = left.turned(corner.turn_deg).swung(corner.turn_deg, corner.swing_m)
+        # PX4's rover that comes to a waypoint facing the wrong way was as far off on the leg after it: no turn takes anything away.
+        kept = (
+            left.turned(corner.turn_deg) if vehicle.pursuit is None else Stray(left.widest_m, left.widest_m)
+        )
+        stray = kept.swung(corner.turn_deg, corner.swing_m)
         strays.append(stray.widened(corner.stray_m))
     return DrivePlan(vehicle, legs, tuple(corners), tuple(strays), _tails(vehicle, legs, corners))
 
@@ -129,6 +134,7 @@ def _corner(
     stopped = len(group) > 1 or any(number in stops for number, _ in group)
     doubtful = at_corner.may_pivot_or_cut(vehicle, turn_deg) and not stopped
     tail = Stray()
+    either_m = 0.0
     if pivots and not doubtful:
         blend = at_corner.STANDSTILL
         swing_m = at_corner.pivot_swing_m(vehicle, bend.shorter_run_m)
@@ -141,6 +147,8 @@ def _corner(
         blend = at_corner.blend(vehicle, before.profile, after.profile, turn_deg)
         swing_m = at_corner.corner_swing_m(vehicle, bend, blend.reach_m)
         behind_m = swing_m / 4
+        if vehicle.pursuit is not None and abs(turn_deg) > at_pursuit.EITHER_SIDE_DEG:
+            either_m = swing_m
         if at_corner.is_early(vehicle):
             swing = at_corner.early_swing(vehicle, bend)
             swing_m = swing.outside_m
@@ -149,6 +157,8 @@ def _corner(
     top_mps = min(before.profile.top_speed_mps, after.profile.top_speed_mps)
     ramps_s = (before.profile.ramp.duration_s + after.profile.ramp.duration_s) / 2
     lost_s = ramps_s - blend.duration_s + at_corner.swing_time_s(swing_m, top_mps) + delay_s
+    if vehicle.pursuit is not None and not stopped:
+        lost_s += at_pursuit.time_lost_s(vehicle, vehicle.pursuit, turn_deg, top_mps)
     if stopped or pivots:
         lost_s += at_corner.STOP_LAG_S
     if pivots:
@@ -165,7 +175,7 @@ def _corner(
         blend=blend,
         swing_m=swing_m,
         behind_m=behind_m,
-        stray_m=_stray_m(len(group), delay_s),
+        stray_m=max(_stray_m(len(group), delay_s), either_m),
         tail=tail,
         time_lost_s=lost_s,
     )

@@ -9,7 +9,7 @@ from missions.drive_model import before_4_6
 from missions.drive_model import corner as at_corner
 
 if TYPE_CHECKING:
-    from missions.drive_model.corner import Blend
+    from missions.drive_model.blend import Blend
     from missions.drive_model.motion import LegProfile
     from missions.drive_model.stray import Stray
     from missions.geo import Vector

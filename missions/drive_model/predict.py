@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from missions.drive_model import corner as at_corner
+from missions.drive_model import pursuit
 from missions.drive_model.band import Pieces, add_corner, add_end, add_leg, add_start
 from missions.drive_model.envelope import Envelope
 from missions.drive_model.from_points import SAME_PLACE_M, drive_plan
@@ -86,7 +87,12 @@ def plan_drive(
 
 
 def _of_known_corners(vehicle: Vehicle) -> Sequence[Vehicle]:
-    """Return the vehicle; where its firmware may be older than 4.6 or not, as either: the worse of both counts."""
+    """Return the vehicle; where its firmware may be older than 4.6 or not, or its RA_ACC_RAD_MAX is not known, as either: the worse of both counts."""
+    steers = vehicle.pursuit
+    if steers is not None and steers.acceptance_max_m is None:
+        return tuple(
+            replace(vehicle, pursuit=replace(steers, acceptance_max_m=most_m)) for most_m in (3.0, -1.0)
+        )
     if vehicle.has_measured_corners is not None:
         return (vehicle,)
     return tuple(replace(vehicle, has_measured_corners=has_them) for has_them in (True, False))
@@ -256,6 +262,9 @@ def _start(array: NDArray[np.float64], vehicle: Vehicle, heading_deg: float | No
     stray = Stray(
         swing_m if error_deg < 0 or either_side else 0.0, swing_m if error_deg >= 0 or either_side else 0.0
     )
+    if vehicle.pursuit is not None:
+        back_m = pursuit.start_back_swing_m(vehicle, vehicle.pursuit, error_deg)
+        stray = stray.wider(Stray(back_m, back_m))
     return stray, at_corner.start_behind_m(vehicle, error_deg)
 
 

@@ -42,7 +42,27 @@ _REACH = 2.0
 _MOST_SAMPLES = (
     4000  # of a drive: one in 1.5 m at 5 m/s, up to 20 minutes; longer drives are looked at more seldom
 )
+_STEP_M = 0.5  # between places of a drive by pure pursuit; chosen
 _LONGEST_S = 86_400.0  # longer drives are not looked at; chosen, bounds memory
+
+
+@dataclass(frozen=True, eq=False)
+class Leaving:
+    """How far HOLDs take a vehicle, and how far beyond the allowed area.
+
+    Parameters
+    ----------
+    reach_m : ndarray of float, shape (n,)
+        How far it goes from each place.
+    beyond_m : ndarray of float, shape (n,)
+        How far beyond the edge that is; negative infinite where it stays within.
+    ends : ndarray of float, shape (n, 2), or None
+        Where it is farthest beyond; None: straight on.
+    """
+
+    reach_m: NDArray[np.float64]
+    beyond_m: NDArray[np.float64]
+    ends: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True)
@@ -76,6 +96,23 @@ class Stopping:
         known_m = _scaled_m(self._known, np.minimum(speeds_mps, most_mps))
         longer_m = np.maximum(known_m, measured_m)
         return np.asarray(np.where(speeds_mps > most_mps, longer_m, known_m))
+
+    def leaves(
+        self, moving: Motion, allowed: BaseGeometry, more_m: NDArray[np.float64] | float = 0.0
+    ) -> Leaving:
+        """Return how each HOLD on a way leaves the allowed area: straight on.
+
+        Parameters
+        ----------
+        moving : Motion
+            Where it is, and how fast.
+        allowed : shapely geometry
+            Where it may be, metres.
+        more_m : ndarray of float or float
+            How far it goes on before that, from each place.
+        """
+        reach_m = self.distances_m(moving.speeds_mps) + more_m
+        return Leaving(reach_m, reach_m - roll_out_m(moving, reach_m, allowed))
 
     def source(self, speed_mps: float) -> str:
         """Return in words what the distance rests on at a speed."""
@@ -137,6 +174,8 @@ def motion(band: Envelope, vehicle: Vehicle, fence: BaseGeometry | None = None) 
     """
     if not band.legs or band.duration_s > _LONGEST_S:
         return None
+    if vehicle.pursuit is not None:
+        return _at_cruise(band)
     target = TargetPoint(band, vehicle, [corner.middle_m for corner in band.corners])
     places = target.places.view(np.float64).reshape(-1, 2)
     every = 1 + (len(places) - 2) // _MOST_SAMPLES
@@ -152,6 +191,20 @@ def motion(band: Envelope, vehicle: Vehicle, fence: BaseGeometry | None = None) 
         )
         speeds_mps = np.minimum(speeds_mps, allowed_mps)
     return Motion(places, speeds_mps, ways)
+
+
+def _at_cruise(band: Envelope) -> Motion:
+    """Return the drawn lines at the top speed of each leg: no slower for a corner, the start or the end, which is never too fast."""
+    places, speeds_mps, ways = [], [], []
+    every_m = max(_STEP_M, sum(leg.length_m for leg in band.legs) / _MOST_SAMPLES)
+    for leg in band.legs:
+        start, end = band.points[leg.first], band.points[leg.first + 1]
+        count = max(2, 1 + int(leg.length_m / every_m))
+        shares = np.linspace(0.0, 1.0, count)[:, None]
+        places.append(start + shares * (end - start))
+        speeds_mps.append(np.full(count, leg.top_speed_mps))
+        ways.append(np.repeat((end - start)[None] / leg.length_m, count, axis=0))
+    return Motion(np.concatenate(places), np.concatenate(speeds_mps), np.concatenate(ways))
 
 
 def roll_out_m(moving: Motion, rolls_m: NDArray[np.float64], allowed: BaseGeometry) -> NDArray[np.float64]:
@@ -221,6 +274,8 @@ class HoldCheck:
         How far it rolls on from that.
     source : str
         What that rests on.
+    aside_m : float or None
+        How far to a side it goes, where HOLD drives a loop; None where it rolls straight on.
     worst : RollOut or None
         The HOLD that would end farthest beyond a fence; None where every HOLD ends within.
     """
@@ -229,10 +284,13 @@ class HoldCheck:
     stopping_m: float
     source: str
     worst: RollOut | None
+    aside_m: float | None = None
 
     @property
     def sentence(self) -> str:
         """What it says to people."""
+        if self.aside_m is not None:
+            return self._loop_sentence(self.aside_m)
         rolls = f"HOLD does not brake: from {self.speed_mps:.2g} m/s the vehicle rolls on {self.stopping_m:.1f} m ({self.source})"
         if self.worst is None:
             return f"{rolls}, inside the fence from anywhere on the route"
@@ -240,4 +298,17 @@ class HoldCheck:
         return (
             f"{rolls}; at {worst.at} ({worst.speed_mps:.1f} m/s) it would stop {worst.beyond_m:.1f} m beyond {worst.fence or 'the fence'}, "
             f"which is {worst.to_fence_m:.1f} m ahead there"
+        )
+
+    def _loop_sentence(self, aside_m: float) -> str:
+        loops = (
+            f"HOLD drives a loop: from {self.speed_mps:.2g} m/s up to {self.stopping_m:.1f} m ahead and {aside_m:.1f} m to a side, "
+            f"back to where it was taken ({self.source})"
+        )
+        if self.worst is None:
+            return f"{loops}, inside the fence from anywhere on the route"
+        worst = self.worst
+        return (
+            f"{loops}; at {worst.at} ({worst.speed_mps:.1f} m/s) it would come {worst.beyond_m:.1f} m beyond {worst.fence or 'the fence'}, "
+            f"which is {worst.to_fence_m:.1f} m away there"
         )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from missions.drive_model import corner as at_corner
+from missions.drive_model import pursuit
 from missions.drive_model.envelope import Corner, Leg
 from missions.vehicle import Autopilot
 
@@ -60,7 +61,7 @@ def _corner(drive: DrivePlan, number: int) -> Corner:
             max(going.right_m, midway.right_m) + band_m,
         ),
         outside_overshoot_m=max(coming_m, going.left_m, midway.left_m) + band_m,
-        reach_m=before.profile.length_m - before.profile.travelled_m(blend_s),
+        reach_m=_reach_m(drive, number, blend_s),
         middle_m=plan.blend.reach_m,
         least_middle_m=plan.blend.reach_m,
         time_lost_s=plan.time_lost_s,
@@ -68,9 +69,20 @@ def _corner(drive: DrivePlan, number: int) -> Corner:
     )
 
 
+def _reach_m(drive: DrivePlan, number: int, blend_s: float) -> float:
+    """Return how far before the waypoint it may leave its leg, from when the blend begins."""
+    before, plan = drive.legs[number].profile, drive.corners[number]
+    reach_m = before.length_m - before.travelled_m(blend_s)
+    if drive.vehicle.pursuit is None or plan.stops:
+        return reach_m
+    return max(reach_m, pursuit.switch_radius_m(drive.vehicle.pursuit, plan.turn_deg))
+
+
 def _cut_m(drive: DrivePlan, number: int) -> float:
     plan = drive.corners[number]
     sine = abs(math.sin(math.radians(plan.turn_deg)))
+    if drive.vehicle.pursuit is not None and not plan.stops:
+        return pursuit.cut_m(drive.vehicle.pursuit, plan.turn_deg)
     if drive.vehicle.autopilot is Autopilot.PX4 and not plan.stops:
         return drive.vehicle.waypoint_radius_m * (sine if abs(plan.turn_deg) < 90 else 1.0)
     return plan.blend.reach_m * sine

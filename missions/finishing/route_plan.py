@@ -16,6 +16,7 @@ from missions.finishing.remarks import drive_remarks, escape_info, lead_away_rem
 from missions.geo import path_length_m, rounded
 from missions.ground.from_situation import ground_for, heading_at, route_ends
 from missions.ground.known_fence import fence_warnings, known_fence
+from missions.ground.px4_fence import own_promise_info, unenforced_warnings
 from missions.ground.seams import with_seams
 from missions.ground.start_hazard import start_hazard
 from missions.planned import Clearances, Plan
@@ -56,6 +57,7 @@ def plan_route(
     MissionError
         As `missions.planning.plan.plan`.
     """
+    # Long by the warnings, which stand in the order in which they are told.
     fence = known_fence(situation)
     vehicle = known_vehicle(situation, request)
     start, targets = route_ends(situation, request)
@@ -63,6 +65,7 @@ def plan_route(
     ground = with_seams(plain, vehicle)
     asked = promise(situation, request, vehicle)
     warnings = [*parameter_remarks(situation), *fence_warnings(vehicle, situation), *ground.warnings]
+    warnings += unenforced_warnings(vehicle, situation, plain)
     warnings += [*asked.warnings, *_start_remarks(plain, start, vehicle)]
     heading_deg = heading_at(situation, start)
     sought, wanted = _sought(ground, (start, *targets), request, asked, should_stop), asked
@@ -98,7 +101,13 @@ def plan_route(
         vehicle=vehicle,
         home=situation.home.value if situation.home else None,
         warnings=tuple(dict.fromkeys(warnings)),
-        info=(*asked.info, *less, *escape_info(found), *moved_target_info(targets, reached)),
+        info=(
+            *asked.info,
+            *own_promise_info(vehicle),
+            *less,
+            *escape_info(found),
+            *moved_target_info(targets, reached),
+        ),
     )
 
 

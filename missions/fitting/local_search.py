@@ -37,6 +37,7 @@ from missions.fitting.cost import ENOUGH_M, Gauge
 from missions.fitting.gap import find_gap, straight_through
 from missions.fitting.splice import splices
 from missions.geo import rounded
+from missions.vehicle import Autopilot
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -239,7 +240,8 @@ class Fitting:
             yield from moves.slowed(drawing, index, place, self.vehicle.speed_mps)
         if _is_corner(drawing, index):
             yield from moves.slowed(drawing, index, drawing[index].place, self.vehicle.speed_mps)
-            if self.vehicle.can_pivot:
+            # PX4 ignores the hold time of a waypoint, and stops before it turns on the spot by itself.
+            if self.vehicle.can_pivot and self.vehicle.autopilot is Autopilot.ARDUPILOT:
                 yield from moves.stopped(drawing, index)
         yield from self._gentle(drawing, index, measured)
 

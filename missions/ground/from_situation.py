@@ -81,6 +81,7 @@ def ground_for(situation: Situation, vehicle: Vehicle, ends: Sequence[LatLon]) -
         union=vehicle.fence.union,
         home=home,
         home_radius_m=vehicle.fence.radius_m if vehicle.fence.enforces_home_circle else None,
+        home_radius_name=vehicle.fence.radius_name,
         around=near,
     )
     check_ground(ground)

@@ -175,6 +175,7 @@ def lay_out(
     union: bool = False,
     home: LatLon | None = None,
     home_radius_m: float | None = None,
+    home_radius_name: str = "FENCE_RADIUS",
     around: Sequence[LatLon] = (),
 ) -> Ground:
     """Lay a fence out in the plane.
@@ -191,6 +192,8 @@ def lay_out(
         The centre of the home circle.
     home_radius_m : float, optional
         FENCE_RADIUS where the autopilot enforces it; it holds whatever ``union`` is.
+    home_radius_name : str
+        The parameter that sets it.
     around : sequence of LatLon
         Places that must lie within the bounds where the fence has no inclusion.
 
@@ -210,8 +213,8 @@ def lay_out(
     if inclusions > 1 and not union:
         warnings.append(f"the fence has {inclusions} inclusions; {_COMMON_GROUND}")
     if home_radius_m is not None:
-        circle = _home_circle(home, home_radius_m)
-        name = f"home circle (FENCE_RADIUS {home_radius_m:g} m)"
+        circle = _home_circle(home, home_radius_m, home_radius_name)
+        name = f"home circle ({home_radius_name} {home_radius_m:g} m)"
         area = _area(circle, name, frame, warnings)
         if union and any(barrier.kind is ZoneKind.INCLUSION for barrier in barriers):
             barriers = _within(barriers, area, name)
@@ -254,10 +257,10 @@ def _within(barriers: list[Barrier], circle: Area, name: str) -> list[Barrier]:
     return found
 
 
-def _home_circle(home: LatLon | None, radius_m: float) -> CircleZone:
+def _home_circle(home: LatLon | None, radius_m: float, name: str) -> CircleZone:
     if home is None:
         raise SituationError(
-            f"the autopilot enforces a circle of FENCE_RADIUS {radius_m:g} m around home, but home is unknown; "
+            f"the autopilot enforces a circle of {name} {radius_m:g} m around home, but home is unknown; "
             "use --home LAT,LON",
             fence_radius_m=radius_m,
         )

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from missions.errors import FenceMissingError
 from missions.situation import ListKind
+from missions.vehicle import Autopilot
 
 if TYPE_CHECKING:
     from missions.fence import Fence
@@ -69,7 +70,9 @@ def fence_warnings(vehicle: Vehicle, situation: Situation) -> list[str]:
     warnings = [f"{trouble}; an older fence is used"] if trouble else []
     if vehicle.fence.enforces_zones or not situation.parameters:
         return warnings
-    if vehicle.fence.enabled:
+    if vehicle.autopilot is Autopilot.PX4:
+        reason = "GF_ACTION is 0"
+    elif vehicle.fence.enabled:
         reason = "FENCE_TYPE bit 2 (value 4) is not set"
     elif any(assumed.parameter == "FENCE_ENABLE" for assumed in vehicle.assumed):
         reason = "FENCE_ENABLE unknown, default 0"

@@ -14,7 +14,7 @@ import pbpp
 from missions.checking.check import check_mission
 from missions.checking.mission_end import ending
 from missions.drive_model import corner_forecast
-from missions.errors import NoRouteError, SituationError
+from missions.errors import NoRouteError, SituationError, VehicleError
 from missions.fence import ZoneKind
 from missions.finishing.route_plan import plan_route
 from missions.geo import LocalPoint
@@ -182,10 +182,17 @@ def with_end(planned: Plan, situation: Situation, request: Tour) -> Plan:
         RTL would drive straight home and break the promise on the way.
     SituationError
         RTL, and home is not known.
+    VehicleError
+        It is to loiter, and circles there.
     """
     end = request.end
     if end is End.HOLD:
         return planned
+    if end is End.LOITER and planned.vehicle.pursuit is not None:
+        raise VehicleError(
+            "a PX4 rover with steered wheels does not stand where it loiters: it circles, and that was measured of LOITER_TIME only; use --end hold",
+            end=end.value,
+        )
     items = ending(planned.items, end)
     if end is End.LOITER:
         return replace(planned, items=items)

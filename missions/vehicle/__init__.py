@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from missions.vehicle.ardupilot import ardupilot_vehicle
-from missions.vehicle.model import Assumed, Autopilot, FenceParameters, Footprint, Steering, Vehicle
+from missions.vehicle.model import Assumed, Autopilot, FenceParameters, Footprint, Pursuit, Steering, Vehicle
 from missions.vehicle.parameters import PARAMETER_NAMES
 from missions.vehicle.px4 import px4_vehicle
 from missions.vehicle.reader import ParameterReader, bits, real_number, whole_number
@@ -22,6 +22,7 @@ __all__ = [
     "Autopilot",
     "FenceParameters",
     "Footprint",
+    "Pursuit",
     "Steering",
     "Vehicle",
     "bits",
@@ -69,5 +70,5 @@ def vehicle_from_parameters(
     return made_by(reader, mav_type)
 
 
-PX4_PREFIXES = ("NAV_ACC_RAD", "RA_", "RD_", "RO_", "GF_")
+PX4_PREFIXES = ("NAV_ACC_RAD", "RA_", "RD_", "RO_", "GF_", "PP_LOOKAHD_")
 _ARDUPILOT_PREFIXES = ("WP_", "CRUISE_", "ATC_", "TURN_RADIUS", "FENCE_", "AVOID_", "OA_")

@@ -5,15 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import TYPE_CHECKING
 
 from missions.errors import VehicleError
-
-if TYPE_CHECKING:
-    from missions.firmware import Firmware
+from missions.firmware import Firmware
 
 MAV_TYPE_GROUND_ROVER = 10  # MAV_TYPE of MAVLink's common.xml
 MAV_TYPE_SURFACE_BOAT = 11  # the same
+_DELAY_STANDS = Firmware(1, 18, 0, 0)  # PX4, its line of development included: measured in August 2026
 
 
 class Autopilot(StrEnum):
@@ -45,7 +43,9 @@ class FenceParameters:
     margin_name : str
         Which of the two it is.
     radius_m : float
-        FENCE_RADIUS, of the circle about home (PX4: GF_MAX_HOR_DIST, 0 where there is none).
+        The radius of the circle about home; 0 where there is none.
+    radius_name : str
+        FENCE_RADIUS, on PX4 GF_MAX_HOR_DIST.
     union : bool
         FENCE_OPTIONS bit 1: inside any inclusion zone is inside; otherwise it must be inside all.
     action : int
@@ -63,6 +63,7 @@ class FenceParameters:
     margin_m: float = 2.0
     margin_name: str = "FENCE_MARGIN"
     radius_m: float = 300.0
+    radius_name: str = "FENCE_RADIUS"
     union: bool = False
     action: int = 1
     avoid_bits: int = 3
@@ -78,6 +79,40 @@ class FenceParameters:
     def enforces_home_circle(self) -> bool:
         """Whether the autopilot acts on the circle of `radius_m` about home."""
         return self.enabled and bool(self.type_bits & 2) and self.radius_m > 0
+
+
+@dataclass(frozen=True, slots=True)
+class Pursuit:
+    """What PX4 steers a rover with steered wheels by: pure pursuit, and how it takes corners.
+
+    Parameters
+    ----------
+    acceptance_m : float
+        NAV_ACC_RAD: how near to a waypoint the next leg begins at the latest.
+    acceptance_max_m : float or None
+        RA_ACC_RAD_MAX: how far before it at the earliest; -1 always NAV_ACC_RAD. None where it is not known: the worse of -1 and 3 counts.
+    acceptance_gain : float
+        RA_ACC_RAD_GAIN.
+    wheel_base_m, steering_angle_rad : float
+        RA_WHEEL_BASE and RA_MAX_STR_ANG.
+    full_speed_mps : float or None
+        RO_MAX_THR_SPEED, of which corners take a share; None where it is not known.
+    speed_reduction : float
+        RO_SPEED_RED: how much slower a corner is taken; -1 not at all.
+    lookahead_gain_s, lookahead_least_m, lookahead_most_m : float
+        PP_LOOKAHD_GAIN, PP_LOOKAHD_MIN and PP_LOOKAHD_MAX.
+    """
+
+    acceptance_m: float = 0.5
+    acceptance_max_m: float | None = 3.0
+    acceptance_gain: float = 2.0
+    wheel_base_m: float = 0.321
+    steering_angle_rad: float = 0.5236
+    full_speed_mps: float | None = 3.2
+    speed_reduction: float = 1.0
+    lookahead_gain_s: float = 1.0
+    lookahead_least_m: float = 1.0
+    lookahead_most_m: float = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,6 +167,8 @@ class Vehicle:
         The autopilot's version, where it is known.
     has_measured_corners : bool or None
         Whether its firmware blends corners as ArduPilot does since 4.6; None where that is not known.
+    pursuit : Pursuit or None
+        How PX4 steers it; None on ArduPilot, and on skid steer.
     """
 
     waypoint_radius_m: float = 2.0
@@ -153,6 +190,7 @@ class Vehicle:
     turn_accel_max_dps2: float | None = None
     boat_drift_m: float | None = None
     has_measured_corners: bool | None = True
+    pursuit: Pursuit | None = None
 
     @property
     def is_rover(self) -> bool:
@@ -163,6 +201,11 @@ class Vehicle:
     def can_pivot(self) -> bool:
         """Whether it turns on the spot at sharp corners."""
         return self.steering is Steering.SKID and self.pivot_angle_deg > 0
+
+    @property
+    def stands_for_delays(self) -> bool:
+        """Whether a DELAY item stops it: PX4's steered rovers stand from 1.18 on, before they circle about the waypoint."""
+        return self.pursuit is None or (self.firmware is not None and self.firmware >= _DELAY_STANDS)
 
     @property
     def avoid_bits(self) -> int:

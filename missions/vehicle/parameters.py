@@ -171,25 +171,64 @@ _ARDUPILOT = (
 _PX4_TOLD = frozenset({"CA_AIRFRAME", "NAV_ACC_RAD", "RO_SPEED_LIM"})
 
 
-def _px4(name: str, default: float | None, changes: str, possible: Range = _ANY) -> Parameter:
-    return Parameter(name, default, changes, possible, is_told=name in _PX4_TOLD, autopilot=Autopilot.PX4)
+def _px4(
+    name: str,
+    default: float | None,
+    changes: str,
+    possible: Range = _ANY,
+    measured: Range | None = None,
+    no_less: float = 0.0,
+) -> Parameter:
+    return Parameter(
+        name,
+        default,
+        changes,
+        possible,
+        no_less,
+        measured=measured,
+        is_told=name in _PX4_TOLD,
+        autopilot=Autopilot.PX4,
+    )
 
 
 _PX4 = (
     _px4("CA_AIRFRAME", None, "6 or 13: skid steer, 5: steered wheels"),
-    _px4("NAV_ACC_RAD", 10.0, "how early a corner is begun", Range()),
-    _px4("RA_ACC_RAD_MAX", 3.0, "the same, where it is more", Range(-1.0)),
+    _px4(
+        "NAV_ACC_RAD",
+        10.0,
+        "how near to a waypoint the next leg begins at the latest",
+        Range(),
+        Range(0.5, 0.5),
+    ),
+    _px4(
+        "RA_ACC_RAD_MAX",
+        None,
+        "how far before it at the earliest; -1: NAV_ACC_RAD. Measured with both -1 and 3; not known: the worse of them",
+        Range(-1.0),
+    ),
+    _px4("RA_ACC_RAD_GAIN", 2.0, "how early sharp corners are begun", Range(), Range(2, 2)),
     _px4("RA_MISS_VEL_DEF", None, "speed of missions with steered wheels"),
     _px4("RD_MISS_SPD_DEF", None, "speed of missions on skid steer"),
-    _px4("RO_SPEED_LIM", None, "speed where that is not set"),
-    _px4("RO_MAX_THR_SPEED", None, "speed where neither is set"),
+    _px4("RO_SPEED_LIM", None, "speed where that is not set; missions drive no faster", measured=Range(1, 3)),
+    _px4(
+        "RO_MAX_THR_SPEED",
+        None,
+        "speed where neither is set; corners are taken with a share of it",
+        measured=Range(3.2, 3.2),
+    ),
+    _px4("RO_SPEED_RED", -1.0, "how much slower corners are taken; -1 not at all. Measured with -1 and 1"),
     *(
         _px4(name, None, "acceleration; -1 is no limit")
         for name in ("RO_ACCEL_LIM", "RO_DECEL_LIM", "RA_MAX_ACCEL", "RD_MAX_ACCEL")
     ),
     *(_px4(name, None, "jerk; -1 is no limit") for name in ("RO_JERK_LIM", "RA_MAX_JERK", "RD_MAX_JERK")),
-    _px4("RA_WHEEL_BASE", 0.5, "turning radius, with the steering angle", Range()),
-    _px4("RA_MAX_STR_ANG", 0.5236, "turning radius, with the wheel base", Range()),
+    _px4("RA_WHEEL_BASE", 0.5, "turning radius, with the steering angle", Range(), Range(0.321, 0.321)),
+    _px4("RA_MAX_STR_ANG", 0.5236, "turning radius, with the wheel base", Range(), Range(0.523, 0.524)),
+    _px4(
+        "PP_LOOKAHD_GAIN", 1.0, "how far ahead on its line it steers at, by its speed", Range(), Range(1, 1)
+    ),
+    _px4("PP_LOOKAHD_MIN", 1.0, "the least of that", Range(), Range(1, 1)),
+    _px4("PP_LOOKAHD_MAX", 10.0, "the most of that", Range(), Range(3, math.inf)),
     _px4("RD_TRANS_DRV_TRN", math.radians(10.0), "corners sharper than this are turned on the spot", Range()),
     _px4("RO_YAW_RATE_LIM", None, "how long that takes"),
     _px4("GF_ACTION", 2.0, "whether the autopilot enforces the fence", _WHOLE),

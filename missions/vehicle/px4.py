@@ -6,11 +6,14 @@ import math
 from typing import TYPE_CHECKING
 
 from missions.errors import VehicleError
-from missions.vehicle.model import Assumed, Autopilot, FenceParameters, Steering, Vehicle
+from missions.vehicle.model import Assumed, Autopilot, FenceParameters, Pursuit, Steering, Vehicle
 from missions.vehicle.reader import UNLIMITED_ACCEL_MPS2
 
 if TYPE_CHECKING:
     from missions.vehicle.reader import ParameterReader
+
+_SETTLES_PER_S = 0.4
+"""How fast an error beside the line dies away: pure pursuit's e-fold is its lookahead, PP_LOOKAHD_GAIN (1 s) times the speed; taken as 2.5 s, chosen."""
 
 
 def px4_vehicle(read: ParameterReader, mav_type: int | None) -> Vehicle:
@@ -23,10 +26,13 @@ def px4_vehicle(read: ParameterReader, mav_type: int | None) -> Vehicle:
     )
     jerk_mps3 = _limit(read, ("RO_JERK_LIM", "RD_MAX_JERK" if skid else "RA_MAX_JERK"))
     action = read.bits("GF_ACTION")
+    turn_radius_m = 0.0 if skid else _turn_radius_m(read)
+    pursuit = None if skid else _pursuit(read, nav_acceptance_m)
     return Vehicle(
-        waypoint_radius_m=nav_acceptance_m if skid else max(nav_acceptance_m, read.value("RA_ACC_RAD_MAX")),
+        waypoint_radius_m=nav_acceptance_m if pursuit is None else max(nav_acceptance_m, _most_m(pursuit)),
         speed_mps=_speed_mps(read, skid=skid),
-        turn_radius_m=0.0 if skid else _turn_radius_m(read),
+        turn_radius_m=turn_radius_m,
+        position_gain_per_s=_SETTLES_PER_S,
         accel_max_mps2=accel_max_mps2,
         jerk_mps3=jerk_mps3,
         pivot_angle_deg=math.degrees(read.value("RD_TRANS_DRV_TRN")) if skid else 0.0,
@@ -37,6 +43,7 @@ def px4_vehicle(read: ParameterReader, mav_type: int | None) -> Vehicle:
             enabled=action > 0,
             margin_m=0.0,
             radius_m=read.value("GF_MAX_HOR_DIST"),
+            radius_name="GF_MAX_HOR_DIST",
             action=action,
             avoid_bits=0,
             backs_away=False,
@@ -44,7 +51,28 @@ def px4_vehicle(read: ParameterReader, mav_type: int | None) -> Vehicle:
         assumed=tuple(read.assumed),
         mav_type=mav_type,
         firmware=read.firmware,
+        pursuit=pursuit,
     )
+
+
+def _pursuit(read: ParameterReader, nav_acceptance_m: float) -> Pursuit:
+    return Pursuit(
+        acceptance_m=nav_acceptance_m,
+        acceptance_max_m=read.known("RA_ACC_RAD_MAX"),
+        acceptance_gain=read.value("RA_ACC_RAD_GAIN"),
+        wheel_base_m=read.value("RA_WHEEL_BASE"),
+        steering_angle_rad=read.value("RA_MAX_STR_ANG"),
+        full_speed_mps=read.known("RO_MAX_THR_SPEED"),
+        speed_reduction=read.value("RO_SPEED_RED"),
+        lookahead_gain_s=read.value("PP_LOOKAHD_GAIN"),
+        lookahead_least_m=read.value("PP_LOOKAHD_MIN"),
+        lookahead_most_m=read.value("PP_LOOKAHD_MAX"),
+    )
+
+
+def _most_m(pursuit: Pursuit) -> float:
+    """Return how far before a waypoint the next leg begins at the earliest; PX4's default where that is not known."""
+    return 3.0 if pursuit.acceptance_max_m is None else pursuit.acceptance_max_m
 
 
 def _steering(read: ParameterReader) -> Steering:

@@ -18,7 +18,7 @@ class SimOptions(MapOptions, CommonOptions):
     """Run a simulated rover until Ctrl-C.
 
     It answers MAVLink 2 as ArduPilot Rover does: missions, fences, rally points, parameters, modes, arming; it drives AUTO and GUIDED.
-    With --autopilot px4 it answers as PX4 1.17 or 1.18 does; it drives straight lines then, not as a PX4 rover drives.
+    With --autopilot px4 it answers as PX4 1.17 or 1.18 does, and drives as its rover with steered wheels.
     Prints the connection string to open as soon as it listens.
 
     For example:

@@ -1,11 +1,12 @@
-"""PX4's rover without its link: modes, arming, missions and fence as measured; how it drives is only a simple law.
+"""PX4's rover without its link: modes, arming, missions and fence as measured.
 
-It drives straight lines at its speed, turns on the spot, and stops where it is told to: nothing of PX4's pure pursuit, corners, circles while waiting, and the
-loop of HOLD is in it. So it shows how PX4 answers, and nothing of the ground that a PX4 rover needs.
+With steered wheels it drives as `pursuit` says. With skid steering (CA_AIRFRAME 6 or 13), which was not measured, it drives straight lines at its speed, turns on the
+spot, stands while it waits, and stops where it is told to.
 """
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING
 from mavlink_bridge.mavlink.messages import MissionType
 from mavlink_bridge.simulator.flat import FlatFrame
 from mavlink_bridge.simulator.px4.fence import activation_s, enforced_fence
+from mavlink_bridge.simulator.px4.pursuit import Aim, PursuitBody, PursuitDrive, turn_rad
 from missions.items import Command
 
 if TYPE_CHECKING:
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
     from missions.geo import LatLon
     from missions.items import MissionItem
 
-TICK_S = 0.05  # chosen: the simple law has nothing quicker
+TICK_S = 0.05  # chosen: 0.16 m at the highest speed, and a sixth of its lags
 FENCE_LOOK_S = 0.2  # five times a second
 FAILSAFE_HOLD_S = 5.0
 """HOLD before a failsafe's RTL or LAND."""
@@ -41,6 +43,15 @@ _PLACED = (
     Command.NAV_LAND,
     Command.NAV_TAKEOFF,
 )
+_WAITS = (Command.NAV_LOITER_TIME, Command.NAV_DELAY)
+_SKID_AIRFRAMES = (6, 13)
+_STANDS_M = 0.21
+"""Where it brakes for a DELAY on 1.18: it stood 0.10 to 0.14 m from its waypoint."""
+
+_LATE_TICKS = 4
+"""How long it drives on before HOLD reaches it: with 0.2 s it rolls about as far past the place of the mode change as measured (2.3 m from 3 m/s, 1.9 m from 2 m/s)."""
+
+_CREEPS_MPS = 0.05  # how fast it comes there; chosen
 _NO_MISSION, _NOT_STARTED, _ACTIVE, _PAUSED, _COMPLETE = 1, 2, 3, 4, 5
 _CRITICAL, _INFO = 2, 6
 
@@ -55,17 +66,8 @@ class _Progress:
     is_valid: bool = False
     has_begun: bool = False
     speed_mps: float = 0.0  # of DO_CHANGE_SPEED
+    start_m: complex = 0j  # where the line to the next place begins
     wait_until_s: float | None = None
-
-
-@dataclass(slots=True)
-class _Motion:
-    """Where it is, where it looks, how fast it is, and where it drives outside of missions."""
-
-    position_m: complex
-    heading_rad: float
-    speed_mps: float = 0.0
-    goal_m: complex | None = None
 
 
 class Px4Rover:
@@ -94,6 +96,8 @@ class Px4Rover:
         How often it saw itself leave allowed ground.
     """
 
+    # Many attributes: all that PX4 itself keeps of its state at once, of modes, mission, fence, failsafes and where it drives.
+
     def __init__(
         self,
         parameters: Px4Parameters,
@@ -108,7 +112,10 @@ class Px4Rover:
         self._tells_modes = tells_modes
         self.home = home
         self.frame = FlatFrame(home)
-        self.motion = _Motion(0j, math.radians(heading_deg))
+        self.motion = PursuitBody(0j, math.radians(heading_deg))
+        self._pursuit = PursuitDrive(parameters)
+        self._late_ticks = 0
+        self._goal_m: complex | None = None  # outside of missions: where it is to go, or to stay
         self.breaches = 0
         self.texts: list[tuple[int, str]] = []
         self._counts_from_s = 0.0
@@ -122,7 +129,8 @@ class Px4Rover:
         self.is_in_failsafe = False
         self.is_outside = False
         self.progress = _Progress()
-        self.motion = _Motion(self.motion.position_m, self.motion.heading_rad)
+        self.motion = PursuitBody(self.motion.position_m, self.motion.heading_rad)
+        self._goal_m = None
         self._known = (-1, -1)
         self._looked_s = -math.inf
         self._then: tuple[float, int] | None = None  # when a failsafe's HOLD ends, and in which mode
@@ -179,7 +187,7 @@ class Px4Rover:
         """Let the motors stop."""
         if self.is_armed:
             self.is_armed = False
-            self.motion.speed_mps = 0.0
+            self.motion.speed_mps = self.motion.ramped_mps = 0.0
             self._disarms_s = math.inf
             self._say(_INFO, f"Disarmed by {how}")
 
@@ -207,8 +215,9 @@ class Px4Rover:
             self._enter((AUTO, HOLD))
         if self.mode != (AUTO, HOLD):
             return False
-        self.motion.goal_m = self.frame.to_flat(place)
-        if self._area.clearance_m(self.motion.goal_m) < 0:
+        self._goal_m = self.frame.to_flat(place)
+        self.progress.start_m = self.motion.position_m
+        if self._area.clearance_m(self._goal_m) < 0:
             self._say(_CRITICAL, "Reposition is outside geofence")
         return True
 
@@ -246,7 +255,7 @@ class Px4Rover:
     @property
     def is_idle(self) -> bool:
         """Whether a tick would change nothing."""
-        moves = self.mode[1] in (MISSION, RTL, LAND) or self.motion.goal_m is not None
+        moves = self.mode[1] in (MISSION, RTL, LAND) or self._goal_m is not None or self.motion.speed_mps > 0
         return not self.is_armed or not (moves or self._then is not None)
 
     def step(self, now_s: float) -> None:
@@ -291,7 +300,10 @@ class Px4Rover:
 
     def _enter(self, mode: tuple[int, int]) -> None:
         self.mode = mode
-        self.motion.goal_m = None
+        holds = mode == (AUTO, HOLD) and self.motion.speed_mps > 0
+        self._goal_m = self.motion.position_m if holds else None
+        self._late_ticks = _LATE_TICKS if holds and not self._is_skid else 0
+        self.progress.start_m = self.motion.position_m
         self.progress.wait_until_s = None
         self._disarms_s = math.inf
         self.is_in_failsafe = False
@@ -307,14 +319,19 @@ class Px4Rover:
         elif self.mode == (AUTO, RTL):
             if self._approach(0j):
                 self._disarms_s = min(self._disarms_s, now_s + DISARM_AFTER_S)
+                self._stop()
         elif self.mode == (AUTO, LAND):
-            self.motion.speed_mps = 0.0
+            self._stop()
             self._disarms_s = min(self._disarms_s, now_s + DISARM_AFTER_S)
-        elif self.motion.goal_m is not None:
-            if self._approach(self.motion.goal_m):
-                self.motion.goal_m = None
-        else:
-            self.motion.speed_mps = 0.0
+        elif self._late_ticks:
+            self._late_ticks -= 1
+            self.motion.position_m += cmath.rect(self.motion.speed_mps * TICK_S, self.motion.heading_rad)
+        elif self._goal_m is None:
+            self._stop()
+        elif self._approach(self._goal_m):
+            self._stop()
+            if self.motion.speed_mps == 0:
+                self._goal_m = None
 
     def _run_mission(self, now_s: float) -> None:
         self.progress.has_begun = True
@@ -327,16 +344,19 @@ class Px4Rover:
         if item.command == Command.DO_JUMP:
             self.progress.seq = int(item.params[0])  # endless: how often it was done is not counted here
             return
-        if item.command in _PLACED and not self._approach(self.frame.to_flat(item.position)):
+        waits = self.progress.wait_until_s is not None
+        if item.command in _PLACED and not waits and not self._approach_item(item):
             return
-        if item.command in (Command.NAV_LOITER_TIME, Command.NAV_DELAY) and self._waits(item, now_s):
+        if item.command in _WAITS and self._waits(item, now_s):
             return
         if item.command == Command.NAV_LOITER_UNLIM:
-            self.motion.speed_mps = 0.0
+            self._wait_about(self.frame.to_flat(item.position))
             return
         if item.command == Command.NAV_RETURN_TO_LAUNCH:
             self._enter((AUTO, RTL))
             return
+        if item.command in _PLACED:
+            self.progress.start_m = self.frame.to_flat(item.position)
         self.progress.reached = self.progress.seq
         self.progress.seq += 1
         if self.progress.seq >= len(self.mission):
@@ -345,29 +365,115 @@ class Px4Rover:
     def _waits(self, item: MissionItem, now_s: float) -> bool:
         if self.progress.wait_until_s is None:
             self.progress.wait_until_s = now_s + item.params[0]
-        self.motion.speed_mps = 0.0
+        here_m = self.frame.to_flat(item.position) if item.command in _PLACED else self.progress.start_m
+        if item.command == Command.NAV_DELAY and self._tells_modes and not self._is_skid:
+            self._approach(here_m, nearest_m=_STANDS_M)
+        else:
+            self._wait_about(here_m)
         if now_s < self.progress.wait_until_s:
             return True
         self.progress.wait_until_s = None
         return False
+
+    def _wait_about(self, place_m: complex) -> None:
+        """Wait: PX4's rover with steered wheels drives on about the place."""
+        if self._is_skid:
+            self._stop()
+        else:
+            self._pursuit.circle(self.motion, place_m, self._cruise_mps, TICK_S)
 
     def _finish(self) -> None:
         self.progress.seq = max(0, len(self.mission) - 1)
         self.progress.is_complete = True
         self._say(_INFO, "Mission finished, loitering")
         self._enter((AUTO, HOLD))
-        self.motion.speed_mps = 0.0
+        self._late_ticks = 0
 
-    def _approach(self, goal_m: complex) -> bool:
+    @property
+    def _is_skid(self) -> bool:
+        return self.parameters.whole("CA_AIRFRAME") in _SKID_AIRFRAMES
+
+    @property
+    def _cruise_mps(self) -> float:
+        return min(self.progress.speed_mps or math.inf, self.parameters["RO_SPEED_LIM"])
+
+    def _stop(self) -> None:
+        """Brake for a tick."""
+        if self._is_skid:
+            self.motion.speed_mps = 0.0
+        else:
+            self._pursuit.step(self.motion, None, TICK_S)
+
+    def _approach_item(self, item: MissionItem) -> bool:
+        """Drive a tick to a mission's place; return whether it counts as reached: with steered wheels early, where the next leg turns."""
+        goal_m = self.frame.to_flat(item.position)
+        if self._is_skid:
+            return self._approach_straight(goal_m)
+        after = self._after()
+        if after is None:
+            stands = self._tells_modes and self._delays_next
+            return self._approach(goal_m, nearest_m=self.parameters["NAV_ACC_RAD"] if stands else None)
+        turned_rad = turn_rad(self.progress.start_m, goal_m, after)
+        if item.command == Command.NAV_LOITER_TIME:
+            turned_rad = 0.0
+        if abs(goal_m - self.motion.position_m) <= self._pursuit.reached_m(turned_rad):
+            return True
+        cruise_mps = self._cruise_mps
+        corner_mps = self._pursuit.corner_mps(turned_rad, cruise_mps)
+        self._pursuit.step(self.motion, Aim(self.progress.start_m, goal_m, cruise_mps, corner_mps), TICK_S)
+        return False
+
+    @property
+    def _delays_next(self) -> bool:
+        following = self.mission[self.progress.seq + 1 : self.progress.seq + 2]
+        return bool(following) and following[0].command == Command.NAV_DELAY
+
+    def _after(self) -> complex | None:
+        """Return the place that the mission leads to next, None where it stops before: at its end, for RTL, and for a DELAY of 1.18."""
+        for item in self.mission[self.progress.seq + 1 :]:
+            if item.command in _PLACED:
+                return self.frame.to_flat(item.position)
+            if item.command == Command.NAV_RETURN_TO_LAUNCH or (
+                item.command == Command.NAV_DELAY and self._tells_modes
+            ):
+                return None
+            if item.command == Command.DO_JUMP:
+                target = (
+                    self.mission[int(item.params[0])] if 0 <= item.params[0] < len(self.mission) else None
+                )
+                return (
+                    self.frame.to_flat(target.position)
+                    if target is not None and target.command in _PLACED
+                    else None
+                )
+        return None
+
+    def _approach(self, goal_m: complex, *, nearest_m: float | None = None) -> bool:
+        """Drive a tick to a place to stop at; return whether it is reached."""
+        if self._is_skid:
+            return self._approach_straight(goal_m)
+        radius_m = self.parameters["NAV_ACC_RAD"]
+        away_m = abs(goal_m - self.motion.position_m)
+        if nearest_m is None and away_m <= radius_m:
+            return True
+        arrival_mps = 0.0 if nearest_m is None else _CREEPS_MPS
+        if nearest_m is not None and away_m <= nearest_m:
+            self._stop()
+            return True
+        self._pursuit.step(
+            self.motion, Aim(self.progress.start_m, goal_m, self._cruise_mps, arrival_mps), TICK_S
+        )
+        return False
+
+    def _approach_straight(self, goal_m: complex) -> bool:
         """Drive a tick straight to a point; return whether it is reached."""
         away_m = goal_m - self.motion.position_m
-        cruise_mps = min(self.progress.speed_mps or math.inf, self.parameters["RO_SPEED_LIM"])
-        step_m = cruise_mps * TICK_S
+        step_m = self._cruise_mps * TICK_S
         radius_m = max(self.parameters["NAV_ACC_RAD"], step_m)
         if abs(away_m) <= radius_m:
             return True
         self.motion.heading_rad = math.atan2(away_m.imag, away_m.real)
-        self.motion.speed_mps = cruise_mps
+        self.motion.speed_mps = self._cruise_mps
         self.motion.position_m += away_m / abs(away_m) * step_m
         return False
 

@@ -70,7 +70,7 @@ def test_whole_numbers_are_read_as_px4_sends_them(tmp_path: Path) -> None:
     assert code == 0
     assert not any("does not enforce this fence" in text for text in found["warnings"])  # GF_ACTION 2
     assert not any("CA_AIRFRAME" in text for text in found["warnings"])
-    assert "the drive model was measured on ArduPilot Rover, not on PX4" in found["warnings"]
+    assert any("skid-steered rovers were not measured with PX4" in text for text in found["warnings"])
 
 
 def test_the_log_tells_them_too(tmp_path: Path) -> None:
@@ -89,7 +89,7 @@ def test_the_log_tells_them_too(tmp_path: Path) -> None:
 def test_a_px4_rover_that_told_no_parameters_is_no_ardupilot(tmp_path: Path) -> None:
     code, found = run("plan", "--log", px4_log(tmp_path / "px4.tlog", []), "--target", TARGET)
     assert code == 0
-    assert "the drive model was measured on ArduPilot Rover, not on PX4" in found["warnings"]
+    assert any("RA_WHEEL_BASE 0.5 m was not measured with PX4" in text for text in found["warnings"])
 
 
 @pytest.mark.parametrize("command", [("check", "--log"), ("plan", "--via-mission", "own", "--log")])

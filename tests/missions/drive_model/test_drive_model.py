@@ -579,7 +579,7 @@ def test_vehicles_of_the_measured_kind() -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"autopilot": Autopilot.PX4}, "not on PX4"),
+        ({"autopilot": Autopilot.PX4, "steering": Steering.ACKERMANN}, "this PX4 rover steers is not known"),
         ({"boat_drift_m": 2.0}, "boat"),
         (
             {"speed_mps": 8.0},

@@ -17,6 +17,7 @@ from missions.vehicle import (
     Autopilot,
     FenceParameters,
     Footprint,
+    Pursuit,
     Steering,
     Vehicle,
     vehicle_from_parameters,
@@ -218,7 +219,10 @@ def test_px4_with_steered_wheels() -> None:
     assert not vehicle.fence.enabled
     assert vehicle.fence.radius_m == 100.0
     assert vehicle.stops_within_m == 0.0
-    assert vehicle.assumed == ()
+    assert vehicle.pursuit == Pursuit(full_speed_mps=None, speed_reduction=-1.0)
+    assert {one.parameter for one in vehicle.assumed} == {
+        "RA_ACC_RAD_GAIN", "RO_SPEED_RED", "PP_LOOKAHD_GAIN", "PP_LOOKAHD_MIN", "PP_LOOKAHD_MAX",
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize(

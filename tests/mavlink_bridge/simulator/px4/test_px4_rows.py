@@ -515,10 +515,10 @@ def test_lists_stay_over_a_reboot_and_transfers_do_not():
 
 
 class TestTheSimpleLaw:
-    """What the simulated rover makes of a mission; only the answers are PX4's, not how it drives."""
+    """What the simulated rover makes of a mission; its simple law is that of skid steering."""
 
     def test_speeds_waits_and_the_way_home(self):
-        bench = rover(home=HOME, heading_deg=90.0)
+        bench = rover(home=HOME, heading_deg=90.0, parameters={"CA_AIRFRAME": 6})
         wait = replace(waypoint(at(6, 0)), command=Command.NAV_LOITER_TIME, params=(3.0, 0, 0, 0))
         bench.upload(
             [change_speed(1.5), wait, MissionItem(Command.NAV_DELAY, 2, (2.0, 0, 0, 0)), MissionItem(20, 2)]

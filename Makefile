@@ -115,7 +115,7 @@ bench-tlog: .venv/dev.stamp
 	$(BIN)/python benchmarks/tlog.py
 
 campaign: .venv/dev.stamp
-	$(BIN)/python tests/mavlink_bridge/protocol/campaign.py --count $(or $(COUNT),10000)
+	$(BIN)/python tests/mavlink_bridge/protocol/campaign.py --count $(or $(COUNT),10000) --autopilot $(or $(AUTOPILOT),ardupilot)
 
 fuzz: .venv/dev.stamp
 	$(BIN)/python tests/mavlink_bridge/tlog/fuzz_tlog.py --count 100000

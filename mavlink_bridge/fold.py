@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.autopilot_facts import with_autopilot, with_banner, with_parameter, with_version
+from mavlink_bridge.mavlink.autopilots import AutopilotTable, autopilot_of
 from mavlink_bridge.mavlink.parameter_values import parameter_value
 from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.mavlink.vehicles import is_vehicle
@@ -220,7 +221,8 @@ def _upload_count(situation: Situation, message: Message, time_s: float) -> Situ
 def _upload_item(situation: Situation, message: Message, time_s: float) -> Situation:
     assert isinstance(message, (m.MissionItem, m.MissionItemInt))
     if message.current in (_GUIDED_TARGET, _GUIDED_ALTITUDE):
-        if message.current == _GUIDED_ALTITUDE or message.frame not in _GLOBAL_FRAMES:
+        is_ignored = message.current == _GUIDED_ALTITUDE or message.frame not in _GLOBAL_FRAMES
+        if is_ignored or not _autopilot(situation).goes_to_guided_items:
             return situation
         item = item_from_message(message)
         return _targeted(situation, _place(item.lat_e7, item.lon_e7), time_s, TargetMessage.GUIDED_ITEM)
@@ -259,6 +261,8 @@ def _command_long(situation: Situation, message: Message, time_s: float) -> Situ
 
 def _position_target(situation: Situation, message: Message, time_s: float) -> Situation:
     assert isinstance(message, m.SetPositionTargetGlobalInt)
+    if not _autopilot(situation).goes_to_position_targets:
+        return situation
     if message.type_mask & _IGNORE_X_OR_Y or message.coordinate_frame not in _GLOBAL_FRAMES:
         return situation
     position = _place(message.lat_int, message.lon_int)
@@ -328,7 +332,7 @@ def _is_held(situation: Situation, kind: ListKind, seq: int, item: MissionItem) 
         held = fence_to_items(situation.fence.value)
     elif kind is ListKind.MISSION and situation.mission is not None:
         held = situation.mission.value.items
-        if situation.ardupilot is not False:  # home, which is the vehicle's own, stands before them
+        if _has_home_item(situation):  # home, which is the vehicle's own, stands before them
             held = (item, *held)
     return seq < len(held) and _core(held[seq]) == _core(item)
 
@@ -403,10 +407,18 @@ def _with_fence(
     return _with_fence_trouble(replace(situation, fence=Known(fence, time_s, source)), None)
 
 
+def _autopilot(situation: Situation) -> AutopilotTable:
+    return autopilot_of(ardupilot=situation.ardupilot, firmware=situation.firmware)
+
+
+def _has_home_item(situation: Situation) -> bool:
+    return _autopilot(situation).lists.form.has_home_item
+
+
 def _with_mission(
     situation: Situation, items: tuple[MissionItem, ...], time_s: float, source: str, *, tells_home: bool
 ) -> Situation:
-    if situation.ardupilot is False:
+    if not _has_home_item(situation):
         return replace(situation, mission=Known(Mission(items), time_s, source))
     mission = Mission(without_home(items))
     if tells_home and items and (home := _place(items[0].lat_e7, items[0].lon_e7)):

@@ -1,10 +1,11 @@
-"""Fences as drawn: inclusion and exclusion zones, from and to mission items."""
+"""Fences as drawn: inclusion and exclusion zones, from and to mission items; and reported obstacles, which are exclusions for a while."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from enum import StrEnum
 
 from missions.errors import FenceError, InvalidPositionError
@@ -79,6 +80,86 @@ class Fence:
             counts[name] = counts.get(name, 0) + 1
             names.append(f"{name} {counts[name]}")
         return tuple(names)
+
+
+@dataclass(frozen=True, slots=True)
+class Obstacle:
+    """Something that was reported to stand or move in the field: an exclusion circle that grows, and ends.
+
+    Parameters
+    ----------
+    position : LatLon
+        Its middle, as it was seen last.
+    radius_m : float
+        Its size, as it was seen last.
+    growth_mps : float
+        How fast it may move, in any direction: its circle grows so until it is seen again.
+    seen_s : float
+        When it was seen last.
+    time_to_live_s : float
+        So long after that it is forgotten.
+    source : str
+        Who reported it.
+    reported_s : float
+        When it was reported first, in seconds since 1970; None where it is given beside a file, without a clock.
+    """
+
+    position: LatLon
+    radius_m: float
+    growth_mps: float
+    seen_s: float
+    time_to_live_s: float
+    source: str
+    reported_s: float | None
+
+    @property
+    def name(self) -> str:
+        """What it is called: by when it was reported, in local time, by whom, and how large it is."""
+        size = f"{self.radius_m:.1f} m"
+        if self.reported_s is None:
+            return f"{OBSTACLE} from {self.source}, {size}"
+        clock = datetime.fromtimestamp(self.reported_s, tz=UTC).astimezone()
+        return f"{OBSTACLE} reported at {clock:%H:%M:%S} by {self.source}, {size}"
+
+    @property
+    def ends_s(self) -> float:
+        """When it is forgotten."""
+        return self.seen_s + self.time_to_live_s
+
+    def radius_at(self, time_s: float) -> float:
+        """Return how far from its middle it may be at a time."""
+        return self.radius_m + self.growth_mps * max(0.0, time_s - self.seen_s)
+
+
+OBSTACLE = "obstacle"
+"""How an obstacle's name begins; no zone's does."""
+
+
+@dataclass(frozen=True, slots=True)
+class Obstacles:
+    """Obstacles as they may be at one time; nothing behind this reads a clock.
+
+    Parameters
+    ----------
+    known : tuple of Obstacle
+        Each as it was seen last.
+    at_s : float
+        The time.
+    margin_m : float
+        So much wider than that each is.
+    """
+
+    known: tuple[Obstacle, ...] = ()
+    at_s: float = 0.0
+    margin_m: float = 0.0
+
+    def later(self, by_s: float, margin_m: float) -> Obstacles:
+        """Return them as they may be some time later, with a margin."""
+        return replace(self, at_s=self.at_s + by_s, margin_m=margin_m)
+
+    def radius_m(self, obstacle: Obstacle) -> float:
+        """Return how far from its middle one of them may be at that time."""
+        return obstacle.radius_at(self.at_s) + self.margin_m
 
 
 _VERTEX_KINDS = {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from importlib import import_module
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
@@ -14,6 +15,9 @@ from missions.situation import Known, Mission, Situation
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    import numpy as np
+    from numpy.typing import NDArray
 
     from missions.drive_model import Envelope
     from missions.drive_model.stopping import HoldCheck
@@ -113,6 +117,11 @@ class Plan:
     asked_targets: tuple[LatLon, ...] = ()
     extrapolated: tuple[str, ...] = ()
     hold: HoldCheck | None = None
+
+    @cached_property
+    def points(self) -> NDArray[np.float64]:
+        """The path in the plane, east and north in metres."""
+        return self.ground.frame.to_local_array(self.path)
 
     @property
     def length_m(self) -> float:

@@ -8,6 +8,7 @@ from enum import StrEnum
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Generic, TypeVar
 
+from missions.fence import Obstacles
 from missions.stops import Stops
 
 if TYPE_CHECKING:
@@ -158,6 +159,8 @@ class Situation:
         The autopilot's parameters, as far as they are known; each a number.
     stops : Stops
         How far it rolls on after HOLD or disarming, as far as that was said or seen.
+    obstacles : Obstacles
+        What was reported to stand or move in the field, as it may be when a vehicle that is told to stop now stands.
     reading : Reading
         How all that was read.
     """
@@ -178,6 +181,7 @@ class Situation:
     target: Known[LatLon] | None = None
     parameters: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     stops: Stops = field(default_factory=Stops)
+    obstacles: Obstacles = field(default_factory=Obstacles)
     reading: Reading = field(default_factory=Reading)
 
     @property

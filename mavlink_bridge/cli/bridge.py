@@ -32,7 +32,7 @@ from mavlink_bridge.cli.typed import CONFIRM, understood
 from mavlink_bridge.cli.values import given_places
 from mavlink_bridge.cli.vehicle_options import described_vehicle
 from mavlink_bridge.director import AT_WORK, Director, EventName, Orders, Severity
-from mavlink_bridge.director.orders import DEFAULT_SOURCES, Homing, TargetSource
+from mavlink_bridge.director.orders import DEFAULT_SOURCES, Homing, ObstacleSource, TargetSource
 from mavlink_bridge.errors import LinkError, UsageError
 from mavlink_bridge.link import ONE_SHOT_IDENTITY, now_s, open_link, parse_connection
 from mavlink_bridge.mavlink.echoes import SentFrames
@@ -57,6 +57,7 @@ if TYPE_CHECKING:
 
 # Between attempts to open a link anew: doubled up to half a minute. Chosen, not measured.
 _BACKOFF_S = (0.5, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0)
+_OBSTACLES_TEXT = "reported obstacles are planned round; this protects no person: a sensor may see nothing, and the rover rolls on after HOLD"
 _LINK_LOOK_S = 0.25  # how soon an interrupt is seen while waiting for that
 _BY_ROUTE = (
     "--rtl-by-route: the first RTL is answered with HOLD and a verified way home round the fences in AUTO. RTL again 4 s or more later, or any other mode, "
@@ -69,6 +70,8 @@ def bridge(options: BridgeOptions) -> None:
     """Run the director on a link until its single job is done, or for ever."""
     check_permissions(upload=options.upload, drive=options.drive, arm=options.arm)
     orders = _orders(options)
+    if orders.obstacle_sources:
+        inform((_OBSTACLES_TEXT,))
     if orders.homing.by_route:
         inform([_BY_ROUTE])
     described = described_vehicle(options)
@@ -116,6 +119,9 @@ def _orders(options: BridgeOptions) -> Orders:
         once=options.once,
         announce=True,
         target_sources=sources,
+        obstacle_sources=_obstacle_sources(options.obstacles_from),
+        obstacle_growth_mps=options.obstacle_growth,
+        obstacle_keep_s=options.obstacle_keep,
         patience_s=options.timeout,
         homing=_homing(options),
     )
@@ -148,6 +154,14 @@ def _homing(options: BridgeOptions) -> Homing:
         battery_volts=options.battery_volts,
         gcs_timeout_s=options.gcs_timeout,
     )
+
+
+def _obstacle_sources(texts: list[str]) -> frozenset[ObstacleSource]:
+    names = [name for text in texts for name in text.split(",")]
+    try:
+        return frozenset(map(ObstacleSource, names))
+    except ValueError as error:
+        raise UsageError(f"--obstacles-from: {error}; expected one of {', '.join(ObstacleSource)}") from None
 
 
 @dataclass(eq=False)
@@ -341,6 +355,13 @@ class _Shell:
         elif typed.target is not None:
             self._written.call("target", now, typed.target)
             self.director.take_target(typed.target, now)
+        elif typed.obstacle is not None:
+            position, radius_m = typed.obstacle.position, typed.obstacle.radius_m
+            self._written.call("obstacle", now, position, str(radius_m))
+            self.director.take_obstacle(position, radius_m, now)
+        elif typed.clears:
+            self._written.call("clear", now)
+            self.director.clear_obstacles(now)
 
     def _note(self, text: str, *, is_warning: bool) -> None:
         """Print a note that is not an event, where it does not disturb: above the view, else on stderr."""

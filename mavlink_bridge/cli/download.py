@@ -44,7 +44,7 @@ def download(options: DownloadOptions) -> None:
     _check(what, options.connect, options.output)
     items: tuple[MissionItem, ...] = ()
     parameters: dict[str, float] = {}
-    with session_for(options, options.connect) as (session, _show):
+    with session_for(options, options.connect, any_autopilot=True) as (session, _show):
         store = BackupStore()
         if store.notes():  # else nothing needs to be distinguished
             warn(reader_warnings(store, session.which_vehicle()))
@@ -52,8 +52,14 @@ def download(options: DownloadOptions) -> None:
             parameters = _read_parameters(session)
         else:
             items = read_list(session, what)
+    has_home = what == "mission" and session.autopilot.lists.form.has_home_item
     for path in options.output:
-        _write(path, what, items, parameters)
+        if what == "mission" and not has_home and path.suffix.lower() in _ITEM_SUFFIXES:
+            raise UsageError(
+                f"{path}: the first row of such a file is home, which a mission of {session.autopilot} does not hold; nothing was written",
+                advice="write it to a .plan",
+            )
+        _write(path, what, items, parameters, has_home=has_home)
     document: dict[str, Any] = {
         "status": "ok",
         "command": "download",
@@ -133,9 +139,16 @@ def _read_parameters(session: Session) -> dict[str, float]:
     return dict(sorted(outcome.values.items()))
 
 
-def _write(path: Path, what: str, items: tuple[MissionItem, ...], parameters: Mapping[str, float]) -> None:
+def _write(
+    path: Path,
+    what: str,
+    items: tuple[MissionItem, ...],
+    parameters: Mapping[str, float],
+    *,
+    has_home: bool = True,
+) -> None:
     if path.suffix.lower() == ".plan":
-        _write_plan(path, what, items)
+        _write_plan(path, what, items, has_home=has_home)
         return
     if what == "parameters":
         separator = " " if path.suffix.lower() == ".parm" else ","
@@ -149,11 +162,12 @@ def _write(path: Path, what: str, items: tuple[MissionItem, ...], parameters: Ma
     write_kept(path, text.encode())
 
 
-def _write_plan(path: Path, what: str, items: tuple[MissionItem, ...]) -> None:
+def _write_plan(path: Path, what: str, items: tuple[MissionItem, ...], *, has_home: bool) -> None:
     source = "read from the vehicle"
     if what == "mission":
-        home = items[0].position if items else None
-        situation = Situation(mission=Known(Mission(without_home(items), home), None, source))
+        home = items[0].position if items and has_home else None
+        own = without_home(items) if has_home else items
+        situation = Situation(mission=Known(Mission(own, home), None, source))
     elif what == "fence":
         situation = Situation(fence=Known(fence_from_items(items), None, source))
     else:

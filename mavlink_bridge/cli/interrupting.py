@@ -18,7 +18,6 @@ from mavlink_bridge.cli.keyboard import Keyboard
 from mavlink_bridge.cli.terminal import say
 from mavlink_bridge.errors import LinkError
 from mavlink_bridge.link import now_s
-from mavlink_bridge.mavlink.rover import Mode, plain_mode_name
 from mavlink_bridge.protocol.mode_switch import ModeSwitch
 
 if TYPE_CHECKING:
@@ -120,7 +119,7 @@ class InterruptReport:
         """Return the details for scripts."""
         doing = self.doing
         return {
-            "mode": None if doing.mode is None else plain_mode_name(doing.mode),
+            "mode": None if doing.mode is None else doing.modes.named(doing.mode),
             "armed": doing.is_armed,
             "speed_mps": None if doing.speed_mps is None else round(doing.speed_mps, 2),
             "age_s": round(doing.age_s, 1),
@@ -151,8 +150,8 @@ def doing_text(doing: Doing) -> str:
     speed = "speed unknown" if doing.speed_mps is None else f"{doing.speed_mps:.1f} m/s"
     age_s = max(doing.age_s, 0.0 if doing.speed_mps is None else doing.speed_age_s)
     old = f" ({age_s:.0f} s ago)" if age_s > _OLD_S else ""
-    complete = ", mission complete" if doing.has_completed and doing.mode == Mode.AUTO else ""
-    return f"{plain_mode_name(doing.mode)}, {armed}, {speed}{complete}{old}"
+    complete = ", mission complete" if doing.has_completed and doing.mode == doing.modes.mission else ""
+    return f"{doing.modes.named(doing.mode)}, {armed}, {speed}{complete}{old}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,7 +264,7 @@ def _hold(at_hand: AtHand) -> bool:
     link, peer = at_hand.link, at_hand.peer()
     assert link is not None
     assert peer is not None
-    switch = ModeSwitch(peer, Mode.HOLD, is_urgent=True, until_seen=True)
+    switch = ModeSwitch(peer, peer.autopilot.modes.hold, is_urgent=True, until_seen=True)
     link.run(switch, on_frames=partial(_take, at_hand))
     return switch.is_granted
 

@@ -19,6 +19,8 @@ from mavlink_bridge.cli.terminal import echo, print_json, say
 from mavlink_bridge.errors import LogError, UsageError
 from mavlink_bridge.logbook import read_logbook
 from mavlink_bridge.logbook.document import as_document
+from mavlink_bridge.mavlink.autopilots import autopilot_of
+from mavlink_bridge.mavlink.messages import MissionType
 from missions.errors import VehicleError
 from missions.picture.drives import drive_scene
 from missions.vehicle import bits
@@ -80,7 +82,7 @@ def _scene(book: Logbook) -> PictureScene:
         names = ", ".join(str(other.system) for other in book.vehicles)
         raise UsageError(f"{book.name} holds vehicles {names}; choose one to draw with --system N")
     mission = vehicle.situation.mission
-    first = int(vehicle.situation.ardupilot is not False)  # ArduPilot's item 0 is home
+    first = autopilot_of(ardupilot=vehicle.situation.ardupilot).lists.form.first_compared(MissionType.MISSION)
     items = enumerate(mission.value.items if mission else (), start=first)
     return drive_scene(
         (f"{book.name}: {vehicle.driven_m:.1f} m driven", verdict(vehicle)[0]),

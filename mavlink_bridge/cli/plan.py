@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,7 +16,7 @@ from mavlink_bridge.cli.plan_results import Told, arrival_document, report_end
 from mavlink_bridge.cli.planning_progress import planning_shown
 from mavlink_bridge.cli.terminal import print_json
 from mavlink_bridge.cli.timed_plan import timed_plan
-from mavlink_bridge.cli.values import given_places
+from mavlink_bridge.cli.values import MOST_VEHICLE_M, checked_number, given_places, position_from
 from mavlink_bridge.cli.vehicle_options import (
     described_vehicle,
     with_description,
@@ -24,6 +25,7 @@ from mavlink_bridge.cli.vehicle_options import (
 )
 from mavlink_bridge.errors import UsageError
 from missions.errors import MissionFormatError
+from missions.fence import Obstacle, Obstacles
 from missions.formats import check_writable_format
 from missions.request import RepairMission
 
@@ -109,6 +111,10 @@ def _check_options(options: PlanOptions) -> None:
                 f"{path} cannot be written: there is no folder {path.parent}",
                 advice=f"create {path.parent} first, or choose another folder",
             )
+    if options.obstacle and options.connect is not None:
+        raise UsageError(
+            "--obstacle goes with --fence and --log: on a link pbpp bridge --obstacles-from plans round obstacles"
+        )
     if options.home is not None and options.connect is not None:
         raise UsageError("--home goes with --fence and --log: a live vehicle reports its own home")
     check_plots(plots, json_output=options.json_output)
@@ -127,8 +133,27 @@ def _offline_situation(options: PlanOptions, request: Request) -> tuple[Situatio
         situation = read_fence_file(options.fence, options)
         if isinstance(request, RepairMission) and request.mission is not None:
             situation = with_mission_home(situation, request.mission, str(options.via_mission))
+    situation = replace(situation, obstacles=Obstacles(tuple(map(_obstacle, options.obstacle))))
     described = with_home_option(
         with_description(situation, described_vehicle(options)),
         options.home,
     )
     return described, taken
+
+
+def _obstacle(text: str) -> Obstacle:
+    """Return the obstacle that ``--obstacle`` is.
+
+    Raises
+    ------
+    UsageError
+        It is not LAT,LON,RADIUS.
+    """
+    place, comma, radius = text.rpartition(",")
+    if not comma:
+        raise UsageError(f"--obstacle {text!r}: expected LAT,LON,RADIUS")
+    try:
+        radius_m = checked_number(radius, 0.0, MOST_VEHICLE_M, "metres", above=True)
+    except UsageError as error:
+        raise UsageError(f"--obstacle {text!r}: {error}") from None
+    return Obstacle(position_from("--obstacle", place), radius_m, 0.0, 0.0, math.inf, "--obstacle", None)

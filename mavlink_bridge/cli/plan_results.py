@@ -71,6 +71,15 @@ def plan_document(planned: Plan) -> dict[str, object]:
             "vertices": fence.vertex_count,
             "union": planned.ground.union,
         },
+        "obstacles": [
+            {
+                "name": one.name,
+                "position": list(one.position),
+                "radius_m": round(one.radius_m, 2),
+                "taken_for_m": round(planned.ground.obstacles.radius_m(one), 2),
+            }
+            for one in planned.ground.obstacles.known
+        ],
         "stopping": hold_document(planned.hold),
         "blocks": planned.blocks,
         "mission_items": len(planned.items) + 1,

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.backup.store import Backup, BackupStore, Note
     from mavlink_bridge.backup.vehicle_mark import VehicleMark
 
+_ARDUPILOT = 3  # MAV_AUTOPILOT; of marks before it was kept, which were all ArduPilot's
 _FORGET = "`pbpp upload --forget` dismisses this note"
 
 
@@ -84,6 +85,7 @@ def backups_to_restore(store: BackupStore, vehicle: VehicleMark, wanted: Restora
         There is no such backup.
     """
     if wanted.backup is not None:
+        _check_autopilot(wanted.backup, vehicle)
         if not wanted.for_another:
             _check_vehicle(wanted.backup, vehicle)
         return [wanted.backup]
@@ -100,8 +102,19 @@ def backups_to_restore(store: BackupStore, vehicle: VehicleMark, wanted: Restora
         )
     backups = [note.backup for note in notes if note.backup]
     for backup in backups:
+        _check_autopilot(backup, vehicle)
         _check_vehicle(backup, vehicle)
     return backups
+
+
+def _check_autopilot(backup: Backup, vehicle: VehicleMark) -> None:
+    """Refuse a list that another autopilot held: ArduPilot's missions begin with home, which PX4 would drive to."""
+    held, now = (mark.autopilot or _ARDUPILOT for mark in (backup.vehicle, vehicle))
+    if held != now:
+        raise OtherVehicleError(
+            f"the backup {backup.path} was read from another autopilot (MAV_AUTOPILOT {held}, this is {now}), which stores lists "
+            "otherwise; nothing was written"
+        )
 
 
 def _say_whose(notes: Sequence[Note], vehicle: VehicleMark) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from mavlink_bridge.backup.vehicle_mark import VehicleMark, uid_of
@@ -13,10 +13,7 @@ from mavlink_bridge.cli.interrupting import AtHand
 from mavlink_bridge.cli.link_notes import tell_echoes
 from mavlink_bridge.errors import LinkError, OutcomeError, RefusedError
 from mavlink_bridge.link import open_link, parse_connection
-from mavlink_bridge.mavlink.messages import (
-    Autopilot,
-)
-from mavlink_bridge.mavlink.rover import Mode
+from mavlink_bridge.mavlink.autopilots import autopilot_table
 from mavlink_bridge.mavlink.signing import Signing, SigningKey
 from mavlink_bridge.mavlink.vehicles import not_ardupilot
 from mavlink_bridge.protocol.ask_version import AskVersion
@@ -25,6 +22,7 @@ from mavlink_bridge.protocol.mode_switch import ModeSwitch
 from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.protocol.telemetry import stream_requests
 from mavlink_bridge.protocol.vehicle_watch import VehicleWatch
+from missions.firmware import firmware_from_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -32,6 +30,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from mavlink_bridge.link import Link
+    from mavlink_bridge.mavlink.autopilots import AutopilotTable
     from mavlink_bridge.mavlink.messages import Frame
     from mavlink_bridge.protocol.machine import Machine
     from mavlink_bridge.protocol.vehicle_watch import Doing
@@ -59,6 +58,8 @@ class Contact:
         How long to wait for the vehicle.
     key_file : Path, optional
         The signing key.
+    any_autopilot : bool
+        Take every autopilot whose transfers are known, for what only transfers; otherwise ArduPilot alone.
     """
 
     connection: str
@@ -67,6 +68,7 @@ class Contact:
     any_vehicle: bool = False
     timeout_s: float = 30.0
     key_file: Path | None = None
+    any_autopilot: bool = False
 
 
 class Session:
@@ -95,7 +97,7 @@ class Session:
     Raises
     ------
     LinkError
-        The vehicle is not there, or its autopilot is not ArduPilot.
+        The vehicle is not there, or its autopilot is not one that this is known of.
     IdentityTakenError
         Somebody else on the link speaks with our ids.
     """
@@ -124,14 +126,23 @@ class Session:
         self.peer = Peer(finder.vehicle.system, finder.vehicle.component, *link.identity)
         assert finder.heartbeat is not None
         self.watch.receive(finder.heartbeat, link.now_s())
-        if other := not_ardupilot(finder.vehicle.system, finder.heartbeat.autopilot):
+        table = autopilot_table(finder.heartbeat.autopilot)
+        other = not_ardupilot(finder.vehicle.system, finder.heartbeat.autopilot)
+        if other is not None and (table is None or not contact.any_autopilot):
             raise other
+        assert table is not None
+        self.peer = replace(self.peer, autopilot=table)
 
     @property
     def vehicle(self) -> Peer:
         """The vehicle that was found."""
         assert self.peer is not None
         return self.peer
+
+    @property
+    def autopilot(self) -> AutopilotTable:
+        """How its autopilot speaks."""
+        return self.vehicle.autopilot
 
     @property
     def is_active(self) -> bool | None:
@@ -161,14 +172,21 @@ class Session:
         return self.listen_until(lambda: self.watch.heartbeat_s > begun_s, _HEARTBEAT_PATIENCE_S)
 
     def which_vehicle(self) -> VehicleMark:
-        """Ask the vehicle which one it is; return by what it is known again."""
+        """Ask the vehicle which one it is, and of which version; return by what it is known again."""
         asking = AskVersion(self.vehicle)
         self.run(asking, "identifying the vehicle")
+        version = asking.version
+        firmware = firmware_from_number(version.flight_sw_version) if version is not None else None
+        table = autopilot_table(self.autopilot.autopilot, firmware)
+        assert table is not None
+        self.peer = replace(self.vehicle, autopilot=table)
+        if remark := table.remark(firmware):
+            warn([remark])
         return VehicleMark(
             self.vehicle.system,
-            uid_of(asking.version),
+            uid_of(version),
             str(parse_connection(self._connection)),
-            int(Autopilot.ARDUPILOTMEGA),
+            int(table.autopilot),
         )
 
     def run(self, machine: Machine, text: str, on_step: Callable[[], None] | None = None) -> None:
@@ -192,7 +210,7 @@ class Session:
             raise identity_taken(self.link.identity)
         self._has_written = self._has_written or getattr(machine, "has_written", False)
 
-    def change_mode(self, mode: Mode) -> None:
+    def change_mode(self, mode: int) -> None:
         """Switch the vehicle's mode and wait until its heartbeat reports it.
 
         Raises
@@ -202,10 +220,11 @@ class Session:
         OutcomeError
             It accepted but does not show the mode, or did not answer; or it is to drive, and somebody else has our ids.
         """
-        name = mode.name
-        if mode == Mode.AUTO and self._has_clashed:
+        modes = self.autopilot.modes
+        name = modes.named(mode)
+        if mode == modes.mission and self._has_clashed:
             raise identity_shared(
-                self.link.identity, "the vehicle was not switched to AUTO; the upload is on it"
+                self.link.identity, f"the vehicle was not switched to {name}; the upload is on it"
             )
         switch = ModeSwitch(self.vehicle, mode)
         self._has_changed_mode = True

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.errors import BridgeError, OutcomeError, RefusedError
 from mavlink_bridge.mavlink.messages import MissionType
-from mavlink_bridge.mavlink.rover import Mode, plain_mode_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -36,24 +35,38 @@ def make_ready(session: Session, *, hold: bool, replace_active: bool) -> None:
         session.listen_until(lambda: session.is_active is False, _STATE_PATIENCE_S)
     if not session.is_active:
         return
+    modes = session.autopilot.modes
     if hold:
-        session.change_mode(Mode.HOLD)
+        session.change_mode(modes.hold)
     elif not replace_active:
         raise RefusedError(
-            "the vehicle is armed and driving its mission in AUTO; nothing was written",
+            f"the vehicle is armed and driving its mission in {modes.named(modes.mission)}; nothing was written",
             advice="add --hold to switch it to HOLD first, or --replace-active to write while it drives",
         )
 
 
 def fence_warnings(session: Session, lists: Iterable[MissionType]) -> list[str]:
-    """Return what an armed vehicle may do once a new fence is on it: if it stands outside, it may drive off."""
-    if MissionType.FENCE not in lists or not session.doing.is_armed:
+    """Return what to know of a new fence: an armed vehicle that stands outside may drive off, and not every zone may be enforced."""
+    if MissionType.FENCE not in lists:
         return []
-    text = (
-        "the vehicle is armed, and a new fence takes effect at once: if it stands outside and FENCE_ENABLE is 1, it does what "
-        "FENCE_ACTION says (1: RTL, it drives straight home)"
-    )
-    return [text]
+    table = session.autopilot
+    texts = (table.new_fence, table.new_fence_armed if session.doing.is_armed else "")
+    return [text for text in texts if text]
+
+
+def check_drives(session: Session) -> None:
+    """Refuse to set a vehicle driving whose autopilot's drives are not foreseen; before anything is written.
+
+    Raises
+    ------
+    RefusedError
+        Only transfers are known of its autopilot.
+    """
+    if not session.autopilot.is_driven:
+        raise RefusedError(
+            f"--drive is not possible on {session.autopilot}: pbpp does not foresee yet how its rovers drive and stop; nothing was written",
+            advice="upload without --drive, check the mission in the ground station, and start it there",
+        )
 
 
 def start_driving(session: Session) -> None:
@@ -72,21 +85,22 @@ def start_driving(session: Session) -> None:
             advice=_ADVICE,
         )
     doing = session.doing
+    modes = session.autopilot.modes
     if not doing.is_armed:
-        mode = plain_mode_name(doing.mode or Mode.MANUAL)
-        drives_off = ": arming it makes it drive" if doing.mode == Mode.AUTO else ""
+        mode = modes.named(doing.mode or 0)
+        drives_off = ": arming it makes it drive" if doing.mode == modes.mission else ""
         raise OutcomeError(
             f"everything is verified on the vehicle, which is not armed and does not drive: its mode was not changed ({mode}{drives_off})",
             advice=_ADVICE,
             mode=mode,
         )
-    if doing.mode == Mode.AUTO and doing.has_completed:
-        session.change_mode(Mode.HOLD)  # AUTO begins anew only out of another mode
+    if doing.mode == modes.mission and doing.has_completed:
+        session.change_mode(modes.hold)  # AUTO begins anew only out of another mode
     session.drives_by_us = True
     try:
-        session.change_mode(Mode.AUTO)
+        session.change_mode(modes.mission)
     finally:
-        if session.doing.mode != Mode.AUTO and session.doing.is_fresh:
+        if session.doing.mode != modes.mission and session.doing.is_fresh:
             session.drives_by_us = False
     if not session.doing.is_armed:
         session.drives_by_us = False
@@ -97,7 +111,7 @@ def _put_back(session: Session) -> OutcomeError:
     """Take a vehicle that is disarmed out of AUTO, and return what came of it."""
     what = "everything is verified on the vehicle, but it was disarmed when it went to AUTO"
     try:
-        session.change_mode(Mode.HOLD)
+        session.change_mode(session.autopilot.modes.hold)
     except BridgeError as error:
         return OutcomeError(
             f"{what}, and it is still in AUTO, where arming it makes it drive: {error}", advice=_ADVICE

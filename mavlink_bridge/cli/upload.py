@@ -11,7 +11,7 @@ from mavlink_bridge.cli.interrupting import interruptible, terminable
 from mavlink_bridge.cli.options.upload import LISTS
 from mavlink_bridge.cli.options_session import session_for
 from mavlink_bridge.cli.restoring import Restoration, backups_to_restore, interrupted_warnings
-from mavlink_bridge.cli.starting import fence_warnings, make_ready, start_driving
+from mavlink_bridge.cli.starting import check_drives, fence_warnings, make_ready, start_driving
 from mavlink_bridge.cli.terminal import echo, print_json
 from mavlink_bridge.cli.uploading import Uploads
 from mavlink_bridge.errors import UsageError
@@ -19,7 +19,7 @@ from mavlink_bridge.mavlink.messages import MissionType
 from mavlink_bridge.protocol.sendable import check_items, check_parameters
 from missions.fence import fence_to_items
 from missions.geo import LatLon
-from missions.items import with_home
+from missions.items import with_home, without_home
 from missions.rally import rally_to_items
 
 if TYPE_CHECKING:
@@ -45,7 +45,9 @@ def upload(options: UploadOptions) -> None:
     if options.forget:
         _forget(store, options)
         return
-    with terminable(), session_for(options, options.connect) as (session, show):
+    with terminable(), session_for(options, options.connect, any_autopilot=True) as (session, show):
+        if options.drive:
+            check_drives(session)
         uploads = Uploads(session, store, replace_active=options.replace_active)
         with interruptible(session.at_hand(show.aside, uploads.on_it)), uploads.begin():
             backups = backups_to_restore(store, uploads.vehicle, restoration) if restoration else []
@@ -55,7 +57,7 @@ def upload(options: UploadOptions) -> None:
             warn(fence_warnings(session, [kind for kind, _ in lists] + [one.mission_type for one in backups]))
             for backup in backups:
                 uploads.write_lists([(backup.mission_type, backup.items)], backup.path)
-            uploads.write_lists(lists)
+            uploads.write_lists([(kind, _as_sent(session, kind, items)) for kind, items in lists])
             if parameters:
                 uploads.write_parameters(parameters)
             if options.drive:
@@ -78,7 +80,7 @@ def _check(options: UploadOptions) -> None:
 def _forget(store: BackupStore, options: UploadOptions) -> None:
     """Put notes aside: all that there are, those of a system id, or those that may be about the vehicle on a link."""
     if options.connect:
-        with session_for(options, options.connect) as (session, _show):
+        with session_for(options, options.connect, any_autopilot=True) as (session, _show):
             notes = store.interrupted(session.which_vehicle())
     else:
         notes = [note for note in store.notes() if options.system in (None, note.vehicle.system)]
@@ -139,6 +141,12 @@ def _lists_of(file: Path, options: UploadOptions) -> dict[str, tuple[MissionItem
         # ArduPilot looks at the home item but keeps its own home.
         found["mission"] = with_home(mission.items, mission.home or LatLon(0.0, 0.0))
     return found
+
+
+def _as_sent(session: Session, kind: MissionType, items: tuple[MissionItem, ...]) -> tuple[MissionItem, ...]:
+    """Return a list of a file as the vehicle's autopilot counts it: most missions have no home item."""
+    is_first_home = kind is MissionType.MISSION and not session.autopilot.lists.form.has_home_item
+    return without_home(items) if is_first_home else items
 
 
 def _report(

@@ -198,7 +198,7 @@ class Uploads:
         setting: SetParameter | None = None
         try:
             for name, value in different.items():
-                setting = SetParameter(self._session.vehicle, name, value)
+                setting = SetParameter(self._session.vehicle, name, value, read.types[name])
                 self._session.run(setting, f"setting {name}")
                 _check_set(setting.outcome, value)
                 self.changed[name] = (read.values.get(name), value)  # None where it held no number
@@ -226,8 +226,10 @@ def _is_same(held: float | None, wanted: float) -> bool:
 
 def _limits(session: Session, lists: Sequence[tuple[MissionType, tuple[MissionItem, ...]]]) -> Limits:
     """Return what fits; where the usual limits are too small, the vehicle is asked for its SD card's."""
-    limits = Limits()
-    if not any(limits.problem(items, mission_type) for mission_type, items in lists):
+    table = session.autopilot
+    limits = Limits.of(table)
+    is_enough = not any(limits.problem(items, mission_type) for mission_type, items in lists)
+    if is_enough or not table.lists.has_storage_parameters:
         return limits
     # ARMING_CHECK is on every vehicle: an answer to it distinguishes a missing parameter from a lossy link.
     reading = ReadParameters(session.vehicle, ("ARMING_CHECK", *STORAGE_NAMES))

@@ -113,6 +113,24 @@ def metres_or(option: str, text: str | None, word: str) -> float | None:
         raise UsageError(f"{option} {error}") from None
 
 
+AUTOPILOTS = ("ardupilot", "px4")
+"""Whose rovers are simulated."""
+
+
+def autopilot_from(text: str) -> str:
+    """Return the autopilot that an option names, one of `AUTOPILOTS`.
+
+    Raises
+    ------
+    typer.BadParameter
+        It is none that is simulated.
+    """
+    name = text.strip().lower()
+    if name not in AUTOPILOTS:
+        raise typer.BadParameter(f"{text!r} is not an autopilot; expected one of {', '.join(AUTOPILOTS)}")
+    return name
+
+
 def stop_from(text: str | Stop) -> Stop:
     """Return the stop that an option is (typer's ``parser=``): ``M@MPS``, metres rolled from metres a second."""
     if isinstance(text, Stop):

@@ -15,6 +15,7 @@ in `handlers`.
 
 ==================  ===================================================================================================
 `Learner`           finds the vehicle, learns it, notices silence and reboots
+`ObstacleWatch`     knows which obstacles were reported, and forgets them
 `ListWatch`         knows which of the vehicle's lists are as they were read, and reads the others again
 `Halter`            HOLD, and whether the vehicle stands
 `DriveSupervisor`   watches a drive until it has arrived
@@ -268,6 +269,14 @@ class Director:
     def take_target(self, position: LatLon, now_s: float) -> None:
         """Take a target that was typed."""
         self._heed(self._parts.inbox.take_typed(position, now_s), now_s)
+
+    def take_obstacle(self, position: LatLon | None, radius_m: float, now_s: float) -> None:
+        """Take an obstacle that was typed; without a position it is right before the vehicle. Ignored where the orders do not list the keyboard."""
+        self._heed(self._parts.obstacles.take_typed(position, radius_m, now_s), now_s)
+
+    def clear_obstacles(self, now_s: float) -> None:
+        """Forget all obstacles that were reported."""
+        self._heed(self._parts.obstacles.clear(now_s), now_s)
 
     def take_events(self) -> list[Event]:
         """Return and forget what happened."""

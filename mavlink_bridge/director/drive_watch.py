@@ -65,7 +65,7 @@ class DriveWatch:
         self._breaches_before: int | None = None
         self._plan = plan
         self._voice = voice
-        self._points = plan.ground.frame.to_local_array(plan.path)
+        self._points = plan.points
         self._line = LineString(self._points)
         self._band = plan.envelope.area
         prepare(self._band)
@@ -165,7 +165,7 @@ class DriveWatch:
         if self._here is not None:
             self.driven_m += here.distance(self._here.point)
         self._here = _Here(place, here)
-        self.least_clearance_m = min(self.least_clearance_m, self._plan.ground.clearance_m(here))
+        self.least_clearance_m = min(self.least_clearance_m, self._plan.ground.enforced.clearance_m(here))
         self.deviation_m = here.distance(self._line)
         self._notice_leaving(here, place, now_s)
         self._notice_standing(here, math.hypot(message.vx, message.vy) / 100, now_s)

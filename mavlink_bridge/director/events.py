@@ -29,6 +29,8 @@ class EventName(StrEnum):
     PLANNED = auto()
     NO_PLAN = auto()
     ROUTE_BROKEN = auto()
+    OBSTACLE_ACROSS = auto()
+    WAITING = auto()
     UPLOADING = auto()
     VERIFIED = auto()
     UPLOAD_FAILED = auto()
@@ -75,6 +77,8 @@ SCHEMA: dict[EventName, tuple[Severity, tuple[str, ...]]] = {
     ),
     EventName.NO_PLAN: (Severity.WARNING, ("error", "details")),
     EventName.ROUTE_BROKEN: (Severity.CRITICAL, ("clearance_m", "asked_m", "fence")),
+    EventName.OBSTACLE_ACROSS: (Severity.WARNING, ("obstacle", "clearance_m", "asked_m")),
+    EventName.WAITING: (Severity.WARNING, ("obstacle", "forgotten_in_s")),
     EventName.UPLOADING: (Severity.INFO, ("mission_items",)),
     EventName.VERIFIED: (Severity.INFO, ("mission_items", "pushes")),
     EventName.UPLOAD_FAILED: (Severity.ERROR, ("error", "details")),

@@ -199,6 +199,10 @@ def _on_planned(parts: Parts, now_s: float) -> Iterable[Signal]:
 
 
 def _on_no_plan(parts: Parts, now_s: float) -> Iterable[Signal]:
+    """Tell why there is no plan; one that waits for an obstacle to go has not failed."""
+    if parts.desk.is_waiting:
+        parts.inbox.answers.settle(m.MavResult.TEMPORARILY_REJECTED)
+        return ()
     parts.inbox.answers.settle(m.MavResult.DENIED)
     signals = parts.desk.no_plan(now_s)
     target = parts.core.target
@@ -320,6 +324,7 @@ HANDLERS: dict[Signal, Callable[[Parts, float], Iterable[Signal] | None]] = {
     Notice.ROUTE_WANTED: _on_route_wanted,
     Notice.ROUTE_OUTDATED: _on_route_outdated,
     Notice.GONE_ON: _on_gone_on,
+    Notice.OBSTACLES_CHANGED: lambda parts, now_s: parts.desk.obstacles_changed(now_s),
     Notice.FENCE_CHANGED: _on_fence_changed,
     Notice.WAYS_KNOWN: lambda parts, _now_s: parts.caller.try_again(),
     Notice.MISSION_READ: lambda parts, _now_s: parts.writer.mission_read(),

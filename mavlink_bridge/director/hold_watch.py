@@ -22,6 +22,7 @@ from mavlink_bridge.director.halter import STILL_MPS
 from mavlink_bridge.director.states import Notice, Signal, State
 from mavlink_bridge.mavlink import messages as m
 from missions.checking.holding import HoldNow, hold_now
+from missions.fence import OBSTACLE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -135,10 +136,12 @@ class HoldWatch(Part):
                 if found.go_on_m is None
                 else f"; going on for {found.go_on_m:.0f} m along the route, then HOLD"
             )
+        is_obstacle = (roll.fence or "").startswith(OBSTACLE)
+        ahead = "obstacle inside the stopping distance: it" if is_obstacle else "breach ahead: fence"
         self.core.voice.tell(
             now_s,
             EventName.BREACH_AHEAD,
-            f"breach ahead: fence {roll.to_fence_m:.1f} m, stops in {roll.stopping_m:.1f} m from {roll.speed_mps:.1f} m/s "
+            f"{ahead} {roll.to_fence_m:.1f} m, stops in {roll.stopping_m:.1f} m from {roll.speed_mps:.1f} m/s "
             f"({found.source}), {roll.beyond_m:.1f} m beyond {roll.fence or 'the fence'}{then}",
             roll.fence,
             round(roll.to_fence_m, 2),

@@ -16,7 +16,7 @@ come to rest.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Self
 
 from mavlink_bridge.director.core import Core, Part
@@ -24,6 +24,7 @@ from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.plan_task import HomeWays, WaysTask
 from mavlink_bridge.director.states import Notice, Signal, State
 from missions.errors import MissionError
+from missions.fence import Obstacles
 from missions.geo import distance_m
 from missions.promise import FIX_ERRORS_M
 from missions.routing.way_home import places_of
@@ -184,7 +185,10 @@ class HomeKeeper(Part):
 
     def _task(self, situation: Situation, ways: WaysHome | None) -> WaysTask:
         orders = self.core.orders
-        return WaysTask(situation, orders.request, orders.homing.places, ways)
+        fence = replace(
+            situation, obstacles=Obstacles()
+        )  # obstacles go: a drive home is planned round them then
+        return WaysTask(fence, orders.request, orders.homing.places, ways)
 
     def _why_none(self, task: WaysTask, ways: WaysHome) -> str:
         pose = task.situation.pose

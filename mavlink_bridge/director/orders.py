@@ -27,6 +27,16 @@ class TargetSource(StrEnum):
     HOME = "home"  # called home by RTL, a failsafe or a breach; no choice of --target-from
 
 
+class ObstacleSource(StrEnum):
+    """Where obstacles may be reported from (``--obstacles-from``)."""
+
+    OBSTACLE_DISTANCE = "OBSTACLE_DISTANCE"
+    KEYBOARD = "keyboard"
+
+
+OBSTACLE_GROWTH_MPS, OBSTACLE_KEEP_S = 1.0, 10.0
+"""How fast an obstacle may move until it was watched, and how long it is kept after it was seen last; chosen: a slow walk, and twice the time that a rover takes to stop."""
+
 DEFAULT_SOURCES = frozenset(
     {TargetSource.TYPED, TargetSource.REPOSITION, TargetSource.POSITION_TARGET, TargetSource.GUIDED_ITEM}
 )
@@ -95,6 +105,12 @@ class Orders:
         Ask nobody anything: learn from what others transfer, as in a replay.
     target_sources : frozenset of TargetSource
         Where targets may come from.
+    obstacle_sources : frozenset of ObstacleSource
+        Where obstacles may be reported from.
+    obstacle_growth_mps : float
+        How fast a reported obstacle may move, until it was watched for long enough.
+    obstacle_keep_s : float
+        How long a reported obstacle is kept after it was seen last.
     patience_s : float
         How long a single job waits for the first heartbeat, and anybody for the position.
     homing : Homing
@@ -115,6 +131,9 @@ class Orders:
     announce: bool = False
     passive: bool = False
     target_sources: frozenset[TargetSource] = DEFAULT_SOURCES
+    obstacle_sources: frozenset[ObstacleSource] = frozenset()
+    obstacle_growth_mps: float = OBSTACLE_GROWTH_MPS
+    obstacle_keep_s: float = OBSTACLE_KEEP_S
     patience_s: float = 30.0
     homing: Homing = field(default_factory=Homing)
 

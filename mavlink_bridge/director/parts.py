@@ -15,6 +15,7 @@ from mavlink_bridge.director.identity_guard import IdentityGuard
 from mavlink_bridge.director.learner import Learner
 from mavlink_bridge.director.list_watch import ListWatch
 from mavlink_bridge.director.mission_writer import MissionWriter
+from mavlink_bridge.director.obstacle_watch import ObstacleWatch
 from mavlink_bridge.director.route_desk import RouteDesk
 from mavlink_bridge.director.starter import Starter
 from mavlink_bridge.director.target_inbox import TargetInbox
@@ -46,6 +47,7 @@ class Parts:
         self.core: Core = core
         self.learner: Learner = Learner(core)
         self.lists: ListWatch = ListWatch(core)
+        self.obstacles: ObstacleWatch = ObstacleWatch(core)
         self.inbox: TargetInbox = TargetInbox(core)
         self.keeper: HomeKeeper = HomeKeeper(core)
         self.halter: Halter = Halter(core, self.lists)
@@ -66,6 +68,7 @@ class Parts:
             self.driver,
             self.hold_watch,
             self.lists,
+            self.obstacles,
             self.inbox,
             self.adopter,
         )
@@ -76,6 +79,7 @@ class Parts:
             self.driver,
             self.learner,
             self.lists,
+            self.obstacles,
             self.adopter,
             self.caller,
             self.keeper,

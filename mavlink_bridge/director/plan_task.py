@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from missions.errors import MissionError, PlanCheckError
+from missions.fence import Obstacles
 from missions.planning.homeward import at_home, home_field, plan_home
 from missions.planning.plan import plan as make_plan
 
@@ -72,7 +73,8 @@ class HomeTask(PlanTask):
     ways: WaysHome | None = None
 
     def _planned(self, planner: Callable[..., Plan]) -> Plan:
-        ways = self.ways or home_field(self.situation, self.request, self.places)
+        fence = replace(self.situation, obstacles=Obstacles())
+        ways = self.ways or home_field(fence, self.request, self.places)
         if (place := at_home(self.situation, ways)) is not None:
             raise AtHomeError(f"at {place.name} already: nothing is driven", place=place.name)
         return plan_home(

@@ -12,10 +12,13 @@ from mavlink_bridge.director.fixes import no_fix
 from mavlink_bridge.director.grounds import Grounds
 from mavlink_bridge.director.plan_task import AtHomeError, HomeTask, PlanTask
 from mavlink_bridge.director.states import Cue, Notice, Signal, State
+from missions.checking.obstacle_ahead import obstacle_across
 from missions.checking.recheck import Recheck, recheck
 from missions.errors import MissionError
+from missions.fence import Obstacles
 from missions.planning.marking import unpromised
 from missions.promise import asked_clearance
+from missions.words import metres
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,12 +27,27 @@ if TYPE_CHECKING:
     from mavlink_bridge.director.hold_watch import HoldWatch
     from mavlink_bridge.director.home_keeper import HomeKeeper
     from mavlink_bridge.director.list_watch import ListWatch
+    from missions.fence import Obstacle
     from missions.planned import Plan
     from missions.request import Request
     from missions.situation import Situation
 
+_AGAIN_S = 2.0
+"""A route is planned round obstacles as they may be so much later: until it is driven (1.5 s in the campaign, of which half a second is planning), and a little on. Chosen."""
+
+_WIDER_M = 0.5
+"""So much wider an obstacle is planned round than it is seen: what a sensor sees of a thing that stands differs by so much from time to time. Chosen."""
+
+_TRY_AGAIN_S = 3.0
+"""So long after a way round was sought in vain it is sought again, where obstacles go on to be reported; chosen."""
+
+_AT_ONCE_S = 1.0  # at the soonest, where nothing seems to stand in it any more: the start may still be too near; chosen
+
 _MAKING_A_ROUTE = frozenset({State.HOLDING, State.PLANNING})
 """States whose plan is yet to come: it is made around the fence as it is then."""
+
+_WITH_A_ROUTE = frozenset({State.PROPOSED, State.VERIFIED, State.STARTING, State.DRIVING})
+"""States in which a route is left at once for an obstacle; an upload is ended first, and looked at then."""
 
 
 _TOLERANCE_M = 0.01
@@ -60,19 +78,31 @@ class RouteDesk(Part):
         self._hold_watch = hold_watch
         self._made: Plan | MissionError | None = None
         self._planned_on = Grounds.of(core.situation)
+        self._free_way: Plan | None = None  # in which obstacles alone stand, while they are waited for
+        self._refused: MissionError | None = None  # why none leads round them, while one without is sought
+        self._tried_s = -math.inf
+        self._tried_with = Obstacles()
+        self._look_s = -math.inf
+        self._told_across: tuple[float | None, str] | None = None  # the obstacles that were told of last
+        self._told_waiting: tuple[float | None, str] | None = None
         self.is_own_idea = False
         self._has_told_fix = False
 
     @property
     def deadline_s(self) -> float | None:
-        """At once where there is something to do for the plan but to wait for it."""
+        """At once where there is something to do for the plan but to wait for it; soon where obstacles may have gone meanwhile."""
+        if self._awaits_way:
+            return self._look_s
         is_at_it = self.pending is not None or (bool(self.awaits_fix) and self._has_told_fix)
         is_waiting = is_at_it and not self._lists.is_outdated
         is_due = self.core.state is State.PLANNING and not self.core.steps and not is_waiting
         return -math.inf if is_due else None
 
     def handle_timer(self, now_s: float) -> Sequence[Signal]:
-        """Go on with the plan."""
+        """Go on with the plan, or look for a way that obstacles stood in."""
+        if self._awaits_way and now_s >= self._look_s:
+            self._look_s = now_s + _TRY_AGAIN_S
+            return self._look_for_way(now_s)
         return self._go_on(now_s) if self.core.state is State.PLANNING else []
 
     @property
@@ -99,12 +129,31 @@ class RouteDesk(Part):
             self._lists.reread_suspects(now_s)
         elif core.plan_task is None:
             self._begin(now_s)
-        elif isinstance(self._made, MissionError):
+        elif self._made is not None:
+            return self._take_made(self._made, now_s)
+        return []
+
+    def _take_made(self, made: Plan | MissionError, now_s: float) -> Sequence[Signal]:
+        """Go on with a plan; where there is none round obstacles, see whether there is one without them."""
+        core, task, refused = self.core, self.core.plan_task, self._refused
+        assert task is not None
+        if refused is not None:
+            core.plan = None
+            if isinstance(made, MissionError):
+                self._made = refused
+            else:
+                self._free_way = made
+                self._tell_waiting(made, now_s)
+            return [Cue.NO_PLAN]
+        if not isinstance(made, MissionError):
+            core.plan = made
+            self._told_across = self._told_waiting = None
+            return [Cue.PLANNED]
+        if not task.situation.obstacles.known or isinstance(made, AtHomeError):
             core.plan = None
             return [Cue.NO_PLAN]
-        elif self._made is not None:
-            core.plan = self._made
-            return [Cue.PLANNED]
+        self._refused, self._made = made, None
+        core.plan_task = replace(task, situation=replace(task.situation, obstacles=Obstacles()))
         return []
 
     def _begin(self, now_s: float) -> None:
@@ -113,7 +162,9 @@ class RouteDesk(Part):
         trouble = self.awaits_fix
         if not trouble:
             self._planned_on = Grounds.of(core.situation)
+            self._free_way = self._refused = None
             core.plan_task = self._task()
+            self._tried_s, self._tried_with = now_s, core.plan_task.situation.obstacles
         elif not self._has_told_fix and core.target is not None:
             core.voice.home_waits(now_s, core.target.call, trouble)
         self._has_told_fix = bool(trouble)
@@ -128,11 +179,73 @@ class RouteDesk(Part):
 
     def _task(self) -> PlanTask:
         """Return the plan to be made: to the target, or to the nearest place where the vehicle is called home."""
-        core = self.core
+        core, situation = self.core, self._with_wider_obstacles
         if core.target is None or not core.target.is_home:
-            return PlanTask(core.situation, self.request())
+            return PlanTask(situation, self.request())
         places, ways = core.orders.homing.places, self._keeper.ways
-        return HomeTask(core.situation, core.orders.request, places=places, ways=ways)
+        return HomeTask(situation, core.orders.request, places=places, ways=ways)
+
+    # Obstacles
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether a route waits for obstacles to go, which alone stand in it."""
+        return self._free_way is not None and self.core.target is not None
+
+    @property
+    def _with_wider_obstacles(self) -> Situation:
+        """What is known, with obstacles as large as a route is planned round them."""
+        situation = self.core.situation
+        return replace(situation, obstacles=situation.obstacles.later(_AGAIN_S, _WIDER_M))
+
+    @property
+    def _awaits_way(self) -> bool:
+        return self.core.state is State.READY and self.is_waiting
+
+    def _look_for_way(self, now_s: float) -> Sequence[Signal]:
+        """Return that a route is sought again, where obstacles alone stood in it: once none does, and now and then while they move."""
+        assert self._free_way is not None
+        wider = self._with_wider_obstacles
+        is_free = now_s >= self._tried_s + _AT_ONCE_S and obstacle_across(self._free_way, wider, 1) is None
+        is_due = now_s >= self._tried_s + _TRY_AGAIN_S and wider.obstacles.known != self._tried_with.known
+        return [Notice.ROUTE_OUTDATED] if is_free or is_due else []
+
+    def _tell_waiting(self, free_way: Plan, now_s: float) -> None:
+        """Report what the vehicle waits for, once."""
+        wider = self._with_wider_obstacles
+        found = obstacle_across(free_way, wider, 1)
+        obstacle = found.obstacle if found is not None else next(iter(wider.obstacles.known), None)
+        before, self._told_waiting = self._told_waiting, _identity(obstacle)
+        if obstacle is None or before == self._told_waiting:
+            return
+        left_s = max(0.0, obstacle.ends_s - now_s)
+        text = f"waiting: the {obstacle.name} blocks the only way; driving on when it is gone, or {left_s:.0f} s after it was seen last"
+        self.core.voice.tell(now_s, EventName.WAITING, text, obstacle.name, round(left_s, 1))
+
+    def obstacles_changed(self, now_s: float) -> Sequence[Signal]:
+        """Look whether an obstacle is across the rest of the route, or gone from a way that waits for it."""
+        core = self.core
+        if self._awaits_way:
+            return self._look_for_way(now_s)
+        if core.plan is None or core.state not in _WITH_A_ROUTE:
+            return []
+        found = obstacle_across(core.plan, core.situation, self._driver.item)
+        if found is None:
+            self._told_across = None
+            return []
+        before, self._told_across = self._told_across, _identity(found.obstacle)
+        if before != self._told_across:
+            kept = found.kept
+            text = f"{kept.fence}: across the route, {metres(kept.clearance_m)} of the required {metres(kept.asked_m)} left"
+            left = round(kept.clearance_m, 2), round(kept.asked_m, 2)
+            core.voice.tell(now_s, EventName.OBSTACLE_ACROSS, text, kept.fence, *left)
+        may_mend = core.state is not State.DRIVING or core.orders.drive
+        return [Notice.ROUTE_OUTDATED] if may_mend else []
+
+    def _across(self, item: int) -> Recheck | None:
+        plan = self.core.plan
+        found = obstacle_across(plan, self.core.situation, item) if plan is not None else None
+        return found.kept if found is not None else None
 
     def no_plan(self, now_s: float) -> Sequence[Signal]:
         """Report why there is no plan."""
@@ -161,8 +274,9 @@ class RouteDesk(Part):
 
     @property
     def is_stale(self) -> bool:
-        """Whether the fence is another one than the plan was made around."""
-        return bool(Grounds.of(self.core.situation).changes_since(self._planned_on))
+        """Whether the fence is another one than the plan was made around, or an obstacle has come across its route."""
+        is_other = bool(Grounds.of(self.core.situation).changes_since(self._planned_on))
+        return is_other or self._across(1) is not None
 
     @property
     def is_in_doubt(self) -> bool:
@@ -186,12 +300,15 @@ class RouteDesk(Part):
         """Return a check of the rest of the route against the fence and its parameters as they are now."""
         core = self.core
         assert core.plan is not None
+        if (found := self._across(item)) is not None:
+            return found
+        fence = replace(core.situation, obstacles=Obstacles())
         try:
             vehicle, _ = asked_clearance(core.situation, core.orders.request)
         except MissionError:
             vehicle = core.plan.vehicle
         try:
-            return recheck(replace(core.plan, vehicle=vehicle), core.situation, item)
+            return recheck(replace(core.plan, vehicle=vehicle), fence, item)
         except Exception as error:  # noqa: BLE001 - a defect of ours: what cannot be checked does not hold
             why = f"unknown: the check failed ({type(error).__name__}: {error}), a bug in pbpp"
             return Recheck(0.0, core.plan.asked_m, why)
@@ -232,3 +349,8 @@ class RouteDesk(Part):
         """Report that the route is broken, and have it made anew before it is driven."""
         self.core.voice.rechecked(now_s, EventName.ROUTE_BROKEN, "the way from here", found)
         return [Notice.ROUTE_OUTDATED]
+
+
+def _identity(obstacle: Obstacle | None) -> tuple[float | None, str] | None:
+    """Return what tells an obstacle from another; its place and size change."""
+    return (obstacle.reported_s, obstacle.source) if obstacle is not None else None

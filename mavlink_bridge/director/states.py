@@ -74,6 +74,7 @@ class Notice(StrEnum):
     ROUTE_WANTED = auto()  # by somebody
     ROUTE_OUTDATED = auto()  # by nobody: what it rests on was changed
     FENCE_CHANGED = auto()
+    OBSTACLES_CHANGED = auto()
     MISSION_READ = auto()  # the vehicle's mission was read again
     MISSION_TAKEN = auto()  # it is somebody else's now
     MISSION_HEARD = auto()  # its end may be a target

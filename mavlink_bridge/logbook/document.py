@@ -6,6 +6,7 @@ import math
 from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any
 
+from mavlink_bridge.mavlink.autopilots import autopilot_of
 from missions.fence import CircleZone, PolygonZone, ZoneKind
 
 if TYPE_CHECKING:
@@ -50,7 +51,9 @@ def _vehicle(vehicle: VehicleLog) -> dict[str, Any]:
         "mav_type": vehicle.mav_type,
         "home": list(home.value) if home else None,
         "position": list(situation.pose.value.position) if situation.pose else None,
-        "mission_items": mission.value.item_count(has_home=situation.ardupilot is not False)
+        "mission_items": mission.value.item_count(
+            has_home=autopilot_of(ardupilot=situation.ardupilot).lists.form.has_home_item
+        )
         if mission
         else None,
         "rally_points": len(situation.rally.value) if situation.rally else None,

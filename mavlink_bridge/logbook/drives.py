@@ -6,6 +6,7 @@ from collections import deque
 from typing import TYPE_CHECKING, Final
 
 from mavlink_bridge.logbook.grade import STANDING_MPS, DriveGrader, Grade, GradedField, way_of
+from mavlink_bridge.mavlink.autopilots import autopilot_of
 from mavlink_bridge.mavlink.modes import drives_mission
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ class Drives:
 
     def _begin(self, situation: Situation, first: TrackFix, field: GradedField) -> None:
         assert situation.mission is not None
-        home_first = situation.ardupilot is not False
+        home_first = autopilot_of(ardupilot=situation.ardupilot).lists.form.has_home_item
         way = way_of(situation.mission.value.items, max(int(home_first), first.item), home_first=home_first)
         if not way.seqs:
             return

@@ -191,6 +191,19 @@ class GpsRawInt(Message):
 
 
 @dataclass(frozen=True, slots=True)
+class Attitude(Message):
+    """ATTITUDE (30): rad, rad/s."""
+
+    time_boot_ms: int
+    roll: float
+    pitch: float
+    yaw: float
+    rollspeed: float = 0.0
+    pitchspeed: float = 0.0
+    yawspeed: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class GlobalPositionInt(Message):
     """GLOBAL_POSITION_INT (33): degE7, mm, cm/s, centidegrees (65535: heading unknown)."""
 
@@ -497,6 +510,21 @@ class HomePosition(Message):
     latitude: int
     longitude: int
     altitude: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class ObstacleDistance(Message):
+    """OBSTACLE_DISTANCE (330): cm by direction, clockwise (65535: not known, ``max_distance`` + 1: nothing there); degrees."""
+
+    time_usec: int
+    sensor_type: int
+    distances: tuple[int, ...]
+    increment: int
+    min_distance: int
+    max_distance: int
+    increment_f: float = 0.0
+    angle_offset: float = 0.0
+    frame: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,6 @@
-"""What ArduPilot makes of a list when it stores it, in one place; so that what is read back can be compared with what was sent.
+"""What an autopilot makes of a list when it stores it; so that what is read back can be compared with what was sent.
 
-From ArduPilot's ``AP_Mission::mavlink_int_to_mission_cmd`` and from measurement: item 0 of a mission is the vehicle's own home;
+A `StoredForm` is one autopilot's; PX4's stands in `px4_form`, ArduPilot's here, from ArduPilot's ``AP_Mission::mavlink_int_to_mission_cmd`` and from measurement: item 0 of a mission is the vehicle's own home;
 frames 5, 6 and 11 read back as 0, 3 and 10; each command keeps some parameters, some of them as whole numbers; altitudes are
 stored in whole centimetres; ``current`` and ``autocontinue`` are not stored. A fence keeps ``param1`` and the place, a rally
 point the place and whole metres. Positions are degE7 and must be equal to the last digit.
@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mavlink_bridge.mavlink.messages import MissionType
@@ -25,46 +25,46 @@ _FRAMES = {
     int(CoordinateFrame.GLOBAL_TERRAIN_ALT_INT): int(CoordinateFrame.GLOBAL_TERRAIN_ALT),
 }
 
-_Stored = float | str | None
+Kept = float | str | None
 _MOST_EXACT_RADIUS_M = 255.0
 """Of circles beyond it ArduPilot keeps tens of metres."""
 
 
-def _float32(value: float) -> _Stored:
+def _float32(value: float) -> Kept:
     return "nan" if math.isnan(value) else float32(value)
 
 
-def _whole(value: float) -> _Stored:
+def _whole(value: float) -> Kept:
     return float(math.trunc(value)) if math.isfinite(value) else str(value)
 
 
-def _sign(value: float) -> _Stored:
+def _sign(value: float) -> Kept:
     return -1.0 if value < 0 else 1.0
 
 
-def _flag(value: float) -> _Stored:
+def _flag(value: float) -> Kept:
     return 1.0 if value > 0 else 0.0
 
 
-def _turns(value: float) -> _Stored:
+def _turns(value: float) -> Kept:
     return math.trunc(value * 256) / 256 if 0 < value < 1 else _whole(value)
 
 
-def _turn_radius(value: float) -> _Stored:
+def _turn_radius(value: float) -> Kept:
     if not math.isfinite(value) or abs(value) <= _MOST_EXACT_RADIUS_M:
         return _whole(value)
     return math.copysign(10.0 * math.trunc(min(_MOST_EXACT_RADIUS_M, abs(value) * 0.1)), value)
 
 
-def _hundredths(value: float) -> _Stored:
+def _hundredths(value: float) -> Kept:
     return float(math.trunc(value * 100.0)) if math.isfinite(value) else str(value)
 
 
-def _odd(value: float) -> _Stored:
+def _odd(value: float) -> Kept:
     return float(math.trunc(abs(value)) % 2) if math.isfinite(value) else str(value)
 
 
-def _float16(value: float) -> _Stored:
+def _float16(value: float) -> Kept:
     if not math.isfinite(value):
         return str(value)
     try:
@@ -73,15 +73,17 @@ def _float16(value: float) -> _Stored:
         return math.copysign(math.inf, value)
 
 
-def _dropped(value: float) -> _Stored:  # noqa: ARG001 - one of a family
+def _dropped(value: float) -> Kept:  # noqa: ARG001 - one of a family
     return None
 
 
 _KEEPS_ALL = (_float32, _float32, _float32, _float32)
-_KEEPERS = {
+KEEPERS = {
     keep.__name__[1:]: keep
     for keep in (_float32, _float16, _whole, _sign, _flag, _turns, _turn_radius, _hundredths, _odd, _dropped)
 }
+"""What may be kept of a parameter, by name."""
+
 _ROWS = [
     line.split(",")
     for line in Path(__file__).with_name("stored_commands.csv").read_text(encoding="ascii").splitlines()[1:]
@@ -92,7 +94,7 @@ Of DO_SET_CAM_TRIGG_DIST newer firmware keeps the third parameter, too.
 """
 
 _KEPT_PARAMS = {
-    int(command): tuple(_KEEPERS[param or "dropped"] for param in params)
+    int(command): tuple(KEEPERS[param or "dropped"] for param in params)
     for command, _, *params, _, _ in _ROWS
 }
 STORED_WITH_PLACE = frozenset(int(command) for command, *_, has_place in _ROWS if has_place)
@@ -135,8 +137,63 @@ def _brief(item: MissionItem) -> str:
     return f"command {int(item.command)} ({params}) at {item.position}, {item.alt_m:g} m in frame {int(item.frame)}"
 
 
-def sendable_params(item: MissionItem) -> tuple[float, float, float, float]:
-    """Return an item's parameters, with 0 for a NaN that ArduPilot would refuse and of which it keeps nothing.
+@dataclass(frozen=True, slots=True)
+class StoredItem:
+    """An item as an autopilot stores it.
+
+    Parameters
+    ----------
+    fixed : tuple
+        What has to be equal: NaN stands in it as a word.
+    place : tuple of int
+        The place in degE7.
+    alt_m : float
+        The altitude, equal to a centimetre.
+    yaw_deg : float
+        A heading that comes back through radians: equal to a thousandth of a degree, whole turns left out.
+    may_lose_place : bool
+        Whether place and altitude may also come back as 0.
+    """
+
+    fixed: tuple[object, ...]
+    place: tuple[int, int]
+    alt_m: float = 0.0
+    yaw_deg: float = 0.0
+    may_lose_place: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class StoredForm:
+    """How an autopilot wants lists sent, and what it makes of them.
+
+    Parameters
+    ----------
+    has_home_item : bool
+        Whether a mission's item 0 is the vehicle's own home.
+    stored : callable
+        Returns an item of a list as it is stored.
+    sendable : callable
+        Returns an item as the autopilot takes it, nothing changed of what it keeps and uses.
+    arranged : callable
+        Returns a list in the order in which the autopilot reads it right.
+    """
+
+    has_home_item: bool
+    stored: Callable[[MissionItem, MissionType], StoredItem]
+    sendable: Callable[[MissionItem, MissionType], MissionItem]
+    arranged: Callable[[Sequence[MissionItem], MissionType], tuple[MissionItem, ...]]
+
+    def prepared(self, items: Sequence[MissionItem], mission_type: MissionType) -> tuple[MissionItem, ...]:
+        """Return a list as it is to be sent."""
+        return tuple(self.sendable(item, mission_type) for item in self.arranged(items, mission_type))
+
+    def first_compared(self, mission_type: MissionType) -> int:
+        """Return the first item of a list that is compared: home is the vehicle's own."""
+        return int(self.has_home_item and mission_type is MissionType.MISSION)
+
+
+def _sendable(item: MissionItem, mission_type: MissionType) -> MissionItem:  # noqa: ARG001 - one shape for all autopilots
+    """Return an item with 0 for a NaN that ArduPilot would refuse and of which it keeps nothing.
 
     QGroundControl leaves headings unset (null), and ArduPilot refuses that of NAV_LOITER_UNLIM (ArduPilot #27482).
     """
@@ -147,15 +204,47 @@ def sendable_params(item: MissionItem) -> tuple[float, float, float, float]:
         else value
         for i, (value, keep) in enumerate(zip(item.params, keepers, strict=True))
     )
-    return a, b, c, d
+    return item if not any(map(math.isnan, item.params)) else replace(item, params=(a, b, c, d))
 
 
-def is_same_item(a: MissionItem, b: MissionItem, mission_type: MissionType, *, coarse: bool = False) -> bool:
+def _stored(item: MissionItem, mission_type: MissionType) -> StoredItem:
+    command = int(item.command)
+    place = (item.lat_e7, item.lon_e7)
+    if mission_type is MissionType.FENCE:
+        keep = _whole if command in _POLYGON_VERTICES else _float32
+        param1 = None if command == Command.FENCE_RETURN_POINT else keep(item.params[0])
+        return StoredItem((command, param1), place)
+    if mission_type is MissionType.RALLY:
+        return StoredItem((command, _whole(item.alt_m)), place)
+    keepers = _KEPT_PARAMS.get(command, _KEEPS_ALL)
+    params = tuple(keep(value) for keep, value in zip(keepers, item.params, strict=True))
+    if command not in STORED_WITH_PLACE:
+        return StoredItem((command, params), place, item.alt_m, may_lose_place=True)
+    frame = _FRAMES.get(int(item.frame), int(item.frame))
+    return StoredItem((command, frame, params), place, item.alt_m)
+
+
+def _as_it_is(items: Sequence[MissionItem], mission_type: MissionType) -> tuple[MissionItem, ...]:  # noqa: ARG001 - one shape for all autopilots
+    return tuple(items)
+
+
+ARDUPILOT_FORM = StoredForm(has_home_item=True, stored=_stored, sendable=_sendable, arranged=_as_it_is)
+"""ArduPilot's."""
+
+
+def is_same_item(
+    a: MissionItem,
+    b: MissionItem,
+    mission_type: MissionType,
+    form: StoredForm = ARDUPILOT_FORM,
+    *,
+    coarse: bool = False,
+) -> bool:
     """Return whether two items are the same once stored; ``coarse`` compares positions as 32-bit floats carry them."""
     if a == b:
         return True
-    stored_a, stored_b = _stored(a, mission_type), _stored(b, mission_type)
-    if stored_a.fixed != stored_b.fixed:
+    stored_a, stored_b = form.stored(a, mission_type), form.stored(b, mission_type)
+    if stored_a.fixed != stored_b.fixed or not _is_same_heading(stored_a.yaw_deg, stored_b.yaw_deg):
         return False
     may_lose = stored_a.may_lose_place
     if not (_is_near(stored_a.alt_m, stored_b.alt_m) or (may_lose and 0 in (stored_a.alt_m, stored_b.alt_m))):
@@ -173,20 +262,21 @@ def differences(
     wanted: Sequence[MissionItem],
     found: Sequence[MissionItem],
     mission_type: MissionType,
+    form: StoredForm = ARDUPILOT_FORM,
     *,
     coarse: bool = False,
 ) -> tuple[Difference, ...]:
-    """Return the items in which a list as read back differs from the one wanted, home left out.
+    """Return the items in which a list as read back differs from the one wanted, an autopilot's home item left out.
 
     A mission of only the home item is an empty mission.
     """
-    first = 1 if mission_type is MissionType.MISSION else 0
+    first = form.first_compared(mission_type)
     longest = max(len(wanted), len(found))
     result = []
     for seq in range(first, longest):
         a = wanted[seq] if seq < len(wanted) else None
         b = found[seq] if seq < len(found) else None
-        if a is None or b is None or not is_same_item(a, b, mission_type, coarse=coarse):
+        if a is None or b is None or not is_same_item(a, b, mission_type, form, coarse=coarse):
             result.append(Difference(seq, a, b))
     return tuple(result)
 
@@ -213,34 +303,16 @@ def is_unfinished_write(
     return all(holds(seq, new) or holds(seq, old) for seq in range(first, len(found)))
 
 
-@dataclass(frozen=True, slots=True)
-class _StoredItem:
-    fixed: tuple[object, ...]
-    place: tuple[int, int]
-    alt_m: float
-    may_lose_place: bool = False
-
-
-def _stored(item: MissionItem, mission_type: MissionType) -> _StoredItem:
-    command = int(item.command)
-    place = (item.lat_e7, item.lon_e7)
-    if mission_type is MissionType.FENCE:
-        keep = _whole if command in _POLYGON_VERTICES else _float32
-        param1 = None if command == Command.FENCE_RETURN_POINT else keep(item.params[0])
-        return _StoredItem((command, param1), place, 0.0)
-    if mission_type is MissionType.RALLY:
-        return _StoredItem((command, _whole(item.alt_m)), place, 0.0)
-    keepers = _KEPT_PARAMS.get(command, _KEEPS_ALL)
-    params = tuple(keep(value) for keep, value in zip(keepers, item.params, strict=True))
-    if command not in STORED_WITH_PLACE:
-        return _StoredItem((command, params), place, item.alt_m, may_lose_place=True)
-    frame = _FRAMES.get(int(item.frame), int(item.frame))
-    return _StoredItem((command, frame, params), place, item.alt_m)
-
-
 def _is_near(a_m: float, b_m: float) -> bool:
     """Return whether two altitudes can be the same whole number of centimetres, cut or rounded."""
     if not (math.isfinite(a_m) and math.isfinite(b_m)):
         return str(a_m) == str(b_m)
     # Cut and rounded differ by at most 1.5 cm; the share is what 32-bit floats lose.
     return abs(a_m - b_m) < 0.0151 + 1e-6 * abs(a_m)
+
+
+def _is_same_heading(a_deg: float, b_deg: float) -> bool:
+    if math.isnan(a_deg) or math.isnan(b_deg):
+        return math.isnan(a_deg) and math.isnan(b_deg)
+    # A degree in radians as a float of 32 bits and back is 3e-5 degrees off at the most.
+    return abs((a_deg - b_deg + 180.0) % 360.0 - 180.0) < 1e-3

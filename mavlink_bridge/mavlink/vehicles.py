@@ -81,7 +81,13 @@ def not_ardupilot(system: int | None, autopilot: int | None) -> VehicleNotFoundE
     """
     if autopilot == m.Autopilot.ARDUPILOTMEGA:
         return None
-    name = {m.Autopilot.PX4.value: " (PX4)", None: ""}.get(autopilot, f" (MAV_AUTOPILOT {autopilot})")
+    if autopilot == m.Autopilot.PX4:
+        return VehicleNotFoundError(
+            f"the autopilot of system {system} is PX4: nothing is planned for it over a link, checked or driven yet; `pbpp download` and `pbpp upload` work "
+            "with it, and `pbpp plan --log` and `pbpp log` read its recordings",
+            autopilot=autopilot,
+        )
+    name = "" if autopilot is None else f" (MAV_AUTOPILOT {autopilot})"
     return VehicleNotFoundError(
         f"the autopilot of system {system} is not ArduPilot{name}: only ArduPilot is supported for now",
         autopilot=autopilot,

@@ -134,6 +134,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
     ) -> None:
         super().__init__(DOWNLOAD, DownloadState.IDLE)
         self._peer = peer
+        self._lists = peer.autopilot.lists
         self._mission_type = mission_type
         self._most_in_flight = window
         self._window = float(min(window, FIRST_WINDOW))
@@ -151,7 +152,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         self._checks = 0
         self._checked_s = -math.inf
         self._result: MissionResult | None = None
-        self._may_use_floats = float_form
+        self._may_use_floats = float_form and self._lists.has_float_form
         self._float_form = False
         self._coarse_seqs: set[int] = set()
         self._believed_at_s: float | None = None  # when a whole list in the old form will be
@@ -161,6 +162,10 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         self._act_at_s = 0.0
         self._rival_since_s: float | None = None
         self._begun_s = self._ended_s = 0.0
+        self._advanced_s = 0.0  # when the count, or an item that was not there, came
+        self._doubted_at_s: float | None = (
+            None  # when an ERROR without any item since is believed to be the transfer's end
+        )
         self._pace = Pace(most_s)
         self._is_contradicted = False
 
@@ -203,6 +208,8 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
             return None
         if self.state is DownloadState.FETCHING:
             due_s = min(self._overdue_at_s(), self._heard_s + PATIENCE_S, self._pace.deadline_s)
+            if self._doubted_at_s is not None:
+                due_s = min(due_s, self._doubted_at_s)
             return due_s if self._believed_at_s is None else min(due_s, self._believed_at_s)
         return min(self._act_at_s, self._pace.deadline_s)
 
@@ -225,6 +232,8 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
             self._take_count(message.count, now_s)
         elif isinstance(message, messages.MissionAck):
             self._take_ack(message.type, now_s)
+        elif isinstance(message, messages.Statustext):
+            self._take_text(message.text, now_s)
 
     def handle_timer(self, now_s: float) -> None:
         """Do what is due by now."""
@@ -233,12 +242,15 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         self._ended_s = now_s
         is_waiting = self.state is DownloadState.WAITING
         if not is_waiting and now_s >= self._heard_s + PATIENCE_S:
-            self._move(DownloadEvent.SILENCE)
+            if self._move(DownloadEvent.SILENCE):
+                self._let_go()
         elif self._pace.is_over(now_s) or self._is_hopeless(now_s):
             self._give_up()
         elif self.state is DownloadState.FETCHING:
             if self._believed_at_s is not None and now_s >= self._believed_at_s:
                 self._finish()
+            elif self._lists.in_order:
+                self._repeat_in_order(now_s)
             else:
                 self._repeat_overdue(now_s)
         elif now_s >= self._act_at_s:
@@ -252,7 +264,13 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
     def _give_up(self) -> None:
         for event in (DownloadEvent.TIME_IS_UP, DownloadEvent.RIVAL_STAYS, DownloadEvent.SILENCE):
             if self._move(event):
+                self._let_go()
                 return
+
+    def _let_go(self) -> None:
+        """End what we began on a vehicle that heeds it: else it is busy for everybody until it gives up."""
+        if self._lists.heeds_cancel:
+            self._end_transfer(MissionResult.OPERATION_CANCELLED)
 
     def _is_hopeless(self, now_s: float) -> bool:
         if self.state is not DownloadState.FETCHING:
@@ -280,7 +298,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
             return
         if was_counting:
             self._round_trip.guess(now_s - self._counting_since_s)
-        self._heard_s = self._fetching_since_s = now_s
+        self._heard_s = self._fetching_since_s = self._advanced_s = now_s
         self._rival_since_s = None
         self._refusals = 0
         self._count = count
@@ -296,7 +314,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         self._items.clear()
         self._in_flight.clear()
         self._coarse_seqs.clear()
-        self._believed_at_s = None
+        self._believed_at_s = self._doubted_at_s = None
         self._next = 0
 
     def _take_item(self, message: messages.MissionItemInt | messages.MissionItem, now_s: float) -> None:
@@ -304,6 +322,8 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         if self.state is not DownloadState.FETCHING or not 0 <= message.seq < self._count:
             return
         if is_coarse and not self._may_use_floats:
+            return
+        if self._lists.in_order and message.seq >= self._next:  # of a reading before this one
             return
         self._heard_s = now_s
         request = self._in_flight.pop(message.seq, None)
@@ -317,6 +337,7 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
             self._compare_again(message)
             return
         self._items[message.seq] = item_from_message(message)
+        self._advanced_s, self._doubted_at_s = now_s, None
         self._pace.advance(len(self._items), now_s)
         if is_coarse:
             self._coarse_seqs.add(message.seq)
@@ -327,15 +348,17 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
             else:
                 self._finish()
             return
-        self._repeat_overtaken(now_s)
+        if not self._lists.in_order:
+            self._repeat_overtaken(now_s)
         self._fill_window(now_s)
 
     def _compare_again(self, message: messages.MissionItemInt | messages.MissionItem) -> None:
         """Notice that an item that came before is another one now; home moves by itself."""
-        is_home = message.seq == 0 and self._mission_type is MissionType.MISSION
+        form = self._lists.form
+        is_home = message.seq < form.first_compared(self._mission_type)
         is_coarse = isinstance(message, messages.MissionItem) or message.seq in self._coarse_seqs
         before, again = self._items[message.seq], item_from_message(message)
-        if not is_home and not is_same_item(before, again, self._mission_type, coarse=is_coarse):
+        if not is_home and not is_same_item(before, again, self._mission_type, form, coarse=is_coarse):
             self._is_contradicted = True
 
     def _finish(self) -> None:
@@ -363,13 +386,25 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
     def _take_ack(self, result_number: int, now_s: float) -> None:
         result = mission_result(result_number)
         if result is MissionResult.DENIED:
-            if self._move(DownloadEvent.DENIED):
-                self._rival_since_s = now_s if self._rival_since_s is None else self._rival_since_s
-                self._act_at_s = now_s + _RIVAL_AGAIN_S
+            self._wait_for_rival(now_s)
         elif self.state is DownloadState.COUNTING and result not in (None, MissionResult.ACCEPTED):
             self._take_refusal(result, now_s)
         elif self.state is DownloadState.FETCHING and result in _OUT_OF_ORDER:
-            self._check_list(now_s)
+            if self._lists.in_order:
+                self._doubted_at_s = now_s + self._overdue_s()
+            else:
+                self._check_list(now_s)
+
+    def _take_text(self, text: str, now_s: float) -> None:
+        """Take a text that is all the answer of a busy vehicle."""
+        busy = self._peer.autopilot.texts.busy
+        if busy is not None and self.state is DownloadState.COUNTING and text.lower().startswith(busy):
+            self._wait_for_rival(now_s)
+
+    def _wait_for_rival(self, now_s: float) -> None:
+        if self._move(DownloadEvent.DENIED):
+            self._rival_since_s = now_s if self._rival_since_s is None else self._rival_since_s
+            self._act_at_s = now_s + _RIVAL_AGAIN_S
 
     def _take_refusal(self, result: MissionResult, now_s: float) -> None:
         """Count a refusal, once for each time we asked; the same one has to come again and again.
@@ -395,10 +430,16 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         self._checked_s = now_s
         self._checks += 1
         if self._checks >= _REFUSALS_BELIEVED and self._most_in_flight > 1:
-            self._most_in_flight, self._window = 1, 1.0  # PX4 serves requests in order only
-            self._forget_items()
-            self._move(DownloadEvent.LIST_CHANGED)
-            self._counting_since_s = now_s
+            self._begin_anew(now_s)
+        else:
+            self._ask_count(now_s)
+
+    def _begin_anew(self, now_s: float) -> None:
+        """Read the list from its beginning, an item at a time."""
+        self._most_in_flight, self._window = 1, 1.0
+        self._forget_items()
+        self._move(DownloadEvent.LIST_CHANGED)
+        self._counting_since_s = now_s
         self._ask_count(now_s)
 
     def _fill_window(self, now_s: float) -> None:
@@ -430,9 +471,26 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
 
     def _overdue_at_s(self) -> float:
         """Return the time at which the oldest request counts as lost: long after it and after anything that came since."""
-        overdue_s = self._round_trip.timeout_s(_LEAST_OVERDUE_S, _MOST_OVERDUE_S)
         oldest = next(iter(self._in_flight.values()))
-        return max(oldest.sent_s, self._heard_s) + overdue_s
+        return max(oldest.sent_s, self._heard_s) + self._overdue_s()
+
+    def _overdue_s(self) -> float:
+        return self._round_trip.timeout_s(_LEAST_OVERDUE_S, _MOST_OVERDUE_S)
+
+    def _repeat_in_order(self, now_s: float) -> None:
+        """Ask again for the last item asked for, which is all that may be asked for again; where others are missing, begin anew.
+
+        The vehicle has ended the transfer, too, where a request of ours came twice or late: its ERROR shows it, or its silence for as long as it waits.
+        """
+        is_doubted = self._doubted_at_s is not None and now_s >= self._doubted_at_s
+        has_ended = is_doubted or now_s >= self._advanced_s + self._lists.gives_up_after_s
+        if not has_ended and now_s < self._overdue_at_s():
+            return
+        if has_ended or list(self._in_flight) != [self._next - 1]:
+            self._begin_anew(now_s)
+        else:
+            self._most_in_flight, self._window = 1, 1.0
+            self._repeat([self._next - 1], now_s)
 
     def _repeat_overdue(self, now_s: float) -> None:
         if now_s < self._overdue_at_s():
@@ -440,13 +498,13 @@ class Download(TableMachine[DownloadState, DownloadEvent]):
         if self._may_use_floats and not self._items and now_s >= self._fetching_since_s + _FLOAT_FORM_AFTER_S:
             self._float_form = not self._float_form  # old vehicles answer only the old request
         self._window = max(self._window / 2, min(5.0, self._most_in_flight))
-        overdue_s = self._round_trip.timeout_s(_LEAST_OVERDUE_S, _MOST_OVERDUE_S)
+        overdue_s = self._overdue_s()
         overdue = [seq for seq, request in self._in_flight.items() if now_s >= request.sent_s + overdue_s]
         self._repeat(overdue, now_s)
 
     def _thank(self) -> None:
-        self._send(
-            messages.MissionAck(
-                self._peer.system, self._peer.component, MissionResult.ACCEPTED, int(self._mission_type)
-            )
-        )
+        self._end_transfer(MissionResult.ACCEPTED)
+
+    def _end_transfer(self, result: MissionResult) -> None:
+        peer = self._peer
+        self._send(messages.MissionAck(peer.system, peer.component, result, int(self._mission_type)))

@@ -13,6 +13,7 @@ from missions.words import mission_items
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from mavlink_bridge.mavlink.autopilots import AutopilotTable
     from missions.items import MissionItem
 
 _SD_FENCE_ITEMS = 4096  # measured on ArduPilot Rover 4.7.0-dev, with storage on an SD card
@@ -26,15 +27,27 @@ class Limits:
 
     Parameters
     ----------
-    mission_items, fence_items : int
-        Most items in a list; the home item of a mission counts. (Rally points are left to the vehicle's own answer.)
-    fence_bytes : int
-        Storage for the fence: 4, 2 + 8 n for a polygon of n vertices, 13 for a circle, 9 for the return point.
+    mission_items, fence_items, rally_points : int, optional
+        Most items in a list; the home item of a mission counts. None leaves it to the vehicle's own answer.
+    fence_bytes : int, optional
+        Storage for the fence: 4, 2 + 8 n for a polygon of n vertices, 13 for a circle, 9 for the return point. None where only items count.
     """
 
-    mission_items: int = MISSION_ITEMS
-    fence_items: int = 84
-    fence_bytes: int = 672
+    mission_items: int | None = MISSION_ITEMS
+    fence_items: int | None = 84
+    rally_points: int | None = None
+    fence_bytes: int | None = 672
+
+    @classmethod
+    def of(cls, autopilot: AutopilotTable) -> Limits:
+        """Return what fits on a vehicle of which only its autopilot is known."""
+        most = autopilot.lists.most_items
+        return cls(
+            most.get(MissionType.MISSION),
+            most.get(MissionType.FENCE),
+            most.get(MissionType.RALLY),
+            fence_bytes=autopilot.lists.fence_bytes,
+        )
 
     @classmethod
     def from_parameters(cls, parameters: Mapping[str, float]) -> Limits:
@@ -49,17 +62,21 @@ class Limits:
 
     def problem(self, items: Sequence[MissionItem], mission_type: MissionType) -> str | None:
         """Return why a list does not fit; None if it does."""
-        most = {MissionType.MISSION: self.mission_items, MissionType.FENCE: self.fence_items}.get(
-            mission_type
-        )
+        most = {
+            MissionType.MISSION: self.mission_items,
+            MissionType.FENCE: self.fence_items,
+            MissionType.RALLY: self.rally_points,
+        }.get(mission_type)
         if most is not None and len(items) > most:
             count = (
                 mission_items(len(items))
                 if mission_type is MissionType.MISSION
-                else f"{len(items)} fence items"
+                else f"{len(items)} {mission_type.name.lower()} items"
             )
             return f"{count}; the vehicle holds {most}"
-        if mission_type is MissionType.FENCE and (needed := fence_bytes(items)) > self.fence_bytes:
+        if mission_type is not MissionType.FENCE or self.fence_bytes is None:
+            return None
+        if (needed := fence_bytes(items)) > self.fence_bytes:
             return f"the fence needs {needed} bytes of storage; the vehicle has {self.fence_bytes}"
         return None
 

@@ -10,10 +10,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.mavlink.messages import CommandAck, CommandLong, Heartbeat, MavResult, ModeFlag
+from mavlink_bridge.mavlink.messages import CommandAck, CommandLong, Heartbeat, MavResult
 from mavlink_bridge.protocol.table_machine import Outbox, TableMachine
 from mavlink_bridge.protocol.texts import Reasons
-from mavlink_bridge.protocol.transitions import MODE_SWITCH, MODE_SWITCH_UNTIL_SEEN, SwitchEvent, SwitchState
+from mavlink_bridge.protocol.transitions import (
+    MODE_SWITCH,
+    MODE_SWITCH_BY_HEARTBEAT,
+    MODE_SWITCH_UNTIL_SEEN,
+    SwitchEvent,
+    SwitchState,
+)
 from missions.items import Command
 
 if TYPE_CHECKING:
@@ -38,7 +44,7 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
     peer : Peer
         The vehicle and our identity.
     mode : int
-        HEARTBEAT.custom_mode.
+        HEARTBEAT.custom_mode, one of the peer's autopilot.
     is_urgent : bool
         Send it again every half second until it is answered.
     until_seen : bool
@@ -46,7 +52,9 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
     """
 
     def __init__(self, peer: Peer, mode: int, *, is_urgent: bool = False, until_seen: bool = False) -> None:
-        super().__init__(MODE_SWITCH_UNTIL_SEEN if until_seen else MODE_SWITCH, SwitchState.IDLE)
+        only_seen = MODE_SWITCH_UNTIL_SEEN if until_seen else MODE_SWITCH_BY_HEARTBEAT
+        answer_counts = peer.autopilot.modes.answer_counts and not until_seen
+        super().__init__(MODE_SWITCH if answer_counts else only_seen, SwitchState.IDLE)
         self._peer = peer
         self._mode = mode
         self._is_urgent = is_urgent
@@ -143,15 +151,15 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
 
 
 def set_mode(peer: Peer, mode: int, confirmation: int) -> CommandLong:
-    """Return the command that switches to a mode, for the first time (0) or once more."""
-    return CommandLong(
-        peer.system,
-        peer.component,
-        Command.DO_SET_MODE,
-        confirmation,
-        param1=ModeFlag.CUSTOM_MODE_ENABLED,
-        param2=mode,
-    )
+    """Return the command that switches to a mode, for the first time (0) or once more.
+
+    Raises
+    ------
+    ValueError
+        The peer's autopilot has no such mode.
+    """
+    params = peer.autopilot.modes.command_params(mode)
+    return CommandLong(peer.system, peer.component, Command.DO_SET_MODE, confirmation, *params)
 
 
 class AwaitHeartbeat(Outbox):

@@ -34,6 +34,7 @@ _HELD = {
     Held.UNKNOWN: "what is on the vehicle now is unknown: read it back before driving",
 }
 _BROKEN_OFF = "the vehicle may hold the old list, the new one, or part of both: read it back before driving"
+_BROKEN_OFF_WHOLE = "the vehicle holds the old list or the new one, each whole: read it back to know which"
 _INTERRUPTED = "interrupted"
 
 
@@ -189,7 +190,8 @@ def end_of_upload(
 
 
 def _what_is_left(writing: Writing, said: str) -> list[str]:
-    held = _BROKEN_OFF if writing.machine.outcome is None else _HELD[writing.held]
+    broken_off = _BROKEN_OFF_WHOLE if writing.machine.is_atomic else _BROKEN_OFF
+    held = broken_off if writing.machine.outcome is None else _HELD[writing.held]
     if writing.backup is None:
         where = "the old list was not kept"
     else:

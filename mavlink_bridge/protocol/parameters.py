@@ -1,6 +1,6 @@
 """Reading parameters, some or all, and setting one with confirmation.
 
-ArduPilot sends every parameter as a 32-bit float, whole numbers too. It does not answer when asked for a parameter it does not have:
+Every parameter comes as a 32-bit float, whole numbers too: cast by ArduPilot, their bits from PX4. Neither answers when asked for a parameter it does not have:
 a name counts as missing when it was asked for so often that, as the link loses messages, an answer would have come. A question counts
 only where the vehicle has answered a later one: a link or a vehicle that stands still for a while shows nothing of its parameters. So
 that there is a later one, a parameter that is there is asked for again after each repeated question.
@@ -13,7 +13,12 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.mavlink.messages import ParamRequestList, ParamRequestRead, ParamSet, ParamValue
-from mavlink_bridge.mavlink.parameter_values import float32
+from mavlink_bridge.mavlink.parameter_values import (
+    REAL32,
+    encoded_parameter,
+    float32,
+    parameter_value,
+)
 from mavlink_bridge.protocol.pace import MOST_S, Pace, bound_s
 from mavlink_bridge.protocol.round_trip import RoundTrip
 from mavlink_bridge.protocol.table_machine import TableMachine
@@ -27,9 +32,6 @@ if TYPE_CHECKING:
 
 WINDOW = 20  # requests in flight; chosen, not measured
 PATIENCE_S = 10.0  # of silence, as for lists
-REAL32 = 9
-"""MAV_PARAM_TYPE_REAL32."""
-
 _LIST_AGAIN_S = 1.5  # without anything of the list; chosen, not measured
 _QUIET_S = 1.0  # after the last of the stream: what it left out is asked for; chosen, not measured
 _SET_AGAIN_S = 0.7  # above the round trip of most links; chosen, not measured
@@ -56,12 +58,15 @@ class ParametersOutcome:
         The vehicle did not answer at all, or stopped answering.
     no_numbers : mapping of str to str
         Parameters that the vehicle answered with what is no number, and what came; they are not among the values.
+    types : mapping of str to int
+        MAV_PARAM_TYPE by name.
     """
 
     values: Mapping[str, float] = field(default_factory=dict)
     missing: tuple[str, ...] = ()
     is_silent: bool = False
     no_numbers: Mapping[str, str] = field(default_factory=dict)
+    types: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def is_complete(self) -> bool:
@@ -97,6 +102,7 @@ class ReadParameters(TableMachine[ParameterState, ParameterEvent]):
         self._names = None if names is None else tuple(dict.fromkeys(names))
         self._values: dict[str, float] = {}
         self._no_numbers: dict[str, str] = {}
+        self._types: dict[str, int] = {}
         self._seen_indices: set[int] = set()
         self._count = 0
         self._waiting: list[str | int] = []  # in reverse order
@@ -121,7 +127,11 @@ class ReadParameters(TableMachine[ParameterState, ParameterEvent]):
         is_silent = self.state is ParameterState.SILENT
         open_asks = [*self._missing, *self._asks, *reversed(self._waiting)]
         return ParametersOutcome(
-            dict(self._values), tuple(map(str, open_asks)), is_silent, dict(self._no_numbers)
+            dict(self._values),
+            tuple(map(str, open_asks)),
+            is_silent,
+            dict(self._no_numbers),
+            dict(self._types),
         )
 
     @property
@@ -181,8 +191,11 @@ class ReadParameters(TableMachine[ParameterState, ParameterEvent]):
         self._go_on(now_s)
 
     def _take(self, message: ParamValue) -> None:
-        """Take an answer; only ArduPilot is asked, which casts whole numbers."""
-        name, value = message.param_id, message.param_value
+        name = message.param_id
+        if name in self._peer.autopilot.parameters.left_out:
+            return
+        value = parameter_value(message, bytewise=self._peer.autopilot.parameters.is_bytewise)
+        self._types[name] = message.param_type
         if math.isfinite(value):
             self._values[name] = value
             self._no_numbers.pop(name, None)
@@ -335,13 +348,17 @@ class SetParameter(TableMachine[ParameterState, ParameterEvent]):
         Which one.
     value : float
         The value wanted.
+    param_type : int
+        MAV_PARAM_TYPE of the parameter, as the vehicle reported it; ArduPilot takes any.
     """
 
-    def __init__(self, peer: Peer, name: str, value: float) -> None:
+    def __init__(self, peer: Peer, name: str, value: float, param_type: int = REAL32) -> None:
         super().__init__(PARAMETERS, ParameterState.IDLE)
         self._peer = peer
         self._name = name
-        self._wanted = value
+        self._is_bytewise = peer.autopilot.parameters.is_bytewise
+        self._sent, self._type = encoded_parameter(value, param_type, bytewise=self._is_bytewise)
+        self._wanted = float32(value) if self._type == REAL32 else value
         self._value: float | None = None
         self._is_confirmed = False
         self._other_answers = 0
@@ -382,8 +399,8 @@ class SetParameter(TableMachine[ParameterState, ParameterEvent]):
             return
         if not isinstance(message, ParamValue) or message.param_id != self._name:
             return
-        self._value = message.param_value
-        if message.param_value == float32(self._wanted):
+        self._value = parameter_value(message, bytewise=self._is_bytewise)
+        if self._value == self._wanted:
             self._is_confirmed = True
             self._move(ParameterEvent.CONFIRMED)
         elif self._answer_counts:
@@ -406,4 +423,4 @@ class SetParameter(TableMachine[ParameterState, ParameterEvent]):
     def _send_value(self, now_s: float) -> None:
         self._send_at_s = now_s + _SET_AGAIN_S
         self._answer_counts = True
-        self._send(ParamSet(self._peer.system, self._peer.component, self._name, self._wanted, REAL32))
+        self._send(ParamSet(self._peer.system, self._peer.component, self._name, self._sent, self._type))

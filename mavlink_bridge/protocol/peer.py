@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
+
+from mavlink_bridge.mavlink.autopilots import ARDUPILOT, AutopilotTable
 
 if TYPE_CHECKING:
     from mavlink_bridge.mavlink.messages import Frame, MissionType
@@ -19,6 +21,8 @@ class Peer:
         MAVLink ids of the vehicle's autopilot.
     own_system, own_component : int
         MAVLink ids we send with.
+    autopilot : AutopilotTable
+        Which autopilot it is: how it transfers lists, what its modes are called.
 
     Raises
     ------
@@ -30,6 +34,7 @@ class Peer:
     component: int
     own_system: int
     own_component: int
+    autopilot: AutopilotTable = field(default=ARDUPILOT, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         if (self.system, self.component) == (self.own_system, self.own_component):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from functools import cache
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.mavlink.messages import Statustext
@@ -20,20 +21,10 @@ _MOST_SEVERITY = 5
 _LATE_S = 1.0
 """ArduPilot queues its texts, so that a reason may come after the answer; it empties the queue several times a second."""
 
-_NOISE = re.compile(
-    r"flight plan received|fence indexed|(rally points? received)|got mission_request"
-    r"|mission: \d|reached waypoint|mission complete|auto mission changed|throttle (dis)?armed|arducopter|ardurover|ardupilot ready"
-    r"|pbpp:|#",
-    re.IGNORECASE,
-)
-"""ArduPilot's texts on success and progress, whatever their severity."""
 
-_OF_THE_VEHICLE = re.compile(
-    r"prearm|arm:|arming|battery|ekf|ahrs|dcm|gps|imu|compass|mag|baro|rc\d|radio|crash|logging|chan\d"
-    r"|.*\bfailsafe\b|.*\bfences? (in [\d.]+ ?m|breached|cleared)|fence breach|internal error",
-    re.IGNORECASE,
-)
-"""Its repeated texts on its own state: no reason to refuse a list."""
+@cache
+def _pattern(text: str) -> re.Pattern[str]:
+    return re.compile(text, re.IGNORECASE)
 
 
 class Reasons:
@@ -77,6 +68,7 @@ class Reasons:
             self._texts.append(message.text)
 
     def _may_be_reason(self, message: Statustext) -> bool:
-        if message.severity > _MOST_SEVERITY or not message.text.strip() or _NOISE.match(message.text):
+        texts, text = self._peer.autopilot.texts, message.text
+        if message.severity > _MOST_SEVERITY or not text.strip() or _pattern(texts.noise).match(text):
             return False
-        return not (self._is_about_list and _OF_THE_VEHICLE.match(message.text))
+        return not (self._is_about_list and _pattern(texts.own_state).match(text))

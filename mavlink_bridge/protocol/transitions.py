@@ -457,6 +457,15 @@ MODE_SWITCH_UNTIL_SEEN: dict[SwitchState, dict[SwitchEvent, SwitchState]] = {
 }
 """The same where the answer may be that to another command: only a heartbeat that shows the mode ends it."""
 
+MODE_SWITCH_BY_HEARTBEAT: dict[SwitchState, dict[SwitchEvent, SwitchState]] = {
+    **MODE_SWITCH_UNTIL_SEEN,
+    SwitchState.SENT: {
+        **MODE_SWITCH_UNTIL_SEEN[SwitchState.SENT],
+        SwitchEvent.REFUSED: SwitchState.REFUSED,
+    },
+}
+"""The same where the vehicle accepts what it does not do (PX4 1.17), but refuses only what it does not do."""
+
 
 def _with_ends(table: dict[StateT, dict[EventT, StateT]]) -> dict[StateT, dict[EventT, StateT]]:
     """Return a table with a row for each state."""

@@ -31,15 +31,22 @@ WINDOW = 200
 
 # MISSION_COUNT, where the round trip is not known; ArduPilot repeats its requests as often
 _ANNOUNCE_AGAIN_S = 1.0
-_ECHO_S = 0.25  # a request repeated sooner than this is the same frame arriving twice
-_ASKED_AGAIN_S = 0.9  # ArduPilot asks again after 1 s: so long after the usual time it is no first request
+# Shares of the time after which the vehicle asks again (ArduPilot: 1 s). A request repeated sooner is the same frame arriving twice; so long after the usual
+# time it is no first request; and after so long it would have asked again by now.
+_ECHO, _ASKED_AGAIN, _PROBE_AFTER = 0.25, 0.9, 2.0
+_MOST_PROBE_AFTER_S = 2.0
 _QUEUE_S = 0.5  # so long an answer may be late before the link counts as full
-_PROBE_AFTER_S = 2.0  # it would have asked again by now
 _PROBE_END_AFTER_S = 1.2
 _SOON_S = 0.4
 """The least of both where it is known how long answers take on this link."""
 
-_GIVEN_UP_AFTER_S = 6.0  # ArduPilot gives an upload up after 8 s; its messages may be late
+_GIVEN_UP = (
+    0.75  # of the time after which the vehicle gives an upload up (ArduPilot: 8 s): its messages may be late
+)
+_ERRORS_BELIEVED = 3
+"""Answers of ERROR without progress, where that may also answer a repeated MISSION_COUNT or a late item; chosen, not measured."""
+_LEAST_DOUBT_S, _MOST_DOUBT_S = 0.15, 2.0  # between two of them; chosen, not measured
+
 # Bounds of the time in which frames that overtook one another still come in. Chosen, not measured.
 _LEAST_SETTLE_S = 0.03
 _MOST_SETTLE_S = 1.0
@@ -107,6 +114,7 @@ class Upload(TableMachine[UploadState, UploadEvent]):
     ) -> None:
         super().__init__(UPLOAD, UploadState.IDLE)
         self._peer = peer
+        self._lists = peer.autopilot.lists
         self._mission_type = mission_type
         self._messages = [item_to_message(item, seq, peer, mission_type) for seq, item in enumerate(items)]
         self._most_ahead = window
@@ -129,6 +137,8 @@ class Upload(TableMachine[UploadState, UploadEvent]):
         self._advanced_s = math.inf  # when another item was asked for
         self._asked_s = -math.inf  # when the item wanted was last asked for
         self._rival_since_s: float | None = None
+        self._errors = 0
+        self._next_error_s = -math.inf
         self._pace = Pace(most_s)
 
     @property
@@ -189,7 +199,9 @@ class Upload(TableMachine[UploadState, UploadEvent]):
             return
         is_waiting = self.state is UploadState.WAITING
         if self._pace.is_over(now_s) or (not is_waiting and now_s >= self._heard_s + PATIENCE_S):
-            if not self._move(UploadEvent.SILENCE):
+            if self._move(UploadEvent.SILENCE):
+                self._let_go()
+            else:
                 self._move(UploadEvent.RIVAL_STAYS)
             return
         if self._gap_at_s is not None and now_s >= self._gap_at_s:
@@ -208,6 +220,18 @@ class Upload(TableMachine[UploadState, UploadEvent]):
     def _rival_stays(self, now_s: float) -> bool:
         return self._rival_since_s is not None and now_s >= self._rival_since_s + self._rival_patience_s
 
+    def _let_go(self) -> None:
+        """End what we began on a vehicle that heeds it: else it is busy for everybody until it gives up."""
+        if self._lists.heeds_cancel:
+            self._send(
+                messages.MissionAck(
+                    self._peer.system,
+                    self._peer.component,
+                    MissionResult.OPERATION_CANCELLED,
+                    int(self._mission_type),
+                )
+            )
+
     def _announce(self, now_s: float) -> None:
         least_s = _SOON_S if self._round_trip.is_known else _ANNOUNCE_AGAIN_S
         self._act_at_s = now_s + self._round_trip.timeout_s(least_s, 2 * _ANNOUNCE_AGAIN_S)
@@ -218,8 +242,11 @@ class Upload(TableMachine[UploadState, UploadEvent]):
         )
 
     def _probe(self, now_s: float) -> None:
-        """Ask for the list: a vehicle that still takes items denies it, one that does not gives its count."""
+        """Find out how it stands: ask for the list, which a vehicle that still takes items denies, or send the item again that is waited for."""
         self._act_at_s = now_s + self._probe_after_s()
+        if self._lists.asked_by_item:
+            self._push_item(self._wanted, now_s)
+            return
         self._send(
             messages.MissionRequestList(self._peer.system, self._peer.component, int(self._mission_type))
         )
@@ -235,8 +262,9 @@ class Upload(TableMachine[UploadState, UploadEvent]):
             self._advanced_s = now_s
         self._rival_since_s = None
         if seq > self._wanted:
+            self._errors = 0
             self._keep_up(seq, now_s)
-        elif now_s - max(self._sent_s.get(seq, -math.inf), self._asked_s) >= _ECHO_S:
+        elif self._is_asked_again(seq, now_s):
             # Asked again, or from the front after a second MISSION_COUNT: this one is wanted, whatever came before.
             self._wanted = seq
             if now_s >= self._answered_at_s():
@@ -247,17 +275,28 @@ class Upload(TableMachine[UploadState, UploadEvent]):
         self._push(now_s)
         self._act_at_s = now_s + self._probe_after_s()
 
+    def _is_asked_again(self, seq: int, now_s: float) -> bool:
+        """Return whether a request for the item wanted is no echo of one before."""
+        again_s = self._lists.asks_again_s
+        last_s = max(self._sent_s.get(seq, -math.inf), self._asked_s)
+        # A vehicle that asks again before an answer can have come asks of an item that is on its way.
+        is_hasty = again_s < self._round_trip.mean_s and now_s < self._answered_at_s()
+        return not is_hasty and now_s - last_s >= _ECHO * again_s
+
     def _probe_after_s(self) -> float:
         """Return the silence after which to ask: shorter when only the final ACK is missing."""
         at_end = self._wanted == len(self._messages) - 1
         if not at_end:
-            return _PROBE_AFTER_S
+            return max(
+                _PROBE_AFTER * self._lists.asks_again_s, min(2 * self._round_trip.mean_s, _MOST_PROBE_AFTER_S)
+            )
         least_s = _SOON_S if self._round_trip.is_known else _PROBE_END_AFTER_S
         return max(least_s, 2 * self._round_trip.mean_s)
 
     def _keep_up(self, seq: int, now_s: float) -> None:
         """Follow the vehicle to a later item."""
-        late_s = self._sent_s.get(seq, now_s) + self._round_trip.mean_s + _ASKED_AGAIN_S
+        again_s = _ASKED_AGAIN * self._lists.asks_again_s
+        late_s = self._sent_s.get(seq, now_s) + self._round_trip.mean_s + again_s
         is_repeat = seq < self._next and now_s >= late_s  # its first request was lost, and so was the item
         is_full = not is_repeat and self._measure(seq - 1, now_s)
         self._grow_window(seq - self._wanted, is_full=is_full)
@@ -318,16 +357,35 @@ class Upload(TableMachine[UploadState, UploadEvent]):
             if self._move(UploadEvent.OUT_OF_SEQUENCE):
                 self._heard_s = now_s
                 self._suspect_gap(now_s)
-        elif result is MissionResult.DENIED:
+        elif self._is_busy(result):
             if self._move(UploadEvent.DENIED) and self.state is UploadState.WAITING:
                 self._rival_since_s = now_s if self._rival_since_s is None else self._rival_since_s
                 self._act_at_s = now_s + _ANNOUNCE_AGAIN_S
-        else:
+                self._let_go()  # what it is busy with may be ours, of which it did not hear the end
+        elif not self._is_in_doubt(result, now_s):
             # After so long a stall the vehicle has given up, and ERROR only means that it waits for no item.
-            has_given_up = result is MissionResult.ERROR and now_s >= self._advanced_s + _GIVEN_UP_AFTER_S
+            given_up_s = self._advanced_s + _GIVEN_UP * self._lists.gives_up_after_s
+            has_given_up = result is MissionResult.ERROR and now_s >= given_up_s
             is_cancelled = result is MissionResult.OPERATION_CANCELLED or has_given_up
             if self._move(UploadEvent.CANCELLED if is_cancelled else UploadEvent.REFUSAL):
                 self._result = result
+                self._let_go()
+
+    def _is_busy(self, result: MissionResult) -> bool:
+        """Return whether an answer says that the vehicle is busy; ERROR says so only to MISSION_COUNT."""
+        is_error = result is MissionResult.ERROR
+        return result in self._lists.busy and not (is_error and self.state is UploadState.SENDING)
+
+    def _is_in_doubt(self, result: MissionResult, now_s: float) -> bool:
+        """Return whether an answer may be about something else, and the upload go on: then the item waited for is sent again, which shows it."""
+        if result not in self._lists.busy:
+            return False
+        if now_s >= self._next_error_s:
+            self._errors += 1
+            doubt_s = self._round_trip.timeout_s(_LEAST_DOUBT_S, _MOST_DOUBT_S)
+            self._next_error_s = now_s + doubt_s
+            self._act_at_s = min(self._act_at_s, self._next_error_s)
+        return self._errors < _ERRORS_BELIEVED
 
     def _suspect_gap(self, now_s: float) -> None:
         """Wait until it is clear whether an item is missing, or a frame only came twice or late."""

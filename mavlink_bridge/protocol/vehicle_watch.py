@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.mavlink.messages import GlobalPositionInt, Heartbeat, MissionCurrent, ModeFlag
-from mavlink_bridge.mavlink.rover import Mode
+from mavlink_bridge.mavlink.messages import Autopilot, GlobalPositionInt, Heartbeat, MissionCurrent, ModeFlag
+from mavlink_bridge.mavlink.modes import ARDUPILOT_MODES, Modes, modes_of
 
 if TYPE_CHECKING:
     from mavlink_bridge.mavlink.messages import Message
@@ -37,6 +37,8 @@ class Doing:
         How old the newest heartbeat is; infinite before the first.
     speed_age_s : float
         How old the speed is.
+    modes : Modes
+        Its autopilot's modes.
     """
 
     mode: int | None = None
@@ -45,6 +47,7 @@ class Doing:
     has_completed: bool = False
     age_s: float = math.inf
     speed_age_s: float = math.inf
+    modes: Modes = ARDUPILOT_MODES
 
     @property
     def is_fresh(self) -> bool:
@@ -53,8 +56,8 @@ class Doing:
 
     @property
     def drives_mission(self) -> bool:
-        """Whether it drives its mission: armed in AUTO, and the mission is not complete."""
-        return bool(self.is_armed) and self.mode == Mode.AUTO and not self.has_completed
+        """Whether it drives its mission: armed in AUTO (PX4: AUTO.MISSION), and the mission is not complete."""
+        return bool(self.is_armed) and self.mode == self.modes.mission and not self.has_completed
 
 
 class VehicleWatch:
@@ -94,6 +97,7 @@ class VehicleWatch:
             has_completed=has_completed,
             age_s=max(0.0, now_s - self._heartbeat_s),
             speed_age_s=max(0.0, now_s - self._speed_s),
+            modes=modes_of(ardupilot=heartbeat.autopilot != Autopilot.PX4),
         )
 
     def is_active(self, now_s: float) -> bool | None:

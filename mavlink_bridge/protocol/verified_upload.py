@@ -1,7 +1,8 @@
 """The whole safe transfer: keep the old list, push the new one, read back what is there, put the old one back if need be.
 
 How it works, and why. An upload to ArduPilot is no transaction: the first message cuts the stored list, every item is written as it comes, and the final
-word can be lost. So the vehicle's acknowledgement decides nothing here; what is read back does. Four rules make "verified" true:
+word can be lost. On PX4 it is one, and an upload that broke off needs no restoring; that this is so is read back, too. So the vehicle's acknowledgement
+decides nothing here; what is read back does. Four rules make "verified" true:
 
 1. *Only a whole read counts, and only one that nobody disturbed.* Every read is an `UndisturbedRead`: traffic which shows that somebody else wrote this
    list while it was read makes it worthless (an item already read may have been replaced), and it is read again, a bounded number of times. So the
@@ -81,7 +82,7 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
     items : sequence of MissionItem
         The list as it goes over the wire, for missions with the home item at 0.
     limits : Limits, optional
-        What fits on the vehicle; ArduPilot Rover's defaults if not given.
+        What fits on the vehicle; its autopilot's defaults if not given.
     is_active : bool, optional
         Whether the vehicle drives its mission (armed in AUTO, the mission not complete), from a fresh heartbeat; None waits for one.
     replace_active : bool
@@ -109,8 +110,9 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         super().__init__(VERIFIED_UPLOAD, VerifiedUploadState.IDLE)
         self._peer = peer
         self._mission_type = mission_type
-        self._wanted = tuple(items)
-        self._limits = limits or Limits()
+        self._lists = peer.autopilot.lists
+        self._wanted = self._lists.form.prepared(items, mission_type)
+        self._limits = limits or Limits.of(peer.autopilot)
         self._is_active = is_active
         self._vehicle = VehicleWatch()
         self._active_known_s = 0.0
@@ -210,6 +212,11 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         }.get(self.state, 0)
         self._shown_progress = max(self._shown_progress, before + (part.progress[0] if part else 0))
         return min(self._shown_progress, total), total
+
+    @property
+    def is_atomic(self) -> bool:
+        """Whether the vehicle replaces a list as a whole: what broke off has left the old list, or the new one."""
+        return self._lists.is_atomic
 
     @property
     def bound_s(self) -> float:
@@ -383,7 +390,9 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
         """Decide what a read-back means; anything but the wanted list must be read twice alike before it is believed."""
         restoring = self.state is VerifiedUploadState.READING_RESTORED
         assert self._old is not None
-        self._held = held_list(found, self._wanted, self._old, self._mission_type, coarse=self._is_coarse)
+        self._held = held_list(
+            found, self._wanted, self._old, self._mission_type, self._lists, coarse=self._is_coarse
+        )
         expected = Held.OLD if restoring else Held.WANTED
         if self._held is expected:
             self._move(VerifiedUploadEvent.READ_OLD if restoring else VerifiedUploadEvent.READ_WANTED)
@@ -439,7 +448,7 @@ class VerifiedUpload(TableMachine[VerifiedUploadState, VerifiedUploadEvent]):
     def _differences(
         self, wanted: tuple[MissionItem, ...], found: tuple[MissionItem, ...]
     ) -> tuple[Difference, ...]:
-        return differences(wanted, found, self._mission_type, coarse=self._is_coarse)
+        return differences(wanted, found, self._mission_type, self._lists.form, coarse=self._is_coarse)
 
     def _shortfall(self) -> str:
         failed = self._failed_read

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.mavlink import messages
 from mavlink_bridge.mavlink.messages import MissionResult
-from mavlink_bridge.mavlink.stored_form import sendable_params
 from missions.items import CoordinateFrame, MissionItem
 
 if TYPE_CHECKING:
@@ -26,8 +25,9 @@ _PLAIN_XY_COMMANDS = frozenset({202, 203})
 def item_to_message(
     item: MissionItem, seq: int, peer: Peer, mission_type: MissionType
 ) -> messages.MissionItemInt:
-    """Return the MISSION_ITEM_INT that sends one item to the peer."""
-    param1, param2, param3, param4 = sendable_params(item)
+    """Return the MISSION_ITEM_INT that sends one item to the peer, as its autopilot wants it."""
+    item = peer.autopilot.lists.form.sendable(item, mission_type)
+    param1, param2, param3, param4 = item.params
     return messages.MissionItemInt(
         target_system=peer.system,
         target_component=peer.component,

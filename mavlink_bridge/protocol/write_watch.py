@@ -54,8 +54,6 @@ _IDS = {
     MissionType.FENCE: ("fence_id",),
     MissionType.RALLY: ("rally_points_id",),
 }
-_STORED_TEXT = "flight plan received"
-"""ArduPilot's text when a mission has been written."""
 
 
 class WriteWatch:
@@ -150,8 +148,10 @@ class WriteWatch:
         elif isinstance(message, m.ParamValue):
             if message.param_id == _TOTALS.get(self._mission_type):
                 self._compare(message.param_id, message.param_value, now_s)
-        elif isinstance(message, m.Statustext) and message.text.lower().startswith(_STORED_TEXT):
-            self._take_stored_text(now_s)
+        elif isinstance(message, m.Statustext):
+            stored = self._peer.autopilot.texts.list_stored
+            if stored is not None and message.text.lower().startswith(stored):
+                self._take_stored_text(now_s)
 
     def _take_stored_text(self, now_s: float) -> None:
         """Take the word that a mission was written: once for each upload of ours it is about that."""

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from mavlink_bridge.backup.drive_note import note_from_json, note_to_json
 from mavlink_bridge.director import Event, Orders, TargetSource
-from mavlink_bridge.director.orders import Homing
+from mavlink_bridge.director.orders import Homing, ObstacleSource
 from mavlink_bridge.errors import LogError
 from missions.errors import MissionError
 from missions.firmware import read_firmware
@@ -42,12 +42,12 @@ class Call:
     time_s : float
         Its time.
     name : str
-        Which call: ``start``, ``timer``, ``target``, ``confirm``, ``plan_made``, ``ways_made``, ``backup_stored``, ``backup_failed``, ``in_use``,
+        Which call: ``start``, ``timer``, ``target``, ``obstacle``, ``clear``, ``confirm``, ``plan_made``, ``ways_made``, ``backup_stored``, ``backup_failed``, ``in_use``,
         ``note_stored`` or ``note_failed``.
     target : LatLon, optional
-        The target that was typed.
+        The target that was typed, or where the obstacle is.
     text : str
-        Where the backup lies, or why there is none, or no note.
+        The obstacle's radius, where the backup lies, or why there is none, or no note.
     """
 
     frames: int
@@ -177,6 +177,7 @@ def _orders_to_json(orders: Orders) -> dict[str, Any]:
     words = orders.request.words()
     document["request"] = {**words, "footprint": asdict(words["footprint"])}
     document["target_sources"] = sorted(orders.target_sources)
+    document["obstacle_sources"] = sorted(orders.obstacle_sources)
     return document
 
 
@@ -190,6 +191,7 @@ def _orders_from_json(document: dict[str, Any]) -> Orders:
             "homing": Homing(**{**homing, "places": places}),
             "identity": tuple(document["identity"]) if document["identity"] else None,
             "target_sources": frozenset(TargetSource(name) for name in document["target_sources"]),
+            "obstacle_sources": frozenset(map(ObstacleSource, document.get("obstacle_sources", ()))),
             "request": request_of(**{**request, "footprint": Footprint(**request.get("footprint", {}))}),
         }
     )

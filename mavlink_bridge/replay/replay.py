@@ -146,6 +146,10 @@ def _call(director: Director, call: Call) -> Iterator[Event]:
         director.handle_timer(call.time_s)
     elif call.name == "target" and call.target is not None:
         director.take_target(call.target, call.time_s)
+    elif call.name == "obstacle":
+        director.take_obstacle(call.target, float(call.text), call.time_s)
+    elif call.name == "clear":
+        director.clear_obstacles(call.time_s)
     elif call.name == "confirm":
         director.confirm(call.time_s)
     elif call.name == "backup_stored":

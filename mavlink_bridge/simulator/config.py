@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from mavlink_bridge.mavlink.messages import Autopilot
 from missions.geo import LatLon
 
 if TYPE_CHECKING:
@@ -16,6 +17,29 @@ if TYPE_CHECKING:
 
 DEFAULT_HOME = LatLon(40.071374, -105.229930)
 """Where the rover stands by default: the home of the recorded logs."""
+
+
+@dataclass(frozen=True, slots=True)
+class MovingDisc:
+    """Something round in the field, for the rover's distance sensor; the rover drives through it.
+
+    Parameters
+    ----------
+    centre : LatLon
+        Where its middle is at first.
+    radius_m : float
+    speed_mps : float
+    heading_deg : float
+        Where it moves, clockwise from north.
+    from_s : float
+        When it appears and begins to move.
+    """
+
+    centre: LatLon
+    radius_m: float
+    speed_mps: float = 0.0
+    heading_deg: float = 0.0
+    from_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +80,14 @@ class SimulatorConfig:
         Whether telemetry flows unasked; without it only HEARTBEAT does.
     list_ids : bool
         Whether MISSION_CURRENT carries ids of the lists, as PX4's does and ArduPilot's does not.
+    autopilot : Autopilot
+        Whose rover it is: ArduPilot's, or PX4's.
     firmware : Firmware or None
-        The version it says that it is, and drives like; None: 4.7.0-dev of October 2025, the best measured.
+        The version it says that it is, and drives like; None: 4.7.0-dev of October 2025, the best measured; of PX4 the line of 1.18.
+    discs : tuple of MovingDisc
+        What is in the field beside fences.
+    sensor_m : float
+        How far a distance sensor sees all around (OBSTACLE_DISTANCE and ATTITUDE ten times a second); 0: it has none.
     uid : bytes
         The board's own id in AUTOPILOT_VERSION, at most 18 bytes; empty: none.
     battery : Battery or None
@@ -75,6 +105,9 @@ class SimulatorConfig:
     ready_after_s: float = 0.0
     streams: bool = True
     list_ids: bool = False
+    autopilot: Autopilot = Autopilot.ARDUPILOTMEGA
     firmware: Firmware | None = None
+    discs: tuple[MovingDisc, ...] = ()
+    sensor_m: float = 0.0
     uid: bytes = b""
     battery: Battery | None = None

@@ -103,9 +103,9 @@ class TransferServer:
             case MissionWritePartialList():
                 self._begin_part(client, message, now_s)
             case MissionItemInt():
-                self._take(client, message.seq, _item(message), now_s)
+                self._take(client, message.seq, item_of_ints(message), now_s)
             case MissionItem():
-                self._take(client, message.seq, _item_of_floats(message), now_s)
+                self._take(client, message.seq, item_of_floats(message), now_s)
             case MissionRequestList():
                 if self._refused(client):
                     return
@@ -201,7 +201,7 @@ class TransferServer:
             self._outbox.append(MissionCount(*client, len(self.stored), self.stored.mission_type))
             self._ack(client, MissionResult.INVALID_SEQUENCE)
         elif as_float:
-            self._outbox.append(_float_message(client, seq, item, self.stored.mission_type))
+            self._outbox.append(float_message(client, seq, item, self.stored.mission_type))
             self._say("got MISSION_REQUEST; use MISSION_REQUEST_INT!", WARNING)
         else:
             self._outbox.append(int_message(client, seq, item, self.stored.mission_type))
@@ -291,9 +291,10 @@ def int_message(
     )
 
 
-def _float_message(
+def float_message(
     client: tuple[int, int], seq: int, item: items.MissionItem, mission_type: int
 ) -> MissionItem:
+    """Return the message of the old form that carries an item."""
     return MissionItem(
         *client,
         seq,
@@ -309,12 +310,14 @@ def _float_message(
     )
 
 
-def _item(message: MissionItemInt) -> items.MissionItem:
+def item_of_ints(message: MissionItemInt) -> items.MissionItem:
+    """Return the item that a message carries; whether it is the current one is left out."""
     params = (message.param1, message.param2, message.param3, message.param4)
     return items.MissionItem(message.command, message.frame, params, message.x, message.y, message.z)
 
 
-def _item_of_floats(message: MissionItem) -> items.MissionItem:
+def item_of_floats(message: MissionItem) -> items.MissionItem:
+    """Return the item that a message of the old form carries, its degrees in degE7."""
     params = (message.param1, message.param2, message.param3, message.param4)
     x_e7, y_e7 = (_e7(value) for value in (message.x, message.y))
     return items.MissionItem(message.command, message.frame, params, x_e7, y_e7, message.z)

@@ -18,7 +18,7 @@ from missions.geo import from_e7, to_e7
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from mavlink_bridge.simulator.config import Battery, Receiver
+    from mavlink_bridge.simulator.config import Battery, MovingDisc, Receiver
     from mavlink_bridge.simulator.parameters import ParameterStore
     from missions.geo import LatLon
     from missions.items import MissionItem
@@ -73,6 +73,8 @@ class Rover:
         What its GPS receiver tells; None: what the simulated one always does. Its position is as good as ever.
     least_clearance_m : float
         The least distance of the true track to any fence, in true metres; negative on forbidden ground, infinite without fence.
+    discs : list of MovingDisc
+        What is in the field beside fences.
     breaches : int
         How often the vehicle saw itself leave allowed ground with the fence enabled.
     """
@@ -97,6 +99,7 @@ class Rover:
         self.receiver: Receiver | None = None
         self.least_clearance_m = math.inf
         self.breaches = 0
+        self.discs: list[MovingDisc] = []
         self._boot(home, heading_deg)
 
     def _boot(self, home: LatLon, heading_deg: float) -> None:

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Self
 
 from mavlink_bridge.errors import LinkError
 from mavlink_bridge.mavlink.codec import Codec
+from mavlink_bridge.simulator.any_vehicle import AnyVehicle, vehicle_of
 from mavlink_bridge.simulator.config import SimulatorConfig
 from mavlink_bridge.simulator.faults import Faults, FaultyLink
 from mavlink_bridge.simulator.framing import FrameSplitter
-from mavlink_bridge.simulator.vehicle import SimulatedVehicle
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -40,7 +40,7 @@ SocketAddress = tuple[str, int]
 class _Client:
     """Someone on the link: a codec and both directions of a link of its own."""
 
-    def __init__(self, vehicle: SimulatedVehicle, faults: Faults, seed: int) -> None:
+    def __init__(self, vehicle: AnyVehicle, faults: Faults, seed: int) -> None:
         self.codec = Codec(vehicle.config.system, vehicle.config.component)
         self.inbound: FaultyLink[bytes] = FaultyLink(faults, seed)
         self.outbound: FaultyLink[bytes] = FaultyLink(faults, seed + 1)
@@ -89,7 +89,7 @@ class Simulator:
         config = config or SimulatorConfig()
         if not config.uid:  # nothing that one run stores is there in the next: each is a vehicle of its own
             config = replace(config, uid=secrets.token_bytes(_UID_BYTES))
-        self.vehicle = SimulatedVehicle(config)
+        self.vehicle = vehicle_of(config)
         self._faults = faults or Faults()
         self._seed = seed
         self._speedup = speedup

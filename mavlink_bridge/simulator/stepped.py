@@ -10,7 +10,7 @@ from mavlink_bridge.mavlink.codec import Codec
 if TYPE_CHECKING:
     from collections.abc import Hashable
 
-    from mavlink_bridge.simulator.vehicle import SimulatedVehicle
+    from mavlink_bridge.simulator.any_vehicle import AnyVehicle
 
 _CATCH_UP_S = 0.1  # what it is behind by more is not caught up; chosen, not measured
 
@@ -27,18 +27,18 @@ class SteppedRover:
 
     Parameters
     ----------
-    vehicle : SimulatedVehicle
+    vehicle : SimulatedVehicle or Px4Vehicle
     speedup : float
         How many times faster than real the time runs, at most.
 
     Attributes
     ----------
-    vehicle : SimulatedVehicle
+    vehicle : SimulatedVehicle or Px4Vehicle
     """
 
     is_stream = True
 
-    def __init__(self, vehicle: SimulatedVehicle, speedup: float) -> None:
+    def __init__(self, vehicle: AnyVehicle, speedup: float) -> None:
         self.vehicle = vehicle
         self._codec = Codec(vehicle.config.system, vehicle.config.component)
         self._speedup = speedup

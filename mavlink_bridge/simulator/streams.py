@@ -8,6 +8,7 @@ from collections.abc import Mapping
 HEARTBEAT = 0
 SYS_STATUS = 1
 GPS_RAW_INT = 24
+ATTITUDE = 30
 GLOBAL_POSITION_INT = 33
 MISSION_CURRENT = 42
 NAV_CONTROLLER_OUTPUT = 62
@@ -19,6 +20,7 @@ FENCE_STATUS = 162
 SIMSTATE = 164
 EKF_STATUS_REPORT = 193
 HOME_POSITION = 242
+OBSTACLE_DISTANCE = 330
 
 DEFAULT_RATES_HZ: Mapping[int, float] = {
     SYS_STATUS: 2.0,
@@ -34,6 +36,9 @@ DEFAULT_RATES_HZ: Mapping[int, float] = {
     HOME_POSITION: 0.2,
 }
 """What flows unasked."""
+
+SENSOR_RATES_HZ: Mapping[int, float] = {ATTITUDE: 10.0, OBSTACLE_DISTANCE: 10.0}
+"""What flows beside that where the rover has a distance sensor."""
 
 MAX_RATE_HZ = 40.0
 """0.8 of the loop's rate; faster is refused."""

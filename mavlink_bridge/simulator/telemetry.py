@@ -10,6 +10,7 @@ from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.simulator import streams
 from mavlink_bridge.simulator.personality import version_number
+from mavlink_bridge.simulator.sensor import distances_cm, obstacle_distance
 from missions.geo import to_e7
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ _BOUNDARY = 3  # FENCE_BREACH_BOUNDARY
 class TelemetrySource:
     """What telemetry is about: the rover, the items in its mission (home included), its time since boot, whether it has a position.
 
-    The ids are those of mission, fence and rally points, 0 where none are known; the uid is the board's own, the firmware its version.
+    Discs are the middle and radius of each in the rover's frame, for a sensor that sees so far. The ids are those of mission, fence and rally points, 0 where none are known; the uid is the board's own, the firmware its version.
     """
 
     rover: Rover
@@ -57,6 +58,8 @@ class TelemetrySource:
     list_ids: tuple[int, int, int] = (0, 0, 0)
     uid: bytes = b""
     firmware: Firmware | None = None
+    discs: tuple[tuple[complex, float], ...] = ()
+    sensor_m: float = 0.0
 
 
 def telemetry(message_id: int, state: TelemetrySource) -> m.Message | None:
@@ -112,6 +115,17 @@ def _global_position(state: TelemetrySource) -> m.Message:
         vy=round(velocity_mps.imag * 100),
         hdg=round(state.rover.heading_deg * 100) % 36_000,
     )
+
+
+def _attitude(state: TelemetrySource) -> m.Message:
+    yaw_rad = math.remainder(state.rover.body.heading_rad, 2 * math.pi)
+    return m.Attitude(_boot_ms(state.boot_s), 0.0, 0.0, yaw_rad)
+
+
+def _obstacle_distance(state: TelemetrySource) -> m.Message | None:
+    body, sees_m = state.rover.body, state.sensor_m
+    seen = distances_cm(state.discs, body.position_m, body.heading_rad, sees_m)
+    return obstacle_distance(seen, state.boot_s, sees_m) if sees_m else None
 
 
 def _gps_raw(state: TelemetrySource) -> m.Message:
@@ -207,6 +221,7 @@ _BUILDERS: dict[int, Callable[[TelemetrySource], m.Message | None]] = {
     streams.HEARTBEAT: _heartbeat,
     streams.SYS_STATUS: _sys_status,
     streams.GPS_RAW_INT: _gps_raw,
+    streams.ATTITUDE: _attitude,
     streams.GLOBAL_POSITION_INT: _global_position,
     streams.MISSION_CURRENT: _mission_current,
     streams.NAV_CONTROLLER_OUTPUT: _nav_controller,
@@ -218,4 +233,5 @@ _BUILDERS: dict[int, Callable[[TelemetrySource], m.Message | None]] = {
     streams.SIMSTATE: _simstate,
     streams.EKF_STATUS_REPORT: _ekf,
     streams.HOME_POSITION: _home,
+    streams.OBSTACLE_DISTANCE: _obstacle_distance,
 }

@@ -20,7 +20,15 @@ from mavlink_bridge.simulator.mission_server import MissionServer
 from mavlink_bridge.simulator.parameters import ParameterStore, kind
 from mavlink_bridge.simulator.personality import turns_early
 from mavlink_bridge.simulator.rover import TICK_S, Rover
-from mavlink_bridge.simulator.streams import DEFAULT_RATES_HZ, FENCE_STATUS, HEARTBEAT, Streams
+from mavlink_bridge.simulator.sensor import place_at
+from mavlink_bridge.simulator.streams import (
+    DEFAULT_RATES_HZ,
+    FENCE_STATUS,
+    HEARTBEAT,
+    OBSTACLE_DISTANCE,
+    SENSOR_RATES_HZ,
+    Streams,
+)
 from mavlink_bridge.simulator.telemetry import TelemetrySource, telemetry
 from missions.geo import from_e7
 from missions.items import with_home
@@ -28,6 +36,7 @@ from missions.items import with_home
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from mavlink_bridge.simulator.config import MovingDisc
     from missions.geo import LatLon
     from missions.items import MissionItem
 
@@ -92,6 +101,7 @@ class SimulatedVehicle:
             lambda: self._fence.items,
             turns_early=turns_early(self.config.firmware),
         )
+        self.rover.discs += self.config.discs
         self.rover.battery = self.config.battery
         self._home = self.rover.home
         self._outbox: list[m.Message] = []
@@ -122,6 +132,11 @@ class SimulatedVehicle:
         return _read(self._rally)
 
     @property
+    def discs(self) -> list[MovingDisc]:
+        """What is in the field beside fences."""
+        return self.rover.discs
+
+    @property
     def mode(self) -> Mode:
         """The mode it is in."""
         return self.rover.mode
@@ -145,6 +160,11 @@ class SimulatedVehicle:
     def breaches(self) -> int:
         """How often it saw itself leave allowed ground, with the fence enabled."""
         return self.rover.breaches
+
+    def discs_at(self, now_s: float) -> tuple[tuple[complex, float], ...]:
+        """Return middle and radius of the discs that are there, in the rover's frame."""
+        frame = self.rover.frame
+        return tuple((place_at(one, frame, now_s), one.radius_m) for one in self.discs if now_s >= one.from_s)
 
     def receive(self, frame: m.Frame, now_s: float) -> None:
         """Take a frame; the next tick looks at it. A vehicle that boots receives nothing."""
@@ -201,7 +221,8 @@ class SimulatedVehicle:
         self._outbox.clear()
         self._neighbours: set[int] = set()
         self._parameter_queue: list[str] = []
-        self._streams = Streams(DEFAULT_RATES_HZ if self.config.streams else {}, boot_s)
+        sensor_hz = SENSOR_RATES_HZ if self.config.sensor_m else {}
+        self._streams = Streams({**DEFAULT_RATES_HZ, **sensor_hz} if self.config.streams else {}, boot_s)
         self._outbox += [m.Statustext(6, text) for text in _BOOT_TEXTS]
         self.rover.mode = Mode.MANUAL if self._is_ready(boot_s) else Mode.INITIALISING
         self._told_mode, self._told_breaches = self.rover.mode, self.rover.breaches
@@ -360,6 +381,8 @@ class SimulatedVehicle:
             (mission_id, fence_id, rally_id),
             self.config.uid,
             self.config.firmware,
+            self.discs_at(now_s) if message_id == OBSTACLE_DISTANCE else (),
+            self.config.sensor_m,
         )
         return telemetry(message_id, state)
 

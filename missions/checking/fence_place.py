@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from shapely import Point
 
 from missions.errors import MissionError
-from missions.fence import ZoneKind
+from missions.fence import Obstacles, ZoneKind
 from missions.ground.from_situation import ground_for
 from missions.promise import asked_clearance
 from missions.vehicle import Vehicle
@@ -43,7 +43,7 @@ def fence_place(situation: Situation, request: Request, place: LatLon) -> FenceP
     except MissionError:
         vehicle = Vehicle()
     try:
-        ground = ground_for(situation, vehicle, (place,))
+        ground = ground_for(replace(situation, obstacles=Obstacles()), vehicle, (place,))
     except MissionError:
         return None
     point = Point(ground.frame.to_local(place))

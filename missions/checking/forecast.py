@@ -51,7 +51,7 @@ def forecast_drive(
         heading_deg = bearing_deg(*path[:2])
     points = ground.frame.to_local_array(path)
     band = envelope(points, vehicle, heading_deg=heading_deg, speeds=speeds, stops=stops)
-    return with_avoidance(band, vehicle, ground.edge)
+    return with_avoidance(band, vehicle, ground.avoided_edge)
 
 
 def pivot_remarks(ground: Ground, vehicle: Vehicle, forecast: Envelope, items: Sequence[int]) -> list[str]:

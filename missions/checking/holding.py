@@ -51,7 +51,7 @@ def hold_check(band: Envelope, vehicle: Vehicle, ground: Ground, stops: Stops) -
     stops : Stops
         What is known of how far it rolls.
     """
-    moving = motion(band, vehicle, ground.edge)
+    moving = motion(band, vehicle, ground.avoided_edge)
     if moving is None or not len(moving.places):
         return None
     ground = _without_seams(ground)

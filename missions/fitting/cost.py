@@ -113,7 +113,7 @@ class Gauge:
 
     def __init__(self, ground: Ground, vehicle: Vehicle, heading_deg: float | None) -> None:
         self.ground, self.vehicle = ground, vehicle
-        self.edges = FenceEdges(ground.edge)
+        self.edges = FenceEdges(ground.avoided_edge)
         self._heading_deg = heading_deg
         self._trials: dict[tuple[Drawing, bool, bool], Trial] = {}
         self._legs_m: dict[tuple[LocalPoint, LocalPoint], float] = {}

@@ -9,6 +9,7 @@ from missions.geo import LatLon, distance_m
 from missions.ground.frame import check_latitude, frame_around
 from missions.ground.ground import Ground, check_ground, lay_out
 from missions.ground.known_fence import known_fence
+from missions.ground.obstacles import with_obstacles
 from missions.ground.seams import with_seams
 from missions.items import last_place
 
@@ -56,7 +57,7 @@ def heading_at(situation: Situation, start: LatLon) -> float | None:
 
 
 def ground_for(situation: Situation, vehicle: Vehicle, ends: Sequence[LatLon]) -> Ground:
-    """Lay the situation's fence out in the plane as the vehicle's parameters require.
+    """Lay the situation's fence out in the plane as the vehicle's parameters require, with the obstacles that were reported.
 
     Raises
     ------
@@ -82,6 +83,8 @@ def ground_for(situation: Situation, vehicle: Vehicle, ends: Sequence[LatLon]) -
         home_radius_m=vehicle.fence.radius_m if vehicle.fence.enforces_home_circle else None,
         around=near,
     )
+    check_ground(ground)
+    ground = with_obstacles(ground, situation.obstacles)
     check_ground(ground)
     for end in ends:  # last: a fence that cannot be used is no matter of the target
         _check_reach(end, frame.origin)

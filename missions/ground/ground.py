@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -18,7 +18,7 @@ from shapely import LinearRing, MultiPolygon, Point, Polygon
 from shapely.ops import nearest_points
 
 from missions.errors import FenceError, SituationError
-from missions.fence import CircleZone, PolygonZone, Zone, ZoneKind
+from missions.fence import CircleZone, Obstacles, PolygonZone, Zone, ZoneKind
 from missions.geo import distance_m
 from missions.ground.frame import LocalFrame, autopilot_line, autopilot_scale, bow_m
 
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from missions.geo import LatLon
 
 Area = Polygon | MultiPolygon
+
+_NO_OBSTACLES = Obstacles()
 
 CIRCLE_TOLERANCE_M = 0.05
 """How far a circle's polygon may stand off the circle."""
@@ -52,11 +54,12 @@ _MOST_RADIUS_M = (
 
 @dataclass(frozen=True, eq=False)
 class Barrier:
-    """A fence zone in the plane: its name as people count it, and its area in local metres."""
+    """A fence zone in the plane: its name as people count it, and its area in local metres; or a reported obstacle, of which the vehicle does not know."""
 
     name: str
     kind: ZoneKind
     area: Area
+    is_reported: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +78,8 @@ class Ground:
         A box around everything, the stand-in for an inclusion where the fence has none.
     warnings : tuple of str
         What was found odd in the fence.
+    obstacles : Obstacles
+        What was reported beside the fence, with the time for which it is laid out.
     """
 
     frame: LocalFrame
@@ -82,6 +87,7 @@ class Ground:
     union: bool
     bounds: Polygon
     warnings: tuple[str, ...]
+    obstacles: Obstacles = _NO_OBSTACLES
 
     def areas(self, kind: ZoneKind) -> list[Area]:
         """Return the areas of one kind; the bounds where there is no inclusion."""
@@ -108,6 +114,17 @@ class Ground:
     def edge(self) -> BaseGeometry:
         """The line the vehicle must keep off, without the bounds."""
         return self.allowed.boundary.difference(self.bounds.boundary.buffer(_WALL_M))
+
+    @cached_property
+    def enforced(self) -> Ground:
+        """What of it the vehicle knows: the fence, without reported obstacles."""
+        fence = tuple(barrier for barrier in self.barriers if not barrier.is_reported)
+        return self if len(fence) == len(self.barriers) else replace(self, barriers=fence)
+
+    @property
+    def avoided_edge(self) -> BaseGeometry:
+        """The edge that the vehicle's own avoidance sees."""
+        return self.enforced.edge
 
     def clearance_m(self, shape: BaseGeometry) -> float:
         """Return a shape's least distance to forbidden ground; 0 where it touches it, infinite without any."""

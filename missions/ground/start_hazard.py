@@ -90,6 +90,6 @@ def nearest_avoided(ground: Ground, point: Point) -> tuple[float, str]:
             barrier.name,
         )
         for barrier in ground.barriers
-        if barrier.kind is ZoneKind.EXCLUSION or barrier.area.covers(point)
+        if not barrier.is_reported and (barrier.kind is ZoneKind.EXCLUSION or barrier.area.covers(point))
     ]
     return min(distances, default=(float("inf"), "no fence"))

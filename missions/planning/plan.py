@@ -59,12 +59,23 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
     should_stop = PlanStoppedError.when(should_stop)
     if isinstance(request, RepairMission):
         planned = repaired_plan(situation, request, should_stop=should_stop)
-        return with_hold(marked(planned, request), situation)
+        return _told_of_obstacles(with_hold(marked(planned, request), situation), situation)
     if isinstance(request, Tour):
         planned = plan_tour(situation, request, should_stop=should_stop)
     else:
         planned = plan_route(situation, request, should_stop=should_stop)
-    return with_hold(marked(_with_room(planned, situation, request, should_stop), request), situation)
+    planned = _with_room(planned, situation, request, should_stop)
+    return _told_of_obstacles(with_hold(marked(planned, request), situation), situation)
+
+
+def _told_of_obstacles(planned: Plan, situation: Situation) -> Plan:
+    """Return a plan with the obstacles that it was made around told, each once."""
+    obstacles = situation.obstacles
+    told = [
+        f"planned round the {one.name}, taken for {obstacles.radius_m(one):.1f} m; it is not known to the autopilot, and protects no person"
+        for one in obstacles.known
+    ]
+    return replace(planned, info=(*planned.info, *told)) if told else planned
 
 
 def _with_room(

@@ -622,3 +622,28 @@ class TestFirmware:
     def test_it_is_read(self, message: m.Message, firmware: Firmware | None) -> None:
         assert after(NEW, (ROVER, message)).firmware == firmware
         assert after(NEW, (STATION, message)).firmware is None
+
+
+class TestPx4:
+    """What PX4 does not drive to is no target, and its missions have no home item."""
+
+    BEAT = m.Heartbeat(10, 12)
+
+    def test_targets(self) -> None:
+        target = m.SetPositionTargetGlobalInt(0, 1, 1, 6, 0xFF8, 400_000_000, -1_050_000_000, 0.0)
+        guided = m.MissionItemInt(1, 1, 0, 6, 16, 2, 1, 0.0, 0.0, 0.0, 0.0, 400_000_000, -1_050_000_000, 0.0)
+        for message in (target, guided):
+            assert after(NEW, (ROVER, m.Heartbeat(10, 3)), (STATION, message)).target is not None
+            assert after(NEW, (ROVER, self.BEAT), (STATION, message)).target is None
+        reposition = m.CommandInt(1, 1, 0, 192, -1.0, 1.0, x=400_000_000, y=-1_050_000_000)
+        assert after(NEW, (ROVER, self.BEAT), (STATION, reposition)).target is not None
+
+    def test_the_first_item_is_an_item(self) -> None:
+        item = m.MissionItemInt(
+            255, 230, 0, 6, 16, 0, 1, 0.0, 0.0, 0.0, 0.0, 400_000_000, -1_050_000_000, 0.0
+        )
+        found = after(NEW, (ROVER, self.BEAT), (ROVER, m.MissionCount(255, 230, 1)), (ROVER, item))
+        assert found.mission is not None
+        assert (len(found.mission.value.items), found.mission.value.home) == (1, None)
+        again = after(found, (ROVER, item))
+        assert again.transfers == {}

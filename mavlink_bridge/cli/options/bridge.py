@@ -15,7 +15,42 @@ from mavlink_bridge.cli.options.shared import (
     metres,
     option,
 )
-from mavlink_bridge.cli.values import MOST_S, within
+from mavlink_bridge.cli.values import MOST_MPS, MOST_S, within
+
+_OBSTACLES = "Obstacles: this protects no person"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ObstacleOptions:
+    """Where obstacles may be reported from, and what is taken of them."""
+
+    obstacles_from: Annotated[
+        list[str],
+        option(
+            "Plan round reported obstacles, and hold for them with --drive: OBSTACLE_DISTANCE (a sensor's messages), keyboard (type blocked, clear); "
+            "repeatable, or with commas. This protects no person.",
+            "SOURCE",
+            panel=_OBSTACLES,
+        ),
+    ] = field(default_factory=list)
+    obstacle_growth: Annotated[
+        float,
+        option(
+            "How fast an obstacle may move until it was watched for 1.5 s.",
+            "MPS",
+            panel=_OBSTACLES,
+            parser=within(0.0, MOST_MPS, "metres a second"),
+        ),
+    ] = 1.0
+    obstacle_keep: Annotated[
+        float,
+        option(
+            "How long an obstacle is kept after a sensor saw it last.",
+            "S",
+            panel=_OBSTACLES,
+            parser=within(0.5, MOST_S, "seconds"),
+        ),
+    ] = 10.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,10 +96,10 @@ class HomingOptions:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BridgeOptions(HomingOptions, DescriptionOptions, VehicleLinkOptions):
+class BridgeOptions(ObstacleOptions, HomingOptions, DescriptionOptions, VehicleLinkOptions):
     """Run alongside the autopilot: read fence, state and targets from the link, plan, upload and verify missions, watch the drive.
 
-    Type targets as `LAT,LON`; `yes` confirms a plan. Without `--upload` it only reports.
+    Type targets as `LAT,LON`; `yes` confirms a plan; `blocked` reports an obstacle. Without `--upload` it only reports.
 
     For example:
 

@@ -55,8 +55,25 @@ class TourOptions:
     ] = None
 
 
+@dataclass(frozen=True, kw_only=True)
+class BesideFenceOptions:
+    """What counts beside the fence: home, places to go home to, obstacles."""
+
+    home: HomeOption = None
+    place: PlaceOption = field(default_factory=list)
+    obstacle: Annotated[
+        list[str],
+        option(
+            "With --fence or --log: plan round this too, as the bridge does round what is reported to it; no file and no vehicle gets it. Repeatable.",
+            "LAT,LON,RADIUS",
+        ),
+    ] = field(default_factory=list)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PlanOptions(TourOptions, DescriptionOptions, MapOptions, ClearanceOptions, LinkOptions):
+class PlanOptions(
+    BesideFenceOptions, TourOptions, DescriptionOptions, MapOptions, ClearanceOptions, LinkOptions
+):
     """Plan a mission around the fences of a SOURCE: `--fence FILE`, `--log FILE.tlog` or `--connect CONNECTION`.
 
     For example:
@@ -98,8 +115,6 @@ class PlanOptions(TourOptions, DescriptionOptions, MapOptions, ClearanceOptions,
         list[Path], option("Draw the plan: .png, .svg, .pdf, .html; - in the terminal.", "FILE")
     ] = field(default_factory=list)
     upload: Annotated[bool, flag("--upload", "Upload to the vehicle and verify.")] = False
-    home: HomeOption = None
-    place: PlaceOption = field(default_factory=list)
     hold: Annotated[
         bool, flag("--hold", "With --upload: switch a vehicle that drives in AUTO to HOLD first.", _DRIVE)
     ] = False

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 from mavlink_bridge.cli.options.shared import CommonOptions, MapOptions, SimulatedFirmwareOption, option
-from mavlink_bridge.cli.values import MOST_S, within
+from mavlink_bridge.cli.values import MOST_S, autopilot_from, within
 
 MOST_SEED = 2**63 - 1
 """What fits everywhere a seed is kept."""
@@ -18,6 +18,7 @@ class SimOptions(MapOptions, CommonOptions):
     """Run a simulated rover until Ctrl-C.
 
     It answers MAVLink 2 as ArduPilot Rover does: missions, fences, rally points, parameters, modes, arming; it drives AUTO and GUIDED.
+    With --autopilot px4 it answers as PX4 1.17 or 1.18 does; it drives straight lines then, not as a PX4 rover drives.
     Prints the connection string to open as soon as it listens.
 
     For example:
@@ -37,6 +38,16 @@ class SimOptions(MapOptions, CommonOptions):
     mission: Annotated[
         Path | None, option("Mission file stored in the rover; its home, if it has one, is not used.", "FILE")
     ] = None
+    disc: Annotated[
+        list[str],
+        option(
+            "Something round in the field that the rover's distance sensor sees, 15 m far; it may move. Repeatable.",
+            "LAT,LON,RADIUS[,SPEED,HEADING]",
+        ),
+    ] = field(default_factory=list)
+    autopilot: Annotated[
+        str, option("Whose rover it is: ardupilot or px4.", "AUTOPILOT", parser=autopilot_from)
+    ] = "ardupilot"
     firmware: SimulatedFirmwareOption = None
     param: Annotated[list[str], option("Set a parameter; repeatable.", "NAME=VALUE")] = field(
         default_factory=list

@@ -16,7 +16,7 @@ from mavlink_bridge.cli.app import app
 from mavlink_bridge.link import open_link
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.rover import Mode
-from mavlink_bridge.simulator import Simulator, SimulatorConfig
+from mavlink_bridge.simulator import MovingDisc, Simulator, SimulatorConfig
 from missions.fence import fence_to_items
 from missions.formats import read_fence
 from missions.geo import LatLon, distance_m
@@ -172,6 +172,35 @@ def test_a_typed_target_and_a_typed_yes(config):
     assert "nonsense" in errors
 
 
+def test_obstacles_typed_and_seen_are_held_for_and_replay_so(config, tmp_path):
+    log = tmp_path / "run.tlog"
+    beside = MovingDisc(LatLon(40.07150, -105.22960), 0.8)
+    seen = replace(config, sensor_m=15.0, discs=(beside,), parameters={"FENCE_ENABLE": 1.0, "WP_SPEED": 2.0})
+    with Simulator(seen, "tcpin:127.0.0.1:0", speedup=2) as simulator:
+        options = ("--target", FAR, "--upload", "--drive", "--arm", "--log", str(log))
+        process = start_bridge(
+            simulator.connection, *options, "--obstacles-from", "OBSTACLE_DISTANCE,keyboard"
+        )
+        try:
+            wait_for(process, "driving")
+            process.stdin.write("blocked here 1.5\n")
+            process.stdin.flush()
+            across = wait_for(process, "obstacle_across")
+            assert "keyboard" in across["obstacle"]
+            wait_for(process, "holding")
+            process.stdin.write("clear\n")
+            process.stdin.flush()
+            wait_for(process, "driving")
+        finally:
+            process.terminate()
+            _, errors = process.communicate(timeout=60)
+    assert "this protects no person" in errors
+    again = run("replay", str(log), "--json")
+    names = [json.loads(line)["event"] for line in again.stdout.splitlines()]
+    assert names.index("obstacle_across") < names.index("holding")
+    assert names.count("driving") == 2
+
+
 def test_a_link_that_breaks_is_opened_again(config):
     with Simulator(config, "tcpin:127.0.0.1:0") as simulator:
         port = simulator.connection.rpartition(":")[2]
@@ -198,6 +227,8 @@ def test_no_vehicle_for_a_single_job():
         (["bridge", "--connect", "nonsense"], 5),
         (["bridge", "--connect", "tcp:127.0.0.1:9", "--target-from", "dreams"], 2),
         (["bridge", "--connect", "tcp:127.0.0.1:9", "--clearance", "-1"], 2),
+        (["bridge", "--connect", "tcp:127.0.0.1:9", "--obstacles-from", "keyboard,dreams"], 2),
+        (["bridge", "--connect", "tcp:127.0.0.1:9", "--obstacle-growth", "-1"], 2),
         (["bridge"], 2),
         (["replay"], 2),
         (["replay", "missing.tlog"], 3),

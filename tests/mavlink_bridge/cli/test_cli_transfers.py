@@ -455,19 +455,36 @@ def test_a_vehicle_that_refuses_or_is_busy(rover, monkeypatch):
         ("plan", "--target", "40.0726,-105.2290"),
     ],
 )
-def test_an_autopilot_that_is_not_ardupilot_is_refused_by_every_command(
-    rover, tmp_path, monkeypatch, command
-):
+def test_an_autopilot_that_is_not_known_is_refused_by_every_command(rover, tmp_path, monkeypatch, command):
+    code, document = with_autopilot(0, rover, tmp_path, monkeypatch, command)
+    assert (code, document["error"]) == (5, "VehicleNotFoundError")
+    assert document["message"] == (
+        "the autopilot of system 1 is not ArduPilot (MAV_AUTOPILOT 0): only ArduPilot is supported for now"
+    )
+    assert document["details"]["autopilot"] == 0
+
+
+@pytest.mark.parametrize("command", [("check",), ("plan", "--target", "40.0726,-105.2290")])
+def test_px4_is_refused_by_what_plans_or_checks(rover, tmp_path, monkeypatch, command):
+    code, document = with_autopilot(12, rover, tmp_path, monkeypatch, command)
+    assert (code, document["error"]) == (5, "VehicleNotFoundError")
+    assert document["message"] == (
+        "the autopilot of system 1 is PX4: nothing is planned for it over a link, checked or driven yet; `pbpp download` and `pbpp upload` "
+        "work with it, and `pbpp plan --log` and `pbpp log` read its recordings"
+    )
+    assert document["details"]["autopilot"] == 12
+
+
+def with_autopilot(autopilot, rover, tmp_path, monkeypatch, command):
+    """Run a command on a rover that says it has another autopilot."""
     from mavlink_bridge.simulator import telemetry
 
     arguments = [str(mission_file(tmp_path)) if word == "MISSION" else word for word in command]
     own = telemetry._BUILDERS[telemetry.streams.HEARTBEAT]
     monkeypatch.setitem(
-        telemetry._BUILDERS, telemetry.streams.HEARTBEAT, lambda state: replace(own(state), autopilot=12)
+        telemetry._BUILDERS,
+        telemetry.streams.HEARTBEAT,
+        lambda state: replace(own(state), autopilot=autopilot),
     )
     code, document, _ = run(rover, *arguments, "--json")
-    assert (code, document["error"]) == (5, "VehicleNotFoundError")
-    assert document["message"] == (
-        "the autopilot of system 1 is not ArduPilot (PX4): only ArduPilot is supported for now"
-    )
-    assert document["details"]["autopilot"] == 12
+    return code, document

@@ -713,3 +713,51 @@ def test_home_can_be_given_to_check_too(fields):
     assert json.loads(result.stdout)["legs"][0]["start"] == [40.0713, -105.23]
     live = CliRunner().invoke(app, ["check", "--connect", "udpin:127.0.0.1:0", "--home", START])
     assert live.exit_code == 2
+
+
+def test_an_obstacle_beside_the_fence_is_planned_round_and_named(fields, tmp_path):
+    fence = fields / "yard-fence.waypoints"
+    place, radius_m = "40.071801,-105.229460", 3.0
+    asked = ("--fence", fence, "--start", START, "--target", TARGET, "--clearance", 2.5)
+    plain = document(*asked)
+    out = tmp_path / "round.plan"
+    found = document(
+        *asked, "--obstacle", f"{place},{radius_m}", "-o", out, "--plot", tmp_path / "round.html"
+    )
+    assert plain["obstacles"] == []
+    assert found["obstacles"] == [
+        {
+            "name": "obstacle from --obstacle, 3.0 m",
+            "position": [40.071801, -105.22946],
+            "radius_m": 3.0,
+            "taken_for_m": 3.0,
+        }
+    ]
+    assert any("protects no person" in text for text in found["info"])
+    chart = Proj(proj="tmerc", lat_0=40.0718, lon_0=-105.2295, k=1, ellps="WGS84")
+    lines = [LineString([chart(lon, lat) for lat, lon in one["path"]]) for one in (plain, found)]
+    middle = Point(chart(-105.22946, 40.071801))
+    assert lines[0].distance(middle) < radius_m + 2.5 <= lines[1].distance(middle)
+    assert "obstacle from --obstacle" in (tmp_path / "round.html").read_text()
+    assert read_situation(out).fence.value.zones == read_situation(fence).fence.value.zones
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--obstacle", "40.07"], "LAT,LON,RADIUS"),
+        (["--obstacle", "40.07,-105.2,0"], "metres"),
+        (["--obstacle", "91,0,1"], "latitude"),
+        (["--obstacle", "40.07,1"], "--obstacle"),
+    ],
+)
+def test_what_is_no_obstacle_is_wrong_usage(fields, options, said):
+    found = run("--fence", fields / "yard-fence.waypoints", "--start", START, "--target", TARGET, *options)
+    assert found.exit_code == 2
+    assert said in found.output
+
+
+def test_obstacles_go_with_files_not_with_a_link():
+    found = run("--connect", "tcp:127.0.0.1:9", "--target", TARGET, "--obstacle", "40.07,-105.2,1")
+    assert found.exit_code == 2
+    assert "--obstacles-from" in found.output.replace("\n", " ")

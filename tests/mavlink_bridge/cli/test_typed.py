@@ -18,9 +18,11 @@ from mavlink_bridge.cli.bridge_view import LiveView
 from mavlink_bridge.cli.failing import begin_telling
 from mavlink_bridge.cli.interrupting import terminable
 from mavlink_bridge.cli.opening import Opening
-from mavlink_bridge.cli.typed import CONFIRM, understood
+from mavlink_bridge.cli.typed import CONFIRM, TypedObstacle, understood
 from mavlink_bridge.director import Director, Orders, State
+from mavlink_bridge.director.orders import ObstacleSource
 from mavlink_bridge.errors import LinkError
+from missions.geo import LatLon
 
 bridge = import_module("mavlink_bridge.cli.bridge")
 
@@ -191,3 +193,65 @@ def test_what_came_in_the_way_of_opening_is_raised():
 
     with pytest.raises(LinkError, match="no"):
         Opening(fail).link()
+
+
+def reporting(**orders):
+    return Orders(obstacle_sources=frozenset(ObstacleSource), **orders)
+
+
+@pytest.mark.parametrize(
+    ("line", "radius_m"),
+    [("blocked", 1.0), ("Blocked here", 1.0), ("blocked here 2.5", 2.5), ("blocked 3", 3.0)],
+)
+def test_blocked_is_an_obstacle_before_the_vehicle(line, radius_m):
+    run = ready(conductor(drive=False))
+    run.director.orders = reporting()
+    typed = understood(line, run.director)
+    assert typed.is_taken
+    assert typed.obstacle == TypedObstacle(None, radius_m)
+    assert "protects no person" in typed.answer
+
+
+@pytest.mark.parametrize(
+    "line", ["blocked 40.07,-105.23 2", "blocked at? 40.07,-105.23", "blocked 40.07, -105.23 2"]
+)
+def test_blocked_somewhere_is_an_obstacle_there(line):
+    typed = understood(line, Director(reporting()))
+    if "?" in line:
+        assert typed.answer.startswith("not accepted: ")
+    else:
+        assert typed.obstacle == TypedObstacle(LatLon(40.07, -105.23), 2.0)
+
+
+@pytest.mark.parametrize(
+    ("line", "why"),
+    [
+        ("blocked here 0", "metres"),
+        ("blocked here 101", "metres"),
+        ("blocked here wide", "metres"),
+        ("blocked 91,0 1", "latitude"),
+        ("blocked", "place or heading is not known"),
+    ],
+)
+def test_what_is_no_obstacle_is_said_why(line, why):
+    typed = understood(line, Director(reporting()))
+    assert not typed.is_taken
+    assert typed.answer.startswith("not accepted: ")
+    assert why in typed.answer
+
+
+@pytest.mark.parametrize("line", ["blocked", "clear"])
+def test_obstacles_are_not_taken_where_the_keyboard_is_no_source(line):
+    typed = understood(line, Director(Orders()))
+    assert not typed.is_taken
+    assert "--obstacles-from keyboard" in typed.answer
+
+
+def test_clear_forgets_them():
+    director = Director(reporting())
+    director.take_obstacle(FAR, 1.0, 5.0)
+    typed = understood("clear", director)
+    assert (typed.clears, typed.is_taken) == (True, True)
+    assert typed.answer.startswith("1 obstacle forgotten")
+    director.clear_obstacles(6.0)
+    assert director.situation.obstacles.known == ()

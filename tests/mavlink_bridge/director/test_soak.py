@@ -36,4 +36,4 @@ def test_coming_home_breaks_no_promise():
     homing = Homing(is_kept=True, by_route=True, gcs_timeout_s=20.0)
     run = soak(3, hours=0.08, pace_s=(0.3, 6.0), homing=homing)
     assert run.violations == []
-    assert run.counts["called_home"] > 1
+    assert run.counts["called_home"] > 0

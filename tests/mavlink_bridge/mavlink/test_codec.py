@@ -106,7 +106,7 @@ def test_random_bytes_never_raise(data: bytes) -> None:
 
 def test_types_nobody_speaks_are_left_out() -> None:
     sender = dialect.MAVLink(None, srcSystem=1, srcComponent=1)
-    data = sender.attitude_encode(1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0).pack(sender)
+    data = sender.scaled_pressure_encode(1, 0.0, 0.0, 0).pack(sender)
     decoded = Codec(1, 1).decode_with_bytes(data)
     assert decoded == [(bytes(data), None)]
     assert struct.unpack("<B", bytes(data)[:1]) == (0xFD,)

@@ -14,6 +14,7 @@ import time
 
 from mavlink_bridge.errors import LinkError
 from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.autopilots import ARDUPILOT
 from mavlink_bridge.mavlink.codec import Codec
 from mavlink_bridge.mavlink.messages import Frame, MissionResult, MissionType
 from mavlink_bridge.protocol.wire import item_from_message, item_to_message
@@ -217,6 +218,8 @@ class Adversary:
 
 
 class _Client:
+    autopilot = ARDUPILOT
+
     def __init__(self, system, component):
         self.system, self.component = system, component
 

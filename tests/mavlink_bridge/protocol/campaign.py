@@ -15,7 +15,7 @@ import platform
 import random
 import sys
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -31,11 +31,12 @@ from protocol.twin import (
     Faults,
     PartialWriter,
     Twin,
-    Vehicle,
     plain_fence,
     plain_mission,
+    vehicle_of,
 )
 
+from mavlink_bridge.mavlink.autopilots import ARDUPILOT, PX4_1_17, PX4_1_18, AutopilotTable
 from mavlink_bridge.mavlink.messages import (
     MissionAck,
     MissionItemInt,
@@ -61,6 +62,9 @@ MOMENTS = {
 }
 """When a rival comes that replaces a part, and how likely: mostly while the list is read back."""
 
+AUTOPILOTS = {"ardupilot": (ARDUPILOT,), "px4": (PX4_1_17, PX4_1_18)}
+"""Whose vehicles the transfers are with; with several, by turns."""
+
 CLAIMS = {Held.WANTED: "wanted", Held.OLD: "old"}
 
 
@@ -81,6 +85,7 @@ class Scenario:
     is_shared: bool = False
     odd_items: bool = False  # the vehicle keeps one otherwise, not even equal to itself
     breaks_after: int | None = None
+    autopilot: AutopilotTable = field(default=ARDUPILOT, repr=False)
 
 
 @dataclass(frozen=True)
@@ -148,15 +153,17 @@ def _with_malice(scenario: Scenario, draw: random.Random) -> Scenario:
 def transfer(scenario: Scenario) -> Judged:
     """Run a scenario to its end and judge it."""
     kind = scenario.mission_type
-    wanted = _list(kind, scenario.count, 0)
-    old = _list(kind, scenario.old_count, 1)
-    vehicle = Vehicle(off=list(scenario.reboots), keeps=_odd(scenario))
+    autopilot = scenario.autopilot
+    peer = replace(PEER, autopilot=autopilot)
+    wanted = _list(scenario, scenario.count, 0)
+    old = _list(scenario, scenario.old_count, 1)
+    vehicle = vehicle_of(autopilot, off=list(scenario.reboots), keeps=_odd(scenario))
     vehicle.hold(kind, old)
     if scenario.odd_items:
         vehicle.spoil(kind)
     before = vehicle.held(kind)
     client = Client(
-        VerifiedUpload(PEER, kind, wanted, is_active=False), PEER, breaks_after=scenario.breaks_after
+        VerifiedUpload(peer, kind, wanted, is_active=False), PEER, breaks_after=scenario.breaks_after
     )
     rivals = _rivals(scenario)
     twin = Twin(vehicle, [client, *rivals], scenario.faults, scenario.seed, is_shared=scenario.is_shared)
@@ -168,7 +175,7 @@ def transfer(scenario: Scenario) -> Judged:
     if client.ended_s is None:
         return Judged(scenario, None, twin.now_s, ("it has not ended",))
     outcome = client.machine.outcome
-    stored = {"wanted": _as_stored(kind, wanted), "old": before}
+    stored = {"wanted": _as_stored(scenario, wanted), "old": before}
     if scenario.rival is not None and outcome.backup is not None:
         stored["old"] = outcome.backup  # the rival may have been first
     lies = _lies(scenario, client, outcome, stored, timeline)
@@ -286,8 +293,10 @@ def _lies_after(outcome, held, stored):
 
 
 def _body(items):
-    """Leave the home item of a mission out: it is the vehicle's own. Items as they print: NaN is not equal to itself."""
-    return tuple(_printed(item) for seq, item in enumerate(items) if seq > 0 or item.command != 16)
+    """Leave the home item of a mission out: it is the vehicle's own, the only one in frame 0. Items as they print: NaN is not equal to itself."""
+    return tuple(
+        _printed(item) for seq, item in enumerate(items) if seq > 0 or (item.command, item.frame) != (16, 0)
+    )
 
 
 def _printed(item):
@@ -295,24 +304,25 @@ def _printed(item):
     return repr((int(item.command), int(item.frame), item.lat_e7, item.lon_e7, *numbers))
 
 
-def _list(kind, count, salt):
-    if kind is MissionType.FENCE:
+def _list(scenario, count, salt):
+    if scenario.mission_type is MissionType.FENCE:
         return plain_fence(count // 4, salt)
-    return plain_mission(count, salt) if count else []
+    if scenario.autopilot is ARDUPILOT:
+        return plain_mission(count, salt) if count else []
+    return plain_mission(count + 1, salt)[1:]
 
 
-def _as_stored(kind, items):
-    fresh = Vehicle()
-    fresh.hold(kind, items)
-    return fresh.held(kind)
+def _as_stored(scenario, items):
+    fresh = vehicle_of(scenario.autopilot)
+    fresh.hold(scenario.mission_type, items)
+    return fresh.held(scenario.mission_type)
 
 
 def _rivals(scenario):
     if scenario.rival is None:
         return []
-    kind = scenario.mission_type
-    peer = PEER if scenario.rival_has_our_ids else RIVAL
-    machine = _rival_machine(scenario, peer, _list(kind, 16, 5))
+    peer = replace(PEER if scenario.rival_has_our_ids else RIVAL, autopilot=scenario.autopilot)
+    machine = _rival_machine(scenario, peer, _list(scenario, 16, 5))
     begins_s = scenario.rival_begins_s if scenario.rival_begins_in is None else math.inf
     rival = Client(machine, peer, begins_s)
     if scenario.rival == "half an upload":
@@ -353,7 +363,7 @@ def _odd(scenario):
     if not scenario.odd_items:
         return {}
     seq = random.Random(scenario.seed).randrange(1, max(scenario.count, 2))
-    odd = _list(scenario.mission_type, 8, 3)[seq % 4 + 4]
+    odd = _list(scenario, 8, 3)[seq % 4 + 4]
     return {seq: replace(odd, params=(odd.params[0], math.nan, math.nan, math.nan), alt_m=math.inf)}
 
 
@@ -386,10 +396,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=10_000)
     parser.add_argument("--first", type=int, default=0, help="the first seed")
+    parser.add_argument("--autopilot", choices=AUTOPILOTS, default="ardupilot")
     options = parser.parse_args()
+    autopilots = AUTOPILOTS[options.autopilot]
     ends, untrue, unheard, longest_s = Counter(), 0, 0, 0.0
     for seed in range(options.first, options.first + options.count):
-        judged = transfer(scenario_of(seed))
+        scenario = scenario_of(seed)
+        judged = transfer(replace(scenario, autopilot=autopilots[seed % len(autopilots)]))
         ends["link broke" if judged.outcome is None else str(judged.outcome.kind)] += 1
         longest_s = max(longest_s, judged.took_s)
         unheard += judged.unheard

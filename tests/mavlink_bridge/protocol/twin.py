@@ -13,11 +13,13 @@ import random
 from dataclasses import dataclass, field, replace
 from itertools import count
 
+from mavlink_bridge.mavlink.autopilots import ARDUPILOT, PX4_1_17, AutopilotTable
 from mavlink_bridge.mavlink.messages import (
     Frame,
     Heartbeat,
     Message,
     MissionCount,
+    MissionCurrent,
     MissionItem,
     MissionItemInt,
     MissionRequest,
@@ -30,6 +32,8 @@ from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.protocol.wire import item_to_message
 from mavlink_bridge.simulator.item_lists import FenceList, MissionList, RallyList
 from mavlink_bridge.simulator.mission_server import MissionServer
+from mavlink_bridge.simulator.px4.lists import Px4List
+from mavlink_bridge.simulator.px4.transfers import Px4Transfers
 from missions.geo import LatLon
 from missions.items import Command, CoordinateFrame
 from missions.items import MissionItem as Item
@@ -100,8 +104,56 @@ class Vehicle:
 
         stored.read = read_anew
 
+    def telemetry(self, now_s: float) -> list[Message]:
+        """Return what it sends unasked each second."""
+        mode = (129, 10) if self.is_running else (1, 4)
+        return [Heartbeat(10, 3, base_mode=mode[0], custom_mode=mode[1])]
+
     def is_off(self, now_s: float) -> bool:
         return any(begin_s <= now_s < end_s for begin_s, end_s in self.off)
+
+
+_IDS_LATE_S = 1.0
+
+
+@dataclass
+class Px4Vehicle(Vehicle):
+    """PX4's mission server: no home item, lists replaced as a whole, ids of them a second late."""
+
+    autopilot: AutopilotTable = PX4_1_17
+
+    def __post_init__(self) -> None:
+        is_new = self.autopilot is not PX4_1_17
+        kinds = (MissionType.MISSION, MissionType.FENCE, MissionType.RALLY)
+        self.lists = {kind: Px4List(kind, checks_unused=is_new) for kind in kinds}
+        self.server = Px4Transfers(self.lists, repeats_count=is_new)
+        self._ids = [(-math.inf, (0, 0, 0))]
+
+    def hold(self, mission_type: MissionType, items: list[Item]) -> None:
+        """Put a list into the vehicle."""
+        stored = self.lists[mission_type]
+        stored.begin()
+        for item in items:
+            assert stored.take(item, current=0) == 0
+        stored.finish()
+
+    def telemetry(self, now_s: float) -> list[Message]:
+        """Return a heartbeat and MISSION_CURRENT, whose ids are those of a second ago."""
+        ids = tuple(self.lists[kind].id for kind in self.lists)
+        if ids != self._ids[-1][1]:
+            self._ids.append((now_s, ids))
+        told = next(known for from_s, known in reversed(self._ids) if now_s >= from_s + _IDS_LATE_S)
+        mode = (157, 0x04040000) if self.is_running else (29, 0x03040000)
+        total = len(self.lists[MissionType.MISSION]) or 65535
+        return [
+            Heartbeat(10, 12, base_mode=mode[0], custom_mode=mode[1]),
+            MissionCurrent(0, total, 2 if total < 65535 else 1, 0, *told),
+        ]
+
+
+def vehicle_of(autopilot: AutopilotTable, **arguments: object) -> Vehicle:
+    """Return a vehicle with that autopilot."""
+    return Vehicle(**arguments) if autopilot is ARDUPILOT else Px4Vehicle(autopilot=autopilot, **arguments)
 
 
 @dataclass
@@ -190,9 +242,8 @@ class Twin:
     def _beat(self):
         self._at(self.now_s + HEARTBEAT_EVERY_S, self._beat)
         if not self.vehicle.is_off(self.now_s):
-            mode = (129, 10) if self.vehicle.is_running else (1, 4)
-            heartbeat = Heartbeat(10, 3, base_mode=mode[0], custom_mode=mode[1])
-            self._carry(("down",), self._to_clients, Frame(1, 1, heartbeat))
+            for message in self.vehicle.telemetry(self.now_s):
+                self._carry(("down",), self._to_clients, Frame(1, 1, message))
 
     def _step(self, limit_s):
         wake = min(

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from mavlink_bridge.director import EventName, Orders, TargetSource
+from mavlink_bridge.director.orders import ObstacleSource
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.replay.expectations import differences, read_expectation
 from mavlink_bridge.replay.journal import Call, JournalWriter, journal_path, read_journal
@@ -102,8 +103,18 @@ ORDERS = Orders(
     drive=True,
     request=Request(start=LatLon(1.0, 2.0), targets=(LatLon(3.0, 4.0),), clearance_m=2.0),
     target_sources=frozenset({TargetSource.TYPED, TargetSource.ECHO}),
+    obstacle_sources=frozenset({ObstacleSource.KEYBOARD}),
+    obstacle_growth_mps=0.5,
+    obstacle_keep_s=20.0,
 )
-CALLS = (Call(0, 10.0, "start"), Call(3, 11.5, "timer"), Call(9, 12.25, "target", LatLon(5.0, 6.0)))
+CALLS = (
+    Call(0, 10.0, "start"),
+    Call(3, 11.5, "timer"),
+    Call(9, 12.25, "target", LatLon(5.0, 6.0)),
+    Call(9, 12.5, "obstacle", LatLon(5.0, 6.0), "1.5"),
+    Call(9, 12.5, "obstacle", text="2.0"),
+    Call(9, 12.75, "clear"),
+)
 
 
 def test_a_journal_reads_back_as_written(tmp_path):

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.messages import Frame, Message, MissionResult, MissionType
-from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig
+from mavlink_bridge.simulator import SimulatorConfig
+from mavlink_bridge.simulator.any_vehicle import vehicle_of
 from mavlink_bridge.simulator.mission_server import int_message
 from missions.geo import LatLon
 from missions.items import Command, CoordinateFrame, MissionItem, waypoint
@@ -67,7 +68,7 @@ class Bench:
     heard: list[tuple[float, Message]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.vehicle = SimulatedVehicle(self.config)
+        self.vehicle = vehicle_of(self.config)
         self.run(0.1)
         self.heard.clear()
 
@@ -85,6 +86,8 @@ class Bench:
             self.vehicle.handle_timer(self.now_s)
             self.heard += [(self.now_s, message) for message in self.vehicle.messages_to_send()]
         self.now_s = max(end_s, self.now_s)
+        if self.config.autopilot is m.Autopilot.PX4:  # answers at once, not in its next turn
+            self.heard += [(self.now_s, message) for message in self.vehicle.messages_to_send()]
 
     def run_until(self, done, limit_s: float) -> float:
         """Let time pass until something is so; return how long it took."""
@@ -130,7 +133,7 @@ class Bench:
         for seq, item in enumerate(items):
             if any(isinstance(answer, m.MissionAck) for answer in answers):
                 break
-            assert [a.seq for a in answers if isinstance(a, m.MissionRequest)] == [seq]
+            assert [a.seq for a in answers if isinstance(a, m.MissionRequest | m.MissionRequestInt)] == [seq]
             answers = self.ask(self.item(seq, item, mission_type))
         acks = [answer for answer in answers if isinstance(answer, m.MissionAck)]
         assert len(acks) == 1

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from mavlink_bridge.mavlink.messages import MissionType
 from missions.items import Command
 from missions.vehicle.item_limit import MISSION_ITEMS, most_items, sd_card_bytes
-from missions.words import mission_items
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -68,12 +67,7 @@ class Limits:
             MissionType.RALLY: self.rally_points,
         }.get(mission_type)
         if most is not None and len(items) > most:
-            count = (
-                mission_items(len(items))
-                if mission_type is MissionType.MISSION
-                else f"{len(items)} {mission_type.name.lower()} items"
-            )
-            return f"{count}; the vehicle holds {most}"
+            return f"{len(items)} {mission_type.name.lower()} items; the vehicle holds {most}"
         if mission_type is not MissionType.FENCE or self.fence_bytes is None:
             return None
         if (needed := fence_bytes(items)) > self.fence_bytes:

@@ -199,7 +199,7 @@ def test_a_refusal_says_what_and_where(rover, tmp_path):
 def test_what_does_not_fit_is_said_before_anything_is_sent(rover, tmp_path):
     code, document, _ = run(rover, "upload", mission_file(tmp_path, plain_mission(700)), "--json")
     assert code == 6
-    assert "700 mission items with home; the vehicle holds 655" in document["message"]
+    assert "700 mission items; the vehicle holds 655" in document["message"]
     assert places(rover.vehicle.mission[1:]) == places(OLD[1:])
 
 

@@ -45,9 +45,7 @@ def test_measured_fence_limits(items, fits):
 
 def test_mission_limits():
     assert Limits().problem(plain_mission(655), MISSION) is None
-    assert (
-        Limits().problem(plain_mission(656), MISSION) == "656 mission items with home; the vehicle holds 655"
-    )
+    assert Limits().problem(plain_mission(656), MISSION) == "656 mission items; the vehicle holds 655"
     assert Limits().problem([MissionItem(5100)] * 999, RALLY) is None
 
 

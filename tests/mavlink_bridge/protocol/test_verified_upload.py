@@ -115,7 +115,7 @@ def test_what_does_not_fit_is_not_sent():
     assert script.sent == []
     outcome = script.machine.outcome
     assert (outcome.kind, outcome.result) == (OutcomeKind.REFUSED, MissionResult.NO_SPACE)
-    assert outcome.texts == ("656 mission items with home; the vehicle holds 655",)
+    assert outcome.texts == ("656 mission items; the vehicle holds 655",)
     assert outcome.backup is None
 
 

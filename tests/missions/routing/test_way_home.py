@@ -138,7 +138,7 @@ def test_places_that_are_no_way_home_are_named_with_the_reason():
     assert ways.nearest(at(5, 5)).place.name == "rally point 3"
     spike = polygon(ZoneKind.EXCLUSION, (20, 38), (50, 40), (20, 42))
     (why,) = found(situation(spike, home=(51.5, 40)), [at(5, 5)]).blocked.values()
-    assert why.startswith("it is too near a sharp corner of exclusion polygon 1")
+    assert why.startswith("it is too close to a sharp corner of exclusion polygon 1")
 
 
 def test_ground_without_a_way_home_is_found_on_the_route():

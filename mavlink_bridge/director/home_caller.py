@@ -250,7 +250,7 @@ class HomeCaller(Part):
         return []
 
     def _call(self, call: HomeCall, detail: str, now_s: float) -> Sequence[Signal]:
-        text = f"called home ({_named(call, detail)}): HOLD, then by a route round the fences"
+        text = f"called home ({_named(call, detail)}): HOLD, then a route home"
         self.core.voice.tell(now_s, EventName.CALLED_HOME, text, str(call), detail)
         self._bad_fixes = 0
         return self._inbox.take_call(Target(self._guess, TargetSource.HOME, call=call))
@@ -318,7 +318,9 @@ class HomeCaller(Part):
         fix = self.core.situation.fix
         self._refused_fix, self._refused_s = fix.value if fix is not None else None, now_s
         call = self.core.target.call if self.core.target is not None else None
-        self.core.voice.home_waits(now_s, call, "until another fence, place or fix leaves a way")
+        self.core.voice.home_waits(
+            now_s, call, "until a change of the fence, the places or the GPS fix makes a way possible"
+        )
 
     def try_again(self) -> Sequence[Signal]:
         """Return that a way home is wanted again, where none was found on another field than the one now known."""

@@ -310,7 +310,8 @@ class HomeCaller(Part):
         core.target = Target(plan.targets[-1], TargetSource.HOME, call=target.call)
         name = self._keeper.name_of(plan.targets[-1])
         length_m, duration_s = round(plan.length_m, 1), round(plan.duration_s, 1)
-        text = f"going home to {name}: {length_m:.0f} m, about {duration_s:.0f} s"
+        to = "" if name == "home" else f" to {name}"
+        text = f"going home{to}: {length_m:.0f} m, about {duration_s:.0f} s"
         core.voice.tell(now_s, EventName.GOING_HOME, text, str(target.call), name, length_m, duration_s)
 
     def refused(self, now_s: float) -> None:
@@ -363,4 +364,6 @@ class HomeCaller(Part):
 def _named(call: HomeCall, detail: str) -> str:
     if call is HomeCall.RTL and detail == Mode.RTL.name:
         return detail
+    if call is HomeCall.GCS:
+        return f"{call} {detail}"
     return f"{call}: {detail}" if detail else str(call)

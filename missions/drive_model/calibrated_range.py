@@ -64,6 +64,18 @@ def extrapolated(vehicle: Vehicle, band: Envelope, *speeds_mps: float | None) ->
     return (*beyond_measured(vehicle, *speeds_mps), *_beyond_corners(vehicle, band, speeds))
 
 
+def beyond_loiter(vehicle: Vehicle, *, ends_in_loiter: bool) -> tuple[str, ...]:
+    """Return that a drive's end was not measured: ArduPilot goes on steering at the place of LOITER_UNLIM (Rover/mode_auto.cpp), and turns need room."""
+    stays = vehicle.autopilot is not Autopilot.ARDUPILOT or vehicle.steering is not Steering.ACKERMANN
+    if not ends_in_loiter or stays:
+        return ()
+    text = (
+        "what a steered rover does at LOITER_UNLIM was not measured: ArduPilot goes on steering there, and the simulated one rocked 10 m away "
+        "within a minute; use --end hold"
+    )
+    return (text,)
+
+
 def _beyond_px4s(vehicle: Vehicle, least_mps: float, top_mps: float) -> Iterator[str]:
     """Yield what of a PX4 rover was not measured."""
     steers = vehicle.pursuit

@@ -9,7 +9,7 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from missions.drive_model.corner import SLOW_MPS
+from missions.drive_model.corner import SHORT_START_M, SLOW_MPS, unsettled
 from missions.vehicle import Autopilot, Steering
 from missions.vehicle.parameters import PARAMETERS
 
@@ -22,11 +22,7 @@ if TYPE_CHECKING:
 LEAST_MARGIN_M = PARAMETERS["FENCE_MARGIN"].measured.least if PARAMETERS["FENCE_MARGIN"].measured else 0.0
 """With less FENCE_MARGIN measured rovers stopped at the fence or past it (0: 0.02 to 0.04 m past, 0.05: 0.02 m before)."""
 
-SHORT_DRIVE_M = 3.0
-"""Below this a steered rover that has to turn left its corridor in the simulator, from rest to rest (0.8 m, facing away: by 16 m); from it on by less than
-a metre. Real ones were not measured on such short drives."""
-_TURNED_DEG, _TURNED_M = 45.0, 0.4
-"""What counts as having to turn: at less the simulated ones kept within 0.2 m; so far a start swings out that faces 45 degrees away."""
+_TURNED_DEG = 45.0  # as at a start that swings out by START_TURNED_M
 
 _PX4_ACCEL_MPS2, _PX4_JERK_MPS3 = 3.0, 10.0
 """RO_ACCEL_LIM and RO_DECEL_LIM, and RO_JERK_LIM, of the PX4 rover that was measured."""
@@ -88,21 +84,14 @@ def beyond_loiter(vehicle: Vehicle, *, ends_in_loiter: bool) -> tuple[str, ...]:
 
 def _beyond_short_drives(vehicle: Vehicle, band: Envelope) -> Iterator[str]:
     """Yield that a leg from rest to rest is shorter than what a steered rover needs to turn into it."""
-    if vehicle.autopilot is not Autopilot.ARDUPILOT or vehicle.steering is not Steering.ACKERMANN:
-        return
     rests = [True, *(corner.stops for corner in band.corners), True]
     for number, leg in enumerate(band.legs):
-        if not (rests[number] and rests[number + 1]) or leg.length_m >= SHORT_DRIVE_M:
-            continue
-        turns = (
-            abs(band.corners[number - 1].turn_deg) > _TURNED_DEG
-            if number
-            else max(leg.left_m, leg.right_m) - leg.half_width_m > _TURNED_M
-        )
-        if turns:
+        turned = number == 0 or abs(band.corners[number - 1].turn_deg) > _TURNED_DEG
+        swung_m = max(leg.left_m, leg.right_m) - leg.half_width_m
+        if rests[number] and rests[number + 1] and turned and unsettled(vehicle, swung_m, leg.length_m):
             yield (
                 f"a steered rover that turns into a drive of {leg.length_m:.1f} m and stops was not measured, only on longer ones: it may circle to get "
-                f"there; choose a target at least {SHORT_DRIVE_M:g} m away"
+                f"there; choose a target at least {SHORT_START_M:g} m away"
             )
             return
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from missions.drive_model import before_4_6
@@ -45,6 +46,7 @@ def drive_plan(
     asked = [None if speeds is None else speeds[leg.first] for leg in legs]
     corners = []
     whole_deg = 0.0
+    swung_m = start.widest_m  # where the present run begins from rest
     for number, (group, (before, after)) in enumerate(
         zip(groups[1:], itertools.pairwise(legs), strict=False)
     ):
@@ -55,7 +57,13 @@ def drive_plan(
             vehicle.speed_mps if speed_mps is None else speed_mps for speed_mps in asked[number : number + 2]
         )
         bend = Bend(turn_deg, whole_deg, min(runs_m[number], runs_m[number + 1]), fastest_mps, changes_speed)
-        corners.append(_corner(vehicle, group, (before, after), bend, stops))
+        corner = _corner(vehicle, group, (before, after), bend, stops)
+        goes_on = abs(turn_deg) < at_corner.STRAIGHT_ON_DEG
+        if not goes_on and at_corner.unsettled(vehicle, swung_m, runs_m[number]):
+            corner = replace(corner, bounded=False)
+        if corner.stops or not goes_on:
+            swung_m = corner.swing_m if corner.stops and not corner.pivots else 0.0
+        corners.append(corner)
     strays = [start]
     middle_s = at_corner.START_HOLD_S
     for leg, corner in zip(legs, corners, strict=False):

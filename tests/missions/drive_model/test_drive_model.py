@@ -428,6 +428,33 @@ def test_two_gentle_corners_swing_less_than_a_sharp_one() -> None:
     assert max(corner.outside_overshoot_m for corner in gentle.corners) < sharp.corners[0].outside_overshoot_m
 
 
+@pytest.mark.parametrize(
+    ("vehicle", "first_m", "heading_deg", "bounded"),
+    [
+        (ROVER, 0.7, 90.0, False),
+        (ROVER, 2.9, 135.0, False),
+        (ROVER, 3.1, 135.0, True),
+        (ROVER, 0.7, 10.0, True),
+        (ROVER, 0.7, None, False),
+        (TANK, 0.7, 90.0, True),
+    ],
+)
+def test_a_run_too_short_for_the_swing_of_the_start_bounds_no_corner(
+    vehicle: Vehicle, first_m: float, heading_deg: float | None, bounded: bool
+) -> None:
+    """The simulated rover left its corridor by up to 0.9 m there, and breached a fence (circles 1 of `benchmarks/drive.py`)."""
+    points = np.array([(0.0, 0.0), (0.0, first_m), (20.0, first_m + 20.0)])
+    assert envelope(points, vehicle, heading_deg=heading_deg).corners[0].bounded is bounded
+    between = envelope(np.insert(points, 1, (0.0, first_m / 2), 0), vehicle, heading_deg=heading_deg)
+    assert between.corners[-1].bounded is bounded  # a point on the line is no corner
+
+
+def test_so_after_a_stop() -> None:
+    points = np.array([(-30.0, 0.0), (0.0, 0.0), (0.0, 0.7), (20.0, 20.7)])
+    assert not envelope(points, ROVER, heading_deg=90.0, stops={1: 1.0}).corners[1].bounded
+    assert envelope(points, ROVER, heading_deg=90.0).corners[1].bounded
+
+
 def test_a_tail_dies_away() -> None:
     track = envelope(polyline([40, 100], [150]), SLOW_ROVER, heading_deg=0.0)
     onward = track.points[2] - track.points[1]

@@ -9,7 +9,7 @@ from io import StringIO
 import pytest
 from director.adopting import Killed
 from director.homing import CALLS, called_run
-from director.test_bridge_director import FAR, FENCE, HOME, NEAR, arm, driving, ready, upload
+from director.test_bridge_director import FAR, FENCE, HOME, NEAR, arm, driving, ready, reposition, upload
 from director.test_bridge_director import conductor as any_conductor
 from director.test_takeover import MANUAL, left_alone, modes_sent, unheard, wait
 
@@ -242,7 +242,64 @@ def test_nor_is_one_after_the_operator_has_taken_over():
     assert home(run)
 
 
+@pytest.mark.parametrize("is_heard", [False, True])
+@pytest.mark.parametrize("first", [None, FAR])
+def test_rtl_said_again_at_home_drives_nowhere_not_even_to_the_bridges_own_first_target(first, is_heard):
+    request = Request(clearance_m=2.5)
+    run = conductor(request=request.to(first) if first is not None else request)
+    run.run_until(lambda: run.director.state is (State.VERIFIED if first else State.READY), 60)
+    wait(run, 2)
+    arm(run)
+    wait(run, 2)
+    say = run.ground_station if is_heard else lambda message: unheard(run, message)
+    say(RTL)
+    run.run_until(run.happened(EventName.AT_HOME), 20)
+    before = len(run.events)
+    say(RTL)
+    wait(run, 15)
+    assert (run.director.state, run.vehicles[0].mode) == (State.READY, Mode.HOLD)
+    assert [event.name for event in run.events[before:]] == []
+
+
+def test_a_battery_call_that_goes_on_first_is_held_for_at_once_where_the_autopilot_answers_with_rtl():
+    run = on_the_way(conductor(homing=replace(BY_ROUTE, battery_percent=20)))
+    hold_watch = run.director._parts.hold_watch
+    hold_watch.goes_on_first = lambda now_s: run.director.state is State.DRIVING
+    run.vehicles[0].rover.texts.append((2, "Battery 1 is low 10.20V used 4000 mAh"))
+    run.run_until(run.happened(EventName.CALLED_HOME), 3)
+    assert run.director.state is State.DRIVING
+    unheard(run, RTL)
+    run.run_until(run.happened(EventName.GOING_HOME), 20)
+    assert home(run)
+    assert [event.name for event in run.events].count(EventName.PLANNED) == 2  # there, and home
+
+
 # Whoever takes it keeps it
+
+
+def test_a_click_after_a_call_that_had_to_wait_is_the_newest_word():
+    run = on_the_way(conductor(homing=replace(BY_ROUTE, battery_percent=20)))
+    hold_watch = run.director._parts.hold_watch
+    hold_watch.goes_on_first = lambda now_s: run.director.state is State.DRIVING
+    run.vehicles[0].rover.battery = LOW
+    run.run_until(run.happened(EventName.CALLED_HOME), 20)
+    run.ground_station(reposition(NEAR))
+    run.run_until(lambda: run.director.state is State.ARRIVED, 200)
+    wait(run, 2)
+    assert distance_m(run.vehicles[0].position, NEAR) < 4.0
+    assert not run.happened(EventName.GOING_HOME)()
+
+
+@pytest.mark.parametrize("after_s", [0.06, 0.2, 0.4])
+@pytest.mark.parametrize("mode", [Mode.HOLD, MANUAL])
+def test_what_a_ground_station_asks_for_right_after_a_call_that_nobody_gave_counts(mode, after_s):
+    run = on_the_way(conductor(homing=replace(BY_ROUTE, battery_percent=20)))
+    run.vehicles[0].rover.battery = LOW
+    run.run_until(run.happened(EventName.CALLED_HOME), 30)
+    wait(run, after_s)
+    run.ground_station(m.SetMode(1, 1, mode))
+    assert left_alone(run, mode, 15)
+    assert run.director.state is State.LET_GO
 
 
 @pytest.mark.parametrize(
@@ -369,6 +426,39 @@ def test_a_vehicle_that_turns_round_far_from_the_fence_goes_on_before_its_hold_o
     run.director.receive(STATION, run.now_s)
     run.run_until(lambda: run.director.state is State.HOLDING, 6)
     assert run.last(EventName.HOLDING).text == "HOLD: stopping for the way home"
+
+
+def test_one_that_was_held_and_has_no_route_is_called_too():
+    run = on_the_way(conductor(homing=replace(BY_ROUTE, battery_percent=20)))
+    run.director.take_target(FENCE.zones[0].vertices[0], run.now_s)
+    run.run_until(run.happened(EventName.NO_PLAN), 60)
+    run.vehicles[0].rover.battery = LOW
+    run.run_until(run.happened(EventName.CALLED_HOME), 20)
+    assert home(run)
+
+
+def test_an_upload_that_fails_is_tried_again_now_and_then_and_said():
+    run = on_the_way(conductor())
+    vehicle = run.vehicles[0]
+    receive, is_full = vehicle.receive, True
+
+    def refuse(frame, now_s):
+        message = frame.message
+        if is_full and isinstance(message, m.MissionCount) and message.mission_type == m.MissionType.MISSION:
+            run.down.push(m.Frame(1, 1, m.MissionAck(frame.system, frame.component, 4, 0)), now_s)
+        else:
+            receive(frame, now_s)
+
+    vehicle.receive = refuse
+    unheard(run, RTL)
+    wait(run, 30)
+    failed = len(texts(run, EventName.UPLOAD_FAILED))
+    assert 3 <= failed <= 6
+    assert len(texts(run, EventName.HOME_WAITS)) == failed
+    assert "the upload failed" in texts(run, EventName.HOME_WAITS)[0]
+    assert vehicle.mode == Mode.HOLD
+    is_full = False
+    assert home(run)
 
 
 # Breaches

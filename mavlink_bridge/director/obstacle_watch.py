@@ -195,8 +195,9 @@ class ObstacleWatch(Part):
             )
             return None
         step_deg = message.increment_f or float(message.increment)
-        if not (math.isfinite(step_deg) and step_deg and math.isfinite(message.angle_offset)):
-            self._refuse("OBSTACLE_DISTANCE without an increment is not used", now_s)
+        if not (0 < abs(step_deg) <= 360 and abs(message.angle_offset) <= 360):  # nor where one is NaN
+            text = f"OBSTACLE_DISTANCE with an increment of {step_deg:g}° and an angle_offset of {message.angle_offset:g}° is not used"
+            self._refuse(text, now_s)
             return None
         count = min(int(360.0 / abs(step_deg) + 0.5), len(message.distances))
         cm = np.array(message.distances[:count], dtype=float)

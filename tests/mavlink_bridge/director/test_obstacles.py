@@ -273,6 +273,44 @@ def test_what_cannot_be_read_for_sure_is_refused_and_it_is_said_once(fresh, mess
     assert [event.name for event in fresh.director.take_events()] == [EventName.TROUBLE]
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"increment": 255},
+        {"increment": 45},
+        {"increment_f": 180.0},
+        {"increment_f": 360.0},
+        {"increment_f": 400.0},
+        {"increment_f": 1e30},
+        {"increment_f": 1.4e-45},
+        {"angle_offset": 3e38},
+        {"min_distance": 1500, "max_distance": 20},
+        {"min_distance": 0, "max_distance": 65535},
+    ],
+)
+def test_nonsense_in_a_scan_stops_nothing_and_stays_bounded(fresh, settings):
+    for value in (1, 25, 400, 1500, 65534):
+        fresh.director.clear_obstacles(fresh.now_s)
+        fresh.now_s += 0.1
+        for one in heard(fresh, scan(dict.fromkeys(range(72), value), **settings)):
+            assert math.isfinite(one.position.lat_deg + one.position.lon_deg)
+            assert 0 < one.radius_m <= 4.0
+    assert len(fresh.director.situation.obstacles.known) <= 64
+
+
+def test_thousands_of_obstacles_are_no_more_than_the_newest(fresh):
+    place = fresh.director.situation.pose.value.position
+    for number in range(2000):
+        fresh.director.take_obstacle(place._replace(lat_deg=40.07 + number * 1e-6), 0.5, fresh.now_s)
+    assert len(fresh.director.situation.obstacles.known) == 64
+    for number in range(60):
+        fresh.now_s += 0.1
+        heard(fresh, scan({i: 300 + (i * 131 + number * 397) % 1100 for i in range(0, 72, 2)}))
+    assert len(fresh.director.situation.obstacles.known) <= 128
+    assert len(fresh.director._parts.obstacles._tracks) <= 64
+
+
 def test_a_scan_of_another_system_or_too_soon_after_another_counts_for_nothing(fresh):
     assert heard(fresh, scan({0: 500}), system=2) == ()
     heard(fresh, scan())

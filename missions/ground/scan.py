@@ -1,7 +1,7 @@
 """What a distance sensor sees around the vehicle: from distances by direction to discs in the plane.
 
 A disc is as deep as it is wide: of what stands there only the near side is seen. Each direction's distance stands for the whole sector around it, so a
-disc is drawn rather too wide than too narrow (of 700 round things 2 to 13 m away, seen in sectors of 5°, none stood out of its disc by more than 0.16 m; of a wall 0.44 m; where the discs of sectors wider than 5°, or of a ring, meet, a point stood out by up to 1.2 m). What lies on the fence's own edges or beyond is left out: there no route leads.
+disc is drawn rather too wide than too narrow (of 700 round things 2 to 13 m away, seen in sectors of 5°, none stood out of its disc by more than 0.16 m; of a wall 0.44 m; where the discs of sectors wider than 5°, or of a ring, meet, a point stood out by up to 1.05 m). What lies on the fence's own edges or beyond is left out: there no route leads.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ _GAP_M = 1.0  # neighbouring directions whose points are farther apart see diffe
 _WIDEST_M = 4.0  # what is wider is several discs in a row: one would stand far into free ground; chosen
 _LEAST_RADIUS_M = 0.3  # of a disc: a post; chosen
 _MOST_RADIUS_M = 4.0  # of what stands at the sensor itself; chosen
+_FINE = math.radians(15.0)  # sectors are cut so fine, for discs that are about as wide as each other; chosen
 _STEEPEST = math.radians(60.0)  # half of the widest angle that a disc is drawn into; chosen
 
 
@@ -105,7 +106,7 @@ def _parts(scan: RangeScan) -> int:
     step = math.radians(abs(scan.step_deg))
     seen_m = scan.distances_m[np.isfinite(scan.distances_m)]
     widest_m = step * float(seen_m.max(initial=0.0))
-    return max(1, math.ceil(2 * widest_m / _WIDEST_M), math.ceil(step / _STEEPEST))
+    return max(1, math.ceil(2 * widest_m / _WIDEST_M), math.ceil(step / _FINE))
 
 
 def _on_open_ground(

@@ -141,7 +141,7 @@ def test_a_wide_sector_is_a_row_of_discs(sectors, away_m):
     half_deg = 180 / sectors
     for bearing in np.radians(np.linspace(-half_deg, half_deg, 181)):
         seen = Point(away_m * math.sin(bearing), away_m * math.cos(bearing))
-        assert min(circle(disc).distance(seen) for disc in found) <= 0.85  # where two meet
+        assert min(circle(disc).distance(seen) for disc in found) <= 1.05  # where two meet
 
 
 @pytest.mark.parametrize("sectors", [1, 2, 3, 4, 8, 72])
@@ -153,5 +153,5 @@ def test_what_is_seen_all_around_is_discs_all_around(sectors, away_m):
     assert len(found) >= 3
     for bearing in np.radians(np.arange(0, 360, 3)):
         seen = Point(away_m * math.sin(bearing), away_m * math.cos(bearing))
-        assert min(circle(disc).distance(seen) for disc in found) <= 1.2  # where two meet
+        assert min(circle(disc).distance(seen) for disc in found) <= 1.05  # where two meet
     assert all(disc.radius_m <= 4.0 for disc in found)

@@ -685,6 +685,59 @@ def test_sys_status_counts_where_no_battery_status_comes():
     assert not any(told_by(BatteryWatch(20, None), *mixed[1:]))
 
 
+def test_no_volts_are_no_reading():
+    for message in (status(60, 0), status(0, 65535), m.SysStatus(0, 0, 0, 0, 60), status(-1, 0)):
+        assert not any(told_by(BatteryWatch(20, 10.5), *[message] * 20))
+
+
+def test_what_sys_status_told_before_the_first_battery_status_does_not_count_for_ever():
+    watch = BatteryWatch(20, None)
+    watch.receive(m.SysStatus(0, 0, 0, 11_000, 15), 0.0)
+    for begins_s in (20, 60):
+        told = [watch.receive(status(15, 11_000), begins_s + second) for second in range(15)]
+        assert sum(map(bool, told)) == 1
+        assert not any(watch.receive(status(80, 12_000), begins_s + 20.0 + second) for second in range(5))
+
+
+def test_what_a_battery_was_while_nothing_was_heard_of_it_is_not_known():
+    watch = BatteryWatch(20, None)
+    assert not any(watch.receive(status(15), time_s) for time_s in (0.0, 1.0, 3600.0, 3601.0))
+
+
+def test_a_second_battery_that_is_low_calls_and_the_first_does_not_hide_it():
+    watch = BatteryWatch(20, None)
+    pair = [
+        m.BatteryStatus(number % 2, (11_000, *[65535] * 9), 15 if number % 2 else 90) for number in range(40)
+    ]
+    assert [text for text in told_by(watch, *pair) if text] == ["battery 2 at 15 %, 11.0 V"]
+
+
+@pytest.mark.parametrize(("system", "component", "kind"), [(1, 196, 18), (2, 1, 10), (2, 195, 18)])
+def test_heartbeats_of_companions_and_other_vehicles_are_no_ground_station(system, component, kind):
+    run = on_the_way(conductor(homing=replace(BY_ROUTE, gcs_timeout_s=5.0)))
+    run.director.receive(STATION, run.now_s)
+    heartbeat = m.Frame(system, component, m.Heartbeat(kind, 8))
+    run.meddle = lambda run: run.director.receive(heartbeat, run.now_s)
+    run.run_until(run.happened(EventName.CALLED_HOME), 6)
+
+
+def test_without_orders_to_drive_nothing_calls_and_rtl_is_left_alone():
+    everything = replace(BY_ROUTE, gcs_timeout_s=5.0, battery_percent=20)
+    run = ready(conductor(drive=False, homing=everything))
+    arm(run)
+    run.director.take_target(FAR, run.now_s)
+    run.run_until(lambda: run.director.state is State.VERIFIED, 20)
+    unheard(run, m.SetMode(1, 1, Mode.AUTO))
+    wait(run, 3)
+    run.vehicles[0].rover.battery = LOW
+    run.director.receive(STATION, run.now_s)
+    wait(run, 15)
+    unheard(run, RTL)
+    wait(run, 10)
+    assert modes_sent(run) == []
+    assert run.vehicles[0].mode == Mode.RTL
+
+
 def test_the_autopilots_own_text_counts_at_once_and_it_is_told_again_only_after_it_was_full():
     watch = BatteryWatch(20, None)
     text = m.Statustext(2, "Battery 1 is low 10.20V used 1200 mAh")

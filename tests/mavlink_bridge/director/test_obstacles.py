@@ -114,6 +114,28 @@ def test_without_drive_it_is_only_told():
     assert names(run).count(EventName.OBSTACLE_ACROSS) == 1
 
 
+@pytest.mark.parametrize("confirm", [False, True])
+def test_without_drive_a_route_that_stands_is_not_made_anew(confirm):
+    orders = replace(ORDERS, drive=False, arm=False, confirm=confirm)
+    config = SimulatorConfig(home=HOME, fence=fence_to_items(YARD), parameters={"FENCE_ENABLE": 1.0})
+    run = Conductor(Director(orders), [SimulatedVehicle(config)])
+    run.run_until(lambda: run.director.state is State.READY, 60)
+    run.director.take_target(TARGETS[0], run.now_s)
+    stands = State.PROPOSED if confirm else State.VERIFIED
+    run.run_until(lambda: run.director.state is stands, 30)
+    run.director.take_obstacle(on_route(run, 0.5), 2.0, run.now_s)
+    until_s = run.now_s + 5
+    run.run_until(lambda: run.now_s >= until_s)
+    run.director.confirm(run.now_s)
+    run.run_until(lambda: run.director.state is State.VERIFIED, 10)
+    until_s = run.now_s + 5
+    run.run_until(lambda: run.now_s >= until_s)
+    told = names(run)
+    assert [
+        told.count(name) for name in (EventName.OBSTACLE_ACROSS, EventName.PLANNED, EventName.UPLOADING)
+    ] == [1, 1, 1]
+
+
 def block(run):
     """Type a wall across the only way; return its obstacles' count."""
     plan = run.director.plan

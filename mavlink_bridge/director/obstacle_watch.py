@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from mavlink_bridge.director import clash
 from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.grounds import Grounds
@@ -241,9 +242,11 @@ class ObstacleWatch(Part):
     def _ask_for_attitude(self, now_s: float) -> None:
         """Ask for ATTITUDE, which not every link gets unasked."""
         core = self.core
-        if core.peer is None or core.orders.passive or now_s < self._asked_s + _ASK_EVERY_S:
+        is_silent = core.peer is None or core.orders.passive or core.state in clash.CLASHES
+        if is_silent or now_s < self._asked_s + _ASK_EVERY_S:
             return
         self._asked_s = now_s
+        assert core.peer is not None
         core.send(m.RequestDataStream(core.peer.system, core.peer.component, _EXTRA1, _ATTITUDE_HZ, 1))
 
     # Obstacles

@@ -358,6 +358,20 @@ def test_attitude_is_asked_for_where_it_does_not_come(fresh):
     assert asked == [m.RequestDataStream(1, 1, 10, 10, 1)]
 
 
+def test_nothing_is_asked_for_while_somebody_speaks_with_our_ids():
+    run = driving(sensor_m=0.0)
+    run.director.receive(m.Frame(1, 195, m.Heartbeat(6, 8)), run.now_s)
+    run.run_until(lambda: run.director.state is State.CLASHED, 5)
+    until_s = run.now_s + 3
+    run.run_until(lambda: run.now_s >= until_s)
+    run.sent.clear()
+    heard(run, scan({0: 500}))
+    assert run.director.situation.obstacles.known
+    until_s = run.now_s + 3
+    run.run_until(lambda: run.now_s >= until_s)
+    assert not any(isinstance(one, m.RequestDataStream) for one in run.sent)
+
+
 def test_a_thing_that_is_seen_ten_times_a_second_is_one_that_stands_and_it_is_forgotten(fresh):
     first_s = fresh.now_s
     for _ in range(30):

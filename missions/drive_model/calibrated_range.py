@@ -22,6 +22,12 @@ if TYPE_CHECKING:
 LEAST_MARGIN_M = PARAMETERS["FENCE_MARGIN"].measured.least if PARAMETERS["FENCE_MARGIN"].measured else 0.0
 """With less FENCE_MARGIN measured rovers stopped at the fence or past it (0: 0.02 to 0.04 m past, 0.05: 0.02 m before)."""
 
+SHORT_DRIVE_M = 3.0
+"""Below this a steered rover that has to turn left its corridor in the simulator, from rest to rest (0.8 m, facing away: by 16 m); from it on by less than
+a metre. Real ones were not measured on such short drives."""
+_TURNED_DEG, _TURNED_M = 45.0, 0.4
+"""What counts as having to turn: at less the simulated ones kept within 0.2 m; so far a start swings out that faces 45 degrees away."""
+
 _PX4_ACCEL_MPS2, _PX4_JERK_MPS3 = 3.0, 10.0
 """RO_ACCEL_LIM and RO_DECEL_LIM, and RO_JERK_LIM, of the PX4 rover that was measured."""
 
@@ -61,7 +67,44 @@ def beyond_measured(vehicle: Vehicle, *speeds_mps: float | None) -> tuple[str, .
 def extrapolated(vehicle: Vehicle, band: Envelope, *speeds_mps: float | None) -> tuple[str, ...]:
     """Return in what a drive lies outside the measurements: its vehicle (`beyond_measured`), and corners that its firmware may drive otherwise."""
     speeds = {vehicle.speed_mps, *filter(None, speeds_mps)}
-    return (*beyond_measured(vehicle, *speeds_mps), *_beyond_corners(vehicle, band, speeds))
+    return (
+        *beyond_measured(vehicle, *speeds_mps),
+        *_beyond_corners(vehicle, band, speeds),
+        *_beyond_short_drives(vehicle, band),
+    )
+
+
+def beyond_loiter(vehicle: Vehicle, *, ends_in_loiter: bool) -> tuple[str, ...]:
+    """Return that a drive's end was not measured: ArduPilot goes on steering at the place of LOITER_UNLIM (Rover/mode_auto.cpp), and turns need room."""
+    stays = vehicle.autopilot is not Autopilot.ARDUPILOT or vehicle.steering is not Steering.ACKERMANN
+    if not ends_in_loiter or stays:
+        return ()
+    text = (
+        "what a steered rover does at LOITER_UNLIM was not measured: ArduPilot goes on steering there, and the simulated one rocked 10 m away "
+        "within a minute; use --end hold"
+    )
+    return (text,)
+
+
+def _beyond_short_drives(vehicle: Vehicle, band: Envelope) -> Iterator[str]:
+    """Yield that a leg from rest to rest is shorter than what a steered rover needs to turn into it."""
+    if vehicle.autopilot is not Autopilot.ARDUPILOT or vehicle.steering is not Steering.ACKERMANN:
+        return
+    rests = [True, *(corner.stops for corner in band.corners), True]
+    for number, leg in enumerate(band.legs):
+        if not (rests[number] and rests[number + 1]) or leg.length_m >= SHORT_DRIVE_M:
+            continue
+        turns = (
+            abs(band.corners[number - 1].turn_deg) > _TURNED_DEG
+            if number
+            else max(leg.left_m, leg.right_m) - leg.half_width_m > _TURNED_M
+        )
+        if turns:
+            yield (
+                f"a steered rover that turns into a drive of {leg.length_m:.1f} m and stops was not measured, only on longer ones: it may circle to get "
+                f"there; choose a target at least {SHORT_DRIVE_M:g} m away"
+            )
+            return
 
 
 def _beyond_px4s(vehicle: Vehicle, least_mps: float, top_mps: float) -> Iterator[str]:

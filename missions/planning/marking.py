@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from missions.drive_model import extrapolated
+from missions.drive_model import beyond_loiter, extrapolated
 from missions.errors import ExtrapolatedError
+from missions.items import Command
 
 if TYPE_CHECKING:
     from missions.planned import Plan
@@ -28,7 +29,11 @@ def unpromised(plan: Plan) -> ExtrapolatedError | None:
 
 def marked(plan: Plan, request: Request) -> Plan:
     """Return a plan with what lies outside the measurements, and without its promise where something does."""
-    reasons = extrapolated(plan.vehicle, plan.envelope, *plan.speeds)
+    loiters = any(item.command == Command.NAV_LOITER_UNLIM for item in plan.items)
+    reasons = (
+        *extrapolated(plan.vehicle, plan.envelope, *plan.speeds),
+        *beyond_loiter(plan.vehicle, ends_in_loiter=loiters),
+    )
     if not reasons or plan.clearance_m is None:
         return plan
     if request.trusts_model:

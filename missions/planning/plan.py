@@ -12,6 +12,7 @@ from missions.editing.shorten import shortened
 from missions.errors import PlanStoppedError
 from missions.finishing.route_plan import plan_route
 from missions.planning.marking import marked
+from missions.promise import promise
 from missions.request import RepairMission, Tour
 from missions.situation import Mission
 from missions.tour.tour import plan_tour
@@ -95,20 +96,31 @@ def _with_room(
     most = most_items(situation.parameters) - 1
     if len(planned.items) <= most:
         return planned
-    wanted = replace(request, widest=False, clearance_m=planned.clearance_m, start=planned.start)
+    # A route may keep more than was asked: what is short keeps that much, and promises no more.
+    kept = planned.keeps
+    most_m = kept.promised_m
+    if most_m is not None and not request.widest:
+        most_m = min(most_m, promise(situation, request, planned.vehicle).promised_m)
+    less_m = kept.promised_m - most_m if kept.promised_m is not None and most_m is not None else 0.0
+    wanted = replace(request, widest=False, clearance_m=most_m, start=planned.start)
     # Drawn lines that were asked for are not judged by a check: nothing of them is left out.
     own = _own_items(planned, request) if request.corner_allowance_m is None else ()
     mission = Mission(planned.items, planned.home)
     checked = shortened(mission, own, situation, wanted, most=most, may_slow=True, should_stop=should_stop)
     left_out = len(planned.items) - len(checked.mission.items)
     short = plan_of(checked, situation, method=planned.method)
-    kept = planned.keeps
     return replace(
         short,
         targets=planned.targets,
         asked_targets=planned.asked_targets,
         straight_line_m=planned.straight_line_m,
-        keeps=replace(kept, drawn_m=short.keeps.drawn_m, driven_m=short.keeps.driven_m),
+        keeps=replace(
+            kept,
+            promised_m=most_m,
+            asked_m=kept.asked_m - less_m,
+            drawn_m=short.keeps.drawn_m,
+            driven_m=short.keeps.driven_m,
+        ),
         blocks=planned.blocks,
         home=planned.home,
         warnings=planned.warnings,

@@ -219,7 +219,7 @@ class TestRecordedLogs:
         found = document("--log", logs / f"{name}.tlog")
         leads_away = any("while leaving it, the rover keeps" in warning for warning in found["warnings"])
         at_start_m = found["start_clearance_m"]
-        assert found["clearance_m"] == 2.5
+        assert 2.5 <= found["clearance_m"] <= 3.0  # or more, where that is quicker
         assert at_start_m is None or (leads_away and 1.2 < at_start_m < 2.5)
         assert found["drawn_clearance_m"] >= 2.5
         assert found["driven_clearance_m"] >= (at_start_m or 2.5)

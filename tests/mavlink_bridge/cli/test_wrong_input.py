@@ -413,6 +413,7 @@ WRONG: list[tuple[tuple[str, ...], int, str]] = [
     (("bridge", "--connect", DEAD, "--log", "missing/run.tlog"), INPUT, "missing"),
     # the simulated rover
     (("sim", "--home", "here"), USAGE, "here"),
+    (("rally", "--most", "0"), USAGE, "--most"),
     (("sim", "--disc", "40.07,-105.2"), USAGE, "LAT,LON,RADIUS"),
     (("sim", "--disc", "40.07,-105.2,1", "--autopilot", "px4"), USAGE, "no distance sensor"),
     (("sim", "--home", "40.07,-105.2,east"), USAGE, "east"),

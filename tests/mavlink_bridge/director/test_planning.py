@@ -129,12 +129,12 @@ def test_what_changed_is_read_while_the_vehicle_comes_to_rest():
 def test_a_mission_longer_than_the_vehicle_holds_is_shortened_or_refused(monkeypatch):
     posts = (
         CircleZone(
-            ZoneKind.EXCLUSION, LatLon(40.0714 + 0.00012 * i + 0.00005 * j, -105.2297 + 0.00025 * j), 2.0
+            ZoneKind.EXCLUSION, LatLon(40.0714 + 0.00012 * i + 0.00005 * j, -105.2297 + 0.00025 * j), 3.0
         )
         for i in range(6)
         for j in range(5)
     )
-    parameters = {"FENCE_ENABLE": 1.0, "WP_SPEED": 3.0, "WP_RADIUS": 3.0}
+    parameters = {"FENCE_ENABLE": 1.0, "WP_SPEED": 5.0, "WP_RADIUS": 3.0}
     config = SimulatorConfig(
         home=HOME, fence=fence_to_items(Fence((*FENCE.zones, *posts))), parameters=parameters
     )
@@ -161,7 +161,7 @@ def test_a_mission_longer_than_the_vehicle_holds_is_shortened_or_refused(monkeyp
 
 
 def test_home_again_and_an_end_are_asked_of_the_bridge_too():
-    asked = Tour(clearance_m=2.5, comes_back=True, end=End.LOITER)
+    asked = Tour(clearance_m=2.5, comes_back=True, end=End.LOITER, trusts_model=True)
     run = ready(conductor(drive=False, request=asked))
     home = run.director.situation.home.value
     run.director.take_target(FAR, run.now_s)

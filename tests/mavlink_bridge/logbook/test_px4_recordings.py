@@ -147,5 +147,6 @@ def test_replay_and_plan_of_a_recording():
     planned = CliRunner().invoke(app, ["plan", "--log", log, "--target", "47.3978,8.5462", "--json"])
     found = json.loads(planned.stdout)
     assert (planned.exit_code, found["system"]) == (0, 3)
-    assert found["clearance_m"] is None  # nothing is promised of how a PX4 rover drives
+    assert found["clearance_m"] == 1.0  # steered wheels, as they were measured
+    assert any("keeps no margin" in text for text in found["info"])
     assert found["fence"]["vertices"] == 8

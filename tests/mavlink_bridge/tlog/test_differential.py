@@ -51,7 +51,7 @@ def test_random_payloads_decode_as_pymavlink_decodes_them(name, tmp_path):
         payload = rng.randbytes(size)
         frames.append(frame_v2(number, payload, system=rng.randrange(256), component=rng.randrange(256)))
         frames.append(frame_v2(number, payload, signature=rng.randbytes(13)))
-        if size in {base, full}:
+        if size in {base, full} and number < 256:  # MAVLink 1 has no others
             frames.append(frame_v1(number, payload, system=rng.randrange(256)))
     path = tmp_path / "one.tlog"
     path.write_bytes(b"".join(record(frame, START_US + place) for place, frame in enumerate(frames)))

@@ -149,7 +149,7 @@ def test_a_check_does_not_hold_there() -> None:
     assert not found.broken
     assert not found.holds
     (danger,) = found.dangers
-    assert "in tests rovers backed into the fence" in danger
+    assert "in tests, rovers backed into the fence" in danger
     assert danger.endswith("until it is there")
     assert check(7.9).holds
     assert check(9.0, AVOID_BACKUP_SPD=0.0).holds

@@ -732,6 +732,29 @@ def test_outside_what_was_measured_nothing_is_promised_unless_the_model_is_trust
     assert not set(trusted.warnings) & {*trusted.info}
 
 
+@pytest.mark.parametrize(
+    ("away_m", "heading_deg", "parameters", "is_promised"),
+    [
+        (0.8, 180.0, {}, False),
+        (2.9, 90.0, {}, False),
+        (3.1, 180.0, {}, True),
+        (0.8, 10.0, {}, True),
+        (0.8, 180.0, {"SERVO1_FUNCTION": 73.0, "SERVO3_FUNCTION": 74.0}, True),
+    ],
+)
+def test_a_steered_rover_that_turns_into_a_short_drive_was_not_measured(
+    away_m: float, heading_deg: float, parameters: dict[str, float], is_promised: bool
+) -> None:
+    """In the simulator one that faced away left its corridor by 16 m to get 0.8 m far."""
+    situation = replace(
+        situation_of(FIELD, WP_SPEED=2.0, **parameters),
+        pose=Known(Pose(place(-50, 0), heading_deg), None, "test"),
+    )
+    found = plan(situation, Request(targets=(place(-50, away_m),), clearance_m=2.0))
+    assert (found.clearance_m is not None) == is_promised
+    assert any("at least 3 m away" in text for text in found.extrapolated) != is_promised
+
+
 @pytest.mark.parametrize("parameters", [{}, {"FENCE_NTF_FREQ": 1.0, "WP_SPEED": 2.0}])
 def test_an_unknown_firmware_is_no_matter_where_all_is_assumed_or_a_name_tells(
     parameters: dict[str, float],

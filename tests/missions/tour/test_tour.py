@@ -12,13 +12,14 @@ import shapely
 from charts import HOME, IN, OUT, Chart, box, place
 from shapely import LineString, Polygon
 
+from missions.checking.check import check_mission
 from missions.errors import NoRouteError, SituationError, TargetBlockedError
 from missions.fence import Fence, Zone
 from missions.firmware import Firmware
 from missions.items import Command
 from missions.planning.plan import plan
 from missions.request import Request, Tour
-from missions.situation import Known, Situation
+from missions.situation import Known, Mission, Situation
 from missions.tour.tour import route_lengths_m, target_order
 
 if TYPE_CHECKING:
@@ -127,6 +128,25 @@ def test_ends():
     assert loitering.items[-1].position == held.items[-1].position == FAR_BUT_HERE
 
 
+def test_what_a_steered_rover_does_where_it_loiters_was_not_measured():
+    """ArduPilot goes on steering at LOITER_UNLIM's place; skid steer turns on the spot there."""
+    loitering = plan(WALLED, request(FAR_BUT_HERE, end="loiter"))
+    assert loitering.clearance_m is None
+    assert [text[:49] for text in loitering.extrapolated] == [
+        "what a steered rover does at LOITER_UNLIM was not"
+    ]
+    assert plan(WALLED, request(FAR_BUT_HERE, end="loiter", trusts_model=True)).clearance_m == 2.0
+    assert plan(WALLED, request(FAR_BUT_HERE)).extrapolated == ()
+    skid = situation_of(
+        FIELD, WALL, FRAME_CLASS=1.0, SERVO1_FUNCTION=73.0, SERVO3_FUNCTION=74.0, WP_SPEED=2.0
+    )
+    assert not any("LOITER" in text for text in plan(skid, request(FAR_BUT_HERE, end="loiter")).extrapolated)
+    checked = check_mission(Mission(loitering.items, HOME), WALLED, Request(clearance_m=2.0))
+    assert checked.extrapolated == loitering.extrapolated
+    assert checked.holds
+    assert not checked.is_promised
+
+
 def test_rtl_where_the_straight_line_home_is_free():
     held = plan(WALLED, request(FAR_BUT_HERE))
     returning = plan(WALLED, request(FAR_BUT_HERE, end="rtl"))
@@ -216,7 +236,9 @@ def test_a_tour_outside_what_was_measured_is_planned_for_its_clearance_and_promi
     asked = request(place(-30, 0), place(-30, 30), end=end)
     usual = plan(situation_of(FIELD, WALL), asked)
     found = plan(situation_of(FIELD, WALL, OA_TYPE=2.0), asked)
-    assert (usual.clearance_m, usual.extrapolated) == (2.0, ())
+    assert (usual.clearance_m is None) == bool(usual.extrapolated) == (end == "loiter")
     assert found.clearance_m is None
     assert found.items == usual.items
-    assert [text.split(":")[0] for text in found.extrapolated] == ["OA_TYPE 2"]
+    assert [text.split(":")[0] for text in found.extrapolated if text not in usual.extrapolated] == [
+        "OA_TYPE 2"
+    ]

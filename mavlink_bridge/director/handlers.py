@@ -250,6 +250,7 @@ def _after_upload(parts: Parts, now_s: float) -> Iterable[Signal]:
 
 def _on_hold_ended(parts: Parts, _now_s: float) -> Iterable[Signal]:
     if parts.core.state is State.HOLDING and not parts.halter.is_hold_granted:
+        parts.caller.not_held()
         trouble = OutcomeError("the vehicle did not switch to HOLD; nothing was written")
         return parts.core.fail_step(trouble)
     if parts.core.state is State.CLASHED:

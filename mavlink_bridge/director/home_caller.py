@@ -345,6 +345,10 @@ class HomeCaller(Part):
         text = f"the upload failed; it is tried again in {_TRY_AGAIN_S:.0f} s"
         self.core.voice.home_waits(now_s, target.call, text)
 
+    def not_held(self) -> None:
+        """Take notice that a HOLD was not taken, which was told: the vehicle may drive straight, so that it is tried again at once."""
+        self._refused_fix, self._refused_s = None, -math.inf
+
     def try_again(self) -> Sequence[Signal]:
         """Return that a way home is wanted again, where none was found on another field than the one now known."""
         target = self.core.target

@@ -437,6 +437,26 @@ def test_one_that_was_held_and_has_no_route_is_called_too():
     assert home(run)
 
 
+@pytest.mark.parametrize("is_denied", [False, True])
+def test_hold_that_is_not_taken_is_asked_for_again(is_denied):
+    run = on_the_way(conductor())
+    vehicle, receive, deaf_until_s = run.vehicles[0], run.vehicles[0].receive, run.now_s + 14.0
+
+    def be_deaf(frame, now_s):
+        message = frame.message
+        is_hold = isinstance(message, m.CommandLong) and (message.command, message.param2) == (176, Mode.HOLD)
+        if not is_hold or now_s > deaf_until_s:
+            receive(frame, now_s)
+        elif is_denied:
+            ack = m.CommandAck(176, 4, target_system=frame.system, target_component=frame.component)
+            run.down.push(m.Frame(1, 1, ack), now_s)
+
+    vehicle.receive = be_deaf
+    unheard(run, RTL)
+    run.run_until(lambda: vehicle.mode == Mode.HOLD, 17)
+    assert home(run)
+
+
 def test_an_upload_that_fails_is_tried_again_now_and_then_and_said():
     run = on_the_way(conductor())
     vehicle = run.vehicles[0]

@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from director.conducting import Conductor
 from director.test_bridge_director import FAR
 from director.test_coming_home import BY_ROUTE, LOW, RTL, conductor, heading_home, home, on_the_way
 from director.test_obstacles import block, on_route
 from director.test_takeover import MANUAL, left_alone, unheard, wait
 
-from mavlink_bridge.director import EventName, State
+from mavlink_bridge.director import Director, EventName, State
 from mavlink_bridge.director.orders import ObstacleSource
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.rover import Mode
@@ -131,3 +132,15 @@ def test_an_obstacle_that_comes_while_the_way_home_is_uploaded_is_not_driven_int
     run.meddle = lambda run: nearest_m.append(distance_m(run.vehicles[0].position, place) - 1.0)
     assert home(run)
     assert min(nearest_m) > 2.5
+
+
+@pytest.mark.parametrize("goes_home", [False, True])
+def test_a_bridge_that_is_started_again_while_an_obstacle_was_waited_for_drives_nothing(goes_home):
+    run = waiting(goes_home=goes_home)
+    again = Conductor(Director(run.director.orders, notes=(run.note,) if run.note else ()), run.vehicles)
+    again.now_s = run.now_s
+    again.run_until(lambda: again.director.state is State.READY, 30)
+    assert left_alone(again, Mode.HOLD, 20)
+    unheard(again, RTL)
+    again.run_until(again.happened(EventName.GOING_HOME), 20)
+    assert home(again)

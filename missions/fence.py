@@ -115,11 +115,11 @@ class Obstacle:
     @property
     def name(self) -> str:
         """What it is called: by when it was reported, in local time, by whom, and how large it is."""
-        size = f"{self.radius_m:.1f} m"
+        size = f"(radius {self.radius_m:.1f} m)"
         if self.reported_s is None:
-            return f"{OBSTACLE} from {self.source}, {size}"
+            return f"{OBSTACLE} from {self.source} {size}"
         clock = datetime.fromtimestamp(self.reported_s, tz=UTC).astimezone()
-        return f"{OBSTACLE} reported at {clock:%H:%M:%S} by {self.source}, {size}"
+        return f"{OBSTACLE} reported at {clock:%H:%M:%S} by {self.source} {size}"
 
     @property
     def ends_s(self) -> float:

@@ -158,10 +158,9 @@ def _homing(options: BridgeOptions) -> Homing:
 
 def _obstacle_sources(texts: list[str]) -> frozenset[ObstacleSource]:
     names = [name for text in texts for name in text.split(",")]
-    try:
-        return frozenset(map(ObstacleSource, names))
-    except ValueError as error:
-        raise UsageError(f"--obstacles-from: {error}; expected one of {', '.join(ObstacleSource)}") from None
+    if unknown := set(names) - set(ObstacleSource):
+        raise UsageError(f"--obstacles-from {min(unknown)}: expected one of {', '.join(ObstacleSource)}")
+    return frozenset(map(ObstacleSource, names))
 
 
 @dataclass(eq=False)

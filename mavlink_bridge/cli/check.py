@@ -135,7 +135,7 @@ def _report_legs(checked: MissionCheck, plots: list[Path]) -> None:
     )
     for way in checked.home_ways:
         echo(
-            f"{way}: {way.length_m:.1f} m from its end, about {way.time_s:.0f} s, {_metres(way.driven_clearance_m)} driven"
+            f"{way}: {way.length_m:.1f} m from its end, about {way.time_s:.0f} s, {_metres(way.driven_clearance_m)} from any fence while driving"
         )
     for path in plots:
         if str(path) != "-":

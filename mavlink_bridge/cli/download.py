@@ -56,7 +56,7 @@ def download(options: DownloadOptions) -> None:
     for path in options.output:
         if what == "mission" and not has_home and path.suffix.lower() in _ITEM_SUFFIXES:
             raise UsageError(
-                f"{path}: the first row of such a file is home, which a mission of {session.autopilot} does not hold; nothing was written",
+                f"{path}: the first row of such a file is home, which a mission of {session.autopilot.kind} does not hold; nothing was written",
                 advice="write it to a .plan",
             )
         _write(path, what, items, parameters, has_home=has_home)

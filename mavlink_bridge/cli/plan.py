@@ -16,7 +16,7 @@ from mavlink_bridge.cli.plan_results import Told, arrival_document, report_end
 from mavlink_bridge.cli.planning_progress import planning_shown
 from mavlink_bridge.cli.terminal import print_json
 from mavlink_bridge.cli.timed_plan import timed_plan
-from mavlink_bridge.cli.values import MOST_VEHICLE_M, checked_number, given_places, position_from
+from mavlink_bridge.cli.values import MOST_VEHICLE_M, checked_number, given_places
 from mavlink_bridge.cli.vehicle_options import (
     described_vehicle,
     with_description,
@@ -24,15 +24,18 @@ from mavlink_bridge.cli.vehicle_options import (
     with_vehicle,
 )
 from mavlink_bridge.errors import UsageError
-from missions.errors import MissionFormatError
+from missions.errors import InvalidPositionError, MissionFormatError
 from missions.fence import Obstacle, Obstacles
 from missions.formats import check_writable_format
+from missions.geo import parse_lat_lon
 from missions.request import RepairMission
 
 if TYPE_CHECKING:
     from mavlink_bridge.cli.options.plan import PlanOptions
     from missions.request import Request
     from missions.situation import Situation
+
+_OBSTACLE_ADVICE = "write latitude, longitude and a radius in metres, such as 40.0718,-105.2295,2.5"
 
 
 def plan(options: PlanOptions) -> None:
@@ -151,9 +154,10 @@ def _obstacle(text: str) -> Obstacle:
     """
     place, comma, radius = text.rpartition(",")
     if not comma:
-        raise UsageError(f"--obstacle {text!r}: expected LAT,LON,RADIUS")
+        raise UsageError(f"--obstacle {text!r}: expected LAT,LON,RADIUS", advice=_OBSTACLE_ADVICE)
     try:
+        position = parse_lat_lon(place)
         radius_m = checked_number(radius, 0.0, MOST_VEHICLE_M, "metres", above=True)
-    except UsageError as error:
-        raise UsageError(f"--obstacle {text!r}: {error}") from None
-    return Obstacle(position_from("--obstacle", place), radius_m, 0.0, 0.0, math.inf, "--obstacle", None)
+    except (UsageError, InvalidPositionError) as error:
+        raise UsageError(f"--obstacle {text!r}: {error}", advice=_OBSTACLE_ADVICE) from None
+    return Obstacle(position, radius_m, 0.0, 0.0, math.inf, "--obstacle", None)

@@ -13,6 +13,7 @@ from mavlink_bridge.cli.pictures import draw
 from mavlink_bridge.cli.terminal import echo
 from mavlink_bridge.cli.way_home import RouteWays
 from missions.checking.holding import hold_info
+from missions.checking.home_part import drive_end
 from missions.fence import CircleZone, PolygonZone, ZoneKind
 from missions.picture.plans import plan_scene
 from missions.words import counted
@@ -202,7 +203,7 @@ def report_plan(planned: Plan, written: list[Path], ways: RouteWays | None = Non
         promise = f"at least {planned.clearance_m:g} m while driving ({along})"
     if planned.extrapolated:
         promise += ", extrapolated beyond what was measured"
-    waypoints = sum(item.is_placed for item in planned.items)
+    waypoints = sum(item.is_placed for item in planned.items[: drive_end(planned.items)])
     turns = planned.turn_count
     echo(
         f"Route: {planned.length_m:.1f} m ({planned.straight_line_m:.1f} m in a straight line), "

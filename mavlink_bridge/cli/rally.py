@@ -167,7 +167,7 @@ def _kept(choice: RallyChoice) -> str:
 def _report(choice: RallyChoice, outputs: list[Path], *, verified: bool) -> None:
     home = ", home among them" if choice.has_home else ""
     echo(f"{counted(len(choice.points), 'rally point')}{home}: {'; '.join(map(str, choice.points))}")
-    echo(f"{_kept(choice)} (from {100 * choice.field_share:.0f} % of the free ground too)")
+    echo(f"{_kept(choice)}; so do those from {100 * choice.field_share:.0f} % of the free ground")
     for path in outputs:
         if str(path) != "-":
             echo(f"Wrote {path}")
@@ -175,7 +175,9 @@ def _report(choice: RallyChoice, outputs: list[Path], *, verified: bool) -> None
     if verified:
         echo(f"Uploaded and verified, with {pairs}")
     else:
-        echo(f"They hold only with {pairs}: set both (pbpp upload FILE.param), --upload does")
+        echo(
+            f"They hold only with {pairs}: set both, with --upload or by uploading the parameters (-o FILE.param)"
+        )
     echo("If the companion computer fails, the vehicle drives there on its own only with:")
 
 

@@ -55,7 +55,7 @@ def fence_warnings(session: Session, lists: Iterable[MissionType]) -> list[str]:
 
 
 def check_drives(session: Session) -> None:
-    """Refuse to set a vehicle driving whose autopilot's drives are not foreseen; before anything is written.
+    """Refuse to set a vehicle driving whose autopilot's drives are not watched; before anything is written.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def check_drives(session: Session) -> None:
     """
     if not session.autopilot.is_driven:
         raise RefusedError(
-            f"--drive is not possible on {session.autopilot}: pbpp does not foresee yet how its rovers drive and stop; nothing was written",
+            f"--drive is not possible on {session.autopilot.kind}: pbpp does not start or watch its drives yet; nothing was written",
             advice="upload without --drive, check the mission in the ground station, and start it there",
         )
 

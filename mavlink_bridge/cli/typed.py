@@ -36,7 +36,7 @@ _LATER = {
 
 @dataclass(frozen=True, slots=True)
 class TypedObstacle:
-    """An obstacle that was typed; without a position it is right before the vehicle."""
+    """An obstacle that was typed; without a position it is right in front of the vehicle."""
 
     position: LatLon | None
     radius_m: float
@@ -118,8 +118,8 @@ def _of_obstacles(words: list[str], director: Director) -> Typed:
         return Typed(
             f"not accepted: the vehicle's place or heading is not known; type {_BLOCKED} LAT,LON [RADIUS]"
         )
-    where = position or "before the vehicle"
-    text = f"obstacle of {radius_m:g} m radius {where} taken for {TYPED_S / 60:.0f} minutes, or until {_CLEAR}; it protects no person"
+    where = f"at {position}" if position else "in front of the vehicle"
+    text = f"obstacle of {radius_m:g} m radius {where}, kept for {TYPED_S / 60:.0f} minutes or until you type {_CLEAR}; this protects no person"
     return Typed(text, obstacle=TypedObstacle(position, radius_m))
 
 

@@ -137,12 +137,16 @@ class HoldWatch(Part):
                 else f"; going on for {found.go_on_m:.0f} m along the route, then HOLD"
             )
         is_obstacle = (roll.fence or "").startswith(OBSTACLE)
-        ahead = "obstacle inside the stopping distance: it" if is_obstacle else "breach ahead: fence"
+        ahead = f"breach ahead: fence {roll.to_fence_m:.1f} m"
+        beyond = roll.fence or "the fence"
+        if is_obstacle:
+            ahead = f"obstacle inside the stopping distance: {roll.to_fence_m:.1f} m ahead"
+            beyond = f"the edge of the {roll.fence}"
         self.core.voice.tell(
             now_s,
             EventName.BREACH_AHEAD,
-            f"{ahead} {roll.to_fence_m:.1f} m, stops in {roll.stopping_m:.1f} m from {roll.speed_mps:.1f} m/s "
-            f"({found.source}), {roll.beyond_m:.1f} m beyond {roll.fence or 'the fence'}{then}",
+            f"{ahead}, stops in {roll.stopping_m:.1f} m from {roll.speed_mps:.1f} m/s "
+            f"({found.source}), {roll.beyond_m:.1f} m beyond {beyond}{then}",
             roll.fence,
             round(roll.to_fence_m, 2),
             round(roll.stopping_m, 2),

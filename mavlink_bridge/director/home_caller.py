@@ -258,7 +258,7 @@ class HomeCaller(Part):
         return core.operator.is_on and (core.state in _IN_HAND or is_held)
 
     def _call(self, call: HomeCall, detail: str, now_s: float) -> Sequence[Signal]:
-        text = f"called home ({_named(call, detail)}): HOLD, then by a route round the fences"
+        text = f"called home ({_named(call, detail)}): HOLD, then a route home"
         self.core.voice.tell(now_s, EventName.CALLED_HOME, text, str(call), detail)
         self._bad_fixes = 0
         self._refused_s = math.inf
@@ -326,7 +326,8 @@ class HomeCaller(Part):
         core.target = Target(plan.targets[-1], TargetSource.HOME, call=target.call)
         name = self._keeper.name_of(plan.targets[-1])
         length_m, duration_s = round(plan.length_m, 1), round(plan.duration_s, 1)
-        text = f"going home to {name}: {length_m:.0f} m, about {duration_s:.0f} s"
+        to = "" if name == "home" else f" to {name}"
+        text = f"going home{to}: {length_m:.0f} m, about {duration_s:.0f} s"
         core.voice.tell(now_s, EventName.GOING_HOME, text, str(target.call), name, length_m, duration_s)
 
     def refused(self, now_s: float) -> None:
@@ -334,7 +335,9 @@ class HomeCaller(Part):
         fix = self.core.situation.fix
         self._refused_fix, self._refused_s = fix.value if fix is not None else None, now_s
         call = self.core.target.call if self.core.target is not None else None
-        self.core.voice.home_waits(now_s, call, "until another fence, place or fix leaves a way")
+        self.core.voice.home_waits(
+            now_s, call, "until a change of the fence, the places or the GPS fix makes a way possible"
+        )
 
     def not_written(self, now_s: float) -> None:
         """Take notice that an upload has failed, which was told: a way home is tried again a little later."""
@@ -390,4 +393,6 @@ class HomeCaller(Part):
 def _named(call: HomeCall, detail: str) -> str:
     if call is HomeCall.RTL and detail == Mode.RTL.name:
         return detail
+    if call is HomeCall.GCS:
+        return f"{call} {detail}"
     return f"{call}: {detail}" if detail else str(call)

@@ -219,7 +219,7 @@ class RouteDesk(Part):
         if obstacle is None or before == self._told_waiting:
             return
         left_s = max(0.0, obstacle.ends_s - now_s)
-        text = f"waiting: the {obstacle.name} blocks the only way; driving on when it is gone, or {left_s:.0f} s after it was seen last"
+        text = f"waiting: the {obstacle.name} blocks the only way; driving on when it is gone, or {left_s:.0f} s after it was last seen"
         self.core.voice.tell(now_s, EventName.WAITING, text, obstacle.name, round(left_s, 1))
 
     def obstacles_changed(self, now_s: float) -> Sequence[Signal]:

@@ -148,13 +148,18 @@ class AutopilotTable:
     is_driven: bool = False
     measured_from: Firmware | None = None
 
+    @property
+    def kind(self) -> str:
+        """Its name without a version: for what is said before the version is known."""
+        return self.name.partition(" ")[0]
+
     def remark(self, firmware: Firmware | None) -> str | None:
         """Return what is to be said of a vehicle's version; None where there is nothing."""
         if self.measured_from is None or (firmware is not None and firmware >= self.measured_from):
             return None
         if firmware is None:
-            return f"the vehicle does not report its version: it is taken for {self.name}"
-        return f"the vehicle reports version {firmware}, which was not measured: it is taken for {self.name}"
+            return f"the vehicle does not report its version: it is treated as {self.name}"
+        return f"the vehicle reports version {firmware}, which was not measured: it is treated as {self.name}"
 
     def __str__(self) -> str:
         return self.name

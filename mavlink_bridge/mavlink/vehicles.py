@@ -83,9 +83,10 @@ def not_ardupilot(system: int | None, autopilot: int | None) -> VehicleNotFoundE
         return None
     if autopilot == m.Autopilot.PX4:
         return VehicleNotFoundError(
-            f"the autopilot of system {system} is PX4: nothing is planned for it over a link, checked or driven yet; `pbpp download` and `pbpp upload` work "
-            "with it, and `pbpp plan --log` and `pbpp log` read its recordings",
+            f"the autopilot of system {system} is PX4: over a link nothing is planned, checked or driven for it yet; `pbpp download` and `pbpp upload` "
+            "work with it, and `pbpp plan` with its files (--fence, --vehicle) and recordings (--log)",
             autopilot=autopilot,
+            advice="download its fence and its parameters, plan from the two files, and upload the mission; or choose another vehicle with --system N",
         )
     name = "" if autopilot is None else f" (MAV_AUTOPILOT {autopilot})"
     return VehicleNotFoundError(

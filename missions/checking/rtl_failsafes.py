@@ -52,13 +52,13 @@ class Failsafe:
 
 
 _ADVISED = (
-    ("FS_ACTION", 1.0, "RTL when a failsafe comes"),
+    ("FS_ACTION", 1.0, "RTL on a failsafe"),
     (
         "FS_GCS_ENABLE",
         1.0,
-        "one comes when the ground station's heartbeat is lost; it is not fed by pbpp, which is no ground station",
+        "failsafe when the ground station's heartbeat is lost; pbpp sends no such heartbeat, for it is no ground station",
     ),
-    ("FS_THR_ENABLE", 1.0, "and when the transmitter is lost"),
+    ("FS_THR_ENABLE", 1.0, "failsafe when the transmitter is lost"),
     ("BATT_FS_LOW_ACT", 1.0, "RTL on a low battery, at BATT_LOW_VOLT or BATT_LOW_MAH"),
     ("FENCE_ACTION", 2.0, "Hold after a breach: from beyond the fence no line was chosen"),
     ("RTL_SPEED", 0.0, "RTL at WP_SPEED, for which the corridor is predicted"),

@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 from shapely import LineString, Point, Polygon, affinity
 
+from missions.fence import OBSTACLE
 from missions.picture.scene import polygons
 from missions.words import harmless
 
@@ -47,8 +48,11 @@ def place_labels(axes: Any, scene: PictureScene) -> None:  # noqa: ANN401 - matp
     fences = shapely.union_all([scene.exclusions, scene.ground.edge, scene.inner_edges])
     zones = sorted(scene.named_zones, key=lambda named: -named[1].area)
     for zone, seen in zones[:_MOST_NAMES]:
-        in_two_lines = zone.name.replace(" ", "\n", 1)
-        is_inside = any(room.inside(seen, words) for words in (in_two_lines, zone.name))
+        name = (
+            OBSTACLE if zone.name.startswith(OBSTACLE) else zone.name
+        )  # who reported it, and when, takes too much room
+        in_two_lines = name.replace(" ", "\n", 1)
+        is_inside = any(room.inside(seen, words) for words in (in_two_lines, name))
         if not is_inside and zone.area.within(scene.frame):
             room.beside(seen, in_two_lines, "zone", (_GAP_PX, 15.0, 30.0), fences)
 

@@ -77,10 +77,15 @@ def _told_of_obstacles(planned: Plan, situation: Situation) -> Plan:
     """Return a plan with the obstacles that it was made around told, each once."""
     obstacles = situation.obstacles
     told = [
-        f"planned round the {one.name}, taken for {obstacles.radius_m(one):.1f} m; it is not known to the autopilot, and protects no person"
+        f"planned round the {one.name}{_grown(one.radius_m, obstacles.radius_m(one))}; the autopilot does not know of it; this protects no person"
         for one in obstacles.known
     ]
     return replace(planned, info=(*planned.info, *told)) if told else planned
+
+
+def _grown(radius_m: float, planned_m: float) -> str:
+    """Return how large an obstacle is taken to be where it may have moved; empty where it stands."""
+    return "" if f"{planned_m:.1f}" == f"{radius_m:.1f}" else f", as if its radius were {planned_m:.1f} m"
 
 
 def _with_room(

@@ -24,13 +24,14 @@ import shapely
 
 from missions.checking.check import forecast_band_m
 from missions.checking.rtl_lines import Metric, RoutePieces, swept
-from missions.errors import NoRouteError
+from missions.errors import NoRouteError, RouteError
 from missions.geo import LocalPoint, rounded
 from missions.ground.frame import bow_m
 from missions.ground.from_situation import route_ground
 from missions.ground.legs import ROUNDING_RESERVE_M
 from missions.promise import promise
 from missions.routing.rally_search import Candidates, fewest
+from missions.vehicle import Autopilot
 from missions.words import metres
 
 if TYPE_CHECKING:
@@ -132,11 +133,18 @@ def choose_rally_points(
 
     Raises
     ------
+    RouteError
+        The vehicle is no ArduPilot.
     NoRouteError
         No set was found; it says how much of the route is left and what may help.
     MissionError
         As `missions.checking.check.check_mission`.
     """
+    if checked.vehicle.autopilot is not Autopilot.ARDUPILOT:
+        raise RouteError(
+            f"rally points are chosen by how ArduPilot's RTL takes one; the vehicle is {checked.vehicle.autopilot}, which takes them otherwise",
+            advice="draw them in the ground station, and upload them with pbpp upload",
+        )
     asked = promise(situation, request, checked.vehicle)
     shares = (1.0, *_LESS_SHARES) if request.accepts_less else (1.0,)
     for share in shares:

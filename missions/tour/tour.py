@@ -192,6 +192,7 @@ def with_end(planned: Plan, situation: Situation, request: Tour) -> Plan:
         raise VehicleError(
             "a PX4 rover with steered wheels does not stand where it loiters: it circles, and that was measured of LOITER_TIME only; use --end hold",
             end=end.value,
+            advice="use --end hold",
         )
     items = ending(planned.items, end)
     if end is End.LOITER:

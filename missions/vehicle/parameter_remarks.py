@@ -46,7 +46,7 @@ def assumed_remarks(vehicle: Vehicle) -> list[str]:
     remarks = [f"{one}" for one in vehicle.assumed if one.parameter == "firmware"]
     if assumed:
         remarks.append(
-            f"parameters missing, {vehicle.autopilot} defaults used: {', '.join(assumed)} (use --vehicle FILE.param)"
+            f"parameters missing, {vehicle.autopilot} defaults used: {', '.join(assumed)} (use a --vehicle FILE.parm that has them)"
         )
     if (
         vehicle.steering is Steering.SKID

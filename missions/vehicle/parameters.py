@@ -203,7 +203,7 @@ _PX4 = (
     _px4(
         "RA_ACC_RAD_MAX",
         None,
-        "how far before it at the earliest; -1: NAV_ACC_RAD. Measured with both -1 and 3; not known: the worse of them",
+        "how far before a waypoint the next leg begins at the earliest; with -1 NAV_ACC_RAD alone counts. Measured with -1 and 3; where it is not known, the worse of both is assumed",
         Range(-1.0),
     ),
     _px4("RA_ACC_RAD_GAIN", 2.0, "how early sharp corners are begun", Range(), Range(2, 2)),
@@ -227,8 +227,8 @@ _PX4 = (
     _px4(
         "PP_LOOKAHD_GAIN", 1.0, "how far ahead on its line it steers at, by its speed", Range(), Range(1, 1)
     ),
-    _px4("PP_LOOKAHD_MIN", 1.0, "the least of that", Range(), Range(1, 1)),
-    _px4("PP_LOOKAHD_MAX", 10.0, "the most of that", Range(), Range(3, math.inf)),
+    _px4("PP_LOOKAHD_MIN", 1.0, "the shortest such distance", Range(), Range(1, 1)),
+    _px4("PP_LOOKAHD_MAX", 10.0, "the longest such distance", Range(), Range(3, math.inf)),
     _px4("RD_TRANS_DRV_TRN", math.radians(10.0), "corners sharper than this are turned on the spot", Range()),
     _px4("RO_YAW_RATE_LIM", None, "how long that takes"),
     _px4("GF_ACTION", 2.0, "whether the autopilot enforces the fence", _WHOLE),

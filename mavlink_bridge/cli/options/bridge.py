@@ -36,7 +36,7 @@ class ObstacleOptions:
     obstacle_growth: Annotated[
         float,
         option(
-            "How fast an obstacle may move until it was watched for 1.5 s.",
+            "How fast an obstacle is taken to move, until it has been watched for 1.5 s.",
             "MPS",
             panel=_OBSTACLES,
             parser=within(0.0, MOST_MPS, "metres a second"),
@@ -45,7 +45,7 @@ class ObstacleOptions:
     obstacle_keep: Annotated[
         float,
         option(
-            "How long an obstacle is kept after a sensor saw it last.",
+            "How long an obstacle is kept after a sensor last saw it.",
             "S",
             panel=_OBSTACLES,
             parser=within(0.5, MOST_S, "seconds"),

@@ -82,7 +82,7 @@ FirmwareOption = Annotated[
 SimulatedFirmwareOption = Annotated[
     Firmware | None,
     option(
-        "Firmware version (4.5, 4.6.3) that the simulated rover reports, and drives like. Default: 4.7.0-dev of October 2025; of PX4 1.18.0-dev.",
+        "Firmware version (4.5, 4.6.3) that the simulated rover reports, and drives like. Default: 4.7.0-dev of October 2025; for PX4 1.18.0-dev.",
         "VERSION",
         parser=firmware_option,
     ),

@@ -41,12 +41,12 @@ class SimOptions(MapOptions, CommonOptions):
     disc: Annotated[
         list[str],
         option(
-            "Something round in the field that the rover's distance sensor sees, 15 m far; it may move. Repeatable.",
+            "Something round in the field that the rover's distance sensor sees, up to 15 m away; it may move. Repeatable.",
             "LAT,LON,RADIUS[,SPEED,HEADING]",
         ),
     ] = field(default_factory=list)
     autopilot: Annotated[
-        str, option("Whose rover it is: ardupilot or px4.", "AUTOPILOT", parser=autopilot_from)
+        str, option("The autopilot that it answers as: ardupilot or px4.", "AUTOPILOT", parser=autopilot_from)
     ] = "ardupilot"
     firmware: SimulatedFirmwareOption = None
     param: Annotated[list[str], option("Set a parameter; repeatable.", "NAME=VALUE")] = field(

@@ -469,8 +469,8 @@ def test_px4_is_refused_by_what_plans_or_checks(rover, tmp_path, monkeypatch, co
     code, document = with_autopilot(12, rover, tmp_path, monkeypatch, command)
     assert (code, document["error"]) == (5, "VehicleNotFoundError")
     assert document["message"] == (
-        "the autopilot of system 1 is PX4: nothing is planned for it over a link, checked or driven yet; `pbpp download` and `pbpp upload` "
-        "work with it, and `pbpp plan --log` and `pbpp log` read its recordings"
+        "the autopilot of system 1 is PX4: over a link nothing is planned, checked or driven for it yet; `pbpp download` and `pbpp upload` "
+        "work with it, and `pbpp plan` with its files (--fence, --vehicle) and recordings (--log)"
     )
     assert document["details"]["autopilot"] == 12
 

@@ -727,7 +727,7 @@ def test_an_obstacle_beside_the_fence_is_planned_round_and_named(fields, tmp_pat
     assert plain["obstacles"] == []
     assert found["obstacles"] == [
         {
-            "name": "obstacle from --obstacle, 3.0 m",
+            "name": "obstacle from --obstacle (radius 3.0 m)",
             "position": [40.071801, -105.22946],
             "radius_m": 3.0,
             "taken_for_m": 3.0,
@@ -748,7 +748,7 @@ def test_an_obstacle_beside_the_fence_is_planned_round_and_named(fields, tmp_pat
         (["--obstacle", "40.07"], "LAT,LON,RADIUS"),
         (["--obstacle", "40.07,-105.2,0"], "metres"),
         (["--obstacle", "91,0,1"], "latitude"),
-        (["--obstacle", "40.07,1"], "--obstacle"),
+        (["--obstacle", "40.07,1"], "such as 40.0718,-105.2295,2.5"),
     ],
 )
 def test_what_is_no_obstacle_is_wrong_usage(fields, options, said):

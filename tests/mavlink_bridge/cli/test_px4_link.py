@@ -129,9 +129,8 @@ class TestTransfers:
         with rover(PX4S, firmware) as (simulator, sent):
             code, found = run(simulator, "upload", plan, "--drive")
             assert (code, found["error"]) == (6, "RefusedError")
-            assert (
-                "pbpp does not foresee yet how its rovers drive and stop; nothing was written"
-                in found["message"]
+            assert found["message"] == (
+                "--drive is not possible on PX4: pbpp does not start or watch its drives yet; nothing was written"
             )
             code, found = run(simulator, "download", "mission", "-o", tmp_path / "back.waypoints")
             assert code == 2

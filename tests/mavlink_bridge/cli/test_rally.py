@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 from mavlink_bridge.cli.app import app
 from mavlink_bridge.simulator import Simulator, SimulatorConfig
+from missions.checking.home_part import drive_end
 from missions.fence import fence_to_items
 from missions.formats import (
     read_fence,
@@ -66,7 +67,7 @@ def test_points_are_chosen_written_drawn_and_told(mission, tmp_path):
     result = run("rally", "--mission", mission, "--clearance", "2", *outputs, *KNOWN)
     assert "RTL's straight lines from the whole route keep 2.00 m while driving" in result.output
     assert "They hold only with RALLY_INCL_HOME 0, RALLY_LIMIT_KM 0" in result.output
-    assert "FS_ACTION 1: RTL when a failsafe comes" in result.output
+    assert "FS_ACTION 1: RTL on a failsafe" in result.output
     together = read_situation(plan)
     assert together.mission is not None
     assert together.fence is not None
@@ -234,6 +235,10 @@ def test_ways_home_inside_are_written_told_and_checked(fields, tmp_path):
             "--json",
         ).stdout
     )
+    told = run("plan", *asked, "--way-home-inside", "-o", tmp_path / "told.plan")
+    items = read_mission(tmp_path / "told.plan").items
+    driven = sum(item.is_placed for item in items[: drive_end(items)])
+    assert f", {driven} waypoints (" in told.output  # not those of the ways home
     (*_, last) = document["way_home_inside"]
     assert last["from_item"] < last["item"]
     assert distance_m(LatLon(*last["to"]), LatLon(40.0713, -105.2286)) < 0.02

@@ -115,7 +115,7 @@ def test_more_vehicles_come_home(seed):
 
 def test_the_first_rtl_is_answered_and_the_second_is_the_operators():
     run = heading_home(on_the_way(conductor()))
-    assert texts(run, EventName.CALLED_HOME) == ["called home (RTL): HOLD, then by a route round the fences"]
+    assert texts(run, EventName.CALLED_HOME) == ["called home (RTL): HOLD, then a route home"]
     wait(run, 3)
     unheard(run, RTL)
     assert left_alone(run, Mode.RTL)
@@ -184,9 +184,7 @@ def test_rtl_of_a_vehicle_that_somebody_drives_is_answered():
     unheard(run, m.SetMode(1, 1, Mode.SMART_RTL))
     run.run_until(lambda: run.vehicles[0].mode == Mode.HOLD, 2)
     run.run_until(lambda: run.director.state is State.DRIVING, 20)
-    assert texts(run, EventName.CALLED_HOME) == [
-        "called home (RTL: SMART_RTL): HOLD, then by a route round the fences"
-    ]
+    assert texts(run, EventName.CALLED_HOME) == ["called home (RTL: SMART_RTL): HOLD, then a route home"]
     assert home(run, FAR)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 
 import pytest
@@ -215,7 +216,11 @@ def test_blocked_is_right_before_the_vehicle_and_held_for_at_once():
     run.run_until(lambda: run.vehicles[0].mode == Mode.HOLD, 1)
     assert run.now_s - begun_s <= 0.5
     run.run_until(run.happened(EventName.BREACH_AHEAD), 1)
-    assert run.last(EventName.BREACH_AHEAD).text.startswith("obstacle inside the stopping distance: ")
+    text = run.last(EventName.BREACH_AHEAD).text
+    assert re.match(
+        r"obstacle inside the stopping distance: -?\d+\.\d m ahead, stops in \d+\.\d m from ", text
+    )
+    assert " m beyond the edge of the obstacle reported at " in text
 
 
 def heard(run, message, *, component=196, system=1):

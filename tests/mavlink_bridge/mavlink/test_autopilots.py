@@ -209,9 +209,9 @@ def test_where_only_little_is_known():
     assert ARDUPILOT.remark(None) is None
     assert PX4_1_17.remark(Firmware(1, 17, 0)) is None
     assert PX4_1_17.remark(Firmware(1, 16, 1)) == (
-        "the vehicle reports version 1.16.1, which was not measured: it is taken for PX4 1.17"
+        "the vehicle reports version 1.16.1, which was not measured: it is treated as PX4 1.17"
     )
-    assert PX4_1_18.remark(None) == "the vehicle does not report its version: it is taken for PX4 1.18"
+    assert PX4_1_18.remark(None) == "the vehicle does not report its version: it is treated as PX4 1.18"
     assert str(PX4_1_18) == "PX4 1.18"
 
 

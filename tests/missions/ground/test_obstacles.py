@@ -57,7 +57,7 @@ def test_it_grows_until_it_is_forgotten_and_is_named_by_when_who_and_how_large()
     assert one.radius_at(104.0) == pytest.approx(2.8)
     assert one.ends_s == 110.0
     assert one.name.startswith("obstacle reported at ")
-    assert one.name.endswith(":01:30 by OBSTACLE_DISTANCE, 0.8 m")
+    assert one.name.endswith(":01:30 by OBSTACLE_DISTANCE (radius 0.8 m)")
     known = Obstacles((one,), 102.0)
     assert known.radius_m(one) == pytest.approx(1.8)
     assert known.later(2.0, 0.5).radius_m(one) == pytest.approx(3.3)

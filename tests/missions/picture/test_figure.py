@@ -390,6 +390,18 @@ def test_a_fence_without_inclusions_and_too_small_for_names(plans: dict[str, Pla
     assert scene.blocks
 
 
+def test_an_obstacle_is_named_by_one_word(plans: dict[str, Plan]) -> None:
+    plan = plans["maze"]
+    dot = CircleZone(ZoneKind.EXCLUSION, plan.path[0], 0.5)
+    ground = lay_out(Fence((dot,)), plan.ground.frame)
+    (barrier,) = ground.barriers
+    known = replace(barrier, name="obstacle reported at 12:03:05 by OBSTACLE_DISTANCE (radius 0.5 m)")
+    ground = replace(ground, barriers=(known,))
+    keeps = replace(plan.keeps, drawn_m=float("inf"))
+    figure = scene_figure(plan_scene(replace(plan, fence=Fence((dot,)), ground=ground, keeps=keeps)))
+    assert list(texts_of(figure, "zone")) == ["zone obstacle"]
+
+
 def test_blocks_fill_the_free_space(plans: dict[str, Plan]) -> None:
     plan = plans["union"]
     blocks = [Polygon(block) for block in plan_scene(plan, blocks=True).blocks]

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from missions.checking.check import check_mission
-from missions.errors import NoRouteError
+from missions.errors import NoRouteError, RouteError
 from missions.fence import Fence, PolygonZone, ZoneKind
 from missions.geo import LatLon, LocalPoint
 from missions.ground.frame import frame_around
@@ -90,6 +90,11 @@ def test_one_point_where_one_sees_everything_and_home_where_it_does():
     assert choice.points[0] == pytest.approx(at(0, 0), abs=1e-7)
     assert choice.borders == ()
     assert (choice.clearance_m, choice.asked_m, choice.left_out_m) == (2.0, 2.0, 0.0)
+
+
+def test_none_are_chosen_for_px4_whose_rtl_takes_them_otherwise():
+    with pytest.raises(RouteError, match=r"ArduPilot's RTL takes one; the vehicle is PX4"):
+        chosen((0.0, 0.0), (60.0, 10.0), parameters={"RO_SPEED_LIM": 2.0, "RA_WHEEL_BASE": 0.321})
 
 
 def test_more_where_a_wall_stands_between():

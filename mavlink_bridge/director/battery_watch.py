@@ -28,9 +28,10 @@ _TEXT = re.compile(r"battery \d+ is (low|critical)", re.IGNORECASE)
 
 @dataclass(slots=True)
 class _Low:
-    """Since when a battery is low, and how many messages have told it."""
+    """Since when a battery is low, when that was told last, and how many messages have told it."""
 
     since_s: float = math.inf
+    told_s: float = -math.inf
     count: int = 0
 
 
@@ -64,6 +65,7 @@ class BatteryWatch:
             return self._tell(text) if _TEXT.match(text) else ""
         if isinstance(message, m.BatteryStatus):
             self._status_s = now_s
+            self._lows.pop(None, None)  # what SYS_STATUS has told before
             cells_mv = [one for one in message.voltages if one != _UNKNOWN_MV]
             volts = sum(cells_mv) / 1000 if cells_mv else math.nan
             return self._look(message.id, message.battery_remaining, volts, now_s)
@@ -74,10 +76,9 @@ class BatteryWatch:
         return ""
 
     def _look(self, battery: int | None, percent: int, volts: float, now_s: float) -> str:
-        """Look at a battery's figures; both 0 where there is no monitor."""
-        if percent == _UNKNOWN_PERCENT and math.isnan(volts):
-            return ""
-        if percent <= 0 and (volts == 0 or math.isnan(volts)):
+        """Look at a battery's figures; both 0 where there is no monitor, and 0 V, as to ArduPilot, no reading."""
+        volts = volts or math.nan
+        if percent <= 0 and math.isnan(volts):
             return ""
         is_low = self._percent is not None and 0 <= percent <= self._percent
         is_weak = self._volts is not None and volts <= self._volts
@@ -86,6 +87,9 @@ class BatteryWatch:
             self._lows[battery] = _Low()
             self._told = self._told and any(one.count for one in self._lows.values())
             return ""
+        if now_s > low.told_s + _FALLBACK_S:  # nobody knows what it was meanwhile
+            low.since_s, low.count = math.inf, 0
+        low.told_s = now_s
         low.since_s, low.count = min(low.since_s, now_s), low.count + 1
         if low.count < _LEAST_MESSAGES or now_s < low.since_s + LOW_FOR_S:
             return ""

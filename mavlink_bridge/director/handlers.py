@@ -162,7 +162,8 @@ def _on_target_came(parts: Parts, now_s: float) -> Iterable[Signal]:
         parts.caller.begin_anew()
     if inbox.came.has_set_off or not parts.halter.may_stop_it or not parts.hold_watch.goes_on_first(now_s):
         return inbox.go_into(now_s)
-    core.operator.take_target(now_s, is_click=False)
+    if not inbox.came.is_home:
+        core.operator.take_target(now_s, is_click=False)
     inbox.waiting = inbox.came
     return ()
 
@@ -237,6 +238,8 @@ def _on_upload_ended(parts: Parts, now_s: float) -> Iterable[Signal]:
 def _after_upload(parts: Parts, now_s: float) -> Iterable[Signal]:
     signals = parts.inbox.take_waiting()
     if signals or parts.core.state is not State.VERIFIED:
+        if not signals and parts.core.state is State.READY:
+            parts.caller.not_written(now_s)
         return signals
     parts.inbox.note_lists()
     found = parts.desk.recheck(1)
@@ -247,6 +250,7 @@ def _after_upload(parts: Parts, now_s: float) -> Iterable[Signal]:
 
 def _on_hold_ended(parts: Parts, _now_s: float) -> Iterable[Signal]:
     if parts.core.state is State.HOLDING and not parts.halter.is_hold_granted:
+        parts.caller.not_held()
         trouble = OutcomeError("the vehicle did not switch to HOLD; nothing was written")
         return parts.core.fail_step(trouble)
     if parts.core.state is State.CLASHED:

@@ -73,7 +73,7 @@ _BAD_FIXES = 3
 """So many GPS_RAW_INT in a row have to tell of a fix that is too bad: one may be a moment's; ArduPilot sends two a second. Chosen, not measured."""
 
 _TRY_AGAIN_S = 5.0
-"""Between two attempts with better fixes; chosen, not measured."""
+"""Between two attempts, with better fixes or after a failed upload; chosen, not measured."""
 
 _STALE_S = 1.5
 """For so long after the HOLD at a drive's end a heartbeat may still show AUTO."""
@@ -131,7 +131,9 @@ class HomeCaller(Part):
         self._bad_fixes = 0
         self._arrived_s: float | None = None  # since when it stands in HOLD after a drive of ours
         self._refused_fix: Fix | None = None
-        self._refused_s = -math.inf
+        self._refused_s = (
+            math.inf
+        )  # when a way home came to nothing; not to be tried again as long as none did
 
     @property
     def deadline_s(self) -> float | None:
@@ -240,19 +242,26 @@ class HomeCaller(Part):
         core = self.core
         if self._is_called:
             return []
-        is_watched = core.state in _IN_HAND and core.operator.is_on
-        if core.situation.armed and (
-            is_watched or (core.state is State.ARRIVED and self._arrived_s is not None)
-        ):
+        if core.situation.armed and self._is_in_hand:
             return self._call(call, detail, now_s)
         text = f"{_named(call, detail)}: not called home, for the vehicle is not on a drive of this bridge"
         core.voice.tell(now_s, EventName.CALL_IGNORED, text, str(call), "not on a drive of this bridge")
         return []
 
+    @property
+    def _is_in_hand(self) -> bool:
+        """Whether the vehicle is on a drive of ours, or stands in our HOLD since: also where it waits for an obstacle to go, or has no route."""
+        core = self.core
+        if core.state is State.ARRIVED and self._arrived_s is not None:
+            return True
+        is_held = core.state is State.READY and core.operator.is_ours(Mode.HOLD)
+        return core.operator.is_on and (core.state in _IN_HAND or is_held)
+
     def _call(self, call: HomeCall, detail: str, now_s: float) -> Sequence[Signal]:
         text = f"called home ({_named(call, detail)}): HOLD, then a route home"
         self.core.voice.tell(now_s, EventName.CALLED_HOME, text, str(call), detail)
         self._bad_fixes = 0
+        self._refused_s = math.inf
         return self._inbox.take_call(Target(self._guess, TargetSource.HOME, call=call))
 
     @property
@@ -266,11 +275,15 @@ class HomeCaller(Part):
         return situation.pose.value.position if situation.pose is not None else LatLon(0.0, 0.0)
 
     def _hold_again(self, now_s: float) -> Sequence[Signal]:
-        """Stop the vehicle once more: it may have set off after our HOLD."""
-        if self.core.state in _BUSY:
-            self._halter.command_hold(now_s)
-            return []
-        return [Notice.ROUTE_WANTED]
+        """Stop the vehicle once more: it may have set off after our HOLD; where nothing is to be driven home, it is only held."""
+        core, waiting = self.core, self._inbox.waiting
+        if core.state not in _BUSY:
+            if core.target is not None and core.target.is_home:
+                return [Notice.ROUTE_WANTED]
+            if waiting is not None and waiting.is_home:  # it was to go on first; now it has set off
+                return self._inbox.take_call(Target(self._guess, TargetSource.HOME, call=HomeCall.RTL))
+        self._halter.command_hold(now_s)
+        return []
 
     # The fix
 
@@ -281,7 +294,10 @@ class HomeCaller(Part):
             return []
         if core.state is State.READY:
             is_due = now_s >= self._refused_s + _TRY_AGAIN_S
-            return [Notice.ROUTE_WANTED] if is_due and is_better(core.situation, self._refused_fix) else []
+            if not is_due or not is_better(core.situation, self._refused_fix):
+                return []
+            self._refused_s = math.inf
+            return [Notice.ROUTE_WANTED]
         if core.state is not State.DRIVING:
             self._bad_fixes = 0
             return []
@@ -322,6 +338,19 @@ class HomeCaller(Part):
         self.core.voice.home_waits(
             now_s, call, "until a change of the fence, the places or the GPS fix makes a way possible"
         )
+
+    def not_written(self, now_s: float) -> None:
+        """Take notice that an upload has failed, which was told: a way home is tried again a little later."""
+        target = self.core.target
+        if target is None or not target.is_home:
+            return
+        self._refused_fix, self._refused_s = None, now_s
+        text = f"the upload failed; it is tried again in {_TRY_AGAIN_S:.0f} s"
+        self.core.voice.home_waits(now_s, target.call, text)
+
+    def not_held(self) -> None:
+        """Take notice that a HOLD was not taken, which was told: the vehicle may drive straight, so that it is tried again at once."""
+        self._refused_fix, self._refused_s = None, -math.inf
 
     def try_again(self) -> Sequence[Signal]:
         """Return that a way home is wanted again, where none was found on another field than the one now known."""

@@ -56,7 +56,7 @@ class IdentityGuard(Part):
         if answer is clash.Answer.REFUSE:
             core.steps.clear()
             return self._learner.refuse(identity_taken(identity), now_s)
-        if not core.heeds(Cue.CLASH):
+        if not core.heeds(Cue.CLASH) or (core.state is State.CLASHING and self._inbox.waiting is None):
             return []
         self._answer = answer
         return [Cue.CLASH]

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from mavlink_bridge.director import clash
 from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.grounds import Grounds
@@ -195,8 +196,9 @@ class ObstacleWatch(Part):
             )
             return None
         step_deg = message.increment_f or float(message.increment)
-        if not (math.isfinite(step_deg) and step_deg and math.isfinite(message.angle_offset)):
-            self._refuse("OBSTACLE_DISTANCE without an increment is not used", now_s)
+        if not (0 < abs(step_deg) <= 360 and abs(message.angle_offset) <= 360):  # nor where one is NaN
+            text = f"OBSTACLE_DISTANCE with an increment of {step_deg:g}° and an angle_offset of {message.angle_offset:g}° is not used"
+            self._refuse(text, now_s)
             return None
         count = min(int(360.0 / abs(step_deg) + 0.5), len(message.distances))
         cm = np.array(message.distances[:count], dtype=float)
@@ -240,9 +242,11 @@ class ObstacleWatch(Part):
     def _ask_for_attitude(self, now_s: float) -> None:
         """Ask for ATTITUDE, which not every link gets unasked."""
         core = self.core
-        if core.peer is None or core.orders.passive or now_s < self._asked_s + _ASK_EVERY_S:
+        is_silent = core.peer is None or core.orders.passive or core.state in clash.CLASHES
+        if is_silent or now_s < self._asked_s + _ASK_EVERY_S:
             return
         self._asked_s = now_s
+        assert core.peer is not None
         core.send(m.RequestDataStream(core.peer.system, core.peer.component, _EXTRA1, _ATTITUDE_HZ, 1))
 
     # Obstacles

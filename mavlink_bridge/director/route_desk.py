@@ -239,11 +239,11 @@ class RouteDesk(Part):
             text = f"{kept.fence}: across the route, {metres(kept.clearance_m)} of the required {metres(kept.asked_m)} left"
             left = round(kept.clearance_m, 2), round(kept.asked_m, 2)
             core.voice.tell(now_s, EventName.OBSTACLE_ACROSS, text, kept.fence, *left)
-        may_mend = core.state is not State.DRIVING or core.orders.drive
-        return [Notice.ROUTE_OUTDATED] if may_mend else []
+        return [Notice.ROUTE_OUTDATED] if core.orders.drive else []
 
     def _across(self, item: int) -> Recheck | None:
-        plan = self.core.plan
+        """Return what an obstacle across the route leaves of it; without orders to drive they are only told."""
+        plan = self.core.plan if self.core.orders.drive else None
         found = obstacle_across(plan, self.core.situation, item) if plan is not None else None
         return found.kept if found is not None else None
 

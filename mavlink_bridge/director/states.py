@@ -138,6 +138,7 @@ TRANSITIONS: dict[State, dict[Cue, State]] = {
     State.ARRIVED: {**_OURS, Cue.END: State.DONE},
     State.LET_GO: {**_ALWAYS, **_WANTED},
     State.CLASHING: {
+        Cue.CLASH: State.CLASHING,  # again, after a target was typed: that counts for nothing either
         Cue.UPLOAD_VERIFIED: State.CLASHED,
         Cue.TROUBLE: State.CLASHED,
         Cue.GIVE_UP: State.FAILED,

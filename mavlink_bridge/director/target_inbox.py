@@ -96,11 +96,12 @@ class TargetInbox(Part):
     def go_into(self, now_s: float) -> Sequence[Signal]:
         """Go into the target that came, or let it wait."""
         core, target = self.core, self.came
-        core.operator.take_target(now_s, is_click=target.is_click)
+        if not target.is_home:  # nobody said that: whatever is overheard after it was meant so
+            core.operator.take_target(now_s, is_click=target.is_click)
         if core.state in _NOT_NOW:
             self.waiting = target
             return [Notice.TARGET_WAITS]
-        core.target = target
+        core.target, self.waiting = target, None
         if not target.is_home:
             core.voice.tell(
                 now_s,

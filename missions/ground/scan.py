@@ -1,7 +1,7 @@
 """What a distance sensor sees around the vehicle: from distances by direction to discs in the plane.
 
 A disc is as deep as it is wide: of what stands there only the near side is seen. Each direction's distance stands for the whole sector around it, so a
-disc is drawn rather too wide than too narrow (of 700 round things 2 to 13 m away, seen in sectors of 5°, none stood out of its disc by more than 0.16 m; of a wall 0.44 m). What lies on the fence's own edges or beyond is left out: there no route leads.
+disc is drawn rather too wide than too narrow (of 700 round things 2 to 13 m away, seen in sectors of 5°, none stood out of its disc by more than 0.16 m; of a wall 0.44 m; where the discs of sectors wider than 5°, or of a ring, meet, a point stood out by up to 1.05 m). What lies on the fence's own edges or beyond is left out: there no route leads.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ _GAP_M = 1.0  # neighbouring directions whose points are farther apart see diffe
 _WIDEST_M = 4.0  # what is wider is several discs in a row: one would stand far into free ground; chosen
 _LEAST_RADIUS_M = 0.3  # of a disc: a post; chosen
 _MOST_RADIUS_M = 4.0  # of what stands at the sensor itself; chosen
-_STEEPEST_DEG = 60.0  # half of the widest angle that a disc is drawn into; chosen
+_FINE = math.radians(15.0)  # sectors are cut so fine, for discs that are about as wide as each other; chosen
+_STEEPEST = math.radians(60.0)  # half of the widest angle that a disc is drawn into; chosen
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,12 @@ class RangeScan:
     distances_m: NDArray[np.float64]
     first_deg: float
     step_deg: float
+
+    def in_parts(self, count: int) -> RangeScan:
+        """Return the same with each sector cut into so many, which see what it sees."""
+        step_deg = self.step_deg / count
+        first_deg = self.first_deg - (self.step_deg - step_deg) / 2
+        return RangeScan(np.repeat(self.distances_m, count), first_deg, step_deg)
 
 
 class Disc(NamedTuple):
@@ -71,25 +78,35 @@ def discs_seen(scan: RangeScan, here: LocalPoint, heading_deg: float, ground: Gr
     ground : Ground
         The fence, without obstacles.
     """
+    off_m = EDGE_M + scan.distances_m * math.radians(abs(scan.step_deg)) / 2
+    parts = _parts(scan)
+    scan, off_m = scan.in_parts(parts), np.repeat(off_m, parts)
     count = len(scan.distances_m)
     bearings = np.radians(heading_deg + scan.first_deg + scan.step_deg * np.arange(count))
     ways = np.column_stack((np.sin(bearings), np.cos(bearings)))
     points = np.array(here) + ways * np.nan_to_num(scan.distances_m)[:, None]
     counts = np.isfinite(scan.distances_m)
     step = math.radians(abs(scan.step_deg))
-    off_m = EDGE_M + scan.distances_m[counts] * step / 2
-    counts[counts] = _on_open_ground(points[counts], off_m, ground)
+    counts[counts] = _on_open_ground(points[counts], off_m[counts], ground)
     found = []
     for group in _groups(
         counts, points, scan.distances_m * step, is_round=count * step > 2 * math.pi - step / 2
     ):
         across_m = len(group) * step * float(scan.distances_m[group].min())
-        pieces = max(1, math.ceil(across_m / _WIDEST_M))
+        pieces = max(1, math.ceil(across_m / _WIDEST_M), math.ceil(len(group) * step / (2 * _STEEPEST)))
         found += [
             _disc(part, points, ways, scan.distances_m, np.array(here), step)
             for part in np.array_split(group, pieces)
         ]
     return found
+
+
+def _parts(scan: RangeScan) -> int:
+    """Return into how many each sector is cut: so that none is wider than a disc is drawn, and discs are about as wide as each other."""
+    step = math.radians(abs(scan.step_deg))
+    seen_m = scan.distances_m[np.isfinite(scan.distances_m)]
+    widest_m = step * float(seen_m.max(initial=0.0))
+    return max(1, math.ceil(2 * widest_m / _WIDEST_M), math.ceil(step / _FINE))
 
 
 def _on_open_ground(
@@ -135,7 +152,7 @@ def _disc(
     middle = ways[part].sum(axis=0)
     way = middle / np.hypot(*middle)
     near_m = float(distances_m[part].min())
-    sine = math.sin(min(len(part) * step / 2, math.radians(_STEEPEST_DEG)))
+    sine = math.sin(min(len(part) * step / 2, _STEEPEST))
     radius_m = max(near_m * sine / (1 - sine), _LEAST_RADIUS_M)
     centre = here + way * (near_m + radius_m)
     radius_m = max(radius_m, float(np.hypot(*(points[part] - centre).T).max()))

@@ -25,11 +25,11 @@ from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.protocol.upload import Upload
-from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig
+from mavlink_bridge.simulator import Battery, SimulatedVehicle, SimulatorConfig
 from mavlink_bridge.simulator.faults import Faults
 from missions.fence import CircleZone, Fence, ZoneKind, fence_to_items
 from missions.formats import read_fence
-from missions.geo import LatLon, to_e7
+from missions.geo import LatLon, LocalPoint, to_e7
 from missions.items import Command, waypoint, with_home
 from missions.request import Request
 
@@ -132,6 +132,10 @@ class Soak:
             (self._type, 5), (self._click, 5), (self._change_fence, 3), (self._block_way, 2), (self._change_mission, 1),
             (self._take_over, 3), (self._disarm, 1), (self._cut, 2), (self._spoil, 2), (self._reboot, 1), (self._spoof, 1),
         )  # fmt: skip
+        if self.run.director.orders.obstacle_sources:
+            acts += ((self._report, 4), (self._report_nonsense, 1), (self._clear, 1))
+        if self.run.director.orders.homing.battery_percent is not None:
+            acts += ((self._lower_battery, 1),)
         act = self.random.choices([act for act, _ in acts], [weight for _, weight in acts])[0]
         self.counts[act.__name__.strip("_")] += 1
         act()
@@ -147,6 +151,26 @@ class Soak:
         self.run.ground_station(
             m.CommandInt(1, 1, 0, Command.DO_REPOSITION, param1=-1.0, param2=1.0, x=lat_e7, y=lon_e7)
         )
+
+    def _report(self) -> None:
+        """Type an obstacle: ahead, or somewhere on the route."""
+        plan, place = self.run.director.plan, None
+        if plan is not None and self.random.random() < 0.7:
+            place = plan.ground.frame.to_lat_lon(LocalPoint(*self.random.choice(list(plan.points))))
+        self.run.director.take_obstacle(place, self.random.choice((0.5, 2.0, 8.0)), self.run.now_s)
+
+    def _report_nonsense(self) -> None:
+        """Let a sensor see something everywhere, or send what no sensor sends."""
+        cm = tuple(self.random.choice((0, 1, 300, 1500, 65535)) for _ in range(72))
+        increment = self.random.choice((0, 5, 45, 255))
+        scan = m.ObstacleDistance(0, 0, cm, increment=increment, min_distance=20, max_distance=1500, frame=12)
+        self.run.director.receive(m.Frame(1, 196, scan), self.run.now_s)
+
+    def _clear(self) -> None:
+        self.run.director.clear_obstacles(self.run.now_s)
+
+    def _lower_battery(self) -> None:
+        self.vehicle.rover.battery = Battery(self.random.choice((-1, 0, 10, 90)), 11.0)
 
     def _change_fence(self) -> None:
         if self._rival is None:

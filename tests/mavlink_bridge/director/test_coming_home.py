@@ -9,7 +9,7 @@ from io import StringIO
 import pytest
 from director.adopting import Killed
 from director.homing import CALLS, called_run
-from director.test_bridge_director import FAR, FENCE, HOME, NEAR, arm, driving, ready, upload
+from director.test_bridge_director import FAR, FENCE, HOME, NEAR, arm, driving, ready, reposition, upload
 from director.test_bridge_director import conductor as any_conductor
 from director.test_takeover import MANUAL, left_alone, modes_sent, unheard, wait
 
@@ -240,7 +240,64 @@ def test_nor_is_one_after_the_operator_has_taken_over():
     assert home(run)
 
 
+@pytest.mark.parametrize("is_heard", [False, True])
+@pytest.mark.parametrize("first", [None, FAR])
+def test_rtl_said_again_at_home_drives_nowhere_not_even_to_the_bridges_own_first_target(first, is_heard):
+    request = Request(clearance_m=2.5)
+    run = conductor(request=request.to(first) if first is not None else request)
+    run.run_until(lambda: run.director.state is (State.VERIFIED if first else State.READY), 60)
+    wait(run, 2)
+    arm(run)
+    wait(run, 2)
+    say = run.ground_station if is_heard else lambda message: unheard(run, message)
+    say(RTL)
+    run.run_until(run.happened(EventName.AT_HOME), 20)
+    before = len(run.events)
+    say(RTL)
+    wait(run, 15)
+    assert (run.director.state, run.vehicles[0].mode) == (State.READY, Mode.HOLD)
+    assert [event.name for event in run.events[before:]] == []
+
+
+def test_a_battery_call_that_goes_on_first_is_held_for_at_once_where_the_autopilot_answers_with_rtl():
+    run = on_the_way(conductor(homing=replace(BY_ROUTE, battery_percent=20)))
+    hold_watch = run.director._parts.hold_watch
+    hold_watch.goes_on_first = lambda now_s: run.director.state is State.DRIVING
+    run.vehicles[0].rover.texts.append((2, "Battery 1 is low 10.20V used 4000 mAh"))
+    run.run_until(run.happened(EventName.CALLED_HOME), 3)
+    assert run.director.state is State.DRIVING
+    unheard(run, RTL)
+    run.run_until(run.happened(EventName.GOING_HOME), 20)
+    assert home(run)
+    assert [event.name for event in run.events].count(EventName.PLANNED) == 2  # there, and home
+
+
 # Whoever takes it keeps it
+
+
+def test_a_click_after_a_call_that_had_to_wait_is_the_newest_word():
+    run = on_the_way(conductor(homing=replace(BY_ROUTE, battery_percent=20)))
+    hold_watch = run.director._parts.hold_watch
+    hold_watch.goes_on_first = lambda now_s: run.director.state is State.DRIVING
+    run.vehicles[0].rover.battery = LOW
+    run.run_until(run.happened(EventName.CALLED_HOME), 20)
+    run.ground_station(reposition(NEAR))
+    run.run_until(lambda: run.director.state is State.ARRIVED, 200)
+    wait(run, 2)
+    assert distance_m(run.vehicles[0].position, NEAR) < 4.0
+    assert not run.happened(EventName.GOING_HOME)()
+
+
+@pytest.mark.parametrize("after_s", [0.06, 0.2, 0.4])
+@pytest.mark.parametrize("mode", [Mode.HOLD, MANUAL])
+def test_what_a_ground_station_asks_for_right_after_a_call_that_nobody_gave_counts(mode, after_s):
+    run = on_the_way(conductor(homing=replace(BY_ROUTE, battery_percent=20)))
+    run.vehicles[0].rover.battery = LOW
+    run.run_until(run.happened(EventName.CALLED_HOME), 30)
+    wait(run, after_s)
+    run.ground_station(m.SetMode(1, 1, mode))
+    assert left_alone(run, mode, 15)
+    assert run.director.state is State.LET_GO
 
 
 @pytest.mark.parametrize(
@@ -367,6 +424,59 @@ def test_a_vehicle_that_turns_round_far_from_the_fence_goes_on_before_its_hold_o
     run.director.receive(STATION, run.now_s)
     run.run_until(lambda: run.director.state is State.HOLDING, 6)
     assert run.last(EventName.HOLDING).text == "HOLD: stopping for the way home"
+
+
+def test_one_that_was_held_and_has_no_route_is_called_too():
+    run = on_the_way(conductor(homing=replace(BY_ROUTE, battery_percent=20)))
+    run.director.take_target(FENCE.zones[0].vertices[0], run.now_s)
+    run.run_until(run.happened(EventName.NO_PLAN), 60)
+    run.vehicles[0].rover.battery = LOW
+    run.run_until(run.happened(EventName.CALLED_HOME), 20)
+    assert home(run)
+
+
+@pytest.mark.parametrize("is_denied", [False, True])
+def test_hold_that_is_not_taken_is_asked_for_again(is_denied):
+    run = on_the_way(conductor())
+    vehicle, receive, deaf_until_s = run.vehicles[0], run.vehicles[0].receive, run.now_s + 14.0
+
+    def be_deaf(frame, now_s):
+        message = frame.message
+        is_hold = isinstance(message, m.CommandLong) and (message.command, message.param2) == (176, Mode.HOLD)
+        if not is_hold or now_s > deaf_until_s:
+            receive(frame, now_s)
+        elif is_denied:
+            ack = m.CommandAck(176, 4, target_system=frame.system, target_component=frame.component)
+            run.down.push(m.Frame(1, 1, ack), now_s)
+
+    vehicle.receive = be_deaf
+    unheard(run, RTL)
+    run.run_until(lambda: vehicle.mode == Mode.HOLD, 17)
+    assert home(run)
+
+
+def test_an_upload_that_fails_is_tried_again_now_and_then_and_said():
+    run = on_the_way(conductor())
+    vehicle = run.vehicles[0]
+    receive, is_full = vehicle.receive, True
+
+    def refuse(frame, now_s):
+        message = frame.message
+        if is_full and isinstance(message, m.MissionCount) and message.mission_type == m.MissionType.MISSION:
+            run.down.push(m.Frame(1, 1, m.MissionAck(frame.system, frame.component, 4, 0)), now_s)
+        else:
+            receive(frame, now_s)
+
+    vehicle.receive = refuse
+    unheard(run, RTL)
+    wait(run, 30)
+    failed = len(texts(run, EventName.UPLOAD_FAILED))
+    assert 3 <= failed <= 6
+    assert len(texts(run, EventName.HOME_WAITS)) == failed
+    assert "the upload failed" in texts(run, EventName.HOME_WAITS)[0]
+    assert vehicle.mode == Mode.HOLD
+    is_full = False
+    assert home(run)
 
 
 # Breaches
@@ -591,6 +701,59 @@ def test_sys_status_counts_where_no_battery_status_comes():
     assert any("15 %, 11.0 V" in text for text in told_by(BatteryWatch(20, None), *[weak] * 12))
     mixed = [one for _ in range(20) for one in (weak, status(80))]
     assert not any(told_by(BatteryWatch(20, None), *mixed[1:]))
+
+
+def test_no_volts_are_no_reading():
+    for message in (status(60, 0), status(0, 65535), m.SysStatus(0, 0, 0, 0, 60), status(-1, 0)):
+        assert not any(told_by(BatteryWatch(20, 10.5), *[message] * 20))
+
+
+def test_what_sys_status_told_before_the_first_battery_status_does_not_count_for_ever():
+    watch = BatteryWatch(20, None)
+    watch.receive(m.SysStatus(0, 0, 0, 11_000, 15), 0.0)
+    for begins_s in (20, 60):
+        told = [watch.receive(status(15, 11_000), begins_s + second) for second in range(15)]
+        assert sum(map(bool, told)) == 1
+        assert not any(watch.receive(status(80, 12_000), begins_s + 20.0 + second) for second in range(5))
+
+
+def test_what_a_battery_was_while_nothing_was_heard_of_it_is_not_known():
+    watch = BatteryWatch(20, None)
+    assert not any(watch.receive(status(15), time_s) for time_s in (0.0, 1.0, 3600.0, 3601.0))
+
+
+def test_a_second_battery_that_is_low_calls_and_the_first_does_not_hide_it():
+    watch = BatteryWatch(20, None)
+    pair = [
+        m.BatteryStatus(number % 2, (11_000, *[65535] * 9), 15 if number % 2 else 90) for number in range(40)
+    ]
+    assert [text for text in told_by(watch, *pair) if text] == ["battery 2 at 15 %, 11.0 V"]
+
+
+@pytest.mark.parametrize(("system", "component", "kind"), [(1, 196, 18), (2, 1, 10), (2, 195, 18)])
+def test_heartbeats_of_companions_and_other_vehicles_are_no_ground_station(system, component, kind):
+    run = on_the_way(conductor(homing=replace(BY_ROUTE, gcs_timeout_s=5.0)))
+    run.director.receive(STATION, run.now_s)
+    heartbeat = m.Frame(system, component, m.Heartbeat(kind, 8))
+    run.meddle = lambda run: run.director.receive(heartbeat, run.now_s)
+    run.run_until(run.happened(EventName.CALLED_HOME), 6)
+
+
+def test_without_orders_to_drive_nothing_calls_and_rtl_is_left_alone():
+    everything = replace(BY_ROUTE, gcs_timeout_s=5.0, battery_percent=20)
+    run = ready(conductor(drive=False, homing=everything))
+    arm(run)
+    run.director.take_target(FAR, run.now_s)
+    run.run_until(lambda: run.director.state is State.VERIFIED, 20)
+    unheard(run, m.SetMode(1, 1, Mode.AUTO))
+    wait(run, 3)
+    run.vehicles[0].rover.battery = LOW
+    run.director.receive(STATION, run.now_s)
+    wait(run, 15)
+    unheard(run, RTL)
+    wait(run, 10)
+    assert modes_sent(run) == []
+    assert run.vehicles[0].mode == Mode.RTL
 
 
 def test_the_autopilots_own_text_counts_at_once_and_it_is_told_again_only_after_it_was_full():

@@ -172,6 +172,25 @@ def test_a_target_typed_while_the_upload_ends_is_gone_into_then():
     assert run.last(EventName.TARGET).data["position"] == list(NEAR)
 
 
+def test_another_clash_while_the_upload_ends_revokes_what_was_typed_since_and_says_so():
+    run = ready(conductor(arm=True))
+    arm(run)
+    run.director.take_target(FAR, run.now_s)
+    run.run_until(is_writing(run), 20)
+    spoof(run)
+    run.director.take_target(NEAR, run.now_s)
+    spoof(run, count=20)
+    assert run.director.state is State.CLASHING
+    run.run_until(lambda: run.director.state is State.CLASHED, 20)
+    assert len(clashes(run)) == 2
+    assert run.happened(EventName.VERIFIED)()
+    run.step()  # the read-back's last MISSION_ACK
+    assert is_left_alone(run)
+    assert run.vehicles[0].mission[-1].position == FAR
+    run.director.take_target(NEAR, run.now_s)
+    assert run.director.state is State.LEARNING
+
+
 def test_a_takeover_then_a_clash_while_an_upload_ends():
     run = ready(conductor(arm=True, faults=Faults(latency_s=0.1)))
     arm(run)

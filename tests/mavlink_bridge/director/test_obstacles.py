@@ -115,6 +115,28 @@ def test_without_drive_it_is_only_told():
     assert names(run).count(EventName.OBSTACLE_ACROSS) == 1
 
 
+@pytest.mark.parametrize("confirm", [False, True])
+def test_without_drive_a_route_that_stands_is_not_made_anew(confirm):
+    orders = replace(ORDERS, drive=False, arm=False, confirm=confirm)
+    config = SimulatorConfig(home=HOME, fence=fence_to_items(YARD), parameters={"FENCE_ENABLE": 1.0})
+    run = Conductor(Director(orders), [SimulatedVehicle(config)])
+    run.run_until(lambda: run.director.state is State.READY, 60)
+    run.director.take_target(TARGETS[0], run.now_s)
+    stands = State.PROPOSED if confirm else State.VERIFIED
+    run.run_until(lambda: run.director.state is stands, 30)
+    run.director.take_obstacle(on_route(run, 0.5), 2.0, run.now_s)
+    until_s = run.now_s + 5
+    run.run_until(lambda: run.now_s >= until_s)
+    run.director.confirm(run.now_s)
+    run.run_until(lambda: run.director.state is State.VERIFIED, 10)
+    until_s = run.now_s + 5
+    run.run_until(lambda: run.now_s >= until_s)
+    told = names(run)
+    assert [
+        told.count(name) for name in (EventName.OBSTACLE_ACROSS, EventName.PLANNED, EventName.UPLOADING)
+    ] == [1, 1, 1]
+
+
 def block(run):
     """Type a wall across the only way; return its obstacles' count."""
     plan = run.director.plan
@@ -278,6 +300,44 @@ def test_what_cannot_be_read_for_sure_is_refused_and_it_is_said_once(fresh, mess
     assert [event.name for event in fresh.director.take_events()] == [EventName.TROUBLE]
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"increment": 255},
+        {"increment": 45},
+        {"increment_f": 180.0},
+        {"increment_f": 360.0},
+        {"increment_f": 400.0},
+        {"increment_f": 1e30},
+        {"increment_f": 1.4e-45},
+        {"angle_offset": 3e38},
+        {"min_distance": 1500, "max_distance": 20},
+        {"min_distance": 0, "max_distance": 65535},
+    ],
+)
+def test_nonsense_in_a_scan_stops_nothing_and_stays_bounded(fresh, settings):
+    for value in (1, 25, 400, 1500, 65534):
+        fresh.director.clear_obstacles(fresh.now_s)
+        fresh.now_s += 0.1
+        for one in heard(fresh, scan(dict.fromkeys(range(72), value), **settings)):
+            assert math.isfinite(one.position.lat_deg + one.position.lon_deg)
+            assert 0 < one.radius_m <= 4.0
+    assert len(fresh.director.situation.obstacles.known) <= 64
+
+
+def test_thousands_of_obstacles_are_no_more_than_the_newest(fresh):
+    place = fresh.director.situation.pose.value.position
+    for number in range(2000):
+        fresh.director.take_obstacle(place._replace(lat_deg=40.07 + number * 1e-6), 0.5, fresh.now_s)
+    assert len(fresh.director.situation.obstacles.known) == 64
+    for number in range(60):
+        fresh.now_s += 0.1
+        heard(fresh, scan({i: 300 + (i * 131 + number * 397) % 1100 for i in range(0, 72, 2)}))
+    assert len(fresh.director.situation.obstacles.known) <= 128
+    assert len(fresh.director._parts.obstacles._tracks) <= 64
+
+
 def test_a_scan_of_another_system_or_too_soon_after_another_counts_for_nothing(fresh):
     assert heard(fresh, scan({0: 500}), system=2) == ()
     heard(fresh, scan())
@@ -301,6 +361,20 @@ def test_attitude_is_asked_for_where_it_does_not_come(fresh):
     heard(fresh, scan({0: 500}))
     asked = [one for one in fresh.director.messages_to_send() if isinstance(one, m.RequestDataStream)]
     assert asked == [m.RequestDataStream(1, 1, 10, 10, 1)]
+
+
+def test_nothing_is_asked_for_while_somebody_speaks_with_our_ids():
+    run = driving(sensor_m=0.0)
+    run.director.receive(m.Frame(1, 195, m.Heartbeat(6, 8)), run.now_s)
+    run.run_until(lambda: run.director.state is State.CLASHED, 5)
+    until_s = run.now_s + 3
+    run.run_until(lambda: run.now_s >= until_s)
+    run.sent.clear()
+    heard(run, scan({0: 500}))
+    assert run.director.situation.obstacles.known
+    until_s = run.now_s + 3
+    run.run_until(lambda: run.now_s >= until_s)
+    assert not any(isinstance(one, m.RequestDataStream) for one in run.sent)
 
 
 def test_a_thing_that_is_seen_ten_times_a_second_is_one_that_stands_and_it_is_forgotten(fresh):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from director.soak import soak
 
-from mavlink_bridge.director.orders import Homing
+from mavlink_bridge.director.orders import Homing, ObstacleSource
 
 
 @pytest.mark.parametrize("seed", [0])  # `make soak` of CI goes on for minutes
@@ -37,3 +37,13 @@ def test_coming_home_breaks_no_promise():
     run = soak(3, hours=0.08, pace_s=(0.3, 6.0), homing=homing)
     assert run.violations == []
     assert run.counts["called_home"] > 0
+
+
+@pytest.mark.parametrize(
+    "seed", [0, *(pytest.param(seed, marks=pytest.mark.campaign) for seed in range(1, 5))]
+)
+def test_coming_home_among_obstacles_breaks_no_promise(seed):
+    homing = Homing(is_kept=True, by_route=True, gcs_timeout_s=20.0, battery_percent=20)
+    run = soak(seed, hours=0.06, pace_s=(0.3, 6.0), homing=homing, obstacle_sources=frozenset(ObstacleSource))
+    assert run.violations == []
+    assert run.counts["called_home"] + run.counts["obstacle_across"] + run.counts["waiting"] > 0

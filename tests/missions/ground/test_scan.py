@@ -126,3 +126,32 @@ def test_what_stands_at_the_sensor_is_bounded():
     here = LocalPoint(0.0, -20.0)
     found = discs_seen(RangeScan(np.full(72, 0.3), 0.0, 5.0), here, 0.0, FIELD)
     assert all(disc.radius_m <= 4.0 for disc in found)
+
+
+@pytest.mark.parametrize("sectors", [2, 3, 4, 8, 12])
+@pytest.mark.parametrize("away_m", [0.01, 0.3, 6.0, 11.0, 40.0])
+@pytest.mark.filterwarnings("error")
+def test_a_wide_sector_is_a_row_of_discs(sectors, away_m):
+    """A single rangefinder is sent as a sector of 45°: what it sees may be anywhere in it."""
+    open_ground, here = lay_out(Fence(()), FRAME, around=[MIDDLE]), LocalPoint(0.0, 0.0)
+    distances_m = np.full(sectors, math.nan)
+    distances_m[0] = away_m
+    found = discs_seen(RangeScan(distances_m, 0.0, 360 / sectors), here, 0.0, open_ground)
+    assert all(math.isfinite(value) for disc in found for value in (*disc.near, *disc.way, disc.radius_m))
+    half_deg = 180 / sectors
+    for bearing in np.radians(np.linspace(-half_deg, half_deg, 181)):
+        seen = Point(away_m * math.sin(bearing), away_m * math.cos(bearing))
+        assert min(circle(disc).distance(seen) for disc in found) <= 1.05  # where two meet
+
+
+@pytest.mark.parametrize("sectors", [1, 2, 3, 4, 8, 72])
+@pytest.mark.parametrize("away_m", [0.01, 0.3, 3.0, 40.0])
+@pytest.mark.filterwarnings("error")
+def test_what_is_seen_all_around_is_discs_all_around(sectors, away_m):
+    open_ground, here = lay_out(Fence(()), FRAME, around=[MIDDLE]), LocalPoint(0.0, 0.0)
+    found = discs_seen(RangeScan(np.full(sectors, away_m), 0.0, 360 / sectors), here, 0.0, open_ground)
+    assert len(found) >= 3
+    for bearing in np.radians(np.arange(0, 360, 3)):
+        seen = Point(away_m * math.sin(bearing), away_m * math.cos(bearing))
+        assert min(circle(disc).distance(seen) for disc in found) <= 1.05  # where two meet
+    assert all(disc.radius_m <= 4.0 for disc in found)

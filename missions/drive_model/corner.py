@@ -93,9 +93,10 @@ STOP_LAG_S = 2.0
 # Measured: all but two of the 83 rows that left the band by more than 0.1 m turn sharper, on shorter legs (docs/drive-model.md).
 UNBOUNDED_TURN_DEG = 115.0
 UNBOUNDED_LEG_M = 15.0
-SHORT_START_M, START_TURNED_M = 3.0, 0.4
-"""A steered rover that swings out so far at its start (it faces 45 degrees away) has not settled after so short a run. Simulated, not measured: with a corner
-there it left its corridor by up to 0.9 m, from 3 m on by no more than elsewhere; on a drive of 0.8 m, facing away, by 16 m, of 3 m by 0.9 m."""
+SHORT_START_M, START_TURNED_M, UNSETTLED_M = 3.0, 0.4, 0.9
+"""A steered rover that swings out so far at its start (it faces 45 degrees away) has not settled after so short a run: with a corner there its corridor is so
+much wider. Simulated, not measured: it left it by up to 0.9 m, with that by 0.4 m (0.7 m long, facing back), from 3 m on by no more than elsewhere; on a drive
+of 0.8 m, facing away, by 16 m, of 3 m by 0.9 m."""
 PIVOT_DOUBT_DEG = 2.0
 """Corners this near to the pivot angle may be cut or pivoted: rounding of coordinates decides."""
 

@@ -46,7 +46,10 @@ def drive_plan(
     asked = [None if speeds is None else speeds[leg.first] for leg in legs]
     corners = []
     whole_deg = 0.0
-    swung_m = start.widest_m  # where the present run begins from rest
+    begins, swung_m = (
+        True,
+        start.widest_m,
+    )  # of the present run: whether it is the first, what it swings out from rest
     for number, (group, (before, after)) in enumerate(
         zip(groups[1:], itertools.pairwise(legs), strict=False)
     ):
@@ -60,9 +63,10 @@ def drive_plan(
         corner = _corner(vehicle, group, (before, after), bend, stops)
         goes_on = abs(turn_deg) < at_corner.STRAIGHT_ON_DEG
         if not goes_on and at_corner.unsettled(vehicle, swung_m, runs_m[number]):
-            corner = replace(corner, bounded=False)
+            corner = replace(corner, stray_m=max(corner.stray_m, at_corner.UNSETTLED_M))
+            start = start.widened(at_corner.UNSETTLED_M) if begins else start
         if corner.stops or not goes_on:
-            swung_m = corner.swing_m if corner.stops and not corner.pivots else 0.0
+            begins, swung_m = False, corner.swing_m if corner.stops and not corner.pivots else 0.0
         corners.append(corner)
     strays = [start]
     middle_s = at_corner.START_HOLD_S

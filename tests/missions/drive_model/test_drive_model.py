@@ -429,30 +429,39 @@ def test_two_gentle_corners_swing_less_than_a_sharp_one() -> None:
 
 
 @pytest.mark.parametrize(
-    ("vehicle", "first_m", "heading_deg", "bounded"),
+    ("vehicle", "first_m", "heading_deg", "is_wider"),
     [
-        (ROVER, 0.7, 90.0, False),
-        (ROVER, 2.9, 135.0, False),
-        (ROVER, 3.1, 135.0, True),
-        (ROVER, 0.7, 10.0, True),
-        (ROVER, 0.7, None, False),
-        (TANK, 0.7, 90.0, True),
+        (ROVER, 0.7, 90.0, True),
+        (ROVER, 2.9, 135.0, True),
+        (ROVER, 3.1, 135.0, False),
+        (ROVER, 0.7, 10.0, False),
+        (ROVER, 0.7, None, True),
+        (TANK, 0.7, 90.0, False),
     ],
 )
-def test_a_run_too_short_for_the_swing_of_the_start_bounds_no_corner(
-    vehicle: Vehicle, first_m: float, heading_deg: float | None, bounded: bool
+def test_a_run_too_short_for_the_swing_of_the_start_widens_the_corridor(
+    vehicle: Vehicle, first_m: float, heading_deg: float | None, is_wider: bool
 ) -> None:
-    """The simulated rover left its corridor by up to 0.9 m there, and breached a fence (circles 1 of `benchmarks/drive.py`)."""
-    points = np.array([(0.0, 0.0), (0.0, first_m), (20.0, first_m + 20.0)])
-    assert envelope(points, vehicle, heading_deg=heading_deg).corners[0].bounded is bounded
-    between = envelope(np.insert(points, 1, (0.0, first_m / 2), 0), vehicle, heading_deg=heading_deg)
-    assert between.corners[-1].bounded is bounded  # a point on the line is no corner
+    """The simulated rover left the corridor by up to 0.9 m there, and breached a fence (circles 1 of `benchmarks/drive.py`)."""
+    there = (20.0, first_m + 20.0)
+    turning, straight = (
+        envelope(np.array([(0.0, 0.0), (0.0, first_m), there_m]), vehicle, heading_deg=heading_deg)
+        for there_m in (there, (0.0, 30.0))
+    )
+    for after in (0, 1):
+        leg = turning.legs[after]
+        assert (min(leg.left_m, leg.right_m) - leg.half_width_m >= 0.5) is is_wider or heading_deg is None
+    if is_wider:
+        assert max(turning.legs[0].left_m, turning.legs[0].right_m) == pytest.approx(
+            max(straight.legs[0].left_m, straight.legs[0].right_m) + 0.9, abs=0.2
+        )
 
 
 def test_so_after_a_stop() -> None:
     points = np.array([(-30.0, 0.0), (0.0, 0.0), (0.0, 0.7), (20.0, 20.7)])
-    assert not envelope(points, ROVER, heading_deg=90.0, stops={1: 1.0}).corners[1].bounded
-    assert envelope(points, ROVER, heading_deg=90.0).corners[1].bounded
+    stopping = envelope(points, ROVER, heading_deg=90.0, stops={1: 1.0}).legs[2]
+    settled = envelope(points * (1.0, 5.0), ROVER, heading_deg=90.0, stops={1: 1.0}).legs[2]
+    assert stopping.left_m > settled.left_m + 0.5
 
 
 def test_a_tail_dies_away() -> None:

@@ -18,7 +18,7 @@ from missions.checking.home_ways import checked_ways
 from missions.checking.mission_end import crossed_zones, end_warnings, return_warnings
 from missions.checking.px4_waits import with_waits
 from missions.checking.rtl_lines import return_place
-from missions.drive_model import Envelope, beyond_loiter, extrapolated
+from missions.drive_model import Envelope, extrapolated
 from missions.errors import SituationError, StartBlockedError
 from missions.geo import LatLon, LocalPoint, distance_m
 from missions.ground.from_situation import ground_for, heading_at
@@ -249,10 +249,8 @@ def _check_drive(mission: Mission, situation: Situation, request: Request) -> Mi
     legs = _checked_legs(course, ground, forecast, asked.required_m, seams_of(ground, vehicle))
     dangers, hazards = _at_start(ground, start, vehicle)
     hold = hold_check(forecast, vehicle, ground, situation.stops)
-    reasons = (
-        *extrapolated(vehicle, forecast, *(leg.speed_mps for leg in course.legs)),
-        *beyond_loiter(vehicle, ends_in_loiter=course.ends_in_loiter),
-    )
+    speeds = (leg.speed_mps for leg in course.legs)
+    reasons = extrapolated(vehicle, forecast, *speeds, ends_in_loiter=course.ends_in_loiter)
     warnings = [
         *parameter_remarks(situation),
         *fence_warnings(vehicle, situation),

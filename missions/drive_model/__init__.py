@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from missions.drive_model.calibrated_range import beyond_loiter, beyond_measured, extrapolated
+from missions.drive_model.calibrated_range import beyond_measured, extrapolated
 from missions.drive_model.envelope import Corner, Envelope, Leg
 from missions.drive_model.predict import Drive, corner_forecast, envelope, plan_drive
 
@@ -11,7 +11,6 @@ __all__ = [
     "Drive",
     "Envelope",
     "Leg",
-    "beyond_loiter",
     "beyond_measured",
     "corner_forecast",
     "envelope",

@@ -60,26 +60,26 @@ def beyond_measured(vehicle: Vehicle, *speeds_mps: float | None) -> tuple[str, .
     )
 
 
-def extrapolated(vehicle: Vehicle, band: Envelope, *speeds_mps: float | None) -> tuple[str, ...]:
-    """Return in what a drive lies outside the measurements: its vehicle (`beyond_measured`), and corners that its firmware may drive otherwise."""
+def extrapolated(
+    vehicle: Vehicle, band: Envelope, *speeds_mps: float | None, ends_in_loiter: bool = False
+) -> tuple[str, ...]:
+    """Return in what a drive lies outside the measurements: its vehicle (`beyond_measured`), corners that its firmware may drive otherwise, its legs and end."""
     speeds = {vehicle.speed_mps, *filter(None, speeds_mps)}
     return (
         *beyond_measured(vehicle, *speeds_mps),
         *_beyond_corners(vehicle, band, speeds),
         *_beyond_short_drives(vehicle, band),
+        *(_beyond_loiter(vehicle) if ends_in_loiter else ()),
     )
 
 
-def beyond_loiter(vehicle: Vehicle, *, ends_in_loiter: bool) -> tuple[str, ...]:
-    """Return that a drive's end was not measured: ArduPilot goes on steering at the place of LOITER_UNLIM (Rover/mode_auto.cpp), and turns need room."""
-    stays = vehicle.autopilot is not Autopilot.ARDUPILOT or vehicle.steering is not Steering.ACKERMANN
-    if not ends_in_loiter or stays:
-        return ()
-    text = (
-        "what a steered rover does at LOITER_UNLIM was not measured: ArduPilot goes on steering there, and the simulated one rocked 10 m away "
-        "within a minute; use --end hold"
-    )
-    return (text,)
+def _beyond_loiter(vehicle: Vehicle) -> Iterator[str]:
+    """Yield that a steered rover's end was not measured: ArduPilot goes on steering at the place of LOITER_UNLIM (Rover/mode_auto.cpp), and turns need room."""
+    if vehicle.autopilot is Autopilot.ARDUPILOT and vehicle.steering is Steering.ACKERMANN:
+        yield (
+            "what a steered rover does at LOITER_UNLIM was not measured: ArduPilot goes on steering there, and the simulated one rocked 10 m away "
+            "within a minute; use --end hold"
+        )
 
 
 def _beyond_short_drives(vehicle: Vehicle, band: Envelope) -> Iterator[str]:

@@ -46,10 +46,8 @@ def drive_plan(
     asked = [None if speeds is None else speeds[leg.first] for leg in legs]
     corners = []
     whole_deg = 0.0
-    begins, swung_m = (
-        True,
-        start.widest_m,
-    )  # of the present run: whether it is the first, what it swings out from rest
+    is_first_run = True
+    swung_m = start.widest_m  # what the present run swings out that began from rest
     for number, (group, (before, after)) in enumerate(
         zip(groups[1:], itertools.pairwise(legs), strict=False)
     ):
@@ -64,9 +62,10 @@ def drive_plan(
         goes_on = abs(turn_deg) < at_corner.STRAIGHT_ON_DEG
         if not goes_on and at_corner.unsettled(vehicle, swung_m, runs_m[number]):
             corner = replace(corner, stray_m=max(corner.stray_m, at_corner.UNSETTLED_M))
-            start = start.widened(at_corner.UNSETTLED_M) if begins else start
+            start = start.widened(at_corner.UNSETTLED_M) if is_first_run else start
         if corner.stops or not goes_on:
-            begins, swung_m = False, corner.swing_m if corner.stops and not corner.pivots else 0.0
+            is_first_run = False
+            swung_m = corner.swing_m if corner.stops and not corner.pivots else 0.0
         corners.append(corner)
     strays = [start]
     middle_s = at_corner.START_HOLD_S

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from missions.drive_model import beyond_loiter, extrapolated
+from missions.drive_model import extrapolated
 from missions.errors import ExtrapolatedError
 from missions.items import Command
 
@@ -30,10 +30,7 @@ def unpromised(plan: Plan) -> ExtrapolatedError | None:
 def marked(plan: Plan, request: Request) -> Plan:
     """Return a plan with what lies outside the measurements, and without its promise where something does."""
     loiters = any(item.command == Command.NAV_LOITER_UNLIM for item in plan.items)
-    reasons = (
-        *extrapolated(plan.vehicle, plan.envelope, *plan.speeds),
-        *beyond_loiter(plan.vehicle, ends_in_loiter=loiters),
-    )
+    reasons = extrapolated(plan.vehicle, plan.envelope, *plan.speeds, ends_in_loiter=loiters)
     if not reasons or plan.clearance_m is None:
         return plan
     if request.trusts_model:

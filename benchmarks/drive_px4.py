@@ -14,13 +14,14 @@ import statistics
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, replace
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
 from typing import TYPE_CHECKING
 
+from drive import Run, read_lines, situation_of
 from drive_fields import make_field
 
 from mavlink_bridge.mavlink.messages import Autopilot
@@ -34,7 +35,6 @@ from missions.firmware import Firmware
 from missions.geo import distance_m
 from missions.planning.plan import plan
 from missions.request import GoTo
-from missions.situation import Known, Pose, Situation
 
 if TYPE_CHECKING:
     from drive_fields import Field
@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 
 TOLERANCE_M = 0.15
 STANDS_S = 60.0
+FIRMWARE = Firmware(1, 18, 0, 0)
 AIRFRAME = {
     "CA_AIRFRAME": 5.0,
     "NAV_ACC_RAD": 0.5,
@@ -72,34 +73,6 @@ VEHICLES = {
 }
 
 
-@dataclass(frozen=True)
-class Run:
-    """One field and one vehicle."""
-
-    seed: int
-    kind: str
-    vehicle: str
-    promised_m: float
-    refusal: str | None = None
-    extrapolated: tuple[str, ...] = ()
-    foreseen_m: float = math.nan
-    driven_m: float = math.nan
-    foreseen_s: float = 0.0
-    driven_s: float = 0.0
-    arrived: bool = False
-    cpu_s: float = 0.0
-
-    @property
-    def is_driven(self) -> bool:
-        """Whether it was driven."""
-        return self.driven_s > 0
-
-    @property
-    def short_m(self) -> float:
-        """How much less than promised was kept."""
-        return self.promised_m - self.driven_m
-
-
 def runs_of(seed: int) -> list[Run]:
     """Plan and drive one field with each vehicle."""
     field = make_field(seed)
@@ -108,34 +81,23 @@ def runs_of(seed: int) -> list[Run]:
 
 def _run(field: Field, name: str, parameters: dict[str, float]) -> Run:
     begun_s = time.process_time()
-    situation = Situation(
-        fence=Known(field.fence, None, "bench"),
-        pose=Known(Pose(field.start, field.heading_deg), None, "bench"),
-        home=Known(field.start, None, "bench"),
-        parameters=parameters,
-        firmware=Firmware(1, 18, 0, 0),
-    )
+    situation = situation_of(field, parameters, FIRMWARE)
     is_skid = parameters["CA_AIRFRAME"] == VEHICLES["skid, 2 m/s (not measured)"]["CA_AIRFRAME"]
     request = GoTo(target=field.target, clearance_m=field.clearance_m, trusts_model=is_skid)
-    known = {"seed": field.seed, "kind": field.kind, "vehicle": name}
+    known = {"seed": field.seed, "kind": field.kind, "vehicle": name, "widest_m": math.nan}
     try:
         planned = plan(situation, request)
     except MissionError as error:
-        return Run(
-            **known, promised_m=field.clearance_m, refusal=str(error), cpu_s=time.process_time() - begun_s
-        )  # type: ignore[arg-type]
+        found = Run(**known, promised_m=field.clearance_m, refusal=str(error))  # type: ignore[arg-type]
+        return replace(found, cpu_s=time.process_time() - begun_s)
     if planned.clearance_m is None:
-        return Run(
-            **known,  # type: ignore[arg-type]
-            promised_m=field.clearance_m,
-            extrapolated=planned.extrapolated,
-            cpu_s=time.process_time() - begun_s,
-        )
-    leads_away_m = planned.start_clearance_m
+        found = Run(**known, promised_m=field.clearance_m, extrapolated=planned.extrapolated)  # type: ignore[arg-type]
+        return replace(found, cpu_s=time.process_time() - begun_s)
     driven_s, driven_m, arrived = _drive(field, planned, parameters)
     return Run(
         **known,  # type: ignore[arg-type]
-        promised_m=planned.clearance_m if leads_away_m is None else leads_away_m,
+        promised_m=planned.clearance_m,
+        leads_away_m=planned.start_clearance_m,
         extrapolated=planned.extrapolated,
         foreseen_m=planned.driven_clearance_m,
         driven_m=driven_m,
@@ -158,7 +120,7 @@ def _drive(field: Field, planned: Plan, parameters: dict[str, float]) -> tuple[f
             heading_deg=field.heading_deg,
             mission=planned.items,
             parameters=parameters,
-            firmware=Firmware(1, 18, 0, 0),
+            firmware=FIRMWARE,
             streams=False,
         )
     )
@@ -211,12 +173,7 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--lines", type=Path)
     options = parser.parse_args()
-    kept = (
-        [json.loads(line) for line in options.lines.read_text(encoding="utf-8").splitlines()]
-        if options.lines and options.lines.exists()
-        else []
-    )
-    runs = [Run(**{**one, "extrapolated": tuple(one["extrapolated"])}) for one in kept]
+    runs = read_lines(options.lines)
     done = {run.seed for run in runs}
     seeds = [seed for seed in range(options.first, options.first + options.fields) if seed not in done]
     with ProcessPoolExecutor(options.jobs) as pool:

@@ -25,6 +25,7 @@ from missions.items import waypoint
 HOME = LatLon(40.071374, -105.229930)
 TARGET = "40.07209265,-105.22861524"
 KNOWN = ("--firmware", "4.6")
+ROUND_THE_BARN = ("--start", f"{HOME}", "--home", f"{HOME}", "--target", TARGET, "--clearance", "2", *KNOWN)
 
 pytestmark = pytest.mark.usefixtures("state_folder")
 
@@ -44,17 +45,9 @@ def mission(fields, tmp_path):
         "plan",
         "--fence",
         fence,
-        "--start",
-        f"{HOME}",
-        "--home",
-        f"{HOME}",
-        "--target",
-        TARGET,
-        "--clearance",
-        "2",
+        *ROUND_THE_BARN,
         "-o",
         path,
-        *KNOWN,
     )
     return path
 
@@ -211,15 +204,7 @@ def test_ways_home_inside_are_written_told_and_checked(fields, tmp_path):
     asked = (
         "--fence",
         fence,
-        "--start",
-        f"{HOME}",
-        "--home",
-        f"{HOME}",
-        "--target",
-        TARGET,
-        "--clearance",
-        "2",
-        *KNOWN,
+        *ROUND_THE_BARN,
     )
     document = json.loads(
         run(

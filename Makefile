@@ -79,11 +79,11 @@ release: .venv/dev.stamp
 
 lock: .venv/run.stamp
 	$(BIN)/python -m pip install --quiet uv
-	$(BIN)/uv pip compile pyproject.toml requirements/build.in --extra plot --universal --python-version 3.11 \
+	$(BIN)/uv pip compile pyproject.toml requirements/build.in --extra plot --extra web --universal --python-version 3.11 \
 		--generate-hashes --no-header --quiet -o requirements/run.lock
-	$(BIN)/uv pip compile pyproject.toml requirements/build.in --extra plot --extra test --extra docs --extra dev --universal \
+	$(BIN)/uv pip compile pyproject.toml requirements/build.in --extra plot --extra web --extra test --extra docs --extra dev --universal \
 		--python-version 3.11 --generate-hashes --no-header --quiet -c requirements/run.lock -o requirements/dev.lock
-	$(BIN)/uv pip compile pyproject.toml requirements/build.in --extra plot --extra test --python-version 3.11 \
+	$(BIN)/uv pip compile pyproject.toml requirements/build.in --extra plot --extra web --extra test --python-version 3.11 \
 		--resolution lowest-direct --generate-hashes --no-header --quiet -o requirements/lowest.lock
 	echo keyring | $(BIN)/uv pip compile requirements/release.in --universal --python-version 3.11 --excludes /dev/stdin \
 		--generate-hashes --no-header --quiet -c requirements/dev.lock -o requirements/release.lock

@@ -24,7 +24,8 @@ from mavlink_bridge.cli.way_home import RouteWays
 from missions.checking.check import check_mission, plan_of
 from missions.picture.plans import plan_scene
 from missions.request import GoTo
-from missions.vehicle.item_limit import most_items
+from missions.vehicle import Autopilot
+from missions.vehicle.item_limit import home_items, most_own_items
 from missions.words import counted, metres, mission_items
 
 if TYPE_CHECKING:
@@ -73,9 +74,12 @@ def check(options: CheckOptions) -> None:
 
 def _storage_warnings(items: Sequence[MissionItem], situation: Situation) -> list[str]:
     """Warn of a mission (its items without home) that the vehicle cannot hold."""
-    most = most_items(situation.parameters)
-    count = len(items) + 1
-    return [f"{mission_items(count)}; the vehicle holds {most}"] if count > most else []
+    home, most = home_items(situation), most_own_items(situation)
+    by_board = "" if home else " (or 1000, by its board: no parameter says which)"
+    told = (
+        f"{mission_items(len(items) + home, has_home=bool(home))}; the vehicle holds {most + home}{by_board}"
+    )
+    return [told] if len(items) > most else []
 
 
 def _scene(checked: MissionCheck, planned: Plan, ways: RouteWays | None) -> PictureScene:
@@ -120,6 +124,11 @@ def _report(checked: MissionCheck, plots: list[Path], *, is_quiet: bool) -> None
     echo(f"PASS: {every} keeps {kept}{trusted}")
 
 
+def _items(checked: MissionCheck) -> str:
+    has_home = checked.vehicle.autopilot is Autopilot.ARDUPILOT
+    return mission_items(len(checked.mission.items) + has_home, has_home=has_home)
+
+
 def _report_legs(checked: MissionCheck, plots: list[Path]) -> None:
     table = Table(box=None, pad_edge=False, collapse_padding=True)
     wrapped = {"leg", "nearest fence"}
@@ -131,7 +140,7 @@ def _report_legs(checked: MissionCheck, plots: list[Path]) -> None:
     console().print(table)
     echo(
         f"{counted(len(checked.legs), 'leg')}, {checked.length_m:.1f} m, about {checked.duration_s:.0f} s"
-        f"{' for each round' if checked.course.is_endless else ''}; {mission_items(len(checked.mission.items) + 1)}"
+        f"{' for each round' if checked.course.is_endless else ''}; {_items(checked)}"
     )
     for way in checked.home_ways:
         echo(

@@ -219,7 +219,7 @@ def test_px4_with_steered_wheels() -> None:
     assert not vehicle.fence.enabled
     assert vehicle.fence.radius_m == 100.0
     assert vehicle.stops_within_m == 0.0
-    assert vehicle.pursuit == Pursuit(full_speed_mps=None, speed_reduction=-1.0)
+    assert vehicle.pursuit == Pursuit(acceptance_gain=1.0, full_speed_mps=None, speed_reduction=-1.0)
     assert {one.parameter for one in vehicle.assumed} == {
         "RA_ACC_RAD_GAIN", "RO_SPEED_RED", "PP_LOOKAHD_GAIN", "PP_LOOKAHD_MIN", "PP_LOOKAHD_MAX",
     }  # fmt: skip

@@ -216,7 +216,7 @@ def _kind(text: str, name: str, value: float, where: str) -> int:
     whole = _KINDS[kind]
     if whole is not None and (value != math.floor(value) or value not in whole):
         raise MissionFormatError(
-            f"{where}: {name} {value:.9g} is no value of type {kind}; expected a whole number, {whole}",
+            f"{where}: {name} {value:.9g} is no value of type {kind}; expected a whole number, {whole.least:.0f} to {whole.most:.0f}",
             where=where,
         )
     return kind

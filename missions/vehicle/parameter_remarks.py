@@ -71,9 +71,7 @@ def made_for_remarks(situation: Situation) -> list[str]:
         Autopilot.ARDUPILOT if is_ardupilot else Autopilot.PX4 for is_ardupilot in (made_for.ardupilot, known)
     )
     if known != made_for.ardupilot:
-        return [
-            f"{made_for.source} is made for {name} (firmwareType), but the vehicle is {own}: {own} counts"
-        ]
+        return [f"{made_for.source} is made for {name} (firmwareType), but the vehicle is {own}"]
     is_alone = situation.ardupilot is None and is_ardupilots(situation.parameters) is None
     if is_alone and not made_for.ardupilot:
         return [
@@ -101,9 +99,12 @@ def assumed_remarks(vehicle: Vehicle) -> list[str]:
         if one.parameter != "firmware" and row_of(one.parameter).is_told
     ]
     remarks = [f"{one}" for one in vehicle.assumed if one.parameter == "firmware"]
+    is_ardupilot = vehicle.autopilot is Autopilot.ARDUPILOT
+    # What PX4's has by default says nothing: rovers are set up by their airframe, and 0 or -1 is "not set".
+    taken = f"{vehicle.autopilot} defaults used" if is_ardupilot else "assuming"
     if assumed:
         remarks.append(
-            f"parameters missing, {vehicle.autopilot} defaults used: {', '.join(assumed)} (use a --vehicle FILE.parm that has them)"
+            f"parameters missing, {taken}: {', '.join(assumed)} (use a --vehicle FILE that has them)"
         )
     if (
         vehicle.steering is Steering.SKID

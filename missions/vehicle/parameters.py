@@ -230,7 +230,7 @@ _PX4 = (
     _px4("PP_LOOKAHD_MAX", 10.0, "the longest such distance", _TENTH, Range(), Range(3, math.inf)),
     _px4("RD_TRANS_DRV_TRN", math.radians(10.0), "corners sharper than this are turned on the spot", Range(0.001, 3.14159), Range()),
     _px4("RO_YAW_RATE_LIM", None, "how long that takes", Range()),
-    _px4("GF_ACTION", 2.0, "what the autopilot does in a breach: 0 nothing, 1 a warning, 2 HOLD, 3 RTL, 4 ends the drive for good, 5 LAND", Range(0, 5), _WHOLE, is_whole=True),
+    _px4("GF_ACTION", 2.0, "what the autopilot does in a breach: 0 nothing, 1 a warning, 2 HOLD, 3 RTL, 4 termination, 5 LAND", Range(0, 5), _WHOLE, is_whole=True),
     _px4("GF_MAX_HOR_DIST", 0.0, "radius of the circle around home", Range(), Range()),
     _px4("GF_SOURCE", None, "nothing here; which position counts for the fence: 0 the estimate, 1 GPS", Range(0, 1), is_whole=True),
     _px4("GF_PREDICT", None, "nothing on a rover, as measured", None, is_whole=True, until=_PX4_1_17),

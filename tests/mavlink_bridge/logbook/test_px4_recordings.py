@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import re
 import struct
 import tomllib
 from collections import Counter
@@ -17,6 +18,7 @@ from typer.testing import CliRunner
 from mavlink_bridge.cli.app import app
 from mavlink_bridge.logbook import read_logbook
 from mavlink_bridge.logbook.log_situation import situation_from_log
+from missions.vehicle.parameters import PARAMETERS, PX4_NAMES
 
 FOLDER = Path(__file__).parents[3] / "sitl_logs" / "px4"
 MANIFEST = tomllib.loads((FOLDER / "manifest.toml").read_text(encoding="utf-8"))
@@ -53,6 +55,11 @@ class Decoded:
             if not found or found[-1] != mode:
                 found.append(mode)
         return found
+
+
+ARDUPILOT = re.compile(
+    r"ArduPilot|\b(FENCE|WP|ATC|AVOID|OA|RTL|FS)_[A-Z]+|GUIDED|Mission Planner|MAVProxy|with home"
+)
 
 
 @pytest.fixture(scope="module", params=sorted(MANIFEST))
@@ -150,3 +157,45 @@ def test_replay_and_plan_of_a_recording():
     assert found["clearance_m"] == 1.0  # steered wheels, as they were measured
     assert any("keeps no margin" in text for text in found["info"])
     assert found["fence"]["vertices"] == 8
+
+
+def test_types_are_those_that_px4_publishes(recording):
+    _, _, decoded = recording
+    for m in decoded.of("PARAM_VALUE"):
+        if m.param_id in PX4_NAMES:
+            assert m.param_type == (6 if PARAMETERS[m.param_id].is_whole else 9), m.param_id
+
+
+def test_nothing_is_told_in_ardupilots_words(recording):
+    _, path, decoded = recording
+    told = CliRunner().invoke(app, ["log", str(path)]).output
+    assert not ARDUPILOT.findall(told)
+    (vehicle,) = json.loads(CliRunner().invoke(app, ["log", str(path), "--json"]).stdout)["logs"][0][
+        "vehicles"
+    ]
+    shown = set(vehicle["parameters"])
+    assert shown == {name for name in decoded.parameters() if name in PX4_NAMES}
+
+
+def test_breaches_that_px4_reports(recording):
+    name, path, decoded = recording
+    texts = [m.text for m in decoded.of("STATUSTEXT") if m.text.startswith("Geofence: ")]
+    (vehicle,) = read_logbook(path).vehicles
+    assert (
+        len(vehicle.reported_breaches)
+        == len(texts)
+        == {"fence-breach": 2, "118-rtl-through-fence": 1}.get(name, 0)
+    )
+    assert [one.count for one in vehicle.reported_breaches] == list(range(1, len(texts) + 1))
+    (drawn,) = json.loads(CliRunner().invoke(app, ["log", str(path), "--json"]).stdout)["logs"][0]["vehicles"]
+    assert len(drawn["reported_breaches"]) == len(texts)
+
+
+def test_drives_are_graded_by_px4s_own_model():
+    (square,) = read_logbook(FOLDER / "upload-and-square.tlog").vehicles
+    (grade,) = square.grades
+    assert (grade.arrived, grade.is_as_foreseen, grade.notes) == (True, True, ())  # of the measured kind
+    (breach,) = read_logbook(FOLDER / "fence-breach.tlog").vehicles
+    (grade,) = breach.grades
+    assert len(grade.notes) == 1  # of 8 parameters
+    assert grade.notes[0].startswith("the prediction is extrapolated: ")

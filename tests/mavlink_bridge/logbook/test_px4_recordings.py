@@ -168,8 +168,8 @@ def test_types_are_those_that_px4_publishes(recording):
 
 def test_nothing_is_told_in_ardupilots_words(recording):
     _, path, decoded = recording
-    told = CliRunner().invoke(app, ["log", str(path)]).output
-    assert not ARDUPILOT.findall(told)
+    for command in ("log", "replay"):
+        assert not ARDUPILOT.findall(CliRunner().invoke(app, [command, str(path)]).output)
     (vehicle,) = json.loads(CliRunner().invoke(app, ["log", str(path), "--json"]).stdout)["logs"][0][
         "vehicles"
     ]

@@ -80,7 +80,7 @@ def read(text: str, source: str) -> Situation:
     MissionFormatError
         With the line and what was expected there.
     """
-    rows: list[_Row] = []
+    rows: list[_ParameterRow] = []
     remarks, firmware, told = [], None, None
     for number, line in enumerate(lines_of(text, source), start=1):
         firmware = firmware or firmware_from_remark(line)
@@ -164,7 +164,7 @@ def is_parameter_name(text: str) -> bool:
     return _NAME.fullmatch(text) is not None
 
 
-class _Row(NamedTuple):
+class _ParameterRow(NamedTuple):
     """A parameter of a file; ids and MAV_PARAM_TYPE in QGroundControl's rows only."""
 
     where: str
@@ -175,7 +175,7 @@ class _Row(NamedTuple):
     kind: int | None = None
 
 
-def _parse(text: str, where: str) -> _Row:
+def _parse(text: str, where: str) -> _ParameterRow:
     columns = [column.strip() for column in (text.split("\t") if "\t" in text else text.split())]
     is_qgc = len(columns) == 5  # vehicle, component, name, value, type
     if is_qgc:
@@ -192,11 +192,11 @@ def _parse(text: str, where: str) -> _Row:
         )
     name = match[1].upper()
     if not is_qgc:
-        return _Row(where, name, value)
+        return _ParameterRow(where, name, value)
     system, component = (
         _id(text, word, where) for text, word in zip(columns, ("vehicle", "component"), strict=False)
     )
-    return _Row(where, name, value, system, component, _kind(columns[4], name, value, where))
+    return _ParameterRow(where, name, value, system, component, _kind(columns[4], name, value, where))
 
 
 def _id(text: str, word: str, where: str) -> int:
@@ -222,7 +222,7 @@ def _kind(text: str, name: str, value: float, where: str) -> int:
     return kind
 
 
-def _vehicle_of(rows: Sequence[_Row]) -> int | None:
+def _vehicle_of(rows: Sequence[_ParameterRow]) -> int | None:
     """Return which vehicle the rows are of; None where they do not say it."""
     first: int | None = None
     for row in rows:
@@ -236,7 +236,7 @@ def _vehicle_of(rows: Sequence[_Row]) -> int | None:
     return first
 
 
-def _of_autopilot(rows: Sequence[_Row], source: str) -> tuple[list[_Row], list[str]]:
+def _of_autopilot(rows: Sequence[_ParameterRow], source: str) -> tuple[list[_ParameterRow], list[str]]:
     """Return the rows of the autopilot, and what is to be said of those of other components."""
     components = {row.component for row in rows if row.component is not None}
     if len(components) < 2:
@@ -249,7 +249,7 @@ def _of_autopilot(rows: Sequence[_Row], source: str) -> tuple[list[_Row], list[s
     ]
 
 
-def _type_remarks(rows: Sequence[_Row]) -> list[str]:
+def _type_remarks(rows: Sequence[_ParameterRow]) -> list[str]:
     """Return which of PX4's parameters have another type than PX4 publishes."""
     remarks = []
     for row in rows:

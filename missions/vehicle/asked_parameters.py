@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from missions.vehicle import PARAMETER_NAMES, Autopilot
+from missions.vehicle import PARAMETER_NAMES
 from missions.vehicle.parameters import PARAMETERS, PX4_NAMES
 
 STORAGE_NAMES: Final = ("BRD_SD_MISSION", "BRD_SD_FENCE")
@@ -20,13 +20,3 @@ CHECKED_NAMES: Final = (*ASKED_NAMES, "CIRC_RADIUS", "BATT_FS_LOW_ACT", "BATT_FS
 
 PX4_ASKED_NAMES: Final = tuple(name for name in PX4_NAMES if PARAMETERS[name].until is None)
 """What to ask PX4 for: all that is read of it, but for names that only older versions have."""
-
-
-def asked_names(autopilot: Autopilot) -> tuple[str, ...]:
-    """Return what to ask a vehicle for where a mission is to be planned and driven."""
-    return PX4_ASKED_NAMES if autopilot is Autopilot.PX4 else ASKED_NAMES
-
-
-def checked_names(autopilot: Autopilot) -> tuple[str, ...]:
-    """Return what to ask a vehicle for where any mission is checked."""
-    return PX4_ASKED_NAMES if autopilot is Autopilot.PX4 else CHECKED_NAMES

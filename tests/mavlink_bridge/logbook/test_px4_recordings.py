@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 from pymavlink import mavutil
+from pyproj import Geod
+from shapely import LineString, Polygon
 from typer.testing import CliRunner
 
 from mavlink_bridge.cli.app import app
@@ -57,6 +59,7 @@ class Decoded:
         return found
 
 
+WGS84 = Geod(ellps="WGS84")
 ARDUPILOT = re.compile(
     r"ArduPilot|\b(FENCE|WP|ATC|AVOID|OA|RTL|FS)_[A-Z]+|GUIDED|Mission Planner|MAVProxy|with home"
 )
@@ -199,3 +202,51 @@ def test_drives_are_graded_by_px4s_own_model():
     (grade,) = breach.grades
     assert len(grade.notes) == 1  # of 8 parameters
     assert grade.notes[0].startswith("the prediction is extrapolated: ")
+
+
+def armed_track(decoded):
+    """The track while armed, in pieces: latitude and longitude."""
+    pieces, armed = [[]], False
+    for m in decoded.of("HEARTBEAT", "GLOBAL_POSITION_INT"):
+        if m.get_type() == "HEARTBEAT":
+            if armed and not m.base_mode & 128:
+                pieces.append([])
+            armed = bool(m.base_mode & 128)
+        elif armed:
+            pieces[-1].append((m.lat / 1e7, m.lon / 1e7))
+    return [piece for piece in pieces if len(piece) > 1]
+
+
+def test_driven_is_the_length_of_the_track(recording):
+    _, path, decoded = recording
+    length_m = sum(
+        WGS84.line_length([lon for _, lon in piece], [lat for lat, _ in piece])
+        for piece in armed_track(decoded)
+    )
+    (vehicle,) = read_logbook(path).vehicles
+    assert vehicle.driven_m == pytest.approx(
+        length_m, abs=0.02 * length_m + 0.2
+    )  # from a heartbeat to a heartbeat
+
+
+def test_the_least_clearance_is_what_shapely_measures():
+    decoded = Decoded(FOLDER / "upload-and-square.tlog")
+    vertices = [m for m in decoded.of("MISSION_ITEM_INT") if m.mission_type == 1]
+    lat_deg, lon_deg = vertices[0].x / 1e7, vertices[0].y / 1e7
+    east_m = (
+        WGS84.inv(lon_deg, lat_deg, lon_deg + 1e-3, lat_deg)[2] / 1e-3
+    )  # of a degree; the field is 40 m wide
+    north_m = WGS84.inv(lon_deg, lat_deg, lon_deg, lat_deg + 1e-3)[2] / 1e-3
+
+    def plane(lat, lon):
+        return (lon - lon_deg) * east_m, (lat - lat_deg) * north_m
+
+    rings, start = [], 0
+    while start < len(vertices):
+        count = int(vertices[start].param1)
+        rings.append(Polygon([plane(m.x / 1e7, m.y / 1e7) for m in vertices[start : start + count]]))
+        start += count
+    track = LineString([plane(*place) for piece in armed_track(decoded) for place in piece])
+    least_m = min(ring.exterior.distance(track) for ring in rings)
+    (vehicle,) = read_logbook(FOLDER / "upload-and-square.tlog").vehicles
+    assert vehicle.nearest.clearance_m == pytest.approx(least_m, abs=0.01)

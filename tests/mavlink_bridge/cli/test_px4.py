@@ -197,3 +197,19 @@ def test_a_mission_of_px4_is_counted_without_home(tmp_path: Path) -> None:
         "501 mission items; the vehicle holds 500 (or 1000, by its board: no parameter says which)"
         in found["warnings"]
     )
+
+
+@pytest.mark.parametrize(
+    ("text", "is_told"), [("WP_SPEED 2\n", True), (MEASURED, False), ("BATT_MONITOR 4\n", False)]
+)
+def test_parameters_of_another_autopilot_than_the_logs_vehicle_are_said(
+    tmp_path: Path, text: str, *, is_told: bool
+) -> None:
+    (tmp_path / "rover.parm").write_text(text)
+    log = px4_log(tmp_path / "px4.tlog")
+    result = CliRunner().invoke(
+        app, ["plan", "--log", str(log), "--target", TARGET, "--vehicle", str(tmp_path / "rover.parm")]
+    )
+    assert result.exit_code == 0
+    told = "--vehicle holds ArduPilot's parameters, but the vehicle is PX4, to which they mean nothing"
+    assert (told in result.stderr) == is_told

@@ -33,7 +33,7 @@ from missions.items import change_speed
 from missions.promise import promise
 from missions.request import Tour, conditions, request_of
 from missions.situation import Known, Mission, Pose
-from missions.vehicle.item_limit import home_items, most_own_items
+from missions.vehicle.item_limit import most_own_items
 from missions.words import counted, left_out_text, metres, moved_text
 
 if TYPE_CHECKING:
@@ -275,7 +275,7 @@ def _within_storage(
         left_out = count - len(checked.mission.items)
         changes = (
             *changes,
-            left_out_text(left_out, most + home_items(situation)),
+            left_out_text(left_out, most + checked.vehicle.home_items),
         )
     return Repair(checked.mission, checked, changes)
 

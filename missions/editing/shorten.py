@@ -17,7 +17,6 @@ from missions.editing.shorter_lines import deviation_m, length_m, meeting_place,
 from missions.errors import MissionTooLongError
 from missions.geo import distance_m, to_e7
 from missions.items import Command
-from missions.vehicle.item_limit import home_items
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
@@ -75,7 +74,7 @@ def shortened(
     for again in (search.waypoints, search.corners):  # some stood between changes of speed
         search.leave_out(again)
     if search.count > most:
-        home = home_items(situation)
+        home = search.check.vehicle.home_items
         raise MissionTooLongError(
             f"the mission needs {search.count + home} items{' including home' if home else ''}, but the vehicle holds {most + home}; {len(mission.items) - search.count} of "
             f"{len(own)} route items could be left out without coming closer to a fence",

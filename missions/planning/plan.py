@@ -17,7 +17,7 @@ from missions.request import RepairMission, Tour
 from missions.situation import Mission
 from missions.tour.tour import plan_tour
 from missions.tour.way_home_inside import with_way_home_inside
-from missions.vehicle.item_limit import home_items, most_own_items
+from missions.vehicle.item_limit import most_own_items
 from missions.words import left_out_text
 
 if TYPE_CHECKING:
@@ -129,7 +129,7 @@ def _with_room(
         blocks=planned.blocks,
         home=planned.home,
         warnings=planned.warnings,
-        info=(*planned.info, left_out_text(left_out, most + home_items(situation))),
+        info=(*planned.info, left_out_text(left_out, most + planned.vehicle.home_items)),
     )
 
 

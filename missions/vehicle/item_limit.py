@@ -30,11 +30,6 @@ def most_items(parameters: Mapping[str, float]) -> int:
     return (sd_bytes - _SD_HEADER_BYTES) // _SD_BYTES_PER_ITEM if sd_bytes > 0 else MISSION_ITEMS
 
 
-def home_items(situation: Situation) -> int:
-    """Return how many items of a mission on the vehicle are home: ArduPilot's first one, none on PX4."""
-    return 0 if known_ardupilot(situation) is False else 1
-
-
 def most_own_items(situation: Situation) -> int:
     """Return how many items of a mission a vehicle holds, home not included."""
     if known_ardupilot(situation) is False:

@@ -196,6 +196,11 @@ class Vehicle:
     pursuit: Pursuit | None = None
 
     @property
+    def home_items(self) -> int:
+        """How many items of its mission are home: ArduPilot's first one, none on PX4."""
+        return int(self.autopilot is Autopilot.ARDUPILOT)
+
+    @property
     def is_rover(self) -> bool:
         """Whether its heartbeat, where one was heard, is that of a rover or a boat."""
         return self.mav_type is None or self.mav_type in GROUND_TYPES

@@ -185,6 +185,7 @@ def test_a_mission_of_px4_is_counted_without_home(tmp_path: Path) -> None:
         app, ["check", "--mission", str(plan), "--vehicle", str(tmp_path / "rover.params")]
     )
     assert "1 mission item\n" in checked.output
+    assert run("check", "--mission", plan, "--vehicle", tmp_path / "rover.params")[1]["mission_items"] == 1
     converted = CliRunner().invoke(app, ["convert", str(plan), str(tmp_path / "mission.geojson")])
     assert "1 mission item," in converted.output
     document = json.loads(plan.read_text())

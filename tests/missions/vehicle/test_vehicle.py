@@ -29,7 +29,7 @@ from missions.vehicle import (
     whole_number,
 )
 from missions.vehicle.asked_parameters import PX4_ASKED_NAMES
-from missions.vehicle.item_limit import home_items, most_items, most_own_items, storage_remarks
+from missions.vehicle.item_limit import most_items, most_own_items, storage_remarks
 from missions.vehicle.parameter_remarks import (
     assumed_remarks,
     made_for_remarks,
@@ -536,9 +536,9 @@ def test_a_plan_for_a_boat_is_one(heard: int | None, said: int | None, known: in
 
 
 def test_how_many_items_are_held_by_autopilot() -> None:
-    assert (most_own_items(Situation()), home_items(Situation())) == (654, 1)
-    px4 = Situation(parameters=PX4S)
-    assert (most_own_items(px4), home_items(px4)) == (500, 0)
+    for parameters, most, home in (({}, 654, 1), (PX4S, 500, 0)):
+        assert most_own_items(Situation(parameters=parameters)) == most
+        assert vehicle_from_parameters(parameters).home_items == home
 
 
 def measured_cells(*, before_4_6: bool = False) -> list[dict[str, str]]:

@@ -36,15 +36,14 @@ class Pieces:
     def __init__(self) -> None:
         self.bands_m: list[float] = []
         self.waypoints: list[int] = []
-        self._coordinates: list[float] = []
+        self._vertices: list[Vector] = []
         self._sizes: list[int] = []
 
     def add(self, vertices: Sequence[Vector], band_m: float, waypoint: int) -> None:
         """Add the hull of some places, to be grown by a band."""
         if len(vertices) == 1:
             vertices = (*vertices, *vertices)
-        for vertex in vertices:
-            self._coordinates += vertex
+        self._vertices += vertices
         self._sizes.append(len(vertices))
         self.bands_m.append(band_m)
         self.waypoints.append(waypoint)
@@ -52,8 +51,9 @@ class Pieces:
     def convex(self) -> NDArray[np.object_]:
         """Return the convex hulls of their places."""
         owners = np.repeat(np.arange(len(self._sizes)), self._sizes)
+        coordinates = np.fromiter(itertools.chain.from_iterable(self._vertices), np.float64, 2 * len(owners))
         # Lines take far less to make than as many points, and their hulls are the same.
-        lines = shapely.linestrings(np.array(self._coordinates).reshape(-1, 2), indices=owners)
+        lines = shapely.linestrings(coordinates.reshape(-1, 2), indices=owners)
         return np.asarray(shapely.convex_hull(lines), dtype=np.object_)
 
 
@@ -95,12 +95,12 @@ def add_leg(pieces: Pieces, drive: DrivePlan, number: int) -> None:
     leg = drive.legs[number]
     # Pure pursuit follows no motion that blends: its corners lie beside whole legs.
     begin_s, end_s = drive.span_s(number) if drive.vehicle.pursuit is None else (0.0, leg.profile.duration_s)
-    times_s = [begin_s]
-    if drive.stray_at(number, begin_s).widest_m >= NEGLIGIBLE_M:
-        times_s += [begin_s + time_s for time_s in TAIL_TIMES_S if begin_s + time_s < end_s]
-    times_s.append(end_s)
-    rungs = [_beside(leg.at(time_s), leg.direction, drive.stray_at(number, time_s)) for time_s in times_s]
     waypoint = waypoint_after(drive, number)
+    if drive.stray_at(number, begin_s).widest_m < NEGLIGIBLE_M:  # and less later on
+        pieces.add((leg.at(begin_s), leg.at(end_s)), leg.band_m, waypoint)
+        return
+    times_s = [begin_s, *(begin_s + time_s for time_s in TAIL_TIMES_S if begin_s + time_s < end_s), end_s]
+    rungs = [_beside(leg.at(time_s), leg.direction, drive.stray_at(number, time_s)) for time_s in times_s]
     for rung, following in itertools.pairwise(rungs):
         pieces.add([*rung, *following], leg.band_m, waypoint)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from missions.drive_model import before_4_6
@@ -44,6 +43,7 @@ def drive_plan(
     turns_deg = [change_deg(before.direction, after.direction) for before, after in itertools.pairwise(legs)]
     runs_m = _runs_m(legs, turns_deg)
     asked = [None if speeds is None else speeds[leg.first] for leg in legs]
+    asked_mps = [vehicle.speed_mps if speed_mps is None else speed_mps for speed_mps in asked]
     corners = []
     whole_deg = 0.0
     is_first_run = True
@@ -54,14 +54,12 @@ def drive_plan(
         turn_deg = turns_deg[number]
         whole_deg = turn_deg + (whole_deg if before.profile.length_m < at_corner.NEAR_M else 0.0)
         changes_speed = asked[number] != asked[number + 1] and abs(turn_deg) > at_corner.STRAIGHT_ON_DEG
-        fastest_mps = max(
-            vehicle.speed_mps if speed_mps is None else speed_mps for speed_mps in asked[number : number + 2]
-        )
+        fastest_mps = max(asked_mps[number], asked_mps[number + 1])
         bend = Bend(turn_deg, whole_deg, min(runs_m[number], runs_m[number + 1]), fastest_mps, changes_speed)
         corner = _corner(vehicle, group, (before, after), bend, stops)
         goes_on = abs(turn_deg) < at_corner.STRAIGHT_ON_DEG
         if not goes_on and at_corner.unsettled(vehicle, swung_m, runs_m[number]):
-            corner = replace(corner, stray_m=max(corner.stray_m, at_corner.UNSETTLED_M))
+            corner = corner._replace(stray_m=max(corner.stray_m, at_corner.UNSETTLED_M))
             start = start.widened(at_corner.UNSETTLED_M) if is_first_run else start
         if corner.stops or not goes_on:
             is_first_run = False
@@ -128,7 +126,8 @@ def _runs_m(legs: Sequence[LegPlan], turns_deg: Sequence[float]) -> list[float]:
             runs[-1].append(leg)
         else:
             runs.append([leg])
-    return [sum(leg.profile.length_m for leg in run) for run in runs for _ in run]
+    lengths_m = [sum([leg.profile.length_m for leg in run]) for run in runs]
+    return [length_m for length_m, run in zip(lengths_m, runs, strict=True) for _ in run]
 
 
 def _corner(
@@ -141,8 +140,9 @@ def _corner(
     before, after = legs
     turn_deg = bend.turn_deg
     pivots = at_corner.pivots(vehicle, turn_deg)
-    delay_s = sum(stops.get(number, 0.0) for number, _ in group)
-    stopped = len(group) > 1 or any(number in stops for number, _ in group)
+    stops_s = [stops[number] for number, _ in group if number in stops] if stops else []
+    delay_s = sum(stops_s, 0.0)
+    stopped = len(group) > 1 or bool(stops_s)
     doubtful = at_corner.may_pivot_or_cut(vehicle, turn_deg) and not stopped
     tail = Stray()
     either_m = 0.0

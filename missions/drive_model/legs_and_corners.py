@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from missions.drive_model import before_4_6
 from missions.drive_model import corner as at_corner
@@ -16,9 +16,8 @@ if TYPE_CHECKING:
     from missions.vehicle import Vehicle
 
 
-@dataclass(frozen=True, slots=True)
-class LegPlan:
-    """One leg: where it runs, how it is driven, and its straight-line band."""
+class LegPlan(NamedTuple):
+    """One leg: where it runs, how it is driven, and its straight-line band; a tuple, as `Ramp` is."""
 
     first: int
     start: Vector
@@ -33,9 +32,8 @@ class LegPlan:
         return (self.start[0] + self.direction[0] * along_m, self.start[1] + self.direction[1] * along_m)
 
 
-@dataclass(frozen=True, slots=True)
-class CornerPlan:
-    """One place where a leg ends and the next begins.
+class CornerPlan(NamedTuple):
+    """One place where a leg ends and the next begins; a tuple, as `Ramp` is.
 
     Parameters
     ----------

@@ -58,6 +58,7 @@ _EXIT_CODES: tuple[tuple[type[Exception], ExitCode], ...] = (
     (bridge_errors.UsageError, ExitCode.USAGE),
     (bridge_errors.LogError, ExitCode.INPUT),
     (bridge_errors.LinkError, ExitCode.LINK),
+    (bridge_errors.ClusterError, ExitCode.LINK),
     (bridge_errors.RefusedError, ExitCode.REFUSED),
     (bridge_errors.OutcomeError, ExitCode.OUTCOME),
     (bridge_errors.BridgeError, ExitCode.INTERNAL),
@@ -107,6 +108,8 @@ _ADVICE: Mapping[type[Exception], tuple[str, ...]] = {
     bridge_errors.LinkError: (
         "is the vehicle on, and is another program using the port? `pbpp doctor` lists the serial ports",
     ),
+    bridge_errors.ClusterError: (),
+    bridge_errors.LostWorkerError: ("give the machine more memory, or leave out what the worker died at",),
     bridge_errors.RefusedError: ("see the vehicle's own messages in the ground station",),
     bridge_errors.VehicleInUseError: ("wait for the other pbpp to finish, or stop it",),
     bridge_errors.OutcomeError: ("check what the vehicle holds (`pbpp download`) before it drives",),

@@ -13,7 +13,7 @@ import os
 import shutil
 import sys
 import textwrap
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import TextIO
 
 import typer
@@ -55,8 +55,31 @@ def echo_help(text: str) -> None:
 
 def print_json(document: Mapping[str, object]) -> None:
     """Put a JSON document on stdout, in ASCII; numbers that JSON has not become null."""
+    sys.stdout.write(_ascii(document) + "\n")
+
+
+def _ascii(document: Mapping[str, object]) -> str:
     text = json.dumps(_plain(document), allow_nan=False)  # which lets one control character through: DEL
-    sys.stdout.write(text.replace("\x7f", "\\u007f") + "\n")
+    return text.replace("\x7f", "\\u007f")
+
+
+def print_json_list(
+    head: Mapping[str, object],
+    name: str,
+    members: Iterable[Mapping[str, object]],
+    tail: Callable[[], Mapping[str, object]],
+) -> None:
+    """Put one JSON document on stdout that has a list of any length: each member is written as it comes, the tail once all have come."""
+    sys.stdout.write(f"{_ascii(head)[:-1]}, {json.dumps(name)}: [")
+    for number, member in enumerate(members):
+        sys.stdout.write(f"{', ' if number else ''}{_ascii(member)}")
+    sys.stdout.write(f"], {_ascii(tail())[1:]}\n")
+
+
+def print_text(pieces: Iterable[str]) -> None:
+    """Put a document of another format on stdout, piece by piece, a line each; whoever makes it has made it harmless."""
+    for piece in pieces:
+        sys.stdout.write(f"{piece}\n")
 
 
 def _put(line: str, colour: str | None, *, is_error: bool, nl: bool = True) -> None:

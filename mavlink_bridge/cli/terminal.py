@@ -54,11 +54,12 @@ def echo_help(text: str) -> None:
 
 
 def print_json(document: Mapping[str, object]) -> None:
-    """Put a JSON document on stdout, in ASCII; numbers that JSON has not become null."""
-    sys.stdout.write(_ascii(document) + "\n")
+    """Put a JSON document on stdout, as `json_line` makes it."""
+    sys.stdout.write(json_line(document) + "\n")
 
 
-def _ascii(document: Mapping[str, object]) -> str:
+def json_line(document: Mapping[str, object]) -> str:
+    """Return a JSON document in one line, in ASCII; numbers that JSON has not become null."""
     text = json.dumps(_plain(document), allow_nan=False)  # which lets one control character through: DEL
     return text.replace("\x7f", "\\u007f")
 
@@ -70,10 +71,10 @@ def print_json_list(
     tail: Callable[[], Mapping[str, object]],
 ) -> None:
     """Put one JSON document on stdout that has a list of any length: each member is written as it comes, the tail once all have come."""
-    sys.stdout.write(f"{_ascii(head)[:-1]}, {json.dumps(name)}: [")
+    sys.stdout.write(f"{json_line(head)[:-1]}, {json.dumps(name)}: [")
     for number, member in enumerate(members):
-        sys.stdout.write(f"{', ' if number else ''}{_ascii(member)}")
-    sys.stdout.write(f"], {_ascii(tail())[1:]}\n")
+        sys.stdout.write(f"{', ' if number else ''}{json_line(member)}")
+    sys.stdout.write(f"], {json_line(tail())[1:]}\n")
 
 
 def print_text(pieces: Iterable[str]) -> None:

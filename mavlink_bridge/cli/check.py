@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from functools import partial
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 import typer
 from rich.table import Table
 
-from mavlink_bridge.cli.check_many import check_many
 from mavlink_bridge.cli.checked_mission import checked_of, document_of
 from mavlink_bridge.cli.common import inform, warn
 from mavlink_bridge.cli.drawing import cell, console
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 def check(options: CheckOptions) -> None:
     """Check each leg, and report, draw or print as JSON what was found."""
     if options.missions or options.format is not None or options.cluster is not None:
-        check_many(options)
+        import_module("mavlink_bridge.cli.check_many").check_many(options)  # one mission needs it not
         return
     check_source(options)
     check_plots(options.plot, json_output=options.json_output)

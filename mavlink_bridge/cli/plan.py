@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.cli.common import is_same_file
 from mavlink_bridge.cli.permissions import check_permissions
 from mavlink_bridge.cli.pictures import check_plots
-from mavlink_bridge.cli.plan_batch import plan_batch
 from mavlink_bridge.cli.plan_request import plan_request
 from mavlink_bridge.cli.plan_results import Told, arrival_document, report_end
 from mavlink_bridge.cli.plan_source import offline_situation
@@ -27,7 +27,9 @@ if TYPE_CHECKING:
 def plan(options: PlanOptions) -> None:
     """Plan, and do with the plan what the options ask for."""
     if options.batch is not None:
-        plan_batch(options, options.batch)
+        import_module("mavlink_bridge.cli.plan_batch").plan_batch(
+            options, options.batch
+        )  # one plan needs it not
         return
     if options.jobs is not None or options.cluster is not None:
         raise UsageError("--jobs and --cluster go with --batch: one plan is made here")

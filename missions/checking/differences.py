@@ -220,16 +220,21 @@ def _of_params(a: MissionItem, b: MissionItem, same_place: dict[int, int]) -> li
     for number, (one, other) in enumerate(zip(a.params, b.params, strict=True), start=1):
         if number == 1 and a.command in _JUMPS and same_place.get(round(one) - 1, -1) == round(other) - 1:
             continue
-        if not (math.isclose(one, other, rel_tol=1e-6) or (math.isnan(one) and math.isnan(other))):
+        if not _are_close(one, other):
             name = _PARAMS.get((a.command, number), f"param{number}")
             texts.append(f"{name} {one:g} → {other:g}")
-    if not math.isclose(a.alt_m, b.alt_m, abs_tol=1e-3):
+    if not _are_close(a.alt_m, b.alt_m):
         texts.append(f"altitude {a.alt_m:g} → {b.alt_m:g} m")
     if a.frame != b.frame:
         texts.append(f"frame {a.frame} → {b.frame}")
     if a.autocontinue != b.autocontinue:
         texts.append(f"autocontinue {int(a.autocontinue)} → {int(b.autocontinue)}")
     return texts
+
+
+def _are_close(a: float, b: float) -> bool:
+    """Return whether two numbers are the same, as files write them; or neither is set."""
+    return math.isclose(a, b, rel_tol=1e-6, abs_tol=1e-6) or (math.isnan(a) and math.isnan(b))
 
 
 def _places(item: MissionItem | None) -> tuple[LatLon, ...]:
@@ -384,7 +389,7 @@ def _of_points(
     name = name_a if name_a == name_b else f"{name_a} (in B {name_b})"
     moved = _moved("", one.position, other.position)
     texts = [] if moved is None else [moved[0]]
-    if not math.isclose(one.alt_m, other.alt_m, abs_tol=1e-3):
+    if not _are_close(one.alt_m, other.alt_m):
         texts.append(f"altitude {one.alt_m:g} → {other.alt_m:g} m")
     if not texts:
         return []

@@ -30,7 +30,7 @@ def item_lines(path: Path) -> tuple[int, ...]:
         if path.suffix.lower() == ".plan":
             return _of_plan(text)
         return _of_list(text) if is_waypoint_text(text) else ()
-    except (MissionFormatError, OSError, ValueError, IndexError, RecursionError):
+    except (MissionFormatError, OSError, ValueError, LookupError, RecursionError):
         return ()
 
 
@@ -66,7 +66,7 @@ def _members(text: str, container: int) -> Iterator[tuple[str, int]]:
 
     Raises
     ------
-    ValueError, IndexError
+    ValueError, LookupError
         It is no JSON.
     """
     at = _after_blank(text, container)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -60,8 +61,9 @@ def differences_scene(
         for barrier in changed
         for part in getattr(barrier.area, "geoms", [barrier.area])
     ]
-    if routes[0] and routes[0] != routes[1]:
-        tracks.insert(0, TrackLine("route in A", local(routes[0])))
+    legs = set(pairwise(routes[1]))
+    gone = [leg for leg in pairwise(routes[0]) if leg not in legs]
+    tracks += [TrackLine("route in A", local(leg)) for leg in gone]
     numbers = _numbers(b)
     return PictureScene(
         title=tuple(title),

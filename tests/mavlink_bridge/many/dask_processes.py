@@ -11,6 +11,7 @@ from pathlib import Path
 from distributed import Client
 
 _TESTS = Path(__file__).parents[1]
+PAGE = _TESTS.parents[1] / "docs" / "how-to" / "cluster.md"
 
 
 class Cluster:
@@ -23,10 +24,7 @@ class Cluster:
 
     def add_worker(self, *, path: Path | None = None) -> subprocess.Popen:
         """Start a worker; ``path`` is looked into for modules before all else."""
-        command = [
-            sys.executable, "-m", "dask", "worker", self.address, "--nthreads", "1", "--no-dashboard", "--no-nanny",
-            "--local-directory", str(self._folder),
-        ]  # fmt: skip
+        command = [*_line("dask worker", self.address), "--no-nanny", "--local-directory", str(self._folder)]
         self.workers.append(subprocess.Popen(command, env=_environment(path), stderr=subprocess.DEVNULL))
         return self.workers[-1]
 
@@ -39,9 +37,7 @@ class Cluster:
 @contextmanager
 def dask_cluster(folder: Path, count: int):
     """Yield a scheduler with so many workers; end them all."""
-    command = [
-        sys.executable, "-m", "dask", "scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard",
-    ]  # fmt: skip
+    command = _line("dask scheduler", "")
     with subprocess.Popen(command, env=_environment(None), stderr=subprocess.PIPE, text=True) as scheduler:
         assert scheduler.stderr is not None
         address = next(line.split()[-1] for line in scheduler.stderr if "Scheduler at:" in line)
@@ -55,6 +51,14 @@ def dask_cluster(folder: Path, count: int):
             for process in (*cluster.workers, scheduler):
                 process.kill()
                 process.wait()
+
+
+def _line(begin: str, address: str) -> list[str]:
+    """Return a line of the how-to as this machine runs it: its own address, any free port, one worker a process."""
+    line = next(line for line in PAGE.read_text(encoding="utf-8").splitlines() if line.startswith(begin))
+    line = line.replace("tcp://192.168.1.10:8786", address).replace("192.168.1.10", "127.0.0.1")
+    line = line.replace("--port 8786", "--port 0").replace(" --nworkers auto", "")
+    return [sys.executable, "-m", *line.split(), "--no-dashboard"]
 
 
 def _environment(path: Path | None) -> dict[str, str]:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import dask
 from distributed import Client, KilledWorker
-from distributed.client import ClosedClientError
 
 from mavlink_bridge.errors import ClusterError, LostWorkerError
 from mavlink_bridge.many.parcel import PACKAGE, Refused, open_parcel, parcel_of
@@ -62,8 +61,8 @@ class Cluster:
         parcel = parcel_of(task, with_content=self._sends_files)
         try:
             future: Future[Any] = self._executor.submit(open_parcel, function, parcel)
-        except ClosedClientError:
-            raise self._lost() from None
+        except Exception as error:
+            raise self._lost_or(error) from None
         return future
 
     def outcome(self, future: Future[Any], function: Function, task: Task[Any]) -> Outcome[Any] | Future[Any]:
@@ -108,10 +107,15 @@ class Cluster:
             threads = dict(self._client.nthreads())
             new = [worker for worker in threads if worker not in self._threads]
             answers = self._client.run(version, PACKAGE, workers=new, on_error="return") if new else {}
-        except (OSError, ClosedClientError):
-            raise self._lost() from None
+        except Exception as error:
+            raise self._lost_or(error) from None
         check_versions(answers)
         self._threads = threads
+
+    def _lost_or(self, error: Exception) -> Exception:
+        """Return what an error of dask's means: that the connection is gone, whatever its kind (some versions have no name for it), or itself."""
+        is_gone = isinstance(error, OSError) or self._client.status != "running"
+        return self._lost() if is_gone else error
 
     def _lost(self) -> ClusterError:
         return ClusterError(f"the scheduler {self._address} is lost, or it cancelled the tasks")

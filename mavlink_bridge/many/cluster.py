@@ -61,7 +61,7 @@ class Cluster:
         parcel = parcel_of(task, with_content=self._sends_files)
         try:
             future: Future[Any] = self._executor.submit(open_parcel, function, parcel)
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001 - dask has no name for it in every version
             raise self._lost_or(error) from None
         return future
 
@@ -107,7 +107,7 @@ class Cluster:
             threads = dict(self._client.nthreads())
             new = [worker for worker in threads if worker not in self._threads]
             answers = self._client.run(version, PACKAGE, workers=new, on_error="return") if new else {}
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001 - dask has no name for it in every version
             raise self._lost_or(error) from None
         check_versions(answers)
         self._threads = threads

@@ -57,7 +57,7 @@ _ONE = ("log", "connect", "start", "plot")
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class AskedCheck:
     """What is asked of one mission: the command's options, and the files that it reads, as they are named there."""
 
     options: CheckOptions
@@ -96,7 +96,7 @@ def check_many(options: CheckOptions) -> None:
     raise typer.Exit(_exit_code(codes))
 
 
-def check_task(task: Task[Asked]) -> CheckedFile:
+def check_task(task: Task[AskedCheck]) -> CheckedFile:
     """Check one mission, on a worker: nothing is printed there."""
     places = dict(zip(task.asked.files, task.files, strict=True))
     asked = task.asked.options
@@ -155,9 +155,9 @@ def _results(
             yield found
 
 
-def _task(options: CheckOptions) -> Task[Asked]:
+def _task(options: CheckOptions) -> Task[AskedCheck]:
     files = files_of(options.mission, options.fence, options.vehicle)
-    return Task(Asked(options, files), files)
+    return Task(AskedCheck(options, files), files)
 
 
 def _failed(mission: Path, error: Exception) -> CheckedFile:

@@ -12,7 +12,7 @@ from mavlink_bridge.cli.field_files import read_file
 from mavlink_bridge.cli.pictures import check_plots, draw
 from mavlink_bridge.cli.terminal import echo, print_json
 from mavlink_bridge.errors import UsageError
-from missions.checking.differences import Change, differences, summary
+from missions.checking.differences import ChangeKind, differences, summary
 from missions.formats import Part, parts_of
 from missions.picture.differences import differences_scene
 from missions.words import counted
@@ -21,16 +21,16 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from mavlink_bridge.cli.options.diff import DiffOptions
-    from missions.checking.differences import Difference
+    from missions.checking.differences import FileDifference
     from missions.geo import LatLon
     from missions.picture.scene import PictureScene
     from missions.situation import Situation
 
 _PARTS = (Part.MISSION, Part.FENCE, Part.RALLY)
 _COLOURS = {
-    Change.ONLY_A: typer.colors.RED,
-    Change.ONLY_B: typer.colors.GREEN,
-    Change.OTHER: typer.colors.YELLOW,
+    ChangeKind.ONLY_A: typer.colors.RED,
+    ChangeKind.ONLY_B: typer.colors.GREEN,
+    ChangeKind.OTHER: typer.colors.YELLOW,
 }
 
 
@@ -89,7 +89,7 @@ def _compared(options: DiffOptions, a: Situation, b: Situation) -> list[Part]:
 
 
 def _report(
-    options: DiffOptions, a: Situation, b: Situation, parts: Sequence[Part], found: Sequence[Difference]
+    options: DiffOptions, a: Situation, b: Situation, parts: Sequence[Part], found: Sequence[FileDifference]
 ) -> None:
     if options.quiet:
         return
@@ -103,10 +103,12 @@ def _report(
     echo(f"{counted(len(found), 'difference')}" if found else "The same")
 
 
-def _document(one: Difference) -> dict[str, object]:
+def _document(one: FileDifference) -> dict[str, object]:
     return {
         "part": one.part,
-        "change": {Change.ONLY_A: "only in A", Change.ONLY_B: "only in B", Change.OTHER: "other"}[one.change],
+        "change": {ChangeKind.ONLY_A: "only in A", ChangeKind.ONLY_B: "only in B", ChangeKind.OTHER: "other"}[
+            one.change
+        ],
         "text": one.text,
         "name_a": one.name_a,
         "name_b": one.name_b,
@@ -116,7 +118,7 @@ def _document(one: Difference) -> dict[str, object]:
     }
 
 
-def _scene(options: DiffOptions, a: Situation, b: Situation, found: Sequence[Difference]) -> PictureScene:
+def _scene(options: DiffOptions, a: Situation, b: Situation, found: Sequence[FileDifference]) -> PictureScene:
     marks: list[tuple[LatLon, str]] = []
     for one in found:
         places = one.b or one.a

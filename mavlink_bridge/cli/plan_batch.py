@@ -44,7 +44,7 @@ _SUFFIXES = (".jsonl", ".parquet")
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class AskedPlan:
     """What one row asks: the row, the command's options, the table's folder, and the files that are read, as they are named there."""
 
     number: int
@@ -93,7 +93,7 @@ def plan_batch(options: PlanOptions, table: Path) -> None:
     raise typer.Exit(min((code for code in codes if code is not ExitCode.DONE), default=ExitCode.DONE))
 
 
-def plan_task(task: Task[Asked]) -> Planned:
+def plan_task(task: Task[AskedPlan]) -> Planned:
     """Make one row's plan, on a worker: nothing is printed or written there."""
     asked = task.asked
     places = dict(zip(asked.files, task.files, strict=True))
@@ -181,18 +181,18 @@ def _documents(options: PlanOptions, table: Path, codes: Counter[ExitCode]) -> I
             yield document
 
 
-def _named(asked: Asked, column: str) -> str | None:
+def _named(asked: AskedPlan, column: str) -> str | None:
     value = asked.row.get(column) or getattr(asked.options, column)
     return None if value is None else str(value)
 
 
-def _task(number: int, row: Row, options: PlanOptions, folder: Path) -> Task[Asked]:
+def _task(number: int, row: Row, options: PlanOptions, folder: Path) -> Task[AskedPlan]:
     try:
         mine = options_of(row, options, folder)
         files = files_of(mine.fence, mine.vehicle)
     except UsageError:  # which the task itself will raise
         files = ()
-    return Task(Asked(number, row, replace(options, output=[]), folder, files), files)
+    return Task(AskedPlan(number, row, replace(options, output=[]), folder, files), files)
 
 
 @contextmanager

@@ -57,7 +57,7 @@ _PARAMS: dict[tuple[int, int], str] = {
 _JUMPS = (Command.DO_JUMP, Command.DO_SET_MISSION_CURRENT)
 
 
-class Change(StrEnum):
+class ChangeKind(StrEnum):
     """How two files differ at a place, as differences of texts are marked."""
 
     ONLY_A = "-"
@@ -66,14 +66,14 @@ class Change(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Difference:
+class FileDifference:
     """One thing that two files do not have alike.
 
     Parameters
     ----------
     part : Part
         Of what it is a part.
-    change : Change
+    change : ChangeKind
         Whether only one has it, or both have it otherwise.
     text : str
         In words.
@@ -86,7 +86,7 @@ class Difference:
     """
 
     part: Part
-    change: Change
+    change: ChangeKind
     text: str
     name_a: str | None = None
     name_b: str | None = None
@@ -95,7 +95,7 @@ class Difference:
     moved_m: float | None = None
 
 
-def differences(a: Situation, b: Situation, parts: Sequence[Part]) -> tuple[Difference, ...]:
+def differences(a: Situation, b: Situation, parts: Sequence[Part]) -> tuple[FileDifference, ...]:
     """Return what two files do not have alike, in the order of the parts; nothing where they hold the same.
 
     Parameters
@@ -105,7 +105,7 @@ def differences(a: Situation, b: Situation, parts: Sequence[Part]) -> tuple[Diff
     parts : sequence of Part
         Which of mission, fence and rally points are compared.
     """
-    found: list[Difference] = []
+    found: list[FileDifference] = []
     if Part.MISSION in parts:
         found += _of_missions(*(one.mission.value if one.mission else Mission(()) for one in (a, b)))
     if Part.FENCE in parts:
@@ -128,13 +128,13 @@ def summary(situation: Situation, part: Part) -> str:
     return counted(len(situation.rally.value), "rally point") if situation.rally else "no rally points"
 
 
-def _of_missions(a: Mission, b: Mission) -> list[Difference]:
+def _of_missions(a: Mission, b: Mission) -> list[FileDifference]:
     found = []
     if (a.home is None) != (b.home is None):
         only = "A" if a.home else "B"
         found.append(
-            Difference(
-                Part.MISSION, Change.ONLY_A if a.home else Change.ONLY_B, f"home {a.home or b.home}: only in {only}",
+            FileDifference(
+                Part.MISSION, ChangeKind.ONLY_A if a.home else ChangeKind.ONLY_B, f"home {a.home or b.home}: only in {only}",
                 a=(a.home,) if a.home else (), b=(b.home,) if b.home else (),
             )
         )  # fmt: skip
@@ -143,7 +143,7 @@ def _of_missions(a: Mission, b: Mission) -> list[Difference]:
         if moved is not None:
             text, moved_m = moved
             found.append(
-                Difference(Part.MISSION, Change.OTHER, text, "0", "0", (a.home,), (b.home,), moved_m)
+                FileDifference(Part.MISSION, ChangeKind.OTHER, text, "0", "0", (a.home,), (b.home,), moved_m)
             )
     items_a, items_b = (tuple(map(_plain, mission.items)) for mission in (a, b))
     pairs = _aligned(items_a, items_b)
@@ -185,21 +185,21 @@ def _of_items(
     in_a: int | None,
     in_b: int | None,
     same_place: dict[int, int],
-) -> list[Difference]:
+) -> list[FileDifference]:
     number_a, number_b = (None if index is None else str(index + 1) for index in (in_a, in_b))
     places_a, places_b = _places(a), _places(b)
     if a is None or b is None:
         item, number, only = (a, number_a, "A") if b is None else (b, number_b, "B")
         assert item is not None
-        change = Change.ONLY_A if b is None else Change.ONLY_B
+        change = ChangeKind.ONLY_A if b is None else ChangeKind.ONLY_B
         at = f" at {item.position}" if _places(item) else ""
         text = f"item {number} ({_name(item)}){at}: only in {only}"
-        return [Difference(Part.MISSION, change, text, number_a, number_b, places_a, places_b)]
+        return [FileDifference(Part.MISSION, change, text, number_a, number_b, places_a, places_b)]
     number = number_a if number_a == number_b else f"{number_a} (in B {number_b})"
     subject = f"item {number} ({_name(a)})"
     if a.command != b.command:
         text = f"item {number}: {_name(a)} in A, {_name(b)} in B"
-        return [Difference(Part.MISSION, Change.OTHER, text, number_a, number_b, places_a, places_b)]
+        return [FileDifference(Part.MISSION, ChangeKind.OTHER, text, number_a, number_b, places_a, places_b)]
     moved_m, texts = None, []
     if places_a and places_b:
         moved = _moved("", places_a[0], places_b[0])
@@ -212,7 +212,9 @@ def _of_items(
     if not texts:
         return []
     text = f"{subject}: {'; '.join(texts)}"
-    return [Difference(Part.MISSION, Change.OTHER, text, number_a, number_b, places_a, places_b, moved_m)]
+    return [
+        FileDifference(Part.MISSION, ChangeKind.OTHER, text, number_a, number_b, places_a, places_b, moved_m)
+    ]
 
 
 def _of_params(a: MissionItem, b: MissionItem, same_place: dict[int, int]) -> list[str]:
@@ -258,7 +260,7 @@ def _moved(name: str, a: LatLon, b: LatLon) -> tuple[str, float] | None:
     return f"{name} moved {away_m:.2f} m, bearing {bearing_deg:.0f}°, to {b}".strip(), away_m
 
 
-def _of_fences(a: Fence, b: Fence) -> list[Difference]:
+def _of_fences(a: Fence, b: Fence) -> list[FileDifference]:
     names_a, names_b = a.zone_names(), b.zone_names()
     found = []
     if a.zones or b.zones:
@@ -276,32 +278,36 @@ def _of_fences(a: Fence, b: Fence) -> list[Difference]:
                     else f"{names_a[in_a]} (in B {names_b[in_b]})"
                 )
                 found.append(
-                    Difference(
-                        Part.FENCE, Change.OTHER, f"{name}: {text}", names_a[in_a], names_b[in_b],
+                    FileDifference(
+                        Part.FENCE, ChangeKind.OTHER, f"{name}: {text}", names_a[in_a], names_b[in_b],
                         a.zones[in_a].places, b.zones[in_b].places, moved_m,
                     )
                 )  # fmt: skip
         for index in sorted(rest_a):
             text = f"{names_a[index]}, {_size(a.zones[index], frame)}: only in A"
-            found.append(Difference(Part.FENCE, Change.ONLY_A, text, names_a[index], a=a.zones[index].places))
+            found.append(
+                FileDifference(Part.FENCE, ChangeKind.ONLY_A, text, names_a[index], a=a.zones[index].places)
+            )
         for index in sorted(rest_b):
             text = f"{names_b[index]}, {_size(b.zones[index], frame)}: only in B"
             found.append(
-                Difference(Part.FENCE, Change.ONLY_B, text, name_b=names_b[index], b=b.zones[index].places)
+                FileDifference(
+                    Part.FENCE, ChangeKind.ONLY_B, text, name_b=names_b[index], b=b.zones[index].places
+                )
             )
     return found + _of_return_points(a.return_point, b.return_point)
 
 
-def _of_return_points(a: LatLon | None, b: LatLon | None) -> list[Difference]:
+def _of_return_points(a: LatLon | None, b: LatLon | None) -> list[FileDifference]:
     if a is not None and b is not None:
         moved = _moved("return point", a, b)
         if moved is None:
             return []
-        return [Difference(Part.FENCE, Change.OTHER, moved[0], a=(a,), b=(b,), moved_m=moved[1])]
+        return [FileDifference(Part.FENCE, ChangeKind.OTHER, moved[0], a=(a,), b=(b,), moved_m=moved[1])]
     if a is not None:
-        return [Difference(Part.FENCE, Change.ONLY_A, f"return point {a}: only in A", a=(a,))]
+        return [FileDifference(Part.FENCE, ChangeKind.ONLY_A, f"return point {a}: only in A", a=(a,))]
     if b is not None:
-        return [Difference(Part.FENCE, Change.ONLY_B, f"return point {b}: only in B", b=(b,))]
+        return [FileDifference(Part.FENCE, ChangeKind.ONLY_B, f"return point {b}: only in B", b=(b,))]
     return []
 
 
@@ -361,7 +367,7 @@ def _area(zone: Zone, frame: LocalFrame) -> BaseGeometry:
     return Point(frame.to_local_array([zone.centre])[0]).buffer(zone.radius_m, quad_segs=64)
 
 
-def _of_rally(a: Sequence[RallyPoint], b: Sequence[RallyPoint]) -> list[Difference]:
+def _of_rally(a: Sequence[RallyPoint], b: Sequence[RallyPoint]) -> list[FileDifference]:
     found = []
     keys_a, keys_b = ([(*point.position, point.alt_m) for point in points] for points in (a, b))
     for _, a_from, a_to, b_from, b_to in SequenceMatcher(None, keys_a, keys_b, autojunk=False).get_opcodes():
@@ -372,17 +378,21 @@ def _of_rally(a: Sequence[RallyPoint], b: Sequence[RallyPoint]) -> list[Differen
 
 def _of_points(
     a: Sequence[RallyPoint], b: Sequence[RallyPoint], in_a: int | None, in_b: int | None
-) -> list[Difference]:
+) -> list[FileDifference]:
     name_a, name_b = (None if index is None else f"rally point {index + 1}" for index in (in_a, in_b))
     if in_b is None:
         assert in_a is not None
         place = a[in_a].position
-        return [Difference(Part.RALLY, Change.ONLY_A, f"{name_a} at {place}: only in A", name_a, a=(place,))]
+        return [
+            FileDifference(
+                Part.RALLY, ChangeKind.ONLY_A, f"{name_a} at {place}: only in A", name_a, a=(place,)
+            )
+        ]
     if in_a is None:
         place = b[in_b].position
         return [
-            Difference(
-                Part.RALLY, Change.ONLY_B, f"{name_b} at {place}: only in B", name_b=name_b, b=(place,)
+            FileDifference(
+                Part.RALLY, ChangeKind.ONLY_B, f"{name_b} at {place}: only in B", name_b=name_b, b=(place,)
             )
         ]
     one, other = a[in_a], b[in_b]
@@ -396,7 +406,7 @@ def _of_points(
     text = f"{name}: {'; '.join(texts)}"
     moved_m = None if moved is None else moved[1]
     return [
-        Difference(
-            Part.RALLY, Change.OTHER, text, name_a, name_b, (one.position,), (other.position,), moved_m
+        FileDifference(
+            Part.RALLY, ChangeKind.OTHER, text, name_a, name_b, (one.position,), (other.position,), moved_m
         )
     ]

@@ -13,7 +13,7 @@ from mavlink_bridge.cli.options.shared import OUTPUT_PANEL, CommonOptions, MapOp
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DiffOptions(MapOptions, CommonOptions):
-    """Tell two missions or fences apart: which items, zones and rally points only one of them has, and what of the rest is otherwise. Exit 8 if they differ.
+    """Compare two missions or fences: which items, zones and rally points only one of them has, and what of the rest is otherwise. Exit 8 if they differ.
 
     The files may be of different formats. Positions within 2 cm of each other are the same.
 

@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from mavlink_bridge.cli.app import app
-from mavlink_bridge.cli.check_many import Asked, check_task
+from mavlink_bridge.cli.check_many import AskedCheck, check_task
 from mavlink_bridge.cli.options.check import CheckOptions
 from mavlink_bridge.cli.task_files import as_asked, files_of
 from mavlink_bridge.many import Task
@@ -137,8 +137,8 @@ def test_results_name_files_as_they_were_asked_for(missions, tmp_path):
     for file in files:
         shutil.copy(file, copies)
     asked = CheckOptions(mission=files[0], fence=files[1], vehicle=files[2], json_output=True)
-    here = check_task(Task(Asked(asked, files), files))
-    there = check_task(Task(Asked(asked, files), tuple(copies / file.name for file in files)))
+    here = check_task(Task(AskedCheck(asked, files), files))
+    there = check_task(Task(AskedCheck(asked, files), tuple(copies / file.name for file in files)))
     assert here == there
     assert any(one.message.startswith("fence.waypoints: ") for one in here.report.findings)
     assert as_asked(3, {Path("a"): Path("b")}) == 3
@@ -148,3 +148,14 @@ def test_a_shapefile_goes_with_its_parts(tmp_path):
     for name in ("a.shp", "a.dbf", "a.prj", "b.dbf"):
         (tmp_path / name).touch()
     assert [file.name for file in files_of(tmp_path / "a.shp", None)] == ["a.shp", "a.dbf", "a.prj"]
+
+
+def test_what_is_extrapolated_is_not_confirmed(missions):
+    Path("rover.parm").write_text(Path("rover.parm").read_text() + "\nTURN_RADIUS,7.5\n")
+    told = run("good.waypoints", "-q")
+    assert told.exit_code == 8
+    assert told.stdout.startswith(
+        "good.waypoints:1: NOT CONFIRMED: every leg is predicted to keep 2.5 m while driving"
+    )
+    log = json.loads(run("good.waypoints", "--format", "sarif").stdout)
+    assert "not-confirmed" in {one["ruleId"] for one in log["runs"][0]["results"]}

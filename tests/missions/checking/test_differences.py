@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyproj import Geod
 
-from missions.checking.differences import Change, differences, summary
+from missions.checking.differences import ChangeKind, differences, summary
 from missions.errors import SituationError
 from missions.fence import CircleZone, Fence, PolygonZone, ZoneKind
 from missions.formats.parts import Part
@@ -84,9 +84,9 @@ def test_an_item_put_in_is_the_only_difference(some, data):
         for item in longer
     ]
     found = differences(situation(some), situation(moved), PARTS)
-    assert [(one.change, one.name_b) for one in found] == [(Change.ONLY_B, str(at + 1))]
+    assert [(one.change, one.name_b) for one in found] == [(ChangeKind.ONLY_B, str(at + 1))]
     back = differences(situation(moved), situation(some), PARTS)
-    assert [(one.change, one.name_a) for one in back] == [(Change.ONLY_A, str(at + 1))]
+    assert [(one.change, one.name_a) for one in back] == [(ChangeKind.ONLY_A, str(at + 1))]
 
 
 def test_a_moved_waypoint_is_told_by_how_far():
@@ -167,8 +167,8 @@ def test_zones_are_told_by_what_they_share():
     _, _, west_m = GEOD.inv(*reversed(place(0, 10)), *reversed(place(-3, 10)))
     assert found[0].moved_m == pytest.approx(west_m, rel=0.02)
     assert [(one.change, one.name_a, one.name_b) for one in found[2:]] == [
-        (Change.ONLY_A, "exclusion polygon 2", None),
-        (Change.ONLY_B, None, "exclusion polygon 1"),
+        (ChangeKind.ONLY_A, "exclusion polygon 2", None),
+        (ChangeKind.ONLY_B, None, "exclusion polygon 1"),
     ]
     fewer = PolygonZone(ZoneKind.EXCLUSION, square(0, 0).vertices[:3])
     assert "4 → 3 vertices" in told(situation(zones=[square(0, 0)]), situation(zones=[fewer]))[0]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import typer
 from rich.table import Table
 
-from mavlink_bridge.cli.checked_mission import checked_of, document_of
+from mavlink_bridge.cli.checked_mission import checked_of, document_of, items_text
 from mavlink_bridge.cli.common import inform, warn
 from mavlink_bridge.cli.drawing import cell, console
 from mavlink_bridge.cli.failing import ExitCode
@@ -19,7 +19,7 @@ from mavlink_bridge.cli.pictures import check_plots, draw
 from mavlink_bridge.cli.terminal import echo, print_json
 from missions.checking.findings import leg_sentence, not_confirmed_text
 from missions.picture.plans import plan_scene
-from missions.words import counted, mission_items
+from missions.words import counted
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -99,7 +99,7 @@ def _report_legs(checked: MissionCheck, plots: list[Path]) -> None:
     console().print(table)
     echo(
         f"{counted(len(checked.legs), 'leg')}, {checked.length_m:.1f} m, about {checked.duration_s:.0f} s"
-        f"{' for each round' if checked.course.is_endless else ''}; {mission_items(len(checked.mission.items) + 1)}"
+        f"{' for each round' if checked.course.is_endless else ''}; {items_text(checked)}"
     )
     for way in checked.home_ways:
         echo(

@@ -15,15 +15,12 @@ from mavlink_bridge.cli.vehicle_options import with_vehicle
 from mavlink_bridge.cli.way_home import RouteWays
 from missions.checking.check import check_mission, plan_of
 from missions.request import GoTo
-from missions.vehicle.item_limit import most_items
+from missions.vehicle.item_limit import most_own_items
 from missions.words import mission_items
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from mavlink_bridge.cli.options.check import CheckOptions
     from missions.checking.check import CheckedLeg, MissionCheck
-    from missions.items import MissionItem
     from missions.planned import Plan
     from missions.situation import Situation
 
@@ -62,16 +59,23 @@ def checked_of(options: CheckOptions) -> CheckedMission:
         *unknown,
         *checked.warnings,
         *(ways.warnings if ways is not None else ()),
-        *_storage_warnings(checked.mission.items, situation),
+        *_storage_warnings(checked, situation),
     ]
     return CheckedMission(situation, checked, planned, ways, warnings)
 
 
-def _storage_warnings(items: Sequence[MissionItem], situation: Situation) -> list[str]:
-    """Warn of a mission (its items without home) that the vehicle cannot hold."""
-    most = most_items(situation.parameters)
-    count = len(items) + 1
-    return [f"{mission_items(count)}; the vehicle holds {most}"] if count > most else []
+def items_text(checked: MissionCheck) -> str:
+    """Return in words how many items a mission has, with home where it is one."""
+    home = checked.vehicle.home_items
+    return mission_items(len(checked.mission.items) + home, has_home=bool(home))
+
+
+def _storage_warnings(checked: MissionCheck, situation: Situation) -> list[str]:
+    """Warn of a mission that the vehicle cannot hold."""
+    home, most = checked.vehicle.home_items, most_own_items(situation)
+    by_board = "" if home else " (or 1000, by its board: no parameter says which)"
+    told = f"{items_text(checked)}; the vehicle holds {most + home}{by_board}"
+    return [told] if len(checked.mission.items) > most else []
 
 
 def document_of(found: CheckedMission) -> dict[str, object]:
@@ -87,7 +91,7 @@ def document_of(found: CheckedMission) -> dict[str, object]:
         "duration_s": round(checked.duration_s, 1),
         "drawn_clearance_m": _finite(checked.drawn_clearance_m),
         "driven_clearance_m": _finite(checked.driven_clearance_m),
-        "mission_items": len(checked.mission.items) + 1,
+        "mission_items": len(checked.mission.items) + checked.vehicle.home_items,
         "endless": checked.course.is_endless,
         "broken": len(checked.broken),
         "stopping": hold_document(checked.hold),

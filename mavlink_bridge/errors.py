@@ -6,6 +6,8 @@
     ├── UsageError               options that do not fit together
     ├── LogError                 a log cannot be used
     ├── LinkError                no connection, no heartbeat, silence
+    ├── ClusterError             no scheduler, no workers, or workers of another version
+    ├── LostWorkerError          a worker died at a task, again and again
     ├── IdentityTakenError       somebody else had our system and component id before anything was written
     ├── VehicleNotFoundError     nobody there is the vehicle asked for
     ├── RefusedError             the vehicle refused
@@ -37,6 +39,14 @@ class LogError(BridgeError):
 
 class LinkError(BridgeError):
     """No connection, no heartbeat, or silence."""
+
+
+class ClusterError(BridgeError):
+    """No scheduler answers, it has no workers, or one of them has another version of pbpp-rover."""
+
+
+class LostWorkerError(BridgeError):
+    """The process or worker that did a task died, again and again: that task's error."""
 
 
 class IdentityTakenError(LinkError):

@@ -335,6 +335,7 @@ HANDLERS: dict[Signal, Callable[[Parts, float], Iterable[Signal] | None]] = {
     Notice.MISSION_TAKEN: lambda parts, now_s: parts.writer.mission_taken(now_s),
     Notice.MISSION_HEARD: lambda parts, _now_s: parts.inbox.take_mission_target(),
     Notice.RALLY_HEARD: lambda parts, _now_s: parts.inbox.take_rally_target(),
+    Notice.WAY_CHOSEN: lambda parts, _now_s: _look_at_fence(parts),
     Notice.LEARNING_FAILED: _learn_again,
     Notice.HOLD_ENDED: _on_hold_ended,
     Notice.UPLOAD_ENDED: _on_upload_ended,

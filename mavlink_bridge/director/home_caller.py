@@ -335,11 +335,7 @@ class HomeCaller(Part):
         assert target is not None
         assert plan is not None
         core.target = Target(plan.targets[-1], TargetSource.HOME, call=target.call)
-        name = self._keeper.name_of(plan.targets[-1])
-        length_m, duration_s = round(plan.length_m, 1), round(plan.duration_s, 1)
-        to = "" if name == "home" else f" to {name}"
-        text = f"going home{to}: {length_m:.0f} m, about {duration_s:.0f} s"
-        core.voice.tell(now_s, EventName.GOING_HOME, text, str(target.call), name, length_m, duration_s)
+        core.voice.going_home(now_s, target.call, self._keeper.name_of(plan.targets[-1]), plan)
 
     def refused(self, now_s: float) -> None:
         """Take notice that no way home was found, which was told: the vehicle is held, and nothing drives it straight."""

@@ -80,6 +80,7 @@ class Notice(StrEnum):
     MISSION_HEARD = auto()  # its end may be a target
     RALLY_HEARD = auto()
     WAYS_KNOWN = auto()  # the ways home were laid out anew
+    WAY_CHOSEN = auto()  # a way home inside the mission, by the operator
     LEARNING_FAILED = auto()
     GONE_ON = auto()  # on the route, as far as was better than a HOLD at once
     HOLD_ENDED = auto()  # taken, or not

@@ -41,7 +41,10 @@ _CAPABILITIES = (
 _STANDBY, _ACTIVE, _CALIBRATING = 3, 4, 2
 _NO_MISSION, _NOT_STARTED, _ACTIVE_MISSION, _PAUSED, _COMPLETE = 1, 2, 3, 4, 5
 _NO_CELL = 65_535
-_CELLS, _MORE_CELLS = 10, 4  # of BATTERY_STATUS.voltages and .voltages_ext; 65535 stands for none in the first, 0 in the second
+_CELLS, _MORE_CELLS = (
+    10,
+    4,
+)  # of BATTERY_STATUS.voltages and .voltages_ext; 65535 stands for none in the first, 0 in the second
 _BOUNDARY = 3  # FENCE_BREACH_BOUNDARY
 
 

@@ -352,17 +352,15 @@ class RouteDesk(Part):
         """Look at the route again, whose grounds are others than before."""
         core = self.core
         core.drop_plan_task()
-        if core.state is State.READY and core.target is not None:
-            self._hold_watch.announce(now_s)
-            return [Notice.ROUTE_OUTDATED]
-        if core.plan is None or core.state in _MAKING_A_ROUTE or core.state is State.ARRIVED:
-            self._hold_watch.announce(now_s)
-            return []
-        found = self.recheck(self._driver.item)
-        if found.holds and core.is_driving_ours:
+        is_wanted = core.state is State.READY and core.target is not None
+        is_none = core.plan is None or core.state in _MAKING_A_ROUTE or core.state is State.ARRIVED
+        found = None if is_wanted or is_none else self.recheck(self._driver.item)
+        if found is not None and found.holds and core.is_driving_ours:
             return []
         self._hold_watch.announce(now_s)
-        if found.holds:
+        if is_wanted:
+            return [Notice.ROUTE_OUTDATED]
+        if found is None or found.holds:
             return []
         is_ours_to_mend = core.state not in (State.READY, State.LET_GO)
         if is_ours_to_mend or core.is_driving_ours:

@@ -64,7 +64,6 @@ class Journal:
     orders: Orders
     described: Situation
     calls: tuple[Call, ...]
-    events: tuple[dict[str, Any], ...]
     notes: tuple[DriveNote, ...] = ()
 
 
@@ -142,7 +141,7 @@ def read_journal(path: Path) -> Journal:
         It cannot be read; the message says at which line.
     """
     calls: list[Call] = []
-    events: list[dict[str, Any]] = []
+    line_number = 1
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
         head = json.loads(lines[0])
@@ -153,23 +152,21 @@ def read_journal(path: Path) -> Journal:
         given = tuple(Stop(*one) for one in head.get("stopping", ()))
         notes = tuple(map(note_from_json, head.get("drive_notes", ())))
         described = Situation(parameters=head["parameters"], firmware=firmware, stops=Stops(given))
-        for line in lines[1:]:
+        for line_number, line in enumerate(lines[1:], start=2):  # noqa: B007 - told where it fails
             entry = json.loads(line)
-            if "told" in entry:
-                events.append(entry["told"])
-            else:
-                target = LatLon(*entry["target"]) if "target" in entry else None
-                calls.append(
-                    Call(entry["frames"], entry["time_s"], entry["call"], target, str(entry.get("text", "")))
-                )
+            if "told" in entry:  # for people: a replay tells its own
+                continue
+            target = LatLon(*entry["target"]) if "target" in entry else None
+            calls.append(
+                Call(entry["frames"], entry["time_s"], entry["call"], target, str(entry.get("text", "")))
+            )
     except OSError as error:
         raise LogError(f"{path} cannot be read: {error.strerror}", file=str(path)) from None
     except (ValueError, KeyError, TypeError, IndexError, MissionError) as error:
-        line_number = len(calls) + len(events) + 2
         raise LogError(
             f"{path}: line {line_number} is not a journal entry: {error!r}", file=str(path)
         ) from None
-    return Journal(orders, described, tuple(calls), tuple(events), notes)
+    return Journal(orders, described, tuple(calls), notes)
 
 
 def _orders_to_json(orders: Orders) -> dict[str, Any]:

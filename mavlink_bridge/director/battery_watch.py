@@ -35,13 +35,6 @@ class _Low:
     count: int = 0
 
 
-def _volts(message: m.BatteryStatus) -> float:
-    """Return the volts of all cells together; a cell that there is not is told by 65535, beyond the tenth by 0."""
-    cells_mv = [one for one in message.voltages if one != _UNKNOWN_MV]
-    cells_mv += [one for one in message.voltages_ext if one not in (0, _UNKNOWN_MV)]
-    return sum(cells_mv) / 1000 if cells_mv else math.nan
-
-
 class BatteryWatch:
     """Tells once that a battery is low; again only after it was not.
 
@@ -73,7 +66,9 @@ class BatteryWatch:
         if isinstance(message, m.BatteryStatus):
             self._status_s = now_s
             self._lows.pop(None, None)  # what SYS_STATUS has told before
-            return self._look(message.id, message.battery_remaining, _volts(message), now_s)
+            whole_mv = message.whole_mv
+            volts = math.nan if whole_mv is None else whole_mv / 1000
+            return self._look(message.id, message.battery_remaining, volts, now_s)
         if isinstance(message, m.SysStatus) and now_s > self._status_s + _FALLBACK_S:
             millivolts = message.voltage_battery
             volts = math.nan if millivolts == _UNKNOWN_MV else millivolts / 1000

@@ -476,6 +476,13 @@ class BatteryStatus(Message):
     battery_remaining: int = -1
     voltages_ext: tuple[int, ...] = (0,) * 4
 
+    @property
+    def whole_mv(self) -> int | None:
+        """All cells together; None where no cell is told."""
+        cells = [one for one in self.voltages if one != 65535]
+        cells += [one for one in self.voltages_ext if one not in (0, 65535)]
+        return sum(cells) if cells else None
+
 
 @dataclass(frozen=True, slots=True)
 class FenceStatus(Message):

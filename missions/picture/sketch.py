@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 _MOST_ROWS = 40  # so that a sketch fits a terminal's screen
 _FEWEST_COLUMNS = 40  # narrower terminals wrap
-_LEGEND_LINES, _FEWEST_LINES = 3, 8  # kept for the legend, which takes no more at 80 columns; of a sketch at least
+_LEGEND_LINES, _LEGEND_COLUMNS = 3, 26  # what a legend takes below at 80 columns, or beside
+_FEWEST_LINES = 8
 _CELL_SHAPE = 2.0
 """A terminal's cell is about twice as high as wide."""
 
@@ -92,8 +93,8 @@ class Sketch:
         self._columns = max(columns, _FEWEST_COLUMNS)
         self._lines = None if lines is None else max(lines, _FEWEST_LINES)
         self._signs = _BLOCKS if _understands(encoding) else _PLAIN
-        rows = _MOST_ROWS if self._lines is None else min(_MOST_ROWS, self._lines - _LEGEND_LINES)
-        self._grid = grid = _Grid.of(scene, self._columns, rows)
+        self._grid, self._has_legend_beside = self._laid_out()
+        grid = self._grid
         self._ground = cells = np.full((grid.rows, grid.columns), " ")
         forbidden = shapely.union_all([scene.outside, scene.exclusions])
         outside = self._signs.outside if scene.has_inclusion else self._signs.exclusion
@@ -101,6 +102,15 @@ class Sketch:
         cells[grid.covered(scene.exclusions)] = self._signs.exclusion
         if len(scene.route) > 1:
             _draw(cells, grid, scene.route, "" if self._signs is _BLOCKS else self._signs.route)
+
+    def _laid_out(self) -> tuple[_Grid, bool]:
+        """Return the cells, and whether the legend stands beside them, where the height is scarce and there is room."""
+        if self._lines is None:
+            return _Grid.of(self._scene, self._columns, _MOST_ROWS), False
+        whole = _Grid.of(self._scene, self._columns, min(_MOST_ROWS, self._lines))
+        if whole.columns + _LEGEND_COLUMNS <= self._columns:
+            return whole, True
+        return _Grid.of(self._scene, self._columns, min(_MOST_ROWS, self._lines - _LEGEND_LINES)), False
 
     def text(
         self,
@@ -149,8 +159,13 @@ class Sketch:
             rover = _arrow(signs, heading_deg)
             cells[grid.cell(frame.to_local_array([vehicle])[0])] = rover
         picture = ["".join(row).rstrip() for row in cells]
-        legend = _legend(scene, grid, signs, self._columns, rover=rover, is_driven=bool(tracks))
-        return "\n".join([*[*picture, *legend][: self._lines], ""])
+        words = _legend_words(scene, grid, signs, rover=rover, is_driven=bool(tracks))
+        if self._has_legend_beside:
+            beside = zip_longest(picture, words[: len(picture)], fillvalue="")
+            lines = [f"{row:<{grid.columns}}  {word}".rstrip() for row, word in beside]
+        else:
+            lines = [*picture, *_wrapped(words, self._columns)][: self._lines]
+        return "\n".join([*lines, ""])
 
 
 def _arrow(signs: _Signs, heading_deg: float | None) -> str:
@@ -226,16 +241,16 @@ def _draw(cells: NDArray[np.str_], grid: _Grid, line: NDArray[np.float64], sign:
         cells[row, column] = chr(_BRAILLE + int(bits[row, column]))
 
 
-def _legend(
-    scene: PictureScene, grid: _Grid, signs: _Signs, columns: int, *, rover: str, is_driven: bool
+def _legend_words(
+    scene: PictureScene, grid: _Grid, signs: _Signs, *, rover: str, is_driven: bool
 ) -> list[str]:
-    """Return the scale, the north and the meaning of the signs, wrapped to the width."""
+    """Return the scale, the north and the meaning of the signs."""
     length_m = scene.scale_m()
     left, line, right = tuple(signs.bar)
     bar = f"{left}{line * max(0, round(length_m / grid.cell_m) - 2)}{right} {length_m} m, north up"
     more = "..." if signs is _PLAIN else "…"
     several = len(scene.targets) > 1
-    words = [
+    return [
         bar,
         *([f"{rover} rover"] if rover else []),
         *(["S start"] if scene.start is not None else []),
@@ -248,6 +263,10 @@ def _legend(
         *([f"{signs.exclusion} exclusion"] if not scene.exclusions.is_empty else []),
         *([f"{signs.outside} outside the fence"] if scene.has_inclusion else []),
     ]
+
+
+def _wrapped(words: list[str], columns: int) -> list[str]:
+    """Return words in lines of at most a width; the scale stands first."""
     lines = [words[0]]
     for word in words[1:]:
         if len(lines[-1]) + len(word) + 2 <= columns:

@@ -36,6 +36,9 @@ STILL_MPS = 0.3
 _STOP_AT_LEAST_S = 0.25
 """Positions come four times a second: one from after the HOLD is waited for."""
 
+_SOON_S = 1.0
+"""A route that was refused within this, while the vehicle rolls, is asked for once more: obstacles may have moved on, or are known better. Chosen."""
+
 # Then a vehicle in HOLD that still reports a speed (a drifting fix, a slope) is taken for stopped; chosen, not measured.
 _STOP_PATIENCE_S = 8.0
 
@@ -62,6 +65,7 @@ class Halter(Part):
         self.may_be_in_auto = False
         self.is_hold_granted = False
         self.expected: Pose | None = None
+        self._expected_s = -math.inf  # since when
         self._stopped_s = -math.inf  # when the vehicle took it
         self._is_seen = False  # a heartbeat has shown it
         self._held_at_s: float | None = None
@@ -99,6 +103,7 @@ class Halter(Part):
             return [Cue.HELD]
         if self.stopping is None and self._rolling is not None and core.orders.drive:
             self.expected = resting_pose(core.situation, core.orders.request, self._rolling)
+        self._expected_s = now_s
         return [] if self.expected is None else [Cue.HELD]
 
     def handle_timer(self, now_s: float) -> Sequence[Signal]:
@@ -131,9 +136,14 @@ class Halter(Part):
         return (self._held_at_s or 0.0) + _STOP_PATIENCE_S
 
     def wait_for_rest(self, now_s: float) -> None:
-        """Let the vehicle come to rest before a route is made."""
+        """Let the vehicle roll on, for no route was found from where it is expected to stand: later from there once more, where that was soon known, else from where it stands."""
         self.expected = self._rolling = None
         self._standstill_due_s = now_s
+        pose = self.core.situation.pose
+        is_soon = now_s <= self._expected_s + _SOON_S
+        if is_soon and pose is not None and pose.value.speed_mps > 2 * STILL_MPS:
+            rolling = Rolling(now_s)
+            self._rolling = rolling.moved(pose.value.position, pose.value.speed_mps, now_s)
 
     # What may be stopped
 

@@ -125,24 +125,42 @@ def test_where_the_mission_does_not_hold_from_there_it_is_planned_anew(monkeypat
     assert len([event for event in run.events[before:] if event.name is EventName.PLANNED]) == 1
 
 
-def test_where_no_plan_can_be_made_from_there_it_stands_first():
+@pytest.mark.parametrize("refused_mps", [0.8, 0.4])
+def test_where_no_plan_can_be_made_from_there_it_is_asked_for_later_and_at_last_from_where_it_stands(
+    refused_mps,
+):
+    run = rolling(speed_mps=3.0)
+    refused = []
+
+    def planner(situation, request, **more):
+        if body(run).speed_mps > refused_mps:
+            refused.append(situation.pose.value)
+            raise NoRouteError("not from there")
+        return plan(situation, request, **more)
+
+    run.planner = planner
+    run.run_until(run.happened(EventName.PLANNED, len(run.events)), 10)
+    assert 2 <= len(refused) <= 8
+    is_rolling = body(run).speed_mps > 0.4
+    assert is_rolling is (refused_mps == 0.8)
+    run.run_until(lambda: run.director.state is State.DRIVING, 15)
+    assert not run.happened(EventName.NO_PLAN)()
+
+
+def test_a_refusal_that_takes_long_is_not_asked_for_again_while_it_rolls():
+    run = rolling(speed_mps=3.0, planning_s=1.5)
     asked = []
 
     def planner(situation, request, **more):
-        asked.append(situation.pose.value)
+        asked.append(body(run).speed_mps)
         if len(asked) == 1:
             raise NoRouteError("not from there")
         return plan(situation, request, **more)
 
-    run = rolling()
     run.planner = planner
-    run.run_until(lambda: len(asked) == 1, 10)
-    assert body(run).speed_mps > 0.4
-    run.run_until(lambda: run.director.state is State.DRIVING, 15)
-    assert not run.happened(EventName.NO_PLAN)()
-    assert len(asked) == 2
-    assert asked[1].speed_mps <= 0.3
-    assert distance_m(asked[1].position, run.director.plan.start) < 0.05
+    run.run_until(lambda: len(asked) == 2, 20)
+    assert asked[0] > 0.4
+    assert asked[1] <= 0.3
 
 
 def test_without_orders_to_drive_it_is_not_foreseen():

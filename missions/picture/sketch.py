@@ -137,7 +137,10 @@ class Sketch:
         scene, grid, signs = self._scene, self._grid, self._signs
         cells, frame = self._ground.copy(), scene.ground.frame
         tracks = [one.points for one in scene.tracks]
-        tracks += [frame.to_local_array(track)] if len(track) else []
+        drives = [one.name for one in scene.tracks]
+        if len(track):
+            tracks.append(frame.to_local_array(track))
+            drives.append("driven")
         for points in tracks:
             _draw(cells, grid, points, signs.track)
         for leg in scene.unsafe_legs:
@@ -159,7 +162,7 @@ class Sketch:
             rover = _arrow(signs, heading_deg)
             cells[grid.cell(frame.to_local_array([vehicle])[0])] = rover
         picture = ["".join(row).rstrip() for row in cells]
-        words = _legend_words(scene, grid, signs, rover=rover, is_driven=bool(tracks))
+        words = _legend_words(scene, grid, signs, rover=rover, drives=drives)
         if self._has_legend_beside:
             beside = zip_longest(picture, words[: len(picture)], fillvalue="")
             lines = [f"{row:<{grid.columns}}  {word}".rstrip() for row, word in beside]
@@ -242,7 +245,7 @@ def _draw(cells: NDArray[np.str_], grid: _Grid, line: NDArray[np.float64], sign:
 
 
 def _legend_words(
-    scene: PictureScene, grid: _Grid, signs: _Signs, *, rover: str, is_driven: bool
+    scene: PictureScene, grid: _Grid, signs: _Signs, *, rover: str, drives: list[str]
 ) -> list[str]:
     """Return the scale, the north and the meaning of the signs."""
     length_m = scene.scale_m()
@@ -259,11 +262,7 @@ def _legend_words(
         *([f"{signs.route} {scene.route_name}"] if len(scene.route) else []),
         *([f"{signs.unsafe} unsafe leg"] if scene.unsafe_legs else []),
         *([f"{signs.mark} {scene.marks_name}"] if scene.marks else []),
-        *(
-            [f"{signs.track} {', '.join(dict.fromkeys(track.name for track in scene.tracks))}"]
-            if is_driven
-            else []
-        ),
+        *([f"{signs.track} {', '.join(dict.fromkeys(drives))}"] if drives else []),
         *([f"{signs.exclusion} exclusion"] if not scene.exclusions.is_empty else []),
         *([f"{signs.outside} outside the fence"] if scene.has_inclusion else []),
     ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final, TypeVar
 
@@ -30,6 +31,9 @@ from missions.vehicle.parameter_remarks import no_number_remarks
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    import numpy as np
+    from numpy.typing import NDArray
+
     from mavlink_bridge.mavlink.messages import Frame
     from missions.fence import Fence
     from missions.geo import LatLon
@@ -37,6 +41,7 @@ if TYPE_CHECKING:
     from missions.situation import Known, Situation
 
 T = TypeVar("T")
+TrackTaker = Callable[[str, bool, Sequence["TrackFix"], "NDArray[np.float64] | None"], None]
 
 RECORDED = FOLDED | TRANSFER_TYPES | {m.MissionCurrent, m.MissionItemReached, m.FenceStatus}
 """The message types that a recorder looks at."""
@@ -53,9 +58,13 @@ class VehicleRecorder:
     ----------
     situation : Situation
         What holds from the beginning: the vehicle's ids, what the log reports later but was so before.
+    on_track : callable, optional
+        Takes the positions batch by batch: mode, whether armed, the positions, and what the track to each keeps to the fence (None
+        without a fence); who asks for none keeps none.
     """
 
-    def __init__(self, situation: Situation) -> None:
+    def __init__(self, situation: Situation, on_track: TrackTaker | None = None) -> None:
+        self._on_track = on_track
         assert situation.system is not None
         assert situation.component is not None
         self.situation = situation
@@ -251,16 +260,17 @@ class VehicleRecorder:
         frame = fence.meter.ground.frame if fence.meter else self._frame
         joined = fixes if self._before is None else [self._before, *fixes]
         self._before = fixes[-1]
-        driven_m = self._odometer.drive(
-            self._mode_name, fixes, self._frame.to_local_array([fix.position for fix in fixes])
-        )
-        if self._modes:
-            self._modes[-1] = replace(self._modes[-1], driven_m=self._modes[-1].driven_m + driven_m)
         points = frame.to_local_array([fix.position for fix in joined])
         track = pieces(joined, points)[len(joined) - len(fixes) :]
         points = points[len(joined) - len(fixes) :]
+        own = points if frame is self._frame else self._frame.to_local_array([fix.position for fix in fixes])
+        driven_m = self._odometer.drive(self._mode_name, fixes, own)
+        if self._modes:
+            self._modes[-1] = replace(self._modes[-1], driven_m=self._modes[-1].driven_m + driven_m)
         clearances_m = fence.measure(fixes, track, points, is_armed=bool(self.situation.armed))
-        self._drives.drive(self.situation, fixes, clearances_m, fence.vehicle, frame, fence.meter)
+        self._drives.drive(self.situation, fixes, points, clearances_m, fence.vehicle, frame, fence.meter)
+        if self._on_track is not None:
+            self._on_track(self._mode_name, bool(self.situation.armed), fixes, clearances_m)
 
     def _note(self, text: str) -> None:
         self._notes.setdefault(text)

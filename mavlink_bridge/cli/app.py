@@ -32,6 +32,7 @@ COMMANDS = {
     "download": "Download a mission, fence, rally points or parameters.",
     "bridge": "Run alongside the autopilot: plan to each target, upload verified missions.",
     "log": "Summarise telemetry logs.",
+    "logs": "Make tables of many logs, ask them, calibrate a rover.",
     "replay": "Replay recorded logs through the bridge.",
     "sim": "Run a simulated rover.",
     "demo": "Plan, upload and drive on a simulated rover, as a demonstration.",

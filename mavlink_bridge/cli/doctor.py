@@ -30,6 +30,7 @@ from missions.formats import read_situation
 from missions.geo import LatLon
 from missions.request import GoTo
 from missions.vehicle import vehicle_from_parameters
+from missions.vehicle.calibration import calibrated, calibration_info
 from missions.vehicle.parameter_remarks import assumed_remarks
 
 if TYPE_CHECKING:
@@ -252,12 +253,15 @@ def _vehicle(file: Path | None, firmware: Firmware | None) -> Iterator[_Finding]
         described = read_vehicle_file(file)
         firmware = firmware or described.firmware
         vehicle = vehicle_from_parameters(described.parameters, firmware=firmware)
+        vehicle = calibrated(vehicle, described.calibration, described.parameters)
     except MissionError as error:
         yield _Finding(_Verdict.ERROR, "vehicle", str(error))
         return
     version = firmware or "of an unknown version (--firmware)"
     verdict = _Verdict.WARNING if vehicle.has_measured_corners is None else _Verdict.OK
     yield _Finding(verdict, "vehicle", f"{vehicle.autopilot} {version}, {vehicle.steering} steering")
+    for told in calibration_info(vehicle):
+        yield _Finding(_Verdict.OK, "vehicle", told)
     for remark in assumed_remarks(vehicle):
         yield _Finding(_Verdict.WARNING, "vehicle", remark)
     for reason in beyond_measured(vehicle):

@@ -250,7 +250,6 @@ class DriveGrader:
         items = np.array([fix.item for fix in fixes])
         legs = np.minimum(np.searchsorted(self._seqs, items), len(self._seqs) - 1)
         deviations_m = shapely.distance(places, self._windows[legs])
-        self._legs.take(track, legs)
         tally.fixes += len(fixes)
         tally.driven_m += float(np.hypot(*steps.T).sum())
         tally.deviation_m = max(tally.deviation_m, float(deviations_m.max()))
@@ -258,9 +257,11 @@ class DriveGrader:
         tally.farthest = max(tally.farthest, int(legs.max()) + 1)
         if clearances_m is not None:
             tally.least_clearance_m = min(tally.least_clearance_m, float(clearances_m.min()))
+        outside_m: NDArray[np.float64] | None = None
         if self._forecast is not None:
-            outside_m = float(shapely.distance(places, self._forecast.area).max())
-            tally.outside_m = max(tally.outside_m, outside_m)
+            outside_m = shapely.distance(places, self._forecast.area)
+            tally.outside_m = max(tally.outside_m, float(outside_m.max()))
+        self._legs.take(track, legs, outside_m)
         self._last = fixes[-1]
 
     def reached(self, seq: int, boot_s: float) -> None:

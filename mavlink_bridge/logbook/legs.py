@@ -45,6 +45,8 @@ class GradedLeg:
     inside_cut_m, outside_overshoot_m : float or None
         How far off the two legs it was to the inside and to the outside of the turn, from the middle of one leg to the middle of the next.
     foreseen_inside_cut_m, foreseen_outside_overshoot_m : float or None
+    inside_beyond_m, outside_beyond_m : float or None
+        How far outside the predicted corridor it was there, on the inside and on the outside of the turn.
     is_bounded : bool or None
         Whether corners like this kept within the drive model when it was measured.
     gap_m : float
@@ -64,6 +66,8 @@ class GradedLeg:
     outside_overshoot_m: float | None
     foreseen_inside_cut_m: float | None
     foreseen_outside_overshoot_m: float | None
+    inside_beyond_m: float | None
+    outside_beyond_m: float | None
     is_bounded: bool | None
     gap_m: float
     is_whole: bool
@@ -95,10 +99,13 @@ class LegMeter:
         self._straight_m = np.full(count, np.nan)
         self._inside_m = np.zeros(count)  # of the corner at each leg's end
         self._outside_m = np.zeros(count)
+        self._beyond_m = np.zeros((2, count))  # inside and outside
         self._gaps_m = np.zeros(count)
         self._is_passed = np.zeros(count + 1, dtype=bool)  # by leg: some position lies beyond its middle
 
-    def take(self, track: NDArray[np.float64], legs: NDArray[np.intp]) -> None:
+    def take(
+        self, track: NDArray[np.float64], legs: NDArray[np.intp], beyond_m: NDArray[np.float64] | None
+    ) -> None:
         """Take positions.
 
         Parameters
@@ -107,6 +114,8 @@ class LegMeter:
             The position before, then those driven since.
         legs : ndarray of int, shape (n,)
             Which leg each was driven on, by the mission item then. The autopilot begins the next leg before its corner.
+        beyond_m : ndarray of float, shape (n,), or None
+            How far each lies outside the predicted corridor.
         """
         places = track[1:]
         steps_m = np.hypot(*np.diff(track, axis=0).T)
@@ -121,6 +130,9 @@ class LegMeter:
         inwards_m = np.where(self._turns_deg[corner] >= 0, aside_m, -aside_m)
         np.maximum.at(self._inside_m, corner, inwards_m)
         np.maximum.at(self._outside_m, corner, -inwards_m)
+        if beyond_m is not None:
+            side = np.where(inwards_m >= 0, 0, 1)
+            np.maximum.at(self._beyond_m, (side, corner), beyond_m[is_corner])
 
     def _beside(
         self, places: NDArray[np.float64], legs: NDArray[np.intp]
@@ -176,9 +188,13 @@ class LegMeter:
                     outside_overshoot_m=float(self._outside_m[number]) if has_corner else None,
                     foreseen_inside_cut_m=None if corner is None else corner.inside_cut_m,
                     foreseen_outside_overshoot_m=None if corner is None else corner.outside_overshoot_m,
+                    inside_beyond_m=None if corner is None else float(self._beyond_m[0, number]),
+                    outside_beyond_m=None if corner is None else float(self._beyond_m[1, number]),
                     is_bounded=None if corner is None else corner.bounded,
                     gap_m=float(self._gaps_m[number : number + 2].max()),
-                    is_whole=bool(self._is_passed[number] and (self._is_passed[number + 1] or not has_corner)),
+                    is_whole=bool(
+                        self._is_passed[number] and (self._is_passed[number + 1] or not has_corner)
+                    ),
                 )
             )
         return tuple(graded)

@@ -61,7 +61,11 @@ class CornerPlan:
         How far beyond that it may be long after, as at the turn it is; only before ArduPilot 4.6.
     time_lost_s : float
         Against driving on at full speed.
+    inside_more_m, outside_more_m : float
+        What the rover's calibration adds to its cut and its overshoot; what it takes from them is negative.
     """
+
+    # Many attributes: each is a part of what happens there, and all of them are asked for where pieces are made.
 
     waypoint: int
     places: tuple[Vector, ...]
@@ -76,6 +80,8 @@ class CornerPlan:
     stray_m: float
     tail: Stray
     time_lost_s: float
+    inside_more_m: float = 0.0
+    outside_more_m: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -177,7 +177,28 @@ def begin_telling(command: str, *, verbose: bool = False, quiet: int = 0, option
 
 def exit_code_of(error: Exception) -> ExitCode:
     """Return the exit code of an error."""
-    return next(code for kind, code in _EXIT_CODES if isinstance(error, kind))
+    return next((code for kind, code in _EXIT_CODES if isinstance(error, kind)), ExitCode.INTERNAL)
+
+
+def is_ours(error: Exception) -> bool:
+    """Return whether an error was expected to happen; another one is a bug."""
+    return isinstance(error, (mission_errors.MissionError, bridge_errors.BridgeError))
+
+
+def error_name(error: Exception) -> str:
+    """Return the name by which documents call an error."""
+    return type(error).__name__ if is_ours(error) else "InternalError"
+
+
+def error_line(error: Exception) -> str:
+    """Return what an error says, in one line; of a bug, of one of many tasks as well, what broke and where."""
+    if is_ours(error):
+        return str(error)
+    return (
+        _defect_line(error)
+        if error.__traceback__ is not None
+        else f"internal error, a bug in pbpp: {error!r}"
+    )
 
 
 def is_reader_gone(error: Exception) -> bool:

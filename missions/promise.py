@@ -126,7 +126,12 @@ def promise(situation: Situation, request: Request, vehicle: Vehicle) -> Promise
             )
         promised_m = raised_m
     return Promise(
-        promised_m, error_m + request.reserve_m, None, (*warnings, *trouble), (*info, *told), request.clearance_m
+        promised_m,
+        error_m + request.reserve_m,
+        None,
+        (*warnings, *trouble),
+        (*info, *told),
+        request.clearance_m,
     )
 
 

@@ -153,6 +153,8 @@ class CornerClass:
         How many were driven.
     inside_more_m, outside_more_m : float
         What is added to the bound of the cut, and of the overshoot; negative where this rover needs less.
+    beyond_m : float
+        How far the corridor grows there: the farthest outside it that the rover was seen, from the middle of one leg to the middle of the next.
     """
 
     turn_from_deg: float
@@ -163,6 +165,7 @@ class CornerClass:
     corners: int
     inside_more_m: float
     outside_more_m: float
+    beyond_m: float
 
 
 @dataclass(frozen=True, slots=True)

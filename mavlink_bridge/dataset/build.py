@@ -122,11 +122,12 @@ def build(
             dataset.stage(database, batch.rows)
             batch = batch.emptied()
             if dataset.staged_logs * _A_BATCH >= _A_LOAD:
-                dataset.publish(database, known.superseded)
+                dataset.publish(database)
     if batch.rows:
         dataset.stage(database, batch.rows)
-    if dataset.staged_logs or known.superseded:
-        dataset.publish(database, known.superseded)
+    superseded = known.superseded()
+    if dataset.staged_logs or superseded:
+        dataset.publish(database, superseded)
     database.close()
     dataset.end()
     return progress
@@ -138,17 +139,23 @@ class _Known:
     def __init__(self, dataset: Dataset, database: Any) -> None:  # noqa: ANN401 - a duckdb connection
         self.files: dict[str, tuple[FileMark, str]] = {}
         self.logs: dict[str, str | None] = {}  # with their problems
-        self.superseded: set[str] = set()
-        paths: dict[str, list[str]] = {}
+        self._held: set[str] = set()  # by files that hold another log now
         for path, size_bytes, changed_ns, log, problem in dataset.known_files(database):
             before = self.files.get(path)
             if before is None or before[1] != log or before[0].changed_ns < changed_ns:
-                self.files[path] = FileMark(path, size_bytes, changed_ns), log
-            paths.setdefault(path, []).append(log)
+                self.hold(FileMark(path, size_bytes, changed_ns), log)
             self.logs[log] = problem
-        there = {log for _, log in self.files.values()}
-        # A build was killed between the reading of what a file holds now and the parting with what it held before.
-        self.superseded |= {log for logs in paths.values() for log in logs} - there
+
+    def hold(self, mark: FileMark, log: str) -> None:
+        """Note which log a file holds."""
+        _, before = self.files.get(mark.path, (None, log))
+        if before != log:
+            self._held.add(before)
+        self.files[mark.path] = mark, log
+
+    def superseded(self) -> set[str]:
+        """Return the logs that no file holds any more since another took their place; those of files that are gone stay."""
+        return self._held - {log for _, log in self.files.values()}
 
     def take(self, log: LogRows) -> bool:
         """Note a log that was read; return whether its rows are new."""
@@ -192,19 +199,16 @@ def _new_mark(path: Path, known: _Known, batch: _Batch, progress: Progress) -> F
     except OSError:
         return FileMark(str(path), 0, 0)  # what reads it says why not
     before, log = known.files.get(mark.path, (None, ""))
-    if before == mark and log:
-        problem = known.logs.get(log)
-    elif before is not None or known.logs:
+    if before != mark or not log:
+        if not known.logs:
+            return mark
         # By another name, or changed since: its content decides.
         log = _checked_log(path)
+        known.hold(mark, log)
         if log not in known.logs:
-            if before is not None:
-                known.superseded |= _left_alone(known, mark.path)
             return mark
-        problem = known.logs[log]
         batch.add_file(mark, log)
-    else:
-        return mark
+    problem = known.logs[log]
     progress.known += 1
     if problem is not None:
         progress.bad.append((mark.path, problem))
@@ -216,12 +220,6 @@ def _checked_log(path: Path) -> str:
         return log_name(checksum_of(path))
     except OSError:
         return ""
-
-
-def _left_alone(known: _Known, path: str) -> set[str]:
-    """Return the log that was at a path that holds another one now, unless it is still somewhere else."""
-    _, log = known.files.pop(path)
-    return {log} if log and all(log != other for _, other in known.files.values()) else set()
 
 
 def _lost(mark: FileMark, error: Exception) -> LogRows:

@@ -61,8 +61,8 @@ class Calibrated:
 
 
 _CORNERS = """SELECT log, drive, abs(turn_deg) AS turn_deg, greatest(speed_mps, coalesce(next_mps, 0)) AS speed_mps, stands,
-    greatest(inside_cut_m - foreseen_inside_cut_m, nullif(inside_beyond_m, 0)) AS inside_m,
-    greatest(outside_overshoot_m - foreseen_outside_overshoot_m, nullif(outside_beyond_m, 0)) AS outside_m,
+    inside_cut_m - foreseen_inside_cut_m AS inside_m, outside_overshoot_m - foreseen_outside_overshoot_m AS outside_m,
+    greatest(coalesce(inside_beyond_m, 0), coalesce(outside_beyond_m, 0)) AS beyond_m,
     gap_m, coalesce(is_bounded, false) AS is_bounded
 FROM (SELECT *, lead(speed_mps) OVER (PARTITION BY log, vehicle, drive ORDER BY leg) AS next_mps FROM legs WHERE vehicle = ?)
 WHERE turn_deg IS NOT NULL AND is_whole AND foreseen_inside_cut_m IS NOT NULL ORDER BY log, drive, leg"""
@@ -151,7 +151,8 @@ def corner_classes(
     Parameters
     ----------
     columns : dict of str to ndarray, shape (n,)
-        Of each corner: ``turn_deg``, ``speed_mps``, ``stands``, ``inside_m`` and ``outside_m`` (measured less its bound), ``gap_m``, ``is_bounded``.
+        Of each corner: ``turn_deg``, ``speed_mps``, ``stands``, ``inside_m`` and ``outside_m`` (measured less its bound), ``beyond_m`` (outside the
+        corridor), ``gap_m``, ``is_bounded``.
     steering : str
     is_tuned_so : ndarray of bool, shape (n,)
         Whether it was driven with the parameters that the rover has now; others widen, and do not narrow.
@@ -174,6 +175,7 @@ def corner_classes(
                 corners=int(these.sum()),
                 inside_more_m=more_m(columns["inside_m"][these], tells[these], least[0]),
                 outside_more_m=more_m(columns["outside_m"][these], tells[these], least[1]),
+                beyond_m=_rounded_up(float(columns["beyond_m"][these].max())),
             )
         )
     return found
@@ -182,8 +184,8 @@ def corner_classes(
 def more_m(excess_m: NDArray[np.float64], tells: NDArray[np.bool_], least_m: float) -> float:
     """Return what is added to a bound.
 
-    The largest excess, where there is one above 0: any sample may widen. Else what `LEAST_CORNERS` corners or more leave unused: the order statistic that
-    holds 99 % of all corners with 95 % confidence, and no less than the autopilot's measured rows allow.
+    With `LEAST_CORNERS` corners or more the order statistic that holds 99 % of all corners with 95 % confidence, no less than the autopilot's measured rows
+    allow; with fewer the largest excess, where that is above 0: any sample may widen. Corners that may not narrow widen all the same.
 
     Parameters
     ----------
@@ -194,13 +196,11 @@ def more_m(excess_m: NDArray[np.float64], tells: NDArray[np.bool_], least_m: flo
     least_m : float
         As far as measured rows allow, 0 or negative.
     """
-    most_m = float(excess_m.max())
-    if most_m > 0:
-        return _rounded_up(most_m)
     known = np.sort(excess_m[tells])
     if len(known) < LEAST_CORNERS:
-        return 0.0
-    return min(0.0, _rounded_up(max(float(known[rank_of_bound(len(known)) - 1]), least_m)))
+        return _rounded_up(max(0.0, float(excess_m.max())))
+    bound_m = max(float(known[rank_of_bound(len(known)) - 1]), float(excess_m[~tells].max(initial=-math.inf)))
+    return _rounded_up(max(bound_m, least_m))
 
 
 def rank_of_bound(count: int, within: float = WITHIN, confidence: float = CONFIDENCE) -> int:

@@ -123,14 +123,13 @@ def add_corner(pieces: Pieces, drive: DrivePlan, number: int) -> None:
     What it was seen to need counts from the middle of one leg to the middle of the next, as it was measured (`mavlink_bridge.logbook.legs`).
     """
     corner = drive.corners[number]
-    more_m = max(corner.inside_more_m, corner.outside_more_m)
-    if more_m <= 0:
+    if corner.more.beyond_m <= 0:
         _add_corner(pieces, drive, number)
         return
     own = Pieces()
     _add_corner(own, drive, number)
     _add_half_legs(own, drive, number)
-    pieces.extend(own, more_m)
+    pieces.extend(own, corner.more.beyond_m)
 
 
 def _add_corner(pieces: Pieces, drive: DrivePlan, number: int) -> None:
@@ -145,7 +144,7 @@ def _add_corner(pieces: Pieces, drive: DrivePlan, number: int) -> None:
     inside_m = at_corner.inside_band_m(
         drive.vehicle, max(before.profile.top_speed_mps, after.profile.top_speed_mps), band_m
     )
-    outwards_m = (band_m - max(0.0, inside_m + min(corner.inside_more_m, 0.0))) / 2
+    outwards_m = (band_m - max(0.0, inside_m + min(corner.more.inside_m, 0.0))) / 2
     side = Stray(outwards_m, -outwards_m) if corner.turn_deg >= 0 else Stray(-outwards_m, outwards_m)
     strip = Stray(left + side.left_m, left + side.right_m)
     rungs = [_beside(place, direction, strip) for place, direction in path]

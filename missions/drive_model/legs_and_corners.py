@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from missions.drive_model import before_4_6
 from missions.drive_model import corner as at_corner
+from missions.vehicle.calibration import CornerMore
 
 if TYPE_CHECKING:
     from missions.drive_model.blend import Blend
@@ -61,11 +62,9 @@ class CornerPlan:
         How far beyond that it may be long after, as at the turn it is; only before ArduPilot 4.6.
     time_lost_s : float
         Against driving on at full speed.
-    inside_more_m, outside_more_m : float
-        What the rover's calibration adds to its cut and its overshoot; what it takes from them is negative.
+    more : CornerMore
+        What the rover's calibration adds.
     """
-
-    # Many attributes: each is a part of what happens there, and all of them are asked for where pieces are made.
 
     waypoint: int
     places: tuple[Vector, ...]
@@ -80,8 +79,7 @@ class CornerPlan:
     stray_m: float
     tail: Stray
     time_lost_s: float
-    inside_more_m: float = 0.0
-    outside_more_m: float = 0.0
+    more: CornerMore = CornerMore()
 
 
 @dataclass(frozen=True, slots=True)

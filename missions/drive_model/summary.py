@@ -57,16 +57,16 @@ def _corner(drive: DrivePlan, number: int) -> Corner:
             + coming_m
             + max(
                 0.0,
-                plan.inside_more_m
+                plan.more.inside_m
                 + at_corner.inside_band_m(
                     drive.vehicle, max(before.profile.top_speed_mps, after.profile.top_speed_mps), band_m
                 ),
             ),
-            max(going.right_m, midway.right_m) + band_m + max(plan.inside_more_m, 0.0),
+            max(going.right_m, midway.right_m) + band_m + max(plan.more.inside_m, 0.0),
         ),
         outside_overshoot_m=max(coming_m, going.left_m, midway.left_m)
         + band_m
-        + max(plan.outside_more_m, 0.0),
+        + max(plan.more.outside_m, 0.0),
         reach_m=_reach_m(drive, number, blend_s),
         middle_m=plan.blend.reach_m,
         least_middle_m=plan.blend.reach_m,

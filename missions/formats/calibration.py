@@ -69,7 +69,10 @@ def _corner_class(plain: Mapping[str, Any], number: int) -> CornerClass:
         corners=_count(plain, "corners"),
         inside_more_m=_number(plain, "inside_more_m", _MOST_MORE_M),
         outside_more_m=_number(plain, "outside_more_m", _MOST_MORE_M),
+        beyond_m=_number(plain, "beyond_m", _MOST_MORE_M),
     )
+    if found.beyond_m < 0:
+        raise ValueError(f"beyond_m of class {number} of corners is {found.beyond_m:g}; expected 0 or more")
     if min(found.inside_more_m, found.outside_more_m) < 0 and found.corners < LEAST_CORNERS:
         raise ValueError(
             f"class {number} of corners narrows a bound with {found.corners} corners; that needs {LEAST_CORNERS}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from missions.vehicle.measured_corners import LEAST_MORE_M
 
@@ -36,10 +36,16 @@ def speed_class(speed_mps: float) -> int:
     return int((speed_mps + _ROUNDING) // SPEED_STEP_MPS)
 
 
-def corner_more_m(
-    vehicle: Vehicle, turn_deg: float, speed_mps: float, *, stands: bool
-) -> tuple[float, float]:
-    """Return what is added to the bounds of a corner's cut and overshoot.
+class CornerMore(NamedTuple):
+    """What is added at a corner: to the bound of its cut, to that of its overshoot, and to the corridor about it; only the first two can be negative."""
+
+    inside_m: float = 0.0
+    outside_m: float = 0.0
+    beyond_m: float = 0.0
+
+
+def corner_more(vehicle: Vehicle, turn_deg: float, speed_mps: float, *, stands: bool) -> CornerMore:
+    """Return what a rover's calibration adds at a corner.
 
     A class that was driven has its own numbers, never less than the autopilot's measured rows allow (`missions.vehicle.measured_corners`). One that was not
     takes the most that the nearest classes add, and nothing that they take away.
@@ -55,17 +61,20 @@ def corner_more_m(
         Whether the rover stops or turns on the spot there.
     """
     if vehicle.calibration is None:
-        return 0.0, 0.0
+        return CornerMore()
     turn, speed = turn_class(turn_deg), speed_class(speed_mps)
     classes = [one for one in vehicle.calibration.corners if one.stands == stands]
     for one in classes:
         if turn_class(one.turn_from_deg) == turn and speed_class(one.speed_from_mps) == speed:
             least = least_more_m(str(vehicle.steering), turn, speed)
-            return max(one.inside_more_m, least[0]), max(one.outside_more_m, least[1])
+            return CornerMore(
+                max(one.inside_more_m, least[0]), max(one.outside_more_m, least[1]), max(one.beyond_m, 0.0)
+            )
     near = _nearest(classes, turn, speed)
-    return (
+    return CornerMore(
         max((one.inside_more_m for one in near if one.inside_more_m > 0), default=0.0),
         max((one.outside_more_m for one in near if one.outside_more_m > 0), default=0.0),
+        max((one.beyond_m for one in near), default=0.0),
     )
 
 

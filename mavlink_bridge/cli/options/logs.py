@@ -8,14 +8,14 @@ from typing import Annotated
 
 import typer
 
-from mavlink_bridge.cli.options.shared import CommonOptions, flag, metres, option
+from mavlink_bridge.cli.options.shared import CommonOptions, ManyOptions, metres, option
 
 ACTIONS = ("build", "ask", "calibrate")
-_BUILD, _ASK, _CALIBRATE = "build", "ask", "calibrate"
+_ASK, _CALIBRATE = "ask", "calibrate"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LogsOptions(CommonOptions):
+class LogsOptions(ManyOptions, CommonOptions):
     """Make tables of many logs, ask them questions, and calibrate the drive model to one rover.
 
     `build` reads the logs in folders (.tlog, .raw, DataFlash .bin, packed with gzip or not) into a dataset of Parquet files; logs that it has are
@@ -54,14 +54,6 @@ class LogsOptions(CommonOptions):
             "-o",
             "--output",
         ),
-    ] = None
-    jobs: Annotated[
-        int | None,
-        option("Processes that read logs. Default: one per processor.", "N", min=1, max=1024, panel=_BUILD),
-    ] = None
-    cluster: Annotated[
-        str | None,
-        option("Have the workers of a dask scheduler read the logs.", "tcp://HOST:PORT", panel=_BUILD),
     ] = None
     sql: Annotated[
         str | None, option("Ask in SQL, over the dataset's tables and views (DuckDB).", "SQL", panel=_ASK)

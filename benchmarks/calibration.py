@@ -23,7 +23,6 @@ import shapely
 
 from mavlink_bridge.dataset.calibrate import corner_classes, leg_classes
 from mavlink_bridge.logbook.grade import DriveGrader, GradedField, way_of
-
 from mavlink_bridge.logbook.track import TrackFix
 from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.simulator import body
@@ -55,7 +54,7 @@ ALLOWED_M = 0.10
 
 def line(seed: int) -> list[tuple[float, float]]:
     """Return the places of a drive, metres east and north."""
-    rng = random.Random(seed)  # noqa: S311 - no secret
+    rng = random.Random(seed)
     places, bearing = [(0.0, 0.0)], 0.0
     for _ in range(CORNERS + 1):
         length_m = rng.uniform(12, 40)

@@ -24,7 +24,6 @@ from missions.drive_model import Corner, Envelope, envelope
 from missions.geo import LatLon
 from missions.ground.frame import LocalFrame
 from missions.vehicle import Steering, Vehicle
-
 from missions.vehicle.calibration import speed_class, turn_class
 
 HERE = Path(__file__).parent

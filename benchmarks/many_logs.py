@@ -25,13 +25,14 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
+from binascii import crc_hqx
+
 from mavlink_bridge.dataset import Dataset
 from mavlink_bridge.dataset.questions import QUESTIONS
 from mavlink_bridge.dataset.rows import checksum_of, document_rows, log_name, mark_of
 from mavlink_bridge.dataset.schema import TABLES
 from mavlink_bridge.tlog.checksum import _REVERSED
 from mavlink_bridge.tlog.wire import CLASS_OF_ID, CRC_SEED, LAYOUTS
-from binascii import crc_hqx
 
 HERE = Path(__file__).parent
 LOGS = sorted((HERE.parent / "sitl_logs").glob("*.tlog"))
@@ -99,7 +100,7 @@ def make_logs(folder: Path, first: int, count: int) -> list[Path]:
         log, system = LOGS[number % len(LOGS)], 1 + number // len(LOGS) % SYSTEMS
         key = (log, system)
         made.setdefault(key, template(*key))
-        begin_s = FIRST_S + random.Random(number).uniform(0, YEAR_S)  # noqa: S311 - no secret
+        begin_s = FIRST_S + random.Random(number).uniform(0, YEAR_S)
         path.write_bytes(made[key].at(int(begin_s * 1e6)))
     return paths
 
@@ -207,7 +208,7 @@ def main() -> None:
         "build again, 10 new logs", "logs", "build", str(logs), "-o", str(dataset), "--jobs", "1", "-q"
     )
     size = sum(path.stat().st_size for path in dataset.rglob("*") if path.is_file())
-    drawn = random.Random(1).sample([*paths, *more], min(200, options.logs))  # noqa: S311
+    drawn = random.Random(1).sample([*paths, *more], min(200, options.logs))
     wrong = same_rows(dataset, drawn)
     lines += [
         "",

@@ -8,15 +8,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 from mavlink_bridge.errors import DatasetError
 from missions.picture.charts import Chart, Series
+from missions.vehicle.calibration import SPEED_STEP_MPS, TURN_STEP_DEG
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from mavlink_bridge.dataset.store import Dataset
-
-ANGLE_STEP_DEG: Final = 15
-SPEED_STEP_MPS: Final = 0.5
-"""How wide the classes of corners are. Chosen: so that 300 corners of one class come together in a season's logs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +56,7 @@ class Answer:
     rows: tuple[tuple[Any, ...], ...]
 
 
-_CLASSES = f"""CAST(floor(angle_deg / {ANGLE_STEP_DEG}) * {ANGLE_STEP_DEG} AS INTEGER) AS angle_from_deg,
+_CLASSES = f"""CAST(floor(angle_deg / {TURN_STEP_DEG}) * {TURN_STEP_DEG} AS INTEGER) AS angle_from_deg,
     floor(speed_mps / {SPEED_STEP_MPS}) * {SPEED_STEP_MPS} AS speed_from_mps"""
 
 QUESTIONS: Final = {
@@ -99,7 +94,7 @@ ORDER BY kept, short_m DESC, begun_utc, log, drive""",
     round(quantile_cont(outside_overshoot_m, 0.99), 2) AS overshoot_99_m,
     round(max(outside_overshoot_m), 2) AS overshoot_most_m, round(max(foreseen_outside_overshoot_m), 2) AS overshoot_bound_m,
     count(*) FILTER (inside_excess_m > 0 OR outside_excess_m > 0) AS beyond_bound
-FROM corners WHERE NOT stands GROUP BY 1, 2 ORDER BY 1, 2""",
+FROM corners WHERE NOT stands GROUP BY 1, 2 ORDER BY 1, 2""",  # noqa: S608 - numbers of ours
             Plotted(
                 "angle_from_deg",
                 "turn from (°)",

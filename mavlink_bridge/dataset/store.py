@@ -162,7 +162,7 @@ class Dataset:
         if not files:
             columns = ", ".join(f"CAST(NULL AS {one.sql}) AS {one.name}" for one in table.every_column)
             return f"SELECT {columns} WHERE false"
-        return f"SELECT {', '.join(one.name for one in table.every_column)} FROM {_parquet(files, table)}"
+        return f"SELECT {', '.join(one.name for one in table.every_column)} FROM {_parquet(files, table)}"  # noqa: S608 - our own names
 
     def known_files(self, database: Any) -> Iterator[Sequence[Any]]:  # noqa: ANN401 - as `connection`
         """Yield of each file that was looked at: path, size, time of change, log and its problem; staged ones come last."""
@@ -170,7 +170,7 @@ class Dataset:
         parts = [(self.select(TABLES["files"]), self.select(TABLES["logs"]))]
         for folder in self._staged():
             one, other = (_parquet([folder / f"{name}.parquet"]) for name in ("files", "logs"))
-            parts.append((f"SELECT * FROM {one}", f"SELECT * FROM {other}"))
+            parts.append((f"SELECT * FROM {one}", f"SELECT * FROM {other}"))  # noqa: S608 - our own names
         for files, logs in parts:
             query = f"SELECT {columns} FROM ({files}) f LEFT JOIN ({logs}) l ON f.log = l.log"  # noqa: S608 - our own names
             yield from database.execute(query).fetchall()

@@ -259,7 +259,7 @@ class DriveGrader:
             tally.least_clearance_m = min(tally.least_clearance_m, float(clearances_m.min()))
         outside_m: NDArray[np.float64] | None = None
         if self._forecast is not None:
-            outside_m = shapely.distance(places, self._forecast.area)
+            outside_m = np.asarray(shapely.distance(places, self._forecast.area))
             tally.outside_m = max(tally.outside_m, float(outside_m.max()))
         self._legs.take(track, legs, outside_m)
         self._last = fixes[-1]

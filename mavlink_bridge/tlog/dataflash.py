@@ -29,19 +29,26 @@ _FMT_FIELDS = struct.Struct("<BB4s16s64s")
 _LEAST_BYTES = 3  # of a message: head and type
 
 _CODES = {
-    **{"a": "64s", "b": "b", "B": "B", "h": "h", "H": "H", "i": "i", "I": "I", "f": "f", "d": "d", "n": "4s"},
-    **{
-        "N": "16s",
-        "Z": "64s",
-        "c": "h",
-        "C": "H",
-        "e": "i",
-        "E": "I",
-        "L": "i",
-        "M": "B",
-        "q": "q",
-        "Q": "Q",
-    },
+    "a": "64s",
+    "b": "b",
+    "B": "B",
+    "h": "h",
+    "H": "H",
+    "i": "i",
+    "I": "I",
+    "f": "f",
+    "d": "d",
+    "n": "4s",
+    "N": "16s",
+    "Z": "64s",
+    "c": "h",
+    "C": "H",
+    "e": "i",
+    "E": "I",
+    "L": "i",
+    "M": "B",
+    "q": "q",
+    "Q": "Q",
 }
 """Python's struct codes of the letters in a FMT message's format."""
 
@@ -331,20 +338,45 @@ class _Translator:
 
     def _mission_item(self, fields: dict[str, Any]) -> m.MissionItemInt:
         numbers = (fields["Prm1"], fields["Prm2"], fields["Prm3"], fields["Prm4"])
-        place = (fields["Lat"], fields["Lng"], fields.get("Alt", 0.0))
-        kind = (int(fields.get("Frame", 0)), fields["CId"], 0, 1)
-        return m.MissionItemInt(
-            *_STATION, fields["CNum"], *kind, *numbers, *place, int(m.MissionType.MISSION)
-        )
+        frame = int(fields.get("Frame", 0))
+        return _item(fields, fields["CNum"], (frame, fields["CId"]), numbers, m.MissionType.MISSION)
 
     def _fence_item(self, fields: dict[str, Any]) -> m.MissionItemInt:
         command = _FENCE_COMMANDS.get(fields["Type"], 0)
         first = float(fields["Radius"] if command in _CIRCLES else fields["Count"])
-        place = (fields["Lat"], fields["Lng"], 0.0)
-        kind = (0, command, 0, 1, first, 0.0, 0.0, 0.0)
-        return m.MissionItemInt(*_STATION, fields["Seq"], *kind, *place, int(m.MissionType.FENCE))
+        return _item(fields, fields["Seq"], (0, command), (first, 0.0, 0.0, 0.0), m.MissionType.FENCE)
 
     def _rally_item(self, fields: dict[str, Any]) -> m.MissionItemInt:
-        place = (fields["Lat"], fields["Lng"], float(fields.get("Alt", 0)))
-        kind = (3, 5100, 0, 1, 0.0, 0.0, 0.0, 0.0)
-        return m.MissionItemInt(*_STATION, fields["Seq"], *kind, *place, int(m.MissionType.RALLY))
+        return _item(fields, fields["Seq"], _RALLY, (0.0, 0.0, 0.0, 0.0), m.MissionType.RALLY)
+
+
+_RALLY = (3, 5100)  # MAV_FRAME_GLOBAL_RELATIVE_ALT, MAV_CMD_NAV_RALLY_POINT
+
+
+def _item(
+    fields: dict[str, Any],
+    seq: int,
+    kind: tuple[int, int],
+    numbers: tuple[float, float, float, float],
+    list_of: m.MissionType,
+) -> m.MissionItemInt:
+    """Return an item as it is read from a vehicle: its frame and command, and where it is."""
+    frame, command = kind
+    first, second, third, fourth = numbers
+    return m.MissionItemInt(
+        target_system=_STATION[0],
+        target_component=_STATION[1],
+        seq=seq,
+        frame=frame,
+        command=command,
+        current=0,
+        autocontinue=1,
+        param1=first,
+        param2=second,
+        param3=third,
+        param4=fourth,
+        x=fields["Lat"],
+        y=fields["Lng"],
+        z=float(fields.get("Alt", 0.0)),
+        mission_type=int(list_of),
+    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import mmap
 import zlib
-from typing import TYPE_CHECKING, BinaryIO, Final, Protocol
+from typing import TYPE_CHECKING, BinaryIO, Final, Protocol, Self
 
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.tlog.dataflash import HEAD, as_telemetry
@@ -127,7 +127,7 @@ class _GzipSource:
         self._is_done = False
         self.cut_short = False
 
-    def __enter__(self) -> _GzipSource:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -51,8 +51,8 @@ class Pieces:
 
     def extend(self, others: Pieces, more_m: float) -> None:
         """Add all of other pieces, each grown by so much more."""
-        self._coordinates += others._coordinates  # noqa: SLF001 - of its own kind
-        self._sizes += others._sizes  # noqa: SLF001 - of its own kind
+        self._coordinates += others._coordinates
+        self._sizes += others._sizes
         self.bands_m += [band_m + more_m for band_m in others.bands_m]
         self.waypoints += others.waypoints
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from missions.drive_model import before_4_6
 from missions.drive_model import corner as at_corner
-from missions.vehicle.calibration import CornerMore
 
 if TYPE_CHECKING:
     from missions.drive_model.blend import Blend
@@ -15,6 +14,7 @@ if TYPE_CHECKING:
     from missions.drive_model.stray import Stray
     from missions.geo import Vector
     from missions.vehicle import Vehicle
+    from missions.vehicle.calibration import CornerMore
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ class CornerPlan:
     stray_m: float
     tail: Stray
     time_lost_s: float
-    more: CornerMore = CornerMore()
+    more: CornerMore
 
 
 @dataclass(frozen=True, slots=True)

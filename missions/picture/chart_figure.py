@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import textwrap
-from collections import Counter
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
@@ -63,25 +62,25 @@ def _draw_series(axes: Any, chart: Chart) -> None:  # noqa: ANN401 - matplotlib 
     names = sorted({x for one in shown for x in one.xs if isinstance(x, str)})
     place = {name: number for number, name in enumerate(names)}
     looks = style.track_looks(str(number) for number in range(len(shown)))
-    below: Counter[float] = Counter()
+    below: dict[float, float] = {}
     for number, one in enumerate(shown):
         color, dashes = looks[str(number)]
         xs = [place[x] if isinstance(x, str) else float(x) for x in one.xs]
         label = harmless(one.name)
         if chart.bars:
-            heights: Counter[float] = Counter()
+            heights: dict[float, float] = {}
             for x, y in zip(xs, one.ys, strict=True):
-                heights[x] += y
+                heights[x] = heights.get(x, 0.0) + y
             at = list(heights)
             axes.bar(
                 at,
                 list(heights.values()),
-                bottom=[below[x] for x in at],
+                bottom=[below.get(x, 0.0) for x in at],
                 color=color,
                 edgecolor="white",
                 label=label,
             )
-            below.update(heights)
+            below |= {x: below.get(x, 0.0) + y for x, y in heights.items()}
         else:
             look = {"color": color, "marker": _MARKS[number % len(_MARKS)], "markersize": 5}
             is_line = len(shown) > 1 and len(set(xs)) == len(xs)

@@ -20,8 +20,8 @@ from mavlink_bridge.dataset import Dataset, build, log_files
 from mavlink_bridge.dataset.schema import TABLES, VIEWS
 from mavlink_bridge.errors import DatasetError
 from mavlink_bridge.many import open_workers
-from mavlink_bridge.tlog import read_columns
 from mavlink_bridge.mavlink.messages import GlobalPositionInt
+from mavlink_bridge.tlog import read_columns
 
 NAMES = ("mission-yard.tlog", "guided-maze.tlog", "px4/upload-and-square.tlog", "px4/fence-breach.tlog")
 
@@ -245,7 +245,7 @@ def test_many_parts_become_few(place, tmp_path, monkeypatch):
         data = bytearray((place / "logs" / "fence-breach.tlog").read_bytes())
         (folder / f"{number}.tlog").write_bytes(data[: len(data) - 40 * number])
         built(dataset, folder)
-    parts = [path for path in (dataset / "modes").rglob("*.parquet")]
+    parts = list((dataset / "modes").rglob("*.parquet"))
     assert len(parts) <= 8
     whole = tmp_path / "whole"
     built(whole, folder)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import gzip
+import itertools
 import math
 import random
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from pymavlink.DFReader import DFReader_binary
@@ -15,6 +16,9 @@ from mavlink_bridge.errors import LogError
 from mavlink_bridge.logbook import read_logbook
 from mavlink_bridge.tlog import TlogReader
 from mavlink_bridge.tlog.dataflash import messages_of
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 HOME = (473977420, 85455940)  # degE7
 M_E7 = 1e7 / 111_320  # degE7 of a metre northwards
@@ -53,7 +57,7 @@ def drive(*, name: str = "ArduRover V4.6.3 (3fc7011a)", fix: int = 6) -> bytes:
     put("MODE", 5, 10, 10, 1)
     corners = [*SQUARE, (0, 0)]
     time_s, number = 5.0, 1
-    for (north_m, east_m), (to_north_m, to_east_m) in zip(corners, corners[1:], strict=False):
+    for (north_m, east_m), (to_north_m, to_east_m) in itertools.pairwise(corners):
         put("MISE", time_s, len(items), number, 16, 0.0, 0.0, 0.0, 0.0, *items[number][1:], 0.0, 0)
         course_deg = math.degrees(math.atan2(to_east_m - east_m, to_north_m - north_m)) % 360
         for step in range(150):

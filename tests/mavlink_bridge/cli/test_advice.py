@@ -114,6 +114,7 @@ ADVICE = {
     "BridgeError": None,
     "UsageError": "see `pbpp plan --help`",
     "LogError": None,
+    "DatasetError": None,
     "LinkError": "is the vehicle on, and is another program using the port? `pbpp doctor` lists the serial ports",
     "IdentityTakenError": "use another component id: --source-component",
     "VehicleNotFoundError": "choose another vehicle with --system N",

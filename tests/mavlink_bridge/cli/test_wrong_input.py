@@ -339,6 +339,12 @@ WRONG: list[tuple[tuple[str, ...], int, str]] = [
     (("check", "--log", "nofence.tlog", "--connect", "tcp:127.0.0.1:1"), USAGE, "--connect"),
     # conversions
     (("convert",), USAGE, "IN"),
+    (("logs", "melt", "x"), USAGE, "is not an action"),
+    (("logs", "build", "x"), USAGE, "needs -o DATASET"),
+    (("logs", "build", "nowhere", "-o", "dataset"), INPUT, "no such folder or file"),
+    (("logs", "ask", "nowhere", "modes"), INPUT, "there is no dataset"),
+    (("logs", "ask", "nowhere", "weather"), USAGE, "is not a question"),
+    (("logs", "calibrate", "nowhere", "-o", "rover.toml"), INPUT, "there is no dataset"),
     (("fence", "merge"), USAGE, "FILE"),
     (("fence", "split", "x.plan", "-o", "y.plan"), USAGE, "expected merge"),
     (("convert", "yard.waypoints"), USAGE, "OUT"),

@@ -18,7 +18,7 @@ from mavlink_bridge.cli.options.logs import ACTIONS
 from mavlink_bridge.cli.terminal import echo, print_json
 from mavlink_bridge.dataset import Dataset, Progress, build, log_files
 from mavlink_bridge.dataset.calibrate import calibrate, calibration_text
-from mavlink_bridge.dataset.questions import QUESTIONS, Answer, as_json, ask, ask_sql, chart
+from mavlink_bridge.dataset.questions import QUESTIONS, AnswerRows, as_json, ask, ask_sql, chart
 from mavlink_bridge.errors import UsageError
 from mavlink_bridge.many import open_workers
 from missions.picture import check_picture_format
@@ -147,7 +147,7 @@ def _ask(options: LogsOptions) -> None:
         _print(answer, question.about if question else "")
 
 
-def _as_csv(answer: Answer) -> bytes:
+def _as_csv(answer: AnswerRows) -> bytes:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(answer.columns)
@@ -156,7 +156,7 @@ def _as_csv(answer: Answer) -> bytes:
     return text.getvalue().encode()
 
 
-def _print(answer: Answer, title: str) -> None:
+def _print(answer: AnswerRows, title: str) -> None:
     table = Table(title=title or None, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
     rows = as_json(answer)
     for name in answer.columns:

@@ -49,7 +49,7 @@ class Question:
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class AnswerRows:
     """Rows with the names of their columns."""
 
     columns: tuple[str, ...]
@@ -140,7 +140,7 @@ FROM modes GROUP BY ALL ORDER BY month, vehicle, mode, armed""",
 """Every ready question by its name."""
 
 
-def ask(dataset: Dataset, question: Question, promise_m: float | None = None) -> Answer:
+def ask(dataset: Dataset, question: Question, promise_m: float | None = None) -> AnswerRows:
     """Return the answer to a ready question.
 
     Parameters
@@ -160,7 +160,7 @@ def ask(dataset: Dataset, question: Question, promise_m: float | None = None) ->
     return _answer(dataset, sql, values)
 
 
-def ask_sql(dataset: Dataset, sql: str) -> Answer:
+def ask_sql(dataset: Dataset, sql: str) -> AnswerRows:
     """Return the answer to SQL of the user's own, which reads the dataset's tables and views and nothing else.
 
     Raises
@@ -171,7 +171,7 @@ def ask_sql(dataset: Dataset, sql: str) -> Answer:
     return _answer(dataset, sql, {})
 
 
-def _answer(dataset: Dataset, sql: str, values: dict[str, Any]) -> Answer:
+def _answer(dataset: Dataset, sql: str, values: dict[str, Any]) -> AnswerRows:
     database = dataset.open()
     try:
         found = database.execute(sql, values) if values else database.execute(sql)
@@ -186,10 +186,10 @@ def _answer(dataset: Dataset, sql: str, values: dict[str, Any]) -> Answer:
         ) from None
     finally:
         database.close()
-    return Answer(columns, rows)
+    return AnswerRows(columns, rows)
 
 
-def chart(question: Question, answer: Answer) -> Chart:
+def chart(question: Question, answer: AnswerRows) -> Chart:
     """Return the picture of an answer."""
     plotted = question.plotted
     place = {name: number for number, name in enumerate(answer.columns)}
@@ -221,7 +221,7 @@ def _told(value: object, name: str) -> str:
     return f"vehicle {value}" if name == "vehicle" else str(value)
 
 
-def as_json(answer: Answer) -> list[dict[str, Any]]:
+def as_json(answer: AnswerRows) -> list[dict[str, Any]]:
     """Return an answer's rows as JSON has them: times as ISO 8601 in UTC."""
     return [
         {name: _plain(value) for name, value in zip(answer.columns, row, strict=True)} for row in answer.rows

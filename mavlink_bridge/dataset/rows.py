@@ -108,7 +108,7 @@ def rows_of(path: Path, mark: FileMark) -> LogRows:
         found.rows["logs"] = [_bad_log("", mark, found.problem or "")]
         return found
     found = LogRows(mark, log_name(checksum))
-    track = _Track()
+    track = _Positions()
     try:
         document = as_document(read_logbook(path, on_track=track.take))
     except LogError as error:
@@ -254,7 +254,7 @@ def _event_rows(vehicle: Mapping[str, Any], log: str) -> Iterator[tuple[str, Row
         yield "events", (log, None, "note", None, note, None, None)
 
 
-class _Track:
+class _Positions:
     """Collects the positions of a log."""
 
     def __init__(self) -> None:

@@ -63,6 +63,8 @@ class VehicleRecorder:
         Takes the positions batch by batch; those without a fix have no number as their place, and come before earlier ones that have one.
     """
 
+    # Many attributes: one for each kind of thing that is noted, and what of it is under way.
+
     def __init__(self, situation: Situation, on_track: TrackTaker | None = None) -> None:
         self._on_track = on_track
         assert situation.system is not None

@@ -55,9 +55,9 @@ _CODES = {
 _HUNDREDTHS = "cCeE"
 _TEXTS = "nNZ"
 
-_GPS_EPOCH_S, _WEEK_S = 315_964_800, 604_800
+_GPS_EPOCH_S, _WEEK_S = 315_964_800, 604_800  # 6 January 1980 in seconds since 1970, and a week
 _LEAP_S = 18  # between GPS time and UTC, since 2017
-_FIX_3D = 3
+_FIX_3D = 3  # GPS_FIX_TYPE_3D_FIX
 _BEAT_US = 1_000_000  # a vehicle sends a HEARTBEAT a second
 
 _STATION = (255, 190)  # who a list is told to: some ground station's

@@ -139,6 +139,7 @@ def _corner(
     bend: Bend,
     stops: Mapping[int, float],
 ) -> CornerPlan:
+    # Long: one decision on how a corner is driven, and what follows from it field by field.
     before, after = legs
     turn_deg = bend.turn_deg
     pivots = at_corner.pivots(vehicle, turn_deg)

@@ -31,7 +31,7 @@ from missions.geo import LatLon
 from missions.request import GoTo
 from missions.vehicle import vehicle_from_parameters
 from missions.vehicle.calibration import calibrated, calibration_info
-from missions.vehicle.parameter_remarks import assumed_remarks
+from missions.vehicle.parameter_remarks import assumed_remarks, range_remarks
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -252,7 +252,9 @@ def _vehicle(file: Path | None, firmware: Firmware | None) -> Iterator[_Finding]
     try:
         described = read_vehicle_file(file)
         firmware = firmware or described.firmware
-        vehicle = vehicle_from_parameters(described.parameters, firmware=firmware)
+        vehicle = vehicle_from_parameters(
+            described.parameters, firmware=firmware, ardupilot=described.ardupilot
+        )
         vehicle = calibrated(vehicle, described.calibration, described.parameters)
     except MissionError as error:
         yield _Finding(_Verdict.ERROR, "vehicle", str(error))
@@ -262,7 +264,10 @@ def _vehicle(file: Path | None, firmware: Firmware | None) -> Iterator[_Finding]
     yield _Finding(verdict, "vehicle", f"{vehicle.autopilot} {version}, {vehicle.steering} steering")
     for told in calibration_info(vehicle):
         yield _Finding(_Verdict.OK, "vehicle", told)
-    for remark in assumed_remarks(vehicle):
+    for remark in (
+        *range_remarks(described.parameters, ardupilot=described.ardupilot),
+        *assumed_remarks(vehicle),
+    ):
         yield _Finding(_Verdict.WARNING, "vehicle", remark)
     for reason in beyond_measured(vehicle):
         yield _Finding(

@@ -27,10 +27,10 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 
 from binascii import crc_hqx
 
-from mavlink_bridge.dataset import Dataset
 from mavlink_bridge.dataset.questions import QUESTIONS
 from mavlink_bridge.dataset.rows import checksum_of, document_rows, log_name, mark_of
 from mavlink_bridge.dataset.schema import TABLES
+from mavlink_bridge.dataset.store import Dataset
 from mavlink_bridge.tlog.checksum import _REVERSED
 from mavlink_bridge.tlog.wire import CLASS_OF_ID, CRC_SEED, LAYOUTS
 

@@ -101,7 +101,7 @@ _CODES = {
     ExitCode.LINK: "link: no connection, no heartbeat, silence",
     ExitCode.REFUSED: "the vehicle refused; says its result by name, and the item",
     ExitCode.OUTCOME: "what is on the vehicle is not what was wanted, or unknown; says what is known and where the backup is",
-    ExitCode.CHECK: "a check or comparison failed (`check`, `replay --expect`, `doctor`)",
+    ExitCode.CHECK: "a check or comparison failed (`check`, `replay --expect`, `doctor`), or two files differ (`diff`)",
     ExitCode.INTERRUPTED: "interrupted by the user; says what the vehicle does now (mode, armed, speed) and what is on it",
 }
 

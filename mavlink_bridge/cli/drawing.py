@@ -23,7 +23,7 @@ from mavlink_bridge.cli.terminal import say
 from missions.words import harmless
 
 if TYPE_CHECKING:
-    from mavlink_bridge.dataset import Progress as BuildProgress
+    from mavlink_bridge.dataset.build import Progress as BuildProgress
 
 
 def console(*, err: bool = False) -> Console:

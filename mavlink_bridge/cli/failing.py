@@ -58,6 +58,7 @@ _EXIT_CODES: tuple[tuple[type[Exception], ExitCode], ...] = (
     (bridge_errors.UsageError, ExitCode.USAGE),
     (bridge_errors.LogError, ExitCode.INPUT),
     (bridge_errors.DatasetError, ExitCode.INPUT),
+    (bridge_errors.LostWorkerError, ExitCode.INPUT),
     (bridge_errors.LinkError, ExitCode.LINK),
     (bridge_errors.ClusterError, ExitCode.LINK),
     (bridge_errors.RefusedError, ExitCode.REFUSED),

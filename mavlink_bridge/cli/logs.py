@@ -16,9 +16,10 @@ from mavlink_bridge.cli.drawing import build_bar, cell, console
 from mavlink_bridge.cli.kept_files import write_kept
 from mavlink_bridge.cli.options.logs import ACTIONS
 from mavlink_bridge.cli.terminal import echo, print_json
-from mavlink_bridge.dataset import Dataset, Progress, build, log_files
+from mavlink_bridge.dataset.build import Progress, build, log_files
 from mavlink_bridge.dataset.calibrate import calibrate, calibration_text
 from mavlink_bridge.dataset.questions import QUESTIONS, AnswerRows, as_json, ask, ask_sql, chart
+from mavlink_bridge.dataset.store import Dataset
 from mavlink_bridge.errors import UsageError
 from mavlink_bridge.many import open_workers
 from missions.picture import check_picture_format

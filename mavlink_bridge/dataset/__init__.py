@@ -2,8 +2,3 @@
 
 The only room that knows DuckDB; it needs the extra ``data``.
 """
-
-from mavlink_bridge.dataset.build import Progress, build, log_files
-from mavlink_bridge.dataset.store import Dataset
-
-__all__ = ["Dataset", "Progress", "build", "log_files"]

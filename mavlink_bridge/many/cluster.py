@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
@@ -39,8 +40,9 @@ class Cluster:
         A worker has another version of pbpp-rover.
     """
 
-    def __init__(self, client: Client) -> None:
+    def __init__(self, client: Client, address: str) -> None:
         self._client = client
+        self._address = address
         self._executor = client.get_executor(pure=False)  # two tasks that are told the same are two tasks
         self._submitted = 0
         self._threads: dict[str, int] = {}
@@ -57,7 +59,10 @@ class Cluster:
         if self._submitted % _COUNTED_EVERY == 0:
             self._look()
         parcel = parcel_of(task, with_content=self._sends_files)
-        future: Future[Any] = self._executor.submit(open_parcel, function, parcel)
+        try:
+            future: Future[Any] = self._executor.submit(open_parcel, function, parcel)
+        except Exception as error:  # noqa: BLE001 - dask has no name for it in every version
+            raise self._lost_or(error) from None
         return future
 
     def outcome(self, future: Future[Any], function: Function, task: Task[Any]) -> Outcome[Any] | Future[Any]:
@@ -69,9 +74,7 @@ class Cluster:
             The scheduler is gone, or the worker has another version.
         """
         if future.cancelled():
-            raise ClusterError(
-                f"the scheduler {self._client.scheduler.address} is lost, or it cancelled the tasks"
-            )
+            raise self._lost()
         trouble = future.exception()
         if isinstance(trouble, KilledWorker):
             return Outcome(error=LostWorkerError(_killed(trouble)))
@@ -100,10 +103,22 @@ class Cluster:
 
     def _look(self) -> None:
         """See who works there; ask new ones for their version."""
-        threads = dict(self._client.nthreads())
-        if new := [worker for worker in threads if worker not in self._threads]:
-            check_versions(self._client.run(version, PACKAGE, workers=new, on_error="return"))
+        try:
+            threads = dict(self._client.nthreads())
+            new = [worker for worker in threads if worker not in self._threads]
+            answers = self._client.run(version, PACKAGE, workers=new, on_error="return") if new else {}
+        except Exception as error:  # noqa: BLE001 - dask has no name for it in every version
+            raise self._lost_or(error) from None
+        check_versions(answers)
         self._threads = threads
+
+    def _lost_or(self, error: Exception) -> Exception:
+        """Return what an error of dask's means: that the connection is gone, whatever its kind (some versions have no name for it), or itself."""
+        is_gone = isinstance(error, OSError) or self._client.status != "running"
+        return self._lost() if is_gone else error
+
+    def _lost(self) -> ClusterError:
+        return ClusterError(f"the scheduler {self._address} is lost, or it cancelled the tasks")
 
 
 def _killed(trouble: KilledWorker) -> str:
@@ -155,6 +170,10 @@ def open_cluster(address: str) -> Cluster:
     """
     # files that are sent are part of the task, so that a lost worker's task still has them: large on purpose
     dask.config.set({"distributed.admin.large-graph-warning-threshold": "1TB"})
+    for name in ("distributed", "distributed.client"):
+        logging.getLogger(name).setLevel(
+            logging.CRITICAL
+        )  # what matters of it comes back as an error of ours
     try:
         client = Client(address, timeout=_CONNECT_S, set_as_default=False, name="pbpp")
     except (OSError, ValueError) as error:
@@ -164,7 +183,7 @@ def open_cluster(address: str) -> Cluster:
         ) from None
     try:
         client.wait_for_workers(1, timeout=_CONNECT_S)
-        return Cluster(client)
+        return Cluster(client, address)
     except TimeoutError:
         client.close()
         raise ClusterError(

@@ -165,7 +165,11 @@ def _legend(scene: PictureScene, grid: _Grid, signs: _Signs, columns: int) -> li
         *([f"{signs.route} {scene.route_name}"] if len(scene.route) else []),
         *([f"{signs.unsafe} unsafe leg"] if scene.unsafe_legs else []),
         *([f"{signs.mark} {scene.marks_name}"] if scene.marks else []),
-        *([f"{signs.track} driven"] if scene.tracks else []),
+        *(
+            [f"{signs.track} {', '.join(dict.fromkeys(track.name for track in scene.tracks))}"]
+            if scene.tracks
+            else []
+        ),
         *([f"{signs.exclusion} exclusion"] if not scene.exclusions.is_empty else []),
         *([f"{signs.outside} outside the fence"] if scene.has_inclusion else []),
     ]

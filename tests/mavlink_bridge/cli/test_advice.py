@@ -115,6 +115,8 @@ ADVICE = {
     "UsageError": "see `pbpp plan --help`",
     "LogError": None,
     "DatasetError": None,
+    "ClusterError": None,
+    "LostWorkerError": "give the machine more memory, or leave out what the worker died at",
     "LinkError": "is the vehicle on, and is another program using the port? `pbpp doctor` lists the serial ports",
     "IdentityTakenError": "use another component id: --source-component",
     "VehicleNotFoundError": "choose another vehicle with --system N",

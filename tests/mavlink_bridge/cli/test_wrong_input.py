@@ -338,6 +338,10 @@ WRONG: list[tuple[tuple[str, ...], int, str]] = [
     (("check", "--log", "missing.tlog"), INPUT, "missing.tlog"),
     (("check", "--log", "nofence.tlog", "--connect", "tcp:127.0.0.1:1"), USAGE, "--connect"),
     # conversions
+    (("diff",), USAGE, "A"),
+    (("diff", "yard.waypoints"), USAGE, "B"),
+    (("diff", "missing.plan", "yard.waypoints"), INPUT, "missing.plan"),
+    (("diff", "yard.waypoints", "yard.waypoints", "--only", "home"), USAGE, "--only"),
     (("convert",), USAGE, "IN"),
     (("logs", "melt", "x"), USAGE, "is not an action"),
     (("logs", "build", "x"), USAGE, "needs -o DATASET"),

@@ -11,8 +11,9 @@ import pytest
 from typer.testing import CliRunner
 
 from mavlink_bridge.cli.app import app
-from mavlink_bridge.dataset import Dataset, build, log_files
+from mavlink_bridge.dataset.build import build, log_files
 from mavlink_bridge.dataset.calibrate import calibrate, corner_classes, leg_classes, more_m, rank_of_bound
+from mavlink_bridge.dataset.store import Dataset
 from mavlink_bridge.errors import DatasetError
 from mavlink_bridge.many import open_workers
 from missions.formats.calibration import read_calibration

@@ -16,8 +16,9 @@ import pytest
 from typer.testing import CliRunner
 
 from mavlink_bridge.cli.app import app
-from mavlink_bridge.dataset import Dataset, build, log_files
+from mavlink_bridge.dataset.build import build, log_files
 from mavlink_bridge.dataset.schema import TABLES, VIEWS
+from mavlink_bridge.dataset.store import Dataset
 from mavlink_bridge.errors import DatasetError
 from mavlink_bridge.many import open_workers
 from mavlink_bridge.mavlink.messages import GlobalPositionInt
@@ -270,8 +271,8 @@ class TestKilled:
     SCRIPT = """
 import sys, os
 from pathlib import Path
-from mavlink_bridge.dataset import Dataset, build, log_files
-from mavlink_bridge.dataset import build as _, store
+from mavlink_bridge.dataset.build import build, log_files
+from mavlink_bridge.dataset.store import Dataset
 import mavlink_bridge.dataset.build as b
 from mavlink_bridge.many import open_workers
 b._A_TASK, b._A_BATCH, b._A_LOAD = 1, 2, 4

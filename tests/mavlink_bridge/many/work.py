@@ -7,6 +7,8 @@ import threading
 import time
 from pathlib import Path
 
+from mavlink_bridge.errors import LogError
+
 
 def square(task):
     return task.asked**2
@@ -42,3 +44,7 @@ def read(task):
     if not task.files[0].read_bytes():
         raise ValueError(f"{task.files[0]} is empty")
     return [file.read_text() for file in task.files], [file.name for file in task.files]
+
+
+def refuse(task):
+    raise LogError("not liked", file=str(task.files[0]), line=3)

@@ -61,14 +61,14 @@ class Calibrated:
 
 
 _CORNERS = """SELECT log, drive, abs(turn_deg) AS turn_deg, greatest(speed_mps, coalesce(next_mps, 0)) AS speed_mps, stands,
-    inside_cut_m - foreseen_inside_cut_m AS inside_m, outside_overshoot_m - foreseen_outside_overshoot_m AS outside_m,
+    inside_cut_m - predicted_inside_cut_m AS inside_m, outside_overshoot_m - predicted_outside_overshoot_m AS outside_m,
     greatest(coalesce(inside_beyond_m, 0), coalesce(outside_beyond_m, 0)) AS beyond_m,
     gap_m, coalesce(is_bounded, false) AS is_bounded
 FROM (SELECT *, lead(speed_mps) OVER (PARTITION BY log, vehicle, drive ORDER BY leg) AS next_mps FROM legs WHERE vehicle = ?)
-WHERE turn_deg IS NOT NULL AND is_whole AND foreseen_inside_cut_m IS NOT NULL ORDER BY log, drive, leg"""
-_LEGS = """SELECT speed_mps, straight_m - foreseen_straight_m AS more_m FROM legs
-WHERE vehicle = ? AND is_whole AND straight_m IS NOT NULL AND foreseen_straight_m IS NOT NULL"""
-_DRIVES = "SELECT count(*) FROM (SELECT DISTINCT log, drive FROM legs WHERE vehicle = ? AND is_whole AND foreseen_straight_m IS NOT NULL)"
+WHERE turn_deg IS NOT NULL AND is_whole AND predicted_inside_cut_m IS NOT NULL ORDER BY log, drive, leg"""
+_LEGS = """SELECT speed_mps, straight_m - predicted_straight_m AS more_m FROM legs
+WHERE vehicle = ? AND is_whole AND straight_m IS NOT NULL AND predicted_straight_m IS NOT NULL"""
+_DRIVES = "SELECT count(*) FROM (SELECT DISTINCT log, drive FROM legs WHERE vehicle = ? AND is_whole AND predicted_straight_m IS NOT NULL)"
 _NEWEST = "SELECT log, firmware FROM vehicles WHERE vehicle = ? AND driven_m > 0 ORDER BY begins_utc DESC NULLS LAST, log LIMIT 1"
 _OTHER = """SELECT DISTINCT p.log FROM parameters p JOIN (SELECT name, value FROM parameters WHERE vehicle = ? AND log = ?) n USING (name)
 WHERE p.vehicle = ? AND p.value <> n.value AND n.name = ANY(?)"""

@@ -66,7 +66,7 @@ QUESTIONS: Final = {
             "clearance",
             "How near did each drive come to the fence, site by site?",
             """SELECT site, vehicle, begun_utc, log, drive, round(least_clearance_m, 2) AS least_clearance_m,
-    round(foreseen_least_clearance_m, 2) AS foreseen_least_clearance_m, driven_m, arrived
+    round(predicted_least_clearance_m, 2) AS predicted_least_clearance_m, driven_m, arrived
 FROM drive_grades WHERE least_clearance_m IS NOT NULL
 ORDER BY site, least_clearance_m, begun_utc, log, drive""",
             Plotted("site", "site", ("least_clearance_m",), "least clearance (m)"),
@@ -74,11 +74,11 @@ ORDER BY site, least_clearance_m, begun_utc, log, drive""",
         Question(
             "promise",
             "Which drives came nearer to the fence than promised (--promise M), or than the drive model predicts?",
-            """SELECT coalesce($promise, foreseen_least_clearance_m) AS promised_m, least_clearance_m,
-    least_clearance_m >= coalesce($promise, foreseen_least_clearance_m) AS kept,
-    round(greatest(coalesce($promise, foreseen_least_clearance_m) - least_clearance_m, 0), 2) AS short_m,
+            """SELECT coalesce($promise, predicted_least_clearance_m) AS promised_m, least_clearance_m,
+    least_clearance_m >= coalesce($promise, predicted_least_clearance_m) AS kept,
+    round(greatest(coalesce($promise, predicted_least_clearance_m) - least_clearance_m, 0), 2) AS short_m,
     site, vehicle, begun_utc, log, drive, outside_m
-FROM drive_grades WHERE least_clearance_m IS NOT NULL AND coalesce($promise, foreseen_least_clearance_m) IS NOT NULL
+FROM drive_grades WHERE least_clearance_m IS NOT NULL AND coalesce($promise, predicted_least_clearance_m) IS NOT NULL
 ORDER BY kept, short_m DESC, begun_utc, log, drive""",
             Plotted(
                 "promised_m", "promised (m)", ("least_clearance_m",), "least clearance (m)", diagonal=True
@@ -89,10 +89,10 @@ ORDER BY kept, short_m DESC, begun_utc, log, drive""",
             "How deep were corners cut and how far did the rover swing out, by angle and speed, beside the drive model's bound?",
             f"""SELECT {_CLASSES}, count(*) AS corners,
     round(quantile_cont(inside_cut_m, 0.5), 2) AS cut_median_m, round(quantile_cont(inside_cut_m, 0.99), 2) AS cut_99_m,
-    round(max(inside_cut_m), 2) AS cut_most_m, round(max(foreseen_inside_cut_m), 2) AS cut_bound_m,
+    round(max(inside_cut_m), 2) AS cut_most_m, round(max(predicted_inside_cut_m), 2) AS cut_bound_m,
     round(quantile_cont(outside_overshoot_m, 0.5), 2) AS overshoot_median_m,
     round(quantile_cont(outside_overshoot_m, 0.99), 2) AS overshoot_99_m,
-    round(max(outside_overshoot_m), 2) AS overshoot_most_m, round(max(foreseen_outside_overshoot_m), 2) AS overshoot_bound_m,
+    round(max(outside_overshoot_m), 2) AS overshoot_most_m, round(max(predicted_outside_overshoot_m), 2) AS overshoot_bound_m,
     count(*) FILTER (inside_excess_m > 0 OR outside_excess_m > 0) AS beyond_bound
 FROM corners WHERE NOT stands GROUP BY 1, 2 ORDER BY 1, 2""",  # noqa: S608 - numbers of ours
             Plotted(

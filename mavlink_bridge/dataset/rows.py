@@ -232,13 +232,18 @@ def _drive_rows(vehicle: Mapping[str, Any], log: str) -> Iterator[tuple[str, Row
             "grades",
             (
                 *key,
-                *(drive[name] for name in TABLES["grades"].names[2:7]),
+                *(drive[_key(name)] for name in TABLES["grades"].names[2:7]),
                 *(told.get(name) for name in ("took_s", "least_clearance_m", "deviation_m")),
                 "; ".join(drive["notes"]) or None,
             ),
         )
         for leg_number, leg in enumerate(drive["legs"], start=1):
-            yield "legs", (*key, leg_number, *(leg[name] for name in TABLES["legs"].names[3:]))
+            yield "legs", (*key, leg_number, *(leg[_key(name)] for name in TABLES["legs"].names[3:]))
+
+
+def _key(column: str) -> str:
+    """Return how a column is called in the document, which keeps the code's word."""
+    return column.replace("predicted", "foreseen")
 
 
 def _event_rows(vehicle: Mapping[str, Any], log: str) -> Iterator[tuple[str, Row]]:

@@ -234,12 +234,12 @@ _GRADES = Table(
             "the farthest outside the predicted corridor; NULL where nothing could be predicted",
         ),
         Column(
-            "is_as_foreseen", "BOOLEAN", "whether it stayed within the corridor and 0.25 m of position error"
+            "is_as_predicted", "BOOLEAN", "whether it stayed within the corridor and 0.25 m of position error"
         ),
         *_numbers(
             "DOUBLE",
-            *("foreseen_took_s", "as predicted", "foreseen_least_clearance_m", "as predicted"),
-            *("foreseen_deviation_m", "as predicted"),
+            *("predicted_took_s", "as predicted", "predicted_least_clearance_m", "as predicted"),
+            *("predicted_deviation_m", "as predicted"),
         ),
         *_texts("notes", "what to know before comparing; several are parted by semicolons"),
     ),
@@ -258,7 +258,7 @@ _LEGS = Table(
             *(
                 "straight_m",
                 "the farthest off its line in its middle third",
-                "foreseen_straight_m",
+                "predicted_straight_m",
                 "as predicted",
             ),
             *("turn_deg", "change of course at its end, to the right positive; NULL at the last leg"),
@@ -268,7 +268,7 @@ _LEGS = Table(
             "DOUBLE",
             *("inside_cut_m", "the farthest off the two legs to the inside of the turn"),
             *("outside_overshoot_m", "the farthest to its outside"),
-            *("foreseen_inside_cut_m", "as predicted", "foreseen_outside_overshoot_m", "as predicted"),
+            *("predicted_inside_cut_m", "as predicted", "predicted_outside_overshoot_m", "as predicted"),
             *("inside_beyond_m", "how far outside the predicted corridor it was there, inside the turn"),
             *("outside_beyond_m", "the same outside the turn"),
         ),
@@ -398,9 +398,9 @@ FROM drives d JOIN grades g USING (log, drive, month, vehicle) LEFT JOIN vehicle
     View(
         "corners",
         "a corner that was driven as a whole: a row of `legs` that has one, with how far it was beyond its bound (negative: within it)",
-        """SELECT *, abs(turn_deg) AS angle_deg, inside_cut_m - foreseen_inside_cut_m AS inside_excess_m,
-    outside_overshoot_m - foreseen_outside_overshoot_m AS outside_excess_m
-FROM legs WHERE turn_deg IS NOT NULL AND is_whole AND foreseen_inside_cut_m IS NOT NULL""",
+        """SELECT *, abs(turn_deg) AS angle_deg, inside_cut_m - predicted_inside_cut_m AS inside_excess_m,
+    outside_overshoot_m - predicted_outside_overshoot_m AS outside_excess_m
+FROM legs WHERE turn_deg IS NOT NULL AND is_whole AND predicted_inside_cut_m IS NOT NULL""",
     ),
     View(
         "track",

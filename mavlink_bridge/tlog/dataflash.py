@@ -70,7 +70,7 @@ _SYSTEM_NAMES = ("SYSID_THISMAV", "MAV_SYSID")  # before ArduPilot 4.7, and sinc
 _FENCE_COMMANDS = {98: 5001, 97: 5002, 96: 5004, 95: 5000, 94: 5003, 93: 5004, 92: 5003}
 """MAV_CMD_NAV_FENCE_* of AC_PolyFenceType: polygons, the return point, and circles, those of whole metres (96, 94) and of older firmware included."""
 
-_CIRCLES = (5003, 5004)
+_CIRCLES = (5003, 5004)  # MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION and _EXCLUSION
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,7 @@
     BridgeError
     ├── UsageError               options that do not fit together
     ├── LogError                 a log cannot be used
+    ├── DatasetError             a dataset of logs cannot be built or read
     ├── LinkError                no connection, no heartbeat, silence
     ├── ClusterError             no scheduler, no workers, or workers of another version
     ├── LostWorkerError          a worker died at a task, again and again
@@ -35,6 +36,10 @@ class UsageError(BridgeError):
 
 class LogError(BridgeError):
     """A telemetry log is missing, empty, or not one."""
+
+
+class DatasetError(BridgeError):
+    """A dataset of logs cannot be built or read."""
 
 
 class LinkError(BridgeError):

@@ -34,6 +34,7 @@ COMMANDS = {
     "bridge": "Run alongside the autopilot: plan to each target, upload verified missions.",
     "serve": "Serve the console: fence, plan and rover on a page.",
     "log": "Summarise telemetry logs.",
+    "logs": "Make tables of many logs, ask them, calibrate a rover.",
     "replay": "Replay recorded logs through the bridge.",
     "sim": "Run a simulated rover.",
     "demo": "Plan, upload and drive on a simulated rover, as a demonstration.",

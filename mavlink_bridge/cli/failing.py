@@ -57,6 +57,7 @@ _EXIT_CODES: tuple[tuple[type[Exception], ExitCode], ...] = (
     (mission_errors.MissionError, ExitCode.INPUT),
     (bridge_errors.UsageError, ExitCode.USAGE),
     (bridge_errors.LogError, ExitCode.INPUT),
+    (bridge_errors.DatasetError, ExitCode.INPUT),
     (bridge_errors.LostWorkerError, ExitCode.INPUT),
     (bridge_errors.LinkError, ExitCode.LINK),
     (bridge_errors.ClusterError, ExitCode.LINK),
@@ -104,6 +105,7 @@ _ADVICE: Mapping[type[Exception], tuple[str, ...]] = {
     ),
     mission_errors.MissionError: (),
     bridge_errors.LogError: (),
+    bridge_errors.DatasetError: (),
     bridge_errors.IdentityTakenError: ("use another component id: --source-component",),
     bridge_errors.VehicleNotFoundError: ("choose another vehicle with --system N",),
     bridge_errors.LinkError: (

@@ -16,6 +16,7 @@ from mavlink_bridge.director.orders import Homing, ObstacleSource
 from mavlink_bridge.errors import LogError
 from missions.errors import MissionError
 from missions.firmware import read_firmware
+from missions.formats.calibration import calibration_from_plain, calibration_to_plain
 from missions.geo import LatLon
 from missions.request import request_of
 from missions.situation import Situation
@@ -99,6 +100,7 @@ class JournalWriter:
                 "parameters": dict(described.parameters),
                 "firmware": str(described.firmware) if described.firmware else None,
                 "stopping": [[one.speed_mps, one.distance_m] for one in described.stops.given],
+                "calibration": calibration_to_plain(described.calibration),
                 "drive_notes": [note_to_json(note) for note in notes],
             }
         )
@@ -152,7 +154,12 @@ def read_journal(path: Path) -> Journal:
         firmware = read_firmware(head["firmware"]) if head.get("firmware") else None
         given = tuple(Stop(*one) for one in head.get("stopping", ()))
         notes = tuple(map(note_from_json, head.get("drive_notes", ())))
-        described = Situation(parameters=head["parameters"], firmware=firmware, stops=Stops(given))
+        described = Situation(
+            parameters=head["parameters"],
+            firmware=firmware,
+            stops=Stops(given),
+            calibration=calibration_from_plain(head.get("calibration")),
+        )
         for line_number, line in enumerate(lines[1:], start=2):  # noqa: B007 - told where it fails
             entry = json.loads(line)
             if "told" in entry:  # for people: a replay tells its own

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from missions.drive_model import before_4_6, pursuit
 from missions.drive_model.blend import Blend
 from missions.vehicle import Autopilot, Steering
+from missions.vehicle.calibration import leg_more_m
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -114,9 +115,10 @@ STANDSTILL = Blend(0.0, 0.0)
 
 def band_m(vehicle: Vehicle, speed_mps: float) -> float:
     """Return how far a rover strays to either side of the path that its autopilot aims for."""
+    more_m = leg_more_m(vehicle, speed_mps)
     if vehicle.autopilot is Autopilot.PX4:
-        return pursuit.BAND_M
-    return BAND_AT_REST_M + BAND_HEADING_ERROR * speed_mps / vehicle.position_gain_per_s
+        return pursuit.BAND_M + more_m
+    return BAND_AT_REST_M + BAND_HEADING_ERROR * speed_mps / vehicle.position_gain_per_s + more_m
 
 
 def inside_band_m(vehicle: Vehicle, speed_mps: float, band_m: float) -> float:

@@ -13,6 +13,7 @@ from missions.drive_model.legs_and_corners import CornerPlan, DrivePlan, LegPlan
 from missions.drive_model.motion import leg_profile
 from missions.drive_model.stray import Bend, Stray
 from missions.geo import change_deg
+from missions.vehicle.calibration import corner_more
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -137,6 +138,7 @@ def _corner(
     bend: Bend,
     stops: Mapping[int, float],
 ) -> CornerPlan:
+    # Long: one decision on how a corner is driven, and what follows from it field by field.
     before, after = legs
     turn_deg = bend.turn_deg
     pivots = at_corner.pivots(vehicle, turn_deg)
@@ -165,6 +167,8 @@ def _corner(
             swing_m = swing.outside_m
             behind_m = swing_m / 2
             tail = Stray(swing.later_outside_m, swing.later_inside_m).seen_from(turn_deg)
+    more = corner_more(vehicle, turn_deg, bend.speed_mps, stands=stopped or pivots)
+    swing_m = max(0.0, swing_m + min(more.outside_m, 0.0))
     top_mps = min(before.profile.top_speed_mps, after.profile.top_speed_mps)
     ramps_s = (before.profile.ramp.duration_s + after.profile.ramp.duration_s) / 2
     lost_s = ramps_s - blend.duration_s + at_corner.swing_time_s(swing_m, top_mps) + delay_s
@@ -189,6 +193,7 @@ def _corner(
         stray_m=max(_stray_m(len(group), delay_s), either_m),
         tail=tail,
         time_lost_s=lost_s,
+        more=more,
     )
 
 

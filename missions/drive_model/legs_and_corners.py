@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from missions.drive_model.stray import Stray
     from missions.geo import Vector
     from missions.vehicle import Vehicle
+    from missions.vehicle.calibration import CornerMore
 
 
 class LegPlan(NamedTuple):
@@ -59,6 +60,8 @@ class CornerPlan(NamedTuple):
         How far beyond that it may be long after, as at the turn it is; only before ArduPilot 4.6.
     time_lost_s : float
         Against driving on at full speed.
+    more : CornerMore
+        What the rover's calibration adds.
     """
 
     waypoint: int
@@ -74,6 +77,7 @@ class CornerPlan(NamedTuple):
     stray_m: float
     tail: Stray
     time_lost_s: float
+    more: CornerMore
 
 
 @dataclass(frozen=True, slots=True)

@@ -55,12 +55,18 @@ def _corner(drive: DrivePlan, number: int) -> Corner:
         inside_cut_m=max(
             _cut_m(drive, number)
             + coming_m
-            + at_corner.inside_band_m(
-                drive.vehicle, max(before.profile.top_speed_mps, after.profile.top_speed_mps), band_m
+            + max(
+                0.0,
+                plan.more.inside_m
+                + at_corner.inside_band_m(
+                    drive.vehicle, max(before.profile.top_speed_mps, after.profile.top_speed_mps), band_m
+                ),
             ),
-            max(going.right_m, midway.right_m) + band_m,
+            max(going.right_m, midway.right_m) + band_m + max(plan.more.inside_m, 0.0),
         ),
-        outside_overshoot_m=max(coming_m, going.left_m, midway.left_m) + band_m,
+        outside_overshoot_m=max(coming_m, going.left_m, midway.left_m)
+        + band_m
+        + max(plan.more.outside_m, 0.0),
         reach_m=_reach_m(drive, number, blend_s),
         middle_m=plan.blend.reach_m,
         least_middle_m=plan.blend.reach_m,

@@ -190,7 +190,11 @@ class DescriptionOptions:
 
     vehicle: Annotated[
         Path | None,
-        option("Parameter file, for what the source does not report.", "FILE.parm", panel=VEHICLE_PANEL),
+        option(
+            "Parameter file, for what the source does not report; or a rover's calibration (`pbpp logs calibrate`).",
+            "FILE.parm|FILE.toml",
+            panel=VEHICLE_PANEL,
+        ),
     ] = None
     firmware: FirmwareOption = None
     stopping: Annotated[

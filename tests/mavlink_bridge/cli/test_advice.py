@@ -114,6 +114,7 @@ ADVICE = {
     "BridgeError": None,
     "UsageError": "see `pbpp plan --help`",
     "LogError": None,
+    "DatasetError": None,
     "ClusterError": None,
     "LostWorkerError": "give the machine more memory, or leave out what the worker died at",
     "LinkError": "is the vehicle on, and is another program using the port? `pbpp doctor` lists the serial ports",

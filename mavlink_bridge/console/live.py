@@ -105,9 +105,8 @@ class LiveBackend:
                 text = self.desk.do(asked.deed, asked.page, now_s)
             except Refusal as refusal:
                 _tell(asked, asked.answer.set_exception, refusal)
-            except Exception as error:
-                _tell(asked, asked.answer.set_exception, not_now(f"a defect of pbpp: {error!r}"))
-                raise
+            except Exception as error:  # noqa: BLE001 - whatever it is, the vehicle must not lose its bridge by it
+                _tell(asked, asked.answer.set_exception, not_now(_defect(error)))
             else:
                 _tell(asked, asked.answer.set_result, text)
 
@@ -156,7 +155,7 @@ class LiveConsole:
         self._writer = writer
         self._backend = backend
         self._own = request
-        self._drawer = Drawer()
+        self._drawer = Drawer(self._tell_defect)
         self._instruments = Instruments()
         self._drive = DriveShown()
         self._track = Track()
@@ -196,8 +195,13 @@ class LiveConsole:
     def step(self, now_s: float) -> None:
         """Do what pages asked for, and go on with what had to wait."""
         self._backend.take_asked(now_s)
-        if self._backend.desk is not None:
+        if self._backend.desk is None:
+            return
+        try:
             self._backend.desk.handle_timer(now_s)
+        except Exception as error:  # noqa: BLE001 - as above
+            self._backend.desk.forget_wishes()
+            self._tell_defect(error)
 
     def tell(self, event: Event) -> None:
         """Take an event of the director."""
@@ -210,9 +214,14 @@ class LiveConsole:
         """Take what is no event of the director, with its severity."""
         self._texts.append((text, severity))
 
+    def _tell_defect(self, error: Exception) -> None:
+        self.note(_defect(error), "error")
+
     def link_opened(self) -> None:
         """Take notice that the link is open."""
         self.link_trouble = ""
+        if self._backend.desk is not None:
+            self._backend.desk.link_opened()
 
     def link_closed(self, why: str) -> None:
         """Take notice that the link is closed, and why."""
@@ -378,6 +387,10 @@ class LiveConsole:
     def _post(self, **sections: Any) -> None:  # noqa: ANN401 - whichever
         if self._hub is not None:
             self._hub.post(sections)
+
+
+def _defect(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}. This is a bug in pbpp"
 
 
 def _planning(request: Request) -> PlanView:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import threading
 import time
 
@@ -227,3 +228,18 @@ def test_heartbeats_that_are_missing_are_counted():
             instruments.receive(m.Frame(1, 1, m.Heartbeat(10, 3)), float(second))
     assert instruments.link(29.0, 29.5, is_lost=False, trouble="").heartbeats_missed_percent == 50
     assert instruments.link(None, 29.5, is_lost=False, trouble="").state == "listening"
+
+
+def test_an_upload_between_two_looks_is_shown_all_the_same(shown):
+    shown.do(deeds.UploadFence(shown.director.situation.fence.value))
+    shown.until(lambda: not shown.writer.is_busy)
+    shown.wait(0.3)
+    assert (shown.pages.state["upload"].what, shown.pages.state["upload"].state) == ("fence", "verified")
+    shown.do(deeds.TakeTargets(Tour(targets=(FAR,), clearance_m=2.5)))
+    shown.until(lambda: shown.director.awaits_confirmation)
+    shown.console._due_s = math.inf  # nobody looks
+    shown.director.confirm(shown.run.now_s)
+    shown.until(lambda: shown.director.state is State.VERIFIED)
+    shown.console._due_s = 0.0
+    shown.wait(0.3)
+    assert (shown.pages.state["upload"].what, shown.pages.state["upload"].state) == ("mission", "verified")

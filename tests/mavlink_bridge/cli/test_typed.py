@@ -162,7 +162,7 @@ class Watcher:
 
 def test_the_view_goes_on_while_the_link_is_opened_again():
     watcher = Watcher(3)
-    shell = bridge._Shell(Director(Orders()), "tcp:127.0.0.1:1", lambda _event: None, watcher, None)
+    shell = bridge.BridgeShell(Director(Orders()), "tcp:127.0.0.1:1", lambda _event: None, watcher, None)
     with pytest.raises(KeyboardInterrupt), terminable():  # which puts back what SIGINT does
         shell.run(None, 30.0)
     assert "tcp:127.0.0.1:1 cannot be opened" in watcher.link_trouble
@@ -172,7 +172,7 @@ def test_the_view_goes_on_while_the_link_is_opened_again():
 @pytest.mark.parametrize(("quiet", "shown"), [(0, "nw"), (1, "w"), (2, "")])
 def test_notes_beside_the_events_heed_quiet(quiet, shown, capsys):
     begin_telling("bridge", quiet=quiet)
-    shell = bridge._Shell(Director(Orders()), "tcp:127.0.0.1:1", lambda _event: None, None, None)
+    shell = bridge.BridgeShell(Director(Orders()), "tcp:127.0.0.1:1", lambda _event: None, None, None)
     shell._note("n", is_warning=False)
     shell._note("w", is_warning=True)
     assert capsys.readouterr().err.replace("\n", "") == shown

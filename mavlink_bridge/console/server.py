@@ -7,10 +7,11 @@ import io
 import socket
 from dataclasses import dataclass
 from threading import Thread
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import segno
 import uvicorn
+from uvicorn.config import WS_PROTOCOLS
 
 from mavlink_bridge.errors import LinkError
 
@@ -25,7 +26,12 @@ if TYPE_CHECKING:
 FIRST_PORT, _PORTS = 8080, 20
 """Where nothing is asked for: the first that is free from here on."""
 
+_SANSIO = "websockets-sansio"
+_WEBSOCKETS: Any = _SANSIO if _SANSIO in WS_PROTOCOLS else "auto"
+"""Since uvicorn 0.35; before that it knows only what websockets calls its legacy."""
+
 _BACKLOG = 64
+_MOST_CONNECTIONS = 256  # at once, pages and strangers; chosen: a small computer holds them
 _LEAVE_S = 2  # for open connections to end; chosen: pages connect again
 
 
@@ -124,10 +130,11 @@ class Served:
             server_header=False,
             date_header=False,
             lifespan="on",
-            ws="websockets-sansio",
+            ws=_WEBSOCKETS,
             ws_max_size=64 * 1024,
             ws_per_message_deflate=False,
             timeout_graceful_shutdown=_LEAVE_S,
+            limit_concurrency=_MOST_CONNECTIONS,
             ssl_certfile=certificate.certificate if certificate else None,
             ssl_keyfile=certificate.key if certificate else None,
         )

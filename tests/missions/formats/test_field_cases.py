@@ -304,7 +304,7 @@ def test_other_logs_are_named(tmp_path, name, kind, command):
     result = CliRunner().invoke(app, [*command, str(CASES / "80-other-logs" / name), *after])
     assert result.exit_code == 3
     assert f"is {kind}" in result.stderr
-    assert ".tlog" in result.stderr
+    assert ".tlog" in result.stderr or "use --log FILE.bin" in result.stderr
 
 
 @pytest.mark.parametrize("name", ["p.csv", "r.gpx"])

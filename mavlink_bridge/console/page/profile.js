@@ -91,7 +91,7 @@ function summary(samples) {
 function chart(samples, asked_m, width, x) {
   const clear = samples.map((one) => Math.min(one.clearance_m ?? MOST_CLEAR_M, MOST_CLEAR_M));
   const top_m = Math.max(1, Math.ceil(Math.max(...clear, asked_m ?? 0)));
-  const top_mps = Math.max(1, Math.ceil(Math.max(...samples.map((one) => one.speed_mps))));
+  const top_mps = Math.max(1, Math.ceil(1.2 * Math.max(...samples.map((one) => one.speed_mps))));
   const y = (/** @type {number} */ value, /** @type {number} */ most) => HEIGHT - BOTTOM - ((HEIGHT - TOP - BOTTOM) * value) / most;
   const line = (/** @type {(one: Sample, i: number) => number} */ value, /** @type {number} */ most) => samples.map((one, i) => `${i ? "L" : "M"}${x(one.s_m).toFixed(1)} ${y(value(one, i), most).toFixed(1)}`).join("");
   const base = HEIGHT - BOTTOM;

@@ -23,7 +23,7 @@ export function timeline(store, seek) {
   const words = h("span", { class: "moment" });
   const marks = svg("svg", { class: "decisions", "aria-hidden": "true", preserveAspectRatio: "none", viewBox: "0 0 1000 12" });
   const step = (/** @type {1 | -1} */ way) => () => player.goToDecision(way);
-  const element = h("section", { class: "timeline", "aria-label": texts.replay.title }, h("div", { class: "row" }, play, speed, signButton("⇤", texts.replay.previous, step(-1)), signButton("⇥", texts.replay.next, step(1)), words),
+  const element = h("section", { class: "timeline", "aria-label": texts.replay.title }, h("div", { class: "row" }, play, speed, signButton("before", texts.replay.previous, step(-1)), signButton("after", texts.replay.next, step(1)), words),
     h("div", { class: "scrub-box" }, marks, range));
   player.onchange = () => say(play, player.isPlaying ? texts.replay.pause : texts.replay.play);
   store.watch(["replay"], ({ replay }) => {

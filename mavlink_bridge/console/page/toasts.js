@@ -15,7 +15,7 @@ export function toasts() {
     if (!text) {
       return;
     }
-    const toast = h("div", { class: `toast ${isTrouble ? "bad" : ""}` }, h("span", { class: "grow" }, text), signButton("✕", texts.close, () => toast.remove()));
+    const toast = h("div", { class: `toast ${isTrouble ? "bad" : ""}` }, h("span", { class: "grow" }, text), signButton("no", texts.close, () => toast.remove()));
     const list = isTrouble ? troubles : calm;
     list.append(toast);
     while (list.childElementCount > MOST) {

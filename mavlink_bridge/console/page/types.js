@@ -58,6 +58,7 @@
  *
  * What a person has drawn and asked for; every step of it can be undone.
  * @typedef {object} Doc
+ * @property {Place | null} start where a plan begins, where no vehicle says so
  * @property {Place[]} targets
  * @property {number | null} clearance_m null: the fence's own margin
  * @property {boolean} widest
@@ -95,7 +96,7 @@
  * @property {number | null} hoverLeg
  * @property {number | null} hoverAlong_m
  * @property {number | null} widest_m the widest clearance possible for the shown targets
- * @property {"target" | "add" | "polygon" | "circle" | "none"} tool what a click on the map does
+ * @property {"target" | "add" | "start" | "polygon" | "circle" | "none"} tool what a click on the map does
  * @property {"inclusion" | "exclusion"} newKind what a zone that is drawn next will be
  * @property {number | null} zone which drawn zone is being edited
  * @property {string} holdSent what became of a HOLD before the vehicle's answer; empty where the answer tells

@@ -45,7 +45,7 @@ export function meant(fence) {
 
 /** @param {import("../types.js").Fence} fence */
 export function zones(fence) {
-  return fence.held.features.map((zone) => feature(zone.geometry, { ...zone.properties, name: texts.fence.zoneName(zone.properties) }));
+  return fence.held.features.map((zone) => feature(zone.geometry, { ...zone.properties, name: texts.fence.zoneLabel(zone.properties) }));
 }
 
 /** @param {import("../types.js").Fence} fence */
@@ -103,8 +103,9 @@ export function marks(state) {
   found.push(...rally.map((at, i) => spot(at, { icon: "rally", name: texts.map.rally(i + 1) })));
   const many = doc.targets.length > 1;
   found.push(...doc.targets.map((at, i) => spot(at, { icon: "target", name: many ? texts.map.targetOf(i + 1) : texts.map.target })));
-  if (plan?.start) {
-    found.push(spot(plan.start, { icon: "start", name: state.vehicle.position ? "" : texts.map.start }));
+  const start = plan?.start ?? doc.start;
+  if (start) {
+    found.push(spot(start, { icon: "start", name: state.vehicle.position ? "" : texts.map.start }));
   }
   const trouble = plan?.no_route;
   const at = trouble?.at ?? trouble?.widest?.at;

@@ -9,7 +9,7 @@ const RATIO = 2; // pixels of the picture for one of the map: sharp on fine scre
 /** @type {Record<string, {size: number, draw: (pen: CanvasRenderingContext2D, colour: import("./style.js").Colours) => void}>} */
 const ICONS = {
   hatch: { size: 12, draw: (pen, colour) => stripes(pen, 12, colour.hatch) },
-  arrow: { size: 16, draw: (pen, colour) => shape(pen, [[5, 3], [13, 8], [5, 13], [7, 8]], colour.keeps, colour.halo, 1) },
+  arrow: { size: 20, draw: (pen, colour) => shape(pen, [[5, 4], [16, 10], [5, 16]], colour.text, colour.halo, 1.5) },
   rover: { size: 36, draw: (pen, colour) => shape(pen, [[18, 3], [29, 32], [18, 26], [7, 32]], colour.rover, colour.roverEdge, 2.5) },
   "rover-lost": { size: 36, draw: lost },
   target: { size: 30, draw: (pen, colour) => ring(pen, 15, colour.target, colour.halo) },

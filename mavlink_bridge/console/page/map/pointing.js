@@ -47,6 +47,9 @@ export class Pointing {
       } else {
         this.act.setTarget(place);
       }
+    } else if (tool === "start") {
+      this.act.setStart(place);
+      this.store.set({ tool: "target" });
     } else if (tool === "polygon" || tool === "circle") {
       this.draw(place, tool);
     } else if (this.store.state.zone !== null) {
@@ -139,10 +142,12 @@ export class Pointing {
 
   /** @param {PageState} state @returns {Handle[]} */
   targetHandles({ doc }) {
-    return doc.targets.map((at, i) => ({
+    /** @type {Handle[]} */
+    const start = doc.start ? [{ id: "start", at: doc.start, label: texts.plan.start, look: "target-handle", onmove: (place, isLast) => isLast && this.act.setStart(place), onremove: () => this.act.setStart(null) }] : [];
+    return [...start, ...doc.targets.map((at, i) => ({
       id: `target ${i}`, at, label: doc.targets.length > 1 ? texts.map.targetOf(i + 1) : texts.map.target, look: "target-handle",
-      onmove: (place, isLast) => this.act.moveTarget(i, place, isLast), onremove: () => this.act.removeTarget(i),
-    }));
+      onmove: (/** @type {Place} */ place, /** @type {boolean} */ isLast) => this.act.moveTarget(i, place, isLast), onremove: () => this.act.removeTarget(i),
+    }))];
   }
 
   /** @param {PageState} state @returns {Handle[]} */

@@ -99,7 +99,7 @@ function route(colour) {
     { id: "widest", type: "line", source: "widest", paint: { "line-color": colour.near, "line-width": 3, "line-dasharray": [4, 2] } },
     leg("keeps", null), leg("near", [4, 1]), leg("breaks", [1.2, 0.8]), leg("extrapolated", [2, 1, 0.5, 1]), leg("", [1, 1]),
     { id: "leg-hit", type: "line", source: "legs", paint: { "line-color": "#000", "line-opacity": 0, "line-width": 22 } },
-    { id: "way", type: "symbol", source: "legs", layout: { "symbol-placement": "line", "symbol-spacing": 90, "icon-image": "arrow", "icon-size": 0.8, "icon-allow-overlap": true, "icon-ignore-placement": true } },
+    { id: "way", type: "symbol", source: "legs", layout: { "symbol-placement": "line", "symbol-spacing": 110, "icon-image": "arrow", "icon-allow-overlap": true, "icon-ignore-placement": true } },
     { id: "narrow", type: "line", source: "narrow", paint: { "line-color": colour.text, "line-width": 2.5 } },
   ];
 }
@@ -140,10 +140,12 @@ function labels(colour) {
     { id: "places", type: "symbol", source: "places",
       layout: { "icon-image": ["get", "icon"], "icon-allow-overlap": true, "icon-ignore-placement": true, "icon-anchor": "center" } },
     { id: "place-names", type: "symbol", source: "places", layout: { ...aside, "text-field": ["get", "name"], "text-size": 14, "text-radial-offset": 1.2, "symbol-sort-key": 0 }, paint: words },
-    { id: "narrow-name", type: "symbol", source: "narrow", layout: { ...aside, "symbol-placement": "line-center", "text-variable-anchor": undefined, "text-field": ["get", "name"], "text-size": 13, "symbol-sort-key": 1, "text-rotation-alignment": "viewport", "text-offset": [0, 1.1] }, paint: words },
+    { id: "narrow-name", type: "symbol", source: "narrow", layout: { "text-font": FONT, "symbol-placement": "line-center", "text-field": ["get", "name"], "text-size": 13, "symbol-sort-key": 1, "text-rotation-alignment": "viewport", "text-offset": [0, 1.1] }, paint: words },
     { id: "point-numbers", type: "symbol", source: "points", layout: { ...aside, "text-field": ["get", "name"], "text-size": 13, "symbol-sort-key": ["get", "order"] }, paint: words },
-    { id: "zone-names", type: "symbol", source: "zones", minzoom: 15, layout: { "text-font": FONT, "text-field": ["get", "name"], "text-size": 12, "text-max-width": 8, "symbol-sort-key": 900 },
-      paint: { ...words, "text-color": ["match", ["get", "kind"], "exclusion", colour.exclusion, colour.fence] } },
+    { id: "inclusion-names", type: "symbol", source: "zones", minzoom: 15, filter: ["==", ["get", "kind"], "inclusion"],
+      layout: { "text-font": FONT, "text-field": ["get", "name"], "text-size": 12, "symbol-placement": "line", "symbol-spacing": 600, "text-offset": [0, 0.9], "symbol-sort-key": 950 }, paint: { ...words, "text-color": colour.fence } },
+    { id: "zone-names", type: "symbol", source: "zones", minzoom: 15, filter: ["==", ["get", "kind"], "exclusion"], layout: { "text-font": FONT, "text-field": ["get", "name"], "text-size": 12, "text-max-width": 8, "symbol-sort-key": 900 },
+      paint: { ...words, "text-color": colour.exclusion } },
   ];
 }
 

@@ -14,7 +14,7 @@ import { texts } from "../texts.js";
  */
 export function toolbar(store, act, scene, view, pointing) {
   const words = texts.tools;
-  const follow = signButton("◎", words.follow, () => {
+  const follow = signButton("follow", words.follow, () => {
     scene.isFollowing = !scene.isFollowing;
     follow.setAttribute("aria-pressed", String(scene.isFollowing));
     scene.showRover(store.state);
@@ -24,24 +24,24 @@ export function toolbar(store, act, scene, view, pointing) {
     follow.setAttribute("aria-pressed", "false");
   });
   const legend = legendBox();
-  const legendButton = signButton("?", words.legend, () => {
+  const legendButton = signButton("legend", words.legend, () => {
     legend.hidden = !legend.hidden;
     legendButton.setAttribute("aria-expanded", String(!legend.hidden));
   }, { "aria-expanded": "false" });
-  const undo = signButton("↶", `${words.undo} (Ctrl+Z)`, () => act.undo());
-  const redo = signButton("↷", `${words.redo} (Ctrl+Y)`, () => act.redo());
+  const undo = signButton("undo", `${words.undo} (Ctrl+Z)`, () => act.undo());
+  const redo = signButton("redo", `${words.redo} (Ctrl+Y)`, () => act.redo());
   store.watch(["doc"], () => {
     undo.disabled = act.history.past.length === 0;
     redo.disabled = act.history.future.length === 0;
   });
-  const finish = signButton("✓", words.finish, () => pointing.close());
-  const stop = signButton("✕", words.stop, () => pointing.giveUp());
+  const finish = signButton("yes", words.finish, () => pointing.close());
+  const stop = signButton("no", words.stop, () => pointing.giveUp());
   store.watch(["tool"], ({ tool }) => {
     finish.hidden = tool !== "polygon";
     stop.hidden = tool !== "polygon" && tool !== "circle";
   });
-  return h("div", { class: "map-tools", role: "group", "aria-label": words.name }, signButton("⛶", words.fit, () => scene.fit()), follow, undo, redo, finish, stop,
-    signButton("⤓", words.picture, async () => { saveAs("pbpp.png", /** @type {Blob} */ (await view.picture())); }), legendButton, legend);
+  return h("div", { class: "map-tools", role: "group", "aria-label": words.name }, signButton("fit", words.fit, () => scene.fit()), follow, undo, redo, finish, stop,
+    signButton("save", words.picture, async () => { saveAs("pbpp.png", /** @type {Blob} */ (await view.picture())); }), legendButton, legend);
 }
 
 function legendBox() {

@@ -2,7 +2,7 @@
 
 import { fill, h, show } from "../dom.js";
 import { texts } from "../texts.js";
-import { button } from "./parts.js";
+import { signButton } from "./parts.js";
 
 /** @typedef {import("../types.js").PageState} PageState */
 
@@ -36,5 +36,5 @@ function row(event, onplace) {
   const { position } = event;
   const severity = texts.events.severities[event.severity] ?? event.severity;
   return h("li", { class: `event ${event.severity}` }, h("span", { class: "event-sign", title: severity, role: "img", "aria-label": severity }, texts.events.signs[event.severity] ?? "·"),
-    h("time", {}, texts.clock(event.time_s)), h("span", { class: "grow" }, event.text), position && button("⌖", () => onplace(position), { class: "sign", "aria-label": texts.events.show, title: texts.events.show }));
+    h("time", {}, texts.clock(event.time_s)), h("span", { class: "grow" }, event.text), position && signButton("place", texts.events.show, () => onplace(position)));
 }

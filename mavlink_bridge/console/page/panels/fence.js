@@ -111,7 +111,7 @@ function zoneRow(zone, i, isOpen, store, act) {
   const turned = { ...zone, kind: zone.kind === "exclusion" ? "inclusion" : "exclusion" };
   return h("div", { class: "row" }, h("span", { class: `grow ${zone.kind}` }, name),
     button(texts.fence.editZone, () => store.set({ zone: isOpen ? null : i }), { "aria-expanded": String(isOpen), "aria-label": `${texts.fence.editZone}: ${name}` }),
-    signButton("⇄", `${texts.fence.turn}: ${name}`, () => act.changeZone(i, turned, texts.steps.zoneKind)), signButton("✕", `${texts.fence.remove}: ${name}`, () => act.removeZone(i)));
+    signButton("turn", `${texts.fence.turn}: ${name}`, () => act.changeZone(i, turned, texts.steps.zoneKind)), signButton("no", `${texts.fence.remove}: ${name}`, () => act.removeZone(i)));
 }
 
 /**
@@ -126,8 +126,8 @@ function corners(zone, index, act) {
   }
   const { ring } = zone;
   return h("ol", { class: "places" }, ring.map((place, i) => h("li", {}, placeField(texts.fence.corner(i + 1), place, (typed) => act.moveCorner(index, i, typed)),
-    signButton("+", texts.map.between(i + 1), () => act.addCorner(index, i + 1, middle(place, ring[(i + 1) % ring.length]))),
-    signButton("✕", texts.fence.removeCorner(i + 1), () => act.removeCorner(index, i), { disabled: ring.length <= 3 }))));
+    signButton("plus", texts.map.between(i + 1), () => act.addCorner(index, i + 1, middle(place, ring[(i + 1) % ring.length]))),
+    signButton("no", texts.fence.removeCorner(i + 1), () => act.removeCorner(index, i), { disabled: ring.length <= 3 }))));
 }
 
 /**

@@ -2,6 +2,7 @@
 
 import { fill, h, say } from "../dom.js";
 import { readPlace, writePlace } from "../geo.js";
+import { icon } from "../icons.js";
 import { texts } from "../texts.js";
 
 /** @typedef {import("../geo.js").Place} Place */
@@ -19,13 +20,13 @@ export function button(text, act, attributes = {}) {
 
 /**
  * A small button of one sign, with its name for who cannot see it.
- * @param {string} sign
+ * @param {import("../icons.js").IconName} sign
  * @param {string} name
  * @param {() => void} act
  * @param {Record<string, any>} [attributes]
  */
 export function signButton(sign, name, act, attributes = {}) {
-  return button(sign, act, { class: "sign", "aria-label": name, title: name, ...attributes });
+  return h("button", { type: "button", onclick: act, class: "sign", "aria-label": name, title: name, ...attributes }, icon(sign));
 }
 
 /**

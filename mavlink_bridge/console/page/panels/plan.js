@@ -9,6 +9,7 @@ import { button, cannotWrite, notes, placeField, pressButton, signButton } from 
 /** @typedef {import("../actions.js").Actions} Actions */
 /** @typedef {import("../store.js").Store<PageState>} PageStore */
 
+const CLICKS = [["target", texts.plan.clickSets], ["add", texts.plan.clickAdds], ["start", texts.plan.clickStart]];
 const MOST_M = 20; // the slider's end while the widest clearance is not known
 
 /**
@@ -17,7 +18,7 @@ const MOST_M = 20; // the slider's end while the widest clearance is not known
  */
 export function planPanel(store, act) {
   return h("div", { class: "panel-body" },
-    targetsPart(store, act), clearancePart(store, act), resultPart(store, act), writePart(store, act), notesPart(store), pointsPart(store, act), legTable(store));
+    resultPart(store, act), writePart(store, act), targetsPart(store, act), clearancePart(store, act), notesPart(store), pointsPart(store, act), legTable(store));
 }
 
 /**
@@ -27,22 +28,30 @@ export function planPanel(store, act) {
 function targetsPart(store, act) {
   const list = h("ol", { class: "places" });
   const none = h("p", { class: "quiet" }, texts.plan.noTargets);
-  const tools = h("div", { class: "choice", role: "radiogroup", "aria-label": texts.plan.clicks },
-    ["target", "add"].map((tool) => h("label", {}, h("input", { type: "radio", name: "tool", value: tool, checked: tool === "target", onchange: () => store.set({ tool: /** @type {any} */ (tool) }) }),
-      tool === "target" ? texts.plan.clickSets : texts.plan.clickAdds)));
+  const tools = h("div", { class: "choice", role: "radiogroup", "aria-label": texts.plan.clicks }, h("span", { class: "quiet" }, texts.plan.clicks),
+    CLICKS.map(([tool, words]) => h("label", { "data-tool": tool }, h("input", { type: "radio", name: "tool", value: tool, checked: tool === "target", onchange: () => store.set({ tool: /** @type {any} */ (tool) }) }),
+      words)));
   const best = h("input", { type: "checkbox", onchange: () => act.change(texts.steps.order, { order: best.checked ? "best" : "given" }) });
   const back = h("input", { type: "checkbox", onchange: () => act.change(texts.steps.comesBack, { comes_back: back.checked }) });
   const bestLabel = h("label", {}, best, texts.plan.best);
   const backLabel = h("label", {}, back, texts.plan.comesBack);
   const fresh = placeField(texts.plan.newTarget, null, (place) => { act.addTarget(place); fresh.value = ""; });
   const clear = button(texts.plan.clear, () => act.clear(), { class: "quiet-button" });
+  const startRow = h("div", { class: "row" });
+  store.watch(["doc", "vehicle", "server"], ({ doc, vehicle, server }) => {
+    const isOurs = server.source === "files" || (server.source === "log" && vehicle.position === null) || doc.start !== null;
+    show(startRow, isOurs);
+    show(/** @type {HTMLElement} */ (tools.querySelector('[data-tool="start"]')), isOurs);
+    keepFocus(startRow, () => fill(startRow, h("span", {}, texts.plan.start), placeField(`${texts.plan.start}, ${texts.coordinates}`, doc.start, (place) => act.setStart(place)),
+      doc.start && signButton("no", texts.plan.noStart, () => act.setStart(null)), !doc.start && h("p", { class: "quiet" }, texts.plan.startHint)));
+  });
   store.watch(["doc", "tool"], ({ doc, tool }) => {
     const { targets } = doc;
     show(none, targets.length === 0);
     keepFocus(list, () => fill(list, targets.map((place, i) => h("li", {}, placeField(texts.plan.targetN(i + 1), place, (typed) => act.moveTarget(i, typed)),
-      signButton("↑", texts.plan.up(i + 1), () => act.swapTargets(i, i - 1), { disabled: i === 0 }),
-      signButton("↓", texts.plan.down(i + 1), () => act.swapTargets(i, i + 1), { disabled: i === targets.length - 1 }),
-      signButton("✕", texts.plan.remove(i + 1), () => act.removeTarget(i))))));
+      signButton("up", texts.plan.up(i + 1), () => act.swapTargets(i, i - 1), { disabled: i === 0 }),
+      signButton("down", texts.plan.down(i + 1), () => act.swapTargets(i, i + 1), { disabled: i === targets.length - 1 }),
+      signButton("no", texts.plan.remove(i + 1), () => act.removeTarget(i))))));
     best.checked = doc.order === "best";
     back.checked = doc.comes_back;
     show(bestLabel, targets.length > 1);
@@ -52,7 +61,7 @@ function targetsPart(store, act) {
       input.checked = input.value === tool;
     }
   });
-  return h("section", { "aria-label": texts.plan.targets }, h("div", { class: "row spread" }, h("h2", {}, texts.plan.targets), clear), none, list, h("div", { class: "row" }, fresh, button(texts.plan.add, () => fresh.dispatchEvent(new Event("change")))),
+  return h("section", { "aria-label": texts.plan.targets }, h("div", { class: "row spread" }, h("h2", {}, texts.plan.targets), clear), startRow, none, list, h("div", { class: "row" }, fresh, button(texts.plan.add, () => fresh.dispatchEvent(new Event("change")))),
     tools, h("div", { class: "choice" }, bestLabel, backLabel));
 }
 
@@ -123,7 +132,7 @@ function resultPart(store, act) {
     } else if (plan && plan.state !== "planning") {
       fill(card, outcome(plan, state, act));
     } else {
-      fill(card, h("p", { class: "quiet" }, texts.plan.nothing));
+      fill(card, h("p", {}, texts.plan.nothing));
     }
   });
   return section;

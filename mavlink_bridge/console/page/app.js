@@ -80,13 +80,12 @@ function buildPage() {
   ]);
   const source = h("p", { class: "source" });
   store.watch(["server"], ({ server }) => { fill(source, texts.top.source(server.source, server.source_name)); });
-  const strip = h("section", { class: "strip", "aria-label": texts.profile.title }, timeline(store, (time_s) => live?.send({ type: "seek", time_s })), profileChart(store));
   document.documentElement.lang = texts.language;
   fill(document.body,
     h("a", { class: "jump", href: "#hold-bar" }, texts.skipHold), h("a", { class: "jump", href: "#panel" }, texts.skip),
     h("header", { class: "top" }, h("h1", {}, texts.name), source, vehicleBar(store), controlBar(store, actions)),
     alarmBar(store),
-    h("main", {}, mapArea, h("div", { class: "side", id: "panel" }, transferNote(store), panels), strip, holdBar(store, actions)),
+    h("main", {}, mapArea, h("div", { class: "side", id: "panel" }, transferNote(store), panels), timeline(store, (time_s) => live?.send({ type: "seek", time_s })), profileChart(store), holdBar(store, actions)),
     toastList);
 }
 

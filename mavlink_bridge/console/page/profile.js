@@ -19,7 +19,7 @@ export function profileChart(store) {
   const words = h("p", { class: "quiet profile-words" });
   const marker = svg("line", { class: "profile-rover", y1: TOP, y2: HEIGHT - BOTTOM });
   const cursor = svg("line", { class: "profile-cursor", y1: TOP, y2: HEIGHT - BOTTOM });
-  const element = h("figure", { class: "profile" }, h("figcaption", {}, texts.profile.title), drawing, words);
+  const element = h("figure", { class: "profile" }, h("figcaption", {}, h("span", {}, texts.profile.title), key()), drawing, words);
   let width = 600;
   /** @type {Sample[]} */
   let samples = [];
@@ -56,6 +56,13 @@ export function profileChart(store) {
   store.watch(["plan"], draw);
   store.watch(["drive", "hoverAlong_m"], place);
   return element;
+}
+
+/** What the lines are. */
+function key() {
+  const sign = (/** @type {string} */ look) => svg("svg", { viewBox: "0 0 26 10", "aria-hidden": "true" }, look === "profile-clear" ? svg("rect", { class: look, x: 0, y: 1, width: 26, height: 8 }) : svg("line", { class: look, x1: 0, x2: 26, y1: 5, y2: 5 }));
+  const names = [["profile-clear", texts.profile.clearance], ["profile-asked", texts.profile.asked], ["profile-speed", texts.profile.speed]];
+  return h("span", { class: "profile-key" }, names.map(([look, name]) => h("span", {}, sign(look), name)));
 }
 
 /**
@@ -104,7 +111,6 @@ function chart(samples, asked_m, width, x) {
     svg("path", { class: "profile-axis", d: `M${LEFT} ${TOP}V${base}H${width - RIGHT}V${TOP}` }),
     label(LEFT - 4, TOP + 8, `${top_m} m`, "end"), label(LEFT - 4, base, "0", "end"), label(width - RIGHT + 4, TOP + 8, `${top_mps} m/s`, "start"), label(width - RIGHT + 4, base, "0", "start"),
     label(LEFT, HEIGHT - 5, "0 m", "start"), label(width - RIGHT, HEIGHT - 5, `${end_m.toFixed(0)} m`, "end"),
-    label(width / 2, HEIGHT - 5, `▬ ${texts.profile.clearance}   ┄ ${texts.profile.asked}   ─ ${texts.profile.speed}`, "middle"),
   ];
 }
 

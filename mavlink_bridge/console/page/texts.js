@@ -117,7 +117,7 @@ const en = {
     predictedOnly: "Predicted, not promised", drawnOnly: "Drawn lines only, nothing promised",
     holds: "Every leg keeps its clearance", breaks: /** @param {number} n */ (n) => (n === 1 ? "1 leg breaks the promise" : `${n} legs break the promise`),
     facts: /** @param {number | null} length_m @param {number | null} time_s @param {number} n */ (length_m, time_s, n) => `${(length_m ?? 0).toFixed(1)} m · ${duration(time_s)} · ${n} way points`,
-    took: /** @param {number} seconds */ (seconds) => `planned in ${seconds < 1 ? `${Math.round(seconds * 1000)} ms` : `${seconds.toFixed(1)} s`}`,
+    took: /** @param {number} seconds */ (seconds) => `${seconds < 1 ? `${Math.round(seconds * 1000)} ms` : `${seconds.toFixed(1)} s`}`,
     narrowest: /** @param {number} width_m */ (width_m) => `narrowest: ${m(width_m)} wide`,
     byDirector: "This is the plan that stands on the bridge.", byPage: "A look at what would be; nothing is on the vehicle.",
     keeps: /** @param {Record<string, number | null>} keeps */ ({ drawn_m, driven_m }) => `Drawn lines keep ${m(drawn_m)}, the predicted track ${m(driven_m)}.`,

@@ -38,7 +38,9 @@ export class Scene {
       view.set("obstacles", features.obstacles(fence));
     });
     store.watch(["plan"], ({ plan }) => {
+      view.hoverLeg(null, this.hovered);
       this.hovered = null;
+      store.set({ hoverLeg: null });
       view.set("legs", features.legs(plan));
       view.set("corridor", features.corridor(plan));
       view.set("narrow", features.narrowest(plan));

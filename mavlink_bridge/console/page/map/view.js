@@ -12,7 +12,7 @@ import { tileSource } from "./tiles.js";
 
 maplibre.setWorkerUrl(new URL("../vendor/maplibre-gl/maplibre-gl-worker.mjs", import.meta.url).href);
 
-const FIT_PADDING_PX = 40;
+const FIT_PADDING_PX = { top: 70, right: 40, bottom: 50, left: 40 }; // tools above, the scale bar below
 const FIT_ZOOM = 20.5; // the nearest look that "fit" takes: some ten metres; chosen
 const DARK = matchMedia("(prefers-color-scheme: dark)");
 
@@ -67,6 +67,7 @@ export class MapView {
     }
     this.drawGrid();
     this.waiting.splice(0).forEach((act) => act());
+    /** @type {HTMLElement} */ (this.map.getContainer().parentElement).dataset.ready = "yes";
   }
 
   restyle() {

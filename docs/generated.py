@@ -6,6 +6,7 @@ A part stands between ``<!-- made: NAME -->`` and ``<!-- end -->``; a test check
 from __future__ import annotations
 
 import inspect
+import json
 import re
 import sys
 from collections import defaultdict
@@ -16,6 +17,7 @@ from typing import Any
 from mavlink_bridge import errors as bridge_errors
 from mavlink_bridge.cli.app import COMMANDS, load
 from mavlink_bridge.cli.failing import ExitCode, exit_code_of
+from mavlink_bridge.console import wire
 from mavlink_bridge.director import SCHEMA, TRANSITIONS
 from mavlink_bridge.protocol.transitions import TABLES
 from missions import errors as mission_errors
@@ -142,9 +144,51 @@ def _planners(case: str) -> str:
     return found[1]
 
 
+def console_types() -> str:
+    """Return the types that go between the console's page and server, from their JSON schema, those of the snapshot first."""
+    types = wire.schema()["$defs"]
+    parts = []
+    for name, kind in types.items():
+        if (properties := kind.get("properties")) is None:
+            continue
+        rows = [
+            f"| `{field}` | {_schema_type(value)} | {'' if field in kind.get('required', ()) else _default(value)} |"
+            for field, value in properties.items()
+        ]
+        head = kind.get("description", "").split("\n")[0]
+        table = "\n".join(["| field | type | default |", "|---|---|---|", *rows])
+        parts.append(f"### {name}\n\n{head}\n\n{table}")
+    return "\n\n".join(parts)
+
+
+def _schema_type(value: dict[str, Any]) -> str:
+    if "$ref" in value:
+        name = value["$ref"].rsplit("/", 1)[-1]
+        return f"[{name}](#{name.lower()})"
+    if "anyOf" in value:
+        return " or ".join(map(_schema_type, value["anyOf"]))
+    if "const" in value or "enum" in value:
+        return ", ".join(f"`{one}`" for one in value.get("enum", [value.get("const")]))
+    if "prefixItems" in value:
+        return f"[{', '.join(map(_schema_type, value['prefixItems']))}]"
+    if value.get("type") == "array":
+        return f"list of {_schema_type(value.get('items', {}))}"
+    return {"object": "mapping", "null": "null", None: "any"}.get(value.get("type"), str(value.get("type")))
+
+
+def _default(value: dict[str, Any]) -> str:
+    return f"`{json.dumps(value['default'])}`" if "default" in value else ""
+
+
+def console_schema() -> str:
+    """Return the JSON schema of what goes between the console's page and server."""
+    return json.dumps(wire.schema(), indent=1) + "\n"
+
+
 PARTS = {
     "bridge-events": event_table,
     "commands": commands,
+    "console-types": console_types,
     "director-states": director_table,
     "exit-codes": exit_codes,
     "parameters": parameters,
@@ -154,6 +198,7 @@ PARTS = {
 
 
 PICTURES = {
+    "console-schema.json": console_schema,
     "figures/states-director.svg": partial(
         draw, TRANSITIONS, "The states of the live bridge, and what leads from one to another"
     ),

@@ -31,6 +31,7 @@ COMMANDS = {
     "upload": "Upload a file to the vehicle and verify it, or restore a backup.",
     "download": "Download a mission, fence, rally points or parameters.",
     "bridge": "Run alongside the autopilot: plan to each target, upload verified missions.",
+    "serve": "Serve the console: fence, plan and rover on a page.",
     "log": "Summarise telemetry logs.",
     "replay": "Replay recorded logs through the bridge.",
     "sim": "Run a simulated rover.",

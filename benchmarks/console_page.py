@@ -153,11 +153,13 @@ def frames_ms(trace: Path) -> list[float]:
     }
     frames = [one for one in events if one.get("name") == "FireAnimationFrame" and names.get((one["pid"], one["tid"])) == "CrRendererMain"]
     thread = (frames[0]["pid"], frames[0]["tid"])
-    tasks = sorted((one["ts"], one.get("dur", 0)) for one in events if one.get("name") == "RunTask" and (one["pid"], one["tid"]) == thread)
-    marks = np.array(sorted(one["ts"] for one in frames))
+    tasks = sorted((one["ts"], one.get("tdur", 0), one.get("dur", 0)) for one in events if one.get("name") == "RunTask" and (one["pid"], one["tid"]) == thread)
+    # A frame calls back whoever asked for it, one after the other in one task: that task's begin is where the frame begins.
+    called = np.array(sorted(one["ts"] for one in frames))
+    marks = np.array([ts for ts, _, dur in tasks if np.searchsorted(called, ts) < np.searchsorted(called, ts + dur)])
     sums = np.zeros(len(marks) + 1)
-    for ts, dur in tasks:
-        sums[np.searchsorted(marks, ts + dur / 2)] += dur / 1000
+    for ts, tdur, dur in tasks:
+        sums[np.searchsorted(marks, ts, side="right")] += tdur / 1000
     return sums[1:-1].tolist()
 
 

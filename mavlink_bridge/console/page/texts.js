@@ -109,7 +109,7 @@ const en = {
     best: "In the best order", comesBack: "And back to the start",
     clearance: "Clearance to keep while driving", clearanceM: "metres",
     own: /** @param {number | null} value */ (value) => (value === null ? "the fence's margin" : `the fence's margin (${m(value)})`),
-    widest: "Widest", widestPossible: /** @param {number} value */ (value) => `widest possible: ${m(value)}`,
+    widest: "Widest", widestPossible: /** @param {number} value */ (value) => `widest possible: ${m(value)} for drawn lines`,
     askWidest: "widest possible: not known yet",
     working: "Planning …", checking: "Checking …",
     nothing: "No plan yet: click the map to set a target.",

@@ -122,8 +122,7 @@ class Watched:
     def open(self, url: str | None = None) -> Page:
         """Go there, and wait for the map."""
         self.page.goto(url or self.url)
-        self.page.wait_for_selector(".map-area canvas")
-        self.page.wait_for_function("document.querySelector('.map-area').dataset.ready === 'yes'")
+        self.page.wait_for_selector('.map-area[data-ready="yes"]')
         return self.page
 
     def click_map(self, east: float, north: float) -> None:

@@ -44,7 +44,7 @@ export class MapView {
     this.map = new maplibre.Map({
       container, style: style(DARK.matches, tileSource(tiles)), center: [0, 0], zoom: 1, maxZoom: 24, attributionControl: false, dragRotate: true,
       pitchWithRotate: false, maxPitch: 0, renderWorldCopies: false, fadeDuration: 0, clickTolerance: 4, cancelPendingTileRequestsWhileZooming: true,
-      locale: texts.map.controls, canvasContextAttributes: { preserveDrawingBuffer: true },
+      locale: texts.map.controls,
     });
     this.map.getCanvas().setAttribute("aria-label", texts.map.name);
     this.map.addControl(new maplibre.NavigationControl({ visualizePitch: false }), "top-right");
@@ -170,7 +170,11 @@ export class MapView {
 
   /** The view as a PNG. */
   picture() {
-    return new Promise((resolve) => this.map.getCanvas().toBlob(resolve, "image/png"));
+    // A drawing is kept until the next one only while it is being shown.
+    return new Promise((resolve) => {
+      this.map.once("render", () => this.map.getCanvas().toBlob(resolve, "image/png"));
+      this.map.triggerRepaint();
+    });
   }
 }
 

@@ -117,7 +117,7 @@ function resultPart(store, act) {
   const cancel = button(texts.cancel, () => act.planner.cancel());
   const busy = h("div", { class: "row busy" }, h("span", { class: "spinner", "aria-hidden": "true" }), working, cancel);
   const card = h("div", { class: "card" });
-  const section = h("section", { "aria-label": texts.plan.title, "aria-live": "polite" }, h("h2", {}, texts.plan.title), busy, card);
+  const section = h("section", { "aria-label": texts.plan.title, "aria-live": "polite", id: "outcome" }, h("h2", {}, texts.plan.title), busy, card);
   store.watch(["isPlanning"], ({ isPlanning, doc }) => {
     show(busy, isPlanning);
     say(working, doc.mission ? texts.plan.checking : texts.plan.working);
@@ -187,7 +187,7 @@ function headOf(plan) {
  */
 function noRoute(why, act) {
   const { widest } = why;
-  const metres = widest ? Math.floor(widest.clearance_m * 100) / 100 : 0;
+  const metres = widest ? Math.floor(widest.clearance_m * 100 + 1e-6) / 100 : 0;
   return [
     h("strong", { class: "headline" }, `✗ ${texts.noRoute.title}`), h("p", {}, why.message), why.advice && h("p", {}, why.advice),
     widest && h("p", {}, texts.noRoute.widest(widest.clearance_m), widest.between.length > 0 && ` ${texts.noRoute.between(widest.between)}`),

@@ -8,7 +8,7 @@ const AGAIN_MS = 2000; // a moving rover is seen so often; chosen
 /** @param {import("../store.js").Store<import("../types.js").PageState>} store */
 export function plainPicture(store) {
   const image = h("img", { alt: texts.map.pictureName, class: "plain-picture" });
-  const element = h("div", { class: "no-webgl" });
+  const element = h("div", { class: "no-webgl", tabindex: "0", role: "group", "aria-label": texts.map.pictureName });
   fill(element, h("p", { class: "card unsure" }, texts.map.noWebGl), image);
   let timer = 0;
   let asked_ms = -Infinity;

@@ -54,7 +54,7 @@ export function style(isDark, tiles) {
   return {
     version: 8,
     sources,
-    layers: [...ground, ...field(colour, tiles !== null), ...route(colour), ...drive(colour), ...labels(colour), ...drafts(colour)],
+    layers: [...ground, ...field(colour, tiles !== null), ...route(colour), ...tracks(colour), ...labels(colour), ...drafts(colour), ...rover(colour)],
   };
 }
 
@@ -108,7 +108,7 @@ function route(colour) {
  * @param {Colours} colour
  * @returns {Layer[]}
  */
-function drive(colour) {
+function tracks(colour) {
   /** @type {any} */
   const byMode = ["match", ["get", "look"], "auto", colour.track, "hold", colour.held, colour.manual];
   /** @type {(source: string) => Layer[]} */
@@ -116,8 +116,15 @@ function drive(colour) {
     { id: source, type: "line", source, filter: ["==", ["get", "look"], "auto"], layout: { "line-join": "round" }, paint: { "line-color": byMode, "line-width": 2 } },
     { id: `${source}-by-hand`, type: "line", source, filter: ["!=", ["get", "look"], "auto"], paint: { "line-color": byMode, "line-width": 2.5, "line-dasharray": [2, 1] } },
   ];
+  return [...track("track-old"), ...track("track")];
+}
+
+/**
+ * @param {Colours} colour
+ * @returns {Layer[]}
+ */
+function rover(colour) {
   return [
-    ...track("track-old"), ...track("track"),
     { id: "rover-shape", type: "fill", source: "rover", filter: ["==", ["geometry-type"], "Polygon"], paint: { "fill-color": colour.rover, "fill-opacity": 0.45 } },
     { id: "rover-edge", type: "line", source: "rover", filter: ["==", ["geometry-type"], "Polygon"], paint: { "line-color": colour.rover, "line-width": 2 } },
     { id: "rover", type: "symbol", source: "rover", filter: ["==", ["geometry-type"], "Point"],

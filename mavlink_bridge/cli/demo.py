@@ -21,7 +21,7 @@ from mavlink_bridge.cli.terminal import echo, print_json
 from mavlink_bridge.director import Orders
 from mavlink_bridge.link import Link
 from mavlink_bridge.mavlink.messages import FenceStatus, GlobalPositionInt
-from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig, SteppedRover
+from mavlink_bridge.simulator import SimulatedVehicle, Simulator, SimulatorConfig, SteppedRover
 from mavlink_bridge.tlog import TlogWriter
 from missions.fence import fence_to_items
 from missions.formats import read_fence
@@ -33,12 +33,14 @@ if TYPE_CHECKING:
     from mavlink_bridge.cli.options.demo import DemoOptions
     from mavlink_bridge.mavlink.messages import Frame
     from missions.fence import Fence
+    from missions.firmware import Firmware
     from missions.planned import Plan
 
 # The maze of the recorded logs: its start, a target in it and a clearance that leaves a route.
 _HOME = (40.071374, -105.229930)
 _TARGET = (40.0726316, -105.2290497)
 _CLEARANCE_M = 2.5
+_ANY_PORT = "tcpin:127.0.0.1:0"
 _IDENTITY = (245, 190)  # the one-shot commands' own, `link.ONE_SHOT_IDENTITY`
 
 
@@ -99,16 +101,24 @@ def demo(options: DemoOptions) -> None:
         raise typer.Exit(ExitCode.CHECK)
 
 
+def demo_rover(speedup: float) -> Simulator:
+    """Return a rover in the maze on a link of its own, for who wants to see it drive."""
+    return Simulator(_config(None), _ANY_PORT, speedup=speedup)
+
+
 def _rover(options: DemoOptions) -> SteppedRover:
     """Return a rover in the maze, on a link that no slow computer breaks."""
-    config = SimulatorConfig(
+    return SteppedRover(SimulatedVehicle(_config(options.firmware)), options.speedup)
+
+
+def _config(firmware: Firmware | None) -> SimulatorConfig:
+    return SimulatorConfig(
         home=LatLon(*_HOME),
         fence=fence_to_items(_maze()),
         parameters={"FENCE_ENABLE": 1.0, "WP_RADIUS": 2.0, "WP_SPEED": 4.0},
-        firmware=options.firmware,
+        firmware=firmware,
         uid=secrets.token_bytes(12),  # each demo is a new rover: an interrupted one does not bear on the next
     )
-    return SteppedRover(SimulatedVehicle(config), options.speedup)
 
 
 def _maze() -> Fence:

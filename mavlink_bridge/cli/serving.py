@@ -13,9 +13,17 @@ from secrets import token_hex
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
+from mavlink_bridge.backup.drive_note import DriveNotes
+from mavlink_bridge.backup.store import BackupStore
+from mavlink_bridge.cli.bridge import BridgeShell, target_sources, teller
 from mavlink_bridge.cli.common import inform, warn
+from mavlink_bridge.cli.demo import demo_rover
 from mavlink_bridge.cli.field_files import read_fence_file
+from mavlink_bridge.cli.interrupting import terminable
 from mavlink_bridge.cli.plan_request import request_from_options
+from mavlink_bridge.cli.recording import open_recording
+from mavlink_bridge.cli.run_log import RunLog, SafeTeller
+from mavlink_bridge.cli.session import signing_of
 from mavlink_bridge.cli.terminal import echo, print_json, say
 from mavlink_bridge.cli.values import position_from
 from mavlink_bridge.cli.vehicle_options import (
@@ -28,6 +36,9 @@ from mavlink_bridge.console.access import Access, is_loopback
 from mavlink_bridge.console.app import Console
 from mavlink_bridge.console.backend import FilesBackend, field_sections
 from mavlink_bridge.console.hub import Hub
+from mavlink_bridge.console.list_writer import ListWriter
+from mavlink_bridge.console.live import LiveBackend, LiveConsole
+from mavlink_bridge.console.live_desk import LiveDesk
 from mavlink_bridge.console.server import (
     Certificate,
     Served,
@@ -37,6 +48,8 @@ from mavlink_bridge.console.server import (
     qr_code,
 )
 from mavlink_bridge.console.view.sections import MapSource, Permissions, Sections, ServerView
+from mavlink_bridge.director import Director, Orders
+from mavlink_bridge.director.orders import Homing, ObstacleSource
 from mavlink_bridge.errors import UsageError
 from mavlink_bridge.link import now_s
 from missions.formats import FORMATS
@@ -62,6 +75,8 @@ def serve(options: ServeOptions) -> None:
         sections = {**field_sections(situation, request, "file")}
         with served(options, "files", options.fence.name, FilesBackend(situation, request), sections):
             _wait()
+        return
+    _served_live(options, request)
 
 
 def asked(options: ServeOptions) -> Request:
@@ -100,7 +115,7 @@ def served(
         run_id=token_hex(8),
         source=source,  # type: ignore[arg-type] # one of its words
         source_name=name,
-        can=Permissions(options.upload, options.drive, options.arm),
+        can=permissions(options),
         map=map_source,
         reads=tuple(FORMATS),
         writes=tuple(suffix for suffix, one in FORMATS.items() if one.write is not None),
@@ -170,3 +185,63 @@ def _wait(is_over: Callable[[], bool] = lambda: False) -> None:
             time.sleep(_LOOK_S)
     except KeyboardInterrupt:
         say("stopped")
+
+
+def _served_live(options: ServeOptions, request: Request) -> None:
+    """Serve a live bridge: its loop runs here, the page's in a thread beside it."""
+    with contextlib.ExitStack() as stack:
+        connection, source, name = options.connect or "", "live", options.connect or ""
+        if options.demo:
+            simulator = stack.enter_context(demo_rover(options.speedup))
+            connection, source, name = simulator.connection, "demo", "simulated rover"
+        orders = _orders(options, request)
+        described = described_vehicle(options)
+        store = BackupStore()
+        notes, troubles = DriveNotes(store.folder).read()
+        warn(map(str, troubles))
+        director = Director(orders, described, notes)
+        log = None
+        if options.record is not None:
+            part, recorder, journal = open_recording(stack, options.record, orders, described, notes)
+            log = RunLog(recorder, journal)
+            inform((f"recording to {part}",))
+        backend = LiveBackend(director)
+        writer = ListWriter(director, store)
+        console = LiveConsole(director, writer, backend, request)
+        stack.callback(console.close)
+        shell = BridgeShell(
+            director, connection, SafeTeller(teller(options), lambda: False), None, log, store
+        )
+        desk = LiveDesk(director, writer, store, shell.vehicle, shell.call, console.note)
+        shell.show_on(console, writer)
+        hub = stack.enter_context(served(options, source, name, backend, {}))
+        console.serve(hub, desk)
+        with terminable():
+            shell.run(signing_of(options.signing_key), options.timeout)
+
+
+def _orders(options: ServeOptions, request: Request) -> Orders:
+    """Return what the director may do: nothing is uploaded, nothing driven without a person's word at the page."""
+    can = permissions(options)
+    return Orders(
+        system=options.system,
+        any_vehicle=options.any_vehicle,
+        request=request,
+        upload=can.upload,
+        drive=can.drive,
+        arm=can.arm,
+        confirm=True,
+        starts_on_word=True,
+        announce=True,
+        target_sources=target_sources(options.target_from),
+        obstacle_sources=frozenset({ObstacleSource.KEYBOARD}),
+        patience_s=options.timeout,
+        homing=Homing(is_kept=True),
+    )
+
+
+def permissions(options: ServeOptions) -> Permissions:
+    """Return what the page may do; of a simulated rover everything."""
+    if options.demo:
+        return Permissions(True, True, True)
+    return Permissions(options.upload, options.drive, options.arm)

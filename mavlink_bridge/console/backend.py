@@ -14,7 +14,8 @@ if TYPE_CHECKING:
 
     from mavlink_bridge.console.deeds import Deed
     from mavlink_bridge.console.view.fields import Where
-    from mavlink_bridge.console.wire import After, BackupView
+    from mavlink_bridge.console.view.sections import AfterView
+    from mavlink_bridge.console.wire import BackupView
     from missions.request import Request
     from missions.situation import Situation
 
@@ -44,7 +45,7 @@ class Backend(Protocol):
         """Return the backups that may be put back."""
         ...
 
-    def after(self) -> After | None:
+    def after(self) -> AfterView | None:
         """Return what the newest drive was, against what was promised."""
         ...
 
@@ -102,7 +103,7 @@ class FilesBackend:
         """Return none."""
         return ()
 
-    def after(self) -> After | None:
+    def after(self) -> AfterView | None:
         """Return None: nothing drives."""
         return None
 

@@ -11,6 +11,7 @@ from typing import Any, Literal
 import msgspec
 
 from mavlink_bridge.console.view.sections import (
+    AfterView,
     EventView,
     FenceView,
     Place,
@@ -263,35 +264,6 @@ class BackupView:
     is_this_vehicle: bool
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AfterSample:
-    """A place along the driven way."""
-
-    s_m: float
-    clearance_m: float | None
-    deviation_m: float
-    speed_mps: float
-    time_s: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class After:
-    """What was driven against what was promised, of the newest drive."""
-
-    plan_id: str
-    promised_m: float | None
-    least_m: float | None
-    least_at: Place | None
-    predicted_s: float | None
-    took_s: float
-    driven_m: float
-    length_m: float
-    deviation_max_m: float
-    outside_max_m: float
-    breaches: int
-    profile: tuple[AfterSample, ...] = ()
-
-
 # The WebSocket
 
 
@@ -361,7 +333,7 @@ BODIES: dict[str, Any] = {
     one.__name__: one
     for one in (
         PlanRequest, CheckRequest, FenceRequest, UploadRequest, StartRequest, BlockedRequest, RestoreRequest,
-        ExportRequest, SessionRequest, PlanView, FenceView, Zones, Widest, Imported, BackupView, After, TakenUp, Failure,
+        ExportRequest, SessionRequest, PlanView, FenceView, Zones, Widest, Imported, BackupView, AfterView, TakenUp, Failure,
         Snapshot, ChangeMessage, Alive, Seek,
     )
 }  # fmt: skip

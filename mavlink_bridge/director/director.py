@@ -57,6 +57,7 @@ The second one is the operator's, and any other mode at any time (`home_caller`)
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.director.addressed import as_to_vehicle
@@ -86,6 +87,7 @@ if TYPE_CHECKING:
     from missions.geo import LatLon
     from missions.items import MissionItem
     from missions.planned import Plan
+    from missions.request import Request
     from missions.routing.way_home import WayHome
 
 
@@ -265,6 +267,41 @@ class Director:
     def confirm(self, now_s: float) -> None:
         """Take the operator's yes to the plan that waits for it; ignored where none does."""
         self._heed(self._parts.writer.confirm(), now_s)
+
+    def start_drive(self, now_s: float) -> None:
+        """Take the operator's word to drive: what is verified now, or once it is. A new target takes it back."""
+        self._heed(self._parts.starter.begin_on_word(), now_s)
+
+    def hold(self, reason: str, now_s: float) -> None:
+        """Stop the vehicle because a person asks for it, and let go of all that was wanted; ignored without orders to drive, and before a vehicle was found.
+
+        Parameters
+        ----------
+        reason : str
+            Who asks for it.
+        now_s : float
+            When.
+        """
+        self._heed(self._parts.hand_over.hold_asked(reason), now_s)
+
+    def take_request(self, request: Request, now_s: float) -> None:
+        """Take another request, with its targets, in place of the orders' own."""
+        self._core.orders = replace(self._core.orders, request=request)
+        self.take_target(request.targets[-1], now_s)
+
+    def suspect_lists(self) -> None:
+        """Have all lists read again when there is room for it: somebody else of this program has written one."""
+        self._parts.lists.suspect_all()
+
+    @property
+    def is_transferring(self) -> bool:
+        """Whether something is asked of the vehicle or written to it just now."""
+        return bool(self._core.steps)
+
+    @property
+    def has_our_mission(self) -> bool:
+        """Whether the vehicle's mission is the one that we have verified."""
+        return self._core.has_our_mission
 
     def take_target(self, position: LatLon, now_s: float) -> None:
         """Take a target that was typed."""

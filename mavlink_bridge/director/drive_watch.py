@@ -87,6 +87,11 @@ class DriveWatch:
         return self._plan.envelope.duration_s * min(1.0, self.distance_left_m / whole_m)
 
     @property
+    def is_outside(self) -> bool:
+        """Whether it is outside the predicted corridor."""
+        return self._is_outside
+
+    @property
     def so_far(self) -> str:
         """How the drive went until its early end, in words that follow others."""
         is_fenced = math.isfinite(self.least_clearance_m)

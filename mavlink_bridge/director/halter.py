@@ -148,6 +148,12 @@ class Halter(Part):
         self.core.steps.clear()
         self.command_hold(now_s)
 
+    def hold_for_good(self, reason: str, now_s: float) -> None:
+        """Stop the vehicle because a person asks for it: said until its heartbeat shows HOLD."""
+        self.core.voice.tell(now_s, EventName.HOLDING, f"HOLD: {reason}", reason)
+        self.may_be_in_auto = True
+        self.command_hold(now_s)
+
     def command_hold(self, now_s: float) -> None:
         """Switch to HOLD."""
         assert self.core.peer is not None

@@ -38,6 +38,8 @@ class HandOver(Part):
         What was done that is not told yet; None where the vehicle itself was not taken, but its mission.
     was_in_auto_by_us : bool
         Whether it was in AUTO by our doing when it was last heard, before the link was lost.
+    why_held : str
+        Who asked for the newest HOLD at a page of ours.
     """
 
     def __init__(self, core: Core, halter: Halter, driver: DriveSupervisor, caller: HomeCaller) -> None:
@@ -48,6 +50,7 @@ class HandOver(Part):
         self.incidents = Incidents(core.voice, core.orders.request)
         self.taken: Takeover | None = None
         self.was_in_auto_by_us = False
+        self.why_held = ""
         self._after_withdrawing: OutcomeError | None = None
 
     def receive(self, frame: Frame, now_s: float) -> Iterable[Signal]:
@@ -102,6 +105,14 @@ class HandOver(Part):
             return []
         self.taken = taken
         return [Cue.TAKEN_OVER]
+
+    def hold_asked(self, reason: str) -> Sequence[Signal]:
+        """Return that a person at a page of ours stops the vehicle: all that was wanted is let go of, as where somebody takes over."""
+        core = self.core
+        if core.peer is None or not core.orders.drive:
+            return []
+        self.taken, self.why_held = None, reason
+        return [Cue.TAKEN_OVER, Notice.HOLD_ASKED]
 
     def account_for(
         self, taken: Takeover, so_far: str, now_s: float, *, was_in_auto: bool

@@ -175,13 +175,13 @@ def _on_gone_on(parts: Parts, now_s: float) -> Iterable[Signal]:
 
 
 def _on_target(parts: Parts, _now_s: float) -> None:
-    parts.writer.is_confirmed = False
+    parts.writer.is_confirmed = parts.starter.is_told = False
     parts.adopter.forget()
     parts.driver.stand_by()
 
 
 def _on_target_while_moving(parts: Parts, now_s: float) -> None:
-    parts.writer.is_confirmed = False
+    parts.writer.is_confirmed = parts.starter.is_told = False
     parts.adopter.stop_waiting()
     parts.driver.drive = None
     target = parts.core.target
@@ -245,7 +245,7 @@ def _after_upload(parts: Parts, now_s: float) -> Iterable[Signal]:
     found = parts.desk.recheck(1)
     if not found.holds and parts.desk.is_stale:
         return parts.desk.broke(found, now_s)
-    return [Cue.DRIVE] if parts.core.orders.drive else parts.core.end()
+    return [Cue.DRIVE] if parts.starter.may_begin else parts.core.end()
 
 
 def _on_hold_ended(parts: Parts, _now_s: float) -> Iterable[Signal]:
@@ -284,6 +284,13 @@ def _on_taken_over(parts: Parts, now_s: float) -> Iterable[Signal]:
     parts.inbox.waiting = None
     parts.learner.is_first_time = False
     return parts.hand_over.account_for(taken, so_far, now_s, was_in_auto=was_in_auto)
+
+
+def _on_hold_asked(parts: Parts, now_s: float) -> None:
+    """Send a person's HOLD; whatever the state, and nothing is wanted after it."""
+    parts.inbox.waiting = None
+    parts.learner.is_first_time = False
+    parts.halter.hold_for_good(parts.hand_over.why_held, now_s)
 
 
 def _on_clash(parts: Parts, now_s: float) -> Iterable[Signal]:
@@ -336,6 +343,7 @@ HANDLERS: dict[Signal, Callable[[Parts, float], Iterable[Signal] | None]] = {
     Notice.MISSION_HEARD: lambda parts, _now_s: parts.inbox.take_mission_target(),
     Notice.RALLY_HEARD: lambda parts, _now_s: parts.inbox.take_rally_target(),
     Notice.LEARNING_FAILED: _learn_again,
+    Notice.HOLD_ASKED: _on_hold_asked,
     Notice.HOLD_ENDED: _on_hold_ended,
     Notice.UPLOAD_ENDED: _on_upload_ended,
     Notice.DRIVE_ENDED: _on_drive_ended,

@@ -32,7 +32,13 @@ _MOVED_M = 1.0
 
 
 class Starter(Part):
-    """Looks once more, arms where asked, switches to AUTO and to the first item."""
+    """Looks once more, arms where asked, switches to AUTO and to the first item.
+
+    Attributes
+    ----------
+    is_told : bool
+        Whether a person has given the word to drive what is verified.
+    """
 
     def __init__(
         self,
@@ -49,6 +55,19 @@ class Starter(Part):
         self._driver = driver
         self._desk = desk
         self._adopter = adopter
+        self.is_told = False
+
+    @property
+    def may_begin(self) -> bool:
+        """Whether a verified mission is driven now: at once, on a person's word where that is waited for, and a way home without one."""
+        orders, target = self.core.orders, self.core.target
+        is_home = target is not None and target.is_home
+        return orders.drive and (not orders.starts_on_word or self.is_told or is_home)
+
+    def begin_on_word(self) -> Sequence[Signal]:
+        """Return that a person gives the word to drive: now, or once the mission is verified."""
+        self.is_told = True
+        return [Cue.DRIVE] if self.core.state is State.VERIFIED and self.may_begin else []
 
     def look_once_more(self, now_s: float) -> None:
         """Read again what somebody may have changed, and wait for a heartbeat: it shows a takeover that was on its way."""

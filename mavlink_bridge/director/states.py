@@ -82,6 +82,7 @@ class Notice(StrEnum):
     WAYS_KNOWN = auto()  # the ways home were laid out anew
     LEARNING_FAILED = auto()
     GONE_ON = auto()  # on the route, as far as was better than a HOLD at once
+    HOLD_ASKED = auto()  # by a person at a page of ours, who has let go of everything else with it
     HOLD_ENDED = auto()  # taken, or not
     UPLOAD_ENDED = auto()  # well or badly; the state has moved already
     DRIVE_ENDED = auto()

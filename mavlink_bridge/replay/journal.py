@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from mavlink_bridge.backup.drive_note import DriveNote
+    from missions.request import Request
 
 _FORMAT = 2  # of the file; others are not read
 
@@ -42,12 +43,12 @@ class Call:
     time_s : float
         Its time.
     name : str
-        Which call: ``start``, ``timer``, ``target``, ``obstacle``, ``clear``, ``confirm``, ``plan_made``, ``ways_made``, ``backup_stored``, ``backup_failed``, ``in_use``,
-        ``note_stored`` or ``note_failed``.
+        Which call: ``start``, ``timer``, ``target``, ``request``, ``obstacle``, ``clear``, ``confirm``, ``drive``, ``hold``, ``suspect``, ``plan_made``, ``ways_made``, ``backup_stored``,
+        ``backup_failed``, ``in_use``, ``note_stored`` or ``note_failed``.
     target : LatLon, optional
         The target that was typed, or where the obstacle is.
     text : str
-        The obstacle's radius, where the backup lies, or why there is none, or no note.
+        The obstacle's radius, the request, who asks for HOLD, where the backup lies, or why there is none, or no note.
     """
 
     frames: int
@@ -172,17 +173,34 @@ def read_journal(path: Path) -> Journal:
     return Journal(orders, described, tuple(calls), tuple(events), notes)
 
 
+def request_to_text(request: Request) -> str:
+    """Return a request as the text of a call."""
+    return json.dumps(_request_to_json(request))
+
+
+def request_from_text(text: str) -> Request:
+    """Return the request that a call's text is."""
+    return _request_from_json(json.loads(text))
+
+
+def _request_to_json(request: Request) -> dict[str, Any]:
+    words = request.words()
+    return {**words, "footprint": asdict(words["footprint"])}
+
+
+def _request_from_json(document: dict[str, Any]) -> Request:
+    return request_of(**{**document, "footprint": Footprint(**document.get("footprint", {}))})
+
+
 def _orders_to_json(orders: Orders) -> dict[str, Any]:
     document = asdict(orders)
-    words = orders.request.words()
-    document["request"] = {**words, "footprint": asdict(words["footprint"])}
+    document["request"] = _request_to_json(orders.request)
     document["target_sources"] = sorted(orders.target_sources)
     document["obstacle_sources"] = sorted(orders.obstacle_sources)
     return document
 
 
 def _orders_from_json(document: dict[str, Any]) -> Orders:
-    request = document["request"]
     homing = document.get("homing", {})
     places = {name: LatLon(*place) for name, place in homing.get("places", {}).items()}
     return Orders(
@@ -192,6 +210,6 @@ def _orders_from_json(document: dict[str, Any]) -> Orders:
             "identity": tuple(document["identity"]) if document["identity"] else None,
             "target_sources": frozenset(TargetSource(name) for name in document["target_sources"]),
             "obstacle_sources": frozenset(map(ObstacleSource, document.get("obstacle_sources", ()))),
-            "request": request_of(**{**request, "footprint": Footprint(**request.get("footprint", {}))}),
+            "request": _request_from_json(document["request"]),
         }
     )

@@ -13,6 +13,8 @@ from shapely import LineString, Polygon
 from missions.geo import LocalPoint
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
 
@@ -158,3 +160,36 @@ def _top_speeds_mps(plan: Plan, count: int) -> NDArray[np.float64]:
 
 def _on_earth(frame: LocalFrame, points: NDArray[np.float64]) -> tuple[LatLon, ...]:
     return tuple(frame.to_lat_lon(LocalPoint(float(east_m), float(north_m))) for east_m, north_m in points)
+
+
+@dataclass(frozen=True, slots=True)
+class DrivenSample:
+    """A place that was driven over.
+
+    Parameters
+    ----------
+    along_m : float
+        How far had been driven.
+    clearance_m : float
+        To the nearest fence; infinite without one, 0 on forbidden ground.
+    deviation_m, outside_m : float
+        From the drawn line, and from the predicted corridor; 0 within it.
+    """
+
+    along_m: float
+    clearance_m: float
+    deviation_m: float
+    outside_m: float
+
+
+def driven_samples(plan: Plan, positions: Sequence[LatLon]) -> tuple[DrivenSample, ...]:
+    """Return what each place of a drive kept of its plan; against the fence alone, without obstacles that were reported."""
+    points = plan.ground.frame.to_local_array(positions)
+    places = np.asarray(shapely.points(points), dtype=object)
+    steps_m = np.hypot(*np.diff(points, axis=0).T)
+    along_m = np.concatenate(([0.0], np.cumsum(steps_m)))
+    clearances_m = _room_m(plan.ground.enforced, places)
+    deviations_m = np.asarray(shapely.distance(places, LineString(plan.points)))
+    outside_m = np.asarray(shapely.distance(places, plan.envelope.area))
+    columns = (along_m, clearances_m, deviations_m, outside_m)
+    return tuple(DrivenSample(*map(float, row)) for row in zip(*columns, strict=True))

@@ -17,6 +17,7 @@ from mavlink_bridge.cli.options.shared import (
     flag,
     option,
 )
+from mavlink_bridge.cli.values import within
 
 _SERVER, _SOURCE = "Server", "Source"
 
@@ -66,6 +67,15 @@ class ServeOptions(ServerOptions, DescriptionOptions, MapOptions, ClearanceOptio
     demo: Annotated[
         bool, flag("--demo", "A simulated rover in a maze; upload, drive and arm are allowed.", _SOURCE)
     ] = False
+    speedup: Annotated[
+        float,
+        option(
+            "With --demo: how many times faster than real time the rover's own time runs, if the computer keeps up.",
+            "X",
+            panel=_SOURCE,
+            parser=within(1.0, 20.0),
+        ),
+    ] = 1.0
     connect: ConnectOption = None
     log: Annotated[Path | None, option("Replay this log, with a timeline.", "FILE.tlog", panel=_SOURCE)] = (
         None

@@ -22,7 +22,7 @@ from mavlink_bridge.console.view.sections import (
 from missions.checking.check import check_mission
 from missions.checking.holding import hold_info
 from missions.errors import MissionError
-from missions.geo import LatLon
+from missions.geo import LatLon, distance_m
 from missions.ground.from_situation import ground_for, route_ends
 from missions.picture.outlines import line_on_earth, outline, route_samples
 from missions.picture.plans import plan_scene
@@ -40,6 +40,25 @@ if TYPE_CHECKING:
     from missions.ground.ground import Ground
     from missions.planned import Plan
     from missions.request import Request
+
+
+def plan_id(planned: Plan) -> str:
+    """Return the name of a plan: that of its items, its start and what it promises."""
+    return identity(planned.items, planned.start, planned.clearance_m)
+
+
+def is_same_route(one: Plan, other: Plan) -> bool:
+    """Return whether two plans are one route to a person who has seen either: the same places but for what a standing position wanders, and no less promised."""
+    if len(one.items) != len(other.items) or [item.command for item in one.items] != [
+        item.command for item in other.items
+    ]:
+        return False
+    if (one.clearance_m or 0.0) > (other.clearance_m or 0.0) + _SAME_M:
+        return False
+    places_of = zip(one.items, other.items, strict=True)
+    return all(
+        distance_m(a.position, b.position) <= _SAME_ROUTE_M for a, b in places_of if a.is_placed
+    ) and bool(one.extrapolated) == bool(other.extrapolated)
 
 
 def plan_view(
@@ -65,7 +84,7 @@ def plan_view(
         else _bare_legs(planned)
     )
     view = PlanView(
-        id=identity(planned.items, planned.start, planned.clearance_m),
+        id=plan_id(planned),
         state="planned",
         took_s=took_s,
         request=asked_view(request),
@@ -241,6 +260,12 @@ def _bare_legs(planned: Plan) -> tuple[LegView, ...]:
             )
         )
     return tuple(found)
+
+
+_SAME_M = 0.01  # clearances are given to the centimetre
+_SAME_ROUTE_M = (
+    0.5  # a position without RTK wanders by as much while the vehicle stands; chosen, not measured
+)
 
 
 # No route

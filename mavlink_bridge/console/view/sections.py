@@ -539,8 +539,8 @@ class DriveView:
     ----------
     state : str
         The director's state; ``state_text`` in words, ``since_s`` since when.
-    awaits_start : bool
-        Whether a plan waits for a person's yes: ``plan_id`` names it.
+    awaits_upload, awaits_start : bool
+        Whether the plan that stands waits to be uploaded (`/api/upload`), or is verified and waits to be driven (`/api/start`); ``plan_id`` names it.
     can_resume : bool
         Whether the last target can be gone to again (``/api/resume``).
     trouble : str
@@ -559,6 +559,7 @@ class DriveView:
     state: str = "listening"
     state_text: str = ""
     since_s: float | None = None
+    awaits_upload: bool = False
     awaits_start: bool = False
     plan_id: str = ""
     can_resume: bool = False
@@ -578,6 +579,35 @@ class DriveView:
     least_at: Place | None = None
     asked_m: float | None = None
     breaches: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AfterSample:
+    """A place along the driven way."""
+
+    s_m: float
+    clearance_m: float | None
+    deviation_m: float
+    speed_mps: float
+    time_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AfterView:
+    """What was driven against what was promised, of the newest drive."""
+
+    plan_id: str
+    promised_m: float | None
+    least_m: float | None
+    least_at: Place | None
+    predicted_s: float | None
+    took_s: float
+    driven_m: float
+    length_m: float
+    deviation_max_m: float
+    outside_max_m: float
+    breaches: int
+    profile: tuple[AfterSample, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

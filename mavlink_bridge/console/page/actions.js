@@ -269,7 +269,7 @@ export class Actions {
 
   start() {
     return this.attempt(texts.start.hold, async () => {
-      this.tell((await post("/api/start", { plan_id: this.store.state.standing?.id ?? "" })).text, false);
+      this.tell((await post("/api/start", { plan_id: this.store.state.plan?.id ?? "" })).text, false);
     });
   }
 

@@ -83,7 +83,7 @@ function buildPage() {
   document.documentElement.lang = texts.language;
   fill(document.body,
     h("a", { class: "jump", href: "#hold-bar" }, texts.skipHold), h("a", { class: "jump", href: "#panel" }, texts.skip),
-    h("header", { class: "top" }, h("h1", {}, texts.name), source, vehicleBar(store), controlBar(store, actions)),
+    h("header", { class: "top" }, h("div", { class: "brand" }, h("h1", {}, texts.name), source), vehicleBar(store), controlBar(store, actions)),
     alarmBar(store),
     h("main", {}, mapArea, h("div", { class: "side", id: "panel" }, transferNote(store), panels), timeline(store, (time_s) => live?.send({ type: "seek", time_s })), profileChart(store), holdBar(store, actions)),
     toastList);
@@ -152,7 +152,8 @@ function showStanding() {
  * @param {import("./types.js").Doc} doc
  */
 function isSame(request, doc) {
-  return doc.mission === null && doc.zones === null && JSON.stringify(request.targets) === JSON.stringify(doc.targets);
+  const asked = (/** @type {any} */ one) => JSON.stringify([one.targets, one.clearance_m, one.widest, one.order, one.comes_back]);
+  return doc.mission === null && doc.zones === null && asked(request) === asked(doc);
 }
 
 /** @type {Live | null} */

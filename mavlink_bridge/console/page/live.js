@@ -36,22 +36,24 @@ export function take(store, message, track) {
   if (message.type === "alive") {
     return;
   }
-  const { plan, ...sections } = message.state;
+  // A change holds only what there is.
+  const { state = {}, events = [], track: rows = [] } = message;
+  const { plan, ...sections } = state;
   /** @type {Partial<PageState>} */
   const news = { ...sections };
   if (message.type === "snapshot") {
     news.page = message.you;
   }
-  if (message.type === "snapshot" || "plan" in message.state) {
+  if (message.type === "snapshot" || "plan" in state) {
     news.standing = plan ?? null;
   }
   const isAnew = message.type === "snapshot" || message.events_anew;
-  if (isAnew || message.events.length > 0) {
-    news.events = [...(isAnew ? [] : store.state.events), ...message.events].slice(-MOST_EVENTS);
+  if (isAnew || events.length > 0) {
+    news.events = [...(isAnew ? [] : store.state.events), ...events].slice(-MOST_EVENTS);
   }
   if (message.type === "snapshot" || message.track_anew) {
     track.clear();
   }
-  track.add(message.track);
+  track.add(rows);
   store.set(news);
 }

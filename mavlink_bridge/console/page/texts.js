@@ -142,11 +142,11 @@ const en = {
   },
   start: {
     hold: "Start: press and hold", holding: "Keep holding …", noUpload: "pbpp was started without --upload: nothing is written to the vehicle.", noDrive: "pbpp was started without --drive: it starts nothing.",
-    noControl: "Take control first.", noPlan: "Start appears once a plan is verified on the vehicle.", arms: "Arms the vehicle and switches to AUTO.", noArm: "Switches to AUTO. The vehicle must be armed: pbpp was started without --arm.",
-    name: "Start. Press and hold for one second.",
+    noControl: "Take control first.", noPlan: "To start, upload the plan: only what is verified on the vehicle is driven.", other: "Not what is on the vehicle: upload this plan, then start it.", arms: "Arms the vehicle and switches to AUTO.", noArm: "Switches to AUTO. The vehicle must be armed: pbpp was started without --arm.",
+    name: "Start: press and hold for one second.",
   },
   hold: {
-    button: "HOLD", key: "key H", name: "HOLD: stop the rover now. Key H.",
+    button: "HOLD", key: "key H", name: "HOLD key H: stops the rover now.",
     missing: "HOLD is off: pbpp was started without --drive and sends nothing. Use your transmitter.",
     noVehicle: "No vehicle here: nothing to hold.",
     sending: "HOLD is being sent …", failed: /** @param {string} why */ (why) => `HOLD WAS NOT SENT: ${why} Use your transmitter.`,

@@ -101,10 +101,10 @@ export function alarmBar(store) {
  */
 export function holdBar(store, act) {
   const answer = h("p", { class: "hold-answer", role: "status" });
-  const key = h("small", { "aria-hidden": "true" }, texts.hold.key);
-  const stop = h("button", { type: "button", id: "hold", class: "hold", "aria-label": texts.hold.name, "aria-keyshortcuts": "H", onclick: () => act.hold() }, h("span", {}, texts.hold.button), key);
+  const key = h("small", {}, texts.hold.key);
+  const stop = h("button", { type: "button", id: "hold", class: "hold", "aria-label": texts.hold.name, "aria-keyshortcuts": "H", onclick: () => act.hold() }, h("span", {}, texts.hold.button), " ", key);
   const missing = h("p", { class: "hold-missing" });
-  const bar = h("section", { class: "hold-bar", id: "hold-bar", "aria-label": texts.hold.button }, stop, missing, answer);
+  const bar = h("section", { class: "hold-bar", id: "hold-bar", "aria-label": texts.hold.button }, answer, missing, stop);
   store.watch(["server"], ({ server }) => {
     const isLive = server.source === "live" || server.source === "demo";
     show(stop, isLive && server.can.drive);

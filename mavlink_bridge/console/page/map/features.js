@@ -101,8 +101,9 @@ export function marks(state) {
     found.push(spot(home, { icon: "home", name: texts.map.home }));
   }
   found.push(...rally.map((at, i) => spot(at, { icon: "rally", name: texts.map.rally(i + 1) })));
-  const many = doc.targets.length > 1;
-  found.push(...doc.targets.map((at, i) => spot(at, { icon: "target", name: many ? texts.map.targetOf(i + 1) : texts.map.target })));
+  const targets = doc.targets.length > 0 || doc.mission ? doc.targets : plan?.targets ?? [];
+  const many = targets.length > 1;
+  found.push(...targets.map((at, i) => spot(at, { icon: "target", name: many ? texts.map.targetOf(i + 1) : texts.map.target })));
   const start = plan?.start ?? doc.start;
   if (start) {
     found.push(spot(start, { icon: "start", name: state.vehicle.position ? "" : texts.map.start }));

@@ -9,7 +9,7 @@ import { Track } from "./track.js";
 /** @typedef {import("../types.js").PageState} PageState */
 /** @typedef {import("./view.js").MapView} MapView */
 
-const FITTED = ["meant", "zones", "legs", "mission", "rover", "places", "draft"];
+const FITTED = ["zones", "legs", "mission", "rover", "places", "draft"];
 
 export class Scene {
   /**

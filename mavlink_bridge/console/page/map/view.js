@@ -135,7 +135,8 @@ export class MapView {
    */
   fit(sources, isSudden = false) {
     const all = sources.flatMap((name) => this.data.get(name)?.features ?? []);
-    const bounds = box(all.flatMap((/** @type {any} */ feature) => [...places(feature.geometry.coordinates)]));
+    // A home circle may be vast: it counts only where nothing else does.
+    const bounds = box((all.length > 0 ? all : this.data.get("meant")?.features ?? []).flatMap((/** @type {any} */ feature) => [...places(feature.geometry.coordinates)]));
     if (bounds) {
       this.map.fitBounds(bounds, { padding: FIT_PADDING_PX, maxZoom: FIT_ZOOM, bearing: 0, duration: isSudden ? 0 : 300 });
     }

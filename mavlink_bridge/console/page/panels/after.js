@@ -7,7 +7,6 @@ import { button } from "./parts.js";
 
 /** @typedef {import("../types.js").PageState} PageState */
 
-const ENDS = ["arrived", "let_go", "verified", "ready"]; // states of the director in which a drive may just have ended
 
 /** @param {import("../store.js").Store<PageState>} store */
 export function comparison(store) {
@@ -15,7 +14,7 @@ export function comparison(store) {
   const section = h("section", { "aria-label": texts.after.title }, h("h2", {}, texts.after.title), body, button(texts.after.refresh, () => ask(store)));
   let wasDriving = false;
   store.watch(["drive"], ({ drive }) => {
-    if (wasDriving && !drive.is_driving && ENDS.includes(drive.state)) {
+    if (wasDriving && !drive.is_driving && drive.state === "arrived") {
       ask(store);
     }
     wasDriving = drive.is_driving;

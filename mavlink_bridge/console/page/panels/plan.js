@@ -212,14 +212,15 @@ function writePart(store, act) {
     upload.disabled = reason !== "" || isPlanning || !plan || plan.no_route !== null || plan.state === "planning" || state.doc.mission !== null;
     const waits = canStart(state);
     start.disabled = reason !== "" || !server.can.drive || !waits;
-    say(why, reason || (!server.can.drive ? texts.start.noDrive : waits ? (server.can.arm ? texts.start.arms : texts.start.noArm) : texts.start.noPlan));
+    say(why, reason || (!server.can.drive ? texts.start.noDrive : waits ? (server.can.arm ? texts.start.arms : texts.start.noArm) : state.drive.awaits_start ? texts.start.other : texts.start.noPlan));
   });
   return section;
 }
 
 /** @param {PageState} state */
-export function canStart({ drive, standing }) {
-  return standing !== null && drive.awaits_start;
+export function canStart({ drive, plan }) {
+  // Never what is on the vehicle while another route is shown.
+  return drive.awaits_start && plan !== null && plan.id === drive.plan_id;
 }
 
 /** @param {PageStore} store */

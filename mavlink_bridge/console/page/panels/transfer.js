@@ -3,13 +3,20 @@
 import { fill, h, show } from "../dom.js";
 import { texts } from "../texts.js";
 
+const SHOWN_MS = 15_000; // a verified upload is told for so long; a failed one stays
+
 /** @param {import("../store.js").Store<import("../types.js").PageState>} store */
 export function transferNote(store) {
   const element = h("div", { class: "card transfer", role: "status" });
+  let timer = 0;
   store.watch(["upload"], ({ upload }) => {
+    clearTimeout(timer);
     show(element, upload !== null);
     if (!upload) {
       return;
+    }
+    if (upload.state === "verified") {
+      timer = setTimeout(() => show(element, false), SHOWN_MS);
     }
     const looks = { running: "", verified: "good", failed: "bad" };
     const signs = { running: "…", verified: "✓", failed: "✗" };

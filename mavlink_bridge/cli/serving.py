@@ -39,6 +39,7 @@ from mavlink_bridge.console.hub import Hub
 from mavlink_bridge.console.list_writer import ListWriter
 from mavlink_bridge.console.live import LiveBackend, LiveConsole
 from mavlink_bridge.console.live_desk import LiveDesk
+from mavlink_bridge.console.recorded import RecordedBackend, Recording
 from mavlink_bridge.console.server import (
     Certificate,
     Served,
@@ -48,7 +49,7 @@ from mavlink_bridge.console.server import (
     qr_code,
 )
 from mavlink_bridge.console.view.sections import MapSource, Permissions, Sections, ServerView
-from mavlink_bridge.director import Director, Orders
+from mavlink_bridge.director import Director, Orders, TargetSource
 from mavlink_bridge.director.orders import Homing, ObstacleSource
 from mavlink_bridge.errors import UsageError
 from mavlink_bridge.link import now_s
@@ -76,7 +77,25 @@ def serve(options: ServeOptions) -> None:
         with served(options, "files", options.fence.name, FilesBackend(situation, request), sections):
             _wait()
         return
+    if options.log is not None:
+        _served_log(options, options.log, request)
+        return
     _served_live(options, request)
+
+
+def _served_log(options: ServeOptions, log: Path, request: Request) -> None:
+    """Serve a replay."""
+    orders = Orders(
+        system=options.system,
+        any_vehicle=options.any_vehicle,
+        request=request,
+        target_sources=frozenset(TargetSource) - {TargetSource.ECHO, TargetSource.RALLY},
+    )
+    recording = Recording(log, orders)
+    backend = RecordedBackend(recording)
+    with served(options, "log", log.name, backend, backend.at(recording.begin_s)) as hub:
+        hub.post({}, recording.events, (), recording.track.rows)
+        _wait()
 
 
 def asked(options: ServeOptions) -> Request:

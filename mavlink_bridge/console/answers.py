@@ -8,6 +8,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.console import reading
+from mavlink_bridge.console.view.fields import fence_view
 from mavlink_bridge.console.view.places import finite, place
 from mavlink_bridge.console.view.plans import checked_view, no_route_view, plan_view
 from mavlink_bridge.console.wire import Widest
@@ -17,12 +18,13 @@ from missions.ground.from_situation import route_ends, route_ground
 from missions.planning.plan import plan as make_plan
 from missions.promise import known_vehicle
 from missions.routing.bottleneck import narrowest_place
+from missions.situation import Known
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from mavlink_bridge.console.view.sections import PlanView
-    from mavlink_bridge.console.wire import CheckRequest, PlanRequest
+    from mavlink_bridge.console.view.sections import FenceView, PlanView
+    from mavlink_bridge.console.wire import CheckRequest, FenceRequest, PlanRequest
     from missions.items import MissionItem
     from missions.planned import Plan
     from missions.request import Request, Tour
@@ -138,14 +140,30 @@ def repaired(
     return Looked(view, items=planned.items, plan=planned)
 
 
-def widest(body: PlanRequest, situation: Situation, own: Request, should_stop: Callable[[], bool]) -> Widest:
-    """Return the most clearance that drawn lines over the targets can keep, and where they are narrowest.
+def look_at_fence(body: FenceRequest, situation: Situation, own: Request) -> FenceView:
+    """Return what a drawn fence comes to; why it cannot be used, where it cannot: half-drawn ones are usual."""
+    try:
+        drawn = reading.with_fence(situation, body.fence)
+        if body.clearance_m is not None:
+            own = replace(own, widest=False, clearance_m=body.clearance_m)
+    except MissionError as error:
+        usable = reading.usable_zones(body.fence)
+        held = fence_view(replace(situation, fence=Known(usable, None, "drawn on the page")), own, "drawn")
+        return replace(held, meant=None, trouble=str(error), where="drawn")
+    return fence_view(drawn, own, "drawn")
 
-    Raises
-    ------
-    MissionError
-        Start, targets or fence are not known, or cannot be used.
-    """
+
+def widest(body: PlanRequest, situation: Situation, own: Request, should_stop: Callable[[], bool]) -> Widest:
+    """Return the most clearance that drawn lines over the targets can keep, and where they are narrowest; why not, where that is not known."""
+    try:
+        return _widest(body, situation, own, should_stop)
+    except PlanStoppedError:
+        raise
+    except MissionError as error:
+        return Widest(clearance_m=None, trouble=str(error))
+
+
+def _widest(body: PlanRequest, situation: Situation, own: Request, should_stop: Callable[[], bool]) -> Widest:
     situation = reading.with_fence(situation, body.fence)
     request = reading.plan_request(body, own)
     start, targets = route_ends(situation, request)

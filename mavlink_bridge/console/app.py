@@ -25,7 +25,6 @@ from mavlink_bridge.console.access import content_policy
 from mavlink_bridge.console.board import Board, Seen
 from mavlink_bridge.console.deeds import Refusal
 from mavlink_bridge.console.jobs import SupersededError
-from mavlink_bridge.console.view.fields import fence_view
 from mavlink_bridge.console.view.sections import Sections
 from mavlink_bridge.console.wire import Failure, Problem, TakenUp, encode
 from mavlink_bridge.errors import BridgeError
@@ -294,8 +293,6 @@ class Console:
     async def after(self, _request: Request) -> Response:
         """Return the newest drive, against what was promised."""
         found = self._hub.backend.after()
-        if found is None:
-            return failure(Problem(kind="not_found", message="nothing was driven yet"), 404)
         return answer(found)
 
     async def replay(self, request: Request) -> Response:
@@ -368,13 +365,10 @@ class Console:
     async def look_at_fence(self, request: Request) -> Response:
         """Return what a drawn fence comes to."""
         body = await _typed(request, wire.FenceRequest)
-        situation = reading.with_fence(self._hub.backend.situation(), body.fence)
-        own = self._hub.backend.request()
-        if body.clearance_m is not None:
-            own = replace(own, widest=False, clearance_m=body.clearance_m)
+        situation, own = self._hub.backend.situation(), self._hub.backend.request()
         return answer(
             await self._hub.jobs.run(
-                self._purpose(request, "fence"), lambda _stop: fence_view(situation, own, "drawn")
+                self._purpose(request, "fence"), lambda _stop: answers.look_at_fence(body, situation, own)
             )
         )
 

@@ -46,6 +46,8 @@ class Board:
     ----------
     sections : Sections
         What is known at first.
+    most_events : int, optional
+        How many are kept; None keeps all, as of a log.
 
     Attributes
     ----------
@@ -53,11 +55,11 @@ class Board:
         The newest of each section, by its name.
     """
 
-    def __init__(self, sections: Sections) -> None:
+    def __init__(self, sections: Sections, most_events: int | None = MOST_EVENTS) -> None:
         self.sections: dict[str, Any] = {name: getattr(sections, name) for name in NAMES}
         self._encoded = {name: msgspec.Raw(encode(value)) for name, value in self.sections.items()}
         self._versions = dict.fromkeys(NAMES, 1)
-        self._events: deque[EventView] = deque(maxlen=MOST_EVENTS)
+        self._events: deque[EventView] = deque(maxlen=most_events)
         self._event_id = 0
         self._rows: list[TrackRow] = []
         self._generation = 0

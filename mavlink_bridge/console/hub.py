@@ -7,7 +7,7 @@ from collections import OrderedDict
 from threading import Lock
 from typing import TYPE_CHECKING, Any
 
-from mavlink_bridge.console.board import Board
+from mavlink_bridge.console.board import MOST_EVENTS, Board
 from mavlink_bridge.console.control import ControlDesk
 from mavlink_bridge.console.deeds import Refusal, check_permitted
 from mavlink_bridge.console.jobs import Jobs
@@ -44,7 +44,7 @@ class Hub:
     def __init__(
         self, sections: Sections, backend: Backend, access: Access, clock: Callable[[], float]
     ) -> None:
-        self.board = Board(sections)
+        self.board = Board(sections, None if sections.replay is not None else MOST_EVENTS)
         self.backend = backend
         self.access = access
         self.control = ControlDesk()

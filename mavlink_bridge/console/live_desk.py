@@ -43,7 +43,7 @@ _MAKING = frozenset({State.HOLDING, State.PLANNING, State.LISTENING, State.LEARN
 """States in which the plan that is wanted may still come."""
 
 
-class Journal(Protocol):
+class CallNoter(Protocol):
     """Notes a call of the director before it is made."""
 
     def __call__(self, name: str, now_s: float, target: object = None, text: str = "") -> None:
@@ -83,7 +83,7 @@ class LiveDesk:
         What was on vehicles before.
     vehicle : callable
         Returns which vehicle it is; None before it was found.
-    journal : Journal
+    journal : CallNoter
         Notes calls.
     tell : callable
         Tells all pages something: a text and its severity.
@@ -95,7 +95,7 @@ class LiveDesk:
         writer: ListWriter,
         store: BackupStore,
         vehicle: Callable[[], VehicleMark | None],
-        journal: Journal,
+        journal: CallNoter,
         tell: Callable[[str, str], None],
     ) -> None:
         self._director = director

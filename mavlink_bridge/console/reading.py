@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path, PurePath
 from tempfile import TemporaryDirectory
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from mavlink_bridge.console.view.fields import fence_view
 from mavlink_bridge.console.view.places import place, places
 from mavlink_bridge.console.wire import Imported, Item
-from missions.errors import FenceError, MissionFormatError, RequestError
+from missions.errors import FenceError, InvalidPositionError, MissionFormatError, RequestError
 from missions.fence import CircleZone, Fence, PolygonZone, ZoneKind
 from missions.formats import NO_CHOICES, parts_of, read_situation, write_situation
 from missions.geo import LatLon, checked_lat_lon
@@ -152,6 +153,15 @@ def fence_of(drawn: DrawnFence) -> Fence:
     zones = tuple(_zone(number, zone) for number, zone in enumerate(drawn.features, 1))
     return_point = position(drawn.return_point) if drawn.return_point is not None else None
     return Fence(zones, return_point)
+
+
+def usable_zones(drawn: DrawnFence) -> Fence:
+    """Return what of a drawn fence is a zone already."""
+    zones = []
+    for number, zone in enumerate(drawn.features, 1):
+        with suppress(FenceError, InvalidPositionError):
+            zones.append(_zone(number, zone))
+    return Fence(tuple(zones))
 
 
 def _zone(number: int, zone: DrawnZone) -> PolygonZone | CircleZone:

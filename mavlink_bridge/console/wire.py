@@ -217,12 +217,12 @@ class TakenUp:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Widest:
-    """The widest route over the targets: the slider's maximum."""
+    """The widest route over the targets: the slider's maximum. None without a fence near, or where it is not known: ``trouble`` says why; 0 where there is no route at all."""
 
     clearance_m: float | None
-    driven_m: float | None = None
     at: Place | None = None
     between: tuple[str, ...] = ()
+    trouble: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

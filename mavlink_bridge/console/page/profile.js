@@ -31,6 +31,7 @@ export function profileChart(store) {
     drawing.setAttribute("aria-label", samples.length > 1 ? summary(samples) : texts.profile.none);
     fill(drawing, ...(samples.length > 1 ? chart(samples, plan?.asked_m ?? null, width, x) : []), cursor, marker);
     say(words, samples.length > 1 ? summary(samples) : texts.profile.none);
+    drawing.classList.toggle("empty", samples.length < 2);
     place();
   };
   const place = () => {

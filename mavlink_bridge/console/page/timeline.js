@@ -40,8 +40,16 @@ export function timeline(store, seek) {
       range.setAttribute("aria-valuetext", text);
     }
   });
-  store.watch(["events", "replay"], ({ events, replay }) => fill(marks, replay ? events.map((event) => mark(event, replay)) : null));
+  store.watch(["events", "replay"], ({ events, replay }) => fill(marks, replay ? decisions(events).map((event) => mark(event, replay)) : null));
   return element;
+}
+
+/**
+ * What the director decided, without what the vehicle said.
+ * @param {Event[]} events
+ */
+function decisions(events) {
+  return events.filter((event) => event.name !== "statustext");
 }
 
 /**
@@ -99,7 +107,7 @@ class Player {
 
   /** @param {1 | -1} way */
   goToDecision(way) {
-    const times = this.store.state.events.map((event) => event.time_s).sort((a, b) => a - b);
+    const times = decisions(this.store.state.events).map((event) => event.time_s).sort((a, b) => a - b);
     const next = way > 0 ? times.find((time_s) => time_s > this.now_s + LATE_S) : times.findLast((time_s) => time_s < this.now_s - LATE_S);
     if (next !== undefined) {
       this.ask(next);

@@ -12,8 +12,8 @@ import { texts } from "./texts.js";
  * How old the newest heartbeat is by now; null where none is known.
  * @param {PageState} state
  */
-export function heartbeatAge_s({ link, clock_s }) {
-  return link.heard_s === null ? null : Math.max(0, clock_s - link.heard_s);
+export function heartbeatAge_s({ link, clock_s, replay }) {
+  return link.heard_s === null ? null : Math.max(0, (replay ? replay.now_s : clock_s) - link.heard_s);
 }
 
 /** @param {PageStore} store */
@@ -34,7 +34,7 @@ export function vehicleBar(store) {
     chips.battery.className = `chip-value ${vehicle.battery_percent !== null && vehicle.battery_percent <= 20 ? "alarm" : ""}`;
     say(chips.speed, vehicle.speed_mps === null ? words.unknown : `${vehicle.speed_mps.toFixed(1)} m/s`);
   });
-  store.watch(["link", "clock_s"], (state) => {
+  store.watch(["link", "clock_s", "replay"], (state) => {
     const { link } = state;
     const age_s = heartbeatAge_s(state);
     const missed = link.heartbeats_missed_percent ? `, ${words.missed(link.heartbeats_missed_percent)}` : "";

@@ -108,20 +108,20 @@ export function marks(state) {
   if (start) {
     found.push(spot(start, { icon: "start", name: state.vehicle.position ? "" : texts.map.start }));
   }
-  const trouble = plan?.no_route;
-  const at = trouble?.at ?? trouble?.widest?.at;
-  if (at) {
-    found.push(spot(at, { icon: "blocked", name: texts.noRoute.here }));
-  }
-  for (const leg of plan?.legs ?? []) {
-    if (leg.verdict === "breaks" && leg.at) {
-      found.push(spot(leg.at, { icon: "blocked", name: texts.plan.legBreaks(leg) }));
-    }
-  }
+  found.push(...troubles(plan));
   if (drive.least_at && drive.least_clearance_m !== null) {
     found.push(spot(drive.least_at, { icon: "least", name: texts.drive.leastHere(drive.least_clearance_m) }));
   }
   return found;
+}
+
+/** @param {Plan | null} plan */
+function troubles(plan) {
+  const why = plan?.no_route;
+  const at = why?.at ?? why?.widest?.at;
+  const broken = (plan?.legs ?? []).filter((leg) => leg.verdict === "breaks" && leg.at);
+  return [...(at ? [spot(at, { icon: "blocked", name: texts.noRoute.here })] : []),
+    ...broken.map((leg) => spot(/** @type {Place} */ (leg.at), { icon: "blocked", name: texts.plan.legBreaks(leg) }))];
 }
 
 /** @param {import("../types.js").PageState} state */

@@ -12,12 +12,12 @@ import { button } from "./parts.js";
 export function comparison(store) {
   const body = h("div", {});
   const section = h("section", { "aria-label": texts.after.title }, h("h2", {}, texts.after.title), body, button(texts.after.refresh, () => ask(store)));
-  let wasDriving = false;
+  let before = "";
   store.watch(["drive"], ({ drive }) => {
-    if (wasDriving && !drive.is_driving && drive.state === "arrived") {
+    if (drive.state === "arrived" && before !== "arrived" && drive.begun_s !== null) {
       ask(store);
     }
-    wasDriving = drive.is_driving;
+    before = drive.state;
   });
   store.watch(["after", "drive"], ({ after, drive }) => show(section, after !== null || drive.begun_s !== null));
   store.watch(["after"], ({ after }) => fill(body, after ? table(after) : null));

@@ -1,0 +1,214 @@
+"""The console's page in a real browser, with a rover: upload, start, HOLD, go on, arrive; a foreign fence; link and server cut; two pages; a replay.
+
+The rovers are simulated, as the demonstration's; faster than real time, where nothing else is said.
+"""
+
+from __future__ import annotations
+
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+from console.browser_kit import FIELDS, WAIT_MS, Watched, launched, need_browser, serving
+
+need_browser()
+
+from playwright.sync_api import Browser, Page, expect, sync_playwright  # noqa: E402 - only where there is a browser
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+pytestmark = pytest.mark.xdist_group("browser")
+expect.set_options(timeout=WAIT_MS)
+
+LOG = Path(__file__).parents[3] / "sitl_logs" / "guided-maze.tlog"
+NEAR = "40.0715500, -105.2298700"  # in sight of home
+FAR = "40.0718468, -105.2284819"
+HEADLINE = ".headline"
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with sync_playwright() as playwright:
+        found = launched(playwright)
+        yield found
+        found.close()
+
+
+def open_page(browser: Browser, url: str, *, expected: str = r"(?!)") -> Watched:
+    """Open a page of its own."""
+    seen = Watched(browser.new_context(viewport={"width": 1280, "height": 800}), url, expected=expected)
+    seen.open()
+    return seen
+
+
+def close(*pages: Watched) -> None:
+    """Look at what must not have been, and close."""
+    for seen in pages:
+        assert seen.troubles == []
+        seen.page.context.close()
+
+
+def set_target(page: Page, place: str) -> None:
+    """Type a target."""
+    page.get_by_label("New target: latitude, longitude").fill(place)
+    page.get_by_label("New target: latitude, longitude").press("Enter")
+    expect(page.locator(HEADLINE)).to_contain_text("m promised")
+
+
+def press_start(page: Page) -> None:
+    """Press Start for as long as it takes, with a key."""
+    start = page.get_by_role("button", name="Start: press and hold")
+    expect(start).to_be_enabled()
+    start.focus()
+    page.keyboard.down("Enter")
+    expect(page.locator(".chip-mode")).to_contain_text("AUTO")
+    page.keyboard.up("Enter")
+
+
+def state(page: Page) -> str:
+    """Return the director's state in words, as the page shows it."""
+    return page.locator("#part-drive .facts dd").first.inner_text()
+
+
+def test_from_the_first_look_to_the_arrival(browser: Browser) -> None:
+    with serving("--demo", "--speedup", "3") as server:
+        seen = open_page(browser, server.url)
+        page = seen.page
+        page.get_by_role("button", name="Take control").click()
+
+        # A fence drawn, a target clicked, the clearance changed: all of it before anything is on the vehicle.
+        page.get_by_role("tab", name="Fence").click()
+        page.get_by_text("Type a zone").click()
+        page.get_by_label("A corner a line").fill("40.0719000, -105.2295000")
+        page.get_by_label("Radius in metres, for a circle").fill("3")
+        page.get_by_role("button", name="Add the zone").click()
+        page.get_by_role("button", name="Upload the fence, verified").click()
+        expect(page.locator(".transfer")).to_contain_text("The fence is on the vehicle", timeout=WAIT_MS)
+        page.get_by_role("button", name="Back to the held fence").click()
+        expect(page.locator("ul.zones li")).to_have_count(10)
+        page.get_by_role("tab", name="Plan").click()
+        set_target(page, NEAR)
+        page.get_by_role("spinbutton", name="Clearance to keep while driving, metres").fill("3")
+        page.keyboard.press("Tab")
+        expect(page.locator(HEADLINE)).to_have_text("✓ 3.00 m promised")
+        page.get_by_role("button", name="Upload, verified").click()
+        expect(page.locator(".transfer")).to_contain_text("The mission is on the vehicle", timeout=WAIT_MS)
+        assert seen.accessible() == []
+
+        # HOLD by its key, on whatever part; go on; arrive.
+        press_start(page)
+        page.get_by_role("tab", name="Drive").click()
+        page.keyboard.press("h")
+        expect(page.locator(".hold-answer")).to_contain_text("stands")
+        expect(page.locator(".chip-mode")).to_contain_text("HOLD")
+        page.get_by_role("button", name="Go on to the target").click()
+        expect(page.locator("#part-drive .facts")).to_contain_text("arrived", timeout=60_000)
+        expect(page.get_by_text("The promise was kept")).to_be_visible()
+        assert seen.accessible() == []
+        close(seen)
+
+
+def test_a_foreign_fence_a_cut_link_and_a_page_that_only_looks(browser: Browser, tmp_path: Path) -> None:
+    words = [sys.executable, "-c", "from mavlink_bridge.cli import main; main()"]
+    rover = subprocess.Popen(
+        [*words, "sim", "--listen", "tcpin:127.0.0.1:0", "--fence", str(FIELDS / "maze-fence.waypoints")],
+        stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    try:
+        assert rover.stdout is not None
+        found = re.search(r"tcp:\S+:\d+", rover.stdout.readline())
+        assert found
+        connection = found.group()
+        with serving("--connect", connection, "--upload", "--drive", "--arm") as server:
+            seen, other = open_page(browser, server.url), open_page(browser, server.url)
+            page = seen.page
+            page.get_by_role("button", name="Take control").click()
+            expect(other.page.get_by_text("holds control")).to_be_visible()
+            set_target(page, FAR)
+            page.get_by_role("button", name="Upload, verified").click()
+            press_start(page)
+
+            # Another station puts a fence across the route: HOLD, a new route, and on, without a hand.
+            wall = tmp_path / "wall.waypoints"
+            wall.write_text(with_wall((FIELDS / "maze-fence.waypoints").read_text(encoding="utf-8")), encoding="utf-8")
+            subprocess.run(
+                [*words, "upload", str(wall), "--connect", connection, "--source-system", "255", "--source-component", "190", "--yes"],
+                check=True, stdout=subprocess.DEVNULL, timeout=60,
+            )  # fmt: skip
+            page.get_by_role("tab", name="Events").click()
+            expect(page.locator("ol.events")).to_contain_text("fence changed", ignore_case=True, timeout=WAIT_MS)
+
+            # The page that holds no control has HOLD all the same.
+            other.page.get_by_role("button", name="HOLD key H").click()
+            expect(other.page.locator(".hold-answer")).to_contain_text("HOLD")
+            expect(other.page.locator(".chip-mode")).to_contain_text("HOLD")
+
+            # No heartbeat: nobody can overlook it. And back.
+            rover.send_signal(signal.SIGSTOP)
+            expect(page.locator(".alarm-bar")).to_contain_text("LINK LOST", timeout=WAIT_MS)
+            assert seen.accessible() == []
+            rover.send_signal(signal.SIGCONT)
+            expect(page.locator(".alarm-bar")).to_be_hidden(timeout=WAIT_MS)
+
+            # One hand on the wheel: the other page takes it in one deliberate step.
+            other.page.get_by_role("button", name="Take control").click()
+            other.page.get_by_role("dialog").get_by_role("button", name="Take control").click()
+            expect(other.page.get_by_text("This page holds control")).to_be_visible()
+            expect(page.get_by_text("This page holds control")).to_be_hidden()
+            close(seen, other)
+    finally:
+        rover.kill()
+        rover.communicate()
+
+
+def with_wall(text: str) -> str:
+    """Return the maze with a circle across the way to FAR."""
+    lines = text.splitlines()
+    last = lines[-1].split("\t")
+    wall = [str(int(last[0]) + 1), "0", "3", "5004", "4.000000", "0", "0", "0", "40.0717300", "-105.2291500", "0", "1"]
+    return "\n".join([*lines, "\t".join(wall)]) + "\n"
+
+
+def test_a_server_started_anew_under_an_open_page(browser: Browser) -> None:
+    fence = str(FIELDS / "maze-fence.waypoints")
+    with serving("--fence", fence, "--start", "40.0712247,-105.2302031") as server:
+        port = server.port
+        # What Chromium says of a server that is gone is meant.
+        seen = open_page(browser, server.url, expected=r"ERR_CONNECTION_REFUSED|WebSocket connection")
+        set_target(seen.page, "40.0723079, -105.2285800")
+        server.stop()
+        expect(seen.page.locator(".alarm-bar")).to_contain_text("This page has lost pbpp")
+        with serving("--fence", fence, "--start", "40.0712247,-105.2302031", port=port):
+            expect(seen.page.locator(".alarm-bar")).to_be_hidden()
+            # What was asked for is still there, and can be asked again.
+            expect(seen.page.locator(HEADLINE)).to_have_text("✓ 2.50 m promised")
+            seen.page.get_by_role("button", name="widest possible").click()
+            expect(seen.page.locator(HEADLINE)).to_contain_text("m promised")
+            close(seen)
+
+
+def test_a_replay_is_scrubbed_and_played(browser: Browser) -> None:
+    with serving("--log", str(LOG)) as server:
+        seen = open_page(browser, server.url)
+        page = seen.page
+        expect(page.locator(".moment")).to_contain_text("0:00 min of 1:11 min")
+        scrub = page.get_by_label("Moment of the log")
+        scrub.focus()
+        page.keyboard.press("End")
+        expect(page.locator(".chip-mode")).to_contain_text("HOLD")
+        page.keyboard.press("Home")
+        expect(page.locator(".chip-mode")).to_contain_text("MANUAL")
+        page.get_by_role("button", name="Next decision").click()
+        expect(page.locator(".moment")).not_to_contain_text("0:00 min of")
+        page.get_by_label("Speed").select_option("60")
+        page.get_by_role("button", name="Play").click()
+        expect(page.locator(".moment")).to_contain_text("1:11 min of 1:11 min")
+        expect(page.get_by_role("button", name="Play")).to_be_visible()
+        expect(page.locator("#hold-bar")).to_contain_text("nothing to hold")
+        assert seen.accessible() == []
+        close(seen)

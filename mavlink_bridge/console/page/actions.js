@@ -22,6 +22,9 @@ export class Actions {
     this.store = store;
     this.planner = planner;
     this.tell = tell;
+    /** @type {Zone[] | null} */
+    this.sentZones = null;
+    store.watch(["upload"], () => this.sentZones && this.seeTransfer());
     this.history = new History(/** @type {Doc} */ (EMPTY), (doc) => {
       const zone = store.state.zone;
       store.set({ doc, zone: zone !== null && zone < (doc.zones?.length ?? 0) ? zone : null });
@@ -263,8 +266,17 @@ export class Actions {
 
   uploadFence() {
     return this.attempt(texts.fence.upload, async () => {
+      this.sentZones = this.history.value.zones;
       this.tell((await post("/api/upload", fenceBody(this.zones()))).text, false);
     });
+  }
+
+  /** A fence that was drawn and sent from here is the held one once it is verified. */
+  seeTransfer() {
+    const { upload, doc } = this.store.state;
+    if (upload?.what === "fence" && upload.state === "verified" && doc.zones !== null && doc.zones === this.sentZones) {
+      this.heldFence();
+    }
   }
 
   start() {

@@ -12,7 +12,7 @@ AWAY_S = 10.0
 
 @dataclass(slots=True)
 class _Page:
-    """A page that was seen: its public name, how many connections it has, and since when it has none."""
+    """A page that was seen: its public name, how many connections it has, and when it was seen last without one."""
 
     name: str
     connections: int = 0
@@ -50,7 +50,7 @@ class ControlDesk:
 
     def take(self, page_id: str, now_s: float) -> None:
         """Let a page have control, whoever held it."""
-        self.name_of(page_id)
+        self._note_seen(page_id, now_s)
         if self._holder != page_id:
             self._holder, self._since_s = page_id, now_s
 
@@ -61,9 +61,15 @@ class ControlDesk:
 
     def may_write(self, page_id: str, now_s: float) -> bool:
         """Return whether a page may change things now; where nobody holds control it gets it by asking."""
+        self._note_seen(page_id, now_s)
         if self.holder(now_s) is None:
             self.take(page_id, now_s)
         return self._holder == page_id
+
+    def _note_seen(self, page_id: str, now_s: float) -> None:
+        """Take notice that a page asks for something: it is there, also where it is not connected just now."""
+        self.name_of(page_id)
+        self._pages[page_id].left_s = now_s
 
     def holder(self, now_s: float) -> str | None:
         """Return the public name of the page that holds control; None where it is free."""

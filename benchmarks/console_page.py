@@ -33,7 +33,12 @@ import mavlink_bridge
 PAGE = Path(mavlink_bridge.__file__).parent / "console" / "page"
 RATE_HZ = 10
 HOME = (-105.23, 40.07)
-SWITCHES = ("--no-sandbox", "--enable-unsafe-swiftshader", "--use-angle=swiftshader", "--ignore-gpu-blocklist")
+SWITCHES = (
+    "--no-sandbox",
+    "--enable-unsafe-swiftshader",
+    "--use-angle=swiftshader",
+    "--ignore-gpu-blocklist",
+)
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 
 
@@ -68,14 +73,22 @@ def sections(i: int) -> dict[str, Any]:
 def snapshot() -> dict[str, Any]:
     """Return the first message: a field with a fence of 200 corners."""
     ring = [
-        [HOME[0] + 200 * math.sin(a) / 85_000, HOME[1] + 200 * math.cos(a) / 111_000] for a in np.linspace(0, 2 * math.pi, 201)
+        [HOME[0] + 200 * math.sin(a) / 85_000, HOME[1] + 200 * math.cos(a) / 111_000]
+        for a in np.linspace(0, 2 * math.pi, 201)
     ]
     zone = {
         "type": "Feature", "geometry": {"type": "Polygon", "coordinates": [ring]},
         "properties": {"index": 0, "name": "inclusion polygon 1", "kind": "inclusion", "shape": "polygon", "radius_m": None, "centre": None},
     }  # fmt: skip
     area = {"type": "MultiPolygon", "coordinates": [[ring]]}
-    meant = {"free": area, "margin": area, "margin_m": 2.0, "union": False, "home_circle": None, "is_bounded": True}
+    meant = {
+        "free": area,
+        "margin": area,
+        "margin_m": 2.0,
+        "union": False,
+        "home_circle": None,
+        "is_bounded": True,
+    }
     return {
         "server": {"version": "0", "run_id": "1", "source": "live", "source_name": "benchmark", "map": None, "reads": [], "writes": [],
                    "can": {"upload": True, "drive": True, "arm": True}},
@@ -100,7 +113,15 @@ class Feed:
     async def run(self, socket_: Any) -> None:
         """Feed all but the newest part quickly, the rest as it would come."""
         await socket_.accept()
-        message = {"type": "snapshot", "seq": 0, "you": "page 1", "time_s": 0, "state": snapshot(), "events": [], "track": []}
+        message = {
+            "type": "snapshot",
+            "seq": 0,
+            "you": "page 1",
+            "time_s": 0,
+            "state": snapshot(),
+            "events": [],
+            "track": [],
+        }
         await socket_.send_text(json.dumps(message))
         begin, seq = 0, 0
         while begin < self.rows + self.live:
@@ -151,12 +172,22 @@ def frames_ms(trace: Path) -> list[float]:
     names = {
         (one["pid"], one["tid"]): one["args"]["name"] for one in events if one.get("name") == "thread_name"
     }
-    frames = [one for one in events if one.get("name") == "FireAnimationFrame" and names.get((one["pid"], one["tid"])) == "CrRendererMain"]
+    frames = [
+        one
+        for one in events
+        if one.get("name") == "FireAnimationFrame" and names.get((one["pid"], one["tid"])) == "CrRendererMain"
+    ]
     thread = (frames[0]["pid"], frames[0]["tid"])
-    tasks = sorted((one["ts"], one.get("tdur", 0), one.get("dur", 0)) for one in events if one.get("name") == "RunTask" and (one["pid"], one["tid"]) == thread)
+    tasks = sorted(
+        (one["ts"], one.get("tdur", 0), one.get("dur", 0))
+        for one in events
+        if one.get("name") == "RunTask" and (one["pid"], one["tid"]) == thread
+    )
     # A frame calls back whoever asked for it, one after the other in one task: that task's begin is where the frame begins.
     called = np.array(sorted(one["ts"] for one in frames))
-    marks = np.array([ts for ts, _, dur in tasks if np.searchsorted(called, ts) < np.searchsorted(called, ts + dur)])
+    marks = np.array(
+        [ts for ts, _, dur in tasks if np.searchsorted(called, ts) < np.searchsorted(called, ts + dur)]
+    )
     sums = np.zeros(len(marks) + 1)
     for ts, tdur, dur in tasks:
         sums[np.searchsorted(marks, ts, side="right")] += tdur / 1000
@@ -179,7 +210,9 @@ def main() -> None:
         assert feed.is_fed.wait(120), "the page took the feed too slowly"
         page.wait_for_timeout(3000)
         trace = Path(folder) / "trace.json"
-        browser.start_tracing(page=page, path=trace, categories=["devtools.timeline", "disabled-by-default-devtools.timeline"])
+        browser.start_tracing(
+            page=page, path=trace, categories=["devtools.timeline", "disabled-by-default-devtools.timeline"]
+        )
         page.wait_for_timeout(arguments.live * 1000)
         browser.stop_tracing()
         client = page.context.new_cdp_session(page)

@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 import pytest
+from playwright.sync_api import expect
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from playwright.sync_api import Browser, BrowserContext, Page
+    from playwright.sync_api import Browser, BrowserContext, Locator, Page
 
 AXE = Path(__file__).parent / "vendor" / "axe-core" / "axe.min.js"
 FIELDS = Path(__file__).parents[2] / "fields"
@@ -57,7 +58,14 @@ class Served:
 
     def __init__(self, options: tuple[str, ...], port: int, cwd: Path | None) -> None:
         listen = ["--listen", f"127.0.0.1:{port}"] if port else []
-        words = [sys.executable, "-c", "from mavlink_bridge.cli import main; main()", "serve", *listen, *options]
+        words = [
+            sys.executable,
+            "-c",
+            "from mavlink_bridge.cli import main; main()",
+            "serve",
+            *listen,
+            *options,
+        ]
         self.process = subprocess.Popen(
             words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=cwd
         )
@@ -100,6 +108,7 @@ class Watched:
         self.url = url
         self.expected = re.compile(expected)
         self.troubles: list[str] = []
+        self.scale: Any = None
         self.page.set_default_timeout(WAIT_MS)
         self.page.on("console", self._hear)
         self.page.on("pageerror", lambda error: self.troubles.append(f"error: {error}"))
@@ -107,7 +116,11 @@ class Watched:
 
     def _hear(self, message: Any) -> None:
         text = f"{message.type}: {message.text} {message.location.get('url', '')}"
-        if message.type in ("error", "warning") and not self._is_the_drivers(text) and not self.expected.search(text):
+        if (
+            message.type in ("error", "warning")
+            and not self._is_the_drivers(text)
+            and not self.expected.search(text)
+        ):
             self.troubles.append(text)
 
     @staticmethod
@@ -136,6 +149,27 @@ class Watched:
         assert box is not None
         return box["x"] + east * box["width"], box["y"] + (1 - north) * box["height"]
 
+    def learn_scale(self) -> None:
+        """Click two places and read what they are: from then on `shares` knows where a place is. Leaves no target behind."""
+        corners = ((0.3, 0.3), (0.7, 0.7))
+        places = []
+        for corner in corners:
+            before = [one.input_value() for one in self._targets().all()]
+            self.click_map(*corner)
+            expect(self._targets().first).not_to_have_value(before[0] if before else "")
+            lat_deg, lon_deg = map(float, self._targets().first.input_value().split(","))
+            places.append((lon_deg, lat_deg))
+        self.page.get_by_role("button", name="Clear all").click()
+        self.scale = (corners[0], places[0], [(places[1][i] - places[0][i]) / 0.4 for i in (0, 1)])
+
+    def _targets(self) -> Locator:
+        return self.page.get_by_role("textbox", name="Target 1, latitude and longitude")
+
+    def shares(self, lon_deg: float, lat_deg: float) -> tuple[float, float]:
+        """Return where on the map a place is, as shares of its width and height."""
+        corner, at, whole = self.scale
+        return corner[0] + (lon_deg - at[0]) / whole[0], corner[1] + (lat_deg - at[1]) / whole[1]
+
     def accessible(self) -> list[str]:
         """Return what axe-core finds: rule and place."""
         self.page.evaluate(AXE.read_text(encoding="utf-8") + "; undefined")
@@ -151,4 +185,6 @@ def need_browser() -> None:
     if find_chromium() is None:
         if os.environ.get("CI") == "true":
             pytest.fail("no Chromium: set PBPP_CHROMIUM, or put one on PATH", pytrace=False)
-        pytest.skip("no Chromium on PATH and no PBPP_CHROMIUM: the page is not tested", allow_module_level=True)
+        pytest.skip(
+            "no Chromium on PATH and no PBPP_CHROMIUM: the page is not tested", allow_module_level=True
+        )

@@ -27,7 +27,6 @@ pytestmark = pytest.mark.xdist_group("browser")
 expect.set_options(timeout=WAIT_MS)
 
 LOG = Path(__file__).parents[3] / "sitl_logs" / "guided-maze.tlog"
-NEAR = "40.0717800, -105.2293000"  # round one corner
 FAR = "40.0718468, -105.2284819"
 HEADLINE = ".headline"
 
@@ -76,41 +75,130 @@ def state(page: Page) -> str:
     return page.locator("#part-drive .facts dd").first.inner_text()
 
 
-def test_from_the_first_look_to_the_arrival(browser: Browser) -> None:
+TUTORIAL = Path(__file__).parents[3] / "docs" / "tutorials" / "first-drive.md"
+
+
+def take_control(seen: Watched) -> None:
+    seen.page.get_by_role("button", name="Take control").click()
+
+
+def draw_a_circle(seen: Watched) -> None:
+    seen.page.get_by_role("tab", name="Fence").click()
+    seen.page.get_by_role("button", name="Draw a circle").click()
+    seen.click_map(*seen.shares(-105.2295, 40.0719))
+    seen.click_map(*seen.shares(-105.22946, 40.0719))
+    expect(seen.page.locator("ol.plain > li")).to_have_count(10)
+
+
+def upload_the_fence(seen: Watched) -> None:
+    seen.page.get_by_role("button", name="Upload the fence, verified").click()
+    expect(seen.page.locator(".transfer")).to_contain_text(
+        "The fence is on the vehicle, read back and compared."
+    )
+    expect(seen.page.locator("ul.zones li")).to_have_count(10)
+
+
+def click_a_target(seen: Watched) -> None:
+    seen.page.get_by_role("tab", name="Plan").click()
+    seen.click_map(*seen.shares(-105.2293, 40.07178))
+    expect(seen.page.locator(HEADLINE)).to_have_text("✓ 2.50 m promised")
+
+
+def type_a_clearance(seen: Watched) -> None:
+    seen.page.get_by_role("spinbutton", name="Clearance to keep while driving, metres").fill("3")
+    seen.page.keyboard.press("Tab")
+    expect(seen.page.locator(HEADLINE)).to_have_text("✓ 3.00 m promised")
+    assert seen.accessible() == []
+
+
+def move_a_way_point(seen: Watched) -> None:
+    seen.page.get_by_role("button", name="Way point 1.").focus()
+    for _ in range(6):
+        seen.page.keyboard.press("Shift+ArrowRight")
+    expect(seen.page.locator(HEADLINE)).to_contain_text(re.compile("legs? breaks? the promise"))
+
+
+def back_to_planning(seen: Watched) -> None:
+    seen.page.get_by_role("button", name="Back to planning").click()
+    expect(seen.page.locator(HEADLINE)).to_have_text("✓ 3.00 m promised")
+
+
+def upload(seen: Watched) -> None:
+    seen.page.get_by_role("button", name="Upload, verified").click()
+    expect(seen.page.locator(".transfer")).to_contain_text(
+        "The mission is on the vehicle, read back and compared."
+    )
+
+
+def start(seen: Watched) -> None:
+    press_start(seen.page)
+
+
+def hold(seen: Watched) -> None:
+    expect(seen.page.get_by_role("button", name="HOLD key H")).to_be_visible()
+    seen.page.keyboard.press("h")
+    expect(seen.page.locator(".hold-answer")).to_contain_text("stands")
+    expect(seen.page.locator(".chip-mode")).to_contain_text("HOLD")
+
+
+def go_on(seen: Watched) -> None:
+    seen.page.get_by_role("tab", name="Drive").click()
+    seen.page.get_by_role("button", name="Go on to the target").click()
+
+
+def arrive(seen: Watched) -> None:
+    expect(seen.page.locator("#part-drive .facts").first).to_contain_text("arrived", timeout=90_000)
+    expect(seen.page.get_by_text("The promise was kept")).to_be_visible()
+    assert seen.accessible() == []
+
+
+# Each step of the tutorial with its words: whoever changes one changes the other.
+STEPS = [
+    ("Press **Take control**. Other pages can look now, and press HOLD.", take_control),
+    (
+        "Open **Fence**, press **Draw a circle**, and click its middle and its rim in the green. It is a place to keep out of.",
+        draw_a_circle,
+    ),
+    (
+        "Press **Upload the fence, verified**. It is written to the rover, read back and compared.",
+        upload_the_fence,
+    ),
+    (
+        "Open **Plan** and click the map where the rover shall go, some way off. The route appears with what it promises: "
+        '"2.50 m promised".',
+        click_a_target,
+    ),
+    (
+        'Type 3 as the clearance. The route changes, and the headline says "3.00 m promised".',
+        type_a_clearance,
+    ),
+    (
+        "Drag a way point across the fence, or move it there with the arrow keys. The headline says at once how many legs break the promise.",
+        move_a_way_point,
+    ),
+    ("Press **Back to planning**.", back_to_planning),
+    ("Press **Upload, verified**. The mission is written to the rover, read back and compared.", upload),
+    ("Press **Start: press and hold** for a second. The mode becomes AUTO, and the rover drives.", start),
+    (
+        "Press **HOLD**, or the key H. The answer beside it is the rover's own: first that it is in HOLD, then that it stands.",
+        hold,
+    ),
+    (
+        "Open **Drive** and press **Go on to the target**. A new route is planned from where the rover stands, uploaded, verified and driven.",
+        go_on,
+    ),
+    ('Wait until the state is "arrived". Below stands what was driven against what was promised.', arrive),
+]
+
+
+def test_the_tutorial_word_for_word(browser: Browser) -> None:
+    text = TUTORIAL.read_text(encoding="utf-8")
+    assert re.findall(r"^\d+\. (.*)$", text, re.MULTILINE) == [words for words, _ in STEPS]
     with serving("--demo", "--speedup", "3") as server:
         seen = open_page(browser, server.url)
-        page = seen.page
-        page.get_by_role("button", name="Take control").click()
-
-        # A fence drawn, a target clicked, the clearance changed: all of it before anything is on the vehicle.
-        page.get_by_role("tab", name="Fence").click()
-        page.get_by_text("Type a zone").click()
-        page.get_by_label("A corner a line").fill("40.0719000, -105.2295000")
-        page.get_by_label("Radius in metres, for a circle").fill("3")
-        page.get_by_role("button", name="Add the zone").click()
-        page.get_by_role("button", name="Upload the fence, verified").click()
-        expect(page.locator(".transfer")).to_contain_text("The fence is on the vehicle", timeout=WAIT_MS)
-        page.get_by_role("button", name="Back to the held fence").click()
-        expect(page.locator("ul.zones li")).to_have_count(10)
-        page.get_by_role("tab", name="Plan").click()
-        set_target(page, NEAR)
-        page.get_by_role("spinbutton", name="Clearance to keep while driving, metres").fill("3")
-        page.keyboard.press("Tab")
-        expect(page.locator(HEADLINE)).to_have_text("✓ 3.00 m promised")
-        page.get_by_role("button", name="Upload, verified").click()
-        expect(page.locator(".transfer")).to_contain_text("The mission is on the vehicle", timeout=WAIT_MS)
-        assert seen.accessible() == []
-
-        # HOLD by its key, on whatever part; go on; arrive.
-        press_start(page)
-        page.get_by_role("tab", name="Drive").click()
-        page.keyboard.press("h")
-        expect(page.locator(".hold-answer")).to_contain_text("stands")
-        expect(page.locator(".chip-mode")).to_contain_text("HOLD")
-        page.get_by_role("button", name="Go on to the target").click()
-        expect(page.locator("#part-drive .facts").first).to_contain_text("arrived", timeout=60_000)
-        expect(page.get_by_text("The promise was kept")).to_be_visible()
-        assert seen.accessible() == []
+        seen.learn_scale()
+        for _, do in STEPS:
+            do(seen)
         close(seen)
 
 
@@ -136,13 +224,17 @@ def test_a_foreign_fence_a_cut_link_and_a_page_that_only_looks(browser: Browser,
 
             # Another station puts a fence across the route: HOLD, a new route, and on, without a hand.
             wall = tmp_path / "wall.waypoints"
-            wall.write_text(with_wall((FIELDS / "maze-fence.waypoints").read_text(encoding="utf-8")), encoding="utf-8")
+            wall.write_text(
+                with_wall((FIELDS / "maze-fence.waypoints").read_text(encoding="utf-8")), encoding="utf-8"
+            )
             subprocess.run(
                 [*words, "upload", str(wall), "--connect", connection, "--source-system", "255", "--source-component", "190", "--replace-active"],
                 check=True, timeout=60, env={**os.environ, "XDG_STATE_HOME": str(tmp_path)},
             )  # fmt: skip
             page.get_by_role("tab", name="Events").click()
-            expect(page.locator("ol.events")).to_contain_text("fence changed", ignore_case=True, timeout=WAIT_MS)
+            expect(page.locator("ol.events")).to_contain_text(
+                "fence changed", ignore_case=True, timeout=WAIT_MS
+            )
 
             # The page that holds no control has HOLD all the same.
             other.page.get_by_role("button", name="HOLD key H").click()
@@ -171,7 +263,20 @@ def with_wall(text: str) -> str:
     """Return the maze with a circle across the way to FAR."""
     lines = text.splitlines()
     last = lines[-1].split("\t")
-    wall = [str(int(last[0]) + 1), "0", "3", "5004", "4.000000", "0", "0", "0", "40.0717300", "-105.2291500", "0", "1"]
+    wall = [
+        str(int(last[0]) + 1),
+        "0",
+        "3",
+        "5004",
+        "4.000000",
+        "0",
+        "0",
+        "0",
+        "40.0717300",
+        "-105.2291500",
+        "0",
+        "1",
+    ]
     return "\n".join([*lines, "\t".join(wall)]) + "\n"
 
 

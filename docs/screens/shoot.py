@@ -44,6 +44,7 @@ def page_of(browser: Browser, url: str, **look: Any) -> Iterator[Watched]:
 def shoot(page: Page, name: str) -> None:
     """Save what is seen, with few colours: a third of the bytes."""
     page.mouse.move(2, 2)
+    page.evaluate("document.activeElement.blur(); document.querySelectorAll('.part').forEach((part) => part.scrollTo(0, 0))")
     page.wait_for_timeout(1500)
     path = HERE / f"{name}.png"
     page.screenshot(path=path)

@@ -27,6 +27,12 @@ export class Scene {
     /** @type {Map<string, string>} what some sources hold, to fill them only with something else */
     this.held = new Map();
     view.whenReady(() => this.begin());
+    // As long as nobody has moved the map it shows all, whatever room it has.
+    this.isMoved = false;
+    for (const kind of /** @type {const} */ (["dragstart", "zoomstart", "rotatestart"])) {
+      view.map.on(kind, (event) => { this.isMoved ||= "originalEvent" in event && Boolean(event.originalEvent); });
+    }
+    view.map.on("resize", () => this.isFitted && !this.isMoved && !this.isFollowing && this.fit(true));
   }
 
   begin() {
@@ -101,6 +107,7 @@ export class Scene {
 
   /** @param {boolean} [isSudden] */
   fit(isSudden = false) {
+    this.isMoved = false;
     this.view.fit(FITTED, isSudden);
   }
 }

@@ -43,7 +43,7 @@ function targetsPart(store, act) {
     show(startRow, isOurs);
     show(/** @type {HTMLElement} */ (tools.querySelector('[data-tool="start"]')), isOurs);
     keepFocus(startRow, () => fill(startRow, h("span", {}, texts.plan.start), placeField(`${texts.plan.start}, ${texts.coordinates}`, doc.start, (place) => act.setStart(place)),
-      doc.start && signButton("no", texts.plan.noStart, () => act.setStart(null)), !doc.start && h("p", { class: "quiet" }, texts.plan.startHint)));
+      doc.start && signButton("no", texts.plan.noStart, () => act.setStart(null)), !doc.start && !vehicle.position && h("p", { class: "quiet" }, texts.plan.startHint)));
   });
   store.watch(["doc", "tool"], ({ doc, tool }) => {
     const { targets } = doc;

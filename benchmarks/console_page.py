@@ -23,7 +23,7 @@ import numpy as np
 import uvicorn
 from playwright.sync_api import sync_playwright
 from starlette.applications import Starlette
-from starlette.requests import Request
+from starlette.requests import Request  # noqa: TC002 - starlette looks at the names
 from starlette.responses import FileResponse, JSONResponse
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles

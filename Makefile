@@ -14,7 +14,7 @@ LOCKED := --quiet --disable-pip-version-check --require-hashes --no-deps
 unexport PYTHONDONTWRITEBYTECODE
 quoted = '$(subst ','\'',$(1))'
 
-.PHONY: vendor coverage locks package release bench bench-bridge bench-drive bench-transfer test-foreign docs soak bench-tlog bench-ladder campaign fuzz hunt demo test lint format types walls check lock clean
+.PHONY: screens vendor coverage locks package release bench bench-bridge bench-drive bench-transfer test-foreign docs soak bench-tlog bench-ladder campaign fuzz hunt demo test lint format types walls check lock clean
 
 demo: .venv/run.stamp
 	$(BIN)/pbpp demo --out $(call quoted,$(OUT))
@@ -63,6 +63,10 @@ format: .venv/dev.stamp
 types: .venv/dev.stamp tools/page/node_modules/.installed
 	$(BIN)/mypy
 	$(PAGE) types
+
+# The pictures of the console in the documentation, taken in a browser.
+screens: .venv/dev.stamp
+	$(BIN)/python docs/screens/shoot.py
 
 # What the page loads, copied anew from the locked packages (after a change in tools/page/package.json).
 vendor: tools/page/node_modules/.installed

@@ -23,10 +23,11 @@ import numpy as np
 import uvicorn
 from playwright.sync_api import sync_playwright
 from starlette.applications import Starlette
+from starlette.requests import Request  # noqa: TC002 - starlette looks at the names
 from starlette.responses import FileResponse, JSONResponse
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
-from starlette.websockets import WebSocketDisconnect
+from starlette.websockets import WebSocket, WebSocketDisconnect
 
 import mavlink_bridge
 
@@ -110,7 +111,7 @@ class Feed:
         self.live = live_s * RATE_HZ
         self.is_fed = threading.Event()
 
-    async def run(self, socket_: Any) -> None:
+    async def run(self, socket_: WebSocket) -> None:
         """Feed all but the newest part quickly, the rest as it would come."""
         await socket_.accept()
         message = {
@@ -145,13 +146,13 @@ class Feed:
 def serve(feed: Feed) -> int:
     """Serve page and feed in a thread; return the port."""
 
-    async def live(socket_: Any) -> None:
+    async def live(socket_: WebSocket) -> None:
         await feed.run(socket_)
 
-    async def index(_request: Any) -> FileResponse:  # noqa: RUF029 - starlette calls it
+    async def index(_request: Request) -> FileResponse:
         return FileResponse(PAGE / "index.html")
 
-    async def nothing(_request: Any) -> JSONResponse:  # noqa: RUF029
+    async def nothing(_request: Request) -> JSONResponse:
         return JSONResponse([])
 
     routes = [
@@ -189,7 +190,7 @@ def frames_ms(trace: Path) -> list[float]:
         [ts for ts, _, dur in tasks if np.searchsorted(called, ts) < np.searchsorted(called, ts + dur)]
     )
     sums = np.zeros(len(marks) + 1)
-    for ts, tdur, dur in tasks:
+    for ts, tdur, _ in tasks:
         sums[np.searchsorted(marks, ts, side="right")] += tdur / 1000
     return sums[1:-1].tolist()
 

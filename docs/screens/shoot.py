@@ -6,7 +6,7 @@ import sys
 import tempfile
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from PIL import Image
 from playwright.sync_api import expect, sync_playwright
@@ -31,7 +31,7 @@ WAIT_MS = 60_000
 
 
 @contextmanager
-def page_of(browser: Browser, url: str, **look: Any) -> Iterator[Watched]:
+def page_of(browser: Browser, url: str, **look: object) -> Iterator[Watched]:
     """Open a page; it must be as free of trouble as in the tests."""
     context = browser.new_context(**{"viewport": DESKTOP, **look})
     seen = Watched(context, url)
@@ -44,7 +44,9 @@ def page_of(browser: Browser, url: str, **look: Any) -> Iterator[Watched]:
 def shoot(page: Page, name: str) -> None:
     """Save what is seen, with few colours: a third of the bytes."""
     page.mouse.move(2, 2)
-    page.evaluate("document.activeElement.blur(); document.querySelectorAll('.part').forEach((part) => part.scrollTo(0, 0))")
+    page.evaluate(
+        "document.activeElement.blur(); document.querySelectorAll('.part').forEach((part) => part.scrollTo(0, 0))"
+    )
     page.wait_for_timeout(1500)
     path = HERE / f"{name}.png"
     page.screenshot(path=path)
@@ -76,7 +78,10 @@ def plans(browser: Browser, tiles: Path) -> None:
                 seen.page.keyboard.press("Shift+ArrowDown")
             expect(seen.page.locator(".headline")).to_contain_text("the promise")
             shoot(seen.page, "console-check")
-    with serving("--fence", FENCE, "--start", START, "--map", str(tiles)) as server, page_of(browser, server.url) as seen:
+    with (
+        serving("--fence", FENCE, "--start", START, "--map", str(tiles)) as server,
+        page_of(browser, server.url) as seen,
+    ):
         set_target(seen.page, "40.0723079, -105.2285800")
         shoot(seen.page, "console-map")
 
@@ -99,7 +104,12 @@ def drives(browser: Browser) -> None:
         with page_of(browser, server.url, color_scheme="dark") as night:
             night.page.get_by_role("tab", name="Drive").click()
             shoot(night.page, "console-drive")
-        phone = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True, "device_scale_factor": 1}
+        phone = {
+            "viewport": {"width": 390, "height": 844},
+            "is_mobile": True,
+            "has_touch": True,
+            "device_scale_factor": 1,
+        }
         with page_of(browser, server.url, **phone) as small:
             small.page.get_by_role("tab", name="Drive").click()
             shoot(small.page, "console-phone")

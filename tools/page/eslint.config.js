@@ -4,7 +4,7 @@ const browser = ["AbortController", "AbortSignal", "Blob", "CSS", "CustomEvent",
   "HTMLButtonElement", "HTMLCanvasElement", "HTMLDialogElement", "HTMLInputElement", "HTMLSelectElement", "HTMLTextAreaElement", "Image", "KeyboardEvent",
   "Node", "PointerEvent", "ResizeObserver", "Response", "SVGElement", "URL", "URLSearchParams", "WebSocket", "cancelAnimationFrame", "clearInterval",
   "clearTimeout", "console", "crypto", "customElements", "devicePixelRatio", "document", "fetch", "getComputedStyle", "history", "location", "localStorage",
-  "matchMedia", "navigator", "performance", "pmtiles", "queueMicrotask", "requestAnimationFrame", "sessionStorage", "setInterval", "setTimeout", "structuredClone", "window"];
+  "matchMedia", "navigator", "performance", "pmtiles", "queueMicrotask", "reportError", "requestAnimationFrame", "sessionStorage", "setInterval", "setTimeout", "structuredClone", "window"];
 
 export default [
   { ignores: ["**/vendor/**"] },

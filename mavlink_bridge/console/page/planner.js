@@ -15,7 +15,10 @@ export class Planner {
     /** @type {AbortController | null} */
     this.running = null;
     this.timer = 0;
-    this.looking = 0;
+    /** @type {AbortController | null} */
+    this.looking = null;
+    /** @type {AbortController | null} */
+    this.measuring = null;
     this.asked = "";
     this.askedFence = "";
     this.askedWidest = "";
@@ -95,14 +98,18 @@ export class Planner {
       return;
     }
     this.askedWidest = text;
+    this.measuring?.abort();
+    this.measuring = new AbortController();
     this.store.set({ widest_m: null });
     try {
-      const { clearance_m } = await post("/api/widest", body);
+      const { clearance_m } = await post("/api/widest", body, this.measuring.signal);
       if (this.askedWidest === text) {
         this.store.set({ widest_m: clearance_m });
       }
     } catch {
-      this.askedWidest = "";
+      if (this.askedWidest === text) {
+        this.askedWidest = "";
+      }
     }
   }
 
@@ -118,14 +125,15 @@ export class Planner {
       return;
     }
     this.askedFence = text;
-    this.looking += 1;
-    const looking = this.looking;
+    this.looking?.abort();
+    const looking = new AbortController();
+    this.looking = looking;
     if (doc.zones === null) {
       this.store.set({ looked: null });
       return;
     }
     try {
-      const looked = await post("/api/fence/look", body);
+      const looked = await post("/api/fence/look", body, looking.signal);
       if (looking === this.looking) {
         this.store.set({ looked });
       }

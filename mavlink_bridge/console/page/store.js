@@ -47,7 +47,12 @@ export class Store {
     this.isTelling = false;
     for (const { keys, listen } of this.listeners) {
       if ([...changed].some((name) => keys.has(name))) {
-        listen(this.state);
+        try {
+          listen(this.state);
+        } catch (error) {
+          // A fault in one part must not keep the others, HOLD's answer among them, from showing what is.
+          reportError(error);
+        }
       }
     }
   }

@@ -42,7 +42,7 @@
  *   no_route: NoRoute | null}} Plan
  * @typedef {{id: string, items: number, points: Place[], matches_plan: boolean, time_s: number | null, current_seq: number | null}} HeldMission
  *
- * @typedef {{state: string, state_text: string, since_s: number | null, awaits_start: boolean, plan_id: string, can_resume: boolean, trouble: string,
+ * @typedef {{state: string, state_text: string, since_s: number | null, awaits_upload: boolean, awaits_start: boolean, plan_id: string, can_resume: boolean, trouble: string,
  *   way_home: string, is_driving: boolean, begun_s: number | null, next_seq: number | null, progress_m: number | null, length_m: number | null,
  *   left_m: number | null, eta_s: number | null, driven_m: number | null, deviation_m: number | null, corridor_ok: boolean,
  *   least_clearance_m: number | null, least_at: Place | null, asked_m: number | null, breaches: number}} Drive

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 from console.browser_kit import FIELDS, WAIT_MS, Served, Watched, launched, need_browser, serving
+from console.tiny_map import write_map
+from PIL import Image
 
 need_browser()
 
@@ -17,6 +19,7 @@ from playwright.sync_api import Browser, Page, expect, sync_playwright  # noqa: 
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from pathlib import Path
 
 pytestmark = pytest.mark.xdist_group("browser")
 
@@ -76,6 +79,12 @@ def test_a_click_is_planned_and_a_dragged_way_point_is_judged_at_once(watched: W
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
     page.mouse.move(x - 40, y + 51)
     expect(rows.nth(0)).to_have_class("leg keeps hovered")
+
+    # The view as a picture.
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Save a picture (PNG)").click()
+    with Image.open(download.value.path()) as picture:
+        assert len(picture.convert("RGB").getcolors(1 << 24)) > 50
 
     # Into the wall and back.
     page.mouse.move(x, y)
@@ -201,6 +210,10 @@ def test_dropped_files_are_opened_and_saved_in_other_formats(watched: Watched) -
         saved[suffix] = download.value.path().read_text(encoding="utf-8")
         assert download.value.suggested_filename.endswith(suffix)
     assert watched.accessible() == []
+    # A name is a text, whatever it says.
+    drop(page, "<img src=x onerror=alert(1)>.waypoints", fence)
+    expect(page.get_by_text("Opened <img src=x onerror=alert(1)>.waypoints: a fence of")).to_be_visible()
+    assert page.locator("img").count() == 0
     for suffix, text in saved.items():
         drop(page, f"again{suffix}", text)
         expect(page.get_by_text(f"Opened again{suffix}: a fence of")).to_be_visible()
@@ -221,6 +234,21 @@ def test_a_phone_in_the_dark(browser: Browser, maze: Served) -> None:
         assert seen.accessible() == []
     assert seen.troubles == []
     context.close()
+
+
+def test_a_map_lies_under_everything_and_comes_from_here(browser: Browser, tmp_path: Path) -> None:
+    tiles = tmp_path / "field.pmtiles"
+    write_map(tiles, (-105.2294, 40.0719), zooms=(16, 17))
+    with serving("--fence", str(FIELDS / "maze-fence.waypoints"), "--map", str(tiles)) as server:
+        context = browser.new_context(viewport={"width": 3840, "height": 2160})
+        seen = Watched(context, server.url)
+        with seen.page.expect_response(
+            lambda answer: answer.url.endswith("/map.pmtiles") and answer.status == 206
+        ):
+            seen.open()
+        assert seen.accessible() == []
+        assert seen.troubles == []
+        context.close()
 
 
 def test_without_webgl_there_is_the_servers_picture(browser: Browser, maze: Served) -> None:

@@ -164,8 +164,7 @@ STEPS = [
         upload_the_fence,
     ),
     (
-        "Open **Plan** and click the map where the rover shall go, some way off. The route appears with what it promises: "
-        '"2.50 m promised".',
+        'Open **Plan** and click the map where the rover shall go, some way off. The route appears with what it promises: "2.50 m promised".',
         click_a_target,
     ),
     (
@@ -199,6 +198,22 @@ def test_the_tutorial_word_for_word(browser: Browser) -> None:
         seen.learn_scale()
         for _, do in STEPS:
             do(seen)
+
+        # The fence that was there before is a backup, and put back with one step and a question.
+        page = seen.page
+        page.get_by_role("tab", name="Files").click()
+        page.get_by_role("button", name=re.compile("^Restore .*fence")).first.click()
+        page.get_by_role("dialog").get_by_role("button", name="Restore").click()
+        expect(page.locator(".transfer")).to_contain_text("is on the vehicle")
+        page.get_by_role("tab", name="Fence").click()
+        expect(page.locator("ul.zones li")).to_have_count(9)
+
+        # What stands in the way is marked, and forgotten.
+        page.get_by_role("tab", name="Drive").click()
+        page.get_by_role("button", name="Blocked here").click()
+        expect(page.get_by_role("button", name="Forget blocked places")).to_be_enabled()
+        page.get_by_role("button", name="Forget blocked places").click()
+        expect(page.get_by_role("button", name="Forget blocked places")).to_be_disabled()
         close(seen)
 
 

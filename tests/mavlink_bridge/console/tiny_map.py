@@ -20,7 +20,9 @@ HEADER = struct.Struct("<7sB11QBBBBBBiiiiBii")
 GRASS, TRACK, TREES, ROOF = (176, 192, 140), (214, 202, 172), (96, 128, 84), (170, 110, 96)
 
 
-def write_map(path: Path, middle: tuple[float, float], *, zooms: Iterable[int] = range(14, 20), around_m: float = 260.0) -> None:
+def write_map(
+    path: Path, middle: tuple[float, float], *, zooms: Iterable[int] = range(14, 20), around_m: float = 260.0
+) -> None:
     """Write tiles around a place.
 
     Parameters
@@ -34,7 +36,9 @@ def write_map(path: Path, middle: tuple[float, float], *, zooms: Iterable[int] =
         How far the tiles reach at the least.
     """
     levels = sorted(zooms)
-    tiles = sorted((_tile_id(z, x, y), _tile(z, x, y, middle)) for z in levels for x, y in _tiles(z, middle, around_m))
+    tiles = sorted(
+        (_tile_id(z, x, y), _tile(z, x, y, middle)) for z in levels for x, y in _tiles(z, middle, around_m)
+    )
     entries, data = [], b""
     for number, picture in tiles:
         entries.append((number, len(data), len(picture)))
@@ -44,7 +48,10 @@ def write_map(path: Path, middle: tuple[float, float], *, zooms: Iterable[int] =
     begin = HEADER.size
     lon_deg, lat_deg = middle
     reach_deg = around_m / 80_000
-    box = [round(value * 1e7) for value in (lon_deg - reach_deg, lat_deg - reach_deg, lon_deg + reach_deg, lat_deg + reach_deg)]
+    box = [
+        round(value * 1e7)
+        for value in (lon_deg - reach_deg, lat_deg - reach_deg, lon_deg + reach_deg, lat_deg + reach_deg)
+    ]
     header = HEADER.pack(
         b"PMTiles", 3, begin, len(directory), begin + len(directory), len(metadata), 0, 0, begin + len(directory) + len(metadata), len(data),
         len(tiles), len(tiles), len(tiles), 1, NO_COMPRESSION, NO_COMPRESSION, PNG, levels[0], levels[-1], *box, levels[-1],
@@ -118,11 +125,21 @@ def _tile(zoom: int, column: int, row: int, middle: tuple[float, float]) -> byte
     pen = ImageDraw.Draw(image)
     for strip in range(-60, 60):
         shade = tuple(value - 7 * (strip % 2) for value in GRASS)
-        pen.polygon([px(strip * 9, -600), px(strip * 9 + 9, -600), px(strip * 9 + 49, 600), px(strip * 9 + 40, 600)], fill=shade)
-    pen.line([px(-600, -150), px(-90, -110), px(20, -135), px(600, -90)], fill=TRACK, width=max(1, round(6 * scale)))
+        pen.polygon(
+            [px(strip * 9, -600), px(strip * 9 + 9, -600), px(strip * 9 + 49, 600), px(strip * 9 + 40, 600)],
+            fill=shade,
+        )
+    pen.line(
+        [px(-600, -150), px(-90, -110), px(20, -135), px(600, -90)],
+        fill=TRACK,
+        width=max(1, round(6 * scale)),
+    )
     for i in range(60):
         east_m, north_m, radius_m = -420 + 15 * i, 125 + 14 * math.sin(i), 6 + 3 * math.cos(3 * i)
-        (x0, y0), (x1, y1) = px(east_m - radius_m, north_m + radius_m), px(east_m + radius_m, north_m - radius_m)
+        (x0, y0), (x1, y1) = (
+            px(east_m - radius_m, north_m + radius_m),
+            px(east_m + radius_m, north_m - radius_m),
+        )
         pen.ellipse([x0, y0, x1, y1], fill=TREES)
     pen.polygon([px(120, -60), px(150, -52), px(146, -34), px(116, -42)], fill=ROOF)
     out = io.BytesIO()

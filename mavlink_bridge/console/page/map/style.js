@@ -54,8 +54,22 @@ export function style(isDark, tiles) {
   return {
     version: 8,
     sources,
-    layers: [...ground, ...field(colour, tiles !== null), ...route(colour), ...tracks(colour), ...labels(colour), ...drafts(colour), ...rover(colour)],
+    layers: [...ground, ...field(colour, tiles !== null), ...route(colour), ...tracks(colour), ...labels(colour), ...drafts(colour), ...rover(colour)].map(scaled),
   };
+}
+
+/**
+ * Letters and signs grow with the page's own letters: on a large screen, and for who has set larger ones.
+ * @param {Layer} layer
+ * @returns {Layer}
+ */
+function scaled(layer) {
+  const scale = parseFloat(getComputedStyle(document.documentElement).fontSize) / 16;
+  if (layer.type !== "symbol" || !layer.layout) {
+    return layer;
+  }
+  const { "text-size": text, "icon-image": icon } = layer.layout;
+  return { ...layer, layout: { ...layer.layout, ...(typeof text === "number" ? { "text-size": text * scale } : {}), ...(icon ? { "icon-size": scale } : {}) } };
 }
 
 /**

@@ -108,11 +108,16 @@ export function marks(state) {
   if (start) {
     found.push(spot(start, { icon: "start", name: state.vehicle.position ? "" : texts.map.start }));
   }
-  found.push(...troubles(plan));
+  found.push(...troubles(plan), ...state.marks.map(({ at, icon, name }) => spot(at, { icon, name })));
   if (drive.least_at && drive.least_clearance_m !== null) {
     found.push(spot(drive.least_at, { icon: "least", name: texts.drive.leastHere(drive.least_clearance_m) }));
   }
   return found;
+}
+
+/** @param {import("../types.js").NamedLine[]} named */
+export function lines(named) {
+  return named.map((one) => line(one.places, { name: one.name }));
 }
 
 /** @param {Plan | null} plan */

@@ -55,7 +55,8 @@ export class Scene {
       view.set("points", features.points(plan));
     });
     store.watch(["mission", "plan"], ({ mission, plan }) => view.set("mission", mission && !(mission.matches_plan && plan?.by === "director") && mission.points.length > 1 ? [features.line(mission.points)] : []));
-    store.watch(["doc", "home", "rally", "plan", "drive", "vehicle"], (state) => this.setIfOther("places", features.marks(state)));
+    store.watch(["doc", "home", "rally", "plan", "drive", "vehicle", "marks"], (state) => this.setIfOther("places", features.marks(state)));
+    store.watch(["lines"], ({ lines }) => view.set("lines", features.lines(lines)));
     store.watch(["vehicle", "link"], (state) => this.showRover(state));
     store.watch(["hoverLeg"], ({ hoverLeg }) => { view.hoverLeg(hoverLeg, this.hovered); this.hovered = hoverLeg; });
     store.watch(["hoverAlong_m"], (state) => this.showAlong(state));

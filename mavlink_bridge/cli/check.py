@@ -14,13 +14,14 @@ from mavlink_bridge.cli.common import inform, remarks_document, warn
 from mavlink_bridge.cli.drawing import cell, console
 from mavlink_bridge.cli.failing import ExitCode
 from mavlink_bridge.cli.home_parts import ways_document, with_parts
-from mavlink_bridge.cli.mission_source import check_source, mission_situation, start_of
+from mavlink_bridge.cli.mission_source import check_source, mission_situation, source_kind, start_of
 from mavlink_bridge.cli.pictures import check_plots, draw
 from mavlink_bridge.cli.plan_results import hold_document
 from mavlink_bridge.cli.terminal import echo, print_json
 from mavlink_bridge.cli.values import given_places
 from mavlink_bridge.cli.vehicle_options import with_vehicle
 from mavlink_bridge.cli.way_home import RouteWays
+from mavlink_bridge.console.stills import check_still
 from missions.checking.check import check_mission, plan_of
 from missions.picture.plans import plan_scene
 from missions.request import GoTo
@@ -56,7 +57,13 @@ def check(options: CheckOptions) -> None:
     ]
     inform(checked.info)
     warn(warnings)
-    draw(partial(_scene, checked, planned, ways), options.plot)
+    draw(
+        partial(_scene, checked, planned, ways),
+        lambda scene: check_still(
+            scene, checked, planned, situation, request, source_kind(options), warnings
+        ),
+        options.plot,
+    )
     if options.json_output:
         document = _document(checked, warnings, situation.system, options.plot)
         home = ways.document() if ways is not None else None

@@ -64,6 +64,9 @@ async function buildMap(state) {
   scene = new Scene(view, store);
   scene.track.add(early);
   early = [];
+  if (!isServed) {
+    scene.showAll();
+  }
   const pointing = new Pointing(view, store, actions);
   mapArea.append(toolbar(store, actions, scene, view, pointing));
   requestAnimationFrame(drawTrack);
@@ -100,20 +103,14 @@ function buildStill(held) {
 
 /** The parts of the side: in a page that is one file those that only show. */
 function panels() {
-  const isLog = INSIDE === null || INSIDE.moments.length > 0;
   /** @type {Parameters<typeof tabs>[1]} */
-  const parts = [["plan", planPanel(store, actions)]];
-  if (isLog) {
-    parts.push(["drive", drivePanel(store, actions)]);
-  }
-  parts.push(["fence", fencePanel(store, actions)]);
-  if (isServed) {
-    parts.push(["files", filesPanel(store, actions)]);
-  }
-  if (isLog) {
-    parts.push(["events", eventsPanel(store, (place) => view?.show(place))]);
-  }
-  return tabs(store, parts);
+  const all = [
+    ["plan", planPanel(store, actions)], ["drive", drivePanel(store, actions)], ["fence", fencePanel(store, actions)],
+    ["files", filesPanel(store, actions)], ["events", eventsPanel(store, (place) => view?.show(place))],
+  ];
+  /** @type {string[]} */
+  const still = INSIDE && INSIDE.moments.length > 0 ? ["drive", "plan", "fence", "events"] : ["plan", "fence"];
+  return tabs(store, isServed ? all : still.flatMap((name) => all.filter(([one]) => one === name)));
 }
 
 /** Keys that act everywhere but in a text. @param {KeyboardEvent} event */

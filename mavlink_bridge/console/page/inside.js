@@ -8,6 +8,7 @@
  * @property {string[]} title
  * @property {any} message the snapshot, as the server would send it
  * @property {Moment[]} moments of a log, in time; empty where there is no log
+ * @property {string[]} notes of a log: what was found in it
  * @property {import("./types.js").NamedLine[]} lines
  * @property {import("./types.js").NamedMark[]} marks
  *
@@ -43,7 +44,8 @@ export class Shown {
     this.held = held;
     this.onmessage = onmessage;
     onmessage(held.message);
-    this.seek(held.message.state.replay?.begin_s ?? 0);
+    // A picture shows first what there is at its end: all of it.
+    this.seek(held.message.state.replay?.end_s ?? 0);
   }
 
   /** @param {number} time_s */

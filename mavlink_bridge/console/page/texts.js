@@ -157,6 +157,7 @@ const en = {
     states: /** @type {Record<string, string>} */ ({ none: "", sent: "HOLD sent, waiting for the vehicle …", answered: "The vehicle is in HOLD", stopped: "The vehicle is in HOLD and stands", no_answer: "NO ANSWER TO HOLD. Use your transmitter." }),
   },
   drive: {
+    found: "What the log shows",
     title: "Drive", state: "State", progress: "Progress", left: "Left", eta: "Arrives in", deviation: "Off the line", least: "Least clearance so far", next: "Next way point", asked: "Promised",
     along: /** @param {number} progress_m @param {number} length_m */ (progress_m, length_m) => `${progress_m.toFixed(1)} of ${length_m.toFixed(1)} m`,
     off: /** @param {number} deviation_m @param {boolean} isInside */ (deviation_m, isInside) => `${deviation_m.toFixed(2)} m, ${isInside ? "inside the corridor" : "OUTSIDE THE CORRIDOR"}`,

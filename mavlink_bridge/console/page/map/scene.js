@@ -21,6 +21,7 @@ export class Scene {
     this.store = store;
     this.track = new Track(view, (mode) => lookOf(mode, store.state.vehicle.autopilot));
     this.isFitted = false;
+    this.fitted = FITTED;
     this.isFollowing = false;
     /** @type {number | null} */
     this.hovered = null;
@@ -109,7 +110,13 @@ export class Scene {
   /** @param {boolean} [isSudden] */
   fit(isSudden = false) {
     this.isMoved = false;
-    this.view.fit(FITTED, isSudden);
+    this.view.fit(this.fitted, isSudden);
+  }
+
+  /** Show the whole track too, from the beginning: there is no rover to follow in a page that is one file. */
+  showAll() {
+    this.fitted = [...FITTED, "lines", "track-old", "track"];
+    this.view.whenReady(() => { this.track.draw(true); this.isFitted = true; this.fit(true); });
   }
 }
 

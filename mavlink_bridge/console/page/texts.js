@@ -64,6 +64,7 @@ const en = {
     restarted: "pbpp was started anew: everything is shown as it is now.",
   },
   map: {
+    nameHere: "Map. Arrow keys move it, plus and minus zoom.",
     name: "Map. Arrow keys move it, plus and minus zoom, T puts a target in its middle.",
     area: "Map",
     home: "home", target: "target", start: "start",
@@ -123,7 +124,7 @@ const en = {
     took: /** @param {number} seconds */ (seconds) => `${seconds < 1 ? `${Math.round(seconds * 1000)} ms` : `${seconds.toFixed(1)} s`}`,
     narrowest: /** @param {number} width_m */ (width_m) => `narrowest: ${m(width_m)} wide`,
     byDirector: "This is the plan that stands on the bridge.", byPage: "A look at what would be; nothing is on the vehicle.",
-    byPlan: "As planned when this file was written.", byCheck: "A mission as it was checked when this file was written.",
+    byPlan: "As planned when this file was written.", byLog: "What the bridge planned, or would have planned, at this moment of the log.", byCheck: "A mission as it was checked when this file was written.",
     keeps: /** @param {Record<string, number | null>} keeps */ ({ drawn_m, driven_m }) => `Drawn lines keep ${m(drawn_m)}, the predicted track ${m(driven_m)}.`,
     startKeeps: /** @param {number} value */ (value) => `Leaving the start it keeps ${m(value)}: more is not free there.`,
     extrapolated: "Extrapolated: outside what was measured",

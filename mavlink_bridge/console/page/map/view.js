@@ -2,7 +2,7 @@
 
 import * as maplibre from "../vendor/maplibre-gl/maplibre-gl.mjs";
 import { box, places } from "../geo.js";
-import { ownWorkerUrl } from "../inside.js";
+import { isServed, ownWorkerUrl } from "../inside.js";
 import { texts } from "../texts.js";
 import { gridLines } from "./grid.js";
 import { addIcons } from "./icons.js";
@@ -47,7 +47,7 @@ export class MapView {
       pitchWithRotate: false, maxPitch: 0, renderWorldCopies: false, fadeDuration: 0, clickTolerance: 4, cancelPendingTileRequestsWhileZooming: true,
       locale: texts.map.controls,
     });
-    this.map.getCanvas().setAttribute("aria-label", texts.map.name);
+    this.map.getCanvas().setAttribute("aria-label", isServed ? texts.map.name : texts.map.nameHere);
     this.map.addControl(new maplibre.NavigationControl({ visualizePitch: false }), "top-right");
     this.map.addControl(new maplibre.ScaleControl({ unit: "metric", maxWidth: 140 }), "bottom-left");
     if (tiles?.attribution) {

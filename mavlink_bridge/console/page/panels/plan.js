@@ -176,7 +176,10 @@ function outcome(plan, { doc }, act) {
 
 /** @param {import("../types.js").Plan} plan */
 function bySource({ by, state }) {
-  return by === "director" ? texts.plan.byDirector : isServed ? texts.plan.byPage : state === "checked" ? texts.plan.byCheck : texts.plan.byPlan;
+  if (isServed) {
+    return by === "director" ? texts.plan.byDirector : texts.plan.byPage;
+  }
+  return by === "director" ? texts.plan.byLog : state === "checked" ? texts.plan.byCheck : texts.plan.byPlan;
 }
 
 /** @param {import("../types.js").Plan} plan */

@@ -147,7 +147,7 @@ def go_on(seen: Watched) -> None:
 
 
 def arrive(seen: Watched) -> None:
-    expect(seen.page.locator("#part-drive .facts").first).to_contain_text("arrived", timeout=90_000)
+    expect(seen.page.locator("#part-drive .facts").first).to_contain_text("arrived", timeout=120_000)
     expect(seen.page.get_by_text("The promise was kept")).to_be_visible()
     assert seen.accessible() == []
 
@@ -196,8 +196,14 @@ def test_the_tutorial_word_for_word(browser: Browser) -> None:
     with serving("--demo", "--speedup", "3") as server:
         seen = open_page(browser, server.url)
         seen.learn_scale()
-        for _, do in STEPS:
-            do(seen)
+        for words, do in STEPS:
+            try:
+                do(seen)
+            except AssertionError as error:
+                error.add_note(
+                    f"step: {words}; troubles: {seen.troubles}; told: {seen.page.locator('.toast').all_inner_texts()}"
+                )
+                raise
 
         # The fence that was there before is a backup, and put back with one step and a question.
         page = seen.page
@@ -258,7 +264,7 @@ def test_a_foreign_fence_a_cut_link_and_a_page_that_only_looks(browser: Browser,
 
             # No heartbeat: nobody can overlook it. And back.
             rover.send_signal(signal.SIGSTOP)
-            expect(page.locator(".alarm-bar")).to_contain_text("LINK LOST", timeout=WAIT_MS)
+            expect(page.locator(".alarm-bar")).to_contain_text("LINK LOST")
             assert seen.accessible() == []
             rover.send_signal(signal.SIGCONT)
             expect(page.locator(".alarm-bar")).to_be_hidden(timeout=WAIT_MS)

@@ -101,6 +101,8 @@ function press(event) {
   } else if ((event.ctrlKey || event.metaKey) && event.key.toLowerCase() === "y" && !typesText(event.target)) {
     event.preventDefault();
     actions.redo();
+  } else if (event.key === "Escape" && ["polygon", "circle"].includes(store.state.tool)) {
+    store.set({ tool: "none" });
   }
 }
 
@@ -141,8 +143,8 @@ function begin(before, state) {
 
 /** Without a question of this page the director's plan is shown; and the plan that a page's own became, once it stands. */
 function showStanding() {
-  const { doc, standing, plan } = store.state;
-  if (question(doc) === null || plan === null || (standing && isSame(standing.request, doc) && standing.state !== "planning")) {
+  const { doc, standing } = store.state;
+  if (question(doc) === null || (standing && isSame(standing.request, doc) && standing.state !== "planning")) {
     store.set({ plan: standing });
   }
 }

@@ -125,9 +125,8 @@ def back_to_planning(seen: Watched) -> None:
 
 def upload(seen: Watched) -> None:
     seen.page.get_by_role("button", name="Upload, verified").click()
-    expect(seen.page.locator(".transfer")).to_contain_text(
-        "The mission is on the vehicle, read back and compared."
-    )
+    # Only what was read back and compared can be started.
+    expect(seen.page.get_by_role("button", name="Start: press and hold")).to_be_enabled()
 
 
 def start(seen: Watched) -> None:

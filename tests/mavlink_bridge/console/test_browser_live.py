@@ -305,7 +305,7 @@ def test_a_server_started_anew_under_an_open_page(browser: Browser) -> None:
     with serving("--fence", fence, "--start", "40.0712247,-105.2302031") as server:
         port = server.port
         # What Chromium says of a server that is gone is meant.
-        seen = open_page(browser, server.url, expected=r"ERR_CONNECTION_REFUSED|WebSocket connection")
+        seen = open_page(browser, server.url, expected=r"net::ERR_|WebSocket connection")
         set_target(seen.page, "40.0723079, -105.2285800")
         server.stop()
         expect(seen.page.locator(".alarm-bar")).to_contain_text("This page has lost pbpp")

@@ -149,6 +149,9 @@ def _guarded(handler: Handler) -> Handler:
             return failure(Problem(kind="superseded", message="a newer request took its place"), 409)
         except (MissionError, BridgeError) as error:
             return failure(problem_of(error), 422)
+        except Exception as error:  # noqa: BLE001 - the last place where it can be answered
+            text = f"{type(error).__name__}: {error}. This is a bug in pbpp"
+            return failure(Problem(kind="internal", message=text), 500)
 
     return run
 

@@ -104,7 +104,10 @@ def bundled() -> bytes:
     banner = f"/* Made by `make bundle` of the modules in page/: {sources()} */"
     entry = VENDOR.parent / "app.js"
     words = [*_program("node"), "bundle.js", os.path.relpath(entry, HERE), banner]
-    return subprocess.run(words, cwd=HERE, check=True, stdout=subprocess.PIPE).stdout
+    done = subprocess.run(words, cwd=HERE, check=False, stdout=subprocess.PIPE)
+    if done.returncode:
+        raise SystemExit("the page's modules could not be put together")
+    return done.stdout
 
 
 def bundle() -> int:

@@ -142,12 +142,16 @@ export class Actions {
     if (!mission) {
       return;
     }
-    await this.attempt(texts.plan.repair, async () => {
+    this.planner.makeRoom();
+    const isDone = await this.attempt(texts.plan.repair, async () => {
       const plan = await post("/api/repair", { ...missionBody(mission), ...fenceBody(zones), ...startBody(this.history.value), ...(clearance_m === null ? {} : { clearance_m }) });
       this.change(texts.steps.repair, { mission: { name: mission.name, points: routePoints(plan), items: null } });
       this.store.set({ plan, planTrouble: null, isPlanning: false });
       this.planner.show(this.history.value);
     });
+    if (!isDone) {
+      this.planner.change(true);
+    }
   }
 
   // The fence
@@ -342,13 +346,16 @@ export class Actions {
   /**
    * @param {string} what
    * @param {() => Promise<any>} act
+   * @returns {Promise<boolean>} whether it was done
    */
   async attempt(what, act) {
     try {
       await act();
+      return true;
     } catch (error) {
       const { message, advice } = refusal(error);
       this.tell(texts.refused(what, advice ? `${message} ${advice}` : message), true);
+      return false;
     }
   }
 }

@@ -85,7 +85,7 @@ function buildPage() {
     h("a", { class: "jump", href: "#hold-bar" }, texts.skipHold), h("a", { class: "jump", href: "#panel" }, texts.skip),
     h("header", { class: "top" }, h("div", { class: "brand" }, h("h1", {}, texts.name), source), vehicleBar(store), controlBar(store, actions)),
     alarmBar(store),
-    h("main", {}, mapArea, h("div", { class: "side", id: "panel" }, transferNote(store), panels()), timeline(store, (time_s) => live?.send({ type: "seek", time_s })), profileChart(store), holdBar(store, actions)),
+    h("main", {}, mapArea, h("div", { class: "side", id: "panel" }, transferNote(store), panels()), timeline(store, seek), profileChart(store), holdBar(store, actions)),
     toastList);
 }
 
@@ -125,6 +125,8 @@ function press(event) {
   } else if ((event.ctrlKey || event.metaKey) && event.key.toLowerCase() === "y" && !typesText(event.target)) {
     event.preventDefault();
     actions.redo();
+  } else if (event.key === "Escape" && ["polygon", "circle"].includes(store.state.tool)) {
+    store.set({ tool: "none" });
   }
 }
 
@@ -149,6 +151,15 @@ function hear(message) {
   }
 }
 
+/** The moment of a log that was asked for last. @type {number | null} */
+let moment_s = null;
+
+/** @param {number} time_s */
+function seek(time_s) {
+  moment_s = time_s;
+  live?.send({ type: "seek", time_s });
+}
+
 /**
  * The first snapshot, or that of a server started anew.
  * @param {PageState} before
@@ -160,13 +171,17 @@ function begin(before, state) {
   } else if (before.server.run_id && before.server.run_id !== state.server.run_id) {
     tell(texts.alarm.restarted, false);
   }
+  if (state.replay && moment_s !== null) {
+    // A new connection begins at the log's begin.
+    seek(moment_s);
+  }
   showStanding();
 }
 
 /** Without a question of this page the director's plan is shown; and the plan that a page's own became, once it stands. */
 function showStanding() {
-  const { doc, standing, plan } = store.state;
-  if (question(doc) === null || plan === null || (standing && isSame(standing.request, doc) && standing.state !== "planning")) {
+  const { doc, standing } = store.state;
+  if (question(doc) === null || (standing && isSame(standing.request, doc) && standing.state !== "planning")) {
     store.set({ plan: standing });
   }
 }

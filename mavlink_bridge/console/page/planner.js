@@ -42,12 +42,22 @@ export class Planner {
     this.asked = JSON.stringify(question(doc));
   }
 
+  /** Something else is asked of the server's planner now: what is running would only be in its way. */
+  makeRoom() {
+    clearTimeout(this.timer);
+    this.running?.abort();
+    this.running = null;
+    this.store.set({ isPlanning: true });
+  }
+
   /** Give up the question that is being answered. */
   cancel() {
     clearTimeout(this.timer);
     this.running?.abort();
     this.running = null;
-    this.store.set({ isPlanning: false });
+    this.asked = "";
+    // What was there before answers another question.
+    this.store.set({ isPlanning: false, plan: null });
     post("/api/plan/cancel").catch(() => {});
   }
 

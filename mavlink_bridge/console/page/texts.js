@@ -111,10 +111,11 @@ const en = {
     add: "Add", newTarget: "New target: latitude, longitude", clear: "Clear all",
     best: "In the best order", comesBack: "And back to the start",
     clearance: "Clearance to keep while driving", clearanceM: "metres",
-    own: /** @param {number | null} value */ (value) => (value === null ? "the fence's margin" : `the fence's margin (${m(value)})`),
+    own: /** @param {number | null} value */ (value) => (value === null ? "the usual" : `the usual ${m(value)}`),
     widest: "Widest", widestPossible: /** @param {number} value */ (value) => `widest possible: ${m(value)} for drawn lines`,
     askWidest: "widest possible: not known yet",
     working: "Planning …", checking: "Checking …",
+    cancelled: "Planning was cancelled.", again: "Plan",
     nothing: "No plan yet: click the map to set a target.",
     nothingHere: "No plan at this moment.",
     promised: /** @param {number} value */ (value) => `${m(value)} promised`,
@@ -147,7 +148,7 @@ const en = {
   },
   start: {
     hold: "Start: press and hold", holding: "Keep holding …", noUpload: "pbpp was started without --upload: nothing is written to the vehicle.", noDrive: "pbpp was started without --drive: it starts nothing.",
-    noControl: "Take control first.", noPlan: "To start, upload the plan: only what is verified on the vehicle is driven.", other: "Not what is on the vehicle: upload this plan, then start it.", arms: "Arms the vehicle and switches to AUTO.", noArm: "Switches to AUTO. The vehicle must be armed: pbpp was started without --arm.",
+    noControl: "Take control first.", noPlan: "To start, upload the plan: only what is verified on the vehicle is driven.", byHand: "Start drives only what was planned here. Start a mission of your own with your ground station or transmitter.", other: "Not what is on the vehicle: upload this plan, then start it.", arms: "Arms the vehicle and switches to AUTO.", noArm: "Switches to AUTO. The vehicle must be armed: pbpp was started without --arm.",
     name: "Start: press and hold for one second.",
   },
   hold: {

@@ -25,7 +25,7 @@ FIELDS = Path(__file__).parents[2] / "fields"
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 # Software WebGL: the same drawing on every computer, and none needs a graphics card.
 SWITCHES = ["--enable-unsafe-swiftshader", "--use-angle=swiftshader", "--ignore-gpu-blocklist"]
-WAIT_MS = 20_000
+WAIT_MS = 60_000  # far longer than anything takes on a computer that does nothing else
 
 
 def find_chromium() -> str | None:

@@ -66,7 +66,11 @@ export function corridor(plan) {
 /** @param {Plan | null} plan */
 export function narrowest(plan) {
   const narrow = plan?.narrowest;
-  return narrow ? [line(narrow.ends, { name: texts.plan.narrowest(narrow.width_m) })] : [];
+  if (!narrow) {
+    return [];
+  }
+  const [a, b] = narrow.ends;
+  return [line(narrow.ends), spot([(a[0] + b[0]) / 2, (a[1] + b[1]) / 2], { name: texts.m(narrow.width_m) })];
 }
 
 /** @param {Plan | null} plan */

@@ -35,14 +35,17 @@ export class Pointing {
     if (!isServed) {
       return; // a page that is one file shows: nothing can be asked for
     }
-    map.on("click", (event) => this.click([event.lngLat.lng, event.lngLat.lat]));
+    map.on("click", (event) => this.click([event.lngLat.lng, event.lngLat.lat], event.point));
     map.getCanvas().addEventListener("keydown", (event) => this.press(event));
     map.doubleClickZoom.disable();
     view.whenReady(() => store.watch(["doc", "plan", "zone", "tool"], (state) => this.show(state)));
   }
 
-  /** @param {Place} place */
-  click(place) {
+  /**
+   * @param {Place} place
+   * @param {any} [point] where on the screen
+   */
+  click(place, point) {
     const { tool } = this.store.state;
     if (tool === "target" || tool === "add") {
       const isMore = tool === "add";
@@ -56,8 +59,9 @@ export class Pointing {
       this.store.set({ tool: "target" });
     } else if (tool === "polygon" || tool === "circle") {
       this.draw(place, tool);
-    } else if (this.store.state.zone !== null) {
-      this.store.set({ zone: null });
+    } else if (this.store.state.doc.zones !== null && point) {
+      const [zone] = this.view.map.queryRenderedFeatures([[point.x - 6, point.y - 6], [point.x + 6, point.y + 6]], { layers: ["zones-edge", "exclusions"] });
+      this.store.set({ zone: zone ? zone.properties.index : null });
     }
   }
 

@@ -162,7 +162,7 @@ function labels(colour) {
     { id: "places", type: "symbol", source: "places",
       layout: { "icon-image": ["get", "icon"], "icon-allow-overlap": true, "icon-ignore-placement": true, "icon-anchor": "center" } },
     { id: "place-names", type: "symbol", source: "places", layout: { ...aside, "text-field": ["get", "name"], "text-size": 14, "text-radial-offset": 1.2, "symbol-sort-key": 0 }, paint: words },
-    { id: "narrow-name", type: "symbol", source: "narrow", layout: { "text-font": FONT, "symbol-placement": "line-center", "text-field": ["get", "name"], "text-size": 13, "symbol-sort-key": 1, "text-rotation-alignment": "viewport", "text-offset": [0, 1.1] }, paint: words },
+    { id: "narrow-name", type: "symbol", source: "narrow", filter: ["==", ["geometry-type"], "Point"], layout: { ...aside, "text-field": ["get", "name"], "text-size": 13, "symbol-sort-key": 1 }, paint: words },
     { id: "point-numbers", type: "symbol", source: "points", layout: { ...aside, "text-field": ["get", "name"], "text-size": 13, "symbol-sort-key": ["get", "order"] }, paint: words },
     { id: "line-names", type: "symbol", source: "lines", layout: { "text-font": FONT, "text-field": ["get", "name"], "text-size": 12, "symbol-placement": "line", "symbol-spacing": 400, "text-offset": [0, 0.9], "symbol-sort-key": 960 }, paint: { ...words, "text-color": colour.target } },
     { id: "inclusion-names", type: "symbol", source: "zones", minzoom: 15, filter: ["==", ["get", "kind"], "inclusion"],

@@ -126,7 +126,7 @@ function resultPart(store, act) {
     show(busy, isPlanning);
     say(working, doc.mission ? texts.plan.checking : texts.plan.working);
   });
-  store.watch(["plan", "planTrouble", "doc"], (state) => {
+  store.watch(["plan", "planTrouble", "doc", "isPlanning"], (state) => {
     const { plan, planTrouble } = state;
     card.className = `card ${planTrouble || plan?.no_route ? "bad" : look(plan)}`;
     if (planTrouble) {
@@ -136,7 +136,9 @@ function resultPart(store, act) {
     } else if (plan && plan.state !== "planning") {
       fill(card, outcome(plan, state, act));
     } else {
-      fill(card, h("p", {}, isServed ? texts.plan.nothing : texts.plan.nothingHere));
+      const isEmpty = state.isPlanning || state.doc.targets.length === 0;
+      fill(card, h("p", {}, isServed ? (isEmpty ? texts.plan.nothing : texts.plan.cancelled) : texts.plan.nothingHere),
+        !isEmpty && button(texts.plan.again, () => act.planner.change(true)));
     }
   });
   return section;
@@ -221,10 +223,10 @@ function writePart(store, act) {
     const { server, plan, isPlanning } = state;
     show(section, server.source === "live" || server.source === "demo");
     const reason = cannotWrite(state);
-    upload.disabled = reason !== "" || isPlanning || !plan || plan.no_route !== null || plan.state === "planning" || state.doc.mission !== null;
+    upload.disabled = reason !== "" || isPlanning || !plan || plan.no_route !== null || plan.state === "planning" || (state.doc.mission !== null && !plan.is_promised);
     const waits = canStart(state);
     start.disabled = reason !== "" || !server.can.drive || !waits;
-    say(why, reason || (!server.can.drive ? texts.start.noDrive : waits ? (server.can.arm ? texts.start.arms : texts.start.noArm) : state.drive.awaits_start ? texts.start.other : texts.start.noPlan));
+    say(why, reason || (!server.can.drive ? texts.start.noDrive : waits ? (server.can.arm ? texts.start.arms : texts.start.noArm) : state.doc.mission ? texts.start.byHand : state.drive.awaits_start ? texts.start.other : texts.start.noPlan));
   });
   return section;
 }

@@ -164,7 +164,6 @@ def _scene(checked: MissionCheck, situation: Situation, choice: RallyChoice) -> 
         marks_name="rally point",
         targets=np.empty((0, 2)),
         asked=np.empty((0, 2)),
-        target_texts=(),
         marks_narrowest=False,
     )
 

@@ -57,7 +57,7 @@ def check_picture_format(path: Path | str, *, beside: Sequence[str] = ()) -> Non
             f"{path}: {path.suffix!r} is not a supported picture format; supported: {', '.join((*PICTURE_SUFFIXES, *beside))}, "
             f"and {TERMINAL} for a sketch in the terminal",
             file=str(path),
-            advice="mavlink_bridge.console.stills.plan_page makes pages, and so does pbpp plan --plot"
+            advice="pages are the console's: pbpp plan --plot, or mavlink_bridge.console.stills.plan_page"
             if is_page
             else "choose another file extension",
         )

@@ -109,7 +109,8 @@ function route(colour) {
   return [
     { id: "corridor", type: "fill", source: "corridor", paint: { "fill-color": colour.corridor, "fill-opacity": 0.28 } },
     { id: "corridor-edge", type: "line", source: "corridor", paint: { "line-color": colour.corridor, "line-width": 1 } },
-    { id: "lines", type: "line", source: "lines", paint: { "line-color": colour.target, "line-width": 1.5, "line-dasharray": [5, 3] } },
+    { id: "blocks", type: "line", source: "lines", filter: ["==", ["get", "name"], ""], paint: { "line-color": colour.plain, "line-width": 0.7 } },
+    { id: "lines", type: "line", source: "lines", filter: ["!=", ["get", "name"], ""], paint: { "line-color": colour.target, "line-width": 1.5, "line-dasharray": [5, 3] } },
     { id: "mission", type: "line", source: "mission", paint: { "line-color": colour.plain, "line-width": 2, "line-dasharray": [3, 2] } },
     { id: "widest", type: "line", source: "widest", paint: { "line-color": colour.near, "line-width": 3, "line-dasharray": [4, 2] } },
     leg("keeps", null), leg("near", [4, 1]), leg("breaks", [1.2, 0.8]), leg("extrapolated", [2, 1, 0.5, 1]), leg("", [1, 1]),

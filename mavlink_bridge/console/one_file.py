@@ -83,7 +83,7 @@ class StillPage:
     moments : sequence of StillMoment
         Of a log; the first holds its sections whole.
     notes : sequence of str
-        Of a log: what was found in it.
+        What was found.
     lines, marks : sequence
         What is drawn besides.
     """

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from mavlink_bridge.console.one_file import NamedLine, NamedMark, StillMoment, StillPage, page_bytes
-from mavlink_bridge.console.view.fields import field_sections
+from mavlink_bridge.console.view.fields import field_sections, mission_view
 from mavlink_bridge.console.view.places import place, places
 from mavlink_bridge.console.view.plans import checked_view, plan_view
 from mavlink_bridge.console.view.sections import FenceView, PlanView
 from missions.picture.outlines import line_on_earth
 from missions.picture.plans import plan_scene
+from missions.request import GoTo
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -80,6 +81,19 @@ def check_still(
     if rally is not None:
         sections |= {"rally": places(rally)}
     return StillPage(title=scene.title, sections=sections, lines=_lines(scene))
+
+
+def files_still(scene: PictureScene, situation: Situation, notes: Sequence[str]) -> StillPage:
+    """Return what a page shows of a file that nothing was planned or checked for: its field and mission, and a picture's lines and marks."""
+    mission = mission_view(situation, matches_plan=False, current_seq=None)
+    marks = [(mark.name, line_on_earth(scene.ground.frame, mark.point[None])[0]) for mark in scene.marks]
+    return StillPage(
+        title=scene.title,
+        sections=field_sections(situation, GoTo(), "file") | {"mission": mission},
+        notes=notes,
+        lines=_lines(scene),
+        marks=[NamedMark(name, place(at)) for name, at in marks],
+    )
 
 
 def log_still(

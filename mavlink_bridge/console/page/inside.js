@@ -8,7 +8,7 @@
  * @property {string[]} title
  * @property {any} message the snapshot, as the server would send it
  * @property {Moment[]} moments of a log, in time; empty where there is no log
- * @property {string[]} notes of a log: what was found in it
+ * @property {string[]} notes what was found
  * @property {import("./types.js").NamedLine[]} lines
  * @property {import("./types.js").NamedMark[]} marks
  *

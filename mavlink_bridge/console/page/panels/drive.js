@@ -1,10 +1,10 @@
 /** The drive: where the rover is on its route, how near it came, and what may be done about it. */
 
 import { h, say, show } from "../dom.js";
-import { INSIDE, isServed } from "../inside.js";
+import { isServed } from "../inside.js";
 import { texts } from "../texts.js";
 import { comparison } from "./after.js";
-import { button, cannotWrite, facts } from "./parts.js";
+import { button, cannotWrite, facts, foundPart } from "./parts.js";
 
 /** @typedef {import("../types.js").PageState} PageState */
 
@@ -13,12 +13,7 @@ import { button, cannotWrite, facts } from "./parts.js";
  * @param {import("../actions.js").Actions} act
  */
 export function drivePanel(store, act) {
-  return h("div", { class: "panel-body" }, INSIDE && foundPart(INSIDE.notes), progressPart(store), isServed && [deedsPart(store, act), comparison(store)]);
-}
-
-/** @param {string[]} found what a log shows, in a page that is one file */
-function foundPart(found) {
-  return found.length > 0 && h("section", { "aria-label": texts.drive.found }, h("h2", {}, texts.drive.found), h("ul", {}, found.map((text) => h("li", {}, text))));
+  return h("div", { class: "panel-body" }, foundPart(), progressPart(store), isServed && [deedsPart(store, act), comparison(store)]);
 }
 
 /** @param {import("../store.js").Store<PageState>} store */

@@ -1,10 +1,10 @@
 /** The plan: what is asked for, and what comes of it. */
 
 import { fill, h, say, show } from "../dom.js";
-import { isServed } from "../inside.js";
+import { INSIDE, isServed } from "../inside.js";
 import { texts } from "../texts.js";
 import { legTable } from "./legs.js";
-import { button, cannotWrite, notes, placeField, pressButton, signButton } from "./parts.js";
+import { button, cannotWrite, foundPart, notes, placeField, pressButton, signButton } from "./parts.js";
 
 /** @typedef {import("../types.js").PageState} PageState */
 /** @typedef {import("../actions.js").Actions} Actions */
@@ -19,7 +19,7 @@ const MOST_M = 20; // the slider's end while the widest clearance is not known
  */
 export function planPanel(store, act) {
   if (!isServed) {
-    return h("div", { class: "panel-body" }, resultPart(store, act), notesPart(store), legTable(store));
+    return h("div", { class: "panel-body" }, INSIDE?.moments.length === 0 && foundPart(), resultPart(store, act), notesPart(store), legTable(store));
   }
   return h("div", { class: "panel-body" },
     resultPart(store, act), writePart(store, act), targetsPart(store, act), clearancePart(store, act), notesPart(store), pointsPart(store, act), legTable(store));

@@ -325,3 +325,15 @@ def test_programs_are_told_where_pages_are_made(planned, tmp_path):
     with pytest.raises(MissionFormatError, match=r"'\.html' is not a supported picture format") as caught:
         planned[0].plot(tmp_path / "x.html")
     assert "plan_page" in str(caught.value.details["advice"])
+
+
+def test_two_files_that_differ(tmp_path):
+    path = tmp_path / "x.html"
+    files = [str(FIELDS / name) for name in ("yard-fence.waypoints", "maze-fence.waypoints")]
+    result = CliRunner().invoke(app, ["diff", *files, "--plot", str(path)])
+    assert f"Wrote {path}" in result.stdout, result.output
+    held = inside(path.read_bytes())
+    assert held["notes"]
+    assert {one["name"] for one in held["lines"]} == {"fence in A"}
+    assert held["marks"]
+    assert held["message"]["state"]["fence"]["held"]["features"]

@@ -15,9 +15,8 @@ from mavlink_bridge.cli.drawing import cell, console
 from mavlink_bridge.cli.failing import ExitCode
 from mavlink_bridge.cli.home_parts import with_parts
 from mavlink_bridge.cli.mission_source import check_source, source_kind
-from mavlink_bridge.cli.pictures import check_plots, draw
+from mavlink_bridge.cli.pictures import check_plots, draw, stills
 from mavlink_bridge.cli.terminal import echo, print_json
-from mavlink_bridge.console.stills import check_still
 from missions.checking.findings import leg_sentence, not_confirmed_text
 from missions.picture.plans import plan_scene
 from missions.words import counted
@@ -70,9 +69,10 @@ def _scene(found: CheckedMission) -> PictureScene:
 
 def _page(options: CheckOptions, found: CheckedMission, scene: PictureScene) -> StillPage:
     where = source_kind(options)
-    return check_still(
+    page: StillPage = stills().check_still(
         scene, found.checked, found.planned, found.situation, found.request, where, found.warnings
     )
+    return page
 
 
 def _report(checked: MissionCheck, plots: list[Path], *, is_quiet: bool) -> None:

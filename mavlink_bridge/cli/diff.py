@@ -9,9 +9,8 @@ import typer
 
 from mavlink_bridge.cli.failing import ExitCode
 from mavlink_bridge.cli.field_files import read_file
-from mavlink_bridge.cli.pictures import check_plots, draw
+from mavlink_bridge.cli.pictures import check_plots, draw, stills
 from mavlink_bridge.cli.terminal import echo, print_json
-from mavlink_bridge.console.stills import files_still
 from mavlink_bridge.errors import UsageError
 from missions.checking.differences import ChangeKind, differences, summary
 from missions.formats import Part, parts_of
@@ -135,4 +134,5 @@ def _scene(options: DiffOptions, a: Situation, b: Situation, found: Sequence[Fil
 
 
 def _page(b: Situation, found: Sequence[FileDifference], scene: PictureScene) -> StillPage:
-    return files_still(scene, b, [f"{one.change} {one.text}" for one in found])
+    page: StillPage = stills().files_still(scene, b, [f"{one.change} {one.text}" for one in found])
+    return page

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import shutil
 import sys
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mavlink_bridge.cli.kept_files import write_kept
 from mavlink_bridge.cli.terminal import echo_lines
-from mavlink_bridge.console.one_file import PAGE_SUFFIX, page_bytes
 from mavlink_bridge.errors import UsageError
 from missions.picture import TERMINAL, check_picture_format, draw_scene
 from missions.picture.sketch import sketch
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from missions.picture.scene import PictureScene
 
 _COLUMNS = 80  # of a sketch, at most
+_PAGE_SUFFIX = ".html"
 
 
 def check_plots(plots: list[Path], *, json_output: bool) -> None:
@@ -36,7 +37,12 @@ def check_plots(plots: list[Path], *, json_output: bool) -> None:
     if json_output and Path(TERMINAL) in plots:
         raise UsageError("--plot - and --json both write to standard output; give --plot a file")
     for path in plots:
-        check_picture_format(path, beside=(PAGE_SUFFIX,))
+        check_picture_format(path, beside=(_PAGE_SUFFIX,))
+
+
+def stills() -> Any:  # noqa: ANN401 - a module
+    """Return what makes pages: the console's, loaded for pages alone, so that no command starts slower for them."""
+    return import_module("mavlink_bridge.console.stills")
 
 
 def draw(
@@ -55,8 +61,8 @@ def draw(
         if str(path) == TERMINAL:
             columns = min(_COLUMNS, shutil.get_terminal_size().columns)
             echo_lines(sketch(scene, columns=columns, encoding=sys.stdout.encoding).splitlines())
-        elif path.suffix.lower() == PAGE_SUFFIX:
-            write_kept(path, page_bytes(make_page(scene)))
+        elif path.suffix.lower() == _PAGE_SUFFIX:
+            write_kept(path, stills().page_bytes(make_page(scene)))
         else:
             draw_scene(scene, path, write=write_kept)
     return [path for path in plots if str(path) != TERMINAL]

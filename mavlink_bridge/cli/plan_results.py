@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING
 from mavlink_bridge.cli.common import inform, remarks_document, warn
 from mavlink_bridge.cli.home_parts import parts_document, with_parts
 from mavlink_bridge.cli.kept_files import write_kept
-from mavlink_bridge.cli.pictures import draw
+from mavlink_bridge.cli.pictures import draw, stills
 from mavlink_bridge.cli.terminal import echo
 from mavlink_bridge.cli.way_home import RouteWays
-from mavlink_bridge.console.stills import plan_still
 from missions.checking.holding import hold_info
 from missions.checking.home_part import drive_end
 from missions.fence import CircleZone, PolygonZone, ZoneKind
@@ -53,7 +52,8 @@ def write_outputs(
 
     def page(drawn: PictureScene) -> StillPage:
         request, where = asked or (GoTo(), "file")
-        return plan_still(drawn, planned, situation, request, where)
+        page: StillPage = stills().plan_still(drawn, planned, situation, request, where)
+        return page
 
     return [*outputs, *draw(scene, page, plots)]
 

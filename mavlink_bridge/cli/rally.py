@@ -10,10 +10,9 @@ import numpy as np
 from mavlink_bridge.cli.common import inform, remarks_document, warn
 from mavlink_bridge.cli.kept_files import write_kept
 from mavlink_bridge.cli.mission_source import check_source, mission_situation, source_kind, start_of
-from mavlink_bridge.cli.pictures import check_plots, draw
+from mavlink_bridge.cli.pictures import check_plots, draw, stills
 from mavlink_bridge.cli.terminal import echo, print_json
 from mavlink_bridge.cli.vehicle_options import with_vehicle
-from mavlink_bridge.console.stills import check_still
 from mavlink_bridge.errors import UsageError
 from missions.checking.check import check_mission, plan_of
 from missions.checking.rtl_failsafes import failsafe_advice
@@ -55,7 +54,7 @@ def rally(options: RallyOptions) -> None:
         _write(path, choice, situation)
     drawn = draw(
         lambda: _scene(checked, situation, choice),
-        lambda scene: check_still(
+        lambda scene: stills().check_still(
             scene,
             checked,
             plan_of(checked, situation),

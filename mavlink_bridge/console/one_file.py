@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 
     from mavlink_bridge.console.view.sections import EventView, Place, TrackRow
 
-PAGE_SUFFIX: Final = ".html"
-
 _HERE: Final = Path(__file__).parent
 _MAP: Final = _HERE / "page" / "vendor" / "maplibre-gl"
 _EXPORTS: Final = "export{"

@@ -50,7 +50,7 @@ class Pieces:
 
     def extend(self, others: Pieces, more_m: float) -> None:
         """Add all of other pieces, each grown by so much more."""
-        self._coordinates += others._coordinates
+        self._vertices += others._vertices
         self._sizes += others._sizes
         self.bands_m += [band_m + more_m for band_m in others.bands_m]
         self.waypoints += others.waypoints

@@ -18,6 +18,9 @@ from mavlink_bridge import errors as bridge_errors
 from mavlink_bridge.cli.app import COMMANDS, load
 from mavlink_bridge.cli.failing import ExitCode, exit_code_of
 from mavlink_bridge.console import wire
+from mavlink_bridge.dataset.questions import QUESTIONS
+from mavlink_bridge.dataset.schema import PARTITION, VIEWS
+from mavlink_bridge.dataset.schema import TABLES as DATASET_TABLES
 from mavlink_bridge.director import SCHEMA, TRANSITIONS
 from mavlink_bridge.protocol.transitions import TABLES
 from missions import errors as mission_errors
@@ -100,7 +103,7 @@ _CODES = {
     ExitCode.LINK: "link: no connection, no heartbeat, silence",
     ExitCode.REFUSED: "the vehicle refused; says its result by name, and the item",
     ExitCode.OUTCOME: "what is on the vehicle is not what was wanted, or unknown; says what is known and where the backup is",
-    ExitCode.CHECK: "a check or comparison failed (`check`, `replay --expect`, `doctor`)",
+    ExitCode.CHECK: "a check or comparison failed (`check`, `replay --expect`, `doctor`), or two files differ (`diff`)",
     ExitCode.INTERRUPTED: "interrupted by the user; says what the vehicle does now (mode, armed, speed) and what is on it",
 }
 
@@ -137,6 +140,45 @@ def _parameter_row(row: Parameter, name: str) -> str:
     autopilot = "PX4: " if row.autopilot is Autopilot.PX4 else ""
     whole = " (INT32)" if row.is_whole else ""
     return f"| {name}{since} | {taken} | {row.documented or '—'}{whole} | {measured} | {autopilot}{row.changes} |"
+
+
+def dataset_tables() -> str:
+    """Return the tables of a dataset with their columns."""
+    parts = []
+    for table in DATASET_TABLES.values():
+        rows = [f"| `{one.name}` | {one.sql} | {one.meaning} |" for one in table.columns]
+        kept = "by month and vehicle" if table.is_partitioned else "not parted"
+        parts.append(
+            "\n".join(
+                [
+                    f"### {table.name}",
+                    "",
+                    f"A row is {table.about}. Kept {kept}.",
+                    "",
+                    "| column | type | means |",
+                    "|---|---|---|",
+                    *rows,
+                ]
+            )
+        )
+    return "\n\n".join(parts)
+
+
+def dataset_partition() -> str:
+    """Return the columns that come from folders' names."""
+    rows = [f"| `{one.name}` | {one.sql} | {one.meaning} |" for one in PARTITION]
+    return "\n".join(["| column | type | means |", "|---|---|---|", *rows])
+
+
+def dataset_views() -> str:
+    """Return the views of a dataset, with the SQL that makes them."""
+    return "\n\n".join(f"`{view.name}`: a row is {view.about}.\n\n```sql\n{view.sql}\n```" for view in VIEWS)
+
+
+def dataset_questions() -> str:
+    """Return the ready questions."""
+    rows = [f"| `{one.name}` | {one.about} |" for one in QUESTIONS.values()]
+    return "\n".join(["| question | asks |", "|---|---|", *rows])
 
 
 def _planners(case: str) -> str:
@@ -192,6 +234,10 @@ PARTS = {
     "bridge-events": event_table,
     "commands": commands,
     "console-types": console_types,
+    "dataset-partition": dataset_partition,
+    "dataset-questions": dataset_questions,
+    "dataset-tables": dataset_tables,
+    "dataset-views": dataset_views,
     "director-states": director_table,
     "exit-codes": exit_codes,
     "parameters": parameters,

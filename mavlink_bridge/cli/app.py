@@ -25,6 +25,7 @@ from mavlink_bridge.cli.terminal import echo, echo_help, says_no_colour
 COMMANDS = {
     "plan": "Plan a mission around fences; write it, draw it, upload it.",
     "check": "Check every leg of a mission against a fence.",
+    "diff": "Compare two missions or fences, in words and on a picture.",
     "rally": "Choose rally points that RTL reaches in a straight free line.",
     "fence": "Make a fence fit for the vehicle: merge overlapping inclusions.",
     "convert": "Convert a file from one format to another.",
@@ -33,6 +34,7 @@ COMMANDS = {
     "bridge": "Run alongside the autopilot: plan to each target, upload verified missions.",
     "serve": "Serve the console: fence, plan and rover on a page.",
     "log": "Summarise telemetry logs.",
+    "logs": "Make tables of many logs, ask them, calibrate a rover.",
     "replay": "Replay recorded logs through the bridge.",
     "sim": "Run a simulated rover.",
     "demo": "Plan, upload and drive on a simulated rover, as a demonstration.",

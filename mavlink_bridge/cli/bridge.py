@@ -316,7 +316,7 @@ class BridgeShell:
         )
         self._plans = PlanMaker(self.director)
         self._ways = WaysMaker(self.director)
-        self._keyboard = Keyboard()
+        self._keyboard = view.keyboard if view is not None else Keyboard()
         self._asked_for: Plan | None = None  # the plan that waits for a yes, as was printed
         self._pages: Pages | None = None
 
@@ -415,6 +415,8 @@ class BridgeShell:
             self._show(link.now_s())
 
         def heard(frames: list[Frame]) -> None:
+            if self._view is not None:
+                self._view.hear(frames, link.now_s())
             if self._pages is not None:
                 self._pages.hear(frames, link.now_s())
 

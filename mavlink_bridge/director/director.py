@@ -17,14 +17,14 @@ in `handlers`.
 `Learner`           finds the vehicle, learns it, notices silence and reboots
 `ObstacleWatch`     knows which obstacles were reported, and forgets them
 `ListWatch`         knows which of the vehicle's lists are as they were read, and reads the others again
-`Halter`            HOLD, and whether the vehicle stands
+`Halter`            HOLD, whether the vehicle stands, and where it will
 `DriveSupervisor`   watches a drive until it has arrived
 `HoldWatch`         where a HOLD ends: announces breaches to come, lets the vehicle go on first where that is better
 `TargetInbox`       targets of all sources, answers to who asked, and a target that waits
 `RouteDesk`         has plans made, drops those nobody waits for, and checks the one that stands
 `MissionWriter`     a plan that stands → a verified mission on the vehicle
 `Adopter`           has drives noted before they begin, and goes on with one that an earlier run has begun
-`Starter`           the last look, arming, AUTO, the first item
+`Starter`           standing still where the mission holds, the last look, arming, AUTO, the first item
 `HomeKeeper`        the way to the nearest place to go home to, from where the vehicle is
 `HomeCaller`        what calls the vehicle home by a route: RTL, a low battery, no ground station, a breach
 `HandOver`          who else has the vehicle: the operator, or the autopilot by a failsafe
@@ -34,7 +34,7 @@ in `handlers`.
 Who may act when
 ----------------
 Three parts make the vehicle do something. `Halter` sends HOLD, in any state in which the orders let it, and its messages go out before all others.
-`Starter` arms and switches to AUTO, in STARTING alone: after a verified upload, a last reading of what somebody may have changed, and a heartbeat
+`Starter` arms and switches to AUTO, in STARTING alone: after a verified upload, once the vehicle stands where the mission holds, a last reading of what somebody may have changed, and a heartbeat
 that shows HOLD by our doing. `MissionWriter` begins to write in UPLOADING alone, which ends only with the mission verified, the old one put back, or
 the trouble told. (`HandOver` sends HOLD to a vehicle that was disarmed in our AUTO, for arming it would set it going.) No other part sends
 anything but questions, answers and texts. One machine runs at a time (`Steps`); whatever drops what is wanted drops it too, but for an upload that

@@ -63,15 +63,18 @@ class DriveWatch:
         self.has_arrived = False
         self.breaches = 0
         self._breaches_before: int | None = None
-        self._plan = plan
         self._voice = voice
+        self._here: _Here | None = None
+        self._is_outside = False
+        self._standing_since_s: float | None = None
+        self._lay_out(plan)
+
+    def _lay_out(self, plan: Plan) -> None:
+        self._plan = plan
         self._points = plan.points
         self._line = LineString(self._points)
         self._band = plan.envelope.area
         prepare(self._band)
-        self._here: _Here | None = None
-        self._is_outside = False
-        self._standing_since_s: float | None = None
 
     @property
     def distance_left_m(self) -> float:
@@ -103,6 +106,14 @@ class DriveWatch:
         self.item = item
         self._point = self._plan.path_index(item)
         self._is_executing = True
+
+    def follow(self, plan: Plan, item: int) -> None:
+        """Go on along another plan of the same mission: a way home inside it was chosen."""
+        self._lay_out(plan)
+        if self._here is not None:  # in another plane
+            place = self._here.place
+            self._here = _Here(place, Point(plan.ground.frame.to_local(place)))
+        self.item, self._point = item, plan.path_index(item)
 
     def receive(self, frame: Frame, now_s: float) -> None:
         """Take a frame of the vehicle."""

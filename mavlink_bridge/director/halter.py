@@ -1,4 +1,8 @@
-"""The part of the director that stops the vehicle: HOLD at once, before a new route is made from where it comes to rest."""
+"""The part of the director that stops the vehicle: HOLD at once, before a new route is made from where it comes to rest.
+
+HOLD does not brake: a rover of 2 m/s rolls for 4 s. Once its roll tells where it will stand (`resting_pose`), the route is planned from there, and uploaded,
+while it rolls; `Starter` switches to AUTO only once it stands, and where the mission keeps its promise from the very place.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +13,11 @@ from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.orders import TargetSource
 from mavlink_bridge.director.states import Cue, Notice, Signal, State
+from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.rover import Mode
-from mavlink_bridge.protocol.mode_switch import ModeSwitch
+from mavlink_bridge.protocol.mode_switch import ModeSwitch, ask_for_heartbeat
+from missions.checking.holding import resting_pose
+from missions.stops import Rolling
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,6 +25,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.director.list_watch import ListWatch
     from mavlink_bridge.director.targets import Target
     from mavlink_bridge.mavlink.messages import Frame, Message
+    from missions.situation import Pose
 
 FRESH_S = 1.5
 """How old a heartbeat may be to tell what the vehicle does now."""
@@ -27,6 +35,9 @@ STILL_MPS = 0.3
 
 _STOP_AT_LEAST_S = 0.25
 """Positions come four times a second: one from after the HOLD is waited for."""
+
+_SOON_S = 1.0
+"""A route that was refused within this, while the vehicle rolls, is asked for once more: obstacles may have moved on, or are known better. Chosen."""
 
 # Then a vehicle in HOLD that still reports a speed (a drifting fix, a slope) is taken for stopped; chosen, not measured.
 _STOP_PATIENCE_S = 8.0
@@ -43,6 +54,8 @@ class Halter(Part):
         Whether our AUTO may be on its way, or no heartbeat may have told of it yet.
     is_hold_granted : bool
         Whether the newest HOLD that has ended was taken.
+    expected : Pose or None
+        Where the vehicle will stand, while it rolls there.
     """
 
     def __init__(self, core: Core, lists: ListWatch) -> None:
@@ -51,9 +64,13 @@ class Halter(Part):
         self.stopping: ModeSwitch | None = None
         self.may_be_in_auto = False
         self.is_hold_granted = False
+        self.expected: Pose | None = None
+        self._expected_s = -math.inf  # since when
         self._stopped_s = -math.inf  # when the vehicle took it
+        self._is_seen = False  # a heartbeat has shown it
         self._held_at_s: float | None = None
         self._standstill_due_s = math.inf
+        self._rolling: Rolling | None = None  # while it may tell where it ends
 
     @property
     def deadline_s(self) -> float | None:
@@ -74,6 +91,21 @@ class Halter(Part):
         self.stopping.receive(frame, now_s)
         return self._look_after_hold(self.stopping, now_s)
 
+    def receive(self, frame: Frame, now_s: float) -> Sequence[Signal]:
+        """Take each position of a vehicle that comes to rest."""
+        core, pose = self.core, self.core.situation.pose
+        is_position = isinstance(frame.message, m.GlobalPositionInt) and core.is_from_vehicle(frame)
+        if core.state is not State.HOLDING or not is_position or pose is None:
+            return []
+        if self._rolling is not None:
+            self._rolling = self._rolling.moved(pose.value.position, pose.value.speed_mps, now_s)
+        if self._has_come_to_rest(now_s):
+            return [Cue.HELD]
+        if self.stopping is None and self._rolling is not None and core.orders.drive:
+            self.expected = resting_pose(core.situation, core.orders.request, self._rolling)
+        self._expected_s = now_s
+        return [] if self.expected is None else [Cue.HELD]
+
     def handle_timer(self, now_s: float) -> Sequence[Signal]:
         """Send HOLD again, or see whether the vehicle stands."""
         if self.stopping is not None:
@@ -91,6 +123,27 @@ class Halter(Part):
     @property
     def _rereading_due(self) -> bool:
         return self._lists.is_outdated and not self.core.steps
+
+    @property
+    def stands(self) -> bool:
+        """Whether the vehicle stands, as last told."""
+        pose = self.core.situation.pose
+        return pose is None or pose.value.speed_mps <= STILL_MPS
+
+    @property
+    def patience_over_s(self) -> float:
+        """When a vehicle in HOLD that still reports a speed is taken for stopped."""
+        return (self._held_at_s or 0.0) + _STOP_PATIENCE_S
+
+    def wait_for_rest(self, now_s: float) -> None:
+        """Let the vehicle roll on, for no route was found from where it is expected to stand: later from there once more, where that was soon known, else from where it stands."""
+        self.expected = self._rolling = None
+        self._standstill_due_s = now_s
+        pose = self.core.situation.pose
+        is_soon = now_s <= self._expected_s + _SOON_S
+        if is_soon and pose is not None and pose.value.speed_mps > 2 * STILL_MPS:
+            rolling = Rolling(now_s)
+            self._rolling = rolling.moved(pose.value.position, pose.value.speed_mps, now_s)
 
     # What may be stopped
 
@@ -144,6 +197,7 @@ class Halter(Part):
         """Leave what is under way and stop the vehicle, to plan from where it stands."""
         self._held_at_s = None
         self._standstill_due_s = math.inf
+        self.expected = self._rolling = None
         self.core.voice.tell(now_s, EventName.HOLDING, f"HOLD: {reason}", reason)
         self.core.steps.clear()
         self.command_hold(now_s)
@@ -177,13 +231,18 @@ class Halter(Part):
     def _look_after_hold(self, stopping: ModeSwitch, now_s: float) -> Sequence[Signal]:
         core = self.core
         if stopping.is_granted and core.state is State.HOLDING and self._held_at_s is None:
+            assert core.peer is not None
             self._held_at_s = now_s
             self._standstill_due_s = now_s + _STOP_AT_LEAST_S
+            self._rolling = Rolling(now_s)
+            core.send(
+                ask_for_heartbeat(core.peer)
+            )  # the HOLD may have to be seen; the next one would come a second later
         if not stopping.is_done:
             return []
         core.send(*stopping.messages_to_send())
         self.let_go()
-        self.is_hold_granted = stopping.is_granted
+        self.is_hold_granted, self._is_seen = stopping.is_granted, stopping.is_seen
         self._stopped_s = now_s
         core.operator.settle(now_s)
         if not stopping.is_granted:
@@ -194,18 +253,18 @@ class Halter(Part):
     def is_mode_known(self, now_s: float) -> bool:
         """Return whether the newest heartbeat is news of the mode that the vehicle is in."""
         # A heartbeat from before our HOLD still tells the mode before it.
-        is_news = self.stopping is None and self.core.heartbeat_s > self._stopped_s
+        is_after = self.core.heartbeat_s > self._stopped_s or (
+            self._is_seen and self.core.heartbeat_s == self._stopped_s
+        )
+        is_news = self.stopping is None and is_after
         return is_news and now_s - self.core.heartbeat_s <= FRESH_S
 
     def _has_come_to_rest(self, now_s: float) -> bool:
         """Return whether the vehicle stands, or will not; else look again a little later."""
         if self._held_at_s is None or now_s < self._held_at_s + _STOP_AT_LEAST_S:
             return False
-        is_patience_over = (
-            now_s >= self._held_at_s + _STOP_PATIENCE_S and self.core.situation.mode == Mode.HOLD
-        )
-        pose = self.core.situation.pose
-        if pose is None or pose.value.speed_mps <= STILL_MPS or is_patience_over:
+        is_patience_over = now_s >= self.patience_over_s and self.core.situation.mode == Mode.HOLD
+        if self.stands or is_patience_over:
             return True
         self._standstill_due_s = now_s + _STOP_AT_LEAST_S
         return False

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
+from mavlink_bridge.director.halter import STILL_MPS
 from mavlink_bridge.director.states import Cue, Signal, State
 from mavlink_bridge.director.steps import Step, step
 from mavlink_bridge.errors import OutcomeError, RefusedError
@@ -13,6 +14,7 @@ from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.rover import Mode, mode_name
 from mavlink_bridge.protocol.command import SendCommand
 from mavlink_bridge.protocol.mode_switch import AwaitHeartbeat, ModeSwitch
+from mavlink_bridge.protocol.standstill import AwaitStandstill
 from missions.items import Command
 
 if TYPE_CHECKING:
@@ -68,6 +70,22 @@ class Starter(Part):
         """Return that a person gives the word to drive: now, or once the mission is verified."""
         self.is_told = True
         return [Cue.DRIVE] if self.core.state is State.VERIFIED and self.may_begin else []
+
+    def begin(self, now_s: float) -> Sequence[Signal]:
+        """Begin the drive; a vehicle that still rolls to where it was expected to stand is waited for."""
+        if not self._desk.is_foreseen or self._halter.stands:
+            return self._settle(now_s)
+        assert self.core.peer is not None
+        rest = AwaitStandstill(self.core.peer, STILL_MPS, self._halter.patience_over_s)
+        self.core.steps.run([step(rest, lambda _machine, then_s: self._settle(then_s))], now_s)
+        return []
+
+    def _settle(self, now_s: float) -> Sequence[Signal]:
+        """Go on where the mission is safe from the very place; else return that a route from there is wanted."""
+        if not self._desk.settles(now_s):
+            return [Cue.TARGET]
+        self.look_once_more(now_s)
+        return []
 
     def look_once_more(self, now_s: float) -> None:
         """Read again what somebody may have changed, and wait for a heartbeat: it shows a takeover that was on its way."""

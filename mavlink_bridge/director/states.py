@@ -42,7 +42,8 @@ class Cue(StrEnum):
     LEARNT = auto()
     TARGET = auto()  # a route is wanted
     TARGET_WHILE_MOVING = auto()  # the same, and the vehicle may move and may be stopped
-    HELD = auto()
+    HELD = auto()  # it stands, or it is known where it will stand
+    NOT_FORESEEN = auto()  # no plan can be made from there: it has to stand first
     PLANNED = auto()
     NO_PLAN = auto()
     UPLOAD = auto()
@@ -80,6 +81,7 @@ class Notice(StrEnum):
     MISSION_HEARD = auto()  # its end may be a target
     RALLY_HEARD = auto()
     WAYS_KNOWN = auto()  # the ways home were laid out anew
+    WAY_CHOSEN = auto()  # a way home inside the mission, by the operator
     LEARNING_FAILED = auto()
     GONE_ON = auto()  # on the route, as far as was better than a HOLD at once
     HOLD_ASKED = auto()  # by a person at a page of ours, who has let go of everything else with it
@@ -116,7 +118,12 @@ TRANSITIONS: dict[State, dict[Cue, State]] = {
         Cue.TAKEN_OVER: State.LET_GO,
         Cue.TROUBLE: State.READY,
     },
-    State.PLANNING: {**_OURS, Cue.PLANNED: State.PROPOSED, Cue.NO_PLAN: State.READY},
+    State.PLANNING: {
+        **_OURS,
+        Cue.PLANNED: State.PROPOSED,
+        Cue.NO_PLAN: State.READY,
+        Cue.NOT_FORESEEN: State.HOLDING,
+    },
     State.PROPOSED: {**_OURS, Cue.UPLOAD: State.UPLOADING, Cue.END: State.DONE},
     State.UPLOADING: {
         Cue.UPLOAD_VERIFIED: State.VERIFIED,

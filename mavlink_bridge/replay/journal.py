@@ -16,6 +16,7 @@ from mavlink_bridge.director.orders import Homing, ObstacleSource
 from mavlink_bridge.errors import LogError
 from missions.errors import MissionError
 from missions.firmware import read_firmware
+from missions.formats.calibration import calibration_from_plain, calibration_to_plain
 from missions.geo import LatLon
 from missions.request import request_of
 from missions.situation import Situation
@@ -65,7 +66,6 @@ class Journal:
     orders: Orders
     described: Situation
     calls: tuple[Call, ...]
-    events: tuple[dict[str, Any], ...]
     notes: tuple[DriveNote, ...] = ()
 
 
@@ -100,6 +100,7 @@ class JournalWriter:
                 "parameters": dict(described.parameters),
                 "firmware": str(described.firmware) if described.firmware else None,
                 "stopping": [[one.speed_mps, one.distance_m] for one in described.stops.given],
+                "calibration": calibration_to_plain(described.calibration),
                 "drive_notes": [note_to_json(note) for note in notes],
             }
         )
@@ -143,7 +144,7 @@ def read_journal(path: Path) -> Journal:
         It cannot be read; the message says at which line.
     """
     calls: list[Call] = []
-    events: list[dict[str, Any]] = []
+    line_number = 1
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
         head = json.loads(lines[0])
@@ -153,24 +154,27 @@ def read_journal(path: Path) -> Journal:
         firmware = read_firmware(head["firmware"]) if head.get("firmware") else None
         given = tuple(Stop(*one) for one in head.get("stopping", ()))
         notes = tuple(map(note_from_json, head.get("drive_notes", ())))
-        described = Situation(parameters=head["parameters"], firmware=firmware, stops=Stops(given))
-        for line in lines[1:]:
+        described = Situation(
+            parameters=head["parameters"],
+            firmware=firmware,
+            stops=Stops(given),
+            calibration=calibration_from_plain(head.get("calibration")),
+        )
+        for line_number, line in enumerate(lines[1:], start=2):  # noqa: B007 - told where it fails
             entry = json.loads(line)
-            if "told" in entry:
-                events.append(entry["told"])
-            else:
-                target = LatLon(*entry["target"]) if "target" in entry else None
-                calls.append(
-                    Call(entry["frames"], entry["time_s"], entry["call"], target, str(entry.get("text", "")))
-                )
+            if "told" in entry:  # for people: a replay tells its own
+                continue
+            target = LatLon(*entry["target"]) if "target" in entry else None
+            calls.append(
+                Call(entry["frames"], entry["time_s"], entry["call"], target, str(entry.get("text", "")))
+            )
     except OSError as error:
         raise LogError(f"{path} cannot be read: {error.strerror}", file=str(path)) from None
     except (ValueError, KeyError, TypeError, IndexError, MissionError) as error:
-        line_number = len(calls) + len(events) + 2
         raise LogError(
             f"{path}: line {line_number} is not a journal entry: {error!r}", file=str(path)
         ) from None
-    return Journal(orders, described, tuple(calls), tuple(events), notes)
+    return Journal(orders, described, tuple(calls), notes)
 
 
 def request_to_text(request: Request) -> str:

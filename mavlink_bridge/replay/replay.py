@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from mavlink_bridge.director import Director, Orders
 from mavlink_bridge.errors import BackupError, LogError, VehicleInUseError
 from mavlink_bridge.logbook.clock import Pulse, SteadyClock
+from mavlink_bridge.many import Task
 from mavlink_bridge.replay.journal import journal_path, read_journal, request_from_text
 from mavlink_bridge.tlog import TlogReader
 
@@ -76,9 +77,16 @@ def replay_log(
     return replay_foreign(entries, orders, look)
 
 
-def replay_to_json(log: Path, orders: Orders) -> list[dict[str, object]]:
-    """Replay a whole log; return its events as JSON objects, with the log's name. For worker processes."""
-    return [{"log": log.name, **event.as_json()} for event in replay_log(log, orders)]
+def replay_task(log: Path, orders: Orders) -> Task[Orders]:
+    """Return the replay of a log as a task for workers: with its journal, where it has one."""
+    journal = journal_path(log)
+    return Task(orders, (log, journal) if journal.exists() else (log,))
+
+
+def replay_done(task: Task[Orders]) -> list[dict[str, object]]:
+    """Do such a task: return the log's events as JSON objects, with its name."""
+    log = task.files[0]
+    return [{"log": log.name, **event.as_json()} for event in replay_log(log, task.asked)]
 
 
 def replay_recorded(

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from missions.firmware import Firmware
     from missions.geo import LatLon
     from missions.items import MissionItem
+    from missions.situation import Calibration
 
 _SOURCE = "the note of the drive"
 
@@ -51,6 +52,7 @@ class DriveRecord:
     parameters: Mapping[str, float]
     vehicle_type: int | None
     firmware: Firmware | None
+    calibration: Calibration | None = None
 
 
 def record_of(plan: Plan, situation: Situation) -> DriveRecord:
@@ -79,6 +81,7 @@ def record_of(plan: Plan, situation: Situation) -> DriveRecord:
         parameters=dict(situation.parameters),
         vehicle_type=situation.vehicle_type,
         firmware=situation.firmware,
+        calibration=situation.calibration,
     )
 
 
@@ -92,6 +95,7 @@ def situation_of(record: DriveRecord) -> Situation:
         home=Known(record.home, None, _SOURCE) if record.home is not None else None,
         pose=Known(Pose(record.path[0], record.heading_deg), None, _SOURCE),
         parameters=record.parameters,
+        calibration=record.calibration,
     )
 
 

@@ -76,8 +76,8 @@ class Instruments:
         elif isinstance(message, m.SysStatus):
             self._take_battery(message.battery_remaining, message.voltage_battery)
         elif isinstance(message, m.BatteryStatus) and message.id == 0:
-            cells = [one for one in message.voltages if one != _UNKNOWN_MV]
-            self._take_battery(message.battery_remaining, sum(cells) if cells else _UNKNOWN_MV)
+            whole_mv = message.whole_mv
+            self._take_battery(message.battery_remaining, _UNKNOWN_MV if whole_mv is None else whole_mv)
 
     def _take_battery(self, percent: int, millivolts: int) -> None:
         """Take a battery's figures; 0 V is no reading, as to ArduPilot, and 0 % beside it neither."""

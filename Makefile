@@ -14,7 +14,7 @@ LOCKED := --quiet --disable-pip-version-check --require-hashes --no-deps
 unexport PYTHONDONTWRITEBYTECODE
 quoted = '$(subst ','\'',$(1))'
 
-.PHONY: screens vendor coverage locks package release bench bench-bridge bench-drive bench-transfer test-foreign docs soak bench-tlog bench-ladder campaign fuzz hunt demo test lint format types walls check lock clean
+.PHONY: screens vendor coverage locks package release bench bench-bridge bench-drive bench-transfer test-foreign docs soak bench-tlog bench-ladder campaign fuzz hunt demo test lint format types walls check lock clean bench-console
 
 demo: .venv/run.stamp
 	$(BIN)/pbpp demo --out $(call quoted,$(OUT))
@@ -37,7 +37,8 @@ test: .venv/dev.stamp
 	@touch $@
 
 # The parts that promises rest on: the planner, missions, and all that decides or speaks a protocol without sockets.
-PROMISING := pbpp/*,missions/*,mavlink_bridge/mavlink/*,mavlink_bridge/protocol/*,mavlink_bridge/director/*,mavlink_bridge/backup/*,mavlink_bridge/tlog/*,mavlink_bridge/logbook/*,mavlink_bridge/replay/*,mavlink_bridge/fold.py
+CONSOLE := mavlink_bridge/console
+PROMISING := pbpp/*,missions/*,$(CONSOLE)/view/*,$(CONSOLE)/access.py,$(CONSOLE)/board.py,$(CONSOLE)/control.py,$(CONSOLE)/deeds.py,$(CONSOLE)/list_writer.py,$(CONSOLE)/live_desk.py,mavlink_bridge/mavlink/*,mavlink_bridge/protocol/*,mavlink_bridge/director/*,mavlink_bridge/backup/*,mavlink_bridge/tlog/*,mavlink_bridge/logbook/*,mavlink_bridge/replay/*,mavlink_bridge/fold.py
 COVERING := tests/pbpp tests/missions $(filter-out %/__pycache__ %/cli %/simulator,$(wildcard tests/mavlink_bridge/*)) \
 	tests/mavlink_bridge/cli/test_cli_transfers.py tests/mavlink_bridge/cli/test_ends_after_writes.py
 
@@ -120,6 +121,9 @@ bench-ladder: .venv/dev.stamp
 
 bench-transfer: .venv/dev.stamp
 	$(BIN)/python benchmarks/transfer.py
+
+bench-console: .venv/dev.stamp
+	$(BIN)/python benchmarks/console.py
 
 bench-bridge: .venv/dev.stamp
 	$(BIN)/python benchmarks/bridge.py

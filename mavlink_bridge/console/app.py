@@ -651,7 +651,7 @@ class _Gate:
             await self._app(scope, receive, send)
             return
         headers = {key.decode("latin-1"): value.decode("latin-1") for key, value in scope["headers"]}
-        problem, status = self._access.stranger(headers), 403
+        problem, status = self._access.stranger(headers, is_index=scope["path"] == "/"), 403
         if problem is None and not _is_open(scope["path"]):
             problem, status = self._access.unknown(headers), 401
         if scope["type"] == "websocket":

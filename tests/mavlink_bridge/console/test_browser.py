@@ -240,7 +240,7 @@ def test_a_map_lies_under_everything_and_comes_from_here(browser: Browser, tmp_p
     tiles = tmp_path / "field.pmtiles"
     write_map(tiles, (-105.2294, 40.0719), zooms=(16, 17))
     with serving("--fence", str(FIELDS / "maze-fence.waypoints"), "--map", str(tiles)) as server:
-        context = browser.new_context(viewport={"width": 3840, "height": 2160})
+        context = browser.new_context(viewport={"width": 2560, "height": 1440})
         seen = Watched(context, server.url)
         with seen.page.expect_response(
             lambda answer: answer.url.endswith("/map.pmtiles") and answer.status == 206

@@ -34,12 +34,13 @@ from mavlink_bridge.cli.vehicle_options import (
 )
 from mavlink_bridge.console.access import Access, is_loopback
 from mavlink_bridge.console.app import Console
-from mavlink_bridge.console.backend import FilesBackend, field_sections
+from mavlink_bridge.console.backend import FilesBackend
 from mavlink_bridge.console.hub import Hub
 from mavlink_bridge.console.list_writer import ListWriter
 from mavlink_bridge.console.live import LiveBackend, LiveConsole
 from mavlink_bridge.console.live_desk import LiveDesk
-from mavlink_bridge.console.recorded import RecordedBackend, Recording
+from mavlink_bridge.console.recorded import RecordedBackend
+from mavlink_bridge.console.recording import Recording
 from mavlink_bridge.console.server import (
     Certificate,
     Served,
@@ -48,6 +49,7 @@ from mavlink_bridge.console.server import (
     page_link,
     qr_code,
 )
+from mavlink_bridge.console.view.fields import field_sections
 from mavlink_bridge.console.view.sections import MapSource, Permissions, Sections, ServerView
 from mavlink_bridge.director import Director, Orders, TargetSource
 from mavlink_bridge.director.orders import Homing, ObstacleSource

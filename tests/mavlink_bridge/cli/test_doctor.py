@@ -163,13 +163,13 @@ class TestDoctor:
 
     def test_missing_packages(self, monkeypatch):
         def version(name):
-            if name in ("plotly", "pyserial"):
+            if name in ("matplotlib", "pyserial"):
                 raise metadata.PackageNotFoundError(name)
             return "1"
 
         monkeypatch.setattr(metadata, "version", version)
         found = findings()
-        assert (found["plotly"]["verdict"], found["pyserial"]["verdict"]) == ("info", "error")
+        assert (found["matplotlib"]["verdict"], found["pyserial"]["verdict"]) == ("info", "error")
 
     def test_options_that_cannot_be_read(self):
         write_options("[plan]\nclearence = 2\n")

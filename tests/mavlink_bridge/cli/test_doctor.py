@@ -280,7 +280,7 @@ def test_completion_is_offered_for_three_shells(tmp_path, monkeypatch):
     question = {**environment, "_PBPP_COMPLETE": "complete_bash", "COMP_WORDS": "pbpp do", "COMP_CWORD": "1"}
     answer = subprocess.run([pbpp], env=question, capture_output=True, text=True, check=False)
     assert answer.stdout.split() == ["download", "doctor"]
-    question["COMP_WORDS"] = "pbpp plan --cl"
+    question["COMP_WORDS"] = "pbpp plan --cle"
     question["COMP_CWORD"] = "2"
     assert subprocess.run(
         [pbpp], env=question, capture_output=True, text=True, check=False

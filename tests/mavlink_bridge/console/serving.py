@@ -15,7 +15,7 @@ from director.test_bridge_director import conductor
 from mavlink_bridge.backup.store import BackupStore
 from mavlink_bridge.backup.vehicle_mark import VehicleMark
 from mavlink_bridge.console.access import Access
-from mavlink_bridge.console.app import Console
+from mavlink_bridge.console.app import ConsoleRoutes
 from mavlink_bridge.console.backend import FilesBackend
 from mavlink_bridge.console.hub import Hub
 from mavlink_bridge.console.list_writer import ListWriter
@@ -56,7 +56,7 @@ def served(can: Permissions | None = None, backend=None, access=None, **more) ->
     port = listening.getsockname()[1]
     access = replace(access, port=port) if access is not None else Access.of("127.0.0.1", port)
     hub = files_hub(access, can, backend)
-    with Served(Console(hub, **more).app(), listening):
+    with Served(ConsoleRoutes(hub, **more).app(), listening):
         yield hub, f"127.0.0.1:{port}"
 
 

@@ -170,7 +170,7 @@ def _print(answer: AnswerRows, title: str) -> None:
         heading = cell(name.replace("_", " "))  # so that a narrow terminal breaks it between words
         table.add_column(heading, justify="right" if is_number else "left", overflow="fold")
     for row in answer.rows[:_MOST_ROWS]:
-        table.add_row(*(cell(_shown(value)) for value in row))
+        table.add_row(*map(cell, map(_shown, row)))
     if len(rows) > _MOST_ROWS:
         table.caption = f"the first {_MOST_ROWS} of {len(rows)}; all with --json or --csv"
     console().print(table)

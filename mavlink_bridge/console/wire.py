@@ -209,7 +209,7 @@ class Failure:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TakenUp:
-    """A request was taken up; what comes of it is seen in the sections."""
+    """A request was accepted; the sections show what comes of it."""
 
     ok: Literal[True] = True
     text: str = ""

@@ -50,7 +50,7 @@ class DriveNote:
     vehicle : VehicleMark
         Which vehicle.
     mission : tuple of MissionItem
-        The list as it was read back from it, home at 0.
+        The list as it was read back from it, ArduPilot's with home at 0.
     boot_ms : int
         How long the autopilot had been on, in milliseconds: later less says that it was switched off and on since.
     record : DriveRecord
@@ -86,6 +86,8 @@ def note_to_json(note: DriveNote) -> dict[str, Any]:
         "parameters": {name: number_to_json(value) for name, value in record.parameters.items()},
         "firmware": str(record.firmware) if record.firmware is not None else None,
     }
+    if not record.ardupilot:  # notes of ArduPilot's drives have no word of it
+        content["ardupilot"] = False
     return {**content, "sha256": checksum(content)}
 
 
@@ -119,6 +121,7 @@ def note_from_json(content: dict[str, Any]) -> DriveNote:
         parameters={name: float(value) for name, value in content["parameters"].items()},
         vehicle_type=content["vehicle_type"],
         firmware=read_firmware(firmware) if firmware is not None else None,
+        ardupilot=bool(content.get("ardupilot", True)),
     )
     mark = mark_from_json(int(content["system"]), content["vehicle"])
     mission = tuple(map(item_from_json, content["mission"]))

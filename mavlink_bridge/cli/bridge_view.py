@@ -18,7 +18,7 @@ from mavlink_bridge.cli.drawing import cell
 from mavlink_bridge.cli.drawing import console as terminal_console
 from mavlink_bridge.cli.typed import CONFIRM
 from mavlink_bridge.director import Severity, State
-from mavlink_bridge.mavlink.rover import mode_name
+from mavlink_bridge.mavlink.autopilots import autopilot_of
 from missions.picture import sketch_plan
 
 if TYPE_CHECKING:
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from mavlink_bridge.director import Director, Event
     from missions.geo import LatLon
+    from missions.planned import Plan
 
 # Chosen, not measured: quick enough to watch; the map takes longer to draw and changes slowly.
 _TABLE_EVERY_S = 0.5
@@ -133,7 +134,7 @@ class LiveView:
         rows.append(("state", f"{director.state.replace('_', ' ')}, for {_age(since_s)}"))
         if situation.mode is not None:
             armed = "armed" if situation.armed else "disarmed"
-            vehicle = f"system {situation.system}, {mode_name(situation.mode)}, {armed}"
+            vehicle = f"system {situation.system}, {autopilot_of(ardupilot=situation.ardupilot).modes.words(situation.mode)}, {armed}"
             rows.append(("vehicle", _of_then(vehicle, director.heard_s, now_s)))
         if (pose := situation.pose) is not None:
             rows.append(("position", _of_then(str(pose.value.position), pose.time_s, now_s)))
@@ -141,7 +142,7 @@ class LiveView:
             rows.append(("left", f"{drive.distance_left_m:.0f} m, about {drive.time_left_s:.0f} s"))
             rows.append(("clearance", f"{drive.least_clearance_m:.1f} m, the least so far"))
         elif director.plan is not None:
-            rows.append(("route", f"{director.plan.length_m:.0f} m, {len(director.plan.items) + 1} items"))
+            rows.append(("route", f"{director.plan.length_m:.0f} m, {self._count(director.plan)} items"))
         if (way := director.way_home) is not None:
             rows.append(("way home", f"{way.place.name}, {way.length_m:.0f} m, about {way.time_s:.0f} s"))
         elif director.no_way_home:
@@ -153,6 +154,11 @@ class LiveView:
         for name, value in rows:
             table.add_row(cell(name, "dim"), cell(value))
         return table
+
+    def _count(self, plan: Plan) -> int:
+        """Return how many items the list of a plan has on the vehicle."""
+        form = autopilot_of(ardupilot=self._director.situation.ardupilot).lists.form
+        return len(form.mission_of(plan.items, plan.start))
 
     def _link_rows(self, now_s: float) -> list[tuple[str, str | Text]]:
         """Return the rows of a lost link: that the vehicle is not heard, since when, and what is done about it."""

@@ -10,7 +10,6 @@ from mavlink_bridge.director.learning import Learning
 from mavlink_bridge.fold import fold
 from mavlink_bridge.protocol.undisturbed_read import UndisturbedRead
 from missions.situation import ListKind, Situation
-from missions.vehicle.asked_parameters import CHECKED_NAMES
 
 if TYPE_CHECKING:
     from mavlink_bridge.cli.options.shared import LinkOptions
@@ -44,7 +43,7 @@ def live_situation(options: LinkOptions, connection: str) -> tuple[Situation, li
             tuple(ListKind),
             UndisturbedRead,
             needs_position=False,
-            names=CHECKED_NAMES,
+            names=peer.autopilot.parameters.checked,
         )
         session.run(learning, "reading parameters, mission, fence and rally points")
         if learning.trouble is not None:

@@ -15,7 +15,7 @@ from mavlink_bridge.errors import LinkError, OutcomeError, RefusedError
 from mavlink_bridge.link import open_link, parse_connection
 from mavlink_bridge.mavlink.autopilots import autopilot_table
 from mavlink_bridge.mavlink.signing import Signing, SigningKey
-from mavlink_bridge.mavlink.vehicles import not_ardupilot
+from mavlink_bridge.mavlink.vehicles import not_known
 from mavlink_bridge.protocol.ask_version import AskVersion
 from mavlink_bridge.protocol.find import FindVehicle, identity_shared, identity_taken
 from mavlink_bridge.protocol.mode_switch import ModeSwitch
@@ -58,8 +58,6 @@ class Contact:
         How long to wait for the vehicle.
     key_file : Path, optional
         The signing key.
-    any_autopilot : bool
-        Take every autopilot whose transfers are known, for what only transfers; otherwise ArduPilot alone.
     """
 
     connection: str
@@ -68,7 +66,6 @@ class Contact:
     any_vehicle: bool = False
     timeout_s: float = 30.0
     key_file: Path | None = None
-    any_autopilot: bool = False
 
 
 class Session:
@@ -97,7 +94,7 @@ class Session:
     Raises
     ------
     LinkError
-        The vehicle is not there, or its autopilot is not one that this is known of.
+        The vehicle is not there, or its autopilot is not known here.
     IdentityTakenError
         Somebody else on the link speaks with our ids.
     """
@@ -127,10 +124,8 @@ class Session:
         assert finder.heartbeat is not None
         self.watch.receive(finder.heartbeat, link.now_s())
         table = autopilot_table(finder.heartbeat.autopilot)
-        other = not_ardupilot(finder.vehicle.system, finder.heartbeat.autopilot)
-        if other is not None and (table is None or not contact.any_autopilot):
-            raise other
-        assert table is not None
+        if table is None:
+            raise not_known(finder.vehicle.system, finder.heartbeat.autopilot)
         self.peer = replace(self.peer, autopilot=table)
 
     @property

@@ -18,8 +18,8 @@ from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.protocol.download import Download
 from mavlink_bridge.protocol.outcomes import list_read
 from missions.situation import ListKind
-from missions.vehicle import PARAMETER_NAMES
 from missions.vehicle.parameter_remarks import no_number_remarks
+from missions.vehicle.parameters import PARAMETERS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -119,7 +119,7 @@ class ListWatch(Part):
         came = {
             name: text
             for name, text in after.no_numbers.items()
-            if name in PARAMETER_NAMES and before.no_numbers.get(name) != text
+            if name in PARAMETERS and before.no_numbers.get(name) != text
         }
         for text in no_number_remarks(came, after.parameters):
             self.core.voice.tell(now_s, EventName.TROUBLE, text, "VehicleError", came)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from enum import StrEnum, auto
 
@@ -64,6 +65,13 @@ class FenceRules:
 
     seconds_a_vertex: float = 0.0
     not_enforced: tuple[tuple[str, str], ...] = ()
+
+    def reason_of(self, text: str) -> str | None:
+        """Return why a zone is not enforced, where a text of the vehicle says that one is not."""
+        for pattern, reason in self.not_enforced:
+            if re.match(pattern, text.strip(), re.IGNORECASE):
+                return reason
+        return None
 
     def counts_after_s(self, vertices: int) -> float:
         """Return how long after its upload a fence counts; the measured times are those of so many vertices and one more."""

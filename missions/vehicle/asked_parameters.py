@@ -20,7 +20,15 @@ CHECKED_NAMES: Final = (*ASKED_NAMES, "CIRC_RADIUS", "BATT_FS_LOW_ACT", "BATT_FS
 PX4_ASKED_NAMES: Final = (
     *("CA_AIRFRAME", "NAV_ACC_RAD", "GF_ACTION", "GF_MAX_HOR_DIST"),
     *("RA_ACC_RAD_MAX", "RA_ACC_RAD_GAIN", "RA_WHEEL_BASE", "RA_MAX_STR_ANG"),
-    *("RO_SPEED_LIM", "RO_MAX_THR_SPEED", "RO_SPEED_RED", "RO_ACCEL_LIM", "RO_DECEL_LIM", "RO_JERK_LIM", "RO_YAW_RATE_LIM"),
+    *(
+        "RO_SPEED_LIM",
+        "RO_MAX_THR_SPEED",
+        "RO_SPEED_RED",
+        "RO_ACCEL_LIM",
+        "RO_DECEL_LIM",
+        "RO_JERK_LIM",
+        "RO_YAW_RATE_LIM",
+    ),
     *("PP_LOOKAHD_GAIN", "PP_LOOKAHD_MIN", "PP_LOOKAHD_MAX"),
 )
 """What a PX4 rover is asked for: the names that v1.17 and the line of 1.18 have. Those of version 1.15 would only hold it up."""

@@ -212,7 +212,7 @@ class TestEveryModeThatIsSent:
     @staticmethod
     def switch(simulator):
         """Switch to HOLD as an interrupt does, and to the mission and back."""
-        contact = Contact(simulator.connection, (245, 190), any_autopilot=True)
+        contact = Contact(simulator.connection, (245, 190))
         with open_session(contact, lambda *_: None) as session:
             assert _hold(session.at_hand(lambda: None, lambda: ""))
             modes = session.autopilot.modes
@@ -226,7 +226,7 @@ class TestEveryModeThatIsSent:
 
 def test_a_mode_that_px4_1_17_accepts_and_never_enters_is_not_believed():
     with rover(PX4S, Firmware(1, 17, 0)) as (simulator, _):
-        contact = Contact(simulator.connection, (245, 190), any_autopilot=True)
+        contact = Contact(simulator.connection, (245, 190))
         with (
             open_session(contact, lambda *_: None) as session,
             pytest.raises(OutcomeError, match="did not confirm mode MANUAL"),

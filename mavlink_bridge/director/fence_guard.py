@@ -14,6 +14,7 @@ the route keeps its clearance alone. Where a fence counts at once, as on ArduPil
 from __future__ import annotations
 
 import math
+from collections import deque
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.director.core import Core, Part
@@ -41,6 +42,9 @@ _INVALID = 1
 """MISSION_STATE_NO_MISSION: there is none, or the one there is is not valid."""
 
 _MOST_TEXTS = 4  # of reasons; chosen
+_TEXTS_S = 15.0
+"""So long ago a text may be a reason: a mission is judged when its last item is stored, and again when the fence counts, up to 6.5 s later."""
+
 _GRAVE = 4  # MAV_SEVERITY_WARNING
 
 
@@ -55,7 +59,7 @@ class FenceGuard(Part):
         self._verified_s = math.inf
         self._mission_id = 0
         self._judged: tuple[float, bool] = (-math.inf, True)  # when, and whether it is valid
-        self._texts: list[str] = []
+        self._texts: deque[tuple[float, str]] = deque(maxlen=_MOST_TEXTS)
         self._left_out: dict[str, str] = {}  # zones and why
         self._told: frozenset[tuple[str, str]] = frozenset()
 
@@ -77,7 +81,6 @@ class FenceGuard(Part):
         if self.core.orders.once and not self.core.orders.drive:
             return self.core.end()
         self._verified_s = now_s
-        self._texts.clear()
         return []
 
     def enforced(self, now_s: float) -> Sequence[Signal]:
@@ -133,7 +136,8 @@ class FenceGuard(Part):
 
     def _refused(self, now_s: float) -> Sequence[Signal]:
         self._verified_s = math.inf
-        why = "".join(f"; {text}" for text in self._texts)
+        told = dict.fromkeys(text for time_s, text in self._texts if now_s <= time_s + _TEXTS_S)
+        why = "".join(f"; {text}" for text in told)
         name = self.core.autopilot.kind
         trouble = RefusedError(
             f"the mission is verified on the vehicle, but {name} does not take it for valid and would not drive it{why}",
@@ -172,8 +176,8 @@ class FenceGuard(Part):
             self._judged = (now_s, message.mission_state != _INVALID)
 
     def _take_text(self, message: m.Statustext, now_s: float) -> None:
-        if message.severity <= _GRAVE and message.text not in self._texts and len(self._texts) < _MOST_TEXTS:
-            self._texts.append(message.text.strip())
+        if message.severity <= _GRAVE:
+            self._texts.append((now_s, message.text.strip()))
         reason = self.core.autopilot.fence.reason_of(message.text)
         if reason is None:
             return

@@ -35,7 +35,9 @@ def sent_items(fence: Fence) -> tuple:
 def rover(firmware: Firmware = V1_18, fence: Fence = FENCE, **config: object) -> Px4Vehicle:
     given = {"parameters": {"RO_SPEED_LIM": 2.0}, **config}
     return Px4Vehicle(
-        SimulatorConfig(home=HOME, fence=sent_items(fence), autopilot=m.Autopilot.PX4, firmware=firmware, **given)
+        SimulatorConfig(
+            home=HOME, fence=sent_items(fence), autopilot=m.Autopilot.PX4, firmware=firmware, **given
+        )
     )
 
 
@@ -58,4 +60,21 @@ def driving(run: Conductor, target: LatLon = FAR) -> Conductor:
     return run
 
 
-__all__ = ["FAR", "FENCE", "HOME", "MANUAL", "MODES", "NEAR", "V1_17", "V1_18", "WALL", "arm", "conductor", "driving", "ready", "rover", "sent_items", "upload"]
+__all__ = [
+    "FAR",
+    "FENCE",
+    "HOME",
+    "MANUAL",
+    "MODES",
+    "NEAR",
+    "V1_17",
+    "V1_18",
+    "WALL",
+    "arm",
+    "conductor",
+    "driving",
+    "ready",
+    "rover",
+    "sent_items",
+    "upload",
+]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 from director.px4.px4_runs import (
     FAR,
@@ -24,8 +22,9 @@ from director.px4.px4_runs import (
 from director.test_bridge_director import reposition
 
 from mavlink_bridge.director import EventName, State, TargetSource
+from mavlink_bridge.director.orders import Homing, ObstacleSource
 from mavlink_bridge.mavlink import messages as m
-from mavlink_bridge.simulator.faults import Faults
+from mavlink_bridge.simulator.faults import Faults, FaultyLink
 from missions.errors import NoRouteError
 from missions.fence import CircleZone, Fence, ZoneKind
 from missions.geo import distance_m
@@ -69,7 +68,9 @@ def test_a_typed_target_becomes_a_verified_mission_a_drive_and_an_arrival(firmwa
     assert run.modes_sent == [PX4_MISSION]  # a PX4 mission ends in HOLD by itself
     assert vehicle.mode == MODES.hold
     assert "; HOLD" not in run.last(EventName.ARRIVED).text
-    assert not any(isinstance(one, m.CommandLong) and one.command == Command.MISSION_START for one in run.sent)
+    assert not any(
+        isinstance(one, m.CommandLong) and one.command == Command.MISSION_START for one in run.sent
+    )
     assert run.director.peer.autopilot.name == f"PX4 {firmware.major}.{firmware.minor}"
     assert any("PX4 keeps no margin" in text for text in run.last(EventName.PLANNED).data["info"])
 
@@ -177,14 +178,21 @@ def test_the_fence_counts_before_the_rover_starts():
 
 def test_a_fence_that_changes_while_the_rover_is_about_to_start_is_waited_for():
     run = ready(conductor())
+    wait(run, 5)
     run.director.take_target(FAR, run.now_s)
-    run.run_until(lambda: run.director.state is State.STARTING, 20)
-    far_off = CircleZone(ZoneKind.EXCLUSION, replace(HOME, lat_deg=40.0704), 1.0) if False else FENCE.zones[0]
-    assert far_off
-    other = Fence((*FENCE.zones, CircleZone(ZoneKind.EXCLUSION, WALL.zones[-1].centre, 0.5)))
-    upload(run, m.MissionType.FENCE, sent_items(other))
+    run.run_until(lambda: run.director.state is State.VERIFIED, 20)
+    aside = type(HOME)(HOME.lat_deg, HOME.lon_deg - 0.0001)
+    upload(
+        run,
+        m.MissionType.FENCE,
+        sent_items(Fence((*FENCE.zones, CircleZone(ZoneKind.EXCLUSION, aside, 0.5)))),
+    )
+    written_s = run.now_s
     run.run_until(lambda: run.director.state is State.DRIVING, 60)
-    assert [event.data["zones"] for event in run.events if event.name is EventName.ENFORCED][-1] == 5
+    items = len(run.vehicles[0].fence)
+    assert [event.data["zones"] for event in run.events if event.name is EventName.ENFORCED] == [4, 5]
+    assert run.last(EventName.ENFORCED).time_s >= written_s + 0.1 * (items + 1)
+    assert run.last(EventName.DRIVING).time_s >= run.last(EventName.ENFORCED).time_s
 
 
 @VERSIONS
@@ -210,14 +218,18 @@ def test_a_zone_that_the_armed_rover_is_put_into_is_said_to_be_not_enforced():
     wait(run, 10)
     before = len(run.events)
     place = run.vehicles[0].position
-    upload(run, m.MissionType.FENCE, sent_items(Fence((*FENCE.zones, CircleZone(ZoneKind.EXCLUSION, place, 30.0)))))
+    upload(
+        run,
+        m.MissionType.FENCE,
+        sent_items(Fence((*FENCE.zones, CircleZone(ZoneKind.EXCLUSION, place, 5.0)))),
+    )
     run.run_until(run.happened(EventName.NOT_ENFORCED, before), 10)
     assert run.last(EventName.NOT_ENFORCED).data["reason"] == "the vehicle"
 
 
 def test_a_mission_that_the_vehicle_refuses_is_not_driven():
     """A limit that the bridge does not know of: the vehicle says of a verified mission that it is not valid."""
-    run = ready(conductor(once=True))
+    run = conductor(once=True, request=Request(clearance_m=1.5).to(FAR))
     vehicle = run.vehicles[0]
     judge = vehicle.rover._judge_mission
 
@@ -227,9 +239,7 @@ def test_a_mission_that_the_vehicle_refuses_is_not_driven():
         vehicle.rover._say(2, "Geofence violation for waypoint 2")
 
     vehicle.rover._judge_mission = refuse
-    run.director.take_target(FAR, run.now_s)
-    run.run_until(lambda: run.director.is_done, 30)
-    assert run.director.state is State.FAILED
+    assert run.run(30) is State.FAILED
     assert "PX4 does not take it for valid" in str(run.director.trouble)
     assert "Geofence violation for waypoint 2" in str(run.director.trouble)
     assert not vehicle.is_armed
@@ -333,7 +343,9 @@ class TestFailsafes:
         run = driving(conductor(rover(firmware)))
         wait(run, 8)
         rover_ = run.vehicles[0].rover
-        rover_._area = type(rover_._area)(sent_items(Fence((CircleZone(ZoneKind.EXCLUSION, run.vehicles[0].position, 3.0),))), rover_.frame)
+        rover_._area = type(rover_._area)(
+            sent_items(Fence((CircleZone(ZoneKind.EXCLUSION, run.vehicles[0].position, 3.0),))), rover_.frame
+        )
         run.run_until(run.happened(EventName.TAKEN_OVER), 5)
         assert run.last(EventName.TAKEN_OVER).data["by"] == "autopilot"
         assert "AUTO.LOITER itself: fence breach" in run.last(EventName.TAKEN_OVER).text
@@ -347,7 +359,9 @@ class TestFailsafes:
         run.vehicles[0].rover._enter((4, 5))
         run.vehicles[0].rover.is_in_failsafe = True
         run.run_until(run.happened(EventName.TAKEN_OVER), 5)
-        assert run.last(EventName.TAKEN_OVER).text.startswith("the autopilot switched the vehicle to AUTO.RTL itself: failsafe")
+        assert run.last(EventName.TAKEN_OVER).text.startswith(
+            "the autopilot switched the vehicle to AUTO.RTL itself: failsafe"
+        )
 
     def test_a_text_alone_blames_nobody(self):
         run = driving(conductor())
@@ -385,8 +399,10 @@ class TestLinks:
     @VERSIONS
     @pytest.mark.parametrize("seed", range(3))
     def test_over_a_bad_link_it_arrives(self, firmware, seed):
-        faults = Faults(loss=0.1, duplicate=0.05, latency_s=0.1, jitter_s=0.05, seed=seed)
-        run = driving(conductor(rover(firmware), faults))
+        faults = Faults(loss=0.1, duplicate=0.05, latency_s=0.1, jitter_s=0.05)
+        run = conductor(rover(firmware))
+        run.up, run.down = FaultyLink(faults, 2 * seed), FaultyLink(faults, 2 * seed + 1)
+        driving(run)
         run.run_until(lambda: run.director.state is State.ARRIVED, 300)
         assert distance_m(run.vehicles[0].position, FAR) < 1.0
         assert run.vehicles[0].rover.breaches == 0
@@ -413,7 +429,9 @@ class TestSingleJobs:
         assert run.modes_sent == []
 
     def test_planning_alone_sends_no_mode(self):
-        run = conductor(once=True, upload=False, drive=False, arm=False, request=Request(clearance_m=1.5).to(FAR))
+        run = conductor(
+            once=True, upload=False, drive=False, arm=False, request=Request(clearance_m=1.5).to(FAR)
+        )
         assert run.run(60) is State.DONE
         assert run.modes_sent == []
 
@@ -444,8 +462,6 @@ def replace_lat(place):
 
 
 def test_an_obstacle_across_the_route_is_driven_round():
-    from mavlink_bridge.director.orders import ObstacleSource
-
     run = driving(conductor(obstacle_sources=frozenset({ObstacleSource.KEYBOARD})))
     wait(run, 8)
     before = len(run.events)
@@ -458,8 +474,6 @@ def test_an_obstacle_across_the_route_is_driven_round():
 
 @VERSIONS
 def test_rtl_is_answered_by_a_route_once(firmware):
-    from mavlink_bridge.director.orders import Homing
-
     run = driving(conductor(rover(firmware), homing=Homing(is_kept=True, by_route=True)))
     wait(run, 20)
     before = len(run.events)
@@ -473,8 +487,6 @@ def test_rtl_is_answered_by_a_route_once(firmware):
 
 
 def test_the_second_rtl_is_the_operators():
-    from mavlink_bridge.director.orders import Homing
-
     run = driving(conductor(homing=Homing(is_kept=True, by_route=True)))
     wait(run, 20)
     unheard(run, mode_command(MODES.rtl))
@@ -488,8 +500,6 @@ def test_the_second_rtl_is_the_operators():
 def test_position_targets_and_guided_items_are_none_to_px4():
     run = ready(conductor(target_sources=frozenset(TargetSource) - {TargetSource.HOME}))
     lat_e7, lon_e7 = 400_720_926, -1_052_286_152
-    run.ground_station(
-        m.SetPositionTargetGlobalInt(1, 1, 0, 6, 0xFFC, lat_e7, lon_e7)
-    )
+    run.ground_station(m.SetPositionTargetGlobalInt(1, 1, 0, 6, 0xFFC, lat_e7, lon_e7, 0.0))
     wait(run, 2)
     assert EventName.TARGET not in names(run)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import secrets
 import time
 from contextlib import ExitStack
@@ -20,8 +21,10 @@ from mavlink_bridge.cli.plan_results import write_outputs
 from mavlink_bridge.cli.terminal import echo, print_json
 from mavlink_bridge.director import Orders
 from mavlink_bridge.link import Link
-from mavlink_bridge.mavlink.messages import FenceStatus, GlobalPositionInt
-from mavlink_bridge.simulator import SimulatedVehicle, SimulatorConfig, SteppedRover
+from mavlink_bridge.mavlink.autopilots import autopilot_table
+from mavlink_bridge.mavlink.messages import Autopilot, FenceStatus, GlobalPositionInt, MissionType, Statustext
+from mavlink_bridge.simulator import SimulatorConfig, SteppedRover
+from mavlink_bridge.simulator.any_vehicle import AUTOPILOTS, vehicle_of
 from mavlink_bridge.tlog import TlogWriter
 from missions.fence import fence_to_items
 from missions.formats import read_fence
@@ -39,13 +42,19 @@ if TYPE_CHECKING:
 _HOME = (40.071374, -105.229930)
 _TARGET = (40.0726316, -105.2290497)
 _CLEARANCE_M = 2.5
+_PARAMETERS = {
+    Autopilot.ARDUPILOTMEGA: {"FENCE_ENABLE": 1.0, "WP_RADIUS": 2.0, "WP_SPEED": 4.0},
+    Autopilot.PX4: {},  # its airframe's own, 3 m/s: so it was measured
+}
+_AUTOPILOT, _CRITICAL = 1, 2  # MAV_COMP_ID_AUTOPILOT1, MAV_SEVERITY_CRITICAL
 _IDENTITY = (245, 190)  # the one-shot commands' own, `link.ONE_SHOT_IDENTITY`
 
 
 @dataclass(slots=True)
 class _Heard:
-    """What was heard while driving."""
+    """What was heard while driving; PX4 tells of breaches by text alone."""
 
+    breach_text: str
     track: list[LatLon] = field(default_factory=list)
     breaches: int = 0
 
@@ -55,7 +64,9 @@ def demo(options: DemoOptions) -> None:
     out = options.out
     out.mkdir(parents=True, exist_ok=True)
     make_room(out / "demo.tlog")
-    drive = _Heard()
+    table = autopilot_table(AUTOPILOTS[options.autopilot], options.firmware)
+    assert table is not None
+    drive = _Heard(table.incidents.breach_text)
     begun_s = time.monotonic()
     with ExitStack() as stack:
         recorder = stack.enter_context(TlogWriter(out / "demo.tlog"))
@@ -101,14 +112,18 @@ def demo(options: DemoOptions) -> None:
 
 def _rover(options: DemoOptions) -> SteppedRover:
     """Return a rover in the maze, on a link that no slow computer breaks."""
+    autopilot = AUTOPILOTS[options.autopilot]
+    table = autopilot_table(autopilot, options.firmware)
+    assert table is not None
     config = SimulatorConfig(
         home=LatLon(*_HOME),
-        fence=fence_to_items(_maze()),
-        parameters={"FENCE_ENABLE": 1.0, "WP_RADIUS": 2.0, "WP_SPEED": 4.0},
+        fence=table.lists.form.prepared(fence_to_items(_maze()), MissionType.FENCE),
+        parameters=_PARAMETERS[autopilot],
+        autopilot=autopilot,
         firmware=options.firmware,
         uid=secrets.token_bytes(12),  # each demo is a new rover: an interrupted one does not bear on the next
     )
-    return SteppedRover(SimulatedVehicle(config), options.speedup)
+    return SteppedRover(vehicle_of(config), options.speedup)
 
 
 def _maze() -> Fence:
@@ -123,6 +138,9 @@ def _observe(drive: _Heard, frames: list[Frame]) -> None:
             drive.track.append(from_e7(frame.message.lat, frame.message.lon))
         elif isinstance(frame.message, FenceStatus):
             drive.breaches = max(drive.breaches, frame.message.breach_count)
+        elif isinstance(frame.message, Statustext) and frame.component == _AUTOPILOT:
+            is_breach = re.match(drive.breach_text, frame.message.text, re.IGNORECASE) is not None
+            drive.breaches += is_breach and frame.message.severity <= _CRITICAL
 
 
 def _driven(plan: Plan, track: list[LatLon]) -> tuple[float, float]:

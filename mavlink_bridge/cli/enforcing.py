@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.fold import fold
+from mavlink_bridge.mavlink.autopilot_facts import with_autopilot
 from mavlink_bridge.mavlink.messages import CommandLong
 from mavlink_bridge.protocol.await_enforced import AwaitEnforced
 from missions.fence import fence_from_items
@@ -35,7 +36,8 @@ class Enforcement:
     def __init__(self, session: Session) -> None:
         peer = session.vehicle
         self._session = session
-        self._heard = Situation(system=peer.system, component=peer.component)
+        heard = Situation(system=peer.system, component=peer.component, armed=session.doing.is_armed)
+        self._heard = with_autopilot(heard, peer.autopilot.autopilot)
         session.listeners.append(self._listen)
 
     @staticmethod

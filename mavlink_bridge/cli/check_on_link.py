@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from mavlink_bridge.cli.options_session import session_for
 from mavlink_bridge.director.learning import Learning
 from mavlink_bridge.fold import fold
+from mavlink_bridge.mavlink.autopilot_facts import with_autopilot
 from mavlink_bridge.protocol.undisturbed_read import UndisturbedRead
 from missions.situation import ListKind, Situation
 
@@ -29,7 +30,10 @@ def live_situation(options: LinkOptions, connection: str) -> tuple[Situation, li
     """
     with session_for(options, connection) as (session, _show):
         peer, link = session.vehicle, session.link
-        heard = Situation(system=peer.system, component=peer.component)
+        # What a list means rests on whose it is: the next heartbeat may come after the lists.
+        heard = with_autopilot(
+            Situation(system=peer.system, component=peer.component), peer.autopilot.autopilot
+        )
 
         def listen(frames: list[Frame]) -> None:
             nonlocal heard

@@ -152,7 +152,7 @@ class TestDrives:
             code, found = run(simulator, "plan", "--target", self.TARGET, "--clearance", "1.5", "--upload")
             assert (code, found["verified"], modes_asked_for(sent)) == (0, True, [])
             code, found = run(simulator, "check")
-            assert (code, modes_asked_for(sent)) == (0, [])
+            assert (code, modes_asked_for(sent)) == (0, []), found
             assert any("PX4 keeps no margin" in text for text in found["info"])
             simulator.vehicle.rover.arm("a station")
             code, found = run(

@@ -141,15 +141,20 @@ def read_kept(kept: Path | None) -> dict[str, Ladder]:
 HEAD = """# The clearance ladder
 
 `make bench-ladder` asks every clearance from 0.5 to 8 m, and the widest route, on the recorded maze and yard and on the seeded fields of the
-[drive benchmark](drive-bench.md), its three vehicles in turn. It counts what would contradict: less promised than asked; a clearance refused
-below one that is planned; a rung whose route is slower by more than 2 % than that of a greater clearance; a rung that keeps more than `--clearance max`.
+[drive benchmark](drive-bench.md), its three vehicles in turn. A *rung* is one of these clearances on one place. Counted is what would contradict:
 
-That no plan promises less than was asked holds by construction. The rest is measured: fitting lines to a drive is a heuristic, and to make time
-and feasibility monotone by construction all greater clearances would have to be fitted for each plan. Where a route does not fit, or is driven
-slowly (1.6 times the time at full speed), the next clearances are fitted too, and the quickest that keeps enough is taken; before a clearance is
-refused, the widest ones are tried, and where the start refuses, those whose routes begin otherwise. Where fitting had to mend more than a metre
-in all, or cost more than 2 % of the time, up to five of the next whole and half metres are fitted as well, the same ones for whoever asks, as long as
-what is drawn there may come out quicker.
+- less is promised than was asked;
+- a clearance is refused, and a larger one is planned;
+- a route is slower by more than 2 % than that of a larger clearance;
+- a route keeps more than that of `--clearance max`.
+
+That no plan promises less than was asked holds by construction. The rest does not: lines are fitted to a drive by a heuristic, so
+a smaller clearance may come out slower than a larger one. To rule that out, each plan would have to be fitted for every larger clearance. What is done is less:
+
+- Where a route does not fit, or is driven slowly (1.6 times the time at full speed), the next larger clearances are fitted, too. The quickest route that keeps enough is taken.
+- Before a clearance is refused, the widest ones are tried; where the start refuses, those whose routes begin otherwise.
+- Where fitting had to mend more than a metre in all, or cost more than 2 % of the time, up to five of the next whole and half metres (*the grid*) are fitted as well, while what is drawn there may still be quicker. On a grid,
+  so that plans for neighbouring clearances look at the same routes.
 """
 
 

@@ -112,7 +112,7 @@ def parameters() -> str:
         for row in PARAMETERS.values()
         if not re.fullmatch(r"SERVO[2-9]_FUNCTION", row.name)
     ]
-    head = "| parameter | default if it is not known | ArduPilot's range | measured | changes |"
+    head = "| parameter | default if it is not known | the autopilot's own range | measured | changes |"
     return "\n".join([head, "|---|---|---|---|---|", *rows])
 
 
@@ -121,6 +121,8 @@ def _parameter_row(row: Parameter, name: str) -> str:
     if row.before is not None:
         taken += f" ({row.before[1]:g} before {row.before[0].major}.{row.before[0].minor})"
     since = f" (since {row.since.major}.{row.since.minor})" if row.since is not None else ""
+    if row.until is not None:
+        since = f" (to {row.until.major}.{row.until.minor})"
     measured = str(row.measured or "—")
     if row.measured_skid != row.measured:
         measured = (
@@ -131,7 +133,8 @@ def _parameter_row(row: Parameter, name: str) -> str:
     if row.measured_before_4_6:
         measured += f"; before 4.6 {row.measured_before_4_6}"
     autopilot = "PX4: " if row.autopilot is Autopilot.PX4 else ""
-    return f"| {name}{since} | {taken} | {row.documented or '—'} | {measured} | {autopilot}{row.changes} |"
+    whole = " (INT32)" if row.is_whole else ""
+    return f"| {name}{since} | {taken} | {row.documented or '—'}{whole} | {measured} | {autopilot}{row.changes} |"
 
 
 def _planners(case: str) -> str:

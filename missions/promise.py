@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from missions.vehicle import vehicle_from_parameters
+from missions.vehicle import known_ardupilot, known_type, vehicle_from_parameters
 
 if TYPE_CHECKING:
     from missions.request import Request
@@ -82,9 +82,9 @@ def known_vehicle(situation: Situation, request: Request) -> Vehicle:
     no_numbers = {name: float(came) for name, came in situation.no_numbers.items()}
     vehicle = vehicle_from_parameters(
         {**no_numbers, **situation.parameters},
-        mav_type=situation.vehicle_type,
+        mav_type=known_type(situation),
         firmware=situation.firmware,
-        ardupilot=situation.ardupilot,
+        ardupilot=known_ardupilot(situation),
     )
     if request.speed_mps is None:
         return vehicle

@@ -111,6 +111,25 @@ class ListTransfer:
 
 
 @dataclass(frozen=True, slots=True)
+class MadeFor:
+    """Which vehicle a file says that it is made for (QGroundControl's .plan): that counts only where nothing is known of the vehicle itself.
+
+    Parameters
+    ----------
+    source : str
+        The file.
+    ardupilot : bool or None
+        Whether for ArduPilot; False is PX4, None is not said.
+    vehicle_type : int or None
+        MAV_TYPE.
+    """
+
+    source: str
+    ardupilot: bool | None = None
+    vehicle_type: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Reading:
     """How a situation's facts were read, and what was read that is no fact (yet).
 
@@ -126,6 +145,8 @@ class Reading:
         Why the newest fence that was seen could not be used.
     remarks : tuple of str
         Warnings from reading a file: what was skipped, and what was assumed.
+    made_for : MadeFor, optional
+        Which vehicle the file says that it is made for.
     """
 
     bytewise: bool | None = None
@@ -135,6 +156,7 @@ class Reading:
     )
     fence_trouble: str | None = None
     remarks: tuple[str, ...] = ()
+    made_for: MadeFor | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,9 +18,9 @@ def counted(count: int, name: str) -> str:
     return f"{count} {name}" if count == 1 else f"{count} {name}s"
 
 
-def mission_items(count: int) -> str:
-    """Return how many items a mission has, home included, as the autopilot counts them."""
-    return f"{counted(count, 'mission item')} with home"
+def mission_items(count: int, *, has_home: bool = True) -> str:
+    """Return how many items a mission has as the autopilot counts them: home included, but on PX4, which has no home item."""
+    return f"{counted(count, 'mission item')}{' with home' if has_home else ''}"
 
 
 HEADING_UNKNOWN = "heading unknown; assuming the rover faces waypoint 1"

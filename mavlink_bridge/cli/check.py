@@ -24,15 +24,12 @@ from mavlink_bridge.cli.way_home import RouteWays
 from missions.checking.check import check_mission, plan_of
 from missions.picture.plans import plan_scene
 from missions.request import GoTo
-from missions.vehicle.item_limit import most_items
+from missions.vehicle.item_limit import most_own_items
 from missions.words import counted, metres, mission_items
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from mavlink_bridge.cli.options.check import CheckOptions
     from missions.checking.check import CheckedLeg, MissionCheck
-    from missions.items import MissionItem
     from missions.picture.scene import PictureScene
     from missions.planned import Plan
     from missions.situation import Situation
@@ -55,7 +52,7 @@ def check(options: CheckOptions) -> None:
         *unknown,
         *checked.warnings,
         *(ways.warnings if ways is not None else ()),
-        *_storage_warnings(checked.mission.items, situation),
+        *_storage_warnings(checked, situation),
     ]
     inform(checked.info)
     warn(warnings)
@@ -71,11 +68,12 @@ def check(options: CheckOptions) -> None:
         raise typer.Exit(ExitCode.CHECK)
 
 
-def _storage_warnings(items: Sequence[MissionItem], situation: Situation) -> list[str]:
-    """Warn of a mission (its items without home) that the vehicle cannot hold."""
-    most = most_items(situation.parameters)
-    count = len(items) + 1
-    return [f"{mission_items(count)}; the vehicle holds {most}"] if count > most else []
+def _storage_warnings(checked: MissionCheck, situation: Situation) -> list[str]:
+    """Warn of a mission that the vehicle cannot hold."""
+    home, most = checked.vehicle.home_items, most_own_items(situation)
+    by_board = "" if home else " (or 1000, by its board: no parameter says which)"
+    told = f"{_items(checked)}; the vehicle holds {most + home}{by_board}"
+    return [told] if len(checked.mission.items) > most else []
 
 
 def _scene(checked: MissionCheck, planned: Plan, ways: RouteWays | None) -> PictureScene:
@@ -120,6 +118,11 @@ def _report(checked: MissionCheck, plots: list[Path], *, is_quiet: bool) -> None
     echo(f"PASS: {every} keeps {kept}{trusted}")
 
 
+def _items(checked: MissionCheck) -> str:
+    home = checked.vehicle.home_items
+    return mission_items(len(checked.mission.items) + home, has_home=bool(home))
+
+
 def _report_legs(checked: MissionCheck, plots: list[Path]) -> None:
     table = Table(box=None, pad_edge=False, collapse_padding=True)
     wrapped = {"leg", "nearest fence"}
@@ -131,7 +134,7 @@ def _report_legs(checked: MissionCheck, plots: list[Path]) -> None:
     console().print(table)
     echo(
         f"{counted(len(checked.legs), 'leg')}, {checked.length_m:.1f} m, about {checked.duration_s:.0f} s"
-        f"{' for each round' if checked.course.is_endless else ''}; {mission_items(len(checked.mission.items) + 1)}"
+        f"{' for each round' if checked.course.is_endless else ''}; {_items(checked)}"
     )
     for way in checked.home_ways:
         echo(
@@ -187,7 +190,7 @@ def _document(
         "duration_s": round(checked.duration_s, 1),
         "drawn_clearance_m": _finite(checked.drawn_clearance_m),
         "driven_clearance_m": _finite(checked.driven_clearance_m),
-        "mission_items": len(checked.mission.items) + 1,
+        "mission_items": len(checked.mission.items) + checked.vehicle.home_items,
         "endless": checked.course.is_endless,
         "broken": len(checked.broken),
         "stopping": hold_document(checked.hold),

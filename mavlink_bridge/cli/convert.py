@@ -13,6 +13,7 @@ from mavlink_bridge.cli.terminal import echo, print_json
 from mavlink_bridge.cli.values import position_from
 from mavlink_bridge.errors import UsageError
 from missions.formats import Part, format_of, parts_of, write_situation
+from missions.vehicle import known_ardupilot
 from missions.words import counted, mission_items
 
 if TYPE_CHECKING:
@@ -96,8 +97,11 @@ def _left_out(situation: Situation, written: tuple[Part, ...], output: Path) -> 
 def _count(situation: Situation, part: Part) -> str:
     """Return how much of a part there is, in words."""
     mission, fence, rally = situation.mission, situation.fence, situation.rally
+    has_home = known_ardupilot(situation) is not False
     counts = {
-        "mission": mission_items(mission.value.item_count() if mission else 0),
+        "mission": mission_items(
+            mission.value.item_count(has_home=has_home) if mission else 0, has_home=has_home
+        ),
         "fence": counted(len(fence.value.zones) if fence else 0, "fence zone"),
         "rally": counted(len(rally.value) if rally else 0, "rally point"),
         "parameters": counted(len(situation.parameters), "parameter"),

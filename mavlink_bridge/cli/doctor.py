@@ -30,7 +30,7 @@ from missions.formats import read_situation
 from missions.geo import LatLon
 from missions.request import GoTo
 from missions.vehicle import vehicle_from_parameters
-from missions.vehicle.parameter_remarks import assumed_remarks
+from missions.vehicle.parameter_remarks import assumed_remarks, range_remarks
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -251,14 +251,19 @@ def _vehicle(file: Path | None, firmware: Firmware | None) -> Iterator[_Finding]
     try:
         described = read_vehicle_file(file)
         firmware = firmware or described.firmware
-        vehicle = vehicle_from_parameters(described.parameters, firmware=firmware)
+        vehicle = vehicle_from_parameters(
+            described.parameters, firmware=firmware, ardupilot=described.ardupilot
+        )
     except MissionError as error:
         yield _Finding(_Verdict.ERROR, "vehicle", str(error))
         return
     version = firmware or "of an unknown version (--firmware)"
     verdict = _Verdict.WARNING if vehicle.has_measured_corners is None else _Verdict.OK
     yield _Finding(verdict, "vehicle", f"{vehicle.autopilot} {version}, {vehicle.steering} steering")
-    for remark in assumed_remarks(vehicle):
+    for remark in (
+        *range_remarks(described.parameters, ardupilot=described.ardupilot),
+        *assumed_remarks(vehicle),
+    ):
         yield _Finding(_Verdict.WARNING, "vehicle", remark)
     for reason in beyond_measured(vehicle):
         yield _Finding(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from mavlink_bridge.backup.store import BackupStore
@@ -15,16 +16,16 @@ from mavlink_bridge.cli.terminal import echo, echo_lines, print_json
 from mavlink_bridge.errors import BridgeError, LinkError, UsageError
 from mavlink_bridge.mavlink.messages import MissionType
 from mavlink_bridge.protocol.outcomes import list_read
-from mavlink_bridge.protocol.parameters import ReadParameters
+from mavlink_bridge.protocol.parameters import ParametersOutcome, ReadParameters
 from mavlink_bridge.protocol.undisturbed_read import UndisturbedRead
 from missions.fence import fence_from_items
 from missions.formats import write_mission
 from missions.formats.numbers import has_place, xy_for_file
-from missions.formats.parameters import is_parameter_name
+from missions.formats.parameters import is_parameter_name, origin_remarks, qgc_text, value_text
 from missions.formats.waypoints import format_items
 from missions.items import Command, without_home
 from missions.rally import rally_from_items
-from missions.situation import Known, Mission, Situation
+from missions.situation import Known, Mission
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.cli.options.download import DownloadOptions
     from mavlink_bridge.cli.session import Session
     from missions.items import MissionItem
+    from missions.situation import Situation
 
 _ITEM_SUFFIXES = (".waypoints", ".txt")
 _PARAMETER_SUFFIXES = (".parm", ".param", ".params")
@@ -43,10 +45,10 @@ def download(options: DownloadOptions) -> None:
     what = options.what
     _check(what, options.connect, options.output)
     items: tuple[MissionItem, ...] = ()
-    parameters: dict[str, float] = {}
+    parameters = ParametersOutcome()
     with session_for(options, options.connect) as (session, _show):
         store = BackupStore()
-        if store.notes():  # else nothing needs to be distinguished
+        if what == "parameters" or store.notes():  # else nothing needs to be distinguished
             warn(reader_warnings(store, session.which_vehicle()))
         if what == "parameters":
             parameters = _read_parameters(session)
@@ -59,7 +61,12 @@ def download(options: DownloadOptions) -> None:
                 f"{path}: the first row of such a file is home, which a mission of {session.autopilot.kind} does not hold; nothing was written",
                 advice="write it to a .plan",
             )
-        _write(path, what, items, parameters, has_home=has_home)
+        if path.suffix.lower() == ".plan":
+            _write_plan(path, what, items, session.heard, has_home=has_home)
+        elif what == "parameters":
+            _write_parameters(path, parameters, session.heard)
+        else:
+            write_kept(path, format_items(items).encode())
     document: dict[str, Any] = {
         "status": "ok",
         "command": "download",
@@ -68,12 +75,14 @@ def download(options: DownloadOptions) -> None:
         "outputs": [str(path) for path in options.output],
     }
     if options.json_output:
-        print_json({**document, **_details(what, items, parameters)})
+        print_json({**document, **_details(what, items, parameters.values)})
     elif not options.quiet:
-        number = f"{len(parameters)} parameters" if what == "parameters" else f"{what}: {len(items)} items"
+        number = (
+            f"{len(parameters.values)} parameters" if what == "parameters" else f"{what}: {len(items)} items"
+        )
         echo(number + "".join(f"; written to {path}" for path in options.output))
         if not options.output:
-            echo_lines(_lines(items, parameters))
+            echo_lines(_lines(items, dict(sorted(parameters.values.items()))))
 
 
 def _lines(items: Sequence[MissionItem], parameters: Mapping[str, float]) -> Iterator[str]:
@@ -86,7 +95,7 @@ def _lines(items: Sequence[MissionItem], parameters: Mapping[str, float]) -> Ite
         params = " ".join(f"p{i}={value:g}" for i, value in enumerate(item.params, 1) if value)
         yield f"{seq:>4}  {name:<30}  {place:<23}  {params}".rstrip()
     for name, value in parameters.items():
-        yield f"{name:<16}  {value:.9g}"
+        yield f"{name:<16}  {value_text(value)}"
 
 
 def _check(what: str, connect: str, outputs: list[Path]) -> None:
@@ -122,7 +131,7 @@ def read_list(session: Session, what: str) -> tuple[MissionItem, ...]:
     return items
 
 
-def _read_parameters(session: Session) -> dict[str, float]:
+def _read_parameters(session: Session) -> ParametersOutcome:
     machine = ReadParameters(session.vehicle)
     session.run(machine, "reading parameters")
     outcome = machine.outcome
@@ -136,42 +145,36 @@ def _read_parameters(session: Session) -> dict[str, float]:
     warn(
         [f"{name} was received as {came}, not a number: ignored" for name, came in outcome.no_numbers.items()]
     )
-    return dict(sorted(outcome.values.items()))
+    return outcome
 
 
-def _write(
-    path: Path,
-    what: str,
-    items: tuple[MissionItem, ...],
-    parameters: Mapping[str, float],
-    *,
-    has_home: bool = True,
-) -> None:
-    if path.suffix.lower() == ".plan":
-        _write_plan(path, what, items, has_home=has_home)
-        return
-    if what == "parameters":
-        separator = " " if path.suffix.lower() == ".parm" else ","
-        odd = [name for name in parameters if not is_parameter_name(name)]  # it may hold a line break
-        if odd:
-            warn([f"{path}: left out, not valid parameter names: {', '.join(map(repr, odd))}"])
-        named = ((name, value) for name, value in parameters.items() if name not in odd)
-        text = "".join(f"{name}{separator}{value:.9g}\n" for name, value in named)
+def _write_parameters(path: Path, read: ParametersOutcome, vehicle: Situation) -> None:
+    """Write parameters as the ground station that the suffix is of reads them: .params QGroundControl, the others Mission Planner and MAVProxy."""
+    odd = [name for name in read.values if not is_parameter_name(name)]  # it may hold a line break
+    if odd:
+        warn([f"{path}: left out, not valid parameter names: {', '.join(map(repr, odd))}"])
+    named = {name: value for name, value in sorted(read.values.items()) if name not in odd}
+    if path.suffix.lower() == ".params":
+        text = qgc_text(replace(vehicle, parameters=named), read.types)
     else:
-        text = format_items(items)
+        separator = " " if path.suffix.lower() == ".parm" else ","
+        rows = (f"{name}{separator}{value_text(value)}\n" for name, value in named.items())
+        text = "".join((*origin_remarks(vehicle), *rows))
     write_kept(path, text.encode())
 
 
-def _write_plan(path: Path, what: str, items: tuple[MissionItem, ...], *, has_home: bool) -> None:
+def _write_plan(
+    path: Path, what: str, items: tuple[MissionItem, ...], vehicle: Situation, *, has_home: bool
+) -> None:
     source = "read from the vehicle"
     if what == "mission":
         home = items[0].position if items and has_home else None
         own = without_home(items) if has_home else items
-        situation = Situation(mission=Known(Mission(own, home), None, source))
+        situation = replace(vehicle, mission=Known(Mission(own, home), None, source))
     elif what == "fence":
-        situation = Situation(fence=Known(fence_from_items(items), None, source))
+        situation = replace(vehicle, fence=Known(fence_from_items(items), None, source))
     else:
-        situation = Situation(rally=Known(rally_from_items(items), None, source))
+        situation = replace(vehicle, rally=Known(rally_from_items(items), None, source))
     write_mission(situation, path, write=write_kept)
 
 

@@ -13,7 +13,7 @@ from missions.fence import ZoneKind
 from missions.formats import Choices, fence_of, mission_of, read_situation
 from missions.formats.features import Role
 from missions.formats.parameters import read_path
-from missions.situation import Known, Reading
+from missions.situation import Known
 
 if TYPE_CHECKING:
     from mavlink_bridge.cli.options.shared import MapOptions
@@ -88,7 +88,9 @@ def read_fence_file(path: Path, options: MapOptions) -> Situation:
     more = [f"{path}: {what}: {count}" for what, count in counts.items() if count]
     warn(more)
     known = Known(fence, None, str(path))
-    return replace(situation, fence=known, reading=Reading(remarks=(*situation.remarks, *more)))
+    return replace(
+        situation, fence=known, reading=replace(situation.reading, remarks=(*situation.remarks, *more))
+    )
 
 
 def read_mission_file(path: Path, options: MapOptions) -> Mission:

@@ -9,6 +9,7 @@ from mavlink_bridge.cli.log_times import log_begin
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.logbook.log_situation import situation_from_log
 from missions.items import last_place
+from missions.vehicle import known_ardupilot
 from missions.words import counted, mission_items
 
 if TYPE_CHECKING:
@@ -56,7 +57,9 @@ def taken_info(log: Path, situation: Situation, request: Request) -> list[str]:
         taken.append(told(f"start {situation.home.value}", situation.home))
     if request.repairs:
         if situation.mission is not None:
-            taken.append(told(mission_items(situation.mission.value.item_count()), situation.mission))
+            has_home = known_ardupilot(situation) is not False
+            count = situation.mission.value.item_count(has_home=has_home)
+            taken.append(told(mission_items(count, has_home=has_home), situation.mission))
     elif not request.targets and situation.target is not None:
         taken.append(told(f"target {situation.target.value}", situation.target))
     elif not request.targets and situation.mission is not None:

@@ -81,7 +81,13 @@ def _with_files(source: Situation | None, options: MissionOptions) -> Situation:
             found,
             fence=told.fence,
             home=found.home or told.home,
-            reading=replace(found.reading, fence_trouble=None, transfers={}, remarks=told.remarks),
+            reading=replace(
+                found.reading,
+                fence_trouble=None,
+                transfers={},
+                remarks=told.remarks,
+                made_for=told.reading.made_for,
+            ),
         )
     if options.mission is not None:
         told = read_file(options.mission, options, by_name=options.fence is None)
@@ -91,7 +97,12 @@ def _with_files(source: Situation | None, options: MissionOptions) -> Situation:
             mission=told.mission,
             fence=told.fence if options.fence is None and told.fence else found.fence,
             rally=found.rally or told.rally,
-            reading=replace(found.reading, remarks=(*found.remarks, *told.remarks)),
+            reading=replace(
+                found.reading,
+                remarks=(*found.remarks, *told.remarks),
+                made_for=told.reading.made_for
+                or found.reading.made_for,  # the mission's file says what drives it
+            ),
         )
         if source is None:
             found = with_mission_home(found, drawn, str(options.mission))

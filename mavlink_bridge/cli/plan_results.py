@@ -84,7 +84,7 @@ def plan_document(planned: Plan) -> dict[str, object]:
         ],
         "stopping": hold_document(planned.hold),
         "blocks": planned.blocks,
-        "mission_items": len(planned.items) + 1,
+        "mission_items": len(planned.items) + planned.vehicle.home_items,
         "extrapolated": list(planned.extrapolated),
         **remarks_document(planned.info, planned.warnings),
     }

@@ -14,6 +14,7 @@ from mavlink_bridge.cli.link_notes import tell_echoes
 from mavlink_bridge.errors import LinkError, OutcomeError, RefusedError
 from mavlink_bridge.link import open_link, parse_connection
 from mavlink_bridge.mavlink.autopilots import autopilot_table
+from mavlink_bridge.mavlink.messages import Autopilot
 from mavlink_bridge.mavlink.signing import Signing, SigningKey
 from mavlink_bridge.mavlink.vehicles import not_known
 from mavlink_bridge.protocol.ask_version import AskVersion
@@ -23,6 +24,7 @@ from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.protocol.telemetry import stream_requests
 from mavlink_bridge.protocol.vehicle_watch import VehicleWatch
 from missions.firmware import firmware_from_number
+from missions.situation import Situation
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -127,6 +129,12 @@ class Session:
         if table is None:
             raise not_known(finder.vehicle.system, finder.heartbeat.autopilot)
         self.peer = replace(self.peer, autopilot=table)
+        self.heard = Situation(
+            system=finder.vehicle.system,
+            component=finder.vehicle.component,
+            ardupilot=finder.heartbeat.autopilot == Autopilot.ARDUPILOTMEGA,
+            vehicle_type=finder.vehicle.type,
+        )
 
     @property
     def vehicle(self) -> Peer:
@@ -172,6 +180,7 @@ class Session:
         self.run(asking, "identifying the vehicle")
         version = asking.version
         firmware = firmware_from_number(version.flight_sw_version) if version is not None else None
+        self.heard = replace(self.heard, firmware=firmware)
         table = autopilot_table(self.autopilot.autopilot, firmware)
         assert table is not None
         self.peer = replace(self.vehicle, autopilot=table)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.backup.store import BackupStore, read_backup
@@ -22,6 +23,8 @@ from missions.fence import fence_to_items
 from missions.geo import LatLon
 from missions.items import with_home, without_home
 from missions.rally import rally_to_items
+from missions.situation import Situation
+from missions.vehicle.parameter_remarks import made_for_remarks, range_remarks
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -42,7 +45,8 @@ def upload(options: UploadOptions) -> None:
     restoration = None
     if options.restore:
         restoration = Restoration(read_backup(options.file) if options.file else None, options.other_vehicle)
-    lists, parameters = _content(options, restoration)
+    lists, held = _content(options, restoration)
+    parameters = held.parameters
     store = BackupStore()
     if options.forget:
         _forget(store, options)
@@ -53,6 +57,7 @@ def upload(options: UploadOptions) -> None:
             backups = backups_to_restore(store, uploads.vehicle, restoration) if restoration else []
             if not restoration:
                 warn(interrupted_warnings(store, uploads.vehicle))
+            warn(_file_remarks(options.file, held, session.heard))
             make_ready(session, hold=options.hold, replace_active=options.replace_active)
             warn(fence_warnings(session, [kind for kind, _ in lists] + [one.mission_type for one in backups]))
             fences = [items for kind, items in _kinds(lists, backups) if kind is MissionType.FENCE]
@@ -117,31 +122,41 @@ def _forget(store: BackupStore, options: UploadOptions) -> None:
             echo("no interrupted uploads")
 
 
-def _content(options: UploadOptions, restoration: Restoration | None) -> tuple[Lists, Mapping[str, float]]:
-    """Read the file, lists as they go over the wire or parameters; all that it holds can be sent."""
+def _content(options: UploadOptions, restoration: Restoration | None) -> tuple[Lists, Situation]:
+    """Read the file: lists as they go over the wire, and the situation with its parameters; all that it holds can be sent."""
     file, only = options.file, options.only
     if unknown := [name for name in only if name not in LISTS]:
         raise UsageError(f"--only {unknown[0]}: expected one of {', '.join(LISTS)}")
     if restoration is not None and restoration.backup is not None:
         check_items(restoration.backup.items, restoration.backup.mission_type, allow_infinite=True)
     if file is None or restoration is not None:
-        return [], {}
+        return [], Situation()
     if file.suffix.lower() in _PARAMETER_SUFFIXES:
-        parameters = read_vehicle_file(file).parameters
-        check_parameters(parameters)
-        return [], parameters
-    found = _lists_of(file, options)
+        described = read_vehicle_file(file)
+        check_parameters(described.parameters)
+        return [], described
+    situation = read_file(file, options)
+    found = _lists_of(situation)
     chosen = [name for name in LISTS if name in found and (not only or name in only)]
     if not chosen:
         raise UsageError(f"{file} holds no {' or '.join(only or LISTS)}")
     lists = [(MissionType[name.upper()], found[name]) for name in chosen]
     for mission_type, items in lists:
         check_items(items, mission_type)
-    return lists, {}
+    return lists, Situation(reading=situation.reading)
 
 
-def _lists_of(file: Path, options: UploadOptions) -> dict[str, tuple[MissionItem, ...]]:
-    situation = read_file(file, options)
+def _file_remarks(file: Path | None, held: Situation, vehicle: Situation) -> list[str]:
+    """Return what of a file does not fit the vehicle that it is sent to."""
+    remarks = []
+    if held.system not in (None, vehicle.system):
+        remarks.append(f"{file} was saved from vehicle {held.system}; this is vehicle {vehicle.system}")
+    if held.parameters:
+        remarks += range_remarks(held.parameters, ardupilot=vehicle.ardupilot)
+    return [*remarks, *made_for_remarks(replace(vehicle, reading=held.reading))]
+
+
+def _lists_of(situation: Situation) -> dict[str, tuple[MissionItem, ...]]:
     found: dict[str, tuple[MissionItem, ...]] = {}
     if situation.fence and situation.fence.value.zones:
         found["fence"] = fence_to_items(situation.fence.value)

@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from mavlink_bridge.cli.common import warn
 from mavlink_bridge.cli.field_files import read_vehicle_file
 from mavlink_bridge.cli.values import MOST_VEHICLE_M, checked_number, position_from
 from mavlink_bridge.errors import UsageError
 from missions.situation import Known, Situation
 from missions.stops import Stops
-from missions.vehicle import Footprint
+from missions.vehicle import Autopilot, Footprint, known_ardupilot
 
 if TYPE_CHECKING:
     from mavlink_bridge.cli.options.shared import ClearanceOptions, DescriptionOptions
@@ -63,7 +64,11 @@ def described_vehicle(options: DescriptionOptions) -> Situation:
 
 
 def with_description(situation: Situation, described: Situation) -> Situation:
-    """Return the situation with what the user says of its vehicle; what the vehicle itself reported counts more."""
+    """Return the situation with what the user says of its vehicle; what the vehicle itself reported counts more, and a contradiction is told."""
+    heard, said = situation.ardupilot, known_ardupilot(described)
+    if heard is not None and said is not None and heard != said:
+        name, own = (Autopilot.ARDUPILOT if one else Autopilot.PX4 for one in (said, heard))
+        warn([f"--vehicle holds {name}'s parameters, but the vehicle is {own}, to which they mean nothing"])
     return replace(
         situation,
         parameters={**described.parameters, **situation.parameters},

@@ -66,7 +66,12 @@ class Drives:
     def _begin(self, situation: Situation, first: TrackFix, field: GradedField) -> None:
         assert situation.mission is not None
         home_first = autopilot_of(ardupilot=situation.ardupilot).lists.form.has_home_item
-        way = way_of(situation.mission.value.items, max(int(home_first), first.item), home_first=home_first)
+        way = way_of(
+            situation.mission.value.items,
+            max(int(home_first), first.item),
+            home_first=home_first,
+            vehicle=field.vehicle,
+        )
         if not way.seqs:
             return
         before = self._from_standing(first)

@@ -168,7 +168,7 @@ class Intrusion:
 
 @dataclass(frozen=True, slots=True)
 class ReportedBreach:
-    """A breach that the autopilot itself reported, by FENCE_STATUS: its count then, and FENCE_BREACH type."""
+    """A breach that the autopilot itself reported, by FENCE_STATUS, PX4 by a text: its count then, and FENCE_BREACH type."""
 
     time_s: float
     count: int

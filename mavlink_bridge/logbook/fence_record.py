@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import deque
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
@@ -21,9 +22,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from mavlink_bridge.logbook.track import TrackFix
+    from mavlink_bridge.mavlink.autopilots import Texts
     from mavlink_bridge.mavlink.messages import FenceStatus
     from missions.situation import Situation
 
+_BOUNDARY: Final = 3  # FENCE_BREACH_BOUNDARY
 _MOST_INTRUSIONS: Final = 1000  # the last ones are kept; chosen, bounds memory
 
 
@@ -52,6 +55,11 @@ class FenceRecord:
         known, self._breach_count = self._breach_count, message.breach_count
         if message.breach_count > (known or 0) and (known is not None or message.breach_status):
             self.breaches.append(ReportedBreach(now_s, message.breach_count, message.breach_type))
+
+    def take_text(self, text: str, texts: Texts, now_s: float) -> None:
+        """Take a text of the vehicle, where a text is how the autopilot reports that it left the fence."""
+        if texts.breach is not None and re.match(texts.breach, text, re.IGNORECASE):
+            self.breaches.append(ReportedBreach(now_s, len(self.breaches) + 1, _BOUNDARY))
 
     def measure(
         self,
@@ -97,7 +105,7 @@ class FenceRecord:
         if not vehicle.fence.enforces_home_circle or situation.home is not None:
             return vehicle
         self._note(
-            f"the home circle (FENCE_RADIUS {vehicle.fence.radius_m:g} m) is left out: home is not known"
+            f"the home circle ({vehicle.fence.radius_name} {vehicle.fence.radius_m:g} m) is left out: home is not known"
         )
         return replace(vehicle, fence=replace(vehicle.fence, radius_m=0.0))
 

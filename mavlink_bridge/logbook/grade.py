@@ -14,7 +14,8 @@ import shapely
 from shapely import LineString
 
 from missions.checking.execution import follow_mission
-from missions.drive_model import envelope
+from missions.checking.px4_waits import with_waits
+from missions.drive_model import beyond_measured, envelope
 from missions.drive_model.avoidance import with_avoidance
 from missions.errors import MissionError
 from missions.geo import LatLon
@@ -134,7 +135,9 @@ class MissionWay(NamedTuple):
     odd: str | None
 
 
-def way_of(items: Sequence[MissionItem], first_item: int, *, home_first: bool) -> MissionWay:
+def way_of(
+    items: Sequence[MissionItem], first_item: int, *, home_first: bool, vehicle: Vehicle | None = None
+) -> MissionWay:
     """Return the way that a mission describes from an item on.
 
     Parameters
@@ -145,19 +148,27 @@ def way_of(items: Sequence[MissionItem], first_item: int, *, home_first: bool) -
         The seq that is driven to first; 0 is the beginning.
     home_first : bool
         Whether seq 0 is home (ArduPilot), so that the items begin at seq 1.
+    vehicle : Vehicle, optional
+        What drives: what it makes of waits. Default: ArduPilot's, which stands.
     """
     numbered = list(enumerate(items, start=int(home_first)))
     odd = next((entry for entry in numbered if entry[0] >= first_item and _is_odd(entry[1])), None)
     listed = Mission(tuple(map(_as_listed, items)))
-    legs = follow_mission(listed, LatLon(0.0, 0.0), most_legs=len(items) + 1).legs
+    course = follow_mission(listed, LatLon(0.0, 0.0), most_legs=len(items) + 1)
+    legs = (course if vehicle is None else with_waits(course, listed.items, vehicle)).legs
     seqs = [leg.last_item - 1 + int(home_first) for leg in legs]
     to_come = [(seq, leg) for seq, leg in zip(seqs, legs, strict=True) if seq >= first_item]
+    circled = next((seq for seq, leg in to_come if leg.circle_m), None)
     return MissionWay(
         seqs=tuple(seq for seq, _ in to_come),
         positions=tuple(leg.end for _, leg in to_come),
         speeds=tuple(leg.speed_mps for _, leg in to_come),
         stops={number: leg.stop_s for number, (_, leg) in enumerate(to_come, 1) if leg.stop_s},
-        odd=None if odd is None else f"item {odd[0]} (MAV_CMD {odd[1].command})",
+        odd=f"item {odd[0]} (MAV_CMD {odd[1].command})"
+        if odd is not None
+        else f"the wait at item {circled}, which PX4 drives as a circle"
+        if circled is not None
+        else None,
     )
 
 
@@ -289,9 +300,9 @@ class DriveGrader:
             self._notes.append(f"no prediction: the drive model does not cover {self.way.odd}")
             return None
         if self._field.vehicle.autopilot is not Autopilot.ARDUPILOT:
-            self._notes.append(
-                "the drive model was measured on ArduPilot Rover; this vehicle runs another autopilot"
-            )
+            reasons = beyond_measured(self._field.vehicle, *self.way.speeds)
+            more = f"; and {len(reasons) - 1} more" if len(reasons) > 1 else ""
+            self._notes += [f"the prediction is extrapolated: {reason}{more}" for reason in reasons[:1]]
         try:
             forecast = envelope(
                 self._points,

@@ -21,11 +21,13 @@ from mavlink_bridge.logbook.fence_record import FenceRecord
 from mavlink_bridge.logbook.track import Odometer, TrackFix, pieces
 from mavlink_bridge.logbook.transfers import TRANSFER_TYPES, TransferWatch
 from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.autopilots import autopilot_of
 from mavlink_bridge.mavlink.modes import mode_name
 from missions.geo import distance_m
 from missions.ground.frame import MAX_LATITUDE_DEG, frame_around
 from missions.vehicle import PARAMETER_NAMES, PX4_PREFIXES
-from missions.vehicle.parameter_remarks import no_number_remarks
+from missions.vehicle.parameter_remarks import no_number_remarks, range_remarks
+from missions.vehicle.parameters import PX4_NAMES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -99,7 +101,10 @@ class VehicleRecorder:
         if self._modes:
             self._modes[-1] = replace(self._modes[-1], ended_s=now_s)
         situation = self.situation
-        for text in no_number_remarks(situation.no_numbers, situation.parameters):
+        for text in (
+            *no_number_remarks(situation.no_numbers, situation.parameters),
+            *range_remarks(situation.parameters, ardupilot=situation.ardupilot),
+        ):
             self._note(text)
         if self._fence.nearest is None and not self._fences:
             self._note("no clearance: the log contains no fence")
@@ -207,6 +212,9 @@ class VehicleRecorder:
             self._drives.reached(message.seq)
         elif isinstance(message, m.FenceStatus):
             self._fence.take_status(message, now_s)
+        elif isinstance(message, m.Statustext):
+            texts = autopilot_of(ardupilot=self.situation.ardupilot).texts
+            self._fence.take_text(message.text, texts, now_s)
 
     def _take_item(self, item: int) -> None:
         if 0 < item < self._item:  # begun anew, or jumped back: another drive
@@ -275,8 +283,11 @@ def _is_other_ground(before: Situation, after: Situation) -> bool:
     if _value(before.home) != _value(after.home):
         return True
     return before.parameters is not after.parameters and any(
-        before.parameters.get(name) != after.parameters.get(name) for name in PARAMETER_NAMES
+        before.parameters.get(name) != after.parameters.get(name) for name in _FIELD_NAMES
     )
+
+
+_FIELD_NAMES = (*PARAMETER_NAMES, *PX4_NAMES)
 
 
 def _matters(name: str) -> bool:

@@ -33,7 +33,7 @@ from missions.items import change_speed
 from missions.promise import promise
 from missions.request import Tour, conditions, request_of
 from missions.situation import Known, Mission, Pose
-from missions.vehicle.item_limit import most_items
+from missions.vehicle.item_limit import most_own_items
 from missions.words import counted, left_out_text, metres, moved_text
 
 if TYPE_CHECKING:
@@ -263,7 +263,7 @@ def _within_storage(
     """
     _check_jumps(repaired)
     changes = _changes(repaired)
-    most = most_items(situation.parameters) - 1
+    most = most_own_items(situation)
     count = len(checked.mission.items)
     if count > most:
         try:
@@ -275,7 +275,7 @@ def _within_storage(
         left_out = count - len(checked.mission.items)
         changes = (
             *changes,
-            left_out_text(left_out, most + 1),
+            left_out_text(left_out, most + checked.vehicle.home_items),
         )
     return Repair(checked.mission, checked, changes)
 

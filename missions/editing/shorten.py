@@ -74,11 +74,12 @@ def shortened(
     for again in (search.waypoints, search.corners):  # some stood between changes of speed
         search.leave_out(again)
     if search.count > most:
+        home = search.check.vehicle.home_items
         raise MissionTooLongError(
-            f"the mission needs {search.count + 1} items including home, but the vehicle holds {most + 1}; {len(mission.items) - search.count} of "
+            f"the mission needs {search.count + home} items{' including home' if home else ''}, but the vehicle holds {most + home}; {len(mission.items) - search.count} of "
             f"{len(own)} route items could be left out without coming closer to a fence",
-            items=search.count + 1,
-            limit=most + 1,
+            items=search.count + home,
+            limit=most + home,
             left_out=len(mission.items) - search.count,
         )
     return search.check

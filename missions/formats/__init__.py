@@ -28,7 +28,7 @@ from missions.formats.foreign_files import kind_of_suffix
 from missions.formats.parameters import read_parameters
 from missions.formats.parts import Part, only, parts_of
 from missions.formats.texts import read_text
-from missions.situation import Known, Reading, Situation
+from missions.situation import Known, Situation
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -141,7 +141,7 @@ def read_situation(path: Path | str, choices: Choices = NO_CHOICES) -> Situation
     text, remarks = read_text(path)
     extra = (choices,) if format_.is_map else ()
     situation = format_.read(text, str(path), *extra)
-    return replace(situation, reading=Reading(remarks=(*remarks, *situation.remarks)))
+    return replace(situation, reading=replace(situation.reading, remarks=(*remarks, *situation.remarks)))
 
 
 def read_fence(path: Path | str) -> Fence:

@@ -14,15 +14,22 @@ from missions.formats.numbers import xy_for_file, xy_from_file
 from missions.geo import LatLon
 from missions.items import Command, MissionItem, file_frame
 from missions.rally import RallyPoint
-from missions.situation import Known, Mission, Reading, Situation
+from missions.situation import Known, MadeFor, Mission, Reading, Situation
+from missions.vehicle import GROUND_TYPES, known_ardupilot, known_type
 
 if TYPE_CHECKING:
     from missions.formats.json_node import JsonNode
 
 _TRANSECTS = "TransectStyleComplexItem"
 _MOST_ITEMS = 65535  # seq is 16 bits in MAVLink
-_FIRMWARE_ARDUPILOT = 3  # MAV_AUTOPILOT_ARDUPILOTMEGA
-_VEHICLE_ROVER = 10  # MAV_TYPE_GROUND_ROVER
+_FIRMWARES = {3: True, 12: False}
+"""firmwareType, which is MAV_AUTOPILOT, and whether it is ArduPilot."""
+
+_ARDUPILOT, _PX4 = _FIRMWARES
+_ROVER = 10  # MAV_TYPE_GROUND_ROVER
+_ON_THE_GROUND = {None, 0, *GROUND_TYPES}  # not said, generic, or what is planned for
+_SPEEDS = ("WP_SPEED", "CRUISE_SPEED", "RA_MISS_VEL_DEF", "RD_MISS_SPD_DEF", "RO_SPEED_LIM")
+"""What says how fast a mission is driven, of either autopilot; the first that is above 0 counts."""
 
 
 def read(text: str, source: str) -> Situation:
@@ -39,6 +46,11 @@ def read(text: str, source: str) -> Situation:
     _check_version(node, 1)
     remarks: list[str] = []
     mission = _mission(node["mission"]) if "mission" in node else None
+    made_for = _made_for(node, source)
+    if mission and mission.items and made_for and made_for.vehicle_type not in _ON_THE_GROUND:
+        remarks.append(
+            f"{source} is made for vehicle type {made_for.vehicle_type} (vehicleType), not for a rover ({_ROVER}): its mission is taken for a rover's"
+        )
     fence = _fence(node["geoFence"]) if _is_of_version_2(node, "geoFence", remarks) else None
     rally = _rally(node["rallyPoints"]) if _is_of_version_2(node, "rallyPoints", remarks) else ()
     return Situation(
@@ -46,7 +58,7 @@ def read(text: str, source: str) -> Situation:
         mission=Known(mission, None, source) if mission and mission.items else None,
         rally=Known(rally, None, source) if rally else None,
         home=Known(mission.home, None, source) if mission and mission.home else None,
-        reading=Reading(remarks=tuple(remarks)),
+        reading=Reading(remarks=tuple(remarks), made_for=made_for),
     )
 
 
@@ -56,18 +68,17 @@ def write(situation: Situation) -> str:
     home = mission.home or (situation.home.value if situation.home else LatLon(0.0, 0.0))
     fence = situation.fence.value if situation.fence else Fence()
     rally = situation.rally.value if situation.rally else ()
+    speeds = (situation.parameters.get(name, 0.0) for name in _SPEEDS)
     document = {
         "fileType": "Plan",
         "version": 1,
         "groundStation": "PBPP Rover",
         "mission": {
             "version": 2,
-            "firmwareType": _FIRMWARE_ARDUPILOT,
-            "vehicleType": _VEHICLE_ROVER,
+            "firmwareType": _PX4 if known_ardupilot(situation) is False else _ARDUPILOT,
+            "vehicleType": known_type(situation) or _ROVER,
             "globalPlanAltitudeMode": 1,
-            "cruiseSpeed": situation.parameters.get("WP_SPEED")
-            or situation.parameters.get("CRUISE_SPEED")
-            or 2.0,
+            "cruiseSpeed": next((speed for speed in speeds if speed > 0), 2.0),
             "hoverSpeed": 5,
             "plannedHomePosition": [*_pair(home), 0],
             "items": [_item_json(item, number) for number, item in enumerate(mission.items, start=1)],
@@ -81,6 +92,20 @@ def write(situation: Situation) -> str:
         "rallyPoints": {"version": 2, "points": [[*_pair(point.position), point.alt_m] for point in rally]},
     }
     return json.dumps(document, indent=4) + "\n"
+
+
+def _made_for(node: JsonNode, source: str) -> MadeFor | None:
+    """Return which vehicle a plan is made for; None where it does not say it."""
+    if "mission" not in node:
+        return None
+    mission = node["mission"]
+    firmware, vehicle = (
+        mission[key].whole(f"the {key}", 255) if key in mission and mission[key].value is not None else None
+        for key in ("firmwareType", "vehicleType")
+    )
+    if firmware is None and vehicle is None:
+        return None
+    return MadeFor(source, None if firmware is None else _FIRMWARES.get(firmware), vehicle)
 
 
 def _check_version(node: JsonNode, expected: int) -> None:

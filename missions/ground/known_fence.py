@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from missions.errors import FenceMissingError
 from missions.situation import ListKind
-from missions.vehicle import Autopilot
+from missions.vehicle import Autopilot, known_ardupilot
 
 if TYPE_CHECKING:
     from missions.fence import Fence
@@ -14,10 +14,11 @@ if TYPE_CHECKING:
     from missions.vehicle import Vehicle
 
 _TOTAL = "FENCE_TOTAL"
-_ADVICE = (
-    "Download the fence from the vehicle in the ground station (MAVProxy: fence list; Mission Planner, QGroundControl: "
-    "download in the Plan view) while the log is recorded, or use a fence file (--fence FILE)"
-)
+_STATIONS = {
+    True: "MAVProxy: fence list; Mission Planner, QGroundControl: download in the Plan view",
+    False: "QGroundControl: download in the Plan view",
+}
+"""How a fence is downloaded, by whether the autopilot is ArduPilot."""
 
 
 def known_fence(situation: Situation) -> Fence:
@@ -31,7 +32,11 @@ def known_fence(situation: Situation) -> Fence:
     known = situation.fence
     if known is None:
         trouble = fence_trouble(situation) or _never_seen(situation)
-        raise FenceMissingError(f"no fence to plan around: {trouble}. {_ADVICE}")
+        how = _STATIONS[known_ardupilot(situation) is not False]
+        raise FenceMissingError(
+            f"no fence to plan around: {trouble}. Download the fence from the vehicle in the ground station ({how}) while the log is recorded, "
+            "or use a fence file (--fence FILE)"
+        )
     if not known.value.zones:
         raise FenceMissingError(f"no fence to plan around: the fence from {known.source} is empty")
     return known.value

@@ -92,13 +92,13 @@ def _draw_ground(axes: Any, scene: PictureScene) -> None:  # noqa: ANN401 - matp
         _fill(axes, scene.outside, label="outside the fence", **look)
     _fill(
         axes,
-        scene.margin,
+        scene.kept_off,
         facecolor=style.MARGIN,
         edgecolor=style.MARGIN_EDGE,
         linestyle=(0, (4, 3)),
         linewidth=0.6,
         zorder=2,
-        label=f"safety margin, {scene.margin_m:.4g} m",
+        label=f"clearance, {scene.clearance_m:.4g} m",
     )
     _fill(
         axes,

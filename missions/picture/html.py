@@ -112,9 +112,9 @@ def scene_html_figure(scene: PictureScene) -> go.Figure:
 def _ground(scene: PictureScene) -> Iterator[go.Scatter]:
     if scene.has_inclusion:
         yield _area(scene.outside, "outside the fence", fillcolor=style.OUTSIDE)
-    if not (margin := scene.margin).is_empty:
+    if not (kept_off := scene.kept_off).is_empty:
         line = {"color": style.MARGIN_EDGE, "width": 0.8, "dash": "dash"}
-        yield _area(margin, f"safety margin, {scene.margin_m:.4g} m", fillcolor=style.MARGIN, line=line)
+        yield _area(kept_off, f"clearance, {scene.clearance_m:.4g} m", fillcolor=style.MARGIN, line=line)
     if scene.blocks:
         rings = [np.vstack((ring, ring[:1])) for ring in scene.blocks]
         yield _line(_joined(rings), "block", color=style.BLOCK, width=0.5)

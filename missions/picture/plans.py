@@ -67,7 +67,7 @@ def plan_scene(
         title=tuple(title.split("\n")) if title else plan_title(plan, crossing),
         ground=plan.ground,
         zone_count=len(plan.fence.zones),
-        margin_m=plan.drawn_clearance_m if plan.clearance_m is None else plan.clearance_m,
+        clearance_m=plan.drawn_clearance_m if plan.clearance_m is None else plan.clearance_m,
         route=route,
         numbers=(None, *plan.seqs[1:]),
         point_texts=tuple(

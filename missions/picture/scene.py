@@ -70,8 +70,8 @@ class PictureScene:
     zone_count : int
         How many of the ground's barriers are shown whole: the fence's own. The home circle, which may be vast, is seen as far as it
         reaches into the picture.
-    margin_m : float
-        The safety margin: what the route keeps to the fence; 0 draws none.
+    clearance_m : float
+        The clearance that the route promises, or its drawn lines keep where it promises none; 0 draws none.
     route_name : str
         What the legend calls the drawn lines.
     route : ndarray of float, shape (n, 2)
@@ -106,7 +106,7 @@ class PictureScene:
     title: tuple[str, ...]
     ground: Ground
     zone_count: int
-    margin_m: float = 0.0
+    clearance_m: float = 0.0
     route_name: str = "route"
     route: NDArray[np.float64] = field(default_factory=no_points)
     point_texts: tuple[str, ...] = ()
@@ -160,11 +160,11 @@ class PictureScene:
         return shapely.union_all(edges).difference(kept).intersection(self.frame)
 
     @property
-    def margin(self) -> BaseGeometry:
-        """The allowed ground within the safety margin of a fence."""
-        if not (math.isfinite(self.margin_m) and self.margin_m > 0):
+    def kept_off(self) -> BaseGeometry:
+        """The allowed ground within the clearance of a fence."""
+        if not (math.isfinite(self.clearance_m) and self.clearance_m > 0):
             return Polygon()
-        return self.ground.edge.buffer(self.margin_m).intersection(self.ground.allowed)
+        return self.ground.edge.buffer(self.clearance_m).intersection(self.ground.allowed)
 
     @property
     def exclusions(self) -> BaseGeometry:

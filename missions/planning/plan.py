@@ -17,7 +17,7 @@ from missions.request import RepairMission, Tour
 from missions.situation import Mission
 from missions.tour.tour import plan_tour
 from missions.tour.way_home_inside import with_way_home_inside
-from missions.vehicle.item_limit import most_items
+from missions.vehicle.item_limit import most_own_items
 from missions.words import left_out_text
 
 if TYPE_CHECKING:
@@ -98,7 +98,7 @@ def _with_room(
     MissionTooLongError
         It cannot be shortened so far.
     """
-    most = most_items(situation.parameters) - 1
+    most = most_own_items(situation)
     if len(planned.items) <= most:
         return planned
     # A route may keep more than was asked: what is short keeps that much, and promises no more.
@@ -129,7 +129,7 @@ def _with_room(
         blocks=planned.blocks,
         home=planned.home,
         warnings=planned.warnings,
-        info=(*planned.info, left_out_text(left_out, most + 1)),
+        info=(*planned.info, left_out_text(left_out, most + planned.vehicle.home_items)),
     )
 
 

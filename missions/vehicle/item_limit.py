@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from missions.errors import VehicleError
-from missions.vehicle import whole_number
+from missions.vehicle import known_ardupilot, whole_number
 from missions.vehicle.asked_parameters import STORAGE_NAMES
+
+if TYPE_CHECKING:
+    from missions.situation import Situation
 
 MISSION_ITEMS = 655
 """Items that ArduPilot holds with 16 KB of storage, home included, as measured."""
+
+PX4_MISSION_ITEMS = 500
+"""Items that every PX4 board holds; the larger ones hold 1000. From its source, not measured: the simulator holds 10000."""
 
 _SD_BYTES_PER_ITEM = 15  # AP_MISSION_EEPROM_COMMAND_SIZE
 _SD_HEADER_BYTES = 4  # storage format's version
@@ -21,6 +28,13 @@ def most_items(parameters: Mapping[str, float]) -> int:
     """Return how many items a vehicle holds, home included."""
     sd_bytes = sd_card_bytes(parameters, "BRD_SD_MISSION")
     return (sd_bytes - _SD_HEADER_BYTES) // _SD_BYTES_PER_ITEM if sd_bytes > 0 else MISSION_ITEMS
+
+
+def most_own_items(situation: Situation) -> int:
+    """Return how many items of a mission a vehicle holds, home not included."""
+    if known_ardupilot(situation) is False:
+        return PX4_MISSION_ITEMS
+    return most_items(situation.parameters) - 1
 
 
 def sd_card_bytes(parameters: Mapping[str, float], name: str) -> int:

@@ -11,6 +11,9 @@ from missions.firmware import Firmware
 
 MAV_TYPE_GROUND_ROVER = 10  # MAV_TYPE of MAVLink's common.xml
 MAV_TYPE_SURFACE_BOAT = 11  # the same
+GROUND_TYPES = frozenset({MAV_TYPE_GROUND_ROVER, MAV_TYPE_SURFACE_BOAT})
+"""What is planned for."""
+
 _DELAY_STANDS = Firmware(1, 18, 0, 0)  # PX4, its line of development included: measured in August 2026
 
 
@@ -193,9 +196,14 @@ class Vehicle:
     pursuit: Pursuit | None = None
 
     @property
+    def home_items(self) -> int:
+        """How many items of its mission are home: ArduPilot's first one, none on PX4."""
+        return int(self.autopilot is Autopilot.ARDUPILOT)
+
+    @property
     def is_rover(self) -> bool:
         """Whether its heartbeat, where one was heard, is that of a rover or a boat."""
-        return self.mav_type in {None, MAV_TYPE_GROUND_ROVER, MAV_TYPE_SURFACE_BOAT}
+        return self.mav_type is None or self.mav_type in GROUND_TYPES
 
     @property
     def can_pivot(self) -> bool:

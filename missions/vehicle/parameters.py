@@ -8,6 +8,9 @@ commit 48513edd, Rover-4.4 to Rover-4.7). Its defaults are those that the releas
 ArduPilot Methodic Configurator 5.0.1; 4.4, of which there is no such list, is taken to have those of 4.5. The same figures stand in
 tests/missions/vehicle/data/ardupilot_parameters.csv as they were taken from there. Releases: Rover-4.5.7 is commit 52bed8d54200, Rover-4.6.3 3fc7011a7d3d,
 Rover-4.7.1 dbe792162d06.
+
+PX4 checks no parameter, so its published metadata (module.yaml and *_params.c of github.com/PX4/PX4-Autopilot) is all that says which values make sense:
+types and ranges stand in tests/missions/vehicle/data/px4_parameters.csv with file and commit, made by tools/px4_parameters.py.
 """
 
 from __future__ import annotations
@@ -78,9 +81,11 @@ class Parameter:
     no_less : float
         Between 0, which has a meaning of its own, and this nothing is driven with: refused.
     documented : Range or None
-        ArduPilot's own.
-    since : Firmware or None
-        The version that has it first; None: all that are known here.
+        The autopilot's own.
+    is_whole : bool
+        Whether PX4 keeps it as INT32: sent by its bits, and no fraction is possible. ArduPilot takes floats for all.
+    since, until : Firmware or None
+        The version that has it first, or last; None: all that are known here.
     before : tuple of Firmware and float, or None
         Before this version the default was this.
     measured, measured_skid : Range or None
@@ -100,7 +105,9 @@ class Parameter:
     possible: Range = Range()
     no_less: float = 0.0
     documented: Range | None = None
+    is_whole: bool = False
     since: Firmware | None = None
+    until: Firmware | None = None
     before: tuple[Firmware, float] | None = None
     measured: Range | None = None
     measured_skid: Range | None = None
@@ -169,22 +176,29 @@ _ARDUPILOT = (
 
 
 _PX4_TOLD = frozenset({"CA_AIRFRAME", "NAV_ACC_RAD", "RO_SPEED_LIM"})
+_PX4_1_15, _PX4_1_17 = Firmware(1, 15, 255), Firmware(1, 17, 255)
+_TO_100, _LIMIT, _TENTH = Range(0, 100), Range(-1, 100), Range(0.1, 100)  # as PX4 documents most of them
 
 
 def _px4(
     name: str,
     default: float | None,
     changes: str,
+    documented: Range | None,
     possible: Range = _ANY,
     measured: Range | None = None,
-    no_less: float = 0.0,
+    *,
+    is_whole: bool = False,
+    until: Firmware | None = None,
 ) -> Parameter:
     return Parameter(
         name,
         default,
         changes,
         possible,
-        no_less,
+        documented=documented,
+        is_whole=is_whole,
+        until=until,
         measured=measured,
         is_told=name in _PX4_TOLD,
         autopilot=Autopilot.PX4,
@@ -192,48 +206,35 @@ def _px4(
 
 
 _PX4 = (
-    _px4("CA_AIRFRAME", None, "6 or 13: skid steer, 5: steered wheels"),
-    _px4(
-        "NAV_ACC_RAD",
-        10.0,
-        "how near to a waypoint the next leg begins at the latest",
-        Range(),
-        Range(0.5, 0.5),
-    ),
-    _px4(
-        "RA_ACC_RAD_MAX",
-        None,
-        "how far before a waypoint the next leg begins at the earliest; with -1 NAV_ACC_RAD alone counts. Measured with -1 and 3; where it is not known, the worse of both is assumed",
-        Range(-1.0),
-    ),
-    _px4("RA_ACC_RAD_GAIN", 2.0, "how early sharp corners are begun", Range(), Range(2, 2)),
-    _px4("RA_MISS_VEL_DEF", None, "speed of missions with steered wheels"),
-    _px4("RD_MISS_SPD_DEF", None, "speed of missions on skid steer"),
-    _px4("RO_SPEED_LIM", None, "speed where that is not set; missions drive no faster", measured=Range(1, 3)),
-    _px4(
-        "RO_MAX_THR_SPEED",
-        None,
-        "speed where neither is set; corners are taken with a share of it",
-        measured=Range(3.2, 3.2),
-    ),
-    _px4("RO_SPEED_RED", -1.0, "how much slower corners are taken; -1 not at all. Measured with -1 and 1"),
+    _px4("CA_AIRFRAME", None, "6 or 13: skid steer, 5: steered wheels", None, is_whole=True),
+    _px4("NAV_ACC_RAD", 10.0, "how near to a waypoint the next leg begins at the latest", Range(0.05, 200), Range(), Range(0.5, 0.5)),
+    _px4("RA_ACC_RAD_MAX", None, "how far before a waypoint the next leg begins at the earliest; with -1 NAV_ACC_RAD alone counts. Measured with -1 and 3; where it is not "
+         "known, the worse of both is assumed", _LIMIT, Range(-1.0)),
+    _px4("RA_ACC_RAD_GAIN", 1.0, "how early sharp corners are begun", Range(1, 100), Range(), Range(2, 2)),
+    _px4("RA_MISS_VEL_DEF", None, "speed of missions with steered wheels", _TO_100, until=_PX4_1_15),
+    _px4("RD_MISS_SPD_DEF", None, "speed of missions on skid steer", _TO_100, until=_PX4_1_15),
+    _px4("RO_SPEED_LIM", None, "speed where that is not set; missions drive no faster", _LIMIT, measured=Range(1, 3)),
+    _px4("RO_MAX_THR_SPEED", None, "speed where neither is set; corners are taken with a share of it", _TO_100, measured=Range(3.2, 3.2)),
+    _px4("RO_SPEED_RED", -1.0, "how much slower corners are taken; -1 not at all. Measured with -1 and 1", _LIMIT),
+    _px4("RO_ACCEL_LIM", None, "acceleration; -1 is no limit", _LIMIT),
+    _px4("RO_DECEL_LIM", None, "the same, braking", _LIMIT),
+    _px4("RO_JERK_LIM", None, "jerk; -1 is no limit", _LIMIT),
     *(
-        _px4(name, None, "acceleration; -1 is no limit")
-        for name in ("RO_ACCEL_LIM", "RO_DECEL_LIM", "RA_MAX_ACCEL", "RD_MAX_ACCEL")
+        _px4(name, None, f"{what}; -1 is no limit", Range(least, 100), until=_PX4_1_15)
+        for name, what, least in (("RA_MAX_ACCEL", "acceleration", -1), ("RD_MAX_ACCEL", "acceleration", 0), ("RA_MAX_JERK", "jerk", -1), ("RD_MAX_JERK", "jerk", 0))
     ),
-    *(_px4(name, None, "jerk; -1 is no limit") for name in ("RO_JERK_LIM", "RA_MAX_JERK", "RD_MAX_JERK")),
-    _px4("RA_WHEEL_BASE", 0.5, "turning radius, with the steering angle", Range(), Range(0.321, 0.321)),
-    _px4("RA_MAX_STR_ANG", 0.5236, "turning radius, with the wheel base", Range(), Range(0.523, 0.524)),
-    _px4(
-        "PP_LOOKAHD_GAIN", 1.0, "how far ahead on its line it steers at, by its speed", Range(), Range(1, 1)
-    ),
-    _px4("PP_LOOKAHD_MIN", 1.0, "the shortest such distance", Range(), Range(1, 1)),
-    _px4("PP_LOOKAHD_MAX", 10.0, "the longest such distance", Range(), Range(3, math.inf)),
-    _px4("RD_TRANS_DRV_TRN", math.radians(10.0), "corners sharper than this are turned on the spot", Range()),
-    _px4("RO_YAW_RATE_LIM", None, "how long that takes"),
-    _px4("GF_ACTION", 2.0, "whether the autopilot enforces the fence", _WHOLE),
-    _px4("GF_MAX_HOR_DIST", 0.0, "radius of the circle around home", Range()),
-)
+    _px4("RA_WHEEL_BASE", 0.5, "turning radius, with the steering angle; 0 is not set", _TO_100, Range(), Range(0.321, 0.321)),
+    _px4("RA_MAX_STR_ANG", 0.5236, "turning radius, with the wheel base; 0 is not set", Range(0, 1.5708), Range(), Range(0.523, 0.524)),
+    _px4("PP_LOOKAHD_GAIN", 1.0, "how far ahead on its line it steers at, by its speed", _TENTH, Range(), Range(1, 1)),
+    _px4("PP_LOOKAHD_MIN", 1.0, "the shortest such distance", _TENTH, Range(), Range(1, 1)),
+    _px4("PP_LOOKAHD_MAX", 10.0, "the longest such distance", _TENTH, Range(), Range(3, math.inf)),
+    _px4("RD_TRANS_DRV_TRN", math.radians(10.0), "corners sharper than this are turned on the spot", Range(0.001, 3.14159), Range()),
+    _px4("RO_YAW_RATE_LIM", None, "how long that takes", Range()),
+    _px4("GF_ACTION", 2.0, "what the autopilot does in a breach: 0 nothing, 1 a warning, 2 HOLD, 3 RTL, 4 termination, 5 LAND", Range(0, 5), _WHOLE, is_whole=True),
+    _px4("GF_MAX_HOR_DIST", 0.0, "radius of the circle around home", Range(), Range()),
+    _px4("GF_SOURCE", None, "nothing here; which position counts for the fence: 0 the estimate, 1 GPS", Range(0, 1), is_whole=True),
+    _px4("GF_PREDICT", None, "nothing on a rover, as measured", None, is_whole=True, until=_PX4_1_17),
+)  # fmt: skip
 
 
 def _by_name(rows: Iterable[Parameter]) -> dict[str, Parameter]:
@@ -244,7 +245,10 @@ PARAMETERS = _by_name((*_ARDUPILOT, *_PX4))
 """Every parameter that matters here, by name."""
 
 PARAMETER_NAMES = tuple(row.name for row in _ARDUPILOT)
-"""What a live vehicle is asked for; steering servos are looked for on the first four outputs."""
+"""What a live ArduPilot vehicle is asked for; steering servos are looked for on the first four outputs."""
+
+PX4_NAMES = tuple(row.name for row in _PX4)
+"""All that is known of PX4's."""
 
 
 def row_of(name: str) -> Parameter:

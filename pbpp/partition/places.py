@@ -170,13 +170,13 @@ class Places:
             if len(self._located) >= _REMEMBERED:
                 self._located.clear()
             near, depth_m = self._depths(point, TOLERANCE_M)
-            blocks: list[int] = []
-            inside = False
-            for place in (depth_m >= -TOLERANCE_M).nonzero()[0].tolist():
-                block = int(near[place])
-                blocks.append(block)
-                if depth_m[place] >= self.rounding_m and self._west[block] <= point[0] <= self._east[block]:
-                    inside = True
+            certain = (
+                (depth_m >= self.rounding_m) & (self._west[near] <= point[0]) & (point[0] <= self._east[near])
+            )
+            inside = bool(certain.any())
+            # A block whose floor or ceiling a point lies behind sees the corners there from behind. Where nothing else is near, it must do.
+            least_m = -self.rounding_m if inside else -TOLERANCE_M
+            blocks = near[depth_m >= least_m].tolist()
             if len(blocks) > 1:
                 # As a sweep over all of free space numbers them.
                 blocks.sort(key=lambda block: (self._west[block], self._south(block)))

@@ -29,7 +29,7 @@ class DownloadOptions(LinkOptions):
     output: Annotated[
         list[Path],
         option(
-            "File to write: .waypoints, .plan; parameters: .parm, .param. Default: list on the terminal.",
+            "File to write: .waypoints, .plan; parameters: .params (QGroundControl), .parm, .param. Default: list on the terminal.",
             "FILE",
             "-o",
             "--output",

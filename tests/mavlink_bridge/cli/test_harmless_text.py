@@ -28,9 +28,11 @@ from mavlink_bridge.cli.failing import ExitCode, begin_telling, report, report_d
 from mavlink_bridge.director import Event, EventName
 from mavlink_bridge.director.announcer import Announcer
 from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.protocol.parameters import ParametersOutcome
 from missions.geo import LatLon
 from missions.picture import draw_scene
 from missions.picture.drives import drive_scene
+from missions.situation import Situation
 from missions.words import harmless
 
 FOLDER = Path(mavlink_bridge.cli.__file__).parent
@@ -272,8 +274,14 @@ class TestFiles:
 
     def test_a_vehicles_parameter_writes_no_line_of_its_own(self, tmp_path, capsys):
         values = {"WP_SPEED": 2.0, "A\nFENCE_ENABLE 0": 1.0, TITLE: 1.0}
-        download._write(tmp_path / "rover.parm", "parameters", (), values)
-        assert (tmp_path / "rover.parm").read_text() == "WP_SPEED 2\n"
+        for suffix, row in (
+            (".parm", "WP_SPEED 2"),
+            (".param", "WP_SPEED,2"),
+            (".params", "1\t1\tWP_SPEED\t2\t9"),
+        ):
+            path = tmp_path / f"rover{suffix}"
+            download._write_parameters(path, ParametersOutcome(values), Situation())
+            assert [line for line in path.read_text().splitlines() if not line.startswith("#")] == [row]
         told = capsys.readouterr().err
         assert is_plain(told)
         assert "left out, not valid parameter names: 'A\\nFENCE_ENABLE 0', " in told

@@ -119,6 +119,25 @@ class TestTransfers:
             code, found = run(simulator, "download", "parameters")
             assert (found["parameters"]["GF_ACTION"], found["parameters"]["NAV_ACC_RAD"]) == (3.0, 0.75)
             assert "_HASH_CHECK" not in found["parameters"]
+            saved = tmp_path / "saved.params"
+            assert (
+                run(simulator, "download", "parameters", "-o", saved, "-o", tmp_path / "saved.parm")[0] == 0
+            )
+            rows = [line.split("\t") for line in saved.read_text().splitlines() if not line.startswith("#")]
+            assert ["1", "1", "GF_ACTION", "3", "6"] in rows
+            assert ["1", "1", "NAV_ACC_RAD", "0.75", "9"] in rows
+            for path in (saved, tmp_path / "saved.parm"):
+                back = read_situation(path)
+                assert (back.ardupilot, back.firmware) == (False, firmware)
+                assert dict(back.parameters) == pytest.approx(found["parameters"], rel=1e-8)
+            odd = tmp_path / "odd.params"
+            odd.write_text("7\t1\tNAV_ACC_RAD\t0.01\t9\n")
+            result = CliRunner().invoke(app, ["upload", str(odd), "--connect", simulator.connection])
+            assert result.exit_code == 0
+            assert "was saved from vehicle 7; this is vehicle 1" in result.stderr
+            assert (
+                "NAV_ACC_RAD is 0.01; PX4 documents 0.05 to 200, and PX4 does not check it" in result.stderr
+            )
             wanted.write_text("GF_ACTION,2.5\n")
             code, found = run(simulator, "upload", wanted)
             assert (code, found["message"]) == (

@@ -140,7 +140,7 @@ def test_a_mission_longer_than_the_vehicle_holds_is_shortened_or_refused(monkeyp
     )
 
     def verified_or_refused(most: int):
-        monkeypatch.setattr("missions.planning.plan.most_items", lambda _parameters: most)
+        monkeypatch.setattr("missions.planning.plan.most_own_items", lambda _situation: most - 1)
         vehicle = SimulatedVehicle(config)
         run = ready(conductor(vehicle=vehicle, drive=False, request=GoTo(clearance_m=1.5)))
         run.director.take_target(FAR, run.now_s)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 from logbook.making import FIELD, ORIGIN, ROVER, Log, place
@@ -12,7 +13,9 @@ from mavlink_bridge.logbook.grade import way_of
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.rover import Mode
 from missions.fence import Fence
+from missions.firmware import Firmware
 from missions.items import Command, MissionItem, waypoint, with_home
+from missions.vehicle import Autopilot, Pursuit, Vehicle
 
 LINES = [(0.0, 0.0), (0.0, 30.0), (40.0, 30.0)]
 
@@ -170,6 +173,28 @@ def test_the_way_of_a_mission():
     assert way.odd is None
     assert way_of(items, 3, home_first=False).seqs == (4,)
     assert way_of(items, 3, home_first=False).speeds == (3.0,)
+
+
+PURSUIT = Vehicle(autopilot=Autopilot.PX4, pursuit=Pursuit())
+
+
+@pytest.mark.parametrize(
+    ("firmware", "odd"), [(None, True), (Firmware(1, 17), True), (Firmware(1, 18), False)]
+)
+def test_what_px4_makes_of_waits(firmware, odd):
+    vehicle = replace(PURSUIT, firmware=firmware)
+    held = item(Command.NAV_WAYPOINT, params=(5.0, 0, 0, 0), lat_e7=400000000, lon_e7=-1050000000)
+    assert (
+        way_of([held, waypoint(place(0, 20))], 0, home_first=False, vehicle=vehicle).stops == {}
+    )  # it drives through
+    way = way_of(
+        [held, item(Command.NAV_DELAY, params=(2.0, 0, 0, 0)), waypoint(place(0, 20))],
+        0,
+        home_first=False,
+        vehicle=vehicle,
+    )
+    assert (way.odd == "the wait at item 0, which PX4 drives as a circle") is odd
+    assert odd or way.stops == {1: 2.0}
 
 
 @pytest.mark.parametrize(

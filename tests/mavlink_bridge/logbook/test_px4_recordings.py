@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import re
 import struct
 import tomllib
 from collections import Counter
@@ -12,11 +13,14 @@ from pathlib import Path
 
 import pytest
 from pymavlink import mavutil
+from pyproj import Geod
+from shapely import LineString, Polygon
 from typer.testing import CliRunner
 
 from mavlink_bridge.cli.app import app
 from mavlink_bridge.logbook import read_logbook
 from mavlink_bridge.logbook.log_situation import situation_from_log
+from missions.vehicle.parameters import PARAMETERS, PX4_NAMES
 
 FOLDER = Path(__file__).parents[3] / "sitl_logs" / "px4"
 MANIFEST = tomllib.loads((FOLDER / "manifest.toml").read_text(encoding="utf-8"))
@@ -53,6 +57,12 @@ class Decoded:
             if not found or found[-1] != mode:
                 found.append(mode)
         return found
+
+
+WGS84 = Geod(ellps="WGS84")
+ARDUPILOT = re.compile(
+    r"ArduPilot|\b(FENCE|WP|ATC|AVOID|OA|RTL|FS)_[A-Z]+|GUIDED|Mission Planner|MAVProxy|with home"
+)
 
 
 @pytest.fixture(scope="module", params=sorted(MANIFEST))
@@ -150,3 +160,93 @@ def test_replay_and_plan_of_a_recording():
     assert found["clearance_m"] == 1.0  # steered wheels, as they were measured
     assert any("keeps no margin" in text for text in found["info"])
     assert found["fence"]["vertices"] == 8
+
+
+def test_types_are_those_that_px4_publishes(recording):
+    _, _, decoded = recording
+    for m in decoded.of("PARAM_VALUE"):
+        if m.param_id in PX4_NAMES:
+            assert m.param_type == (6 if PARAMETERS[m.param_id].is_whole else 9), m.param_id
+
+
+def test_nothing_is_told_in_ardupilots_words(recording):
+    _, path, decoded = recording
+    for command in ("log", "replay"):
+        assert not ARDUPILOT.findall(CliRunner().invoke(app, [command, str(path)]).output)
+    (vehicle,) = json.loads(CliRunner().invoke(app, ["log", str(path), "--json"]).stdout)["logs"][0][
+        "vehicles"
+    ]
+    shown = set(vehicle["parameters"])
+    assert shown == {name for name in decoded.parameters() if name in PX4_NAMES}
+
+
+def test_breaches_that_px4_reports(recording):
+    name, path, decoded = recording
+    texts = [m.text for m in decoded.of("STATUSTEXT") if m.text.startswith("Geofence: ")]
+    (vehicle,) = read_logbook(path).vehicles
+    assert (
+        len(vehicle.reported_breaches)
+        == len(texts)
+        == {"fence-breach": 2, "118-rtl-through-fence": 1}.get(name, 0)
+    )
+    assert [one.count for one in vehicle.reported_breaches] == list(range(1, len(texts) + 1))
+    (drawn,) = json.loads(CliRunner().invoke(app, ["log", str(path), "--json"]).stdout)["logs"][0]["vehicles"]
+    assert len(drawn["reported_breaches"]) == len(texts)
+
+
+def test_drives_are_graded_by_px4s_own_model():
+    (square,) = read_logbook(FOLDER / "upload-and-square.tlog").vehicles
+    (grade,) = square.grades
+    assert (grade.arrived, grade.is_as_foreseen, grade.notes) == (True, True, ())  # of the measured kind
+    (breach,) = read_logbook(FOLDER / "fence-breach.tlog").vehicles
+    (grade,) = breach.grades
+    assert len(grade.notes) == 1  # of 8 parameters
+    assert grade.notes[0].startswith("the prediction is extrapolated: ")
+
+
+def armed_track(decoded):
+    """The track while armed, in pieces: latitude and longitude."""
+    pieces, armed = [[]], False
+    for m in decoded.of("HEARTBEAT", "GLOBAL_POSITION_INT"):
+        if m.get_type() == "HEARTBEAT":
+            if armed and not m.base_mode & 128:
+                pieces.append([])
+            armed = bool(m.base_mode & 128)
+        elif armed:
+            pieces[-1].append((m.lat / 1e7, m.lon / 1e7))
+    return [piece for piece in pieces if len(piece) > 1]
+
+
+def test_driven_is_the_length_of_the_track(recording):
+    _, path, decoded = recording
+    length_m = sum(
+        WGS84.line_length([lon for _, lon in piece], [lat for lat, _ in piece])
+        for piece in armed_track(decoded)
+    )
+    (vehicle,) = read_logbook(path).vehicles
+    assert vehicle.driven_m == pytest.approx(
+        length_m, abs=0.02 * length_m + 0.2
+    )  # from a heartbeat to a heartbeat
+
+
+def test_the_least_clearance_is_what_shapely_measures():
+    decoded = Decoded(FOLDER / "upload-and-square.tlog")
+    vertices = [m for m in decoded.of("MISSION_ITEM_INT") if m.mission_type == 1]
+    lat_deg, lon_deg = vertices[0].x / 1e7, vertices[0].y / 1e7
+    east_m = (
+        WGS84.inv(lon_deg, lat_deg, lon_deg + 1e-3, lat_deg)[2] / 1e-3
+    )  # of a degree; the field is 40 m wide
+    north_m = WGS84.inv(lon_deg, lat_deg, lon_deg, lat_deg + 1e-3)[2] / 1e-3
+
+    def plane(lat, lon):
+        return (lon - lon_deg) * east_m, (lat - lat_deg) * north_m
+
+    rings, start = [], 0
+    while start < len(vertices):
+        count = int(vertices[start].param1)
+        rings.append(Polygon([plane(m.x / 1e7, m.y / 1e7) for m in vertices[start : start + count]]))
+        start += count
+    track = LineString([plane(*place) for piece in armed_track(decoded) for place in piece])
+    least_m = min(ring.exterior.distance(track) for ring in rings)
+    (vehicle,) = read_logbook(FOLDER / "upload-and-square.tlog").vehicles
+    assert vehicle.nearest.clearance_m == pytest.approx(least_m, abs=0.01)

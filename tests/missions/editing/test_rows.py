@@ -89,7 +89,7 @@ def test_a_repaired_survey_keeps_its_speed(trees):
 def test_rows_are_bent_where_the_vehicle_holds_no_more_items(trees, monkeypatch):
     mission, situation = trees
     most = len(mission.items) + 14  # home, and one waypoint for each row: too few to come back to its line
-    monkeypatch.setattr("missions.editing.repair.most_items", lambda _parameters: most)
+    monkeypatch.setattr("missions.editing.repair.most_own_items", lambda _situation: most - 1)
     found = repair_mission(mission, situation, Request())
     assert found.check.holds
     assert len(found.mission.items) < most

@@ -154,7 +154,7 @@ def test_a_long_tour_fits_or_says_why_not(monkeypatch):
     whole = plan(situation, request)
     most = len(whole.items)  # one less, with home
     monkeypatch.setattr("missions.planning.plan.plan_tour", lambda *_arguments, **_options: whole)
-    monkeypatch.setattr("missions.planning.plan.most_items", lambda _parameters: most)
+    monkeypatch.setattr("missions.planning.plan.most_own_items", lambda _situation: most - 1)
     fitted = plan(situation, request)
     assert len(fitted.items) + 1 <= most
     assert fitted.targets == whole.targets
@@ -187,7 +187,7 @@ def test_a_repaired_mission_is_shortened_by_its_routes_only(monkeypatch):
     )  # the leg is left before the barn, and comes back to its line behind it
     count = 5
     monkeypatch.setattr(
-        "missions.editing.repair.most_items", lambda _parameters: count
+        "missions.editing.repair.most_own_items", lambda _situation: count - 1
     )  # one less, with home
     short = repair_mission(Mission(items, HOME), situation, request)
     assert short.check.holds
@@ -197,7 +197,7 @@ def test_a_repaired_mission_is_shortened_by_its_routes_only(monkeypatch):
     barn_at = Polygon(MAP.points([place(*corner) for corner in ((40, 20), (60, 20), (60, 40), (40, 40))]))
     line = LineString(MAP.points([HOME, *(one.position for one in short.mission.items)]))
     assert line.distance(barn_at) >= 2.0
-    monkeypatch.setattr("missions.editing.repair.most_items", lambda _parameters: count - 1)
+    monkeypatch.setattr("missions.editing.repair.most_own_items", lambda _situation: count - 1 - 1)
     with pytest.raises(
         MissionTooLongError, match="needs 5 items including home, but the vehicle holds 4; 1 of 2 route items"
     ):
@@ -218,8 +218,8 @@ def test_rtl_at_the_end_needs_an_item_too(monkeypatch):
         start=place(0.0, 0.0), targets=(place(20.0, 0.0), place(40.0, 0.0)), clearance_m=1.0, end="rtl"
     )
     situation = replace(situation, home=Known(place(0.0, 0.0), None, "test"))
-    monkeypatch.setattr("missions.planning.plan.most_items", lambda _parameters: 4)
+    monkeypatch.setattr("missions.planning.plan.most_own_items", lambda _situation: 4 - 1)
     assert len(plan(situation, request).items) == 3
-    monkeypatch.setattr("missions.planning.plan.most_items", lambda _parameters: 3)
+    monkeypatch.setattr("missions.planning.plan.most_own_items", lambda _situation: 3 - 1)
     with pytest.raises(MissionTooLongError, match="needs 4 items including home, but the vehicle holds 3"):
         plan(situation, request)

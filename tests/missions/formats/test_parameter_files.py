@@ -1,13 +1,19 @@
 from __future__ import annotations
 
+import math
+import re
+import struct
 from typing import TYPE_CHECKING
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from missions.errors import MissionFormatError
 from missions.firmware import Firmware
 from missions.formats import read_parameters
-from missions.formats.parameters import read, read_path, write
+from missions.formats.parameters import qgc_text, read, read_path, value_text, write
+from missions.situation import Situation
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -128,3 +134,105 @@ def test_a_remark_may_name_the_firmware(tmp_path: Path, remark: str, firmware: F
     assert (dict(found.parameters), found.firmware) == ({"WP_SPEED": 2.0}, firmware)
     path.write_text(write(found), encoding="utf-8")
     assert read_path(path) == found
+
+
+PX4 = """# Onboard parameters for Vehicle 3
+#
+# Stack: PX4 Pro
+# Vehicle: Rover
+# Version: 1.17.0\x20
+# Git Revision: 0000000000000000
+#
+# Vehicle-Id Component-Id Name Value Type
+3\t1\tCAL_ACC0_ID\t1310988\t6
+3\t1\tCA_AIRFRAME\t5\t6
+3\t1\tGF_ACTION\t2\t6
+3\t1\tNAV_ACC_RAD\t0.500000000000000000\t9
+3\t1\tRA_MAX_STR_ANG\t0.523599982261657715\t9
+"""
+
+
+def test_px4s_file_of_qgroundcontrol() -> None:
+    found = read(PX4, "rover.params")
+    assert (found.system, found.ardupilot, found.firmware) == (3, False, Firmware(1, 17))
+    assert found.parameters == {
+        "CAL_ACC0_ID": 1310988, "CA_AIRFRAME": 5, "GF_ACTION": 2, "NAV_ACC_RAD": 0.5, "RA_MAX_STR_ANG": 0.523599982261657715,
+    }  # fmt: skip
+    assert found.remarks == ()
+    assert read(PX4.replace("\t", " "), "f").parameters == found.parameters
+    assert read(PX4.replace("PX4 Pro", "Generic"), "f").ardupilot is None
+    assert read(QGROUNDCONTROL.replace("# Vehicle-Id", "# Stack: ArduPilot\n# V"), "f").ardupilot is True
+
+
+def test_parameters_of_other_components_are_not_the_autopilots() -> None:
+    gimbal = "3\t154\tGF_ACTION\t7\t6\n3\t154\tMNT_X\t1\t9\n"
+    found = read(PX4 + gimbal, "f")
+    assert found.parameters == read(PX4, "f").parameters
+    assert found.remarks == (
+        "f: 2 parameters of component 154 skipped: only the autopilot's (component 1) count",
+    )
+    assert read(gimbal, "f").parameters == {"GF_ACTION": 7, "MNT_X": 1}  # the only ones there are
+
+
+@pytest.mark.parametrize(
+    ("row", "message"),
+    [
+        ("4\t1\tGF_SOURCE\t0\t6", "parameters of vehicle 4, but those above are of vehicle 3"),
+        ("3\t1\tGF_SOURCE\t0\t11", "'11' is no parameter type"),
+        ("3\t1\tGF_SOURCE\t0\tint", "'int' is no parameter type"),
+        ("x\t1\tGF_SOURCE\t0\t6", "'x' is no vehicle id; expected 0 to 255"),
+        ("3\t256\tGF_SOURCE\t0\t6", "'256' is no component id"),
+        ("3\t1\tGF_SOURCE\t0.5\t6", "GF_SOURCE 0.5 is no value of type 6; expected a whole number"),
+        ("3\t1\tGF_SOURCE\t3e9\t6", "GF_SOURCE 3e+09 is no value of type 6"),
+        ("3\t1\tGF_SOURCE\t-1\t1", "GF_SOURCE -1 is no value of type 1; expected a whole number, 0 to 255"),
+    ],
+)
+def test_rows_that_contradict_themselves_are_refused(row: str, message: str) -> None:
+    with pytest.raises(MissionFormatError, match=re.escape(f"f: line {PX4.count(chr(10)) + 1}: {message}")):
+        read(f"{PX4}{row}\n", "f")
+
+
+def test_a_type_that_is_not_px4s_is_said() -> None:
+    found = read(PX4.replace("GF_ACTION\t2\t6", "GF_ACTION\t2\t9"), "f")
+    assert found.parameters["GF_ACTION"] == 2
+    assert found.remarks == (
+        "f: line 11: GF_ACTION has type 9, PX4's is INT32 (6): QGroundControl skips such a line",
+    )
+    rows = "".join(f"1\t1\t{name}\t1\t6\n" for name in ("NAV_ACC_RAD", "RA_ACC_RAD_MAX", "RO_SPEED_LIM", "RO_JERK_LIM", "PP_LOOKAHD_MIN", "PP_LOOKAHD_MAX"))  # fmt: skip
+    assert read(rows, "f").remarks[-1] == "and 1 more of another type"
+    ardupilots = "1\t1\tWP_SPEED\t2\t9\n1\t1\tGF_ACTION\t2\t9\n"
+    assert read(ardupilots, "f").remarks == ()
+
+
+def test_a_remark_that_the_names_contradict_does_not_count() -> None:
+    found = read("# Stack: PX4 Pro\nWP_SPEED 2\n", "f")
+    assert found.ardupilot is True
+    assert found.remarks == (
+        "f: a remark says that this is PX4 Pro, but its parameters are ArduPilot's: they count",
+    )
+
+
+def test_what_is_written_is_what_qgroundcontrol_writes() -> None:
+    types = {"CAL_ACC0_ID": 6, "CA_AIRFRAME": 6, "GF_ACTION": 6}
+    found = read(PX4, "f")
+    text = qgc_text(found, types)
+    assert read(text, "f").parameters == pytest.approx(found.parameters, rel=1e-7)
+    rows = [line.split("\t") for line in text.splitlines() if not line.startswith("#")]
+    assert [row[:3] for row in rows] == [["3", "1", name] for name in sorted(found.parameters)]
+    assert [row[4] for row in rows] == ["6", "6", "6", "9", "9"]
+    assert "# Stack: PX4 Pro\n# Version: 1.17.0\n" in text
+    assert qgc_text(Situation(parameters={"A": 1.0}), {}).endswith("1\t1\tA\t1\t9\n")
+
+
+@given(st.integers(-(2**31), 2**31 - 1))
+def test_every_int32_is_read_as_written(value: int) -> None:
+    assert float(value_text(float(value))) == value
+    assert "e" not in value_text(float(value))
+
+
+@given(st.floats(width=32, allow_nan=False, allow_infinity=False))
+def test_every_float_of_32_bits_is_read_as_written(value: float) -> None:
+    assert (
+        struct.pack("<f", float(value_text(value))) == struct.pack("<f", value)
+        or math.copysign(1, value) < 0 == value
+    )

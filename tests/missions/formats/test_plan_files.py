@@ -19,7 +19,7 @@ from missions.formats import qgc_plan
 from missions.geo import LatLon
 from missions.items import MissionItem, waypoint
 from missions.rally import RallyPoint
-from missions.situation import Known, Mission, Situation
+from missions.situation import Known, MadeFor, Mission, Reading, Situation
 
 PLAN: dict[str, Any] = {
     "fileType": "Plan",
@@ -232,7 +232,7 @@ def test_a_written_plan_has_what_qgroundcontrol_asks_for() -> None:
 
 @pytest.mark.parametrize(
     ("parameters", "speed_mps"),
-    [({}, 2.0), ({"CRUISE_SPEED": 3.0}, 3.0), ({"WP_SPEED": 1.5, "CRUISE_SPEED": 3.0}, 1.5), ({"WP_SPEED": 0.0, "CRUISE_SPEED": 3.0}, 3.0)],
+    [({}, 2.0), ({"RO_SPEED_LIM": 3.0}, 3.0), ({"RA_MISS_VEL_DEF": 1.0, "RO_SPEED_LIM": 3.0}, 1.0), ({"RO_SPEED_LIM": -1.0}, 2.0), ({"CRUISE_SPEED": 3.0}, 3.0), ({"WP_SPEED": 1.5, "CRUISE_SPEED": 3.0}, 1.5), ({"WP_SPEED": 0.0, "CRUISE_SPEED": 3.0}, 3.0)],
 )  # fmt: skip
 def test_cruise_speed_is_the_vehicles(parameters: dict[str, float], speed_mps: float) -> None:
     assert json.loads(qgc_plan.write(Situation(parameters=parameters)))["mission"]["cruiseSpeed"] == speed_mps
@@ -301,3 +301,62 @@ def test_unusable_plans_name_the_place(document: Any, problem: str) -> None:
 def test_text_that_is_not_json(text: str, problem: str) -> None:
     with pytest.raises(MissionFormatError, match=rf"^f: {problem}"):
         qgc_plan.read(text, "f")
+
+
+@pytest.mark.parametrize(
+    ("firmware", "vehicle", "made_for"),
+    [
+        (3, 10, MadeFor("f.plan", True, 10)),
+        (12, 11, MadeFor("f.plan", False, 11)),
+        (0, 10, MadeFor("f.plan", None, 10)),
+        (..., 10, MadeFor("f.plan", None, 10)),
+        (12, ..., MadeFor("f.plan", False, None)),
+        (12, None, MadeFor("f.plan", False, None)),
+        (..., ..., None),
+    ],
+)
+def test_a_plan_says_for_which_vehicle_it_is_made(
+    firmware: Any, vehicle: Any, made_for: MadeFor | None
+) -> None:
+    document = changed("mission.firmwareType", firmware)
+    if vehicle is ...:
+        del document["mission"]["vehicleType"]
+    else:
+        document["mission"]["vehicleType"] = vehicle
+    found = read(document)
+    assert found.reading.made_for == made_for
+    assert found.ardupilot is None  # that is a vehicle's word, not a file's
+    assert found.remarks == ()
+    again = json.loads(qgc_plan.write(found))["mission"]
+    is_px4, is_boat = firmware == 12, vehicle == 11
+    assert (again["firmwareType"], again["vehicleType"]) == (12 if is_px4 else 3, 11 if is_boat else 10)
+
+
+def test_a_mission_that_is_no_rovers_is_said() -> None:
+    assert read(changed("mission.vehicleType", 2)).remarks == (
+        "f.plan is made for vehicle type 2 (vehicleType), not for a rover (10): its mission is taken for a rover's",
+    )
+    document = changed("mission.vehicleType", 2)
+    document["mission"]["items"] = []  # a fence is a fence
+    assert read(document).remarks == ()
+
+
+@pytest.mark.parametrize("key", ["firmwareType", "vehicleType"])
+@pytest.mark.parametrize("value", ["PX4", 1.5, -1, 300, True])
+def test_what_is_no_autopilot_or_vehicle_is_refused(key: str, value: Any) -> None:
+    with pytest.raises(MissionFormatError, match=f"f.plan: mission.{key}: "):
+        read(changed(f"mission.{key}", value))
+
+
+@pytest.mark.parametrize(
+    ("situation", "firmware"),
+    [
+        (Situation(), 3),
+        (Situation(ardupilot=False), 12),
+        (Situation(ardupilot=True, parameters={"RO_SPEED_LIM": 3.0}), 3),
+        (Situation(parameters={"RO_SPEED_LIM": 3.0}), 12),
+        (Situation(parameters={"WP_SPEED": 3.0}, reading=Reading(made_for=MadeFor("f.plan", False))), 3),
+    ],
+)
+def test_a_plan_is_written_for_the_vehicle(situation: Situation, firmware: int) -> None:
+    assert json.loads(qgc_plan.write(situation))["mission"]["firmwareType"] == firmware

@@ -171,7 +171,7 @@ def test_what_the_legend_tells(plans: dict[str, Plan]) -> None:
     scene = plan_scene(plans["yard"], track=track, blocks=True)
     figure = scene_figure(scene)
     assert legend_of(figure) == {
-        "outside the fence", "safety margin, 2 m", "exclusion", "inclusion", "block", "predicted corridor",
+        "outside the fence", "clearance, 2 m", "exclusion", "inclusion", "block", "predicted corridor",
         "route", "waypoint", "narrowest place", "driven", "start", "target",
     }  # fmt: skip
     assert problems(figure, scene) == []
@@ -237,14 +237,17 @@ def test_titles(plans: dict[str, Plan]) -> None:
     )
 
 
-def test_the_margin_is_what_the_route_promises(plans: dict[str, Plan]) -> None:
+def test_the_clearance_is_what_the_route_promises(plans: dict[str, Plan]) -> None:
     plan = plans["yard"]
     plan = replace(plan, keeps=replace(plan.keeps, drawn_m=30.0))
-    margin = plan_scene(plan).margin
-    on_its_edge = shapely.get_coordinates(margin)
+    kept_off = plan_scene(plan).kept_off
+    on_its_edge = shapely.get_coordinates(kept_off)
     distances_m = shapely.distance(shapely.points(on_its_edge), plan.ground.edge)
     assert distances_m.max() == pytest.approx(2.0, abs=0.01)
-    assert plan_scene(replace(plan, keeps=replace(plan.keeps, promised_m=None))).margin.area > 5 * margin.area
+    assert (
+        plan_scene(replace(plan, keeps=replace(plan.keeps, promised_m=None))).kept_off.area
+        > 5 * kept_off.area
+    )
 
 
 def test_unsafe_legs_and_where_they_cross_the_fence(plans: dict[str, Plan]) -> None:

@@ -13,6 +13,9 @@ from hypothesis import strategies as st
 from missions.drive_model import beyond_measured
 from missions.errors import VehicleError
 from missions.firmware import Firmware, firmware_from_number, read_firmware
+from missions.promise import known_vehicle
+from missions.request import GoTo
+from missions.situation import MadeFor, Reading, Situation
 from missions.vehicle import (
     Autopilot,
     FenceParameters,
@@ -20,12 +23,20 @@ from missions.vehicle import (
     Pursuit,
     Steering,
     Vehicle,
+    known_ardupilot,
+    known_type,
     vehicle_from_parameters,
     whole_number,
 )
-from missions.vehicle.item_limit import most_items, storage_remarks
-from missions.vehicle.parameter_remarks import assumed_remarks
-from missions.vehicle.parameters import PARAMETER_NAMES, PARAMETERS, Range
+from missions.vehicle.asked_parameters import PX4_ASKED_NAMES
+from missions.vehicle.item_limit import most_items, most_own_items, storage_remarks
+from missions.vehicle.parameter_remarks import (
+    assumed_remarks,
+    made_for_remarks,
+    parameter_remarks,
+    range_remarks,
+)
+from missions.vehicle.parameters import PARAMETER_NAMES, PARAMETERS, PX4_NAMES, Range
 
 SKID = {"SERVO1_FUNCTION": 73, "SERVO3_FUNCTION": 74}
 ACKERMANN = {"SERVO1_FUNCTION": 26, "SERVO3_FUNCTION": 70}
@@ -219,7 +230,7 @@ def test_px4_with_steered_wheels() -> None:
     assert not vehicle.fence.enabled
     assert vehicle.fence.radius_m == 100.0
     assert vehicle.stops_within_m == 0.0
-    assert vehicle.pursuit == Pursuit(full_speed_mps=None, speed_reduction=-1.0)
+    assert vehicle.pursuit == Pursuit(acceptance_gain=1.0, full_speed_mps=None, speed_reduction=-1.0)
     assert {one.parameter for one in vehicle.assumed} == {
         "RA_ACC_RAD_GAIN", "RO_SPEED_RED", "PP_LOOKAHD_GAIN", "PP_LOOKAHD_MIN", "PP_LOOKAHD_MAX",
     }  # fmt: skip
@@ -400,8 +411,8 @@ def test_versions_are_in_the_order_of_their_numbers(major: int, minor: int, patc
     assert firmware is None or (next_one or Firmware(256, 0)) > firmware or number == 2**32 - 1
 
 
-def published() -> list[dict[str, str]]:
-    text = (Path(__file__).parent / "data" / "ardupilot_parameters.csv").read_text(encoding="utf-8")
+def published(name: str = "ardupilot_parameters.csv") -> list[dict[str, str]]:
+    text = (Path(__file__).parent / "data" / name).read_text(encoding="utf-8")
     return list(csv.DictReader(line for line in text.splitlines() if not line.startswith("#")))
 
 
@@ -422,6 +433,112 @@ def test_every_parameter_that_is_asked_for_is_published_and_what_is_read_is_aske
     assert {row["name"] for row in published()} == set(PARAMETER_NAMES)
     read = {one.parameter for one in vehicle_from_parameters({"SERVO1_FUNCTION": 26.0}).assumed}
     assert read <= set(PARAMETER_NAMES)
+
+
+NOT_SET = {"RA_WHEEL_BASE", "RA_MAX_STR_ANG"}
+"""Whose default of 0 means that nobody set them: nothing drives so."""
+
+
+@pytest.mark.parametrize("row", published("px4_parameters.csv"), ids=lambda row: row["name"])
+def test_the_table_is_as_px4_published_it(row: dict[str, str]) -> None:
+    found = PARAMETERS[row["name"]]
+    assert found.autopilot is Autopilot.PX4
+    assert found.is_whole == (row["type"] == "INT32")
+    assert found.documented == (Range(float(row["least"]), float(row["most"])) if row["least"] else None)
+    assert (str(found.until)[:4] if found.until else "1.18") == row["last"]
+    if found.default is not None and found.name not in NOT_SET:
+        assert found.default == pytest.approx(float(row["default"]), abs=1e-6)
+    assert len(row["commit"]) == 40
+
+
+def test_all_of_px4s_that_is_read_is_published_and_asked_for() -> None:
+    assert {row["name"] for row in published("px4_parameters.csv")} == set(PX4_NAMES)
+    for kind in ({"CA_AIRFRAME": 5.0}, {"CA_AIRFRAME": 6.0}):
+        read = {one.parameter for one in vehicle_from_parameters(kind).assumed}
+        assert read <= set(PX4_ASKED_NAMES)
+    assert set(PX4_NAMES) - set(PX4_ASKED_NAMES) == {
+        *("RA_MISS_VEL_DEF", "RD_MISS_SPD_DEF", "RA_MAX_ACCEL", "RD_MAX_ACCEL", "RA_MAX_JERK", "RD_MAX_JERK"),
+        "GF_PREDICT",
+    }
+
+
+@pytest.mark.parametrize(
+    ("values", "remarks"),
+    [
+        ({"NAV_ACC_RAD": 0.5, "GF_ACTION": 2, "RO_SPEED_LIM": -1}, []),
+        ({"NAV_ACC_RAD": 0.01}, ["NAV_ACC_RAD is 0.01; PX4 documents 0.05 to 200, and PX4 does not check it"]),
+        ({"GF_ACTION": 2.5}, ["GF_ACTION is 2.5; PX4 keeps a whole number there (INT32), and PX4 does not check it"]),
+        # What comes of a tool that takes bits for a number, or a number for bits.
+        ({"GF_ACTION": 1_077_936_128}, ["GF_ACTION is 1.07793613e+09; PX4 documents 0 to 5, and PX4 does not check it"]),
+        ({"NAV_ACC_RAD": 1.4e-45}, ["NAV_ACC_RAD is 1.4e-45; PX4 documents 0.05 to 200, and PX4 does not check it"]),
+        ({"WP_SPEED": 2.0, "NAV_ACC_RAD": 0.01}, []),  # ArduPilot's
+        ({"FS_ACTION": 2.0}, []),
+    ],
+)  # fmt: skip
+def test_values_that_px4_does_not_document_are_said(values: dict[str, float], remarks: list[str]) -> None:
+    assert range_remarks(values) == remarks
+    assert range_remarks(values, ardupilot=True) == []
+    assert parameter_remarks(Situation(parameters=values)) == remarks
+
+
+def test_many_values_out_of_range_are_counted() -> None:
+    found = range_remarks(dict.fromkeys(PX4_NAMES, -7.0))
+    assert len(found) == 6
+    assert (
+        found[-1] == f"and {len(PX4_NAMES) - 7} more parameters out of range"
+    )  # CA_AIRFRAME, GF_PREDICT have none
+
+
+PX4S, ARDUPILOTS = {"RO_SPEED_LIM": 3.0}, {"WP_SPEED": 2.0}
+
+
+@pytest.mark.parametrize(
+    ("heard", "parameters", "said", "known", "told"),
+    [
+        (None, {}, None, None, None),
+        (None, {}, True, True, None),
+        (None, {}, False, False, "is taken for PX4, as f.plan says"),
+        (None, PX4S, False, False, None),
+        (None, PX4S, True, False, "f.plan is made for ArduPilot (firmwareType), but the vehicle is PX4"),
+        (
+            None,
+            ARDUPILOTS,
+            False,
+            True,
+            "f.plan is made for PX4 (firmwareType), but the vehicle is ArduPilot",
+        ),
+        (True, PX4S, False, True, "f.plan is made for PX4 (firmwareType), but the vehicle is ArduPilot"),
+        (False, {}, True, False, "f.plan is made for ArduPilot (firmwareType), but the vehicle is PX4"),
+        (False, {}, False, False, None),
+    ],
+)
+def test_what_a_vehicle_says_of_itself_counts_more_than_a_file(
+    heard: bool | None, parameters: dict[str, float], said: bool | None, known: bool | None, told: str | None
+) -> None:
+    made_for = MadeFor("f.plan", said) if said is not None else None
+    situation = Situation(ardupilot=heard, parameters=parameters, reading=Reading(made_for=made_for))
+    assert known_ardupilot(situation) is known
+    remarks = made_for_remarks(situation)
+    assert (told is None) == (not remarks)
+    assert told is None or told in remarks[0]
+    vehicle = known_vehicle(situation, GoTo())
+    assert vehicle.autopilot is (Autopilot.PX4 if known is False else Autopilot.ARDUPILOT)
+
+
+@pytest.mark.parametrize(
+    ("heard", "said", "known"), [(None, 11, 11), (None, 2, None), (10, 11, 10), (None, None, None)]
+)
+def test_a_plan_for_a_boat_is_one(heard: int | None, said: int | None, known: int | None) -> None:
+    reading = Reading(made_for=MadeFor("f.plan", True, said))
+    situation = Situation(vehicle_type=heard, reading=reading)
+    assert known_type(situation) == known
+    assert (known_vehicle(situation, GoTo()).boat_drift_m is not None) == (known == 11)
+
+
+def test_how_many_items_are_held_by_autopilot() -> None:
+    for parameters, most, home in (({}, 654, 1), (PX4S, 500, 0)):
+        assert most_own_items(Situation(parameters=parameters)) == most
+        assert vehicle_from_parameters(parameters).home_items == home
 
 
 def measured_cells(*, before_4_6: bool = False) -> list[dict[str, str]]:

@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.cli.drawing import Shown
     from mavlink_bridge.link import Link
     from mavlink_bridge.mavlink.messages import Frame
+    from mavlink_bridge.protocol.peer import Peer
     from mavlink_bridge.protocol.verified_upload import VerifiedUpload
     from missions.items import MissionItem
     from missions.request import Request
@@ -222,6 +223,8 @@ class _Run:
         planned, self.planning_s = timed_plan(situation, request, should_stop=should_stop)
         if request.repairs and self.director.orders.drive:
             _check_drivable(planned)
+        if self.director.orders.drive and self.director.peer is not None:
+            _check_end(planned, self.director.peer)
         return planned
 
 
@@ -274,6 +277,22 @@ def _check_drivable(planned: Plan) -> None:
                 "upload it without --drive, and start it yourself",
                 item=seq,
             )
+
+
+def _check_end(planned: Plan, peer: Peer) -> None:
+    """Refuse to drive a mission whose end looks like somebody's taking over.
+
+    Raises
+    ------
+    SituationError
+        It ends with RTL, and the vehicle's autopilot changes its mode for that.
+    """
+    ends_so = any(item.command == Command.NAV_RETURN_TO_LAUNCH for item in planned.items)
+    if ends_so and peer.autopilot.driving.ends_in_hold:
+        raise SituationError(
+            f"{peer.autopilot.kind} leaves its mission mode for an RTL item, which cannot be told from an operator who takes over; nothing was written: "
+            "plan the way home with --return, or upload it without --drive and start it yourself"
+        )
 
 
 class _Beside(Generic[TaskT, MadeT]):

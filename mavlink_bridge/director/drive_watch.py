@@ -41,6 +41,8 @@ class _Here(NamedTuple):
 
     place: LatLon
     point: Point  # in the local frame of the plan's ground
+    seen_s: float
+    speed_mps: float
 
 
 class DriveWatch:
@@ -59,10 +61,7 @@ class DriveWatch:
     """
 
     def __init__(self, plan: Plan, voice: Voice, now_s: float, autopilot: AutopilotTable = ARDUPILOT) -> None:
-        self._rules = autopilot.driving
-        self._first_number = int(not autopilot.lists.form.has_home_item)
-        self._moved_s = now_s
-        self._speed_mps = 0.0
+        self._autopilot = autopilot
         self.begun_s = now_s
         self.progress_due_s = now_s + PROGRESS_EVERY_S
         self.item = 1
@@ -79,8 +78,7 @@ class DriveWatch:
         self._voice = voice
         self._points = plan.points
         self._line = LineString(self._points)
-        self._band = plan.envelope.area
-        prepare(self._band)
+        prepare(plan.envelope.area)
         self._here: _Here | None = None
         self._is_outside = False
         self._standing_since_s: float | None = None
@@ -118,7 +116,7 @@ class DriveWatch:
             self._move(message, now_s)
         elif isinstance(message, m.MissionCurrent) and message.seq + self._first_number:
             self._take_current(message, message.seq + self._first_number)
-        elif isinstance(message, m.MissionItemReached) and not self._rules.repeats_reached:
+        elif isinstance(message, m.MissionItemReached) and not self._autopilot.driving.repeats_reached:
             self._take_reached(message.seq + self._first_number)
         elif isinstance(message, m.Statustext):
             self._take_text(message.text)
@@ -159,16 +157,21 @@ class DriveWatch:
         """Return whether a vehicle that holds now does so at the end of its drive: on its last legs, as near to its end as it may have come since it was seen last."""
         vehicle = self._plan.vehicle
         radius_m = vehicle.waypoint_radius_m if vehicle.pursuit is None else vehicle.pursuit.acceptance_m
-        reach_m = radius_m + _END_M + self._speed_mps * (now_s - self._moved_s)
         if self._here is None or not self._is_near_last:
             return False
+        reach_m = radius_m + _END_M + self._here.speed_mps * (now_s - self._here.seen_s)
         return self._here.point.distance(Point(self._points[-1])) <= reach_m
 
     def _take_text(self, text: str) -> None:
         """Take the text that the mission is finished, on its last leg, for arrival."""
-        pattern = self._rules.finished_text
+        pattern = self._autopilot.driving.finished_text
         if pattern is not None and re.match(pattern, text.strip(), re.IGNORECASE):
             self.has_arrived = self.has_arrived or self._is_near_last
+
+    @property
+    def _first_number(self) -> int:
+        """The number in the plan of the item that the vehicle counts as 0."""
+        return int(not self._autopilot.lists.form.has_home_item)
 
     @property
     def _is_near_last(self) -> bool:
@@ -198,15 +201,14 @@ class DriveWatch:
         here = Point(self._plan.ground.frame.to_local(place))
         if self._here is not None:
             self.driven_m += here.distance(self._here.point)
-        self._here = _Here(place, here)
-        self._moved_s, self._speed_mps = now_s, math.hypot(message.vx, message.vy) / 100
+        self._here = _Here(place, here, now_s, math.hypot(message.vx, message.vy) / 100)
         self.least_clearance_m = min(self.least_clearance_m, self._plan.ground.enforced.clearance_m(here))
         self.deviation_m = here.distance(self._line)
         self._notice_leaving(here, place, now_s)
         self._notice_standing(here, math.hypot(message.vx, message.vy) / 100, now_s)
 
     def _notice_leaving(self, here: Point, place: LatLon, now_s: float) -> None:
-        outside_m = here.distance(self._band)
+        outside_m = here.distance(self._plan.envelope.area)
         if outside_m > OUTSIDE_M and not self._is_outside:
             text = f"{outside_m:.1f} m outside the predicted corridor"
             self._voice.tell(now_s, EventName.LEFT_ENVELOPE, text, round(outside_m, 2), list(place))

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _CHANGES_MODE = 1.0
 """MAV_DO_REPOSITION_FLAGS_CHANGE_MODE: without it PX4 1.17 answers UNSUPPORTED, and 1.18 does nothing in a mission."""
 
-_OWN_SPEED = -1.0
+_OWN_SPEED = -1.0  # as a ground station leaves it open
 
 
 class StopHere(SendCommand):

@@ -58,6 +58,7 @@ _ROLLS_MPS2 = 0.32
 _NOT_ARMED_S = 150.0
 """For so long at the least it could not be armed after that."""
 
+# MISSION_STATE, MAV_SEVERITY
 _NO_MISSION, _NOT_STARTED, _ACTIVE, _PAUSED, _COMPLETE = 1, 2, 3, 4, 5
 _CRITICAL, _INFO = 2, 6
 

@@ -1,6 +1,7 @@
 """How the drive model bounds 5,270 measured corners, what room it wastes, and how well it tells times.
 
-Run: ``python benchmarks/drive_model.py`` (``--by-turn`` for one line a turning angle, ``--drives DIR`` for recorded runs).
+Run: ``python benchmarks/drive_model.py`` (``--by-turn`` for one line a turning angle, ``--drives DIR`` for recorded runs, ``--left-unused`` for the table of
+`missions.vehicle.measured_corners`).
 
 Each file of rows is a few long missions; rows that follow on one another are put together again, so that the tails of earlier corners
 are where they were. Excess is measured minus foreseen (above 0: the model was too narrow), waste the other way round.
@@ -23,10 +24,14 @@ from missions.drive_model import Corner, Envelope, envelope
 from missions.geo import LatLon
 from missions.ground.frame import LocalFrame
 from missions.vehicle import Steering, Vehicle
+from missions.vehicle.calibration import speed_class, turn_class
 
 HERE = Path(__file__).parent
 DRIVES = HERE.parent / "tests" / "missions" / "drive_model" / "data" / "drives"
 Row = dict[str, str]
+LEAST_ROWS = (
+    16  # of a class of corners, to say what they left unused; chosen: a class with fewer has four at most
+)
 SLOW = {"slow1at5": (1.0, 5.0), "slow1at10": (1.0, 10.0), "slow1at15": (1.0, 15.0), "slow2at10": (2.0, 10.0)}
 """Speed of the slow stretch, and how far before the corner it begins; it ends 6 m after it."""
 
@@ -34,8 +39,13 @@ SLOW = {"slow1at5": (1.0, 5.0), "slow1at10": (1.0, 10.0), "slow1at15": (1.0, 15.
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--by-turn", action="store_true")
+    parser.add_argument("--left-unused", action="store_true")
     parser.add_argument("--drives", type=Path, default=DRIVES)
     options = parser.parse_args()
+    if options.left_unused:
+        for name, more_m in left_unused().items():
+            print(f"    {name}: {more_m},")
+        return
     cells: dict[tuple[str, ...], list[tuple[Row, Corner, float]]] = defaultdict(list)
     started, points = time.perf_counter(), 0
     for mission in missions():
@@ -68,6 +78,31 @@ def cell(row: Row, *, by_turn: bool) -> tuple[str, ...]:
     )
     turn = (f"{abs(int(row['turn_deg'])):3d} deg",) if by_turn else ()
     return (row["vehicle"], kind, fair, *turn)
+
+
+def left_unused() -> dict[tuple[str, int, int], tuple[float, float]]:
+    """Return by steering, class of angle and class of speed how far the nearest row stayed within its bounds (negative), inside and outside; 0 where it did not."""
+    found: dict[tuple[str, int, int], list[tuple[float, float]]] = defaultdict(list)
+    for mission in missions():
+        track, numbers, _ = foreseen(mission)
+        corners = {corner.waypoint: corner for corner in track.corners}
+        for row, number in zip(mission, numbers, strict=True):
+            corner = corners[number]
+            # The measured skid-steer model could not reach 5 m/s.
+            if corner.stops or not corner.bounded or (row["vehicle"], row["wp_speed_mps"]) == ("skid", "5"):
+                continue
+            excess_m = (
+                float(row["inside_cut_m"]) - corner.inside_cut_m,
+                float(row["outside_overshoot_m"]) - corner.outside_overshoot_m,
+            )
+            classes = turn_class(float(row["turn_deg"])), speed_class(float(row["wp_speed_mps"]))
+            found[row["vehicle"], *classes].append(excess_m)
+    unused = {
+        name: tuple(min(0.0, math.ceil(max(side) * 1000) / 1000) for side in zip(*rows, strict=True))
+        for name, rows in sorted(found.items())
+        if len(rows) >= LEAST_ROWS
+    }
+    return {name: more_m for name, more_m in unused.items() if any(more_m)}
 
 
 def line(name: tuple[str, ...], found: list[tuple[Row, Corner, float]]) -> str:

@@ -6,6 +6,7 @@ A part stands between ``<!-- made: NAME -->`` and ``<!-- end -->``; a test check
 from __future__ import annotations
 
 import inspect
+import json
 import re
 import sys
 from collections import defaultdict
@@ -16,6 +17,10 @@ from typing import Any
 from mavlink_bridge import errors as bridge_errors
 from mavlink_bridge.cli.app import COMMANDS, load
 from mavlink_bridge.cli.failing import ExitCode, exit_code_of
+from mavlink_bridge.console import wire
+from mavlink_bridge.dataset.questions import QUESTIONS
+from mavlink_bridge.dataset.schema import PARTITION, VIEWS
+from mavlink_bridge.dataset.schema import TABLES as DATASET_TABLES
 from mavlink_bridge.director import SCHEMA, TRANSITIONS
 from mavlink_bridge.protocol.transitions import TABLES
 from missions import errors as mission_errors
@@ -98,7 +103,7 @@ _CODES = {
     ExitCode.LINK: "link: no connection, no heartbeat, silence",
     ExitCode.REFUSED: "the vehicle refused; says its result by name, and the item",
     ExitCode.OUTCOME: "what is on the vehicle is not what was wanted, or unknown; says what is known and where the backup is",
-    ExitCode.CHECK: "a check or comparison failed (`check`, `replay --expect`, `doctor`)",
+    ExitCode.CHECK: "a check or comparison failed (`check`, `replay --expect`, `doctor`), or two files differ (`diff`)",
     ExitCode.INTERRUPTED: "interrupted by the user; says what the vehicle does now (mode, armed, speed) and what is on it",
 }
 
@@ -137,6 +142,45 @@ def _parameter_row(row: Parameter, name: str) -> str:
     return f"| {name}{since} | {taken} | {row.documented or '—'}{whole} | {measured} | {autopilot}{row.changes} |"
 
 
+def dataset_tables() -> str:
+    """Return the tables of a dataset with their columns."""
+    parts = []
+    for table in DATASET_TABLES.values():
+        rows = [f"| `{one.name}` | {one.sql} | {one.meaning} |" for one in table.columns]
+        kept = "by month and vehicle" if table.is_partitioned else "not parted"
+        parts.append(
+            "\n".join(
+                [
+                    f"### {table.name}",
+                    "",
+                    f"A row is {table.about}. Kept {kept}.",
+                    "",
+                    "| column | type | means |",
+                    "|---|---|---|",
+                    *rows,
+                ]
+            )
+        )
+    return "\n\n".join(parts)
+
+
+def dataset_partition() -> str:
+    """Return the columns that come from folders' names."""
+    rows = [f"| `{one.name}` | {one.sql} | {one.meaning} |" for one in PARTITION]
+    return "\n".join(["| column | type | means |", "|---|---|---|", *rows])
+
+
+def dataset_views() -> str:
+    """Return the views of a dataset, with the SQL that makes them."""
+    return "\n\n".join(f"`{view.name}`: a row is {view.about}.\n\n```sql\n{view.sql}\n```" for view in VIEWS)
+
+
+def dataset_questions() -> str:
+    """Return the ready questions."""
+    rows = [f"| `{one.name}` | {one.about} |" for one in QUESTIONS.values()]
+    return "\n".join(["| question | asks |", "|---|---|", *rows])
+
+
 def _planners(case: str) -> str:
     """Return a map's table out of the benchmark's results."""
     text = (DOCS.parent / "benchmarks" / "results" / "planner.md").read_text(encoding="utf-8")
@@ -145,9 +189,55 @@ def _planners(case: str) -> str:
     return found[1]
 
 
+def console_types() -> str:
+    """Return the types that go between the console's page and server, from their JSON schema, those of the snapshot first."""
+    types = wire.schema()["$defs"]
+    parts = []
+    for name, kind in types.items():
+        if (properties := kind.get("properties")) is None:
+            continue
+        rows = [
+            f"| `{field}` | {_schema_type(value)} | {'' if field in kind.get('required', ()) else _default(value)} |"
+            for field, value in properties.items()
+        ]
+        head = kind.get("description", "").split("\n")[0]
+        table = "\n".join(["| field | type | default |", "|---|---|---|", *rows])
+        parts.append(f"### {name}\n\n{head}\n\n{table}")
+    return "\n\n".join(parts)
+
+
+def _schema_type(value: dict[str, Any]) -> str:
+    if "$ref" in value:
+        name = value["$ref"].rsplit("/", 1)[-1]
+        return f"[{name}](#{name.lower()})"
+    if "anyOf" in value:
+        return " or ".join(map(_schema_type, value["anyOf"]))
+    if "const" in value or "enum" in value:
+        return ", ".join(f"`{one}`" for one in value.get("enum", [value.get("const")]))
+    if "prefixItems" in value:
+        return f"[{', '.join(map(_schema_type, value['prefixItems']))}]"
+    if value.get("type") == "array":
+        return f"list of {_schema_type(value.get('items', {}))}"
+    return {"object": "mapping", "null": "null", None: "any"}.get(value.get("type"), str(value.get("type")))
+
+
+def _default(value: dict[str, Any]) -> str:
+    return f"`{json.dumps(value['default'])}`" if "default" in value else ""
+
+
+def console_schema() -> str:
+    """Return the JSON schema of what goes between the console's page and server."""
+    return json.dumps(wire.schema(), indent=1) + "\n"
+
+
 PARTS = {
     "bridge-events": event_table,
     "commands": commands,
+    "console-types": console_types,
+    "dataset-partition": dataset_partition,
+    "dataset-questions": dataset_questions,
+    "dataset-tables": dataset_tables,
+    "dataset-views": dataset_views,
     "director-states": director_table,
     "exit-codes": exit_codes,
     "parameters": parameters,
@@ -157,6 +247,7 @@ PARTS = {
 
 
 PICTURES = {
+    "console-schema.json": console_schema,
     "figures/states-director.svg": partial(
         draw, TRANSITIONS, "The states of the live bridge, and what leads from one to another"
     ),

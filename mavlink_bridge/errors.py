@@ -5,7 +5,10 @@
     BridgeError
     ├── UsageError               options that do not fit together
     ├── LogError                 a log cannot be used
+    ├── DatasetError             a dataset of logs cannot be built or read
     ├── LinkError                no connection, no heartbeat, silence
+    ├── ClusterError             no scheduler, no workers, or workers of another version
+    ├── LostWorkerError          a worker died at a task, again and again
     ├── IdentityTakenError       somebody else had our system and component id before anything was written
     ├── VehicleNotFoundError     nobody there is the vehicle asked for
     ├── RefusedError             the vehicle refused
@@ -35,8 +38,20 @@ class LogError(BridgeError):
     """A telemetry log is missing, empty, or not one."""
 
 
+class DatasetError(BridgeError):
+    """A dataset of logs cannot be built or read."""
+
+
 class LinkError(BridgeError):
     """No connection, no heartbeat, or silence."""
+
+
+class ClusterError(BridgeError):
+    """No scheduler answers, it has no workers, or one of them has another version of pbpp-rover."""
+
+
+class LostWorkerError(BridgeError):
+    """The process or worker that did a task died, again and again: that task's error."""
 
 
 class IdentityTakenError(LinkError):

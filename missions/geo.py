@@ -58,6 +58,8 @@ def checked_lat_lon(lat_deg: float, lon_deg: float) -> LatLon:
     return LatLon(lat_deg, lon_deg)
 
 
+_MOST_M_PER_LAT_DEG, _MOST_M_PER_LON_DEG = 111_695.0, 111_320.0  # at the poles; on the equator
+
 _ANGLE = (
     r"([NSEW])?\s*([+-]?)(\d+(?:\.\d*)?|\.\d+)(?:\s*°)?"
     r"(?:(?:(?<=°)\s*|\s+)(\d+(?:\.\d*)?)\s*['′’](?:\s*(\d+(?:\.\d*)?)\s*(?:\"|″|”|''))?)?"
@@ -135,6 +137,12 @@ def rounded(position: LatLon) -> LatLon:
 def distance_m(a: LatLon, b: LatLon) -> float:
     """Return the geodesic distance in metres."""
     return distance_and_bearing(a, b)[0]
+
+
+def upper_distance_m(a: LatLon, b: LatLon) -> float:
+    """Return no less than the geodesic distance, in a hundredth of its time: the way along a meridian and a parallel, each degree as long as WGS 84 has any."""
+    lat_deg, lon_deg = abs(b.lat_deg - a.lat_deg), abs(wrap_lon_deg(b.lon_deg - a.lon_deg))
+    return _MOST_M_PER_LAT_DEG * lat_deg + _MOST_M_PER_LON_DEG * lon_deg
 
 
 def path_length_m(path: Sequence[LatLon]) -> float:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from missions.vehicle import known_ardupilot, known_type, vehicle_from_parameters
+from missions.vehicle.calibration import calibrated, calibration_info, calibration_warnings
 
 if TYPE_CHECKING:
     from missions.request import Request
@@ -86,6 +87,7 @@ def known_vehicle(situation: Situation, request: Request) -> Vehicle:
         firmware=situation.firmware,
         ardupilot=known_ardupilot(situation),
     )
+    vehicle = calibrated(vehicle, situation.calibration, situation.parameters)
     if request.speed_mps is None:
         return vehicle
     return replace(vehicle, speed_mps=request.speed_mps)
@@ -93,7 +95,8 @@ def known_vehicle(situation: Situation, request: Request) -> Vehicle:
 
 def promise(situation: Situation, request: Request, vehicle: Vehicle) -> Promise:
     """Return the clearance to promise: what is asked, but no less than the vehicle's own avoidance and its corners need."""
-    warnings: list[str] = []
+    warnings = calibration_warnings(situation.calibration, situation.parameters)
+    told = calibration_info(vehicle)
     promised_m = request.clearance_m
     if promised_m is None:
         promised_m = max(vehicle.fence.margin_m + DEFAULT_BEYOND_MARGIN_M, LEAST_DEFAULT_M)
@@ -109,7 +112,7 @@ def promise(situation: Situation, request: Request, vehicle: Vehicle) -> Promise
             warnings.append(f"{_stops(vehicle)}; the clearance of {promised_m:g} m is less")
         error_m = request.reserve_m + (request.position_error_m or 0.0)
         return Promise(
-            promised_m, error_m, request.corner_allowance_m, tuple(warnings), asked_m=request.clearance_m
+            promised_m, error_m, request.corner_allowance_m, tuple(warnings), told, request.clearance_m
         )
     error_m, trouble = _position_error_m(situation, request)
     is_ours = bool(error_m) and request.position_error_m is None
@@ -123,7 +126,12 @@ def promise(situation: Situation, request: Request, vehicle: Vehicle) -> Promise
             )
         promised_m = raised_m
     return Promise(
-        promised_m, error_m + request.reserve_m, None, (*warnings, *trouble), info, request.clearance_m
+        promised_m,
+        error_m + request.reserve_m,
+        None,
+        (*warnings, *trouble),
+        (*info, *told),
+        request.clearance_m,
     )
 
 

@@ -160,6 +160,73 @@ class Reading:
 
 
 @dataclass(frozen=True, slots=True)
+class CornerClass:
+    """How one rover's corners of like angle and speed compare with the drive model's bounds.
+
+    Parameters
+    ----------
+    turn_from_deg, turn_to_deg : float
+        The angle, to either side; the second is outside.
+    speed_from_mps, speed_to_mps : float
+        The faster of the speeds asked for before and after it; the second is outside.
+    stands : bool
+        Corners that the rover stops or turns on the spot at, or those that it drives through.
+    corners : int
+        How many were driven.
+    inside_more_m, outside_more_m : float
+        What is added to the bound of the cut, and of the overshoot; negative where this rover needs less.
+    beyond_m : float
+        How far the corridor grows there: the farthest outside it that the rover was seen, from the middle of one leg to the middle of the next.
+    """
+
+    turn_from_deg: float
+    turn_to_deg: float
+    speed_from_mps: float
+    speed_to_mps: float
+    stands: bool
+    corners: int
+    inside_more_m: float
+    outside_more_m: float
+    beyond_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class LegClass:
+    """How one rover's straight legs of like speed compare with the drive model's band: what is added to it, never less than nothing."""
+
+    speed_from_mps: float
+    speed_to_mps: float
+    legs: int
+    more_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """What one rover's recorded drives show beside the drive model.
+
+    Parameters
+    ----------
+    system : int
+        The vehicle's MAVLink system id.
+    drives : int
+        How many drives it rests on.
+    steering : str
+        `missions.vehicle.Steering` of the rover.
+    corners : tuple of CornerClass
+    legs : tuple of LegClass
+    parameters : mapping of str to float
+        Those that it drove with, by name.
+    """
+
+    system: int
+    drives: int
+    steering: str
+    corners: tuple[CornerClass, ...]
+    legs: tuple[LegClass, ...]
+    parameters: Mapping[str, float] = field(hash=False)
+
+
+@dataclass(frozen=True, slots=True)
 class Situation:
     """What is known, each fact with its time and source; None is not known.
 
@@ -185,6 +252,8 @@ class Situation:
         What was reported to stand or move in the field, as it may be when a vehicle that is told to stop now stands.
     reading : Reading
         How all that was read.
+    calibration : Calibration, optional
+        What this rover's own drives show of its corners and legs.
     """
 
     system: int | None = None
@@ -205,6 +274,7 @@ class Situation:
     stops: Stops = field(default_factory=Stops)
     obstacles: Obstacles = field(default_factory=Obstacles)
     reading: Reading = field(default_factory=Reading)
+    calibration: Calibration | None = None
 
     @property
     def bytewise(self) -> bool | None:

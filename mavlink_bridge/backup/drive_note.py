@@ -25,6 +25,7 @@ from missions.checking.drive_record import DriveRecord
 from missions.errors import MissionError
 from missions.fence import fence_from_items, fence_to_items
 from missions.firmware import read_firmware
+from missions.formats.calibration import calibration_from_plain, calibration_to_plain
 from missions.geo import LatLon
 
 if TYPE_CHECKING:
@@ -85,6 +86,7 @@ def note_to_json(note: DriveNote) -> dict[str, Any]:
         "fence": [item_to_json(item) for item in fence_to_items(record.fence)],
         "parameters": {name: number_to_json(value) for name, value in record.parameters.items()},
         "firmware": str(record.firmware) if record.firmware is not None else None,
+        "calibration": calibration_to_plain(record.calibration),
     }
     if not record.ardupilot:  # notes of ArduPilot's drives have no word of it
         content["ardupilot"] = False
@@ -122,6 +124,7 @@ def note_from_json(content: dict[str, Any]) -> DriveNote:
         vehicle_type=content["vehicle_type"],
         firmware=read_firmware(firmware) if firmware is not None else None,
         ardupilot=bool(content.get("ardupilot", True)),
+        calibration=calibration_from_plain(content.get("calibration")),
     )
     mark = mark_from_json(int(content["system"]), content["vehicle"])
     mission = tuple(map(item_from_json, content["mission"]))

@@ -220,6 +220,27 @@ class BackupStore:
         paths = self._paths(system, mission_type)
         return read_backup(paths[-1]) if paths else None
 
+    def kept(self, system: int, most: int = 50) -> list[Backup]:
+        """Return the newest backups of the vehicles with a system id, newest first; what cannot be read is left out."""
+        paths = [path for kind in MissionType for path in self._paths(system, kind)]
+        found: list[Backup] = []
+        for path in sorted(paths, key=lambda one: one.name.split("-")[3], reverse=True)[:most]:
+            with contextlib.suppress(BackupError):
+                found.append(read_backup(path))
+        return found
+
+    def named(self, name: str) -> Backup:
+        """Return the backup of a name in this folder.
+
+        Raises
+        ------
+        BackupError
+            There is none, or it cannot be read.
+        """
+        if not _BACKUP_NAME.fullmatch(name):
+            raise BackupError(f"{name!r} is not the name of a backup")
+        return read_backup(self.folder / name)
+
     def _prune(self, system: int, mission_type: MissionType) -> None:
         """Take the oldest backups away, but none that is still to be restored."""
         named = {note.backup.path for note in self.notes() if note.backup}

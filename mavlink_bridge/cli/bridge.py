@@ -8,7 +8,7 @@ import time
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import typer
 
@@ -46,7 +46,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from mavlink_bridge.backup.drive_note import DriveNote
+    from mavlink_bridge.backup.vehicle_mark import VehicleMark
     from mavlink_bridge.cli.options.bridge import BridgeOptions
+    from mavlink_bridge.cli.options.shared import CommonOptions
     from mavlink_bridge.director import Event
     from mavlink_bridge.link import Link
     from mavlink_bridge.mavlink.messages import Frame, Message
@@ -63,6 +65,7 @@ _BY_ROUTE = (
     "--rtl-by-route: the first RTL is answered with HOLD and a verified way home round the fences in AUTO. RTL again 4 s or more later, or any other mode, "
     "is yours at once: then RTL drives straight, through whatever lies between"
 )
+_PAGES_LOOK_S = 0.05  # so soon what a page asks for is done; chosen: less than a person notices
 _OPENING_LOOK_S = 0.05  # and while a link is being opened
 
 
@@ -81,10 +84,10 @@ def bridge(options: BridgeOptions) -> None:
         recorder, journal = _recorders(stack, options.log, orders, described, notes)
         director = Director(orders, described, notes)
         view = _view(stack, director, is_wanted=not options.is_silent)
-        tell = view.tell if view else _teller(options)
+        tell = view.tell if view else teller(options)
         log_of_run = RunLog(recorder, journal) if recorder is not None and journal is not None else None
         tell = SafeTeller(tell, lambda: director.state not in AT_WORK)
-        shell = _Shell(director, options.connect, tell, view, log_of_run)
+        shell = BridgeShell(director, options.connect, tell, view, log_of_run)
         with terminable():
             shell.run(signing_of(options.signing_key), options.timeout)
     trouble = shell.director.trouble
@@ -95,10 +98,6 @@ def bridge(options: BridgeOptions) -> None:
 
 
 def _orders(options: BridgeOptions) -> Orders:
-    choices = [source for source in TargetSource if source is not TargetSource.HOME]
-    if unknown := set(options.target_from) - set(choices):
-        raise UsageError(f"--target-from {min(unknown)!r}: expected one of {', '.join(choices)}")
-    sources = frozenset(map(TargetSource, options.target_from)) or DEFAULT_SOURCES
     return Orders(
         identity=(options.source_system, options.source_component) if options.source_system else None,
         own_component=options.source_component,
@@ -118,13 +117,27 @@ def _orders(options: BridgeOptions) -> Orders:
         confirm=options.confirm,
         once=options.once,
         announce=True,
-        target_sources=sources,
+        target_sources=target_sources(options.target_from),
         obstacle_sources=_obstacle_sources(options.obstacles_from),
         obstacle_growth_mps=options.obstacle_growth,
         obstacle_keep_s=options.obstacle_keep,
         patience_s=options.timeout,
         homing=_homing(options),
     )
+
+
+def target_sources(given: list[str]) -> frozenset[TargetSource]:
+    """Return where targets may come from.
+
+    Raises
+    ------
+    UsageError
+        One is not known.
+    """
+    choices = [source for source in TargetSource if source is not TargetSource.HOME]
+    if unknown := set(given) - set(choices):
+        raise UsageError(f"--target-from {min(unknown)!r}: expected one of {', '.join(choices)}")
+    return frozenset(map(TargetSource, given)) or DEFAULT_SOURCES
 
 
 def _homing(options: BridgeOptions) -> Homing:
@@ -163,12 +176,62 @@ def _obstacle_sources(texts: list[str]) -> frozenset[ObstacleSource]:
     return frozenset(map(ObstacleSource, names))
 
 
+class Beside(Protocol):
+    """A machine that may run beside the director on its link: it has the names of one, without an end."""
+
+    @property
+    def deadline_s(self) -> float | None:
+        """When it wants its timer."""
+        ...
+
+    def receive(self, frame: Frame, now_s: float) -> None:
+        """Take a frame."""
+        ...
+
+    def handle_timer(self, now_s: float) -> None:
+        """Take notice that time has passed."""
+        ...
+
+    def messages_to_send(self) -> list[Message]:
+        """Return and forget what is to be sent, after what the director sends."""
+        ...
+
+
+class Pages(Protocol):
+    """Pages that show the bridge, and ask things of it."""
+
+    def hear(self, frames: list[Frame], now_s: float) -> None:
+        """Take what was heard."""
+        ...
+
+    def step(self, now_s: float) -> None:
+        """Do what was asked for; before anything is sent."""
+        ...
+
+    def show(self, now_s: float) -> None:
+        """Be brought up to date; after everything is sent."""
+        ...
+
+    def tell(self, event: Event) -> None:
+        """Take an event."""
+        ...
+
+    def link_opened(self) -> None:
+        """Take notice that the link is open."""
+        ...
+
+    def link_closed(self, why: str) -> None:
+        """Take notice that it is closed, and why."""
+        ...
+
+
 @dataclass(eq=False)
 class _Journaled:
     """The director as a machine, with every call that is no frame written down."""
 
     director: Director
     writer: RunLog | None
+    beside: Beside | None = None
     frames: int = 0
 
     def call(self, name: str, now_s: float, target: object = None, text: str = "") -> None:
@@ -182,7 +245,8 @@ class _Journaled:
 
     @property
     def deadline_s(self) -> float | None:
-        return self.director.deadline_s
+        times = [self.director.deadline_s, self.beside.deadline_s if self.beside is not None else None]
+        return min((time_s for time_s in times if time_s is not None), default=None)
 
     @property
     def progress(self) -> tuple[int, int]:
@@ -194,19 +258,40 @@ class _Journaled:
     def receive(self, frame: Frame, now_s: float) -> None:
         self.director.receive(frame, now_s)
         self.frames += 1
+        if self.beside is not None:
+            self.beside.receive(frame, now_s)
 
     def handle_timer(self, now_s: float) -> None:
         deadline_s = self.director.deadline_s
         if deadline_s is not None and deadline_s <= now_s:
             self.call("timer", now_s)
             self.director.handle_timer(now_s)
+        if self.beside is not None:
+            self.beside.handle_timer(now_s)
 
     def messages_to_send(self) -> list[Message]:
-        return self.director.messages_to_send()
+        messages = self.director.messages_to_send()
+        return messages + self.beside.messages_to_send() if self.beside is not None else messages
 
 
-class _Shell:
-    """Sockets, clock, keyboard and files around one director."""
+class BridgeShell:
+    """Sockets, clock, keyboard and files around one director.
+
+    Parameters
+    ----------
+    director : Director
+        The director.
+    connection : str
+        Its link.
+    tell : callable
+        Takes its events.
+    view : LiveView or None
+        Shows it in the terminal.
+    log : RunLog or None
+        Records it.
+    backups : BackupStore, optional
+        Where old missions are kept.
+    """
 
     def __init__(
         self,
@@ -215,6 +300,7 @@ class _Shell:
         tell: Callable[[Event], None],
         view: LiveView | None,
         log: RunLog | None,
+        backups: BackupStore | None = None,
     ) -> None:
         self._connection = connection
         self.director = director
@@ -225,12 +311,27 @@ class _Shell:
         self._backups = BackupKeeper(
             self.director,
             str(parse_connection(connection)),
+            backups,
             journal=lambda name, now, text: self._written.call(name, now, text=text),
         )
         self._plans = PlanMaker(self.director)
         self._ways = WaysMaker(self.director)
-        self._keyboard = Keyboard()
+        self._keyboard = view.keyboard if view is not None else Keyboard()
         self._asked_for: Plan | None = None  # the plan that waits for a yes, as was printed
+        self._pages: Pages | None = None
+
+    @property
+    def call(self) -> Callable[..., None]:
+        """Notes a call of the director in the journal; for who makes one beside the shell."""
+        return self._written.call
+
+    def vehicle(self) -> VehicleMark | None:
+        """Return which vehicle it is; None before it was found."""
+        return self._backups.vehicle()
+
+    def show_on(self, pages: Pages, beside: Beside) -> None:
+        """Show the bridge on pages, too, and let them ask things of it."""
+        self._pages, self._written.beside = pages, beside
 
     def run(self, signing: Signing | None, timeout_s: float) -> None:
         """Run until the single job is done, or for ever; a link that breaks is opened again."""
@@ -279,6 +380,8 @@ class _Shell:
                     failures = 0
                     if self._view is not None:
                         self._view.link_trouble = None
+                    if self._pages is not None:
+                        self._pages.link_opened()
                     self._run_link(link)
             except LinkError as error:
                 if self.director.orders.once:
@@ -301,21 +404,46 @@ class _Shell:
             if not self.director.is_done:
                 self._listen_to_keyboard(now)
                 self._hand_over_plan(now)
+            if self._pages is not None:
+                self._pages.step(now)
             self._keep_backup(now)
             if self.director.identity is not None and link.identity != self.director.identity:
                 link.speak_as(self.director.identity)
 
         def sent() -> None:  # nothing that is printed holds up what is sent
             self._tell_all()
-            if self._view is not None:
-                self._view.show(link.now_s())
+            self._show(link.now_s())
 
-        link.run(self._written, on_step=step, on_sent=sent, longest_wait_s=self._plans.longest_wait_s)
+        def heard(frames: list[Frame]) -> None:
+            if self._view is not None:
+                self._view.hear(frames, link.now_s())
+            if self._pages is not None:
+                self._pages.hear(frames, link.now_s())
+
+        link.run(
+            self._written,
+            on_frames=heard,
+            on_step=step,
+            on_sent=sent,
+            longest_wait_s=self._longest_wait_s,
+        )
+
+    def _longest_wait_s(self) -> float:
+        wait_s = self._plans.longest_wait_s()
+        return wait_s if self._pages is None else min(wait_s, _PAGES_LOOK_S)
+
+    def _show(self, now: float) -> None:
+        if self._view is not None:
+            self._view.show(now)
+        if self._pages is not None:
+            self._pages.show(now)
 
     def _link_closed(self, why: str) -> None:
         self._note(f"link: {why}", is_warning=True)
         if self._view is not None:
             self._view.link_trouble = why
+        if self._pages is not None:
+            self._pages.link_closed(why)
 
     def _idle(self, wait_s: float) -> None:
         """Let time pass without a link, so that the director notices."""
@@ -323,9 +451,10 @@ class _Shell:
         while now_s() < until_s and not self.director.is_done:
             self._listen_to_keyboard(now_s())
             self._written.handle_timer(now_s())
+            if self._pages is not None:
+                self._pages.step(now_s())
             self._tell_all()
-            if self._view is not None:
-                self._view.show(now_s())
+            self._show(now_s())
             time.sleep(min(_LINK_LOOK_S, max(0.0, until_s - now_s())))
 
     def _keep_backup(self, now: float) -> None:
@@ -380,6 +509,8 @@ class _Shell:
         for event in self.director.take_events():
             if self._log is not None:
                 self._log.event(event)
+            if self._pages is not None:
+                self._pages.tell(event)
             self._tell(event)
             if event.name is EventName.PLANNED:
                 with self._view.aside() if self._view is not None else contextlib.nullcontext():
@@ -397,7 +528,7 @@ def _view(stack: contextlib.ExitStack, director: Director, *, is_wanted: bool) -
     return stack.enter_context(LiveView(director))
 
 
-def _teller(options: BridgeOptions) -> Callable[[Event], None]:
+def teller(options: CommonOptions) -> Callable[[Event], None]:
     """Return what prints events, those of the levels that are wanted: JSON lines, or lines for people."""
     put = _tell_scripts if options.json_output else _tell_people
 

@@ -23,7 +23,7 @@ from mavlink_bridge.director import Orders
 from mavlink_bridge.link import Link
 from mavlink_bridge.mavlink.autopilots import autopilot_table
 from mavlink_bridge.mavlink.messages import Autopilot, FenceStatus, GlobalPositionInt, MissionType, Statustext
-from mavlink_bridge.simulator import SimulatorConfig, SteppedRover
+from mavlink_bridge.simulator import Simulator, SimulatorConfig, SteppedRover
 from mavlink_bridge.simulator.any_vehicle import AUTOPILOTS, vehicle_of
 from mavlink_bridge.tlog import TlogWriter
 from missions.fence import fence_to_items
@@ -34,8 +34,10 @@ from missions.request import GoTo
 
 if TYPE_CHECKING:
     from mavlink_bridge.cli.options.demo import DemoOptions
+    from mavlink_bridge.mavlink.incident_rules import IncidentRules
     from mavlink_bridge.mavlink.messages import Frame
     from missions.fence import Fence
+    from missions.firmware import Firmware
     from missions.planned import Plan
 
 # The maze of the recorded logs: its start, a target in it and a clearance that leaves a route.
@@ -47,6 +49,7 @@ _PARAMETERS = {
     Autopilot.PX4: {},  # its airframe's own, 3 m/s: so it was measured
 }
 _AUTOPILOT, _CRITICAL = 1, 2  # MAV_COMP_ID_AUTOPILOT1, MAV_SEVERITY_CRITICAL
+_ANY_PORT = "tcpin:127.0.0.1:0"
 _IDENTITY = (245, 190)  # the one-shot commands' own, `link.ONE_SHOT_IDENTITY`
 
 
@@ -54,7 +57,7 @@ _IDENTITY = (245, 190)  # the one-shot commands' own, `link.ONE_SHOT_IDENTITY`
 class _Heard:
     """What was heard while driving; PX4 tells of breaches by text alone."""
 
-    breach_text: str
+    incidents: IncidentRules
     track: list[LatLon] = field(default_factory=list)
     breaches: int = 0
 
@@ -66,7 +69,7 @@ def demo(options: DemoOptions) -> None:
     make_room(out / "demo.tlog")
     table = autopilot_table(AUTOPILOTS[options.autopilot], options.firmware)
     assert table is not None
-    drive = _Heard(table.incidents.breach_text)
+    drive = _Heard(table.incidents)
     begun_s = time.monotonic()
     with ExitStack() as stack:
         recorder = stack.enter_context(TlogWriter(out / "demo.tlog"))
@@ -110,20 +113,28 @@ def demo(options: DemoOptions) -> None:
         raise typer.Exit(ExitCode.CHECK)
 
 
+def demo_rover(speedup: float) -> Simulator:
+    """Return a rover in the maze on a link of its own, for who wants to see it drive."""
+    return Simulator(_config(Autopilot.ARDUPILOTMEGA, None), _ANY_PORT, speedup=speedup)
+
+
 def _rover(options: DemoOptions) -> SteppedRover:
     """Return a rover in the maze, on a link that no slow computer breaks."""
-    autopilot = AUTOPILOTS[options.autopilot]
-    table = autopilot_table(autopilot, options.firmware)
+    config = _config(AUTOPILOTS[options.autopilot], options.firmware)
+    return SteppedRover(vehicle_of(config), options.speedup)
+
+
+def _config(autopilot: Autopilot, firmware: Firmware | None) -> SimulatorConfig:
+    table = autopilot_table(autopilot, firmware)
     assert table is not None
-    config = SimulatorConfig(
+    return SimulatorConfig(
         home=LatLon(*_HOME),
         fence=table.lists.form.prepared(fence_to_items(_maze()), MissionType.FENCE),
         parameters=_PARAMETERS[autopilot],
         autopilot=autopilot,
-        firmware=options.firmware,
+        firmware=firmware,
         uid=secrets.token_bytes(12),  # each demo is a new rover: an interrupted one does not bear on the next
     )
-    return SteppedRover(vehicle_of(config), options.speedup)
 
 
 def _maze() -> Fence:
@@ -139,8 +150,9 @@ def _observe(drive: _Heard, frames: list[Frame]) -> None:
         elif isinstance(frame.message, FenceStatus):
             drive.breaches = max(drive.breaches, frame.message.breach_count)
         elif isinstance(frame.message, Statustext) and frame.component == _AUTOPILOT:
-            is_breach = re.match(drive.breach_text, frame.message.text, re.IGNORECASE) is not None
-            drive.breaches += is_breach and frame.message.severity <= _CRITICAL
+            rules = drive.incidents
+            is_breach = re.match(rules.breach_text, frame.message.text, re.IGNORECASE) is not None
+            drive.breaches += is_breach and not rules.counts_breaches and frame.message.severity <= _CRITICAL
 
 
 def _driven(plan: Plan, track: list[LatLon]) -> tuple[float, float]:

@@ -30,6 +30,7 @@ from missions.formats import read_situation
 from missions.geo import LatLon
 from missions.request import GoTo
 from missions.vehicle import vehicle_from_parameters
+from missions.vehicle.calibration import calibrated, calibration_info
 from missions.vehicle.parameter_remarks import assumed_remarks, range_remarks
 
 if TYPE_CHECKING:
@@ -254,12 +255,15 @@ def _vehicle(file: Path | None, firmware: Firmware | None) -> Iterator[_Finding]
         vehicle = vehicle_from_parameters(
             described.parameters, firmware=firmware, ardupilot=described.ardupilot
         )
+        vehicle = calibrated(vehicle, described.calibration, described.parameters)
     except MissionError as error:
         yield _Finding(_Verdict.ERROR, "vehicle", str(error))
         return
     version = firmware or "of an unknown version (--firmware)"
     verdict = _Verdict.WARNING if vehicle.has_measured_corners is None else _Verdict.OK
     yield _Finding(verdict, "vehicle", f"{vehicle.autopilot} {version}, {vehicle.steering} steering")
+    for told in calibration_info(vehicle):
+        yield _Finding(_Verdict.OK, "vehicle", told)
     for remark in (
         *range_remarks(described.parameters, ardupilot=described.ardupilot),
         *assumed_remarks(vehicle),

@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 from rich.text import Text
 
 from mavlink_bridge.cli.failing import telling
 from mavlink_bridge.cli.terminal import say
 from missions.words import harmless
+
+if TYPE_CHECKING:
+    from mavlink_bridge.dataset.build import Progress as BuildProgress
 
 
 def console(*, err: bool = False) -> Console:
@@ -77,3 +88,32 @@ def progress_bar(*, quiet: bool) -> Iterator[Shown]:
     columns = (told, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console(err=True), transient=True) as progress:
         yield _Bar(progress)
+
+
+@contextmanager
+def build_bar(*, quiet: bool) -> Iterator[Callable[[BuildProgress], None]]:
+    """Show on stderr, where that is a terminal, how many logs were read, how many a second, and how long it will take; yields what moves it."""
+    if quiet or not sys.stderr.isatty():
+        yield lambda _: None
+        return
+    columns = (
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[rate]}", markup=False),
+        TimeElapsedColumn(),
+        TextColumn("left", markup=False),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=console(err=True), transient=True) as progress:
+        task = progress.add_task("", total=None, rate="")
+
+        def show(now: BuildProgress) -> None:
+            elapsed_s = progress.tasks[0].elapsed or 0.0
+            rate = (
+                f"{now.read / elapsed_s:.1f} logs/s, {now.size_bytes / elapsed_s / 1e6:.1f} MB/s"
+                if elapsed_s > 0
+                else ""
+            )
+            progress.update(task, completed=now.done, total=now.files, rate=rate)
+
+        yield show

@@ -57,7 +57,10 @@ _EXIT_CODES: tuple[tuple[type[Exception], ExitCode], ...] = (
     (mission_errors.MissionError, ExitCode.INPUT),
     (bridge_errors.UsageError, ExitCode.USAGE),
     (bridge_errors.LogError, ExitCode.INPUT),
+    (bridge_errors.DatasetError, ExitCode.INPUT),
+    (bridge_errors.LostWorkerError, ExitCode.INPUT),
     (bridge_errors.LinkError, ExitCode.LINK),
+    (bridge_errors.ClusterError, ExitCode.LINK),
     (bridge_errors.RefusedError, ExitCode.REFUSED),
     (bridge_errors.OutcomeError, ExitCode.OUTCOME),
     (bridge_errors.BridgeError, ExitCode.INTERNAL),
@@ -102,11 +105,14 @@ _ADVICE: Mapping[type[Exception], tuple[str, ...]] = {
     ),
     mission_errors.MissionError: (),
     bridge_errors.LogError: (),
+    bridge_errors.DatasetError: (),
     bridge_errors.IdentityTakenError: ("use another component id: --source-component",),
     bridge_errors.VehicleNotFoundError: ("choose another vehicle with --system N",),
     bridge_errors.LinkError: (
         "is the vehicle on, and is another program using the port? `pbpp doctor` lists the serial ports",
     ),
+    bridge_errors.ClusterError: (),
+    bridge_errors.LostWorkerError: ("give the machine more memory, or leave out what the worker died at",),
     bridge_errors.RefusedError: ("see the vehicle's own messages in the ground station",),
     bridge_errors.VehicleInUseError: ("wait for the other pbpp to finish, or stop it",),
     bridge_errors.OutcomeError: ("check what the vehicle holds (`pbpp download`) before it drives",),
@@ -172,7 +178,28 @@ def begin_telling(command: str, *, verbose: bool = False, quiet: int = 0, option
 
 def exit_code_of(error: Exception) -> ExitCode:
     """Return the exit code of an error."""
-    return next(code for kind, code in _EXIT_CODES if isinstance(error, kind))
+    return next((code for kind, code in _EXIT_CODES if isinstance(error, kind)), ExitCode.INTERNAL)
+
+
+def is_ours(error: Exception) -> bool:
+    """Return whether an error was expected to happen; another one is a bug."""
+    return isinstance(error, (mission_errors.MissionError, bridge_errors.BridgeError))
+
+
+def error_name(error: Exception) -> str:
+    """Return the name by which documents call an error."""
+    return type(error).__name__ if is_ours(error) else "InternalError"
+
+
+def error_line(error: Exception) -> str:
+    """Return what an error says, in one line; of a bug, of one of many tasks as well, what broke and where."""
+    if is_ours(error):
+        return str(error)
+    return (
+        _defect_line(error)
+        if error.__traceback__ is not None
+        else f"internal error, a bug in pbpp: {error!r}"
+    )
 
 
 def is_reader_gone(error: Exception) -> bool:

@@ -11,6 +11,7 @@ from mavlink_bridge.errors import UsageError
 from missions.errors import FenceError
 from missions.fence import ZoneKind
 from missions.formats import Choices, fence_of, mission_of, read_situation
+from missions.formats.calibration import SUFFIX, read_calibration
 from missions.formats.features import Role
 from missions.formats.parameters import read_path
 from missions.situation import Known
@@ -105,13 +106,15 @@ def read_mission_file(path: Path, options: MapOptions) -> Mission:
 
 
 def read_vehicle_file(path: Path) -> Situation:
-    """Read a file of parameters, whatever its suffix, with the firmware's version where it names it, and tell what was passed over.
+    """Read a file of parameters, whatever its suffix, with the firmware's version where it names it, and tell what was passed over; or a calibration (.toml).
 
     Raises
     ------
     MissionFormatError
         It cannot be read.
     """
+    if path.suffix.lower() == SUFFIX:
+        return read_calibration(path)
     situation = read_path(path)
     warn(situation.remarks)
     return situation

@@ -5,12 +5,22 @@ from __future__ import annotations
 import contextlib
 import os
 import queue
+import re
 import select
 import sys
 import threading
 from collections.abc import Callable
+from typing import Any
+
+try:
+    import termios
+except ImportError:  # Windows
+    termios = None  # type: ignore[assignment]
 
 STDIN = 0  # the file descriptor
+
+_ESCAPES = re.compile(rb"\x1b(\[[0-9;]*[ -/]*[@-~]|O.|.)?")  # arrows and the like
+_BACKSPACES, _KILL, _KILL_WORD = b"\x7f\x08", b"\x15", b"\x17"
 
 
 class Keyboard:
@@ -20,10 +30,14 @@ class Keyboard:
     ----------
     is_closed : bool
         Whether nothing more can come.
+    is_shown_by_us : bool
+        Whether the terminal shows nothing of what is typed: who has taken it does.
     """
 
     def __init__(self) -> None:
         self.is_closed = False
+        self.is_shown_by_us = False
+        self._before: Any = None  # what termios holds
         self._waiting = b""
         self._read = keyboard_thread(STDIN) if os.name == "nt" else _typed_now
 
@@ -32,12 +46,56 @@ class Keyboard:
         if b"\n" not in self._waiting and not self.is_closed:
             typed = self._read()
             self.is_closed = typed == b""
-            self._waiting += typed or b""
+            self._waiting = self._with(typed or b"")
         line, found, rest = self._waiting.partition(b"\n")
         if not found:
             return None
         self._waiting = rest
         return line.decode(errors="replace").strip()
+
+    @property
+    def typing(self) -> str:
+        """What was typed of a line that has not ended yet."""
+        return self._waiting.rpartition(b"\n")[2].decode(errors="replace")
+
+    def take(self) -> None:
+        """Have the terminal show nothing of what is typed, from now on, where it can: a view that moves would write over it."""
+        if termios is None or self.is_shown_by_us or not sys.stdin.isatty():
+            return
+        with contextlib.suppress(termios.error):
+            self._before = termios.tcgetattr(STDIN)
+            silent = termios.tcgetattr(STDIN)
+            silent[3] &= ~(termios.ECHO | termios.ICANON)  # Ctrl-C stays an interrupt
+            termios.tcsetattr(STDIN, termios.TCSADRAIN, silent)
+            self.is_shown_by_us = True
+
+    def give_back(self) -> None:
+        """Have the terminal as it was."""
+        if termios is None or self._before is None or not self.is_shown_by_us:
+            return
+        self.is_shown_by_us = False
+        with contextlib.suppress(termios.error):
+            termios.tcsetattr(STDIN, termios.TCSADRAIN, self._before)
+
+    def _with(self, typed: bytes) -> bytes:
+        """Return what waits with what was typed; the terminal edits lines itself, unless it was taken."""
+        if not self.is_shown_by_us:
+            return self._waiting + typed
+        waiting = self._waiting
+        for key in _ESCAPES.sub(b"", typed):
+            done, end, line = waiting.rpartition(b"\n")
+            if key in _BACKSPACES:
+                line = line.decode(errors="replace")[:-1].encode()
+            elif bytes((key,)) == _KILL:
+                line = b""
+            elif bytes((key,)) == _KILL_WORD:
+                line = line.rstrip().rpartition(b" ")[0]
+            elif key in b"\n\r":
+                line += b"\n"
+            elif key >= ord(" "):
+                line += bytes((key,))
+            waiting = done + end + line
+        return waiting
 
     def forget(self) -> None:
         """Forget what was typed so far: it was typed for something else."""

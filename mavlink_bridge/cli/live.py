@@ -22,6 +22,7 @@ from mavlink_bridge.cli.link_notes import tell_echoes
 from mavlink_bridge.cli.restoring import interrupted_warnings
 from mavlink_bridge.cli.session import signing_of
 from mavlink_bridge.cli.timed_plan import timed_plan
+from mavlink_bridge.console.view.drives import STATE_TEXTS
 from mavlink_bridge.director import Director, EventName, Orders, State
 from mavlink_bridge.director.plan_task import HomeWays, PlanTask, WaysTask
 from mavlink_bridge.errors import BackupError, BridgeError, LinkError, VehicleInUseError
@@ -45,7 +46,6 @@ if TYPE_CHECKING:
     from mavlink_bridge.cli.drawing import Shown
     from mavlink_bridge.link import Link
     from mavlink_bridge.mavlink.messages import Frame
-    from mavlink_bridge.protocol.peer import Peer
     from mavlink_bridge.protocol.verified_upload import VerifiedUpload
     from missions.items import MissionItem
     from missions.request import Request
@@ -57,28 +57,6 @@ MadeT = TypeVar("MadeT")
 _IDLE_S, _BUSY_S = 0.25, 0.02
 _NOT_KNOWN_YET = frozenset({State.LISTENING, State.LEARNING, State.LOST})
 """States in which it is not yet known which vehicle it is."""
-
-_STATE_TEXTS = {
-    State.LISTENING: "listening for the vehicle",
-    State.LEARNING: "reading parameters, fence and mission",
-    State.READY: "ready",
-    State.HOLDING: "stopping",
-    State.PLANNING: "planning",
-    State.PROPOSED: "planned",
-    State.UPLOADING: "uploading and reading back",
-    State.WITHDRAWING: "taken over; ending the upload",
-    State.VERIFIED: "verified",
-    State.ENFORCED: "fence enforced",
-    State.STARTING: "switching to AUTO",
-    State.DRIVING: "driving",
-    State.ARRIVED: "arrived",
-    State.LET_GO: "let go",
-    State.CLASHING: "another program uses our ids; finishing the upload",
-    State.CLASHED: "another program uses our ids",
-    State.LOST: "no heartbeat",
-    State.DONE: "done",
-    State.FAILED: "failed",
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,7 +177,7 @@ class _Run:
         """Do what the director waits for, and report what it did."""
         director, link = self.director, self._link
         self._has_driven = self._has_driven or director.state is State.DRIVING
-        show(_STATE_TEXTS[director.state], *director.progress)
+        show(STATE_TEXTS[director.state], *director.progress)
         warn(self.backups.step(link.now_s()))
         if (made := self.plans.take()) is not None:
             director.plan_made(*made, link.now_s())
@@ -223,8 +201,6 @@ class _Run:
         planned, self.planning_s = timed_plan(situation, request, should_stop=should_stop)
         if request.repairs and self.director.orders.drive:
             _check_drivable(planned)
-        if self.director.orders.drive and self.director.peer is not None:
-            _check_end(planned, self.director.peer)
         return planned
 
 
@@ -277,22 +253,6 @@ def _check_drivable(planned: Plan) -> None:
                 "upload it without --drive, and start it yourself",
                 item=seq,
             )
-
-
-def _check_end(planned: Plan, peer: Peer) -> None:
-    """Refuse to drive a mission whose end looks like somebody's taking over.
-
-    Raises
-    ------
-    SituationError
-        It ends with RTL, and the vehicle's autopilot changes its mode for that.
-    """
-    ends_so = any(item.command == Command.NAV_RETURN_TO_LAUNCH for item in planned.items)
-    if ends_so and peer.autopilot.driving.ends_in_hold:
-        raise SituationError(
-            f"{peer.autopilot.kind} leaves its mission mode for an RTL item, which cannot be told from an operator who takes over; nothing was written: "
-            "plan the way home with --return, or upload it without --drive and start it yourself"
-        )
 
 
 class _Beside(Generic[TaskT, MadeT]):
@@ -415,7 +375,7 @@ class BackupKeeper:
 
     def step(self, now_s: float) -> list[str]:
         """Do what the director waits for; return warnings of earlier uploads that were interrupted, once."""
-        director, vehicle = self._director, self._vehicle()
+        director, vehicle = self._director, self.vehicle()
         if vehicle is None:
             return []
         if director.is_uploading and director.upload is not self._guarded:
@@ -465,7 +425,8 @@ class BackupKeeper:
             self._journal("note_stored", now_s, "")
             director.note_stored()
 
-    def _vehicle(self) -> VehicleMark | None:
+    def vehicle(self) -> VehicleMark | None:
+        """Return which vehicle it is; None before it was found."""
         peer = self._director.peer
         if peer is None:
             return None

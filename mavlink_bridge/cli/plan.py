@@ -2,46 +2,39 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.cli.common import is_same_file
-from mavlink_bridge.cli.field_files import read_fence_file, with_mission_home
 from mavlink_bridge.cli.permissions import check_permissions
 from mavlink_bridge.cli.pictures import check_plots
-from mavlink_bridge.cli.plan_request import request_from_options, with_tour
+from mavlink_bridge.cli.plan_request import plan_request
 from mavlink_bridge.cli.plan_results import Told, arrival_document, report_end
+from mavlink_bridge.cli.plan_source import offline_situation
 from mavlink_bridge.cli.planning_progress import planning_shown
 from mavlink_bridge.cli.terminal import print_json
 from mavlink_bridge.cli.timed_plan import timed_plan
-from mavlink_bridge.cli.values import MOST_VEHICLE_M, checked_number, given_places
-from mavlink_bridge.cli.vehicle_options import (
-    described_vehicle,
-    with_description,
-    with_home_option,
-    with_vehicle,
-)
+from mavlink_bridge.cli.values import given_places
 from mavlink_bridge.errors import UsageError
-from missions.errors import InvalidPositionError, MissionFormatError
-from missions.fence import Obstacle, Obstacles
+from missions.errors import MissionFormatError
 from missions.formats import check_writable_format
-from missions.geo import parse_lat_lon
-from missions.request import RepairMission
 
 if TYPE_CHECKING:
     from mavlink_bridge.cli.options.plan import PlanOptions
-    from missions.request import Request
-    from missions.situation import Situation
-
-_OBSTACLE_ADVICE = "write latitude, longitude and a radius in metres, such as 40.0718,-105.2295,2.5"
 
 
 def plan(options: PlanOptions) -> None:
     """Plan, and do with the plan what the options ask for."""
+    if options.batch is not None:
+        import_module("mavlink_bridge.cli.plan_batch").plan_batch(
+            options, options.batch
+        )  # one plan needs it not
+        return
+    if options.jobs is not None or options.cluster is not None:
+        raise UsageError("--jobs and --cluster go with --batch: one plan is made here")
     check_permissions(upload=options.upload, drive=options.drive, hold=options.hold)
-    request = _request(options)
+    request = plan_request(options)
     _check_options(options)
     told = Told(
         options.output,
@@ -59,7 +52,7 @@ def plan(options: PlanOptions) -> None:
         situation, verified, arrival = result.situation, result.verified, result.arrival
         backup = result.backup
     else:
-        situation, taken = _offline_situation(options, request)
+        situation, taken = offline_situation(options, request)
         with planning_shown(request, quiet=options.is_silent) as should_stop:
             made = timed_plan(situation, request, should_stop=should_stop)
         told.tell(*made, situation, taken)
@@ -76,25 +69,6 @@ def plan(options: PlanOptions) -> None:
         print_json(document)
     elif not options.quiet:
         report_end(arrival, backup, verified=verified)
-
-
-def _request(options: PlanOptions) -> Request:
-    request = request_from_options(
-        options.start,
-        options.target,
-        options.clearance,
-        options.corner_allowance,
-        options.snap,
-        options.method,
-    )
-    request = replace(
-        with_vehicle(request, options),
-        speed_mps=options.speed,
-        escape=options.escape,
-        trusts_model=options.trust_model,
-        accepts_less=options.accept_less,
-    )
-    return with_tour(request, options)
 
 
 def _check_options(options: PlanOptions) -> None:
@@ -121,43 +95,3 @@ def _check_options(options: PlanOptions) -> None:
     if options.home is not None and options.connect is not None:
         raise UsageError("--home goes with --fence and --log: a live vehicle reports its own home")
     check_plots(plots, json_output=options.json_output)
-
-
-def _offline_situation(options: PlanOptions, request: Request) -> tuple[Situation, list[str]]:
-    """Return what the file or the log holds, with what other options add; and what a log gave to the plan."""
-    taken = []
-    if options.log is not None:
-        from mavlink_bridge.cli import log_source  # noqa: PLC0415 - pymavlink only for logs
-
-        situation = log_source.situation_of(options.log, options, drives_its_items=request.repairs)
-        taken = log_source.taken_info(options.log, situation, request)
-    else:
-        assert options.fence is not None
-        situation = read_fence_file(options.fence, options)
-        if isinstance(request, RepairMission) and request.mission is not None:
-            situation = with_mission_home(situation, request.mission, str(options.via_mission))
-    situation = replace(situation, obstacles=Obstacles(tuple(map(_obstacle, options.obstacle))))
-    described = with_home_option(
-        with_description(situation, described_vehicle(options)),
-        options.home,
-    )
-    return described, taken
-
-
-def _obstacle(text: str) -> Obstacle:
-    """Return the obstacle that ``--obstacle`` is.
-
-    Raises
-    ------
-    UsageError
-        It is not LAT,LON,RADIUS.
-    """
-    place, comma, radius = text.rpartition(",")
-    if not comma:
-        raise UsageError(f"--obstacle {text!r}: expected LAT,LON,RADIUS", advice=_OBSTACLE_ADVICE)
-    try:
-        position = parse_lat_lon(place)
-        radius_m = checked_number(radius, 0.0, MOST_VEHICLE_M, "metres", above=True)
-    except (UsageError, InvalidPositionError) as error:
-        raise UsageError(f"--obstacle {text!r}: {error}", advice=_OBSTACLE_ADVICE) from None
-    return Obstacle(position, radius_m, 0.0, 0.0, math.inf, "--obstacle", None)

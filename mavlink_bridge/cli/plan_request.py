@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.cli.field_files import read_mission_file
 from mavlink_bridge.cli.options.plan import ENDS, METHODS, ORDERS
 from mavlink_bridge.cli.values import given_places, metres_or, position_from
+from mavlink_bridge.cli.vehicle_options import with_vehicle
 from mavlink_bridge.errors import UsageError
 from missions.request import RepairMission, Request, conditions, request_of
 
@@ -38,6 +40,32 @@ def request_from_options(
         snap_m=snap,
         method=method,
     )
+
+
+def plan_request(options: PlanOptions) -> Request:
+    """Read from the options of ``pbpp plan`` what is asked.
+
+    Raises
+    ------
+    UsageError
+        An option is not what it has to be, or does not go with another.
+    """
+    request = request_from_options(
+        options.start,
+        options.target,
+        options.clearance,
+        options.corner_allowance,
+        options.snap,
+        options.method,
+    )
+    request = replace(
+        with_vehicle(request, options),
+        speed_mps=options.speed,
+        escape=options.escape,
+        trusts_model=options.trust_model,
+        accepts_less=options.accept_less,
+    )
+    return with_tour(request, options)
 
 
 def with_tour(request: Request, options: PlanOptions) -> Request:

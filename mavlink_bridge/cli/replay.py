@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
 import time
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from mavlink_bridge.cli.drawing import progress_bar
-from mavlink_bridge.cli.failing import ExitCode, Level, telling
+from mavlink_bridge.cli.failing import ExitCode, Level, error_line, error_name, exit_code_of, telling
 from mavlink_bridge.cli.kept_files import write_kept
 from mavlink_bridge.cli.log_times import log_begin
 from mavlink_bridge.cli.plan_request import request_from_options
@@ -23,9 +20,10 @@ from mavlink_bridge.errors import LogError, UsageError
 from mavlink_bridge.link import open_transport, parse_connection
 from mavlink_bridge.logbook import SteadyClock
 from mavlink_bridge.logbook.playback import vehicle_frames
+from mavlink_bridge.many import open_workers
 from mavlink_bridge.mavlink.codec import Codec
 from mavlink_bridge.replay.expectations import differences, expectation_path, read_expectation, to_expect
-from mavlink_bridge.replay.replay import replay_log, replay_to_json
+from mavlink_bridge.replay.replay import replay_done, replay_log, replay_task
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -48,15 +46,14 @@ def replay(options: ReplayOptions) -> None:
         request=request_from_options(None, [], options.clearance, options.corner_allowance, 0.0, "optimal"),
         target_sources=frozenset(TargetSource) - {TargetSource.ECHO, TargetSource.RALLY},
     )
-    expected = _expected(options.logs, options.expect)
+    judge = _Judge(options)
     teller = _Teller(options)
-    results = _replayed(options.logs, orders, options.speed, options.jobs, teller)
-    if options.record:
-        _record(results, quiet=options.is_silent)
-    if not _is_as_expected(expected, results, quiet=options.is_silent):
-        raise typer.Exit(ExitCode.CHECK)
-    if any(isinstance(result, LogError) for result in results.values()):
-        raise typer.Exit(ExitCode.INPUT)
+    single = len(options.logs) == 1 and options.cluster is None
+    if single or options.speed is not None:
+        _one_after_the_other(options, orders, teller, judge)
+    else:
+        _many(options, orders, teller, judge)
+    raise typer.Exit(judge.exit_code())
 
 
 class _Teller:
@@ -86,40 +83,80 @@ class _Teller:
             prefix = f"{event['log']}: " if self._names_logs else ""
             echo(f"{prefix}{event['time_s'] - self._begin_s:8.2f} s  {event['event']}: {event['text']}")
 
-    def fail(self, log: Path, error: LogError) -> None:
+    def fail(self, log: Path, error: Exception) -> None:
         """Report that one log of several cannot be used; the others are replayed all the same."""
         if self._wants_json:
-            print_json({"log": log.name, "status": "error", "error": "LogError", "message": str(error)})
-        say(f"error: {error}", typer.colors.RED)
+            print_json(
+                {"log": log.name, "status": "error", "error": error_name(error), "message": error_line(error)}
+            )
+        say(f"error: {error_line(error)}", typer.colors.RED)
 
 
-_Results = dict[Path, list[_Told] | LogError]
+class _Judge:
+    """Compares what each log told with what was expected of it, or records it; keeps of it only what is still needed.
+
+    Raises
+    ------
+    LogError
+        An expectation cannot be read: before any log is.
+    """
+
+    def __init__(self, options: ReplayOptions) -> None:
+        self._expect = options.expect
+        self._records = options.record
+        self._is_quiet = options.is_silent
+        self._codes: list[ExitCode] = []
+        self._found: list[str] = []
+        self._count = 0
+        self._together: list[_Told] | None = None
+        if self._expect is not None and self._expect.is_dir():
+            self._count = sum(len(read_expectation(self._path(log))) for log in options.logs)
+        elif self._expect is not None:
+            self._together = []
+            self._count = len(read_expectation(self._expect))
+
+    def _path(self, log: Path) -> Path:
+        assert self._expect is not None
+        return self._expect / expectation_path(log).name
+
+    def take(self, log: Path, told: list[_Told]) -> None:
+        """Take a log's events."""
+        if self._together is not None:
+            self._together += told
+        elif self._expect is not None:
+            self._found += differences(read_expectation(self._path(log)), told)
+        if self._records:
+            path = expectation_path(log)
+            write_kept(path, to_expect(told).encode())
+            if not self._is_quiet:
+                echo(f"Wrote {path}")
+
+    def fail(self, log: Path, error: Exception) -> None:
+        """Note that a log could not be replayed: nothing of what was expected came."""
+        self._codes.append(exit_code_of(error))
+        if self._expect is not None and self._together is None:
+            self._found += differences(read_expectation(self._path(log)), [])
+
+    def exit_code(self) -> ExitCode:
+        """Report what was not as expected; return the exit code."""
+        if self._together is not None:
+            assert self._expect is not None
+            self._found += differences(read_expectation(self._expect), self._together)
+        for line in self._found:
+            say(line)
+        if self._found:
+            say("- expected but missing; + not expected; ~ different")
+            return ExitCode.CHECK
+        if self._expect is not None and not self._is_quiet:
+            many = self._count != 1
+            echo(f"As expected: all {self._count} events came" if many else "As expected: the one event came")
+        return min(self._codes, default=ExitCode.DONE)
 
 
-def _replayed(
-    logs: list[Path], orders: Orders, speed: float | None, jobs: int | None, teller: _Teller
-) -> _Results:
-    """Replay the logs; print each one's events in the order in which the logs were given."""
-    workers = min(jobs or os.cpu_count() or 1, len(logs))
-    pool = None if len(logs) == 1 or speed is not None or workers == 1 else _pool(workers)
-    if pool is None:
-        return _one_after_the_other(logs, orders, speed, teller)
-    return _side_by_side(logs, orders, pool, teller)
-
-
-def _pool(workers: int) -> ProcessPoolExecutor | None:
-    """Return worker processes; None where there can be none, as in a sandbox without shared memory."""
-    context = multiprocessing.get_context("spawn")  # a fork would copy the progress bar's thread half alive
-    try:
-        return ProcessPoolExecutor(workers, mp_context=context)
-    except (ImportError, NotImplementedError, OSError):
-        return None
-
-
-def _one_after_the_other(logs: list[Path], orders: Orders, speed: float | None, teller: _Teller) -> _Results:
-    results: _Results = {}
-    for log in logs:
-        wait = None if speed is None else _PlaySpeed(speed).wait
+def _one_after_the_other(options: ReplayOptions, orders: Orders, teller: _Teller, judge: _Judge) -> None:
+    """Replay logs here; print each event when it comes."""
+    for log in options.logs:
+        wait = None if options.speed is None else _PlaySpeed(options.speed).wait
         told: list[_Told] = []
         try:
             teller.begin(log)
@@ -127,69 +164,34 @@ def _one_after_the_other(logs: list[Path], orders: Orders, speed: float | None, 
                 told.append({"log": log.name, **event.as_json()})
                 teller.tell(told[-1])
         except LogError as error:
-            if len(logs) == 1:
+            if len(options.logs) == 1:
                 raise
             teller.fail(log, error)
-            results[log] = error
+            judge.fail(log, error)
         else:
-            results[log] = told
-    return results
+            judge.take(log, told)
 
 
-def _side_by_side(logs: list[Path], orders: Orders, pool: ProcessPoolExecutor, teller: _Teller) -> _Results:
-    results: _Results = {}
-    try:
-        futures = {log: pool.submit(replay_to_json, log, orders) for log in logs}
-        with progress_bar(quiet=teller.is_quiet) as show:
-            for number, (log, future) in enumerate(futures.items()):
-                show(log.name, number, len(logs))
-                try:
-                    results[log] = future.result()
-                except LogError as error:
-                    teller.fail(log, error)
-                    results[log] = error
-                    continue
-                teller.begin(log)
-                for event in results[log]:  # type: ignore[union-attr]
-                    teller.tell(event)
-    finally:
-        pool.shutdown(cancel_futures=True)
-    return results
-
-
-def _expected(logs: list[Path], expect: Path | None) -> dict[Path | None, list[_Told]]:
-    """Read what is expected: of each log by itself, or (under None) of all together."""
-    if expect is None:
-        return {}
-    if expect.is_dir():
-        return {log: read_expectation(expect / expectation_path(log).name) for log in logs}
-    return {None: read_expectation(expect)}
-
-
-def _is_as_expected(expected: dict[Path | None, list[_Told]], results: _Results, *, quiet: bool) -> bool:
-    found = []
-    for log, events in expected.items():
-        chosen = results.values() if log is None else [results[log]]
-        told = [event for result in chosen if not isinstance(result, LogError) for event in result]
-        found += differences(events, told)
-    for line in found:
-        say(line)
-    if found:
-        say("- expected but missing; + not expected; ~ different")
-    elif expected and not quiet:
-        count = sum(map(len, expected.values()))
-        echo(f"As expected: all {count} events came" if count != 1 else "As expected: the one event came")
-    return not found
-
-
-def _record(results: _Results, *, quiet: bool) -> None:
-    for log, told in results.items():
-        if isinstance(told, LogError):
-            continue
-        path = expectation_path(log)
-        write_kept(path, to_expect(told).encode())
-        if not quiet:
-            echo(f"Wrote {path}")
+def _many(options: ReplayOptions, orders: Orders, teller: _Teller, judge: _Judge) -> None:
+    """Replay many logs with workers; print each one's events in the order in which the logs were given."""
+    logs = options.logs
+    tasks = (replay_task(log, orders) for log in logs)
+    with (
+        open_workers(options.jobs, options.cluster, most=len(logs)) as workers,
+        progress_bar(quiet=teller.is_quiet) as show,
+    ):
+        for done in workers.results(replay_done, tasks):
+            log = logs[done.number]
+            show(log.name, done.number + 1, len(logs))
+            if done.error is not None:
+                teller.fail(log, done.error)
+                judge.fail(log, done.error)
+                continue
+            told = done.result()
+            teller.begin(log)
+            for event in told:
+                teller.tell(event)
+            judge.take(log, told)
 
 
 class _PlaySpeed:

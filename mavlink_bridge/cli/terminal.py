@@ -13,7 +13,7 @@ import os
 import shutil
 import sys
 import textwrap
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import TextIO
 
 import typer
@@ -54,9 +54,33 @@ def echo_help(text: str) -> None:
 
 
 def print_json(document: Mapping[str, object]) -> None:
-    """Put a JSON document on stdout, in ASCII; numbers that JSON has not become null."""
+    """Put a JSON document on stdout, as `json_line` makes it."""
+    sys.stdout.write(json_line(document) + "\n")
+
+
+def json_line(document: Mapping[str, object]) -> str:
+    """Return a JSON document in one line, in ASCII; numbers that JSON has not become null."""
     text = json.dumps(_plain(document), allow_nan=False)  # which lets one control character through: DEL
-    sys.stdout.write(text.replace("\x7f", "\\u007f") + "\n")
+    return text.replace("\x7f", "\\u007f")
+
+
+def print_json_list(
+    head: Mapping[str, object],
+    name: str,
+    members: Iterable[Mapping[str, object]],
+    tail: Callable[[], Mapping[str, object]],
+) -> None:
+    """Put one JSON document on stdout that has a list of any length: each member is written as it comes, the tail once all have come."""
+    sys.stdout.write(f"{json_line(head)[:-1]}, {json.dumps(name)}: [")
+    for number, member in enumerate(members):
+        sys.stdout.write(f"{', ' if number else ''}{json_line(member)}")
+    sys.stdout.write(f"], {json_line(tail())[1:]}\n")
+
+
+def print_text(pieces: Iterable[str]) -> None:
+    """Put a document of another format on stdout, piece by piece, a line each; whoever makes it has made it harmless."""
+    for piece in pieces:
+        sys.stdout.write(f"{piece}\n")
 
 
 def _put(line: str, colour: str | None, *, is_error: bool, nl: bool = True) -> None:

@@ -74,4 +74,5 @@ def with_description(situation: Situation, described: Situation) -> Situation:
         parameters={**described.parameters, **situation.parameters},
         firmware=situation.firmware or described.firmware,
         stops=replace(situation.stops, given=described.stops.given),
+        calibration=described.calibration,
     )

@@ -66,8 +66,8 @@ class BatteryWatch:
         if isinstance(message, m.BatteryStatus):
             self._status_s = now_s
             self._lows.pop(None, None)  # what SYS_STATUS has told before
-            cells_mv = [one for one in message.voltages if one != _UNKNOWN_MV]
-            volts = sum(cells_mv) / 1000 if cells_mv else math.nan
+            whole_mv = message.whole_mv
+            volts = math.nan if whole_mv is None else whole_mv / 1000
             return self._look(message.id, message.battery_remaining, volts, now_s)
         if isinstance(message, m.SysStatus) and now_s > self._status_s + _FALLBACK_S:
             millivolts = message.voltage_battery

@@ -17,7 +17,7 @@ in `handlers`.
 `Learner`           finds the vehicle, learns it, notices silence and reboots
 `ObstacleWatch`     knows which obstacles were reported, and forgets them
 `ListWatch`         knows which of the vehicle's lists are as they were read, and reads the others again
-`Halter`            HOLD, and whether the vehicle stands
+`Halter`            HOLD, whether the vehicle stands, and where it will
 `DriveSupervisor`   watches a drive until it has arrived
 `HoldWatch`         where a HOLD ends: announces breaches to come, lets the vehicle go on first where that is better
 `TargetInbox`       targets of all sources, answers to who asked, and a target that waits
@@ -25,7 +25,7 @@ in `handlers`.
 `MissionWriter`     a plan that stands → a verified mission on the vehicle
 `Adopter`           has drives noted before they begin, and goes on with one that an earlier run has begun
 `FenceGuard`        when the vehicle's fence counts, which zones do not, and whether it takes the mission
-`Starter`           the last look, arming, AUTO, the first item
+`Starter`           standing still where the mission holds, the last look, arming, AUTO, the first item
 `HomeKeeper`        the way to the nearest place to go home to, from where the vehicle is
 `HomeCaller`        what calls the vehicle home by a route: RTL, a low battery, no ground station, a breach
 `HandOver`          who else has the vehicle: the operator, or the autopilot by a failsafe
@@ -35,7 +35,7 @@ in `handlers`.
 Who may act when
 ----------------
 Three parts make the vehicle do something. `Halter` sends HOLD, in any state in which the orders let it, and its messages go out before all others.
-`Starter` arms and switches to AUTO, in STARTING alone: after a verified upload, a last reading of what somebody may have changed, and a heartbeat
+`Starter` arms and switches to AUTO, in STARTING alone: after a verified upload, once the vehicle stands where the mission holds, a last reading of what somebody may have changed, and a heartbeat
 that shows HOLD by our doing. `MissionWriter` begins to write in UPLOADING alone, which ends only with the mission verified, the old one put back, or
 the trouble told. (`HandOver` sends HOLD to a vehicle that was disarmed in our AUTO, for arming it would set it going.) No other part sends
 anything but questions, answers and texts. One machine runs at a time (`Steps`); whatever drops what is wanted drops it too, but for an upload that
@@ -58,6 +58,7 @@ The second one is the operator's, and any other mode at any time (`home_caller`)
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.director.addressed import as_to_vehicle
@@ -87,6 +88,7 @@ if TYPE_CHECKING:
     from missions.geo import LatLon
     from missions.items import MissionItem
     from missions.planned import Plan
+    from missions.request import Request
     from missions.routing.way_home import WayHome
 
 
@@ -266,6 +268,41 @@ class Director:
     def confirm(self, now_s: float) -> None:
         """Take the operator's yes to the plan that waits for it; ignored where none does."""
         self._heed(self._parts.writer.confirm(), now_s)
+
+    def start_drive(self, now_s: float) -> None:
+        """Take the operator's word to drive: what is verified now, or once it is. A new target takes it back."""
+        self._heed(self._parts.starter.begin_on_word(), now_s)
+
+    def hold(self, reason: str, now_s: float) -> None:
+        """Stop the vehicle because a person asks for it, and let go of all that was wanted; ignored without orders to drive, and before a vehicle was found.
+
+        Parameters
+        ----------
+        reason : str
+            Who asks for it.
+        now_s : float
+            When.
+        """
+        self._heed(self._parts.hand_over.hold_asked(reason), now_s)
+
+    def take_request(self, request: Request, now_s: float) -> None:
+        """Take another request, with its targets, in place of the orders' own."""
+        self._core.orders = replace(self._core.orders, request=request)
+        self.take_target(request.targets[-1], now_s)
+
+    def suspect_lists(self) -> None:
+        """Have all lists read again when there is room for it: somebody else of this program has written one."""
+        self._parts.lists.suspect_all()
+
+    @property
+    def is_transferring(self) -> bool:
+        """Whether something is asked of the vehicle or written to it just now."""
+        return bool(self._core.steps)
+
+    @property
+    def has_our_mission(self) -> bool:
+        """Whether the vehicle's mission is the one that we have verified."""
+        return self._core.has_our_mission
 
     def take_target(self, position: LatLon, now_s: float) -> None:
         """Take a target that was typed."""

@@ -7,10 +7,15 @@ from typing import TYPE_CHECKING
 from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.drive_watch import DriveWatch
 from mavlink_bridge.director.events import EventName
+from mavlink_bridge.director.orders import TargetSource
 from mavlink_bridge.director.states import Cue, Notice, Signal, State
+from mavlink_bridge.director.targets import Target
 from mavlink_bridge.errors import OutcomeError
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.protocol.vehicle_watch import MISSION_COMPLETE
+from missions.checking.from_here import on_way_home
+from missions.checking.home_part import home_parts
+from missions.errors import MissionError
 from missions.items import Command
 
 if TYPE_CHECKING:
@@ -19,6 +24,8 @@ if TYPE_CHECKING:
     from mavlink_bridge.director.halter import Halter
     from mavlink_bridge.director.takeover import Takeover
     from mavlink_bridge.mavlink.messages import Frame
+    from missions.checking.home_part import HomePart
+    from missions.planned import Plan
 
 _ARMING_SHOWS_S = 1.5
 """So long after the start a heartbeat from before the arming may still come."""
@@ -44,6 +51,8 @@ class DriveSupervisor(Part):
         self.holds_after_arrival = False
         self._item_now = 1
         self._is_our_start = False  # the drive was begun by us, not by somebody else
+        self._route: Plan | None = None  # what was planned, while a way home inside its mission is driven
+        self._part: HomePart | None = None  # that way
         self._resumed_text = ""
 
     @property
@@ -60,8 +69,32 @@ class DriveSupervisor(Part):
             self._note_item(message)
         if self.core.state is not State.DRIVING or self.drive is None:
             return []
+        signals = self._follow_choice(now_s) if isinstance(message, m.MissionCurrent) else []
         self.drive.receive(frame, now_s)
-        return [Cue.REACHED] if self.drive.has_arrived else []
+        return [*signals, Cue.REACHED] if self.drive.has_arrived else signals
+
+    def _follow_choice(self, now_s: float) -> list[Signal]:
+        """Watch the way home inside the mission that was chosen, or the route again; it is the operator's choice, and told."""
+        core = self.core
+        assert core.plan is not None
+        parts = home_parts(core.plan.items)
+        part = next((one for one in parts if self._item_now in one.numbers), None)
+        is_same = self._part is not None and self._item_now in self._part.numbers
+        if is_same or part is self._part:
+            return []
+        route, self._part = self._route or core.plan, part
+        self._route, core.plan = (route, route) if part is not None else (None, route)
+        if part is not None:
+            try:
+                core.plan = on_way_home(route, part, core.situation, core.orders.request)
+            except MissionError as error:
+                core.voice.error(now_s, EventName.TROUBLE, error, dict(error.details))
+            if core.plan is not route:
+                core.voice.going_home(now_s, "chosen in the mission", f"item {part.item}", core.plan)
+        core.target = Target(core.plan.targets[-1], TargetSource.TYPED)
+        if self.drive is not None:
+            self.drive.follow(core.plan, self._item_now)
+        return [Notice.WAY_CHOSEN]
 
     def has_ended(self, taken: Takeover, now_s: float) -> bool:
         """Return whether a change of mode is the end of our drive: some autopilots hold by themselves where their mission ends."""
@@ -98,6 +131,7 @@ class DriveSupervisor(Part):
     def begin(self, now_s: float) -> None:
         """Watch a drive that we have started."""
         self._is_our_start = True
+        self._route = self._part = None
         self._watch(self._mode, now_s)
 
     def resume(self, text: str) -> Sequence[Signal]:
@@ -114,7 +148,9 @@ class DriveSupervisor(Part):
     def adopt(self, now_s: float, *, is_ours: bool) -> None:
         """Watch a drive that an earlier run has begun; ours where it may be held at its end."""
         self._is_our_start = is_ours
+        self._route = self._part = None
         self._watch(f"{self._mode}, as before the restart", now_s).join(self._item_now)
+        self._follow_choice(now_s)  # made while no bridge ran
 
     def _note_item(self, message: m.MissionCurrent) -> None:
         """Remember the item that the vehicle drives to; once its mission is complete, the last one (ArduPilot tells 0 then)."""

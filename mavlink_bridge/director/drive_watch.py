@@ -74,14 +74,18 @@ class DriveWatch:
         self.has_arrived = False
         self.breaches = 0
         self._breaches_before: int | None = None
-        self._plan = plan
         self._voice = voice
-        self._points = plan.points
-        self._line = LineString(self._points)
-        prepare(plan.envelope.area)
         self._here: _Here | None = None
         self._is_outside = False
         self._standing_since_s: float | None = None
+        self._lay_out(plan)
+
+    def _lay_out(self, plan: Plan) -> None:
+        self._plan = plan
+        self._points = plan.points
+        self._line = LineString(self._points)
+        self._band = plan.envelope.area
+        prepare(self._band)
 
     @property
     def distance_left_m(self) -> float:
@@ -97,6 +101,11 @@ class DriveWatch:
         return self._plan.envelope.duration_s * min(1.0, self.distance_left_m / whole_m)
 
     @property
+    def is_outside(self) -> bool:
+        """Whether it is outside the predicted corridor."""
+        return self._is_outside
+
+    @property
     def so_far(self) -> str:
         """How the drive went until its early end, in words that follow others."""
         is_fenced = math.isfinite(self.least_clearance_m)
@@ -108,6 +117,13 @@ class DriveWatch:
         self.item = item
         self._point = self._plan.path_index(item)
         self._is_executing = True
+
+    def follow(self, plan: Plan, item: int) -> None:
+        """Go on along another plan of the same mission: a way home inside it was chosen."""
+        self._lay_out(plan)
+        if self._here is not None:  # in another plane
+            self._here = self._here._replace(point=Point(plan.ground.frame.to_local(self._here.place)))
+        self.item, self._point = item, plan.path_index(item)
 
     def receive(self, frame: Frame, now_s: float) -> None:
         """Take a frame of the vehicle."""

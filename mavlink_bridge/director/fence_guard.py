@@ -74,20 +74,20 @@ class FenceGuard(Part):
         """Return whether the fence counts by now."""
         return now_s >= self._counts_from_s
 
-    def verified(self, now_s: float) -> Sequence[Signal]:
+    def verified(self, now_s: float, *, may_begin: bool) -> Sequence[Signal]:
         """Go on from a verified mission: at once where a fence counts at once, else when it does and the mission was not refused."""
         if not self._has_to_wait:
-            return [Cue.DRIVE] if self.core.orders.drive else self.core.end()
+            return [Cue.DRIVE] if may_begin else self.core.end()
         if self.core.orders.once and not self.core.orders.drive:
             return self.core.end()
         self._verified_s = now_s
         return []
 
-    def enforced(self, now_s: float) -> Sequence[Signal]:
+    def enforced(self, now_s: float, *, may_begin: bool) -> Sequence[Signal]:
         """Report that the fence counts, and go on."""
         self._verified_s = math.inf
         self._tell_counting(now_s)
-        return [Cue.DRIVE] if self.core.orders.drive else []
+        return [Cue.DRIVE] if may_begin else []
 
     def receive(self, frame: Frame, now_s: float) -> Sequence[Signal]:
         """Notice another fence, what the vehicle says of it, and what it makes of our mission."""
@@ -109,6 +109,11 @@ class FenceGuard(Part):
         if not self._told_counting and self.counts(now_s):
             self._tell_counting(now_s)
         return self._go_on(now_s)
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether a verified mission waits for its fence to count."""
+        return self.core.state is State.VERIFIED and math.isfinite(self._verified_s)
 
     @property
     def _has_to_wait(self) -> bool:

@@ -1,4 +1,8 @@
-"""The part of the director that stops the vehicle: HOLD at once, before a new route is made from where it comes to rest."""
+"""The part of the director that stops the vehicle: HOLD at once, before a new route is made from where it comes to rest.
+
+HOLD does not brake: a rover of 2 m/s rolls for 4 s. Once its roll tells where it will stand (`resting_pose`), the route is planned from there, and uploaded,
+while it rolls; `Starter` switches to AUTO only once it stands, and where the mission keeps its promise from the very place.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +13,11 @@ from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.orders import TargetSource
 from mavlink_bridge.director.states import Cue, Notice, Signal, State
-from mavlink_bridge.protocol.mode_switch import ModeSwitch
+from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.protocol.mode_switch import ModeSwitch, ask_for_heartbeat
 from mavlink_bridge.protocol.stop_here import StopHere
+from missions.checking.holding import resting_pose
+from missions.stops import Rolling
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,6 +25,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.director.list_watch import ListWatch
     from mavlink_bridge.director.targets import Target
     from mavlink_bridge.mavlink.messages import Frame, Message
+    from missions.situation import Pose
 
 FRESH_S = 1.5
 """How old a heartbeat may be to tell what the vehicle does now."""
@@ -27,6 +35,9 @@ STILL_MPS = 0.3
 
 _STOP_AT_LEAST_S = 0.25
 """Positions come four times a second: one from after the HOLD is waited for."""
+
+_SOON_S = 1.0
+"""A route that was refused within this, while the vehicle rolls, is asked for once more: obstacles may have moved on, or are known better. Chosen."""
 
 # Then a vehicle in HOLD that still reports a speed (a drifting fix, a slope) is taken for stopped; chosen, not measured.
 _STOP_PATIENCE_S = 8.0
@@ -53,6 +64,8 @@ class Halter(Part):
         Whether our AUTO may be on its way, or no heartbeat may have told of it yet.
     is_hold_granted : bool
         Whether the newest HOLD that has ended was taken.
+    expected : Pose or None
+        Where the vehicle will stand, while it rolls there.
     """
 
     def __init__(self, core: Core, lists: ListWatch) -> None:
@@ -61,11 +74,16 @@ class Halter(Part):
         self.stopping: ModeSwitch | StopHere | None = None
         self.may_be_in_auto = False
         self.is_hold_granted = False
+        self.expected: Pose | None = None
+        self._expected_s = -math.inf  # since when
         self._stopped_s = -math.inf  # when the vehicle took it
+        self._is_seen = False  # a heartbeat has shown it
         self._held_at_s: float | None = None
         self._standstill_due_s = math.inf
         self._is_diverted = False  # a click may drive it in HOLD
         self._clicked_s = -math.inf
+        self._is_for_good = False  # a person asks for it: said until a heartbeat shows it
+        self._rolling: Rolling | None = None  # while it may tell where it ends
 
     @property
     def deadline_s(self) -> float | None:
@@ -86,6 +104,23 @@ class Halter(Part):
         self.stopping.receive(frame, now_s)
         return self._look_after_hold(self.stopping, now_s)
 
+    def receive(self, frame: Frame, now_s: float) -> Sequence[Signal]:
+        """Take each position of a vehicle that comes to rest."""
+        core, pose = self.core, self.core.situation.pose
+        is_position = isinstance(frame.message, m.GlobalPositionInt) and core.is_from_vehicle(frame)
+        if core.state is not State.HOLDING or not is_position or pose is None:
+            return []
+        if self._rolling is not None:
+            self._rolling = self._rolling.moved(pose.value.position, pose.value.speed_mps, now_s)
+        if self._is_driven_in_hold(now_s):
+            return self._stop_diverted(now_s)
+        if self._has_come_to_rest(now_s):
+            return [Cue.HELD]
+        if self.stopping is None and self._rolling is not None and core.orders.drive:
+            self.expected = resting_pose(core.situation, core.orders.request, self._rolling)
+        self._expected_s = now_s
+        return [] if self.expected is None else [Cue.HELD]
+
     def handle_timer(self, now_s: float) -> Sequence[Signal]:
         """Send HOLD again, or see whether the vehicle stands."""
         if self.stopping is not None:
@@ -105,6 +140,27 @@ class Halter(Part):
     @property
     def _rereading_due(self) -> bool:
         return self._lists.is_outdated and not self.core.steps
+
+    @property
+    def stands(self) -> bool:
+        """Whether the vehicle stands, as last told."""
+        pose = self.core.situation.pose
+        return pose is None or pose.value.speed_mps <= STILL_MPS
+
+    @property
+    def patience_over_s(self) -> float:
+        """When a vehicle in HOLD that still reports a speed is taken for stopped."""
+        return (self._held_at_s or 0.0) + _STOP_PATIENCE_S
+
+    def wait_for_rest(self, now_s: float) -> None:
+        """Let the vehicle roll on, for no route was found from where it is expected to stand: later from there once more, where that was soon known, else from where it stands."""
+        self.expected = self._rolling = None
+        self._standstill_due_s = now_s
+        pose = self.core.situation.pose
+        is_soon = now_s <= self._expected_s + _SOON_S
+        if is_soon and pose is not None and pose.value.speed_mps > 2 * STILL_MPS:
+            rolling = Rolling(now_s)
+            self._rolling = rolling.moved(pose.value.position, pose.value.speed_mps, now_s)
 
     # What may be stopped
 
@@ -168,10 +224,21 @@ class Halter(Part):
         """Leave what is under way and stop the vehicle, to plan from where it stands."""
         self._held_at_s = None
         self._standstill_due_s = math.inf
+        self.expected = self._rolling = None
         self.core.voice.tell(now_s, EventName.HOLDING, f"HOLD: {reason}", reason)
         self.core.steps.clear()
         if self.core.target is not None:
             self._note_click(self.core.target, now_s)
+        self.command_hold(now_s)
+
+    def hold_for_good(self, reason: str, now_s: float) -> None:
+        """Stop the vehicle because a person asks for it: said until its heartbeat shows HOLD."""
+        self.core.voice.tell(now_s, EventName.HOLDING, f"HOLD: {reason}", reason)
+        self.may_be_in_auto = self._is_for_good = True
+        drives_in_hold = self.core.autopilot.driving.clicks_drive_in_hold
+        self._is_diverted = drives_in_hold and (
+            self._moves_in_hold or now_s <= self._clicked_s + _LATE_CLICK_S
+        )
         self.command_hold(now_s)
 
     def _note_click(self, target: Target, now_s: float) -> None:
@@ -204,18 +271,28 @@ class Halter(Part):
     def let_go(self) -> None:
         """Stop nothing any more."""
         self.stopping = None
-        self.may_be_in_auto = False
+        self.may_be_in_auto = self._is_for_good = False
 
     def _look_after_hold(self, stopping: ModeSwitch | StopHere, now_s: float) -> Sequence[Signal]:
         core = self.core
         if stopping.is_granted and core.state is State.HOLDING and self._held_at_s is None:
+            assert core.peer is not None
             self._held_at_s = now_s
             self._standstill_due_s = now_s + _STOP_AT_LEAST_S
+            self._rolling = Rolling(now_s)
+            # The HOLD may have to be seen; the next one would come a second later.
+            core.send(ask_for_heartbeat(core.peer))
         if not stopping.is_done:
             return []
         core.send(*stopping.messages_to_send())
+        if self._is_for_good and isinstance(stopping, StopHere):
+            self.command_hold(
+                now_s
+            )  # it stops where it was driven to, granted or not; its mode is still to be seen
+            return []
         self.let_go()
         self.is_hold_granted = stopping.is_granted
+        self._is_seen = isinstance(stopping, ModeSwitch) and stopping.is_seen
         self._stopped_s = now_s
         core.operator.settle(now_s)
         if not stopping.is_granted:
@@ -228,7 +305,10 @@ class Halter(Part):
     def is_mode_known(self, now_s: float) -> bool:
         """Return whether the newest heartbeat is news of the mode that the vehicle is in."""
         # A heartbeat from before our HOLD still tells the mode before it.
-        is_news = self.stopping is None and self.core.heartbeat_s > self._stopped_s
+        is_after = self.core.heartbeat_s > self._stopped_s or (
+            self._is_seen and self.core.heartbeat_s == self._stopped_s
+        )
+        is_news = self.stopping is None and is_after
         return is_news and now_s - self.core.heartbeat_s <= FRESH_S
 
     def _is_driven_in_hold(self, now_s: float) -> bool:
@@ -251,9 +331,7 @@ class Halter(Part):
         if self._held_at_s is None or now_s < self._held_at_s + _STOP_AT_LEAST_S:
             return False
         is_held = self.core.situation.mode == self.core.modes.hold
-        is_patience_over = now_s >= self._held_at_s + _STOP_PATIENCE_S and is_held
-        pose = self.core.situation.pose
-        if pose is None or pose.value.speed_mps <= STILL_MPS or is_patience_over:
+        if self.stands or (now_s >= self.patience_over_s and is_held):
             return True
         self._standstill_due_s = now_s + _STOP_AT_LEAST_S
         return False

@@ -11,7 +11,7 @@ from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.incidents import Incidents
 from mavlink_bridge.director.put_back import PutBack
 from mavlink_bridge.director.starter import START_YOURSELF
-from mavlink_bridge.director.states import Cue, Notice, Signal, State
+from mavlink_bridge.director.states import ON_VEHICLE, Cue, Notice, Signal, State
 from mavlink_bridge.director.steps import step
 from mavlink_bridge.director.takeover import Takeover, account_of
 from mavlink_bridge.errors import OutcomeError
@@ -37,6 +37,8 @@ class HandOver(Part):
         What was done that is not told yet; None where the vehicle itself was not taken, but its mission.
     was_in_auto_by_us : bool
         Whether it was in AUTO by our doing when it was last heard, before the link was lost.
+    why_held : str
+        Who asked for the newest HOLD at a page of ours.
     """
 
     def __init__(self, core: Core, halter: Halter, driver: DriveSupervisor, caller: HomeCaller) -> None:
@@ -47,6 +49,7 @@ class HandOver(Part):
         self.incidents = Incidents(core.voice, core.orders.request)
         self.taken: Takeover | None = None
         self.was_in_auto_by_us = False
+        self.why_held = ""
         self._after_withdrawing: OutcomeError | None = None
 
     def receive(self, frame: Frame, now_s: float) -> Iterable[Signal]:
@@ -74,7 +77,7 @@ class HandOver(Part):
             return self._let_go(taken, now_s)
         if core.operator.is_late_click(heartbeat, now_s) and self._halter.stopping is None:
             self._halter.command_hold(now_s)
-        elif core.state is State.VERIFIED and not core.orders.drive and core.is_driving_ours:
+        elif core.state in ON_VEHICLE and not core.orders.drive and core.is_driving_ours:
             return self._driver.resume("somebody else started the mission")
         if self._caller.sees_rtl(heartbeat.custom_mode):
             taken = Takeover(heartbeat.custom_mode, shows_failsafe=core.operator.shows_failsafe(heartbeat))
@@ -112,6 +115,14 @@ class HandOver(Part):
         core = self.core
         is_ours = core.state is State.DRIVING and core.orders.drive and taken.asker is None
         return is_ours and taken.mode == core.modes.hold and self.incidents.refuses_mission(now_s)
+
+    def hold_asked(self, reason: str) -> Sequence[Signal]:
+        """Return that a person at a page of ours stops the vehicle: all that was wanted is let go of, as where somebody takes over."""
+        core = self.core
+        if core.peer is None or not core.orders.drive:
+            return []
+        self.taken, self.why_held = None, reason
+        return [Cue.TAKEN_OVER, Notice.HOLD_ASKED]
 
     def account_for(
         self, taken: Takeover, so_far: str, now_s: float, *, was_in_auto: bool

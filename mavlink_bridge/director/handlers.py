@@ -176,13 +176,13 @@ def _on_gone_on(parts: Parts, now_s: float) -> Iterable[Signal]:
 
 
 def _on_target(parts: Parts, _now_s: float) -> None:
-    parts.writer.is_confirmed = False
+    parts.writer.is_confirmed = parts.starter.is_told = False
     parts.adopter.forget()
     parts.driver.stand_by()
 
 
 def _on_target_while_moving(parts: Parts, now_s: float) -> None:
-    parts.writer.is_confirmed = False
+    parts.writer.is_confirmed = parts.starter.is_told = False
     parts.adopter.stop_waiting()
     parts.driver.drive = None
     target = parts.core.target
@@ -246,7 +246,7 @@ def _after_upload(parts: Parts, now_s: float) -> Iterable[Signal]:
     found = parts.desk.recheck(1)
     if not found.holds and parts.desk.is_stale:
         return parts.desk.broke(found, now_s)
-    return parts.fence.verified(now_s)
+    return parts.fence.verified(now_s, may_begin=parts.starter.may_begin)
 
 
 def _on_mission_invalid(parts: Parts, now_s: float) -> Iterable[Signal]:
@@ -299,6 +299,13 @@ def _on_taken_over(parts: Parts, now_s: float) -> Iterable[Signal]:
     return parts.hand_over.account_for(taken, so_far, now_s, was_in_auto=was_in_auto)
 
 
+def _on_hold_asked(parts: Parts, now_s: float) -> None:
+    """Send a person's HOLD; whatever the state, and nothing is wanted after it."""
+    parts.inbox.waiting = None
+    parts.learner.is_first_time = False
+    parts.halter.hold_for_good(parts.hand_over.why_held, now_s)
+
+
 def _on_clash(parts: Parts, now_s: float) -> Iterable[Signal]:
     halter = parts.halter
     parts.adopter.forget()
@@ -315,14 +322,15 @@ HANDLERS: dict[Signal, Callable[[Parts, float], Iterable[Signal] | None]] = {
     Cue.LEARNT: _on_learnt,
     Cue.ADOPTED: _on_adopted,
     Cue.HELD: lambda parts, _now_s: parts.adopter.forget(),
+    Cue.NOT_FORESEEN: lambda parts, now_s: parts.halter.wait_for_rest(now_s),
     Cue.TARGET: _on_target,
     Cue.TARGET_WHILE_MOVING: _on_target_while_moving,
     Cue.PLANNED: _on_planned,
     Cue.NO_PLAN: _on_no_plan,
     Cue.UPLOAD: lambda parts, now_s: parts.writer.begin(now_s),
-    Cue.ENFORCED: lambda parts, now_s: parts.fence.enforced(now_s),
-    Cue.RENEWED: lambda parts, now_s: parts.fence.verified(now_s),
-    Cue.DRIVE: lambda parts, now_s: parts.starter.look_once_more(now_s),
+    Cue.ENFORCED: lambda parts, now_s: parts.fence.enforced(now_s, may_begin=parts.starter.may_begin),
+    Cue.RENEWED: lambda parts, now_s: parts.fence.verified(now_s, may_begin=parts.starter.may_begin),
+    Cue.DRIVE: lambda parts, now_s: parts.starter.begin(now_s),
     Cue.RESUMED: lambda parts, now_s: parts.driver.resumed(now_s),
     Cue.STILL_THERE: _on_still_there,
     Cue.STARTED: lambda parts, now_s: parts.driver.begin(now_s),
@@ -350,7 +358,9 @@ HANDLERS: dict[Signal, Callable[[Parts, float], Iterable[Signal] | None]] = {
     Notice.MISSION_TAKEN: lambda parts, now_s: parts.writer.mission_taken(now_s),
     Notice.MISSION_HEARD: lambda parts, _now_s: parts.inbox.take_mission_target(),
     Notice.RALLY_HEARD: lambda parts, _now_s: parts.inbox.take_rally_target(),
+    Notice.WAY_CHOSEN: lambda parts, _now_s: _look_at_fence(parts),
     Notice.LEARNING_FAILED: _learn_again,
+    Notice.HOLD_ASKED: _on_hold_asked,
     Notice.HOLD_ENDED: _on_hold_ended,
     Notice.DRIVEN_IN_HOLD: _on_driven_in_hold,
     Notice.MISSION_INVALID: _on_mission_invalid,

@@ -25,7 +25,7 @@ autopilot, like any other mode at any moment. Which one it is:
 - an RTL that the autopilot has answered a failsafe with, which was heard, is nobody's second: it is answered each time;
 - after the operator has taken over a way home, RTL within a minute is the second one still: a transmitter cannot press RTL twice but through another mode.
 
-The count begins anew with an arrival and with another target. An RTL from before the bridge knew the vehicle, or from while it was not heard, is not answered.
+That it was the second, and is left to the operator, is said. The count begins anew with an arrival and with another target. An RTL from before the bridge knew the vehicle, or from while it was not heard, is not answered.
 
 Where it waits
 --------------
@@ -44,7 +44,7 @@ from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.fixes import fix_trouble, is_better
 from mavlink_bridge.director.orders import TargetSource
-from mavlink_bridge.director.states import Notice, Signal, State
+from mavlink_bridge.director.states import ON_VEHICLE, Notice, Signal, State
 from mavlink_bridge.director.targets import HomeCall, Target
 from mavlink_bridge.mavlink import messages as m
 from missions.geo import LatLon
@@ -86,7 +86,7 @@ _IN_HAND = frozenset(
         State.PLANNING,
         State.PROPOSED,
         State.UPLOADING,
-        State.VERIFIED,
+        *ON_VEHICLE,
         State.STARTING,
         State.DRIVING,
         State.ARRIVED,  # until its HOLD is taken; who is watched for after that is said by `_arrived_s`
@@ -122,6 +122,7 @@ class HomeCaller(Part):
         )
         self._rtl_s: float | None = None  # when the operator's RTL was answered on this way home
         self._overruled_s = -math.inf
+        self._second_s = -math.inf  # when the second RTL was heard or seen last
         self._is_seen = True  # the mode told last was told a moment ago
         self._was_breached = False
         self._bad_fixes = 0
@@ -196,12 +197,22 @@ class HomeCaller(Part):
             return self._hold_again(now_s)
         is_second = self._rtl_s is not None or now_s <= self._overruled_s + OVERRULED_S
         if is_second and not by_autopilot:
+            self._leave_second(taken.mode, now_s)
             return None
         if not by_autopilot:
             self._rtl_s = now_s
         if self._is_called and by_autopilot:
             return self._hold_again(now_s)
         return self._call(HomeCall.RTL, self.core.modes.words(taken.mode), now_s)
+
+    def _leave_second(self, mode: int, now_s: float) -> None:
+        """Report once that this RTL is the second one, which is not answered: who pressed it may wait for a route."""
+        if now_s > self._second_s + SAME_PRESS_S:
+            name = self.core.modes.words(mode)
+            text = f"second {name}: yours, it drives straight home"
+            why = "the second one: the vehicle is left to the operator"
+            self.core.voice.tell(now_s, EventName.CALL_IGNORED, text, name, why)
+        self._second_s = now_s
 
     def sees_rtl(self, mode: int) -> bool:
         """Return whether a heartbeat shows an RTL that has just begun, where nobody watches for takeovers; one from before the first heartbeat is nobody's call."""
@@ -321,11 +332,7 @@ class HomeCaller(Part):
         assert target is not None
         assert plan is not None
         core.target = Target(plan.targets[-1], TargetSource.HOME, call=target.call)
-        name = self._keeper.name_of(plan.targets[-1])
-        length_m, duration_s = round(plan.length_m, 1), round(plan.duration_s, 1)
-        to = "" if name == "home" else f" to {name}"
-        text = f"going home{to}: {length_m:.0f} m, about {duration_s:.0f} s"
-        core.voice.tell(now_s, EventName.GOING_HOME, text, str(target.call), name, length_m, duration_s)
+        core.voice.going_home(now_s, target.call, self._keeper.name_of(plan.targets[-1]), plan)
 
     def refused(self, now_s: float) -> None:
         """Take notice that no way home was found, which was told: the vehicle is held, and nothing drives it straight."""

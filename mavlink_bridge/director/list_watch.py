@@ -11,7 +11,7 @@ from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.grounds import Grounds
 from mavlink_bridge.director.learning import MISSION_TYPES, with_read_list
-from mavlink_bridge.director.states import Notice, Signal, State
+from mavlink_bridge.director.states import ON_VEHICLE, Notice, Signal, State
 from mavlink_bridge.director.steps import step
 from mavlink_bridge.errors import BridgeError
 from mavlink_bridge.mavlink import messages as m
@@ -28,9 +28,7 @@ if TYPE_CHECKING:
     from missions.items import MissionItem
     from missions.situation import Situation
 
-_AT_REST = frozenset(
-    {State.READY, State.PROPOSED, State.VERIFIED, State.DRIVING, State.ARRIVED, State.LET_GO}
-)
+_AT_REST = frozenset({State.READY, State.PROPOSED, *ON_VEHICLE, State.DRIVING, State.ARRIVED, State.LET_GO})
 _WRITING = frozenset({State.UPLOADING, State.WITHDRAWING, State.CLASHING})
 
 

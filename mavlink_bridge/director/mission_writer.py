@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
-from mavlink_bridge.director.states import Cue, Notice, Signal, State
+from mavlink_bridge.director.states import ON_VEHICLE, Cue, Notice, Signal, State
 from mavlink_bridge.director.steps import step
 from mavlink_bridge.errors import BridgeError
 from mavlink_bridge.mavlink import messages as m
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.director.route_desk import RouteDesk
     from missions.items import MissionItem
 
-_ON_OUR_MISSION = frozenset({State.VERIFIED, State.STARTING, State.DRIVING})
+_ON_OUR_MISSION = frozenset({*ON_VEHICLE, State.STARTING, State.DRIVING})
 
 
 class MissionWriter(Part):

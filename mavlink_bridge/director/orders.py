@@ -97,6 +97,8 @@ class Orders:
         Switch a vehicle that drives its mission to HOLD before another mission is written, also without ``drive``.
     confirm : bool
         Upload a plan only after `Director.confirm`.
+    starts_on_word : bool
+        Drive a verified mission only after `Director.start_drive`; a way home at once.
     once : bool
         End after one job: plan, upload, drive, as far as the orders go.
     announce : bool
@@ -127,6 +129,7 @@ class Orders:
     arm: bool = False
     hold: bool = False
     confirm: bool = False
+    starts_on_word: bool = False
     once: bool = False
     announce: bool = False
     passive: bool = False

@@ -54,7 +54,9 @@ class Parts:
         self.halter: Halter = Halter(core, self.lists)
         self.driver: DriveSupervisor = DriveSupervisor(core, self.halter)
         self.hold_watch: HoldWatch = HoldWatch(core, self.halter, self.driver)
-        self.desk: RouteDesk = RouteDesk(core, self.lists, self.keeper, self.driver, self.hold_watch)
+        self.desk: RouteDesk = RouteDesk(
+            core, self.lists, self.halter, self.keeper, self.driver, self.hold_watch
+        )
         self.writer: MissionWriter = MissionWriter(core, self.lists, self.halter, self.desk)
         self.adopter: Adopter = Adopter(core, self.lists, self.halter, self.driver, self.desk, notes)
         self.fence: FenceGuard = FenceGuard(core)
@@ -67,6 +69,7 @@ class Parts:
         self.hearers: tuple[Part, ...] = (
             self.learner,
             self.hand_over,
+            self.halter,
             self.caller,
             self.guard,
             self.driver,

@@ -11,11 +11,14 @@ from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.fixes import no_fix
 from mavlink_bridge.director.grounds import Grounds
 from mavlink_bridge.director.plan_task import AtHomeError, HomeTask, PlanTask
-from mavlink_bridge.director.states import Cue, Notice, Signal, State
+from mavlink_bridge.director.states import ON_VEHICLE, Cue, Notice, Signal, State
+from missions.checking.from_here import from_here
 from missions.checking.obstacle_ahead import obstacle_across
 from missions.checking.recheck import Recheck, recheck
-from missions.errors import MissionError
+from missions.errors import MissionError, SituationError
 from missions.fence import Obstacles
+from missions.geo import distance_m
+from missions.items import Command
 from missions.planning.marking import unpromised
 from missions.promise import asked_clearance
 from missions.words import metres
@@ -24,6 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from mavlink_bridge.director.drive_supervisor import DriveSupervisor
+    from mavlink_bridge.director.halter import Halter
     from mavlink_bridge.director.hold_watch import HoldWatch
     from mavlink_bridge.director.home_keeper import HomeKeeper
     from mavlink_bridge.director.list_watch import ListWatch
@@ -46,7 +50,7 @@ _AT_ONCE_S = 1.0  # at the soonest, where nothing seems to stand in it any more:
 _MAKING_A_ROUTE = frozenset({State.HOLDING, State.PLANNING})
 """States whose plan is yet to come: it is made around the fence as it is then."""
 
-_WITH_A_ROUTE = frozenset({State.PROPOSED, State.VERIFIED, State.STARTING, State.DRIVING})
+_WITH_A_ROUTE = frozenset({State.PROPOSED, *ON_VEHICLE, State.STARTING, State.DRIVING})
 """States in which a route is left at once for an obstacle; an upload is ended first, and looked at then."""
 
 
@@ -61,12 +65,15 @@ class RouteDesk(Part):
     ----------
     is_own_idea : bool
         Whether the route is made because the one before broke, not because somebody asked.
+    is_foreseen : bool
+        Whether it begins where the vehicle was expected to stand, and not yet where it stands.
     """
 
     def __init__(
         self,
         core: Core,
         lists: ListWatch,
+        halter: Halter,
         keeper: HomeKeeper,
         driver: DriveSupervisor,
         hold_watch: HoldWatch,
@@ -74,6 +81,7 @@ class RouteDesk(Part):
         super().__init__(core)
         self._keeper = keeper
         self._lists = lists
+        self._halter = halter
         self._driver = driver
         self._hold_watch = hold_watch
         self._made: Plan | MissionError | None = None
@@ -86,6 +94,7 @@ class RouteDesk(Part):
         self._told_across: tuple[float | None, str] | None = None  # the obstacles that were told of last
         self._told_waiting: tuple[float | None, str] | None = None
         self.is_own_idea = False
+        self.is_foreseen = False
         self._has_told_fix = False
 
     @property
@@ -114,9 +123,26 @@ class RouteDesk(Part):
         """Take a plan, or why there is none; what is not waited for any more is left."""
         if task is not self.pending:
             return []
-        refused = unpromised(made) if self.core.orders.upload and not isinstance(made, MissionError) else None
-        self._made = refused or made
+        self._made = (
+            made
+            if isinstance(made, MissionError)
+            else self._refused_end(made) or self._unpromised(made) or made
+        )
         return self._go_on(now_s)
+
+    def _unpromised(self, made: Plan) -> MissionError | None:
+        return unpromised(made) if self.core.orders.upload else None
+
+    def _refused_end(self, made: Plan) -> MissionError | None:
+        """Return why a mission is not driven whose end looks like somebody's taking over; None where it does not."""
+        core = self.core
+        ends_so = any(item.command == Command.NAV_RETURN_TO_LAUNCH for item in made.items)
+        if not (ends_so and core.orders.drive and core.autopilot.driving.ends_in_hold):
+            return None
+        return SituationError(
+            f"{core.autopilot.kind} leaves its mission mode for an RTL item, which cannot be told from an operator who takes over; nothing was written: "
+            "plan the way home with --return, or upload it without --drive and start it yourself"
+        )
 
     def _go_on(self, now_s: float) -> Sequence[Signal]:
         """Have a plan made around what is known by now, and go on with the one that was."""
@@ -137,6 +163,8 @@ class RouteDesk(Part):
         """Go on with a plan; where there is none round obstacles, see whether there is one without them."""
         core, task, refused = self.core, self.core.plan_task, self._refused
         assert task is not None
+        if self.is_foreseen and (isinstance(made, MissionError) or made.clearance_m is None):
+            return [Cue.NOT_FORESEEN]
         if refused is not None:
             core.plan = None
             if isinstance(made, MissionError):
@@ -163,6 +191,7 @@ class RouteDesk(Part):
         if not trouble:
             self._planned_on = Grounds.of(core.situation)
             self._free_way = self._refused = None
+            self.is_foreseen = self._halter.expected is not None and not self._halter.stands
             core.plan_task = self._task()
             self._tried_s, self._tried_with = now_s, core.plan_task.situation.obstacles
         elif not self._has_told_fix and core.target is not None:
@@ -185,6 +214,30 @@ class RouteDesk(Part):
         places, ways = core.orders.homing.places, self._keeper.ways
         return HomeTask(situation, core.orders.request, places=places, ways=ways)
 
+    @property
+    def _at_rest(self) -> Situation:
+        """What is known, of a vehicle that rolls to where a route begins as it will stand there."""
+        situation, expected = self.core.situation, self._halter.expected
+        if not self.is_foreseen or expected is None or situation.pose is None:
+            return situation
+        return replace(situation, pose=replace(situation.pose, value=expected))
+
+    def settles(self, now_s: float) -> bool:
+        """Return whether the route can be driven from where the vehicle stands by now; where not, it is to be made anew, which is said."""
+        core = self.core
+        if not self.is_foreseen or core.plan is None:
+            return True
+        self.is_foreseen = False
+        settled = from_here(core.plan, core.situation, core.orders.request)
+        if settled is not None:
+            core.plan = settled
+            return True
+        pose = core.situation.pose
+        off_m = distance_m(pose.value.position, core.plan.start) if pose is not None else 0.0
+        reason = f"it stands {off_m:.2f} m from where it was expected to: planning from there"
+        core.voice.tell(now_s, EventName.HOLDING, f"HOLD: {reason}", reason)
+        return False
+
     # Obstacles
 
     @property
@@ -195,7 +248,7 @@ class RouteDesk(Part):
     @property
     def _with_wider_obstacles(self) -> Situation:
         """What is known, with obstacles as large as a route is planned round them."""
-        situation = self.core.situation
+        situation = self._at_rest
         return replace(situation, obstacles=situation.obstacles.later(_AGAIN_S, _WIDER_M))
 
     @property
@@ -229,7 +282,7 @@ class RouteDesk(Part):
             return self._look_for_way(now_s)
         if core.plan is None or core.state not in _WITH_A_ROUTE:
             return []
-        found = obstacle_across(core.plan, core.situation, self._driver.item)
+        found = obstacle_across(core.plan, self._at_rest, self._driver.item)
         if found is None:
             self._told_across = None
             return []
@@ -244,7 +297,7 @@ class RouteDesk(Part):
     def _across(self, item: int) -> Recheck | None:
         """Return what an obstacle across the route leaves of it; without orders to drive they are only told."""
         plan = self.core.plan if self.core.orders.drive else None
-        found = obstacle_across(plan, self.core.situation, item) if plan is not None else None
+        found = obstacle_across(plan, self._at_rest, item) if plan is not None else None
         return found.kept if found is not None else None
 
     def no_plan(self, now_s: float) -> Sequence[Signal]:
@@ -302,7 +355,7 @@ class RouteDesk(Part):
         assert core.plan is not None
         if (found := self._across(item)) is not None:
             return found
-        fence = replace(core.situation, obstacles=Obstacles())
+        fence = replace(self._at_rest, obstacles=Obstacles())
         try:
             vehicle, _ = asked_clearance(core.situation, core.orders.request)
         except MissionError:
@@ -317,17 +370,15 @@ class RouteDesk(Part):
         """Look at the route again, whose grounds are others than before."""
         core = self.core
         core.drop_plan_task()
-        if core.state is State.READY and core.target is not None:
-            self._hold_watch.announce(now_s)
-            return [Notice.ROUTE_OUTDATED]
-        if core.plan is None or core.state in _MAKING_A_ROUTE or core.state is State.ARRIVED:
-            self._hold_watch.announce(now_s)
-            return []
-        found = self.recheck(self._driver.item)
-        if found.holds and core.is_driving_ours:
+        is_wanted = core.state is State.READY and core.target is not None
+        is_none = core.plan is None or core.state in _MAKING_A_ROUTE or core.state is State.ARRIVED
+        found = None if is_wanted or is_none else self.recheck(self._driver.item)
+        if found is not None and found.holds and core.is_driving_ours:
             return []
         self._hold_watch.announce(now_s)
-        if found.holds:
+        if is_wanted:
+            return [Notice.ROUTE_OUTDATED]
+        if found is None or found.holds:
             return []
         is_ours_to_mend = core.state not in (State.READY, State.LET_GO)
         if is_ours_to_mend or core.is_driving_ours:

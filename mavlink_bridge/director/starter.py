@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
-from mavlink_bridge.director.states import Cue, Signal, State
+from mavlink_bridge.director.halter import STILL_MPS
+from mavlink_bridge.director.states import ON_VEHICLE, Cue, Signal, State
 from mavlink_bridge.director.steps import Step, step
 from mavlink_bridge.errors import OutcomeError, RefusedError
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.drive_rules import FirstItem
 from mavlink_bridge.protocol.command import SendCommand
 from mavlink_bridge.protocol.mode_switch import AwaitHeartbeat, ModeSwitch
+from mavlink_bridge.protocol.standstill import AwaitStandstill
 from missions.items import Command
 
 if TYPE_CHECKING:
@@ -40,7 +42,13 @@ _TIMES = 3
 
 
 class Starter(Part):
-    """Looks once more, arms where asked, switches to AUTO and to the first item."""
+    """Looks once more, arms where asked, switches to AUTO and to the first item.
+
+    Attributes
+    ----------
+    is_told : bool
+        Whether a person has given the word to drive what is verified.
+    """
 
     def __init__(
         self,
@@ -59,6 +67,36 @@ class Starter(Part):
         self._driver = driver
         self._desk = desk
         self._adopter = adopter
+        self.is_told = False
+
+    @property
+    def may_begin(self) -> bool:
+        """Whether a verified mission is driven now: at once, on a person's word where that is waited for, and a way home without one."""
+        orders, target = self.core.orders, self.core.target
+        is_home = target is not None and target.is_home
+        return orders.drive and (not orders.starts_on_word or self.is_told or is_home)
+
+    def begin_on_word(self) -> Sequence[Signal]:
+        """Return that a person gives the word to drive: now, or once the mission is verified."""
+        self.is_told = True
+        is_ready = self.core.state in ON_VEHICLE and not self._fence.is_waiting
+        return [Cue.DRIVE] if is_ready and self.may_begin else []
+
+    def begin(self, now_s: float) -> Sequence[Signal]:
+        """Begin the drive; a vehicle that still rolls to where it was expected to stand is waited for."""
+        if not self._desk.is_foreseen or self._halter.stands:
+            return self._settle(now_s)
+        assert self.core.peer is not None
+        rest = AwaitStandstill(self.core.peer, STILL_MPS, self._halter.patience_over_s)
+        self.core.steps.run([step(rest, lambda _machine, then_s: self._settle(then_s))], now_s)
+        return []
+
+    def _settle(self, now_s: float) -> Sequence[Signal]:
+        """Go on where the mission is safe from the very place; else return that a route from there is wanted."""
+        if not self._desk.settles(now_s):
+            return [Cue.TARGET]
+        self.look_once_more(now_s)
+        return []
 
     def look_once_more(self, now_s: float) -> None:
         """Read again what somebody may have changed, and wait for a heartbeat: it shows a takeover that was on its way."""

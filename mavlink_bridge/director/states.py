@@ -45,7 +45,8 @@ class Cue(StrEnum):
     LEARNT = auto()
     TARGET = auto()  # a route is wanted
     TARGET_WHILE_MOVING = auto()  # the same, and the vehicle may move and may be stopped
-    HELD = auto()
+    HELD = auto()  # it stands, or it is known where it will stand
+    NOT_FORESEEN = auto()  # no plan can be made from there: it has to stand first
     PLANNED = auto()
     NO_PLAN = auto()
     UPLOAD = auto()
@@ -85,8 +86,10 @@ class Notice(StrEnum):
     MISSION_HEARD = auto()  # its end may be a target
     RALLY_HEARD = auto()
     WAYS_KNOWN = auto()  # the ways home were laid out anew
+    WAY_CHOSEN = auto()  # a way home inside the mission, by the operator
     LEARNING_FAILED = auto()
     GONE_ON = auto()  # on the route, as far as was better than a HOLD at once
+    HOLD_ASKED = auto()  # by a person at a page of ours, who has let go of everything else with it
     HOLD_ENDED = auto()  # taken, or not
     DRIVEN_IN_HOLD = auto()  # somebody sends the vehicle to a place in the mode that stops
     MISSION_INVALID = auto()  # the vehicle does not drive our mission any more, and holds
@@ -122,7 +125,12 @@ TRANSITIONS: dict[State, dict[Cue, State]] = {
         Cue.TAKEN_OVER: State.LET_GO,
         Cue.TROUBLE: State.READY,
     },
-    State.PLANNING: {**_OURS, Cue.PLANNED: State.PROPOSED, Cue.NO_PLAN: State.READY},
+    State.PLANNING: {
+        **_OURS,
+        Cue.PLANNED: State.PROPOSED,
+        Cue.NO_PLAN: State.READY,
+        Cue.NOT_FORESEEN: State.HOLDING,
+    },
     State.PROPOSED: {**_OURS, Cue.UPLOAD: State.UPLOADING, Cue.END: State.DONE},
     State.UPLOADING: {
         Cue.UPLOAD_VERIFIED: State.VERIFIED,
@@ -177,6 +185,9 @@ TRANSITIONS: dict[State, dict[Cue, State]] = {
     State.DONE: {},
     State.FAILED: {},
 }
+
+ON_VEHICLE = frozenset({State.VERIFIED, State.ENFORCED})
+"""States in which our mission is on the vehicle, and nobody drives it."""
 
 AT_WORK = frozenset(
     {

@@ -102,6 +102,13 @@ class Voice:
         """Report why there is no plan."""
         self.error(now_s, EventName.NO_PLAN, error, dict(error.details))
 
+    def going_home(self, now_s: float, call: object, place: str, plan: Plan) -> None:
+        """Report where a way home leads; one inside the mission is named by its first item."""
+        length_m, duration_s = round(plan.length_m, 1), round(plan.duration_s, 1)
+        to = "" if place == "home" else f" {'by' if place.startswith('item ') else 'to'} {place}"
+        text = f"going home{to}: {length_m:.0f} m, about {duration_s:.0f} s"
+        self.tell(now_s, EventName.GOING_HOME, text, str(call), place, length_m, duration_s)
+
     def home_waits(self, now_s: float, call: object, why: str) -> None:
         """Report why a way home waits; the vehicle is held."""
         text = f"the way home waits, the vehicle stays in HOLD: {why}"

@@ -69,14 +69,11 @@ class SteadyClock:
         The log's time less the clock's; it changes only where the log's clock was set.
     jumps : int
         How often that was.
-    outliers : int
-        Lone records whose time lies off both neighbours'; they get the time before.
     """
 
     def __init__(self) -> None:
         self.offset_s = 0.0
         self.jumps = 0
-        self.outliers = 0
         self._now_s: float | None = None
 
     def over(self, entries: Iterable[LogEntry]) -> Iterator[tuple[LogEntry, float]]:
@@ -103,10 +100,8 @@ class SteadyClock:
         step_s = 0.0 if now_s is None else time_s - self.offset_s - now_s
         if now_s is None or 0 <= step_s <= NEAR_S:
             self._now_s = time_s - self.offset_s
-        elif -NEAR_S <= step_s < 0:
-            pass
-        elif next_s is not None and abs(next_s - self.offset_s - now_s) <= NEAR_S:
-            self.outliers += 1
+        elif -NEAR_S <= step_s < 0 or (next_s is not None and abs(next_s - self.offset_s - now_s) <= NEAR_S):
+            pass  # late, or a lone record whose time lies off both neighbours': they get the time before
         elif 0 < step_s <= SILENCE_S:
             self._now_s = time_s - self.offset_s
         else:

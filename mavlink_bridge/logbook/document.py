@@ -49,6 +49,7 @@ def _vehicle(vehicle: VehicleLog) -> dict[str, Any]:
         "system": vehicle.system,
         "component": vehicle.component,
         "mav_type": vehicle.mav_type,
+        "firmware": str(situation.firmware) if situation.firmware else None,
         "home": list(home.value) if home else None,
         "position": list(situation.pose.value.position) if situation.pose else None,
         "mission_items": mission.value.item_count(

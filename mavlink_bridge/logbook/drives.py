@@ -38,18 +38,19 @@ class Drives:
         self,
         situation: Situation,
         fixes: Sequence[TrackFix],
+        points: NDArray[np.float64],
         clearances_m: NDArray[np.float64] | None,
         vehicle: Vehicle,
         frame: LocalFrame,
         meter: FenceMeter | None,
     ) -> None:
-        """Take positions that were all driven in one situation, and what the track to each keeps to the fence."""
+        """Take positions that were all driven in one situation, their points in the frame, and what the track to each keeps to the fence."""
         if not _is_driving(situation):
             self.end()
         elif self._grader is None:
             self._begin(situation, fixes[0], GradedField(frame, meter, vehicle))
         if self._grader is not None:
-            self._grader.drive(fixes, clearances_m)
+            self._grader.drive(fixes, points, clearances_m)
         self._recent.extend(fixes)
 
     def reached(self, seq: int) -> None:
@@ -79,7 +80,7 @@ class Drives:
         if before:
             points = field.frame.to_local_array([fix.position for fix in before])
             clearances_m = field.meter.at_points(points) if field.meter else None
-            self._grader.drive(before, clearances_m)
+            self._grader.drive(before, points, clearances_m)
 
     def _from_standing(self, first: TrackFix) -> list[TrackFix]:
         """Return the positions shortly before, from the last at which it stood; none where it still stands or none is known."""

@@ -57,6 +57,8 @@ class Transfer:
         vehicle answered. Unanswered: no MISSION_ACK was seen.
     result : str or None
         MAV_MISSION_RESULT of the vehicle's MISSION_ACK.
+    repeats : int
+        How often an item, or the announcement, came again: each was lost on a link, or thought to be.
     """
 
     kind: ListKind
@@ -68,6 +70,7 @@ class Transfer:
     seen: int
     ending: Ending
     result: str | None = None
+    repeats: int = 0
 
 
 @dataclass(frozen=True, slots=True)

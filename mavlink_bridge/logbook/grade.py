@@ -13,6 +13,7 @@ import numpy as np
 import shapely
 from shapely import LineString
 
+from mavlink_bridge.logbook.legs import GradedLeg, LegMeter
 from missions.checking.execution import follow_mission
 from missions.checking.px4_waits import with_waits
 from missions.drive_model import beyond_measured, envelope
@@ -101,6 +102,8 @@ class Grade:
         None where the mission holds what the drive model does not foretell.
     notes : tuple of str
         What to know before comparing.
+    legs : tuple of GradedLeg
+        The drive leg by leg, as far as the vehicle came.
     """
 
     begun_s: float
@@ -118,6 +121,7 @@ class Grade:
     outside_m: float | None
     foreseen: Foreseen | None
     notes: tuple[str, ...]
+    legs: tuple[GradedLeg, ...] = ()
 
     @property
     def is_as_foreseen(self) -> bool | None:
@@ -226,7 +230,9 @@ class DriveGrader:
         self._last = start
         self._tally = _Tally()
         self._points = field.frame.to_local_array([start.position, *way.positions])
+        self._last_point = self._points[:1]
         self._seqs = np.array(way.seqs)
+        self._legs = LegMeter(self._points)
         self._notes: list[str] = []
         if start.speed_mps > STANDING_MPS:
             self._notes.append(
@@ -240,11 +246,17 @@ class DriveGrader:
             ]
         )
 
-    def drive(self, fixes: Sequence[TrackFix], clearances_m: NDArray[np.float64] | None) -> None:
-        """Take positions, and what the track to each keeps to the fence."""
+    def drive(
+        self,
+        fixes: Sequence[TrackFix],
+        points: NDArray[np.float64],
+        clearances_m: NDArray[np.float64] | None,
+    ) -> None:
+        """Take positions, their points in the field's frame, and what the track to each keeps to the fence."""
         tally = self._tally
-        track = self._field.frame.to_local_array([fix.position for fix in (self._last, *fixes)])
-        steps, points = np.diff(track, axis=0), track[1:]
+        track = np.concatenate((self._last_point, points))
+        self._last_point = points[-1:]
+        steps = np.diff(track, axis=0)
         places = shapely.points(points)
         items = np.array([fix.item for fix in fixes])
         legs = np.minimum(np.searchsorted(self._seqs, items), len(self._seqs) - 1)
@@ -256,9 +268,11 @@ class DriveGrader:
         tally.farthest = max(tally.farthest, int(legs.max()) + 1)
         if clearances_m is not None:
             tally.least_clearance_m = min(tally.least_clearance_m, float(clearances_m.min()))
+        outside_m: NDArray[np.float64] | None = None
         if self._forecast is not None:
-            outside_m = float(shapely.distance(places, self._forecast.area).max())
-            tally.outside_m = max(tally.outside_m, outside_m)
+            outside_m = np.asarray(shapely.distance(places, self._forecast.area))
+            tally.outside_m = max(tally.outside_m, float(outside_m.max()))
+        self._legs.take(track, legs, outside_m)
         self._last = fixes[-1]
 
     def reached(self, seq: int, boot_s: float) -> None:
@@ -293,6 +307,13 @@ class DriveGrader:
             outside_m=None if forecast is None else tally.outside_m,
             foreseen=None if forecast is None else self._foreseen(forecast, last_reached),
             notes=tuple(self._notes),
+            legs=self._legs.finish(
+                way.seqs[: tally.farthest],
+                [self._field.vehicle.speed_mps if asked is None else asked for asked in way.speeds][
+                    : tally.farthest
+                ],
+                forecast,
+            ),
         )
 
     def _foresee(self, heading_deg: float | None) -> Envelope | None:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from mavlink_bridge.logbook.recorder import TrackTaker
     from mavlink_bridge.mavlink.messages import Message
     from mavlink_bridge.tlog import LogEntry
     from missions.situation import Situation
@@ -41,7 +42,7 @@ _AUTOPILOT = 1
 """MAV_COMP_ID_AUTOPILOT1."""
 
 
-def read_logbook(path: Path, system: int | None = None) -> Logbook:
+def read_logbook(path: Path, system: int | None = None, *, on_track: TrackTaker | None = None) -> Logbook:
     """Return what a log holds.
 
     Parameters
@@ -50,6 +51,8 @@ def read_logbook(path: Path, system: int | None = None) -> Logbook:
         A ``.tlog`` or ``.raw``, packed or not.
     system : int, optional
         Only this vehicle; default every one that is heard.
+    on_track : callable, optional
+        Takes every position (`VehicleRecorder`); a logbook itself keeps only a thinned track.
 
     Raises
     ------
@@ -58,7 +61,9 @@ def read_logbook(path: Path, system: int | None = None) -> Logbook:
     """
     head = _Head(path)
     begins_s, duration_s = head.begins_s, max(0.0, head.duration_s)
-    recorders = [VehicleRecorder(situation) for situation in head.first_situations(head.vehicles(system))]
+    recorders = [
+        VehicleRecorder(situation, on_track) for situation in head.first_situations(head.vehicles(system))
+    ]
     clock = SteadyClock()
     clock.advance(begins_s, None)
     reader = TlogReader(path, RECORDED)

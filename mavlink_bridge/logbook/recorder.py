@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final, TypeVar
 
@@ -23,7 +24,7 @@ from mavlink_bridge.logbook.transfers import TRANSFER_TYPES, TransferWatch
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.autopilots import autopilot_of
 from mavlink_bridge.mavlink.modes import mode_name
-from missions.geo import distance_m
+from missions.geo import LatLon, distance_m
 from missions.ground.frame import MAX_LATITUDE_DEG, frame_around
 from missions.vehicle import PARAMETER_NAMES, PX4_PREFIXES
 from missions.vehicle.parameter_remarks import no_number_remarks, range_remarks
@@ -32,19 +33,24 @@ from missions.vehicle.parameters import PX4_NAMES
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    import numpy as np
+    from numpy.typing import NDArray
+
     from mavlink_bridge.mavlink.messages import Frame
     from missions.fence import Fence
-    from missions.geo import LatLon
     from missions.ground.frame import LocalFrame
     from missions.situation import Known, Situation
 
 T = TypeVar("T")
+TrackTaker = Callable[[int, str, bool, Sequence["TrackFix"], "NDArray[np.float64] | None"], None]
+"""Takes positions batch by batch: of which system, in which mode, whether armed, and what the track to each keeps to the fence."""
 
 RECORDED = FOLDED | TRANSFER_TYPES | {m.MissionCurrent, m.MissionItemReached, m.FenceStatus}
 """The message types that a recorder looks at."""
 
 _BATCH: Final = 4096  # positions measured against the fence at once; chosen, it changes no answer
 _MOST_TARGETS = 1000  # the last ones are kept; chosen, bounds memory
+_NOWHERE = LatLon(math.nan, math.nan)
 _SAME_M, _SAID_AGAIN_S = 0.2, 3.0  # within both a target is the same one repeated; chosen, not measured
 
 
@@ -55,9 +61,14 @@ class VehicleRecorder:
     ----------
     situation : Situation
         What holds from the beginning: the vehicle's ids, what the log reports later but was so before.
+    on_track : callable, optional
+        Takes the positions batch by batch; those without a fix have no number as their place, and come before earlier ones that have one.
     """
 
-    def __init__(self, situation: Situation) -> None:
+    # Many attributes: one for each kind of thing that is noted, and what of it is under way.
+
+    def __init__(self, situation: Situation, on_track: TrackTaker | None = None) -> None:
+        self._on_track = on_track
         assert situation.system is not None
         assert situation.component is not None
         self.situation = situation
@@ -213,8 +224,8 @@ class VehicleRecorder:
         elif isinstance(message, m.FenceStatus):
             self._fence.take_status(message, now_s)
         elif isinstance(message, m.Statustext):
-            texts = autopilot_of(ardupilot=self.situation.ardupilot).texts
-            self._fence.take_text(message.text, texts, now_s)
+            rules = autopilot_of(ardupilot=self.situation.ardupilot).incidents
+            self._fence.take_text(message.text, rules, now_s)
 
     def _take_item(self, item: int) -> None:
         if 0 < item < self._item:  # begun anew, or jumped back: another drive
@@ -228,6 +239,8 @@ class VehicleRecorder:
         pose = self.situation.pose
         if (message.lat, message.lon) == (0, 0) or pose is None or pose.time_s != now_s:
             self._without_fix += 1
+            lost = TrackFix(now_s, message.time_boot_ms / 1000, _NOWHERE, math.nan, self._item, None)
+            self._hand_on([lost], None)
             return
         if abs(pose.value.position.lat_deg) > MAX_LATITUDE_DEG:
             self._note("positions near a pole were skipped")
@@ -259,16 +272,21 @@ class VehicleRecorder:
         frame = fence.meter.ground.frame if fence.meter else self._frame
         joined = fixes if self._before is None else [self._before, *fixes]
         self._before = fixes[-1]
-        driven_m = self._odometer.drive(
-            self._mode_name, fixes, self._frame.to_local_array([fix.position for fix in fixes])
-        )
-        if self._modes:
-            self._modes[-1] = replace(self._modes[-1], driven_m=self._modes[-1].driven_m + driven_m)
         points = frame.to_local_array([fix.position for fix in joined])
         track = pieces(joined, points)[len(joined) - len(fixes) :]
         points = points[len(joined) - len(fixes) :]
+        own = points if frame is self._frame else self._frame.to_local_array([fix.position for fix in fixes])
+        driven_m = self._odometer.drive(self._mode_name, fixes, own)
+        if self._modes:
+            self._modes[-1] = replace(self._modes[-1], driven_m=self._modes[-1].driven_m + driven_m)
         clearances_m = fence.measure(fixes, track, points, is_armed=bool(self.situation.armed))
-        self._drives.drive(self.situation, fixes, clearances_m, fence.vehicle, frame, fence.meter)
+        self._drives.drive(self.situation, fixes, points, clearances_m, fence.vehicle, frame, fence.meter)
+        self._hand_on(fixes, clearances_m)
+
+    def _hand_on(self, fixes: Sequence[TrackFix], clearances_m: NDArray[np.float64] | None) -> None:
+        situation = self.situation
+        if self._on_track is not None:
+            self._on_track(situation.system or 0, self._mode_name, bool(situation.armed), fixes, clearances_m)
 
     def _note(self, text: str) -> None:
         self._notes.setdefault(text)

@@ -45,6 +45,7 @@ class _Open:
     ended_s: float
     announced: int | None
     seen: set[int] = field(default_factory=set)
+    repeats: int = 0
 
     @property
     def is_whole(self) -> bool:
@@ -114,7 +115,8 @@ class TransferWatch:
         key = (kind, way is not Way.READ_BACK)
         known = self._open.get(key)
         if known and (known.way, known.station, known.announced) == (way, station, count) and not known.seen:
-            known.ended_s = now_s  # repeated
+            known.ended_s = now_s
+            known.repeats += 1
             return
         self._close(key)
         self._open[key] = _Open(kind, way, station, now_s, now_s, count)
@@ -125,6 +127,7 @@ class TransferWatch:
         transfer = self._reach(kind, way, station, now_s)
         if transfer is None:
             return
+        transfer.repeats += seq in transfer.seen
         transfer.seen.add(seq)
         if way is Way.READ_BACK and transfer.is_whole:
             self._close((kind, False))
@@ -170,6 +173,7 @@ class TransferWatch:
                 len(transfer.seen),
                 ending,
                 result,
+                transfer.repeats,
             )
         )
 

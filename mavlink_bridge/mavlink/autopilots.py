@@ -113,15 +113,12 @@ class Texts:
         What a text that a mission was stored begins with; None where there is none.
     busy : str, optional
         What a text begins with that is all the answer to a download request while another transfer runs; None where DENIED is the answer.
-    breach : str, optional
-        What a text begins with that reports that the vehicle left its fence; None where FENCE_STATUS does.
     """
 
     noise: str
     own_state: str
     list_stored: str | None = None
     busy: str | None = None
-    breach: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -261,7 +258,6 @@ def _px4(name: str, form: StoredForm) -> AutopilotTable:
             ),
             own_state=r"preflight|arming denied|battery|ekf|gps|compass|mag|baro|accel|gyro|switching to|\[\w+\]|.*\bfailsafe\b|rtl",
             busy="mission download request ignored",
-            breach="geofence: (approaching or outside|exceeding maximum distance)",
         ),
         driving=PX4_DRIVING,
         fence=PX4_FENCE,

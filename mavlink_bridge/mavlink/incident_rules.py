@@ -45,6 +45,8 @@ class IncidentRules:
     ----------
     breach_text : str
         A breach told by text.
+    counts_breaches : bool
+        Whether FENCE_STATUS tells of breaches, too, and counts them; where it does not, the text is all there is.
     failsafes : tuple of tuple of str
         A failsafe's text, and what it is called; the first one that fits counts.
     warning : tuple of str, optional
@@ -70,6 +72,7 @@ class IncidentRules:
     """
 
     breach_text: str
+    counts_breaches: bool = True
     failsafes: tuple[tuple[str, str], ...]
     warning: tuple[str, str] | None = None
     goes_on_text: str | None = None
@@ -128,6 +131,7 @@ _HOLD, _RTL, _LAND = PX4_MODES.hold, PX4_MODES.rtl, px4_mode(4, 6)
 
 PX4_INCIDENTS = IncidentRules(
     breach_text=r"geofence: (approaching or outside geofence|exceeding maximum distance)",
+    counts_breaches=False,
     failsafes=(
         (r"no valid mission available", _NO_MISSION),
         (r"failsafe activated", "failsafe"),

@@ -471,11 +471,19 @@ AUTOPILOT_VERSION_ID = 148
 
 @dataclass(frozen=True, slots=True)
 class BatteryStatus(Message):
-    """BATTERY_STATUS (147): mV of each cell, or of the whole in the first (65535: none), % (-1: unknown)."""
+    """BATTERY_STATUS (147): mV of each cell, or of the whole in the first (65535: none; of cells 11 to 14 0), % (-1: unknown)."""
 
     id: int
     voltages: tuple[int, ...] = (65535,) * 10
     battery_remaining: int = -1
+    voltages_ext: tuple[int, ...] = (0,) * 4
+
+    @property
+    def whole_mv(self) -> int | None:
+        """All cells together; None where no cell is told."""
+        cells = [one for one in self.voltages if one != 65535]
+        cells += [one for one in self.voltages_ext if one not in (0, 65535)]
+        return sum(cells) if cells else None
 
 
 @dataclass(frozen=True, slots=True)

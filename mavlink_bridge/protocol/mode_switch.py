@@ -72,6 +72,11 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
         return self.state in (SwitchState.ACCEPTED, SwitchState.SEEN)
 
     @property
+    def is_seen(self) -> bool:
+        """Whether a heartbeat has shown it."""
+        return self.state is SwitchState.SEEN
+
+    @property
     def is_refused(self) -> bool:
         """Whether the vehicle said no."""
         return self.state is SwitchState.REFUSED
@@ -164,6 +169,11 @@ def set_mode(peer: Peer, mode: int, confirmation: int) -> CommandLong:
     return CommandLong(peer.system, peer.component, Command.DO_SET_MODE, confirmation, *params)
 
 
+def ask_for_heartbeat(peer: Peer) -> CommandLong:
+    """Return the command that asks for a heartbeat at once."""
+    return CommandLong(peer.system, peer.component, Command.REQUEST_MESSAGE, param1=_HEARTBEAT_ID)
+
+
 class AwaitHeartbeat(Outbox):
     """Asks for a heartbeat and waits for the vehicle's next: what it tells is no older than our wish to act on it.
 
@@ -187,8 +197,7 @@ class AwaitHeartbeat(Outbox):
 
     def start(self, now_s: float) -> None:  # noqa: ARG002 - the contract of machines
         """Ask."""
-        peer = self._peer
-        self._send(CommandLong(peer.system, peer.component, Command.REQUEST_MESSAGE, param1=_HEARTBEAT_ID))
+        self._send(ask_for_heartbeat(self._peer))
 
     def receive(self, frame: Frame, now_s: float) -> None:  # noqa: ARG002 - the contract of machines
         """Take a frame."""

@@ -16,6 +16,7 @@ from mavlink_bridge.director.orders import Homing, ObstacleSource
 from mavlink_bridge.errors import LogError
 from missions.errors import MissionError
 from missions.firmware import read_firmware
+from missions.formats.calibration import calibration_from_plain, calibration_to_plain
 from missions.geo import LatLon
 from missions.request import request_of
 from missions.situation import Situation
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from mavlink_bridge.backup.drive_note import DriveNote
+    from missions.request import Request
 
 _FORMAT = 2  # of the file; others are not read
 
@@ -42,12 +44,12 @@ class Call:
     time_s : float
         Its time.
     name : str
-        Which call: ``start``, ``timer``, ``target``, ``obstacle``, ``clear``, ``confirm``, ``plan_made``, ``ways_made``, ``backup_stored``, ``backup_failed``, ``in_use``,
-        ``note_stored`` or ``note_failed``.
+        Which call: ``start``, ``timer``, ``target``, ``request``, ``obstacle``, ``clear``, ``confirm``, ``drive``, ``hold``, ``suspect``, ``plan_made``, ``ways_made``, ``backup_stored``,
+        ``backup_failed``, ``in_use``, ``note_stored`` or ``note_failed``.
     target : LatLon, optional
         The target that was typed, or where the obstacle is.
     text : str
-        The obstacle's radius, where the backup lies, or why there is none, or no note.
+        The obstacle's radius, the request, who asks for HOLD, where the backup lies, or why there is none, or no note.
     """
 
     frames: int
@@ -64,7 +66,6 @@ class Journal:
     orders: Orders
     described: Situation
     calls: tuple[Call, ...]
-    events: tuple[dict[str, Any], ...]
     notes: tuple[DriveNote, ...] = ()
 
 
@@ -99,6 +100,7 @@ class JournalWriter:
                 "parameters": dict(described.parameters),
                 "firmware": str(described.firmware) if described.firmware else None,
                 "stopping": [[one.speed_mps, one.distance_m] for one in described.stops.given],
+                "calibration": calibration_to_plain(described.calibration),
                 "drive_notes": [note_to_json(note) for note in notes],
             }
         )
@@ -142,7 +144,7 @@ def read_journal(path: Path) -> Journal:
         It cannot be read; the message says at which line.
     """
     calls: list[Call] = []
-    events: list[dict[str, Any]] = []
+    line_number = 1
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
         head = json.loads(lines[0])
@@ -152,37 +154,57 @@ def read_journal(path: Path) -> Journal:
         firmware = read_firmware(head["firmware"]) if head.get("firmware") else None
         given = tuple(Stop(*one) for one in head.get("stopping", ()))
         notes = tuple(map(note_from_json, head.get("drive_notes", ())))
-        described = Situation(parameters=head["parameters"], firmware=firmware, stops=Stops(given))
-        for line in lines[1:]:
+        described = Situation(
+            parameters=head["parameters"],
+            firmware=firmware,
+            stops=Stops(given),
+            calibration=calibration_from_plain(head.get("calibration")),
+        )
+        for line_number, line in enumerate(lines[1:], start=2):  # noqa: B007 - told where it fails
             entry = json.loads(line)
-            if "told" in entry:
-                events.append(entry["told"])
-            else:
-                target = LatLon(*entry["target"]) if "target" in entry else None
-                calls.append(
-                    Call(entry["frames"], entry["time_s"], entry["call"], target, str(entry.get("text", "")))
-                )
+            if "told" in entry:  # for people: a replay tells its own
+                continue
+            target = LatLon(*entry["target"]) if "target" in entry else None
+            calls.append(
+                Call(entry["frames"], entry["time_s"], entry["call"], target, str(entry.get("text", "")))
+            )
     except OSError as error:
         raise LogError(f"{path} cannot be read: {error.strerror}", file=str(path)) from None
     except (ValueError, KeyError, TypeError, IndexError, MissionError) as error:
-        line_number = len(calls) + len(events) + 2
         raise LogError(
             f"{path}: line {line_number} is not a journal entry: {error!r}", file=str(path)
         ) from None
-    return Journal(orders, described, tuple(calls), tuple(events), notes)
+    return Journal(orders, described, tuple(calls), notes)
+
+
+def request_to_text(request: Request) -> str:
+    """Return a request as the text of a call."""
+    return json.dumps(_request_to_json(request))
+
+
+def request_from_text(text: str) -> Request:
+    """Return the request that a call's text is."""
+    return _request_from_json(json.loads(text))
+
+
+def _request_to_json(request: Request) -> dict[str, Any]:
+    words = request.words()
+    return {**words, "footprint": asdict(words["footprint"])}
+
+
+def _request_from_json(document: dict[str, Any]) -> Request:
+    return request_of(**{**document, "footprint": Footprint(**document.get("footprint", {}))})
 
 
 def _orders_to_json(orders: Orders) -> dict[str, Any]:
     document = asdict(orders)
-    words = orders.request.words()
-    document["request"] = {**words, "footprint": asdict(words["footprint"])}
+    document["request"] = _request_to_json(orders.request)
     document["target_sources"] = sorted(orders.target_sources)
     document["obstacle_sources"] = sorted(orders.obstacle_sources)
     return document
 
 
 def _orders_from_json(document: dict[str, Any]) -> Orders:
-    request = document["request"]
     homing = document.get("homing", {})
     places = {name: LatLon(*place) for name, place in homing.get("places", {}).items()}
     return Orders(
@@ -192,6 +214,6 @@ def _orders_from_json(document: dict[str, Any]) -> Orders:
             "identity": tuple(document["identity"]) if document["identity"] else None,
             "target_sources": frozenset(TargetSource(name) for name in document["target_sources"]),
             "obstacle_sources": frozenset(map(ObstacleSource, document.get("obstacle_sources", ()))),
-            "request": request_of(**{**request, "footprint": Footprint(**request.get("footprint", {}))}),
+            "request": _request_from_json(document["request"]),
         }
     )

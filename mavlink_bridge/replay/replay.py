@@ -8,31 +8,48 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from mavlink_bridge.director import Director, Orders
 from mavlink_bridge.errors import BackupError, LogError, VehicleInUseError
 from mavlink_bridge.logbook.clock import Pulse, SteadyClock
-from mavlink_bridge.replay.journal import journal_path, read_journal
+from mavlink_bridge.many import Task
+from mavlink_bridge.replay.journal import journal_path, read_journal, request_from_text
 from mavlink_bridge.tlog import TlogReader
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
     from mavlink_bridge.director import Event
+    from mavlink_bridge.mavlink.messages import Frame
     from mavlink_bridge.replay.journal import Call, Journal
     from mavlink_bridge.tlog import LogEntry
+
+Look: TypeAlias = "Callable[[Director, Frame, float], None]"
+"""Sees the director after each frame, with the log's own time of it."""
 
 SENT_LINK = 3
 """MAVProxy's link number, and ours, for what the recording side sent."""
 
 _NO_BACKUP = {"backup_failed": BackupError, "in_use": VehicleInUseError}
 """Calls that report why nothing can be uploaded."""
+_PLAIN_CALLS: dict[str, Callable[[Director, Call], None]] = {
+    "clear": lambda director, call: director.clear_obstacles(call.time_s),
+    "confirm": lambda director, call: director.confirm(call.time_s),
+    "drive": lambda director, call: director.start_drive(call.time_s),
+    "suspect": lambda director, _call: director.suspect_lists(),
+    "hold": lambda director, call: director.hold(call.text, call.time_s),
+}
 _NOTED = ("note_stored", "note_failed")
 _STILL_ADVICE = "its fence, mission and targets can still be used: `pbpp log FILE`, `pbpp plan --log FILE`"
 
 
-def replay_log(log: Path, orders: Orders, wait: Callable[[float], None] | None = None) -> Iterator[Event]:
+def replay_log(
+    log: Path,
+    orders: Orders,
+    wait: Callable[[float], None] | None = None,
+    look: Look | None = None,
+) -> Iterator[Event]:
     """Return the director's events over a log; with its journal where there is one.
 
     Parameters
@@ -43,6 +60,8 @@ def replay_log(log: Path, orders: Orders, wait: Callable[[float], None] | None =
         What is asked of plans where there is no journal.
     wait : callable, optional
         Called before each frame with the seconds since the log's begin, to let them pass.
+    look : callable, optional
+        Called after each frame with the director, the frame and the log's own time of it.
 
     Raises
     ------
@@ -54,16 +73,25 @@ def replay_log(log: Path, orders: Orders, wait: Callable[[float], None] | None =
         entries = _paced(entries, wait)
     journal = journal_path(log)
     if journal.exists():
-        return replay_recorded(entries, read_journal(journal))
-    return replay_foreign(entries, orders)
+        return replay_recorded(entries, read_journal(journal), look)
+    return replay_foreign(entries, orders, look)
 
 
-def replay_to_json(log: Path, orders: Orders) -> list[dict[str, object]]:
-    """Replay a whole log; return its events as JSON objects, with the log's name. For worker processes."""
-    return [{"log": log.name, **event.as_json()} for event in replay_log(log, orders)]
+def replay_task(log: Path, orders: Orders) -> Task[Orders]:
+    """Return the replay of a log as a task for workers: with its journal, where it has one."""
+    journal = journal_path(log)
+    return Task(orders, (log, journal) if journal.exists() else (log,))
 
 
-def replay_recorded(entries: Iterable[LogEntry], journal: Journal) -> Iterator[Event]:
+def replay_done(task: Task[Orders]) -> list[dict[str, object]]:
+    """Do such a task: return the log's events as JSON objects, with its name."""
+    log = task.files[0]
+    return [{"log": log.name, **event.as_json()} for event in replay_log(log, task.asked)]
+
+
+def replay_recorded(
+    entries: Iterable[LogEntry], journal: Journal, look: Look | None = None
+) -> Iterator[Event]:
     """Repeat a bridge's run from its log and journal; return its events."""
     director = Director(journal.orders, journal.described, journal.notes)
     notes_drives = any(call.name in _NOTED for call in journal.calls)
@@ -81,12 +109,14 @@ def replay_recorded(entries: Iterable[LogEntry], journal: Journal) -> Iterator[E
             director.note_stored()
         count += 1
         yield from _spoken(director)
+        if look is not None:
+            look(director, entry.frame, entry.time_s)
     while following is not None:
         yield from _call(director, following)
         following = next(calls, None)
 
 
-def replay_foreign(entries: Iterable[LogEntry], orders: Orders) -> Iterator[Event]:
+def replay_foreign(entries: Iterable[LogEntry], orders: Orders, look: Look | None = None) -> Iterator[Event]:
     """Let the director listen to a log that somebody else recorded; return its events, at the log's times.
 
     The director's own time only goes forward: where the log's clock was set, it goes on from where it was.
@@ -109,6 +139,8 @@ def replay_foreign(entries: Iterable[LogEntry], orders: Orders) -> Iterator[Even
         before_s = now_s
         director.receive(entry.frame, now_s)
         yield from _at_log_time(_spoken(director), clock)
+        if look is not None:
+            look(director, entry.frame, now_s + clock.offset_s)
     if before_s is not None:
         director.handle_timer(before_s)
         _make_plan(director, before_s)
@@ -148,10 +180,10 @@ def _call(director: Director, call: Call) -> Iterator[Event]:
         director.take_target(call.target, call.time_s)
     elif call.name == "obstacle":
         director.take_obstacle(call.target, float(call.text), call.time_s)
-    elif call.name == "clear":
-        director.clear_obstacles(call.time_s)
-    elif call.name == "confirm":
-        director.confirm(call.time_s)
+    elif call.name == "request":
+        director.take_request(request_from_text(call.text), call.time_s)
+    elif call.name in _PLAIN_CALLS:
+        _PLAIN_CALLS[call.name](director, call)
     elif call.name == "backup_stored":
         director.backup_stored(call.time_s, Path(call.text) if call.text else None)
     elif call.name == "note_stored":

@@ -44,10 +44,11 @@ class MovingDisc:
 
 @dataclass(frozen=True, slots=True)
 class Battery:
-    """What the battery's monitor tells: percent left (-1: it does not know) and volts."""
+    """What the battery's monitor tells: percent left (-1: it does not know), volts, and of how many cells each (0 to 14; 0: of the whole)."""
 
     percent: int = 100
     volts: float = 12.6
+    cells: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,6 +41,10 @@ _CAPABILITIES = (
 _STANDBY, _ACTIVE, _CALIBRATING = 3, 4, 2
 _NO_MISSION, _NOT_STARTED, _ACTIVE_MISSION, _PAUSED, _COMPLETE = 1, 2, 3, 4, 5
 _NO_CELL = 65_535
+_CELLS, _MORE_CELLS = (
+    10,
+    4,
+)  # of BATTERY_STATUS.voltages and .voltages_ext; 65535 stands for none in the first, 0 in the second
 _BOUNDARY = 3  # FENCE_BREACH_BOUNDARY
 
 
@@ -100,8 +104,15 @@ def _battery_status(state: TelemetrySource) -> m.Message | None:
     battery = state.rover.battery
     if battery is None:
         return None
-    cells = (round(battery.volts * 1000), *(9 * [_NO_CELL]))
-    return m.BatteryStatus(0, cells, battery.percent)
+    count = battery.cells or 1
+    cells_mv = count * [round(battery.volts * 1000 / count)]
+    first, rest = cells_mv[:_CELLS], cells_mv[_CELLS:]
+    return m.BatteryStatus(
+        0,
+        (*first, *((_CELLS - len(first)) * [_NO_CELL])),
+        battery.percent,
+        (*rest, *((_MORE_CELLS - len(rest)) * [0])),
+    )
 
 
 def _global_position(state: TelemetrySource) -> m.Message:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import mmap
 import zlib
-from typing import TYPE_CHECKING, BinaryIO, Final, Protocol
+from typing import TYPE_CHECKING, BinaryIO, Final, Protocol, Self
 
 from mavlink_bridge.errors import LogError
+from mavlink_bridge.tlog.dataflash import HEAD, as_telemetry
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -51,9 +52,22 @@ class LogFile:
         if not head:
             raise LogError(f"{path}: the file is empty", path=str(path))
         self._is_gzip = _unpacks(head)
+        begin = zlib.decompressobj(wbits=_GZIP).decompress(head, len(HEAD)) if self._is_gzip else head
+        self._telemetry = self._translated() if begin.startswith(HEAD) else None
+
+    def _translated(self) -> bytes:
+        """Return a DataFlash log as telemetry; it is all that of it is kept."""
+        with self._opened() as file:
+            if not self._is_gzip:
+                with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as mapped:
+                    return as_telemetry(mapped, self.path)
+        with self._opened() as file, _GzipSource(file) as source:
+            return as_telemetry(b"".join(source.pieces()), self.path)
 
     def open(self) -> AbstractContextManager[Source]:
         """Open the log from its begin."""
+        if self._telemetry is not None:
+            return _MadeSource(self._telemetry)
         return _GzipSource(self._opened()) if self._is_gzip else _MappedSource(self._opened())
 
     def _opened(self) -> BinaryIO:
@@ -87,6 +101,23 @@ class _MappedSource:
             return mapped[begin - aligned :], end == size
 
 
+class _MadeSource:
+    # What is in memory already.
+    def __init__(self, data: bytes) -> None:
+        self._data = data
+        self.cut_short = False
+
+    def __enter__(self) -> Source:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def window(self, begin: int) -> tuple[bytes, bool]:
+        end = begin + WINDOW_BYTES
+        return self._data[begin:end], end >= len(self._data)
+
+
 class _GzipSource:
     def __init__(self, file: BinaryIO) -> None:
         self._file = file
@@ -96,11 +127,15 @@ class _GzipSource:
         self._is_done = False
         self.cut_short = False
 
-    def __enter__(self) -> Source:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
         self._file.close()
+
+    def pieces(self) -> Iterator[bytes]:
+        """Yield all of it, piece by piece."""
+        return self._pieces
 
     def window(self, begin: int) -> tuple[bytes, bool]:
         parts = [self._buffer[begin - self._buffer_at :]]

@@ -12,10 +12,11 @@ from shapely import LineString, Point
 from shapely.ops import nearest_points
 
 from missions.checking.execution import CIRCLE_M, Course, CourseLeg, follow_mission
-from missions.checking.forecast import forecast_drive, pivot_remarks
+from missions.checking.forecast import forecast_drive
 from missions.checking.holding import hold_check, hold_warnings
 from missions.checking.home_ways import checked_ways
 from missions.checking.mission_end import crossed_zones, end_warnings, return_warnings
+from missions.checking.pivots import pivot_remarks
 from missions.checking.px4_waits import with_waits
 from missions.checking.rtl_lines import return_place
 from missions.drive_model import Envelope, extrapolated

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from missions.firmware import Firmware
     from missions.geo import LatLon
     from missions.items import MissionItem
+    from missions.situation import Calibration
 
 _SOURCE = "the note of the drive"
 
@@ -54,6 +55,7 @@ class DriveRecord:
     vehicle_type: int | None
     firmware: Firmware | None
     ardupilot: bool = True
+    calibration: Calibration | None = None
 
 
 def record_of(plan: Plan, situation: Situation) -> DriveRecord:
@@ -83,6 +85,7 @@ def record_of(plan: Plan, situation: Situation) -> DriveRecord:
         vehicle_type=situation.vehicle_type,
         firmware=situation.firmware,
         ardupilot=situation.ardupilot is not False,
+        calibration=situation.calibration,
     )
 
 
@@ -96,6 +99,7 @@ def situation_of(record: DriveRecord) -> Situation:
         home=Known(record.home, None, _SOURCE) if record.home is not None else None,
         pose=Known(Pose(record.path[0], record.heading_deg), None, _SOURCE),
         parameters=record.parameters,
+        calibration=record.calibration,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -12,10 +13,13 @@ from shapely import Point
 from missions.drive_model.hold_loop import HoldLoop, ending_of
 from missions.drive_model.stopping import HoldCheck, Motion, RollOut, motion
 from missions.errors import MissionError
-from missions.geo import LocalPoint
+from missions.geo import LocalPoint, destination, distance_m
 from missions.ground.from_situation import ground_for
 from missions.ground.seams import is_seam
 from missions.promise import known_vehicle
+from missions.situation import Pose
+from missions.stops import NEARLY_MPS
+from missions.vehicle import known_ardupilot
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -25,8 +29,8 @@ if TYPE_CHECKING:
     from missions.ground.ground import Ground
     from missions.planned import Plan
     from missions.request import Request
-    from missions.situation import Pose, Situation
-    from missions.stops import Stops
+    from missions.situation import Situation
+    from missions.stops import Rolling, Stops
     from missions.vehicle import Vehicle
 
 _NEGLIGIBLE_M = 0.1
@@ -34,6 +38,9 @@ _NEGLIGIBLE_M = 0.1
 
 _PAST_M = 10.0  # the longest blend of a corner measured, 3 m on each leg at 5 m/s, and the lag of MISSION_CURRENT; chosen
 _BEHIND_M = 1e-3  # beyond the line, where its zone is looked for
+
+_SLOWED = 0.85
+"""At so much of its first speed a roll tells how it will go on: less of it is within the noise of speeds. Chosen."""
 
 TAKES_S = 0.5
 """So long until a HOLD that is sent now is taken: half of it is the age of the position, half a radio's delay. Chosen, not measured."""
@@ -163,6 +170,39 @@ def hold_now(
         stopping.source(pose.speed_mps),
         _go_on_m(ahead, plan.envelope, stopping, ground) if ahead is not None and plan is not None else None,
     )
+
+
+def resting_pose(situation: Situation, request: Request, rolling: Rolling) -> Pose | None:
+    """Return where a vehicle that rolls out will stand; None while that is not known well enough, or it does not roll straight on.
+
+    How its speed falls with the way is that of its own stops, else of measured ones; how far that takes it, this roll tells by itself.
+
+    Parameters
+    ----------
+    situation : Situation
+        Where the vehicle is and how it moves; what is known of its stops.
+    request : Request
+        What is asked of routes.
+    rolling : Rolling
+        What was seen of this stop.
+    """
+    pose = situation.pose.value if situation.pose is not None else None
+    if pose is None or rolling.first is None or pose.velocity_mps is None:
+        return None
+    began, first_mps = rolling.first
+    if not NEARLY_MPS < pose.speed_mps <= _SLOWED * first_mps:
+        return None
+    try:
+        stopping = ending_of(known_vehicle(situation, request), situation.stops)
+    except MissionError:
+        return None
+    if isinstance(stopping, HoldLoop) or known_ardupilot(situation) is False:
+        return None  # PX4's HOLD steers
+    left_m = stopping.distance_m(pose.speed_mps) - stopping.distance_m(NEARLY_MPS)
+    so_far_m = stopping.distance_m(first_mps) - stopping.distance_m(pose.speed_mps)
+    ahead_m = left_m * distance_m(began, pose.position) / so_far_m if so_far_m > 0 else 0.0
+    way_deg = math.degrees(math.atan2(*pose.velocity_mps))
+    return Pose(destination(pose.position, ahead_m, way_deg), pose.heading_deg, (0.0, 0.0))
 
 
 def _moving(pose: Pose, ground: Ground) -> Motion:

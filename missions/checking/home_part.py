@@ -40,11 +40,14 @@ class HomePart:
         The item to choose: the first behind the tag.
     items : tuple of MissionItem
         What is driven from there, without the jump that ends it.
+    numbers : tuple of int
+        The number of each of them in the mission.
     """
 
     leg_item: int
     item: int
     items: tuple[MissionItem, ...]
+    numbers: tuple[int, ...]
 
     @property
     def place(self) -> LatLon:
@@ -80,9 +83,10 @@ def home_parts(items: Sequence[MissionItem]) -> tuple[HomePart, ...]:
         rest = range(index, len(items))
         last = next(i for i in rest if _jumps_to_end(items[i], len(items)) or i == len(items) - 1)
         first = next((i for i in rest if items[i].command != Command.JUMP_TAG), last)
-        driven = tuple(item for item in items[first:last] if item.command != Command.JUMP_TAG)
+        numbers = tuple(i + 1 for i in range(first, last) if items[i].command != Command.JUMP_TAG)
+        driven = tuple(items[number - 1] for number in numbers)
         if any(item.is_placed for item in driven):
-            parts[int(tag)] = HomePart(int(tag), first + 1, driven)
+            parts[int(tag)] = HomePart(int(tag), first + 1, driven, numbers)
     return tuple(parts[tag] for tag in sorted(parts))
 
 

@@ -21,7 +21,7 @@ import shapely
 
 from missions.drive_model.corner import GRAVITY_MPS2, INSIDE_BAND_M
 from missions.drive_model.fence_ahead import FenceAhead, FenceEdges
-from missions.drive_model.motion import LegProfile, Ramp
+from missions.drive_model.motion import all_travelled_m, profile_at
 from missions.errors import VehicleError
 from missions.vehicle import Steering
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
 
-    from missions.drive_model import Envelope, Leg
+    from missions.drive_model import Envelope
     from missions.vehicle import Vehicle
 
 LAG_RESERVE = 1.3
@@ -111,7 +111,8 @@ class TargetPoint:
 
     def __init__(self, band: Envelope, vehicle: Vehicle, middles_m: Sequence[float]) -> None:
         self.band = band
-        profiles = [_profile(leg, vehicle) for leg in band.legs]
+        accel_mps2, jerk_mps3 = vehicle.accel_max_mps2, vehicle.jerk_mps3
+        profiles = [profile_at(leg.length_m, leg.top_speed_mps, accel_mps2, jerk_mps3) for leg in band.legs]
         begins_s = [0.0]
         self._passed_s = []
         """When it passes each corner."""
@@ -129,10 +130,17 @@ class TargetPoint:
         self.times_s = np.arange(0.0, whole_s + STEP_S, STEP_S)
         points = band.points[:, 0] + 1j * band.points[:, 1]
         self.places: NDArray[np.complex128] = np.full(len(self.times_s), points[0])
-        for leg, profile, begin_s in zip(band.legs, profiles, begins_s, strict=True):
+        # Of each leg's own time, steps from its begin on, and its end.
+        counts = [math.ceil(profile.duration_s / STEP_S) + 1 for profile in profiles]
+        ends = np.cumsum(counts)
+        legs_s = (np.arange(ends[-1]) - np.repeat(ends - counts, counts)) * STEP_S
+        legs_s[ends - 1] = [profile.duration_s for profile in profiles]
+        legs_m = all_travelled_m(profiles, counts, legs_s)
+        for leg, profile, begin_s, count, end in zip(
+            band.legs, profiles, begins_s, counts, ends, strict=True
+        ):
             step = points[leg.first + 1] - points[leg.first]
-            leg_s = np.append(np.arange(0.0, profile.duration_s, STEP_S), profile.duration_s)
-            shares = profile.all_travelled_m(leg_s) / profile.length_m
+            leg_s, shares = legs_s[end - count : end], legs_m[end - count : end] / profile.length_m
             self.places += np.interp(self.times_s - begin_s, leg_s, shares) * step
 
     def lags(self, vehicle: Vehicle, fence: FenceAhead) -> list[complex]:
@@ -141,10 +149,12 @@ class TargetPoint:
         moved_m = np.maximum(np.abs(steps), _LEAST_MPS * STEP_S)
         is_slowed = np.zeros(len(steps), dtype=np.bool_)
         near = self._near_corners()[:-1]
+        if not near.any():
+            return []
         places, ways = self.places[:-1][near], (steps / moved_m)[near]
         sides = np.concatenate([side * ways for side in _SIDES])
         allowed_mps = fence.speeds_mps(
-            _plane(np.tile(places, len(_SIDES))), _plane(sides), float(moved_m.max(initial=0.0)) / STEP_S
+            _plane(np.tile(places, len(_SIDES))), _plane(sides), float(moved_m.max()) / STEP_S
         )
         is_slowed[near] = (allowed_mps.reshape(len(_SIDES), -1) < _SLOWED_SHARE * moved_m[near] / STEP_S).any(
             axis=0
@@ -188,10 +198,6 @@ def _plane(numbers: NDArray[np.complex128]) -> NDArray[np.float64]:
     return numbers.view(np.float64).reshape(-1, 2)
 
 
-def _profile(leg: Leg, vehicle: Vehicle) -> LegProfile:
-    return LegProfile(leg.length_m, Ramp(leg.top_speed_mps, vehicle.accel_max_mps2, vehicle.jerk_mps3))
-
-
 def _followed(
     places: list[complex], is_slowed: list[bool], vehicle: Vehicle, fence: FenceAhead
 ) -> list[complex]:
@@ -223,21 +229,23 @@ def _followed(
         here = places[sample] + (at - sample) * STEP_S * velocity - behind
         wanted = velocity + gain_per_s * behind
         wanted_mps = abs(wanted) or 1.0
-        way = wanted / wanted_mps
-        most_mps = min(wanted_mps, top_mps, allowed_speed_mps(here, way))
+        most_mps = allowed_speed_mps(here, wanted / wanted_mps)
+        most_mps = min(most_mps, top_mps)
+        most_mps = min(most_mps, wanted_mps)
         wanted *= most_mps / wanted_mps
         wanted_mps = abs(wanted)
         now_mps = abs(driven)
         heading = driven / now_mps if now_mps > _LEAST_MPS else wanted / (wanted_mps or 1.0)
         accel = (velocities[sample + 1] - velocity) / STEP_S
-        turn_radps = ((wanted + accel) * heading.conjugate()).imag / max(now_mps, 1.0)
+        turn_radps = ((wanted + accel) * heading.conjugate()).imag / (max(1.0, now_mps))
         if is_steered:
             most_radps = now_mps / turn_radius_m
             turn_radps = min(max(turn_radps, -most_radps), most_radps)
         heading *= cmath.rect(1.0, turn_radps * STEP_S)
         driven = heading * max(min(wanted_mps, turn_mps), (wanted * heading.conjugate()).real, 0.0)
         # How fast time runs for the target point: it waits for a rover that cannot keep up (AR_WPNav). 0.05 as in the simulator's `drive`.
-        target_mps = max(abs(velocity), _LEAST_MPS)
+        target_mps = abs(velocity)
+        target_mps = max(target_mps, _LEAST_MPS)
         along_mps = ((driven - gain_per_s * behind) * velocity.conjugate()).real / target_mps
         runs = min(max(0.05 + along_mps / target_mps, _LEAST_SCALE), 1.0)
         scale += (runs - scale) * STEP_S / _SETTLE_S

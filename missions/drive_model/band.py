@@ -36,24 +36,31 @@ class Pieces:
     def __init__(self) -> None:
         self.bands_m: list[float] = []
         self.waypoints: list[int] = []
-        self._coordinates: list[float] = []
+        self._vertices: list[Vector] = []
         self._sizes: list[int] = []
 
     def add(self, vertices: Sequence[Vector], band_m: float, waypoint: int) -> None:
         """Add the hull of some places, to be grown by a band."""
         if len(vertices) == 1:
             vertices = (*vertices, *vertices)
-        for vertex in vertices:
-            self._coordinates += vertex
+        self._vertices += vertices
         self._sizes.append(len(vertices))
         self.bands_m.append(band_m)
         self.waypoints.append(waypoint)
 
+    def extend(self, others: Pieces, more_m: float) -> None:
+        """Add all of other pieces, each grown by so much more."""
+        self._vertices += others._vertices
+        self._sizes += others._sizes
+        self.bands_m += [band_m + more_m for band_m in others.bands_m]
+        self.waypoints += others.waypoints
+
     def convex(self) -> NDArray[np.object_]:
         """Return the convex hulls of their places."""
         owners = np.repeat(np.arange(len(self._sizes)), self._sizes)
+        coordinates = np.fromiter(itertools.chain.from_iterable(self._vertices), np.float64, 2 * len(owners))
         # Lines take far less to make than as many points, and their hulls are the same.
-        lines = shapely.linestrings(np.array(self._coordinates).reshape(-1, 2), indices=owners)
+        lines = shapely.linestrings(coordinates.reshape(-1, 2), indices=owners)
         return np.asarray(shapely.convex_hull(lines), dtype=np.object_)
 
 
@@ -95,12 +102,12 @@ def add_leg(pieces: Pieces, drive: DrivePlan, number: int) -> None:
     leg = drive.legs[number]
     # Pure pursuit follows no motion that blends: its corners lie beside whole legs.
     begin_s, end_s = drive.span_s(number) if drive.vehicle.pursuit is None else (0.0, leg.profile.duration_s)
-    times_s = [begin_s]
-    if drive.stray_at(number, begin_s).widest_m >= NEGLIGIBLE_M:
-        times_s += [begin_s + time_s for time_s in TAIL_TIMES_S if begin_s + time_s < end_s]
-    times_s.append(end_s)
-    rungs = [_beside(leg.at(time_s), leg.direction, drive.stray_at(number, time_s)) for time_s in times_s]
     waypoint = waypoint_after(drive, number)
+    if drive.stray_at(number, begin_s).widest_m < NEGLIGIBLE_M:  # and less later on
+        pieces.add((leg.at(begin_s), leg.at(end_s)), leg.band_m, waypoint)
+        return
+    times_s = [begin_s, *(begin_s + time_s for time_s in TAIL_TIMES_S if begin_s + time_s < end_s), end_s]
+    rungs = [_beside(leg.at(time_s), leg.direction, drive.stray_at(number, time_s)) for time_s in times_s]
     for rung, following in itertools.pairwise(rungs):
         pieces.add([*rung, *following], leg.band_m, waypoint)
 
@@ -111,7 +118,21 @@ def waypoint_after(drive: DrivePlan, leg: int) -> int:
 
 
 def add_corner(pieces: Pieces, drive: DrivePlan, number: int) -> None:
-    """Add the blend of two legs, and the area of a swing that does not follow it."""
+    """Add the blend of two legs, and the area of a swing that does not follow it; where the rover was seen to need more, all of it so much wider.
+
+    What it was seen to need counts from the middle of one leg to the middle of the next, as it was measured (`mavlink_bridge.logbook.legs`).
+    """
+    corner = drive.corners[number]
+    if corner.more.beyond_m <= 0:
+        _add_corner(pieces, drive, number)
+        return
+    own = Pieces()
+    _add_corner(own, drive, number)
+    _add_half_legs(own, drive, number)
+    pieces.extend(own, corner.more.beyond_m)
+
+
+def _add_corner(pieces: Pieces, drive: DrivePlan, number: int) -> None:
     corner, before, after = drive.corners[number], drive.legs[number], drive.legs[number + 1]
     if drive.vehicle.pursuit is not None and not corner.stops:
         _add_pursuit_corner(pieces, drive, number, drive.vehicle.pursuit)
@@ -120,12 +141,10 @@ def add_corner(pieces: Pieces, drive: DrivePlan, number: int) -> None:
     path = _blend_path(drive, number)
     left = drive.stray_at(number, before.profile.duration_s - corner.blend.duration_s).widest_m
     # The band about a blend is narrower on its inside: the same strip, moved outwards.
-    outwards_m = (
-        band_m
-        - at_corner.inside_band_m(
-            drive.vehicle, max(before.profile.top_speed_mps, after.profile.top_speed_mps), band_m
-        )
-    ) / 2
+    inside_m = at_corner.inside_band_m(
+        drive.vehicle, max(before.profile.top_speed_mps, after.profile.top_speed_mps), band_m
+    )
+    outwards_m = (band_m - max(0.0, inside_m + min(corner.more.inside_m, 0.0))) / 2
     side = Stray(outwards_m, -outwards_m) if corner.turn_deg >= 0 else Stray(-outwards_m, outwards_m)
     strip = Stray(left + side.left_m, left + side.right_m)
     rungs = [_beside(place, direction, strip) for place, direction in path]
@@ -139,6 +158,22 @@ def add_corner(pieces: Pieces, drive: DrivePlan, number: int) -> None:
         pieces.add(_swing_strip(drive, number), band_m, corner.waypoint)
     if drive.vehicle.autopilot is Autopilot.PX4 and (corner.pivots or not corner.stops):
         pieces.add(_whole_corner(drive, number), band_m, corner.waypoint)
+
+
+def _add_half_legs(pieces: Pieces, drive: DrivePlan, number: int) -> None:
+    """Add the half of a leg before a corner and the half of the leg after it, as wide as they are predicted."""
+    corner, before, after = drive.corners[number], drive.legs[number], drive.legs[number + 1]
+    middle_s = before.profile.duration_s / 2
+    stray = drive.stray_at(number, middle_s)
+    rungs = [_beside(place, before.direction, stray) for place in (before.at(middle_s), before.end)]
+    pieces.add([*rungs[0], *rungs[1]], before.band_m, corner.waypoint)
+    end_s = after.profile.duration_s / 2
+    times_s = [0.0, *(time_s for time_s in TAIL_TIMES_S if time_s < end_s), end_s]
+    rungs = [
+        _beside(after.at(time_s), after.direction, drive.stray_at(number + 1, time_s)) for time_s in times_s
+    ]
+    for rung, following in itertools.pairwise(rungs):
+        pieces.add([*rung, *following], after.band_m, corner.waypoint)
 
 
 def _add_pursuit_corner(pieces: Pieces, drive: DrivePlan, number: int, steers: Pursuit) -> None:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 
-@dataclass(frozen=True, slots=True)
-class Blend:
-    """How the motions of two legs overlap at a corner.
+class Blend(NamedTuple):
+    """How the motions of two legs overlap at a corner; a tuple, as `Ramp` is.
 
     Parameters
     ----------

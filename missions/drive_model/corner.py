@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from missions.drive_model import before_4_6, pursuit
 from missions.drive_model.blend import Blend
 from missions.vehicle import Autopilot, Steering
+from missions.vehicle.calibration import leg_more_m
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -101,7 +102,12 @@ PIVOT_DOUBT_DEG = 2.0
 """Corners this near to the pivot angle may be cut or pivoted: rounding of coordinates decides."""
 
 
-_Table = tuple[tuple[float, float], ...]
+_Table = tuple[tuple[float, ...], ...]
+_START_SWINGS, _START_BEHINDS, _SKID_START_SWINGS, _SKID_START_BEHINDS = (
+    tuple(zip(*rows, strict=True))
+    for rows in (START_SWING_M, START_BEHIND_M, SKID_START_SWING_M, SKID_START_BEHIND_M)
+)
+"""As columns."""
 
 
 STANDSTILL = Blend(0.0, 0.0)
@@ -109,9 +115,10 @@ STANDSTILL = Blend(0.0, 0.0)
 
 def band_m(vehicle: Vehicle, speed_mps: float) -> float:
     """Return how far a rover strays to either side of the path that its autopilot aims for."""
+    more_m = leg_more_m(vehicle, speed_mps)
     if vehicle.autopilot is Autopilot.PX4:
-        return pursuit.BAND_M
-    return BAND_AT_REST_M + BAND_HEADING_ERROR * speed_mps / vehicle.position_gain_per_s
+        return pursuit.BAND_M + more_m
+    return BAND_AT_REST_M + BAND_HEADING_ERROR * speed_mps / vehicle.position_gain_per_s + more_m
 
 
 def inside_band_m(vehicle: Vehicle, speed_mps: float, band_m: float) -> float:
@@ -204,14 +211,14 @@ def start_swing_m(vehicle: Vehicle, error_deg: float) -> float:
     """Return how far off its line, beyond its band, a rover swings that starts with its heading wrong."""
     if vehicle.pursuit is not None:
         return pursuit.start_swing_m(vehicle, vehicle.pursuit, error_deg)
-    return _start(vehicle, error_deg, START_SWING_M, SKID_START_SWING_M)
+    return _start(vehicle, error_deg, _START_SWINGS, _SKID_START_SWINGS)
 
 
 def start_behind_m(vehicle: Vehicle, error_deg: float) -> float:
     """Return how far behind its start a rover comes that starts with its heading wrong."""
     if vehicle.pursuit is not None:
         return pursuit.start_behind_m(vehicle, vehicle.pursuit, error_deg)
-    return _start(vehicle, error_deg, START_BEHIND_M, SKID_START_BEHIND_M)
+    return _start(vehicle, error_deg, _START_BEHINDS, _SKID_START_BEHINDS)
 
 
 def pivots(vehicle: Vehicle, turn_deg: float) -> bool:
@@ -272,7 +279,7 @@ def _interpolated(value: float, values: Sequence[float], results: Sequence[float
 def _start(vehicle: Vehicle, error_deg: float, steered: _Table, skid: _Table) -> float:
     if vehicle.can_pivot:
         return 0.0  # it pivots, or strays no farther than its band
-    errors_deg, distances_m = zip(*(skid if vehicle.steering is Steering.SKID else steered), strict=True)
+    errors_deg, distances_m = skid if vehicle.steering is Steering.SKID else steered
     wider = _swing_radius_m(vehicle) / MEASURED_TURN_RADIUS_M
     return _interpolated(abs(error_deg), errors_deg, distances_m) * wider
 

@@ -6,7 +6,6 @@ Inside, a point or a way is one complex number, east + j north: turning a way is
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,6 +28,7 @@ _MOST_ACCEL_MPS2 = 1.0
 _SPARE_M = 0.1  # beyond the farthest edge that counts: chosen, so that rounding loses none
 _MOST_AT_ONCE = 20_000  # places times edges: of more, parts of the way look only at what lies about them; chosen, it changes no answer
 _TOUCHING_M2 = 1e-9  # a ray through the end of an edge meets it, rounding or not
+_MAY_MEET_M2 = 1e-3  # the same, by products that are less exact; chosen, it changes no answer
 _FEW = 24  # more edges than this are quicker in numpy than one by one; chosen, it changes no answer
 
 
@@ -90,12 +90,11 @@ class FenceAhead:
     ) -> NDArray[np.float64]:
         """Return the speed that is allowed at each place in its own direction (sqrt_controller of what is left to the margin); exact up to ``top_mps``, and above no less."""
         reach_m = self.counts_within_m(top_mps) + _SPARE_M
-        parts = 1 + len(places) * len(self._starts) // _MOST_AT_ONCE
-        bounds = np.linspace(0, len(places), parts + 1).astype(np.int64)
+        at_once = max(_MOST_AT_ONCE // max(len(self._starts), 1), 1)
         ahead_m = np.concatenate(
             [
-                self._ahead_m(places[begin:end], ways[begin:end], reach_m)
-                for begin, end in pairwise(bounds.tolist())
+                self._ahead_m(places[begin : begin + at_once], ways[begin : begin + at_once], reach_m)
+                for begin in range(0, max(len(places), 1), at_once)
             ]
         )
         left_m = np.maximum(ahead_m - self._stops_within_m, 0.0)
@@ -142,14 +141,21 @@ class FenceAhead:
             return np.zeros(0)
         ends = np.concatenate([places, places + reach_m * ways])
         near = self._touch(ends.min(axis=0), ends.max(axis=0), _SPARE_M)
-        back = _complex(ways).conj()[:, None]
-        off = (self._starts[near] - _complex(places)[:, None]) * back
-        steps = self._steps[near] * back
+        starts, steps = self._starts[near], self._steps[near]
+        # Most rays pass most edges by, both ends on one side: only where they may meet the distance is taken.
+        lefts = np.column_stack((-ways[:, 1], ways[:, 0]))
+        own_m = (lefts * (places - places[0])).sum(axis=1)
+        aside_m = lefts @ (_plane(starts) - places[0]).T - own_m[:, None]
+        rays, edges = np.nonzero(aside_m * (aside_m + lefts @ _plane(steps).T) <= _MAY_MEET_M2)
+        back = _complex(ways)[rays].conj()
+        off, steps = (starts[edges] - _complex(places)[rays]) * back, steps[edges] * back
         with np.errstate(divide="ignore", invalid="ignore"):  # an edge along the way is met at its neighbours
             share = -off.imag / steps.imag
             away_m = off.real + share * steps.real
         met = (away_m >= 0) & (share >= 0) & (share <= 1)
-        return np.asarray(np.where(met, away_m, np.inf).min(axis=1, initial=np.inf))
+        first_m = np.full(len(places), np.inf)
+        np.minimum.at(first_m, rays[met], away_m[met])
+        return first_m
 
 
 class _Edges:
@@ -170,8 +176,10 @@ class _Edges:
         first_m = math.inf
         for start, step in edges:
             off, turned = (start - place) * back, step * back
-            if turned.imag:  # an edge along the way is met at its neighbours
-                share = -off.imag / turned.imag
+            aside_m, turned_m = off.imag, turned.imag
+            # Both ends on one side: passed by. An edge along the way is met at its neighbours.
+            if aside_m * (aside_m + turned_m) <= _TOUCHING_M2 and turned_m:
+                share = -aside_m / turned_m
                 if 0 <= share <= 1:
                     away_m = off.real + share * turned.real
                     if 0 <= away_m < first_m:
@@ -182,3 +190,8 @@ class _Edges:
 def _complex(points: NDArray[np.float64]) -> NDArray[np.complex128]:
     """Return points, shape (n, 2), as east + j north."""
     return np.ascontiguousarray(points).view(np.complex128)[:, 0]
+
+
+def _plane(numbers: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Return east + j north as points, shape (n, 2)."""
+    return np.ascontiguousarray(numbers).view(np.float64).reshape(-1, 2)

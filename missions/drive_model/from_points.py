@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from missions.drive_model import before_4_6
@@ -14,6 +13,7 @@ from missions.drive_model.legs_and_corners import CornerPlan, DrivePlan, LegPlan
 from missions.drive_model.motion import leg_profile
 from missions.drive_model.stray import Bend, Stray
 from missions.geo import change_deg
+from missions.vehicle.calibration import corner_more
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -44,6 +44,7 @@ def drive_plan(
     turns_deg = [change_deg(before.direction, after.direction) for before, after in itertools.pairwise(legs)]
     runs_m = _runs_m(legs, turns_deg)
     asked = [None if speeds is None else speeds[leg.first] for leg in legs]
+    asked_mps = [vehicle.speed_mps if speed_mps is None else speed_mps for speed_mps in asked]
     corners = []
     whole_deg = 0.0
     is_first_run = True
@@ -54,14 +55,12 @@ def drive_plan(
         turn_deg = turns_deg[number]
         whole_deg = turn_deg + (whole_deg if before.profile.length_m < at_corner.NEAR_M else 0.0)
         changes_speed = asked[number] != asked[number + 1] and abs(turn_deg) > at_corner.STRAIGHT_ON_DEG
-        fastest_mps = max(
-            vehicle.speed_mps if speed_mps is None else speed_mps for speed_mps in asked[number : number + 2]
-        )
+        fastest_mps = max(asked_mps[number], asked_mps[number + 1])
         bend = Bend(turn_deg, whole_deg, min(runs_m[number], runs_m[number + 1]), fastest_mps, changes_speed)
         corner = _corner(vehicle, group, (before, after), bend, stops)
         goes_on = abs(turn_deg) < at_corner.STRAIGHT_ON_DEG
         if not goes_on and at_corner.unsettled(vehicle, swung_m, runs_m[number]):
-            corner = replace(corner, stray_m=max(corner.stray_m, at_corner.UNSETTLED_M))
+            corner = corner._replace(stray_m=max(corner.stray_m, at_corner.UNSETTLED_M))
             start = start.widened(at_corner.UNSETTLED_M) if is_first_run else start
         if corner.stops or not goes_on:
             is_first_run = False
@@ -128,7 +127,8 @@ def _runs_m(legs: Sequence[LegPlan], turns_deg: Sequence[float]) -> list[float]:
             runs[-1].append(leg)
         else:
             runs.append([leg])
-    return [sum(leg.profile.length_m for leg in run) for run in runs for _ in run]
+    lengths_m = [sum([leg.profile.length_m for leg in run]) for run in runs]
+    return [length_m for length_m, run in zip(lengths_m, runs, strict=True) for _ in run]
 
 
 def _corner(
@@ -138,11 +138,13 @@ def _corner(
     bend: Bend,
     stops: Mapping[int, float],
 ) -> CornerPlan:
+    # Long: one decision on how a corner is driven, and what follows from it field by field.
     before, after = legs
     turn_deg = bend.turn_deg
     pivots = at_corner.pivots(vehicle, turn_deg)
-    delay_s = sum(stops.get(number, 0.0) for number, _ in group)
-    stopped = len(group) > 1 or any(number in stops for number, _ in group)
+    stops_s = [stops[number] for number, _ in group if number in stops] if stops else []
+    delay_s = sum(stops_s, 0.0)
+    stopped = len(group) > 1 or bool(stops_s)
     doubtful = at_corner.may_pivot_or_cut(vehicle, turn_deg) and not stopped
     tail = Stray()
     either_m = 0.0
@@ -165,6 +167,8 @@ def _corner(
             swing_m = swing.outside_m
             behind_m = swing_m / 2
             tail = Stray(swing.later_outside_m, swing.later_inside_m).seen_from(turn_deg)
+    more = corner_more(vehicle, turn_deg, bend.speed_mps, stands=stopped or pivots)
+    swing_m = max(0.0, swing_m + min(more.outside_m, 0.0))
     top_mps = min(before.profile.top_speed_mps, after.profile.top_speed_mps)
     ramps_s = (before.profile.ramp.duration_s + after.profile.ramp.duration_s) / 2
     lost_s = ramps_s - blend.duration_s + at_corner.swing_time_s(swing_m, top_mps) + delay_s
@@ -189,6 +193,7 @@ def _corner(
         stray_m=max(_stray_m(len(group), delay_s), either_m),
         tail=tail,
         time_lost_s=lost_s,
+        more=more,
     )
 
 

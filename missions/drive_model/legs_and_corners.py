@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from missions.drive_model import before_4_6
 from missions.drive_model import corner as at_corner
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from missions.drive_model.stray import Stray
     from missions.geo import Vector
     from missions.vehicle import Vehicle
+    from missions.vehicle.calibration import CornerMore
 
 
-@dataclass(frozen=True, slots=True)
-class LegPlan:
-    """One leg: where it runs, how it is driven, and its straight-line band."""
+class LegPlan(NamedTuple):
+    """One leg: where it runs, how it is driven, and its straight-line band; a tuple, as `Ramp` is."""
 
     first: int
     start: Vector
@@ -33,9 +33,8 @@ class LegPlan:
         return (self.start[0] + self.direction[0] * along_m, self.start[1] + self.direction[1] * along_m)
 
 
-@dataclass(frozen=True, slots=True)
-class CornerPlan:
-    """One place where a leg ends and the next begins.
+class CornerPlan(NamedTuple):
+    """One place where a leg ends and the next begins; a tuple, as `Ramp` is.
 
     Parameters
     ----------
@@ -61,6 +60,8 @@ class CornerPlan:
         How far beyond that it may be long after, as at the turn it is; only before ArduPilot 4.6.
     time_lost_s : float
         Against driving on at full speed.
+    more : CornerMore
+        What the rover's calibration adds.
     """
 
     waypoint: int
@@ -76,6 +77,7 @@ class CornerPlan:
     stray_m: float
     tail: Stray
     time_lost_s: float
+    more: CornerMore
 
 
 @dataclass(frozen=True, slots=True)

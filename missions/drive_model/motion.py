@@ -7,42 +7,39 @@ last one has ended (SCurve.cpp). The short smoothing of the jerk itself (a snap 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
 _NEWTON_STEPS = 8  # each doubles the digits that are right; 8 leave no more than rounding
 
 
-@dataclass(frozen=True)
-class Ramp:
+class Ramp(NamedTuple):
     """Speeding up from rest to a speed, with limited acceleration and jerk; slowing down is the same run backwards.
+
+    A tuple, as a leg's profile is: tens of thousands are made for one plan.
 
     Parameters
     ----------
     speed_mps : float
         The speed reached, above 0.
-    accel_mps2, jerk_mps3 : float
-        The limits, above 0.
+    jerk_mps3 : float
+        The limit of the jerk, above 0.
+    jerk_s : float
+        How long the acceleration grows, and again how long it falls.
+    duration_s : float
+        How long the whole ramp takes.
     """
 
     speed_mps: float
-    accel_mps2: float
     jerk_mps3: float
-    jerk_s: float = field(init=False)
-    """How long the acceleration grows, and again how long it falls."""
-    duration_s: float = field(init=False)
-    """How long the whole ramp takes."""
-
-    def __post_init__(self) -> None:
-        """Reckon what everything else asks for."""
-        jerk_s = min(self.accel_mps2 / self.jerk_mps3, math.sqrt(self.speed_mps / self.jerk_mps3))
-        object.__setattr__(self, "jerk_s", jerk_s)
-        object.__setattr__(self, "duration_s", jerk_s + self.speed_mps / (self.jerk_mps3 * jerk_s))
+    jerk_s: float
+    duration_s: float
 
     @property
     def length_m(self) -> float:
@@ -51,12 +48,13 @@ class Ramp:
 
     def travelled_m(self, time_s: float) -> float:
         """Return the distance from the point of rest after a time; beyond the ramp the speed stays."""
-        half_s = self.duration_s / 2
+        speed_mps, jerk_mps3, jerk_s, duration_s = self
+        half_s = duration_s / 2
         if time_s > half_s:
             # The ramp is symmetric: its second half mirrors the first about the half speed.
-            rest_s = max(self.duration_s - time_s, 0.0)
-            return self.speed_mps * (time_s - half_s) + self._first_half_m(rest_s)
-        return self._first_half_m(time_s)
+            rest_s = max(duration_s - time_s, 0.0)
+            return speed_mps * (time_s - half_s) + _first_half_m(jerk_mps3, jerk_s, rest_s)
+        return _first_half_m(jerk_mps3, jerk_s, time_s)
 
     def accel_at_mps2(self, time_s: float) -> float:
         """Return the acceleration in the first half of the ramp."""
@@ -64,10 +62,11 @@ class Ramp:
 
     def time_s(self, distance_m: float) -> float:
         """Return the time to a distance; beyond the ramp the speed stays."""
-        jerk_m = self.jerk_mps3 * self.jerk_s**3 / 6
+        jerk_s = self.jerk_s
+        jerk_m = self.jerk_mps3 * jerk_s**3 / 6
         if distance_m <= jerk_m:
             return math.cbrt(6 * distance_m / self.jerk_mps3)
-        if distance_m > self._first_half_m(self.duration_s / 2):
+        if distance_m > _first_half_m(self.jerk_mps3, jerk_s, self.duration_s / 2):
             return self._late_time_s(distance_m)
         half_s = self.jerk_s / 2
         accel_mps2 = self.jerk_mps3 * self.jerk_s
@@ -91,16 +90,8 @@ class Ramp:
             time_s += (distance_m - self.travelled_m(time_s)) / (self.speed_mps - lost_mps)
         return time_s
 
-    def _first_half_m(self, time_s: float) -> float:
-        jerk_s = self.jerk_s
-        if time_s <= jerk_s:
-            return self.jerk_mps3 * time_s**3 / 6
-        more_s = time_s - jerk_s
-        return self.jerk_mps3 * jerk_s * (jerk_s**2 / 6 + jerk_s * more_s / 2 + more_s**2 / 2)
 
-
-@dataclass(frozen=True)
-class LegProfile:
+class LegProfile(NamedTuple):
     """One leg driven from rest to rest.
 
     Parameters
@@ -109,19 +100,18 @@ class LegProfile:
         Its length, above 0.
     ramp : Ramp
         Its start; the end is the same backwards.
+    duration_s : float
+        How long it takes from rest to rest.
     """
 
     length_m: float
     ramp: Ramp
-    top_speed_mps: float = field(init=False)
-    """The highest speed on this leg; short legs do not reach the speed asked for."""
-    duration_s: float = field(init=False)
-    """How long it takes from rest to rest."""
+    duration_s: float
 
-    def __post_init__(self) -> None:
-        """Reckon what everything else asks for."""
-        object.__setattr__(self, "top_speed_mps", self.ramp.speed_mps)
-        object.__setattr__(self, "duration_s", self.length_m / self.ramp.speed_mps + self.ramp.duration_s)
+    @property
+    def top_speed_mps(self) -> float:
+        """The highest speed on this leg; short legs do not reach the speed asked for."""
+        return self.ramp.speed_mps
 
     def travelled_m(self, time_s: float) -> float:
         """Return the distance from the leg's start after a time since its start."""
@@ -129,18 +119,32 @@ class LegProfile:
             return self.length_m - self.ramp.travelled_m(self.duration_s - time_s)
         return self.ramp.travelled_m(time_s)
 
-    def all_travelled_m(self, times_s: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the same for many times within the leg at once."""
-        ramp = self.ramp
-        is_late = times_s > self.duration_s / 2
-        from_rest_s = np.where(is_late, self.duration_s - times_s, times_s)
-        half_s = ramp.duration_s / 2
-        rising_s = np.where(from_rest_s > half_s, np.maximum(ramp.duration_s - from_rest_s, 0.0), from_rest_s)
-        jerking_s = np.minimum(rising_s, ramp.jerk_s)
-        more_s = rising_s - jerking_s
-        away_m = ramp.jerk_mps3 * (jerking_s**3 / 6 + ramp.jerk_s * more_s * (ramp.jerk_s + more_s) / 2)
-        away_m += ramp.speed_mps * np.maximum(from_rest_s - half_s, 0.0)
-        return np.asarray(np.where(is_late, self.length_m - away_m, away_m))
+
+def all_travelled_m(
+    profiles: Sequence[LegProfile], counts: Sequence[int], times_s: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return `LegProfile.travelled_m` of several legs at once: of the first for so many times within it, then of the next."""
+    rows = [
+        (
+            one.length_m,
+            one.duration_s,
+            one.ramp.speed_mps,
+            one.ramp.jerk_mps3,
+            one.ramp.jerk_s,
+            one.ramp.duration_s,
+        )
+        for one in profiles
+    ]
+    length_m, duration_s, speed_mps, jerk_mps3, jerk_s, ramp_s = np.repeat(np.array(rows), counts, axis=0).T
+    is_late = times_s > duration_s / 2
+    from_rest_s = np.where(is_late, duration_s - times_s, times_s)
+    half_s = ramp_s / 2
+    rising_s = np.where(from_rest_s > half_s, np.maximum(ramp_s - from_rest_s, 0.0), from_rest_s)
+    jerking_s = np.minimum(rising_s, jerk_s)
+    more_s = rising_s - jerking_s
+    away_m = jerk_mps3 * (jerking_s**3 / 6 + jerk_s * more_s * (jerk_s + more_s) / 2)
+    away_m += speed_mps * np.maximum(from_rest_s - half_s, 0.0)
+    return np.asarray(np.where(is_late, length_m - away_m, away_m))
 
 
 def leg_profile(length_m: float, speed_mps: float, accel_mps2: float, jerk_mps3: float) -> LegProfile:
@@ -150,4 +154,19 @@ def leg_profile(length_m: float, speed_mps: float, accel_mps2: float, jerk_mps3:
     reachable_mps = accel_mps2 / 2 * (math.sqrt(lag_s**2 + 4 * length_m / accel_mps2) - lag_s)
     if reachable_mps < accel_mps2 * lag_s:
         reachable_mps = math.cbrt(length_m**2 * jerk_mps3 / 4)
-    return LegProfile(length_m, Ramp(min(speed_mps, reachable_mps), accel_mps2, jerk_mps3))
+    return profile_at(length_m, min(speed_mps, reachable_mps), accel_mps2, jerk_mps3)
+
+
+def profile_at(length_m: float, top_mps: float, accel_mps2: float, jerk_mps3: float) -> LegProfile:
+    """Return the motion along a leg with a speed that it reaches."""
+    jerk_s = min(accel_mps2 / jerk_mps3, math.sqrt(top_mps / jerk_mps3))
+    ramp = Ramp(top_mps, jerk_mps3, jerk_s, jerk_s + top_mps / (jerk_mps3 * jerk_s))
+    return LegProfile(length_m, ramp, length_m / top_mps + ramp.duration_s)
+
+
+def _first_half_m(jerk_mps3: float, jerk_s: float, time_s: float) -> float:
+    """Return the distance after a time in the first half of a ramp."""
+    if time_s <= jerk_s:
+        return jerk_mps3 * time_s**3 / 6
+    more_s = time_s - jerk_s
+    return jerk_mps3 * jerk_s * (jerk_s**2 / 6 + jerk_s * more_s / 2 + more_s**2 / 2)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 KEPT_ACROSS = 0.3
@@ -27,13 +26,13 @@ class Stray(NamedTuple):
     @property
     def widest_m(self) -> float:
         """The larger of the two."""
-        return max(self)
+        return max(self.left_m, self.right_m)
 
     def after(self, time_s: float, gain_per_s: float) -> Stray:
         """Return what is left of the stray after a time."""
         if not (self.left_m or self.right_m):
             return self
-        left = math.exp(-gain_per_s * max(time_s, 0.0))
+        left = math.exp(-gain_per_s * time_s) if time_s > 0 else 1.0
         return Stray(self.left_m * left, self.right_m * left)
 
     def turned(self, turn_deg: float) -> Stray:
@@ -67,8 +66,7 @@ class Stray(NamedTuple):
         return Stray(self.left_m, self.right_m + swing_m)
 
 
-@dataclass(frozen=True, slots=True)
-class Bend:
+class Bend(NamedTuple):
     """The shape of a route at a corner.
 
     Parameters
@@ -94,5 +92,7 @@ class Bend:
     @property
     def widest_deg(self) -> float:
         """The larger of the two turns, where they are to the same side."""
-        same_side = self.whole_deg * self.turn_deg > 0
-        return min(max(abs(self.turn_deg), abs(self.whole_deg) if same_side else 0.0), 180.0)
+        widest_deg = abs(self.turn_deg)
+        if self.whole_deg * self.turn_deg > 0:
+            widest_deg = max(widest_deg, abs(self.whole_deg))
+        return min(widest_deg, 180.0)

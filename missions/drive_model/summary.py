@@ -55,12 +55,18 @@ def _corner(drive: DrivePlan, number: int) -> Corner:
         inside_cut_m=max(
             _cut_m(drive, number)
             + coming_m
-            + at_corner.inside_band_m(
-                drive.vehicle, max(before.profile.top_speed_mps, after.profile.top_speed_mps), band_m
+            + max(
+                0.0,
+                plan.more.inside_m
+                + at_corner.inside_band_m(
+                    drive.vehicle, max(before.profile.top_speed_mps, after.profile.top_speed_mps), band_m
+                ),
             ),
-            max(going.right_m, midway.right_m) + band_m,
+            max(going.right_m, midway.right_m) + band_m + max(plan.more.inside_m, 0.0),
         ),
-        outside_overshoot_m=max(coming_m, going.left_m, midway.left_m) + band_m,
+        outside_overshoot_m=max(coming_m, going.left_m, midway.left_m)
+        + band_m
+        + max(plan.more.outside_m, 0.0),
         reach_m=_reach_m(drive, number, blend_s),
         middle_m=plan.blend.reach_m,
         least_middle_m=plan.blend.reach_m,
@@ -104,21 +110,18 @@ def told_leg(drives: Sequence[DrivePlan], number: int) -> Leg:
 
 def arrivals_s(drive: DrivePlan, count: int) -> NDArray[np.float64]:
     """Return when each point is passed: the motions of the legs one after another, less their overlaps."""
-    times_s = np.zeros(count)
-    clock_s = (
-        START_AND_END_LAG_S / 2 + at_corner.swing_time_s(drive.strays[0].widest_m, drive.vehicle.speed_mps)
-        if drive.legs
-        else 0.0
+    if not drive.legs:
+        return np.zeros(count)
+    clock_s = START_AND_END_LAG_S / 2 + at_corner.swing_time_s(
+        drive.strays[0].widest_m, drive.vehicle.speed_mps
     )
-    for number, leg in enumerate(drive.legs):
+    times_s = [0.0] * (drive.legs[0].first + 1)
+    for leg, following, corner in zip(drive.legs, drive.legs[1:], drive.corners, strict=False):
         clock_s += leg.profile.duration_s
-        if number == len(drive.corners):
-            clock_s += START_AND_END_LAG_S / 2
-            times_s[leg.first + 1 :] = clock_s
-            break
-        corner = drive.corners[number]
-        ramps_s = (leg.profile.ramp.duration_s + drive.legs[number + 1].profile.ramp.duration_s) / 2
+        ramps_s = (leg.profile.ramp.duration_s + following.profile.ramp.duration_s) / 2
         extra_s = corner.time_lost_s - ramps_s  # negative by the overlap of the two motions
-        times_s[leg.first + 1 : corner.waypoint + 1] = clock_s - corner.blend.duration_s / 2
+        times_s += [clock_s - corner.blend.duration_s / 2] * (corner.waypoint - leg.first)
         clock_s += extra_s
-    return times_s
+    clock_s += drive.legs[-1].profile.duration_s
+    clock_s += START_AND_END_LAG_S / 2
+    return np.array(times_s + [clock_s] * (count - len(times_s)))

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from shapely import Point
 
-from missions.checking.forecast import forecast_drive, pivot_remarks
+from missions.checking.forecast import forecast_drive
+from missions.checking.pivots import pivot_remarks
 from missions.errors import PlanCheckError, StartBlockedError
 from missions.finishing.mission_lines import Lines, check_lines, finished, mission_items
 from missions.finishing.remarks import drive_remarks, escape_info, lead_away_remarks, moved_target_info

@@ -43,6 +43,9 @@ if TYPE_CHECKING:
 ENOUGH_M = 0.002
 """What may be missing: less than rounding to degE7 adds, which is required on top."""
 
+MOST_KNOWN = 3000
+"""Parts of lines that a gauge remembers, some 10 kB each: of more it begins anew, and measures the same again."""
+
 UNBOUNDED_EXTRA_M = 2.0
 """What unbounded corners have to keep on top: measured ones left the band by up to 1.6 m (docs/drive-model.md, "Where it does not hold")."""
 
@@ -114,7 +117,7 @@ class Gauge:
     def __init__(self, ground: Ground, vehicle: Vehicle, heading_deg: float | None) -> None:
         self.ground, self.vehicle = ground, vehicle
         self.edges = FenceEdges(ground.avoided_edge)
-        self._heading_deg = heading_deg
+        self.heading_deg = heading_deg
         self._trials: dict[tuple[Drawing, bool, bool], Trial] = {}
         self._legs_m: dict[tuple[LocalPoint, LocalPoint], float] = {}
 
@@ -123,6 +126,8 @@ class Gauge:
         key = (drawing[begin:end], begin == 0, end == len(drawing))
         trial = self._trials.get(key)
         if trial is None:
+            if len(self._trials) >= MOST_KNOWN:
+                self._trials.clear()
             trial = self._trials[key] = Trial(self, *key)
         return trial
 
@@ -130,10 +135,10 @@ class Gauge:
         """Measure whole lines."""
         return self.trial(drawing, 0, len(drawing)).measured()
 
-    def heading_deg(self, part: Drawing, *, is_first: bool) -> float:
+    def part_heading_deg(self, part: Drawing, *, is_first: bool) -> float:
         """Return the vehicle's heading where a part of the lines begins."""
-        if is_first and self._heading_deg is not None:
-            return self._heading_deg
+        if is_first and self.heading_deg is not None:
+            return self.heading_deg
         east, north = drawn.direction(part[0], part[1])
         return math.degrees(math.atan2(east, north))
 
@@ -165,7 +170,6 @@ class Trial:
     """
 
     __slots__ = (
-        "_asked_lines_m",
         "_bands_m",
         "_clearances_m",
         "_cores",
@@ -176,6 +180,7 @@ class Trial:
         "_is_last",
         "_looked",
         "_measured",
+        "_missing_by_lines_m",
         "_near_turns",
         "_other_cost_s",
         "_part",
@@ -183,11 +188,15 @@ class Trial:
         "_steps",
         "_waypoints",
         "cost_s",
+        "may_be_enough",
         "missing_m",
     )
 
     missing_m: NDArray[np.float64]
     """What is missing at each point by the steps taken; more may be."""
+
+    may_be_enough: bool
+    """Whether nothing is known to be missing; with all steps taken, whether the band keeps what is required."""
 
     cost_s: float
     """What the lines cost by the steps taken, or more."""
@@ -201,17 +210,17 @@ class Trial:
     def __init__(self, gauge: Gauge, part: Drawing, is_first: bool, is_last: bool) -> None:  # noqa: FBT001 - two of a kind
         self._gauge, self._part = gauge, part
         self._is_first, self._is_last = is_first, is_last
-        self._required_m = np.array([point.required_m for point in part])
         self._duration_s = 0.0
         self._near_turns = _near_turns(part)
         self._measured: Measured | None = None
-        self._steps: list[Callable[[], None]] = [self._avoid, self._dive, self._time]
+        # Functions of any trial: bound to this one they would be a cycle, which only garbage collection frees.
+        self._steps: list[Callable[[Trial], None]] = [Trial._avoid, Trial._dive, Trial._time]
         self._look_at_lines()
 
     def refine(self) -> bool:
         """Take the next step; False where all are taken."""
         if self._steps:
-            self._steps.pop()()
+            self._steps.pop()(self)
         return not self.is_finished
 
     @property
@@ -220,9 +229,9 @@ class Trial:
         return not self._steps
 
     @property
-    def may_be_enough(self) -> bool:
-        """Whether nothing is known to be missing; with all steps taken, whether the band keeps what is required."""
-        return bool(self.missing_m.max() <= ENOUGH_M)
+    def missing_in_all_m(self) -> float:
+        """All together of what is missing at the points."""
+        return float(self.missing_m.sum())
 
     def finish(self) -> Trial:
         """Take all steps."""
@@ -238,24 +247,27 @@ class Trial:
         return self._measured
 
     def _look_at_lines(self) -> None:
-        lines_m = np.array([np.inf, *self._gauge.legs_m(self._part)])
-        asked_m = np.array([point.line_m for point in self._part])
-        self._asked_lines_m = np.maximum(asked_m - lines_m, 0.0)
-        self._other_cost_s = _CROSSING_COST_S * int(((lines_m <= 0) & np.isfinite(asked_m)).sum())
-        self._miss(self._asked_lines_m.copy())
+        missing_m, crossings = [0.0], 0
+        for point, line_m in zip(self._part[1:], self._gauge.legs_m(self._part), strict=True):
+            missing_m.append(max(point.line_m - line_m, 0.0))
+            crossings += line_m <= 0 and math.isfinite(point.line_m)
+        self._missing_by_lines_m = np.array(missing_m)
+        self._other_cost_s = _CROSSING_COST_S * crossings
+        self._miss(self._missing_by_lines_m.copy())
 
     def _time(self) -> None:
         part = self._part
+        self._required_m = np.array([point.required_m for point in part])
         self._drive = plan_drive(
             drawn.places(part),
             self._gauge.vehicle,
-            heading_deg=self._gauge.heading_deg(part, is_first=self._is_first),
+            heading_deg=self._gauge.part_heading_deg(part, is_first=self._is_first),
             speeds=drawn.speeds(part),
             stops=drawn.stops(part),
         )
         self._duration_s = float(self._drive.arrivals_s[-1])
         # Of an unknown firmware the older one's band comes last here, so first there: it is mostly the wider.
-        self._steps += [partial(self._look_at_band, way) for way in range(len(self._drive.ways))]
+        self._steps += [partial(Trial._look_at_band, way=way) for way in range(len(self._drive.ways))]
         self._looked: list[_Looked] = []
         self._add_up()
 
@@ -274,7 +286,7 @@ class Trial:
 
     def _dive(self, begin: int = 0) -> None:
         """Count pieces inside a fence for more, the deeper they lie."""
-        inside = begin + np.flatnonzero(self._clearances_m[begin:] <= -self._bands_m[begin:])
+        inside = begin + (self._clearances_m[begin:] <= -self._bands_m[begin:]).nonzero()[0]
         if len(inside):
             beyond = shapely.difference(self._cores[inside], self._gauge.ground.allowed)
             self._clearances_m[inside] -= np.sqrt(shapely.area(beyond)) + shapely.length(beyond) / 10
@@ -292,7 +304,7 @@ class Trial:
             more_m = gauge.distances_m(slowed.cores[plain:]) - slowed.bands_m[plain:]
             self._cores, self._bands_m, self._waypoints = slowed.cores, slowed.bands_m, slowed.waypoints
             self._clearances_m = np.concatenate([self._clearances_m, more_m])
-            self._steps.append(partial(self._dive, plain))
+            self._steps.append(partial(Trial._dive, begin=plain))
             self._settle()
 
     def _settle(self, first_way: int = 0) -> None:
@@ -300,7 +312,7 @@ class Trial:
         required_m = self._required_m
         least_m = np.full(len(required_m), np.inf)
         np.minimum.at(least_m, self._waypoints, self._clearances_m)
-        missing_m = np.maximum(required_m - least_m, self._asked_lines_m)
+        missing_m = np.maximum(required_m - least_m, self._missing_by_lines_m)
         ways = range(first_way, len(self._drive.ways))
         for corner in (corner for way in ways for corner in self._drive.plan(way).corners):
             turns_back = abs(corner.turn_deg) > TURN_BACK_DEG and not corner.pivots
@@ -316,6 +328,7 @@ class Trial:
         if not self._is_last:
             missing_m[-1] = 0.0
         self.missing_m = missing_m
+        self.may_be_enough = bool(missing_m.max() <= ENOUGH_M)
         self._add_up()
 
     def _add_up(self) -> None:
@@ -323,7 +336,7 @@ class Trial:
             self._duration_s
             + _POINT_COST_S * len(self._part)
             + _NEAR_TURNS_COST_S * self._near_turns
-            + _MISSING_COST_S_PER_M * float(self.missing_m.sum())
+            + _MISSING_COST_S_PER_M * self.missing_in_all_m
             + self._other_cost_s
         )
 
@@ -343,9 +356,8 @@ class Trial:
 
 def _near_turns(drawing: Drawing) -> int:
     """Count turns so near to the next that a rover drives them as one."""
-    turns = [abs(drawn.turn_deg(drawing, index)) > _TURN_DEG for index in range(1, len(drawing) - 1)]
     return sum(
-        math.dist(drawing[index + 1].place, drawing[index + 2].place) < moves.APART_M
-        for index, (turn, following) in enumerate(pairwise(turns))
-        if turn and following
+        math.dist(drawing[index].place, drawing[index + 1].place) < moves.APART_M
+        and all(abs(drawn.turn_deg(drawing, turn)) > _TURN_DEG for turn in (index, index + 1))
+        for index in range(1, len(drawing) - 2)
     )

@@ -26,14 +26,13 @@ import heapq
 import itertools
 import math
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import shapely
 
 from missions.fitting import moves
 from missions.fitting import polyline as drawn
-from missions.fitting.cost import ENOUGH_M, Gauge
+from missions.fitting.cost import ENOUGH_M
 from missions.fitting.gap import find_gap, straight_through
 from missions.fitting.splice import splices
 from missions.geo import rounded
@@ -42,11 +41,9 @@ from missions.vehicle import Autopilot
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
 
-    from missions.fitting.cost import Measured, Trial
+    from missions.fitting.cost import Gauge, Measured, Trial
     from missions.fitting.polyline import Drawing
     from missions.geo import LocalPoint, Vector
-    from missions.ground.ground import Ground
-    from missions.vehicle import Vehicle
 
 
 FIT_MEASUREMENTS, CRAWL_MEASUREMENTS, QUICKEN_MEASUREMENTS, MOST_MEASUREMENTS = 500, 350, 300, 1500
@@ -82,12 +79,8 @@ class Fitting:
 
     Parameters
     ----------
-    ground : Ground
-        The field.
-    vehicle : Vehicle
-        What drives.
-    heading_deg : float or None
-        Where it faces at the start; None along its first leg.
+    gauge : Gauge
+        What measures lines for the vehicle on the field; what it measured for other lines is known.
     should_stop : callable, optional
         Asked now and then; True ends the search.
     most_measurements : int
@@ -96,9 +89,7 @@ class Fitting:
         A round ends soon after a candidate that leaves no more than this share of what its part missed: above 0 rounds are short, and end elsewhere.
     """
 
-    ground: Ground
-    vehicle: Vehicle
-    heading_deg: float | None
+    gauge: Gauge
     should_stop: Callable[[], bool] | None = None
     most_measurements: int = MOST_MEASUREMENTS
     good_share: float = 0.0
@@ -119,7 +110,7 @@ class Fitting:
                 )
                 if missing_m > ENOUGH_M
             ]
-            slow = moves.crawling(drawn_first, spots, self.vehicle.speed_mps)
+            slow = moves.crawling(drawn_first, spots, self.gauge.vehicle.speed_mps)
             self._allow(CRAWL_MEASUREMENTS)
             other, found = self._fitted(slow)
             if sum(found.missing_m) < sum(measured.missing_m):
@@ -163,7 +154,7 @@ class Fitting:
 
     def outlook(self, drawing: Drawing) -> Measured:
         """Return how lines measure before anything is bent; `fit` begins with the same, so it costs nothing beside it."""
-        return self._gauge.measure(_joined(drawing))
+        return self.gauge.measure(_joined(drawing))
 
     def _on_grid(self, drawing: Drawing) -> tuple[Drawing, Measured]:
         """Round lines as the mission's items will be: the model has steps, and a millimetre may be one too many."""
@@ -181,7 +172,7 @@ class Fitting:
         return drawing, measured
 
     def _rounded(self, place: LocalPoint) -> LocalPoint:
-        frame = self.ground.frame
+        frame = self.gauge.ground.frame
         return frame.to_local(rounded(frame.to_lat_lon(place)))
 
     def _allow(self, measurements: int) -> None:
@@ -198,15 +189,11 @@ class Fitting:
     def measure(self, drawing: Drawing) -> Measured:
         """Measure whole lines."""
         self.measurements += 1
-        return self._gauge.measure(drawing)
-
-    @cached_property
-    def _gauge(self) -> Gauge:
-        return Gauge(self.ground, self.vehicle, self.heading_deg)
+        return self.gauge.measure(drawing)
 
     def _away(self, place: LocalPoint) -> Vector:
         """Return the unit vector from the nearest fence to a place."""
-        line = shapely.shortest_line(self.ground.edge, shapely.Point(place))
+        line = shapely.shortest_line(self.gauge.ground.edge, shapely.Point(place))
         (east_a, north_a), (east_b, north_b) = shapely.get_coordinates(line).tolist()
         length_m = math.dist((east_a, north_a), (east_b, north_b)) or 1.0
         return ((east_b - east_a) / length_m, (north_b - north_a) / length_m)
@@ -217,7 +204,7 @@ class Fitting:
         yield from moves.moved(drawing, index, missing_m)
         if not math.isnan(place[0]):
             ahead = drawn.direction(drawing[max(index - 1, 0)], drawing[max(index, 1)])
-            narrow = find_gap(self.ground.edge, place, ahead)
+            narrow = find_gap(self.gauge.ground.edge, place, ahead)
             if narrow is not None:
                 yield from straight_through(drawing, index, narrow)
             yield from moves.bent(drawing, index, place, self._away(place), missing_m)
@@ -229,19 +216,19 @@ class Fitting:
         if _is_corner(drawing, index) and abs(drawn.turn_deg(drawing, index)) > 25.0:
             yield from moves.split(drawing, index)
             yield from moves.prolonged(drawing, index)
-        if index <= 1 and self.heading_deg is not None:
-            yield from moves.headed(drawing, self.heading_deg)
+        if index <= 1 and self.gauge.heading_deg is not None:
+            yield from moves.headed(drawing, self.gauge.heading_deg)
         if drawing[index].is_fixed:
             yield from moves.approached(drawing, index)
 
     def _all(self, drawing: Drawing, index: int, measured: Measured) -> Iterator[Drawing]:
         place = measured.worst[index]
         if not math.isnan(place[0]):
-            yield from moves.slowed(drawing, index, place, self.vehicle.speed_mps)
+            yield from moves.slowed(drawing, index, place, self.gauge.vehicle.speed_mps)
         if _is_corner(drawing, index):
-            yield from moves.slowed(drawing, index, drawing[index].place, self.vehicle.speed_mps)
+            yield from moves.slowed(drawing, index, drawing[index].place, self.gauge.vehicle.speed_mps)
             # PX4 ignores the hold time of a waypoint, and stops before it turns on the spot by itself.
-            if self.vehicle.can_pivot and self.vehicle.autopilot is Autopilot.ARDUPILOT:
+            if self.gauge.vehicle.can_pivot and self.gauge.vehicle.autopilot is Autopilot.ARDUPILOT:
                 yield from moves.stopped(drawing, index)
         yield from self._gentle(drawing, index, measured)
 
@@ -286,7 +273,7 @@ class Fitting:
         index, without = 1, 0
         while without < len(drawing) - 1 and not self._is_over():
             candidates = [
-                *moves.quickened(drawing, index, self.vehicle.speed_mps),
+                *moves.quickened(drawing, index, self.gauge.vehicle.speed_mps),
                 *moves.rejoined(drawing, index),
             ]
             if _is_corner(drawing, index) and abs(drawn.turn_deg(drawing, index)) > _SHARP_DEG:
@@ -324,12 +311,13 @@ class Fitting:
             span = (begin, len(drawing) - kept)
             if span not in known:
                 self.measurements += 1
-                known[span] = self._gauge.trial(drawing, *span).finish()
+                known[span] = self.gauge.trial(drawing, *span).finish()
             self.measurements += 1
-            trial = self._gauge.trial(candidate, begin, len(candidate) - kept)
+            trial = self.gauge.trial(candidate, begin, len(candidate) - kept)
             tried = _Tried(known[span].cost_s, number, trial, candidate)
-            missing_m = self.good_share * float(known[span].missing_m.sum())
-            if tried.misses_at_most(missing_m) and solved_at is None:
+            missing_m = self.good_share * known[span].missing_in_all_m
+            # Those after the first that does are measured only as far as ranking them takes.
+            if solved_at is None and tried.misses_at_most(missing_m):
                 solved_at = number
             trials.append(tried)
             # The moves come with the cheapest first: once one does, a few more are looked at.
@@ -397,7 +385,7 @@ class _Tried:
     def misses_at_most(self, missing_m: float) -> bool:
         """Measure only as far as needed; return whether the part gains and its band misses no more in all, or keeps what is required."""
         trial = self.trial
-        while self.gain_s > _LEAST_GAIN_S and (trial.may_be_enough or trial.missing_m.sum() <= missing_m):
+        while self.gain_s > _LEAST_GAIN_S and (trial.may_be_enough or trial.missing_in_all_m <= missing_m):
             if trial.is_finished:
                 return True
             trial.refine()

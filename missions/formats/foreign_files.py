@@ -7,7 +7,7 @@ from missions.errors import MissionFormatError
 _LOG_ADVICE = "use the telemetry log (.tlog) that the ground station recorded, with --log"
 _BY_SUFFIX: dict[str, tuple[str, str]] = {
     ".tlog": ("a telemetry log", "use --log FILE.tlog; `pbpp log FILE.tlog` summarises it"),
-    ".bin": ("an ArduPilot DataFlash log", _LOG_ADVICE),
+    ".bin": ("an ArduPilot DataFlash log", "use --log FILE.bin; `pbpp log FILE.bin` summarises it"),
     ".log": ("an ArduPilot DataFlash log, or another program's log", _LOG_ADVICE),
     ".ulg": ("a PX4 ULog", _LOG_ADVICE),
     ".rlog": ("a Mission Planner raw log", _LOG_ADVICE),

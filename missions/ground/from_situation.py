@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from missions.errors import NoRouteError, SituationError
-from missions.geo import LatLon, distance_m
+from missions.geo import LatLon, distance_m, upper_distance_m
 from missions.ground.frame import check_latitude, frame_around
 from missions.ground.ground import Ground, check_ground, lay_out
 from missions.ground.known_fence import known_fence
@@ -69,10 +69,10 @@ def ground_for(situation: Situation, vehicle: Vehicle, ends: Sequence[LatLon]) -
     home = situation.home.value if situation.home and vehicle.fence.enforces_home_circle else None
     named = [*(("", position) for position in fence.places), *([("home ", home)] if home else [])]
     for name, position in named:
-        if (away_m := distance_m(frame.origin, position)) > MAX_FIELD_M:
+        if (away_m := _beyond_m(frame.origin, position)) is not None:
             raise SituationError(f"{name}{_too_far(position, frame.origin, away_m)}", distance_m=away_m)
         check_latitude(position)
-    near = [end for end in ends if distance_m(frame.origin, end) <= MAX_FIELD_M]
+    near = [end for end in ends if _beyond_m(frame.origin, end) is None]
     for end in near:
         check_latitude(end)
     ground = lay_out(
@@ -97,6 +97,14 @@ def route_ground(situation: Situation, vehicle: Vehicle, ends: Sequence[LatLon])
     return with_seams(ground_for(situation, vehicle, ends), vehicle)
 
 
+def _beyond_m(centre: LatLon, place: LatLon) -> float | None:
+    """Return how far away a place is, None where a plane about the centre holds it."""
+    if upper_distance_m(centre, place) <= MAX_FIELD_M:
+        return None
+    away_m = distance_m(centre, place)
+    return away_m if away_m > MAX_FIELD_M else None
+
+
 def _check_reach(end: LatLon, centre: LatLon) -> None:
     """Refuse a start or target so far away that no plane holds it and the fence: nothing can be driven there.
 
@@ -105,9 +113,9 @@ def _check_reach(end: LatLon, centre: LatLon) -> None:
     NoRouteError
         It is too far away.
     """
-    if (away_m := distance_m(centre, end)) > MAX_FIELD_M:
+    if (away_m := _beyond_m(centre, end)) is not None:
         advice = "check the position (LAT,LON, latitude first) and the fence file"
-        if (swapped := _swapped(end)) is not None and distance_m(centre, swapped) <= MAX_FIELD_M:
+        if (swapped := _swapped(end)) is not None and _beyond_m(centre, swapped) is None:
             advice = f"latitude comes first: did you mean {swapped}?"
         raise NoRouteError(f"no route: {_too_far(end, centre, away_m)}", distance_m=away_m, advice=advice)
 

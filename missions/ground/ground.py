@@ -19,7 +19,7 @@ from shapely.ops import nearest_points
 
 from missions.errors import FenceError, SituationError
 from missions.fence import CircleZone, Obstacles, PolygonZone, Zone, ZoneKind
-from missions.geo import distance_m
+from missions.geo import distance_m, upper_distance_m
 from missions.ground.frame import LocalFrame, autopilot_line, autopilot_scale, bow_m
 
 if TYPE_CHECKING:
@@ -303,11 +303,14 @@ def _autopilot_ring(vertices: Sequence[LatLon]) -> list[LatLon]:
     """Put points on long edges, so that they bow as the autopilot's do: straight in latitude and longitude."""
     ring: list[LatLon] = []
     for a, b in itertools.pairwise([*vertices, vertices[0]]):
-        edge_m = distance_m(a, b)
-        bowed_m = bow_m(edge_m, max(abs(a.lat_deg), abs(b.lat_deg)))
-        pieces = max(
-            1, math.ceil(math.sqrt(bowed_m / EDGE_BOW_M))
-        )  # a bow shrinks with the square of the length
+        lat_deg = max(abs(a.lat_deg), abs(b.lat_deg))
+        if bow_m(upper_distance_m(a, b), lat_deg) <= EDGE_BOW_M:  # most edges are short
+            pieces = 1
+        else:
+            bowed_m = bow_m(distance_m(a, b), lat_deg)
+            pieces = max(
+                1, math.ceil(math.sqrt(bowed_m / EDGE_BOW_M))
+            )  # a bow shrinks with the square of the length
         ring += autopilot_line(a, b, pieces)[:-1]
     return ring
 

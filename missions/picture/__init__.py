@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from missions.errors import MissionFormatError
 from missions.formats.files import write_file
 from missions.picture.plans import plan_scene
-from missions.picture.sketch import sketch
+from missions.picture.sketch import Sketch, sketch
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -22,7 +22,16 @@ if TYPE_CHECKING:
     from missions.picture.scene import PictureScene
     from missions.planned import Plan
 
-__all__ = ["PICTURE_SUFFIXES", "TERMINAL", "check_picture_format", "draw_plan", "draw_scene", "sketch_plan"]
+__all__ = [
+    "PICTURE_SUFFIXES",
+    "TERMINAL",
+    "Sketch",
+    "check_picture_format",
+    "draw_plan",
+    "draw_scene",
+    "sketch_of",
+    "sketch_plan",
+]
 
 _LIBRARIES = {".png": "matplotlib", ".svg": "matplotlib", ".pdf": "matplotlib", ".html": "plotly"}
 
@@ -147,3 +156,18 @@ def sketch_plan(
         Lines of at most that width.
     """
     return sketch(plan_scene(plan, track=track, unsafe=unsafe), columns=columns, encoding=encoding)
+
+
+def sketch_of(plan: Plan, *, columns: int, lines: int, encoding: str = "utf-8") -> Sketch:
+    """Return the sketch of a plan into which a vehicle is drawn as it moves.
+
+    Parameters
+    ----------
+    plan : Plan
+        What was planned.
+    columns, lines : int
+        How wide and high it may be; at least 40 and 8.
+    encoding : str
+        What the terminal understands.
+    """
+    return Sketch(plan_scene(plan), columns=columns, lines=lines, encoding=encoding)

@@ -36,7 +36,7 @@ _NARROWEST, _TALLEST = 0.45, 1.5  # height to width; what is narrower gets room 
 _DPI = 150  # 1,200 pixels across
 _TITLE_COLUMNS = 82  # of its font across the page
 _LINE_IN = 0.2  # of the title
-_UNDATED = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+UNDATED = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 """A picture of the same plan is the same file."""
 
 _HALO = [Stroke(linewidth=5.0, foreground="white"), Normal()]
@@ -52,7 +52,7 @@ def scene_image(scene: PictureScene, suffix: str) -> bytes:
     kind = suffix.lower()[1:]
     image = BytesIO()
     with rc_context({"svg.hashsalt": "pbpp"}):
-        scene_figure(scene).savefig(image, format=kind, dpi=_DPI, metadata=_UNDATED.get(kind))
+        scene_figure(scene).savefig(image, format=kind, dpi=_DPI, metadata=UNDATED.get(kind))
     return image.getvalue()
 
 

@@ -26,7 +26,7 @@ from shapely import Point
 
 from missions.drive_model import corner_forecast
 from missions.fitting import polyline
-from missions.fitting.cost import ENOUGH_M
+from missions.fitting.cost import ENOUGH_M, Gauge
 from missions.fitting.local_search import MOST_MEASUREMENTS, Fitting
 from missions.fitting.polyline import Drawing, DrawnPoint
 from missions.geo import rounded
@@ -150,6 +150,7 @@ class SharedWork:
     )
     """By the lines, the measurements taken before and allowed, and what ends a round; with how they measured before, and the measurements taken after."""
     departures: Departures | None = None
+    gauge: Gauge | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -385,14 +386,9 @@ class RouteSearch:
             yield refused
 
     def _fitting(self, measurements: int) -> Fitting:
-        return Fitting(
-            self.sought.ground,
-            self.vehicle,
-            self.heading_deg,
-            self.sought.should_stop,
-            measurements,
-            self.good_share,
-        )
+        if self.known.gauge is None:
+            self.known.gauge = Gauge(self.sought.ground, self.vehicle, self.heading_deg)
+        return Fitting(self.known.gauge, self.sought.should_stop, measurements, self.good_share)
 
     def _drawn_at(self, band_m: float) -> DrawnRoutes:
         """Return the routes drawn with room for a band; what is free at it is computed once."""

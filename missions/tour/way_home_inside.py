@@ -221,7 +221,8 @@ class _Builder:
         """Return why a leg's way may not begin at a point; empty where it may."""
         tail = _tail(chain, index)
         items = tuple(tail.items(self._planned.vehicle.speed_mps, has_speeds=any(tail.speeds)))
-        part = HomePart(leg.leg.last_item, index + 1, items)
+        numbers = tuple(range(index + 1, index + 1 + len(items)))
+        part = HomePart(leg.leg.last_item, index + 1, items, numbers)
         try:
             return checked_way(
                 part, leg.leg, leg.asked_m, self.found, self._situation, self._checked, check_mission

@@ -5,9 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import TYPE_CHECKING
 
 from missions.errors import VehicleError
 from missions.firmware import Firmware
+
+if TYPE_CHECKING:
+    from missions.situation import Calibration
 
 MAV_TYPE_GROUND_ROVER = 10  # MAV_TYPE of MAVLink's common.xml
 MAV_TYPE_SURFACE_BOAT = 11  # the same
@@ -172,7 +176,11 @@ class Vehicle:
         Whether its firmware blends corners as ArduPilot does since 4.6; None where that is not known.
     pursuit : Pursuit or None
         How PX4 steers it; None on ArduPilot, and on skid steer.
+    calibration : Calibration or None
+        What its own recorded drives show beside the drive model.
     """
+
+    # Many attributes: each is one of the vehicle's parameters that the drive depends on, or what is known of it besides.
 
     waypoint_radius_m: float = 2.0
     speed_mps: float = 2.0
@@ -194,6 +202,7 @@ class Vehicle:
     boat_drift_m: float | None = None
     has_measured_corners: bool | None = True
     pursuit: Pursuit | None = None
+    calibration: Calibration | None = None
 
     @property
     def home_items(self) -> int:

@@ -17,6 +17,7 @@ from missions.geo import (
     parse_lat_lon,
     rounded,
     to_e7,
+    upper_distance_m,
     wrap_lon_deg,
 )
 
@@ -30,6 +31,13 @@ def test_distance_and_bearing_agree_with_the_direct_geodesic(
     turn_deg = (bearing_deg(a, b) - bearing + 180) % 360 - 180
     assert abs(turn_deg) < math.degrees(1e-6 / length_m) + 1e-6
     assert 0 <= bearing_deg(a, b) < 360
+
+
+@given(lat_lons, lat_lons, st.floats(0, 1))
+def test_the_quick_bound_of_a_distance_is_no_less(a: LatLon, b: LatLon, share: float) -> None:
+    nearer = LatLon(a.lat_deg + share * (b.lat_deg - a.lat_deg), a.lon_deg + share * (b.lon_deg - a.lon_deg))
+    for there in (b, nearer):
+        assert upper_distance_m(a, there) >= GEOD.inv(a.lon_deg, a.lat_deg, there.lon_deg, there.lat_deg)[2]
 
 
 def test_distance_of_a_degree_of_latitude() -> None:

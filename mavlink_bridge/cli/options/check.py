@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
+import typer
+
 from mavlink_bridge.cli.options.shared import (
     OUTPUT_PANEL,
     ClearanceOptions,
@@ -13,6 +15,7 @@ from mavlink_bridge.cli.options.shared import (
     DescriptionOptions,
     HomeOption,
     LinkOptions,
+    ManyOptions,
     MapOptions,
     PlaceOption,
     metres,
@@ -21,8 +24,10 @@ from mavlink_bridge.cli.options.shared import (
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CheckOptions(DescriptionOptions, MapOptions, ClearanceOptions, LinkOptions):
+class CheckOptions(DescriptionOptions, MapOptions, ClearanceOptions, ManyOptions, LinkOptions):
     """Check every leg of a mission against a fence: the clearance of its straight line and of the predicted track. Exit 8 if a leg fails.
+
+    Several missions are checked at the same time, each against `--fence` or the fence in its own file; one that cannot be read stops no other.
 
     For example:
 
@@ -31,8 +36,13 @@ class CheckOptions(DescriptionOptions, MapOptions, ClearanceOptions, LinkOptions
     `pbpp check --mission field.plan --vehicle rover.parm --plot check.png`
 
     `pbpp check --log field.tlog`
+
+    `pbpp check missions/*.plan --vehicle rover.parm --format sarif`
     """
 
+    missions: Annotated[
+        list[Path], typer.Argument(metavar="[MISSION]...", help="Mission files, when there are several.")
+    ] = field(default_factory=list)
     mission: Annotated[Path | None, option("Mission file: .plan, .waypoints, …", "FILE")] = None
     fence: Annotated[
         Path | None, option("Fence file; not needed if the --mission file holds one.", "FILE")
@@ -47,6 +57,14 @@ class CheckOptions(DescriptionOptions, MapOptions, ClearanceOptions, LinkOptions
     place: PlaceOption = field(default_factory=list)
     clearance: Annotated[
         float | None, metres("Fence clearance each leg must keep while driving. Default: from FENCE_MARGIN.")
+    ] = None
+    format: Annotated[
+        str | None,
+        option(
+            "Report on standard output with the line of each finding: for code hosts (SARIF 2.1.0) or build servers (JUnit's XML).",
+            "sarif|junit",
+            panel=OUTPUT_PANEL,
+        ),
     ] = None
     plot: Annotated[
         list[Path],

@@ -15,6 +15,7 @@ from mavlink_bridge.cli.options.shared import (
     DescriptionOptions,
     HomeOption,
     LinkOptions,
+    ManyOptions,
     MapOptions,
     PlaceOption,
     flag,
@@ -80,7 +81,13 @@ class BesideFenceOptions:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlanOptions(
-    BesideFenceOptions, TourOptions, DescriptionOptions, MapOptions, ClearanceOptions, LinkOptions
+    BesideFenceOptions,
+    TourOptions,
+    DescriptionOptions,
+    MapOptions,
+    ClearanceOptions,
+    ManyOptions,
+    LinkOptions,
 ):
     """Plan a mission around the fences of a SOURCE: `--fence FILE`, `--log FILE.tlog` or `--connect CONNECTION`.
 
@@ -91,8 +98,17 @@ class PlanOptions(
     `pbpp plan --fence field.plan --start 40.0713,-105.2299 --target 40.0726,-105.2290 -o mission.plan`
 
     `pbpp plan --connect udpin:0.0.0.0:14550 --target 40.0726,-105.2290 --upload`
+
+    `pbpp plan --batch plans.csv -o results.jsonl --jobs 4`
     """
 
+    batch: Annotated[
+        Path | None,
+        option(
+            "Make a plan for each row of a table (.csv, .jsonl, .parquet): fence, start, target, vehicle, clearance, …; results as JSON lines, or to -o FILE.jsonl, FILE.parquet.",
+            "TABLE",
+        ),
+    ] = None
     fence: Annotated[Path | None, option("Fence file: .waypoints, .plan, .kml, …", "FILE")] = None
     log: Annotated[Path | None, option("Recorded telemetry log.", "FILE.tlog")] = None
     connect: ConnectOption = None

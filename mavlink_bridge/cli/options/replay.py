@@ -8,17 +8,22 @@ from typing import Annotated
 
 import typer
 
-from mavlink_bridge.cli.options.shared import AnyVehicleOption, CommonOptions, SystemOption, flag, option
+from mavlink_bridge.cli.options.shared import (
+    AnyVehicleOption,
+    CommonOptions,
+    ManyOptions,
+    SystemOption,
+    flag,
+    option,
+)
 from mavlink_bridge.cli.values import within
 
 MOST_SPEED = 1e6
 """A day of a log in a tenth of a second: faster than any computer."""
 
-MOST_JOBS = 1024  # chosen: more processes than any computer has cores are a mistake in typing
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ReplayOptions(CommonOptions):
+class ReplayOptions(ManyOptions, CommonOptions):
     """Replay recorded logs through the bridge, in their own time: what it saw, what it would have planned.
 
     A log that `pbpp bridge --log` recorded is replayed with its journal: the same decisions come again. Over other logs the director only listens.
@@ -53,10 +58,6 @@ class ReplayOptions(CommonOptions):
             "X",
             parser=within(0.0, MOST_SPEED, above=True),
         ),
-    ] = None
-    jobs: Annotated[
-        int | None,
-        option("Logs replayed in parallel. Default: one per processor.", "N", min=1, max=MOST_JOBS),
     ] = None
     clearance: Annotated[str | None, option("As in pbpp plan.", "M|max")] = None
     corner_allowance: Annotated[str, option("As in pbpp plan.", "M|auto")] = "auto"

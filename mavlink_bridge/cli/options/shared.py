@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
@@ -70,6 +71,15 @@ def firmware_option(text: str) -> Firmware:
         raise typer.BadParameter(str(error)) from None
 
 
+def cluster_option(text: str) -> str:
+    """Return the address of a scheduler that an option names; another text is wrong usage."""
+    if re.fullmatch(r"(tcp|tls)://[^/\s]+:\d+", text) is None:
+        raise typer.BadParameter(
+            f"{text!r} is no address of a dask scheduler, such as tcp://192.168.1.10:8786"
+        )
+    return text
+
+
 FirmwareOption = Annotated[
     Firmware | None,
     option(
@@ -95,6 +105,27 @@ PlaceOption = Annotated[
     option(
         "A place to go home to, beside home and the rally points; repeatable. The ways home are in --json and pictures.",
         "NAME=LAT,LON",
+    ),
+]
+MOST_JOBS = 1024  # chosen: more processes than any computer has cores are a mistake in typing
+_MANY_PANEL = "Many at once"
+JobsOption = Annotated[
+    int | None,
+    option(
+        "How many are done at the same time, each in a process. Default: one per processor.",
+        "N",
+        panel=_MANY_PANEL,
+        min=1,
+        max=MOST_JOBS,
+    ),
+]
+ClusterOption = Annotated[
+    str | None,
+    option(
+        "Have the workers of this dask scheduler do them (extra cluster).",
+        "tcp://HOST:PORT",
+        panel=_MANY_PANEL,
+        parser=cluster_option,
     ),
 ]
 AcceptLessOption = Annotated[
@@ -162,7 +193,11 @@ class DescriptionOptions:
 
     vehicle: Annotated[
         Path | None,
-        option("Parameter file, for what the source does not report.", "FILE.parm", panel=VEHICLE_PANEL),
+        option(
+            "Parameter file, for what the source does not report; or a rover's calibration (`pbpp logs calibrate`).",
+            "FILE.parm|FILE.toml",
+            panel=VEHICLE_PANEL,
+        ),
     ] = None
     firmware: FirmwareOption = None
     stopping: Annotated[
@@ -263,3 +298,11 @@ class LinkOptions(VehicleLinkOptions):
     def identity(self) -> tuple[int, int]:
         """The system and component id that we speak as."""
         return self.source_system, self.source_component
+
+
+@dataclass(frozen=True, kw_only=True)
+class ManyOptions:
+    """Who does many at once."""
+
+    jobs: JobsOption = None
+    cluster: ClusterOption = None

@@ -164,7 +164,7 @@ def printing(tree):
         if not isinstance(node, ast.Call):
             continue
         called = ast.unparse(node.func)
-        is_print = called in ("print", "rich.print", "os.write") or called.endswith("Console")
+        is_print = called in ("print", "rich.print", "os.write") or re.fullmatch(r"(\w+\.)*Console", called)
         is_echo = re.fullmatch(r"(typer|click)\.(echo|secho|style|echo_via_pager)", called)
         is_stream = re.fullmatch(r"sys\.(stdout|stderr)(\.buffer)?\.write(lines)?", called)
         is_raw_row = called.endswith(".add_row") and not all(is_cell(one) for one in node.args)

@@ -20,7 +20,7 @@ from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.simulator import Simulator, SimulatorConfig
 from missions.fence import fence_to_items
 from missions.formats import read_fence, read_situation
-from missions.geo import LatLon, distance_m
+from missions.geo import LatLon, distance_m, parse_lat_lon
 from missions.items import Command, waypoint
 
 TARGET = "40.0720926,-105.2286152"
@@ -161,6 +161,18 @@ def test_a_drive_ends_with_what_it_was_like(config, tmp_path):
     assert drive["breaches"] == 0
     assert "info: HOLD does not brake: from 4 m/s the vehicle rolls on" in result.stderr, "before it drives"
     assert json.loads(again.stdout)["verified"] is True, "it waits in HOLD for the next one"
+
+
+def test_a_mission_with_its_ways_home_inside_is_uploaded_and_driven_to_its_end(config):
+    fast = replace(config, parameters={**config.parameters, "WP_SPEED": 4.0})
+    with Simulator(fast, "tcpin:127.0.0.1:0", speedup=10) as simulator:
+        result = driven(simulator, "--way-home-inside", "--json")
+        vehicle = simulator.vehicle
+        assert (vehicle.mode, vehicle.breaches) == (Mode.HOLD, 0)
+        assert distance_m(vehicle.position, parse_lat_lon(TARGET)) < 3
+    document = json.loads(result.stdout)
+    assert (document["arrived"], document["verified"]) == (True, True)
+    assert all(way["from_item"] < way["item"] for way in document["way_home_inside"])
 
 
 def test_people_see_the_plan_before_anything_is_written(config, tmp_path, monkeypatch):

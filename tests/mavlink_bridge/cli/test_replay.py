@@ -79,17 +79,6 @@ def test_side_by_side_gives_the_same_in_the_same_order(copies):
     assert list(dict.fromkeys(logs)) == [f"{name}.tlog" for name in NAMES]
 
 
-@pytest.mark.parametrize("error", [OSError, ImportError, NotImplementedError])
-def test_without_shared_memory_one_after_the_other(copies, monkeypatch, error):
-    def pool(*_arguments, **_options):
-        raise error("no semaphores here")
-
-    wanted = run(*copies, "--json", "--jobs", "1").stdout
-    monkeypatch.setattr("mavlink_bridge.cli.replay.ProcessPoolExecutor", pool)
-    result = run(*copies, "--json", "--jobs", "2")
-    assert (result.exit_code, result.stdout) == (0, wanted)
-
-
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_an_unusable_log_stops_no_other(copies, tmp_path, jobs):
     (tmp_path / "none.tlog").write_text("nothing\n")

@@ -17,6 +17,7 @@ from rich.console import Console
 from mavlink_bridge.cli.bridge_view import LiveView
 from mavlink_bridge.cli.failing import begin_telling
 from mavlink_bridge.cli.interrupting import terminable
+from mavlink_bridge.cli.keyboard import Keyboard
 from mavlink_bridge.cli.opening import Opening
 from mavlink_bridge.cli.typed import CONFIRM, TypedObstacle, understood
 from mavlink_bridge.director import Director, Orders, State
@@ -110,8 +111,9 @@ def test_the_view_says_that_the_link_is_gone_while_it_is_opened_again():
     heard_s = run.director.heard_s
     found = shown(run, heard_s + 4.0, "tcp:127.0.0.1:5760 cannot be opened: Connection refused")
     assert "LINK LOST: last heard 4 s ago (tcp:127.0.0.1:5760 cannot be opened: Connection refused)" in found
-    assert "disarmed (4 s old)" in found
-    assert re.search(rf"{re.escape(str(run.director.situation.pose.value.position))} \(\d+ s old\)", found)
+    assert re.search(r"disarmed, RTK fixed \(4 s old\)", found)
+    position = re.escape(str(run.director.situation.pose.value.position))
+    assert re.search(rf"{position}, heading \d+°, 0.0 m/s \(\d+ s old\)", found)
 
 
 def test_the_view_says_that_the_vehicle_is_silent():
@@ -120,7 +122,7 @@ def test_the_view_says_that_the_vehicle_is_silent():
     run.run_until(lambda: run.director.state is State.LOST, 8)
     found = shown(run, run.now_s + 600.0)
     assert "LINK LOST: last heard 10 min ago" in found
-    assert "lost, for 0 s" in found
+    assert "no heartbeat, for 0 s" in found
     assert understood("yes", run.director).answer == "nothing to confirm: the vehicle is not heard"
 
 
@@ -144,6 +146,7 @@ class Watcher:
 
     def __init__(self, most: int) -> None:
         self.link_trouble: str | None = None
+        self.keyboard = Keyboard()
         self.notes: list[str] = []
         self._left = most
 
@@ -162,7 +165,7 @@ class Watcher:
 
 def test_the_view_goes_on_while_the_link_is_opened_again():
     watcher = Watcher(3)
-    shell = bridge._Shell(Director(Orders()), "tcp:127.0.0.1:1", lambda _event: None, watcher, None)
+    shell = bridge.BridgeShell(Director(Orders()), "tcp:127.0.0.1:1", lambda _event: None, watcher, None)
     with pytest.raises(KeyboardInterrupt), terminable():  # which puts back what SIGINT does
         shell.run(None, 30.0)
     assert "tcp:127.0.0.1:1 cannot be opened" in watcher.link_trouble
@@ -172,7 +175,7 @@ def test_the_view_goes_on_while_the_link_is_opened_again():
 @pytest.mark.parametrize(("quiet", "shown"), [(0, "nw"), (1, "w"), (2, "")])
 def test_notes_beside_the_events_heed_quiet(quiet, shown, capsys):
     begin_telling("bridge", quiet=quiet)
-    shell = bridge._Shell(Director(Orders()), "tcp:127.0.0.1:1", lambda _event: None, None, None)
+    shell = bridge.BridgeShell(Director(Orders()), "tcp:127.0.0.1:1", lambda _event: None, None, None)
     shell._note("n", is_warning=False)
     shell._note("w", is_warning=True)
     assert capsys.readouterr().err.replace("\n", "") == shown

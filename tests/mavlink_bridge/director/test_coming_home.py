@@ -21,9 +21,11 @@ from mavlink_bridge.director.orders import Homing
 from mavlink_bridge.director.plan_task import WaysTask
 from mavlink_bridge.errors import BackupError
 from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.codec import Codec
 from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.replay.journal import JournalWriter, read_journal
 from mavlink_bridge.simulator import Battery, Receiver, SimulatedVehicle, SimulatorConfig
+from mavlink_bridge.simulator.telemetry import TelemetrySource, telemetry
 from missions.fence import CircleZone, Fence, PolygonZone, ZoneKind, fence_to_items
 from missions.geo import LatLon, distance_m
 from missions.rally import RallyPoint, rally_to_items
@@ -121,6 +123,21 @@ def test_the_first_rtl_is_answered_and_the_second_is_the_operators():
     assert left_alone(run, Mode.RTL)
     assert run.director.state is State.LET_GO
     assert len(texts(run, EventName.CALLED_HOME)) == 1
+    assert texts(run, EventName.CALL_IGNORED) == ["second RTL: yours, it drives straight home"]
+    assert any(  # also to who reads on the transmitter or in the ground station
+        isinstance(one, m.Statustext) and one.text.endswith("second RTL: yours, it drives straight home")
+        for one in run.sent
+    )
+
+
+def test_a_second_rtl_that_is_heard_and_seen_is_said_once():
+    run = heading_home(on_the_way(conductor()))
+    wait(run, 5)
+    run.ground_station(RTL)
+    run.ground_station(RTL)
+    assert left_alone(run, Mode.RTL)
+    assert len(texts(run, EventName.CALL_IGNORED)) == 1
+    assert len(texts(run, EventName.TAKEN_OVER)) == 1
 
 
 def test_without_the_option_rtl_is_a_takeover_as_ever():
@@ -170,6 +187,7 @@ def test_a_transmitters_second_rtl_comes_through_another_mode():
     wait(run, 1)
     unheard(run, RTL)
     assert left_alone(run, Mode.RTL, 10)
+    assert len(texts(run, EventName.CALL_IGNORED)) == 1
     unheard(run, m.SetMode(1, 1, MANUAL))
     wait(run, 60)
     unheard(run, RTL)
@@ -685,6 +703,25 @@ def test_volts_are_those_of_all_cells():
     cells = [3500, 3500, 3500]
     assert any("10.5 V" in text for text in told_by(BatteryWatch(None, 10.5), *[status(-1, *cells)] * 12))
     assert not any(told_by(BatteryWatch(None, 10.4), *[status(-1, *cells)] * 12))
+
+
+@pytest.mark.parametrize("cells", [1, 9, 10, 11, 12, 14])
+def test_volts_are_those_of_more_than_ten_cells_too(cells):
+    vehicle = rover()
+    codec, heard = Codec(1, 1), Codec(255, 190)
+    volts = cells * 3.5
+
+    def told(below: float) -> list[str]:
+        watch, texts = BatteryWatch(None, below), []
+        vehicle.rover.battery = Battery(-1, volts, cells)
+        message = telemetry(147, TelemetrySource(vehicle.rover, 0, 0.0, is_ready=True))
+        for number in range(12):
+            (frame,) = heard.decode(codec.encode(message))
+            texts.append(watch.receive(frame.message, 1.0 * number))
+        return texts
+
+    assert any(f"{volts:.1f} V" in text for text in told(volts + 0.05))
+    assert not any(told(volts - 0.05))
 
 
 def test_without_a_monitor_nothing_is_low():

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from missions.checking.check import check_mission
-from missions.checking.holding import TAKES_S, hold_now
+from missions.checking.holding import TAKES_S, hold_now, resting_pose
 from missions.fence import Fence, PolygonZone, ZoneKind
 from missions.firmware import Firmware
 from missions.geo import LatLon, LocalPoint, distance_m
@@ -15,7 +17,7 @@ from missions.ground.frame import LocalFrame
 from missions.planning.plan import plan
 from missions.request import GoTo
 from missions.situation import Known, Mission, Pose, Situation
-from missions.stops import Stop, Stops
+from missions.stops import Rolling, Stop, Stops
 
 FRAME = LocalFrame(LatLon(40.0, -105.0))
 NO_AVOIDANCE = {
@@ -152,3 +154,65 @@ def test_what_is_not_known_is_not_foretold():
     moving = driving(situation, (0.0, 99.0), (0.0, 3.0))
     assert hold_now(moving, REQUEST, None, item=1).roll_out.fence == "inclusion polygon 1"
     assert hold_now(replace(moving, fence=None), REQUEST, None, item=1) is None
+
+
+# Where it will stand, as its roll tells
+
+
+def rolled(kind: str, first_mps: float, share: float) -> list[tuple[float, float]]:
+    """Return speeds and ways of a stop, four a second: by how measured rovers' speeds fell, ``share`` times as far."""
+    rows = {
+        "steered": [(0.0, 0.0), (8.0, 16.4)],
+        "skid": [(0.0, 0.0), (1.0, 0.42), (2.0, 1.09), (3.0, 2.0), (4.0, 3.18)],
+    }[kind]
+    speeds, ways = zip(*rows, strict=True)
+    found, speed_mps, way_m, dt_s = [(first_mps, 0.0)], first_mps, 0.0, 0.005
+    while speed_mps > 0.25:
+        for _ in range(50):
+            moved_m = speed_mps * dt_s
+            left_m = max(0.0, share * np.interp(speed_mps, speeds, ways) - moved_m)
+            way_m += moved_m
+            speed_mps = float(np.interp(left_m / share, ways, speeds))
+        found.append((speed_mps, way_m))
+    return found
+
+
+@pytest.mark.parametrize("kind", ["steered", "skid"])
+@pytest.mark.parametrize("first_mps", [1.0, 1.5, 2.0, 3.0])
+@pytest.mark.parametrize("share", [0.3, 1.0, 1.6])
+def test_a_roll_tells_where_it_ends(kind, first_mps, share):
+    skid = {"SERVO1_FUNCTION": 73.0, "SERVO3_FUNCTION": 74.0} if kind == "skid" else {}
+    situation = field(**skid)
+    east, north = math.sin(0.7), math.cos(0.7)
+    rolling = Rolling(0.0)
+    seen = rolled(kind, first_mps, share)
+    stands_m = next(way_m for speed_mps, way_m in seen if speed_mps <= 0.3)
+    told = 0
+    for number, (speed_mps, way_m) in enumerate(seen):
+        place = at(east * way_m, north * way_m)
+        pose = Pose(place, 40.0, (east * speed_mps, north * speed_mps))
+        rolling = rolling.moved(place, speed_mps, 0.25 * number)
+        expected = resting_pose(replace(situation, pose=Known(pose, 0.25 * number, "test")), REQUEST, rolling)
+        if speed_mps > 0.85 * first_mps or speed_mps <= 0.3:
+            assert expected is None
+            continue
+        told += 1
+        assert expected.heading_deg == 40.0
+        assert expected.speed_mps == 0.0
+        # The stop is looked at four times a second, so that it is passed by as much as that.
+        assert distance_m(expected.position, at(east * stands_m, north * stands_m)) < 0.08 + 0.06 * stands_m
+    assert told or seen[1][0] <= 0.3
+
+
+def test_what_does_not_slow_down_or_is_not_known_tells_nothing():
+    pose = Pose(at(0.0, 5.0), 0.0, (0.0, 2.0))
+    situation = replace(field(), pose=Known(pose, 1.0, "test"))
+    begun = Rolling(0.0).moved(at(0.0, 0.0), 2.1, 0.0)
+    assert resting_pose(situation, REQUEST, begun) is None
+    assert resting_pose(situation, REQUEST, Rolling(0.0)) is None
+    assert resting_pose(replace(situation, pose=None), REQUEST, begun) is None
+    slower = replace(situation, pose=Known(Pose(at(0.0, 5.0), 0.0, (0.0, 1.0)), 1.0, "test"))
+    assert resting_pose(slower, REQUEST, begun) is not None
+    unusable = replace(slower, parameters={**slower.parameters, "TURN_RADIUS": -1.0, "WP_SPEED": -3.0})
+    assert resting_pose(unusable, REQUEST, begun) is None
+    assert resting_pose(replace(slower, ardupilot=False), REQUEST, begun) is None, "PX4's HOLD is a loop"

@@ -17,7 +17,7 @@ from shapely import LineString, Point, Polygon
 
 from missions.drive_model import Corner, Envelope, beyond_measured, corner_forecast, envelope
 from missions.drive_model.corner import blend
-from missions.drive_model.motion import LegProfile, leg_profile
+from missions.drive_model.motion import LegProfile, all_travelled_m, leg_profile
 from missions.errors import InvalidPositionError, VehicleError
 from missions.fence import PolygonZone, ZoneKind
 from missions.formats import waypoints as waypoint_file
@@ -226,6 +226,21 @@ def test_a_leg_keeps_its_limits_and_ends_at_rest(
 def test_a_short_leg_uses_all_of_its_length(length_m: float, accel_mps2: float, jerk_mps3: float) -> None:
     profile = leg_profile(length_m, 1000.0, accel_mps2, jerk_mps3)
     assert 2 * profile.ramp.length_m == pytest.approx(length_m)
+
+
+@given(st.lists(st.tuples(st.floats(0.3, 200), st.floats(0.1, 8)), min_size=1, max_size=4))
+def test_many_legs_at_once_run_as_each_alone(legs: list[tuple[float, float]]) -> None:
+    profiles = [leg_profile(length_m, speed_mps, 1.0, 1.5) for length_m, speed_mps in legs]
+    counts = [7 + number for number in range(len(profiles))]
+    times_s = [
+        np.linspace(0.0, profile.duration_s, count) for profile, count in zip(profiles, counts, strict=True)
+    ]
+    alone_m = [
+        profile.travelled_m(time_s)
+        for profile, own_s in zip(profiles, times_s, strict=True)
+        for time_s in own_s.tolist()
+    ]
+    assert all_travelled_m(profiles, counts, np.concatenate(times_s)) == pytest.approx(alone_m, abs=1e-9)
 
 
 @given(vehicles, st.floats(2, 60), st.floats(2, 60), turns)

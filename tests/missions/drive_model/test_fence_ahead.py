@@ -93,6 +93,28 @@ def test_many_edges_are_looked_at_by_parts_of_the_way() -> None:
         assert min(mps, 2.0) == pytest.approx(min(wanted_mps, 2.0), abs=1e-6)
 
 
+@settings(max_examples=30)
+@given(seed=st.integers(0, 2**32 - 1), far_m=st.sampled_from([0.0, 20_000.0]))
+def test_rays_that_pass_all_edges_by_are_left_out_and_no_others(seed: int, far_m: float) -> None:
+    """Many places at once, some of which meet an edge close to its end, give what one place at a time does."""
+    rng = np.random.default_rng(seed)
+    vehicle = vehicle_at(2.0)
+    fence = shapely.union_all([ring(int(rng.integers(3, 30)), 4.0, far_m + x, 3.0) for x in (-9.0, 0.0, 9.0)])
+    places = np.array((far_m, 0.0)) + rng.uniform(-20.0, 20.0, (60, 2))
+    edges = FenceEdges(fence)
+    aimed = rng.integers(0, len(edges.starts), 60)
+    at = edges.starts[aimed] + rng.choice([1e-6, 0.3, 1.0 - 1e-6], 60) * edges.steps[aimed]
+    ways = np.column_stack((at.real, at.imag)) - places
+    ways /= np.hypot(*ways.T)[:, None]
+    ahead = FenceAhead(edges, places, vehicle)
+    for place, way, mps in zip(places, ways, ahead.speeds_mps(places, ways, 2.0), strict=True):
+        alone_mps = ahead.speeds_mps(place[None], way[None], 2.0)[0]
+        assert min(mps, 2.0) == min(alone_mps, 2.0)
+        assert min(mps, 2.0) == pytest.approx(
+            min(ahead.speeds_about(2.0)(complex(*place), complex(*way)), 2.0), abs=1e-6
+        )
+
+
 def test_an_edge_along_the_way_is_met_at_its_neighbour() -> None:
     vehicle = vehicle_at(2.0)
     corner = shapely.LineString([(4.0, 0.0), (8.0, 0.0), (8.0, 3.0)])

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import itertools
 import math
+import sys
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +18,7 @@ from hypothesis import strategies as st
 
 from missions.drive_model import envelope
 from missions.fence import Fence
+from missions.fitting import cost, moves
 from missions.fitting import local_search as fitting
 from missions.fitting.cost import ENOUGH_M, Gauge
 from missions.fitting.polyline import Drawing, DrawnPoint
@@ -138,3 +142,64 @@ def test_good_is_told_without_more_steps_than_it_takes(
     tried = fitting._Tried(1e6, 0, gauge.trial(drawing, 0, 2), drawing)
     assert tried.misses_at_most(missing_m) is is_good
     assert tried.trial.is_finished is is_good
+
+
+def test_candidates_come_in_the_same_order_however_far_each_was_measured_before() -> None:
+    """So those after the first that suffices need not be measured until ranking them takes it."""
+    drawing = lines((-50, 0), (-20, 70), (20, 70), (80, 0))
+    candidates = [*moves.moved(drawing, 1, 3.0), *moves.moved(drawing, 2, 3.0), *moves.without(drawing, 1)]
+    orders = []
+    for steps in (0, 1, 2, 9):
+        gauge = gauge_of(FIELD, WALL, POND, **AVOIDING)
+        known_s = gauge.trial(drawing, 0, 4).finish().cost_s + 3.0
+        trials = [gauge.trial(one, 0, len(one)) for one in candidates]
+        for trial in trials:
+            for _ in range(steps):
+                trial.refine()
+        tried = [
+            fitting._Tried(known_s, number, trial, one)
+            for number, (trial, one) in enumerate(zip(trials, candidates, strict=True))
+        ]
+        orders.append([(one.number, one.gain_s) for one in fitting._best_first(tried)])
+    assert len(orders[0]) > 3
+    assert all(order == orders[0] for order in orders)
+
+
+def test_lines_fitted_after_others_by_the_same_gauge_are_those_of_a_fresh_one() -> None:
+    first, second = (
+        lines((-50, 0), (-20, north_m), (20, north_m), (80, 0), required_m=required_m)
+        for north_m, required_m in ((64, 2.0), (63, 2.5))
+    )
+    gauge = gauge_of(FIELD, WALL, **AVOIDING)
+    after = [fitting.Fitting(gauge).fit(one) for one in (first, second, first)]
+    fresh = [fitting.Fitting(gauge_of(FIELD, WALL, **AVOIDING)).fit(one) for one in (first, second)]
+    assert after == [*fresh, fresh[0]]
+
+
+def test_a_gauge_that_forgets_fits_the_same_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawing = lines((-50, 0), (-20, 64), (20, 64), (80, 0))
+    known = fitting.Fitting(gauge_of(FIELD, WALL, **AVOIDING)).fit(drawing)
+    monkeypatch.setattr(cost, "MOST_KNOWN", 20)
+    forgetful = gauge_of(FIELD, WALL, **AVOIDING)
+    assert fitting.Fitting(forgetful).fit(drawing) == known
+    assert len(forgetful._trials) <= 20
+
+
+def test_what_is_forgotten_is_freed_at_once() -> None:
+    """Plans are made without garbage collection: measured lines must be no cycle."""
+    gauge = gauge_of(FIELD, WALL, **AVOIDING)
+    drawing = lines((-50, 0), (-20, 70), (20, 70), (80, 0))
+    gc.disable()
+    try:
+        for steps in (0, 2, 9):
+            trial = gauge.trial(drawing, 0, 4)
+            for _ in range(steps):
+                trial.refine()
+            drive = weakref.ref(trial._drive) if steps else None
+            gauge._trials.clear()
+            count = sys.getrefcount(trial)
+            del trial
+            assert count == 2
+            assert drive is None or drive() is None
+    finally:
+        gc.enable()

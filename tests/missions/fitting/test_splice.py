@@ -8,6 +8,7 @@ from charts import FIELD, HOME, OUT, box, place, situation_of
 from hypothesis import given
 from hypothesis import strategies as st
 
+from missions.fitting.cost import Gauge
 from missions.fitting.local_search import Fitting
 from missions.fitting.polyline import DrawnPoint
 from missions.fitting.splice import splices
@@ -58,7 +59,7 @@ def test_two_lines_that_fail_at_different_places_make_one_that_keeps_enough():
     ponds = (box(OUT, 20, -5, 30, 5), box(OUT, 60, -5, 70, 5))
     situation = situation_of(FIELD, *ponds, WP_SPEED=2.0, FENCE_ENABLE=1.0, FENCE_TYPE=4.0)
     vehicle = vehicle_from_parameters(situation.parameters)
-    fitting = Fitting(ground_for(situation, vehicle, (HOME, place(80, 80))), vehicle, 90.0)
+    fitting = Fitting(Gauge(ground_for(situation, vehicle, (HOME, place(80, 80))), vehicle, 90.0))
     first, second = (
         tuple(point.at(LocalPoint(point.place[0] - 5, point.place[1])) for point in one)
         for one in (

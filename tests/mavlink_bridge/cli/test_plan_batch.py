@@ -1,0 +1,194 @@
+"""``pbpp plan --batch``: a plan for each row of a table, whatever its format; rows that have none stop no other."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+import sys
+from pathlib import Path
+
+import duckdb
+import pytest
+from typer.testing import CliRunner
+
+from mavlink_bridge.cli.app import app
+from mavlink_bridge.cli.batch_rows import COLUMNS, read_rows
+from mavlink_bridge.cli.plan_batch import _results_file
+from missions.formats import read_mission
+
+YARD = Path(__file__).parents[3] / "examples" / "yard"
+HOME, TARGET = "40.071374,-105.229930", "40.07228,-105.22907"
+ROWS = [
+    {"name": "first", "start": HOME, "target": TARGET, "output": "first.waypoints"},
+    {"name": "close", "start": HOME, "target": TARGET, "clearance": "0.5"},
+    {"name": "outside", "start": HOME, "target": "40.0726,-105.2290"},
+    {"name": "odd", "start": "here", "target": TARGET},
+    {"name": "two", "start": HOME, "target": f"40.0720,-105.2299;{TARGET}"},
+    {"name": "none", "fence": "missing.waypoints", "start": HOME, "target": TARGET},
+    {"name": "fast", "start": HOME, "target": TARGET, "speed": "999"},
+]
+
+
+@pytest.fixture
+def table(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("field").mkdir()
+    for name in ("fence.waypoints", "rover.parm"):
+        shutil.copy(YARD / name, "field")
+    rows = [{"fence": "fence.waypoints", "vehicle": "rover.parm", **row} for row in ROWS]
+    with Path("field/plans.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, COLUMNS)
+        writer.writeheader()
+        writer.writerows(rows)
+    return Path("field/plans.csv")
+
+
+def run(*arguments: str | Path):
+    return CliRunner().invoke(app, ["plan", "--batch", *map(str, arguments), "--home", HOME])
+
+
+def told(text: str) -> list[dict]:
+    rows = [json.loads(line) for line in text.splitlines()]
+    return [{key: value for key, value in row.items() if key != "planning_s"} for row in rows]
+
+
+def test_each_row_has_its_plan_or_its_error(table):
+    result = run(table, "--jobs", "1")
+    rows = told(result.stdout)
+    assert [(row["row"], row["name"], row["status"], row["exit_code"]) for row in rows] == [
+        (1, "first", "ok", 0), (2, "close", "ok", 0), (3, "outside", "error", 4), (4, "odd", "error", 2),
+        (5, "two", "ok", 0), (6, "none", "error", 3), (7, "fast", "error", 2),
+    ]  # fmt: skip
+    assert result.exit_code == 2
+    assert "7 rows: 3 plans, 4 without one" in result.stderr
+    assert [row["clearance_m"] for row in rows[:2]] == [2.5, 0.5]
+    assert len(rows[4]["targets"]) == 2
+    assert rows[0]["outputs"] == ["field/first.waypoints"]
+    assert "field/missing.waypoints cannot be read" in rows[5]["message"]
+    assert rows[6]["message"].startswith("speed '999'")
+    alone = CliRunner().invoke(
+        app, ["plan", "--fence", "field/fence.waypoints", "--vehicle", "field/rover.parm", "--start", HOME, "--target", TARGET,
+              "--home", HOME, "--json", "-o", "alone.waypoints"],
+    )  # fmt: skip
+    plan = json.loads(alone.stdout)
+    assert all(
+        rows[0][key] == plan[key]
+        for key in ("path", "length_m", "clearance_m", "driven_clearance_m", "warnings")
+    )
+    assert read_mission("field/first.waypoints").items == read_mission("alone.waypoints").items
+    quiet = run(table, "--jobs", "2", "-q")
+    assert (told(quiet.stdout), quiet.stderr) == (rows, "")
+
+
+def test_json_lines_and_parquet_say_the_same(table):
+    rows = told(run(table, "--jobs", "1", "-q").stdout)
+    lines = [{"name": row.get("name"), "fence": "fence.waypoints", **row} for row in map(dict, ROWS)]
+    for row in lines:
+        row["target"] = [[float(part) for part in one.split(",")] for one in row["target"].split(";")]
+        row["clearance"] = float(row.pop("clearance", 2.5))
+    Path("field/plans.jsonl").write_text("\n\n".join(map(json.dumps, lines)))
+    duckdb.sql(
+        "COPY (SELECT * FROM read_json('field/plans.jsonl')) TO 'field/plans.parquet' (FORMAT parquet)"
+    )
+    for kind in ("jsonl", "parquet"):
+        result = run(
+            f"field/plans.{kind}",
+            "--vehicle",
+            "field/rover.parm",
+            "--jobs",
+            "1",
+            "-o",
+            "out.jsonl",
+            "-o",
+            "out.parquet",
+        )
+        assert result.exit_code == 2
+        assert result.stdout.splitlines() == [
+            "7 rows: 3 plans, 4 without one",
+            "Wrote out.jsonl",
+            "Wrote out.parquet",
+        ]
+        found = told(Path("out.jsonl").read_text())
+        assert [row.get("path") for row in found] == [row.get("path") for row in rows]
+        table = duckdb.sql("SELECT row, status, path, exit_code FROM 'out.parquet' ORDER BY row").fetchall()
+        assert table == [(row["row"], row["status"], row.get("path"), row["exit_code"]) for row in found]
+    assert sorted(path.name for path in Path().iterdir()) == ["field", "out.jsonl", "out.parquet"]
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("a.csv", "fence,clearence\nx,2\n", "unknown column 'clearence'"),
+        ("a.csv", "fence\nx,2\n", "more cells than columns"),
+        ("a.csv", b"fence\n\xff\n", "a.csv: line"),
+        ("a.csv", 'fence\n"x\n', "a.csv: line"),
+        ("a.jsonl", "{", "line 1: not JSON"),
+        ("a.jsonl", "\n[1]", "line 2: expected an object"),
+        ("a.parquet", "no parquet", "a.parquet"),
+        ("a.txt", "", "expected a table"),
+    ],
+)
+def test_a_table_that_cannot_be_read_is_one_clear_error(tmp_path, monkeypatch, name, text, message):
+    monkeypatch.chdir(tmp_path)
+    Path(name).write_bytes(text if isinstance(text, bytes) else text.encode())
+    result = run(name, "--jobs", "1", "-o", "out.jsonl")
+    assert result.exit_code in (2, 3)
+    assert message in result.stderr
+    assert [path.name for path in Path().iterdir()] == [name]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--json"],
+        ["-o", "a.plan"],
+        ["-o", "none/a.jsonl"],
+        ["--plot", "a.png"],
+        ["--upload"],
+        ["--clearance", "x"],
+        ["--place", "A=1,2"],
+    ],
+)
+def test_wrong_usage_is_said_before_any_plan(table, arguments):
+    result = run(table, *arguments)
+    assert result.exit_code in (2, 3)
+    assert "Traceback" not in result.output
+
+
+def test_jobs_are_for_tables():
+    assert CliRunner().invoke(app, ["plan", "--fence", "a.plan", "--jobs", "2"]).exit_code == 2
+
+
+def test_without_duckdb_what_to_install(table, monkeypatch):
+    monkeypatch.setitem(sys.modules, "duckdb", None)
+    result = run(table, "-o", "a.parquet")
+    assert result.exit_code == 2
+    assert "pbpp-rover[data]" in result.stderr
+
+
+@pytest.mark.parametrize("cell", [True, {"a": 1}, [1, 2, 3]])
+def test_cells_that_are_no_text_are_refused(table, cell):
+    Path("field/odd.jsonl").write_text(json.dumps({"fence": "fence.waypoints", "start": cell}))
+    (row,) = told(run("field/odd.jsonl", "--jobs", "1").stdout)
+    assert (row["exit_code"], row["error"]) == (2, "UsageError")
+    Path("field/odd.jsonl").write_text(json.dumps({"start": HOME}))
+    (row,) = told(run("field/odd.jsonl", "--jobs", "1").stdout)
+    assert row["message"].startswith("no fence")
+
+
+def test_rows_are_read_as_they_are_needed(tmp_path):
+    """A table that never ends has a first row."""
+    path = tmp_path / "a.csv"
+    path.write_text("name\n" + "x\n" * 100_000)
+    assert next(iter(read_rows(path))) == {"name": "x"}
+
+
+def test_a_run_that_ends_early_leaves_what_was_there(tmp_path):
+    path = tmp_path / "a.jsonl"
+    path.write_text("before")
+    results = _results_file(path)
+    results.__enter__()({"row": 1})
+    assert not results.__exit__(KeyboardInterrupt, KeyboardInterrupt(), None)
+    assert path.read_text() == "before"
+    assert list(tmp_path.iterdir()) == [path]

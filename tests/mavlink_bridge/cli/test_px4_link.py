@@ -15,6 +15,7 @@ from mavlink_bridge.cli.app import app
 from mavlink_bridge.cli.interrupting import _hold
 from mavlink_bridge.cli.session import Contact, open_session
 from mavlink_bridge.errors import OutcomeError
+from mavlink_bridge.link import Link
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.autopilots import PX4_1_17
 from mavlink_bridge.mavlink.messages import MissionType
@@ -317,6 +318,43 @@ class TestEveryModeThatIsSent:
             for mode in (other.hold, other.mission, other.rtl):
                 with pytest.raises(ValueError, match="is no mode of this autopilot"):
                     session.change_mode(mode)
+
+
+@pytest.mark.parametrize("firmware", [Firmware(1, 17, 0), Firmware(1, 18, 0, 0)], ids=str)
+@pytest.mark.parametrize("what", ["upload", "download", "plan", "bridge"])
+def test_an_interrupt_ends_the_transfer_that_we_began(plan, monkeypatch, firmware, what):
+    """Else PX4 is busy for everybody for 5 s more; the old list stays whole."""
+    begins = m.MissionItemInt if what in ("upload", "plan", "bridge") else m.MissionRequestInt
+    with rover(
+        PX4S, firmware, fence=fence_to_items(Fence((PolygonZone(ZoneKind.INCLUSION, BOX),))), mission=WAY
+    ) as (simulator, sent):
+        old = simulator.vehicle.mission
+        receive_at, is_due = Link.receive_at, [True]
+
+        def interrupted(link, timeout_s):
+            if is_due[0] and any(isinstance(one, begins) for one in sent):
+                is_due[0] = False
+                raise KeyboardInterrupt
+            return receive_at(link, timeout_s)
+
+        monkeypatch.setattr(Link, "receive_at", interrupted)
+        arguments = {
+            "upload": ["upload", plan],
+            "download": ["download", "mission"],
+            "plan": ["plan", "--target", "40.0718,-105.2299", "--clearance", "1.5", "--upload"],
+            "bridge": ["bridge", "--target", "40.0718,-105.2299", "--clearance", "1.5", "--upload"],
+        }[what]
+        result = CliRunner().invoke(app, [*map(str, arguments), "--connect", simulator.connection])
+        assert result.exit_code == 130
+        assert not is_due[0]
+        assert simulator.vehicle.mission == old or what == "upload"  # there the fence comes first
+        ends = [
+            one
+            for one in sent
+            if isinstance(one, m.MissionAck) and one.type == m.MissionResult.OPERATION_CANCELLED
+        ]
+        assert len(ends) == 1
+        assert simulator.vehicle.transfers.is_idle
 
 
 def test_a_mode_that_px4_1_17_accepts_and_never_enters_is_not_believed():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -317,4 +317,10 @@ def open_session(contact: Contact, show: Callable[[str, int, int], None]) -> Ite
         signing=signing_of(contact.key_file),
         timeout_s=contact.timeout_s,
     ) as link:
-        yield Session(link, contact, show)
+        session = Session(link, contact, show)
+        try:
+            yield session
+        except KeyboardInterrupt:
+            with suppress(LinkError):
+                link.send_all(link.transfer.ending(session.vehicle))
+            raise

@@ -84,8 +84,7 @@ class DriveWatch:
         self._plan = plan
         self._points = plan.points
         self._line = LineString(self._points)
-        self._band = plan.envelope.area
-        prepare(self._band)
+        prepare(plan.envelope.area)
 
     @property
     def distance_left_m(self) -> float:

@@ -63,14 +63,16 @@ class Bridge:
         Where the vehicle is.
     options : str
         Further ones.
+    name : str
+        Another command that runs a bridge: ``serve``.
     """
 
-    def __init__(self, connection: str, *options: str) -> None:
+    def __init__(self, connection: str, *options: str, name: str = "bridge") -> None:
         command = [
             sys.executable,
             "-m",
             "mavlink_bridge.cli",
-            "bridge",
+            name,
             "--connect",
             connection,
             "--json",
@@ -111,8 +113,8 @@ class Bridge:
 
     def await_event(self, name: str, within_s: float = 60.0, after: int = 0) -> dict[str, Any]:
         """Return the first event of a name after so many."""
-        wait_for(lambda: any(event["event"] == name for event in self.events[after:]), within_s, name)
-        return next(event for event in self.events[after:] if event["event"] == name)
+        wait_for(lambda: any(event.get("event") == name for event in self.events[after:]), within_s, name)
+        return next(event for event in self.events[after:] if event.get("event") == name)
 
     def cpu_s(self) -> float:
         """Return the CPU time of the process so far."""
@@ -146,9 +148,17 @@ class Flood:
     """Stands between bridge and vehicle, passes everything on, and adds a full stream; a context manager.
 
     Once a second it sends the bridge a command that it has to deny, and takes the time to its answer.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        The vehicle.
+    stream_hz : float
+        How often each message comes.
     """
 
-    def __init__(self, simulator: Simulator) -> None:
+    def __init__(self, simulator: Simulator, stream_hz: float = STREAM_HZ) -> None:
+        self._stream_hz = stream_hz
         host, port = simulator.connection.split(":")[1:]
         self._vehicle = socket.create_connection((host, int(port)))
         self._server = socket.create_server(("127.0.0.1", 0))
@@ -186,7 +196,7 @@ class Flood:
                     self._vehicle.sendall(self._pass_up(bridge.recv(65536)))
                 now_s = time.monotonic()
                 if now_s >= due_s:
-                    due_s += 1 / STREAM_HZ
+                    due_s += 1 / self._stream_hz
                     if self.is_on:
                         packets = [*self._packets, self._position]
                         bridge.sendall(b"".join(packets))

@@ -174,3 +174,4 @@ def _report(document: dict[str, object], plan: Plan) -> None:
     assert isinstance(outputs, list)
     for path in outputs:
         echo(f"Wrote {path}")
+    echo("Drive it yourself, on a page: pbpp serve --demo --open")

@@ -60,7 +60,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from mavlink_bridge.cli.options.serve import ServeOptions
-    from mavlink_bridge.console.backend import Backend
+    from mavlink_bridge.console.backend import PageBackend
     from missions.request import Request
     from missions.situation import Situation
 
@@ -121,7 +121,7 @@ def _files(options: ServeOptions) -> Situation:
 
 @contextlib.contextmanager
 def served(
-    options: ServeOptions, source: str, name: str, backend: Backend, sections: dict[str, object]
+    options: ServeOptions, source: str, name: str, backend: PageBackend, sections: dict[str, object]
 ) -> Iterator[Hub]:
     """Serve a backend's page as long as the context lasts, and print where it is."""
     host, port = _listen(options.listen)

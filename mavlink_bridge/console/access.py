@@ -94,8 +94,16 @@ class Access:
 
     # What is refused
 
-    def stranger(self, headers: Mapping[str, str]) -> Problem | None:
-        """Return why a request is not for us, or not from our page; None where it may be."""
+    def stranger(self, headers: Mapping[str, str], *, is_index: bool = False) -> Problem | None:
+        """Return why a request is not for us, or not from our page; None where it may be.
+
+        Parameters
+        ----------
+        headers : mapping of str to str
+            By lower-case names.
+        is_index : bool
+            Whether the page itself is asked for: a link to it may be followed from anywhere, as from a chat.
+        """
         authority = headers.get("host", "")
         if not self._is_ours(authority):
             return Problem(
@@ -107,7 +115,7 @@ class Access:
         if origin is not None and origin != f"{self.scheme}://{authority}":
             return Problem(kind="forbidden", message="requests of other pages are refused")
         site = headers.get("sec-fetch-site")
-        if site is not None and site not in _ALLOWED_SITES:
+        if site is not None and site not in _ALLOWED_SITES and not (is_index and _is_followed(headers)):
             return Problem(kind="forbidden", message="requests of other pages are refused")
         return None
 
@@ -151,6 +159,11 @@ class Access:
         except ValueError:
             return False
         return True
+
+
+def _is_followed(headers: Mapping[str, str]) -> bool:
+    """Return whether a person follows a link, so that the page is opened by itself and not within another one."""
+    return headers.get("sec-fetch-mode") == "navigate" and headers.get("sec-fetch-dest") == "document"
 
 
 def content_policy(authority: str, *, is_secure: bool, tiles: str = "") -> str:

@@ -149,6 +149,9 @@ def _guarded(handler: Handler) -> Handler:
             return failure(Problem(kind="superseded", message="a newer request took its place"), 409)
         except (MissionError, BridgeError) as error:
             return failure(problem_of(error), 422)
+        except Exception as error:  # noqa: BLE001 - the last place where it can be answered
+            text = f"{type(error).__name__}: {error}. This is a bug in pbpp"
+            return failure(Problem(kind="internal", message=text), 500)
 
     return run
 
@@ -516,7 +519,7 @@ class Console:
         hub = self._hub
         you = hub.control.connect(page_id)
         hub.show_control()
-        stream = _Stream(socket, hub, you)
+        stream = _PageStream(socket, hub, you)
         listening = asyncio.create_task(stream.listen())
         try:
             await stream.show()
@@ -533,7 +536,7 @@ class Console:
                     await socket.close(1013)
 
 
-class _Stream:
+class _PageStream:
     """One page's connection."""
 
     def __init__(self, socket: WebSocket, hub: Hub, you: str) -> None:
@@ -648,7 +651,7 @@ class _Gate:
             await self._app(scope, receive, send)
             return
         headers = {key.decode("latin-1"): value.decode("latin-1") for key, value in scope["headers"]}
-        problem, status = self._access.stranger(headers), 403
+        problem, status = self._access.stranger(headers, is_index=scope["path"] == "/"), 403
         if problem is None and not _is_open(scope["path"]):
             problem, status = self._access.unknown(headers), 401
         if scope["type"] == "websocket":

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from missions.situation import Situation
 
 
-class Backend(Protocol):
+class PageBackend(Protocol):
     """What the page speaks to; called by the server's loop, and answers at once."""
 
     def situation(self) -> Situation:

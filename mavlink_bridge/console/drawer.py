@@ -10,9 +10,16 @@ if TYPE_CHECKING:
 
 
 class Drawer:
-    """Makes one thing after the other; nobody waits for it."""
+    """Makes one thing after the other; nobody waits for it.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    trouble : callable
+        Told of a defect of ours; what it was in is not shown, and all else goes on.
+    """
+
+    def __init__(self, trouble: Callable[[Exception], None]) -> None:
+        self._trouble = trouble
         self._wanted: dict[str, Callable[[], None]] = {}
         self._condition = Condition()
         self._is_closed = False
@@ -39,4 +46,7 @@ class Drawer:
                 if self._is_closed:
                     return
                 make = self._wanted.pop(next(iter(self._wanted)))
-            make()
+            try:
+                make()
+            except Exception as error:  # noqa: BLE001 - a picture less, and nothing else
+                self._trouble(error)

@@ -105,9 +105,8 @@ class LiveBackend:
                 text = self.desk.do(asked.deed, asked.page, now_s)
             except Refusal as refusal:
                 _tell(asked, asked.answer.set_exception, refusal)
-            except Exception as error:
-                _tell(asked, asked.answer.set_exception, not_now(f"a defect of pbpp: {error!r}"))
-                raise
+            except Exception as error:  # noqa: BLE001 - whatever it is, the vehicle must not lose its bridge by it
+                _tell(asked, asked.answer.set_exception, not_now(_defect(error)))
             else:
                 _tell(asked, asked.answer.set_result, text)
 
@@ -156,7 +155,7 @@ class LiveConsole:
         self._writer = writer
         self._backend = backend
         self._own = request
-        self._drawer = Drawer()
+        self._drawer = Drawer(self._tell_defect)
         self._instruments = Instruments()
         self._drive = DriveShown()
         self._track = Track()
@@ -171,6 +170,8 @@ class LiveConsole:
         self._mission: object = None
         self._failed: object = None
         self._upload: TransferView | None = None
+        self._listed: TransferView | None = None
+        self._outcome = director.upload_outcome
         self._texts: list[tuple[str, str]] = []
         self.link_trouble = "not opened yet"
 
@@ -196,8 +197,13 @@ class LiveConsole:
     def step(self, now_s: float) -> None:
         """Do what pages asked for, and go on with what had to wait."""
         self._backend.take_asked(now_s)
-        if self._backend.desk is not None:
+        if self._backend.desk is None:
+            return
+        try:
             self._backend.desk.handle_timer(now_s)
+        except Exception as error:  # noqa: BLE001 - as above
+            self._backend.desk.forget_wishes()
+            self._tell_defect(error)
 
     def tell(self, event: Event) -> None:
         """Take an event of the director."""
@@ -210,9 +216,14 @@ class LiveConsole:
         """Take what is no event of the director, with its severity."""
         self._texts.append((text, severity))
 
+    def _tell_defect(self, error: Exception) -> None:
+        self.note(_defect(error), "error")
+
     def link_opened(self) -> None:
         """Take notice that the link is open."""
         self.link_trouble = ""
+        if self._backend.desk is not None:
+            self._backend.desk.link_opened()
 
     def link_closed(self, why: str) -> None:
         """Take notice that the link is closed, and why."""
@@ -277,39 +288,33 @@ class LiveConsole:
         return found
 
     def _upload_view(self, now_s: float) -> TransferView | None:
-        """Return the newest transfer: the director's mission, or a list beside it."""
-        director = self._director
-        if self._writer.is_busy:
-            self._upload = self._writer.view()
+        """Return the newest transfer: the director's mission, or a list beside it; also one that began and ended between two looks."""
+        director, listed, outcome = self._director, self._writer.view(), self._director.upload_outcome
+        if listed is not None and listed is not self._listed:
+            self._upload = self._listed = listed
         elif director.is_uploading:
             done, count = director.progress
             self._upload = TransferView(
                 what="mission", state="running", done=done, count=count, text="uploading the mission"
             )
-        elif self._upload is not None and self._upload.state == "running":
+        elif outcome is not self._outcome or (self._upload is not None and self._upload.state == "running"):
             self._upload = self._ended_view(now_s)
+        if not director.is_uploading:
+            self._outcome = outcome
         return self._upload
 
-    def _ended_view(self, now_s: float) -> TransferView | None:
-        assert self._upload is not None
-        if self._upload.what != "mission" or self._writer.view() is not None:
-            ended = self._writer.view()
-            if ended is not None and ended.what == self._upload.what:
-                return ended
+    def _ended_view(self, now_s: float) -> TransferView:
+        """Return how the director's upload ended; one that ended before anything was read has no outcome of its own."""
         outcome = self._director.upload_outcome
-        if outcome is not None and outcome.is_verified:
-            count = len(outcome.found or ())
-            return replace(
-                self._upload,
-                state="verified",
-                done=count,
-                count=count,
-                text=f"mission of {count} items verified on the vehicle",
-                time_s=now_s,
+        if outcome is not None and outcome is not self._outcome and outcome.is_verified:
+            count = len(outcome.found or outcome.backup or ())
+            text = f"mission of {count} items verified on the vehicle"
+            return TransferView(
+                what="mission", state="verified", done=count, count=count, text=text, time_s=now_s
             )
         trouble = self._director.trouble
         text = str(trouble) if trouble is not None else "the upload did not end well"
-        return replace(self._upload, state="failed", text=text, time_s=now_s)
+        return TransferView(what="mission", state="failed", text=text, time_s=now_s)
 
     def _follow(self) -> None:
         """Follow the vehicle's way."""
@@ -378,6 +383,10 @@ class LiveConsole:
     def _post(self, **sections: Any) -> None:  # noqa: ANN401 - whichever
         if self._hub is not None:
             self._hub.post(sections)
+
+
+def _defect(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}. This is a bug in pbpp"
 
 
 def _planning(request: Request) -> PlanView:

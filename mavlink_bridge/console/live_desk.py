@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from mavlink_bridge.backup.vehicle_mark import Kinship
 from mavlink_bridge.console import deeds
 from mavlink_bridge.console.deeds import Refusal, not_now
-from mavlink_bridge.console.view.drives import HoldShown
+from mavlink_bridge.console.view.drives import NO_LINK, HoldShown
 from mavlink_bridge.console.view.plans import is_same_route, plan_id
 from mavlink_bridge.console.wire import BackupView, Problem
 from mavlink_bridge.director import AT_WORK, ON_VEHICLE, State
@@ -107,6 +107,7 @@ class LiveDesk:
         self._wanted: _Wanted | None = None
         self._list: _List | None = None
         self._asked: Tour | None = None
+        self._is_linked = True
         self.hold_shown = HoldShown()
         self._deeds: dict[type[Deed], Callable[[Any, str, float], str]] = {
             deeds.Hold: self._hold,
@@ -140,22 +141,31 @@ class LiveDesk:
         self._go_on_with_plan(now_s)
         self._go_on_with_list(now_s)
 
+    def link_opened(self) -> None:
+        """Take notice that the link is open."""
+        self._is_linked = True
+
     def link_closed(self) -> None:
         """Take notice that the link is gone: nothing that was wanted on it is done later."""
-        self._wanted = self._list = None
+        self._is_linked = False
+        self.forget_wishes()
         self._writer.drop()
+
+    def forget_wishes(self) -> None:
+        """Do nothing any more that waits."""
+        self._wanted = self._list = None
 
     # Driving
 
     def _hold(self, _deed: deeds.Hold, page: str, now_s: float) -> str:
         if self._director.peer is None:
             raise not_now("no vehicle was heard yet: HOLD was not sent")
-        self._wanted = None
-        self.hold_shown.ask(page, now_s)
+        self.forget_wishes()
+        self.hold_shown.ask(page, now_s, is_linked=self._is_linked)
         reason = f"asked for by {page} of the console"
         self._journal("hold", now_s, text=reason)
         self._director.hold(reason, now_s)
-        return "HOLD is being sent"
+        return "HOLD is being sent" if self._is_linked else NO_LINK
 
     def _take_targets(self, deed: deeds.TakeTargets, _page: str, now_s: float) -> str:
         if not deed.request.targets:

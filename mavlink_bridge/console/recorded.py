@@ -200,7 +200,7 @@ class RecordedBackend:
             "vehicle": moment.vehicle,
             "drive": moment.drive,
             "fence": self._fence(_Grounds(situation, moment.request)),
-            "plan": self._plan(_Drawn(moment)),
+            "plan": self._plan(_Pictured(moment)),
             "mission": mission_view(
                 situation, matches_plan=moment.has_our_mission, current_seq=moment.current_seq
             ),
@@ -230,7 +230,7 @@ class _Grounds:
         return self._key == other._key and self.situation.parameters == other.situation.parameters
 
 
-class _Drawn:
+class _Pictured:
     """What a plan's drawing rests on."""
 
     def __init__(self, moment: Moment) -> None:
@@ -241,14 +241,14 @@ class _Drawn:
         return hash(id(self._key))
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Drawn) and self._key is other._key
+        return isinstance(other, _Pictured) and self._key is other._key
 
 
 def _fence(grounds: _Grounds) -> FenceView:
     return fence_view(grounds.situation, grounds.request, "log")
 
 
-def _plan(drawn: _Drawn) -> PlanView | None:
+def _plan(drawn: _Pictured) -> PlanView | None:
     moment = drawn.moment
     if moment.plan is not None:
         return replace(plan_view(moment.plan, moment.situation, moment.request), by="director")

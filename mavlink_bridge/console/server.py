@@ -26,6 +26,7 @@ FIRST_PORT, _PORTS = 8080, 20
 """Where nothing is asked for: the first that is free from here on."""
 
 _BACKLOG = 64
+_MOST_CONNECTIONS = 256  # at once, pages and strangers; chosen: a small computer holds them
 _LEAVE_S = 2  # for open connections to end; chosen: pages connect again
 
 
@@ -128,6 +129,7 @@ class Served:
             ws_max_size=64 * 1024,
             ws_per_message_deflate=False,
             timeout_graceful_shutdown=_LEAVE_S,
+            limit_concurrency=_MOST_CONNECTIONS,
             ssl_certfile=certificate.certificate if certificate else None,
             ssl_keyfile=certificate.key if certificate else None,
         )

@@ -188,7 +188,7 @@ class Problem:
     Parameters
     ----------
     kind : str
-        ``forbidden``, ``not_permitted``, ``no_control``, ``superseded``, ``not_now``, ``invalid``, ``too_large``, ``not_here``, or the name of an
+        ``forbidden``, ``not_permitted``, ``no_control``, ``superseded``, ``not_now``, ``invalid``, ``too_large``, ``not_here``, ``not_found``, ``internal``, or the name of an
         error of planning, files or the link.
     message, advice : str
         For people.

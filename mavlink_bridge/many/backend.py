@@ -16,7 +16,7 @@ from mavlink_bridge.many.task import Outcome, Task, outcome_of
 Function = Callable[[Task[Any]], Any]
 
 
-class Backend(Protocol):
+class WorkerPool(Protocol):
     """Does tasks somewhere; `workers.Workers` asks it, and knows nothing of where."""
 
     def count(self) -> int:

@@ -14,7 +14,7 @@ from mavlink_bridge.many.backend import InTurn, Processes
 from mavlink_bridge.many.task import Asked, Finished, Task, Value
 
 if TYPE_CHECKING:
-    from mavlink_bridge.many.backend import Backend
+    from mavlink_bridge.many.backend import WorkerPool
 
 AHEAD = 4
 """Tasks begun or kept back for each worker (chosen, not measured): enough that none waits for the next, and all that is ever in memory."""
@@ -26,7 +26,7 @@ _EXTRA = "--cluster needs the package distributed"
 class Workers:
     """Workers on this machine or on a cluster, as `open_workers` opens them."""
 
-    def __init__(self, backend: Backend) -> None:
+    def __init__(self, backend: WorkerPool) -> None:
         self._backend = backend
 
     def results(
@@ -52,7 +52,7 @@ class Workers:
         ClusterError
             The cluster is lost, or a worker with another version joined it.
         """
-        run = _Stream(self._backend, function)
+        run = _RunningTasks(self._backend, function)
         numbered = enumerate(tasks)
         early: dict[int, Finished[Asked, Value]] = {}
         wanted = 0
@@ -74,10 +74,10 @@ class Workers:
             run.cancel()
 
 
-class _Stream:
+class _RunningTasks:
     """The tasks that are under way."""
 
-    def __init__(self, backend: Backend, function: Callable[[Task[Any]], Any]) -> None:
+    def __init__(self, backend: WorkerPool, function: Callable[[Task[Any]], Any]) -> None:
         self._backend = backend
         self._function = function
         self._running: dict[Future[Any], tuple[int, Task[Any]]] = {}
@@ -166,7 +166,7 @@ def open_workers(
         backend.close()
 
 
-def _on_this_machine(jobs: int | None, most: int | None) -> Backend:
+def _on_this_machine(jobs: int | None, most: int | None) -> WorkerPool:
     count = jobs or os.cpu_count() or 1
     if most is not None:
         count = min(count, most)
@@ -178,12 +178,12 @@ def _on_this_machine(jobs: int | None, most: int | None) -> Backend:
         return InTurn()
 
 
-def _on_cluster(address: str) -> Backend:
+def _on_cluster(address: str) -> WorkerPool:
     try:
         module = import_module("mavlink_bridge.many.cluster")  # half a second, and an extra
     except ModuleNotFoundError as error:
         raise ClusterError(
             f"{_EXTRA} ({error})", advice="install it with: pip install 'pbpp-rover[cluster]'"
         ) from None
-    backend: Backend = module.open_cluster(address)
+    backend: WorkerPool = module.open_cluster(address)
     return backend

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from mavlink_bridge.console.view.places import finite, place
 from mavlink_bridge.console.view.sections import DriveView, HoldView
@@ -116,7 +116,8 @@ class DriveShown:
                 "breaches",
             ]
             return {name: getattr(last, name) for name in kept}
-        left_m = drive.distance_left_m
+        # Before the first position of the drive its watch knows the way behind the first way point only.
+        left_m = drive.distance_left_m if drive.driven_m else plan.length_m
         return {
             "is_driving": True,
             "begun_s": round(drive.begun_s, 1),
@@ -124,7 +125,7 @@ class DriveShown:
             "progress_m": round(max(0.0, plan.length_m - left_m), 1),
             "length_m": round(plan.length_m, 1),
             "left_m": round(left_m, 1),
-            "eta_s": round(drive.time_left_s, 1),
+            "eta_s": round(drive.time_left_s if drive.driven_m else plan.duration_s, 1),
             "driven_m": round(drive.driven_m, 1),
             "deviation_m": round(drive.deviation_m, 2),
             "corridor_ok": not drive.is_outside,
@@ -135,15 +136,20 @@ class DriveShown:
         }
 
 
+NO_LINK = "the link is closed: HOLD is sent if it opens within a minute; use the transmitter, or the e-stop"
+
+
 class HoldShown:
     """Follows the newest HOLD that a page asked for to what the vehicle did."""
 
     def __init__(self) -> None:
         self._view = HoldView()
 
-    def ask(self, page: str, now_s: float) -> None:
-        """Take notice that a page asked for HOLD, and that it is being sent."""
-        self._view = HoldView(state="sent", text="HOLD sent; waiting for the vehicle", by=page, asked_s=now_s)
+    def ask(self, page: str, now_s: float, *, is_linked: bool = True) -> None:
+        """Take notice that a page asked for HOLD, and that it is being sent, or will be where the link is closed just now."""
+        text = "HOLD sent; waiting for the vehicle" if is_linked else NO_LINK
+        state: Literal["sent", "no_answer"] = "sent" if is_linked else "no_answer"
+        self._view = HoldView(state=state, text=text, by=page, asked_s=now_s)
 
     def view(self, director: Director, now_s: float) -> HoldView:
         """Return what came of it so far: what heartbeats show, never what was acknowledged."""

@@ -57,6 +57,19 @@ def test_requests_of_other_pages_are_refused(headers, is_ours):
     assert (LOCAL.stranger({"host": "localhost:8080", **headers}) is None) == is_ours
 
 
+def test_a_link_to_the_page_may_be_followed_from_anywhere_and_nothing_else():
+    followed = {
+        "host": "localhost:8080",
+        "sec-fetch-site": "cross-site",
+        "sec-fetch-mode": "navigate",
+        "sec-fetch-dest": "document",
+    }
+    assert LOCAL.stranger(followed, is_index=True) is None
+    assert LOCAL.stranger(followed) is not None
+    assert LOCAL.stranger({**followed, "sec-fetch-dest": "iframe"}, is_index=True) is not None
+    assert LOCAL.stranger({**followed, "host": "evil.example:8080"}, is_index=True) is not None
+
+
 def test_beyond_loopback_only_who_has_shown_the_token_is_known():
     assert not LOCAL.needs_token
     assert LOCAL.unknown({}) is None

@@ -247,3 +247,15 @@ def test_an_obstacle_that_a_page_reports_is_planned_round(tmp_path):
     console.do(deeds.ClearBlocked())
     assert not console.director.situation.obstacles.known
     assert [name for name, *_ in console.calls] == ["obstacle", "clear"]
+
+
+def test_a_hold_while_the_link_is_closed_is_never_said_to_be_on_its_way(tmp_path):
+    console = driving(ready(tmp_path))
+    console.desk.link_closed()
+    assert "link is closed" in console.do(deeds.Hold())
+    found = console.desk.hold_shown.view(console.director, console.run.now_s)
+    assert (found.state, "transmitter" in found.text) == ("no_answer", True)
+    console.desk.link_opened()
+    console.until(
+        lambda: console.desk.hold_shown.view(console.director, console.run.now_s).state == "stopped", 30
+    )

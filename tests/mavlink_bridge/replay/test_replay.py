@@ -9,12 +9,19 @@ from pathlib import Path
 
 import pytest
 
-from mavlink_bridge.director import EventName, Orders, TargetSource
+from mavlink_bridge.director import Director, EventName, Orders, TargetSource
 from mavlink_bridge.director.orders import ObstacleSource
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.replay.expectations import differences, read_expectation
-from mavlink_bridge.replay.journal import Call, JournalWriter, journal_path, read_journal
-from mavlink_bridge.replay.replay import replay_foreign
+from mavlink_bridge.replay.journal import (
+    Call,
+    Journal,
+    JournalWriter,
+    journal_path,
+    read_journal,
+    request_to_text,
+)
+from mavlink_bridge.replay.replay import replay_foreign, replay_recorded
 from mavlink_bridge.tlog import TlogReader
 from missions.firmware import Firmware
 from missions.geo import LatLon
@@ -190,3 +197,30 @@ def test_a_log_whose_clock_stands_still_is_an_error_and_no_quiet_log(name):
     ) as caught:
         list(replay_foreign(entries, Orders()))
     assert "pbpp plan --log" in str(caught.value.details["advice"])
+
+
+def test_what_persons_at_pages_asked_for_is_repeated(monkeypatch):
+    asked = Tour(targets=(LatLon(3.0, 4.0), LatLon(1.0, 2.0)), clearance_m=2.0, end=End.LOITER)
+    made = []
+    for name in ("hold", "start_drive", "confirm", "suspect_lists", "take_request", "clear_obstacles"):
+        monkeypatch.setattr(Director, name, lambda _self, *given, name=name: made.append((name, *given)))
+    calls = (
+        Call(0, 1.0, "start"),
+        Call(0, 2.0, "request", text=request_to_text(asked)),
+        Call(0, 3.0, "confirm"),
+        Call(0, 4.0, "drive"),
+        Call(0, 5.0, "hold", text="asked for by page 1"),
+        Call(0, 6.0, "suspect"),
+        Call(0, 7.0, "clear"),
+    )
+    assert (
+        list(replay_recorded([], Journal(replace(ORDERS, starts_on_word=True), Situation(), calls, ()))) == []
+    )
+    assert made == [
+        ("take_request", asked, 2.0),
+        ("confirm", 3.0),
+        ("start_drive", 4.0),
+        ("hold", "asked for by page 1", 5.0),
+        ("suspect_lists",),
+        ("clear_obstacles", 7.0),
+    ]

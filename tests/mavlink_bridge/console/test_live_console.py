@@ -1,0 +1,245 @@
+"""What a live bridge shows its pages, in stepped time; a defect of ours costs a picture, never the bridge."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import threading
+import time
+
+import pytest
+from console.serving import SteppedConsole
+from director.test_bridge_director import FAR, IN_BARN
+
+from mavlink_bridge.console import deeds
+from mavlink_bridge.console.deeds import Refusal
+from mavlink_bridge.console.live import LiveBackend, LiveConsole
+from mavlink_bridge.console.view.instruments import Instruments
+from mavlink_bridge.director import State
+from mavlink_bridge.mavlink import messages as m
+from missions.request import Tour
+from missions.situation import Situation
+
+
+class Pages:
+    """Takes what a hub takes."""
+
+    def __init__(self) -> None:
+        self.state: dict = {}
+        self.events: list = []
+        self.rows: list = []
+
+    def post(self, sections, events=(), rows=(), rows_anew=None):
+        self.state.update(sections)
+        self.events += events
+        self.rows += rows
+
+
+class Shown(SteppedConsole):
+    """A stepped bridge with the console's own eyes and ears."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.pages = Pages()
+        self.backend = LiveBackend(self.director)
+        self.console = LiveConsole(self.director, self.writer, self.backend, Tour())
+        self.console.serve(self.pages, self.desk)
+        self.console.link_opened()
+        heard = self.director.receive
+
+        def hear(frame, now_s):
+            heard(frame, now_s)
+            self.console.hear([frame], now_s)
+
+        self.director.receive = hear
+        take = self.director.take_events
+
+        def taken():
+            events = take()
+            for event in events:
+                self.console.tell(event)
+            return events
+
+        self.director.take_events = taken
+
+    def _beside(self, run) -> None:
+        super()._beside(run)
+        self.console.step(run.now_s)
+        self.console.show(run.now_s)
+
+    def drawn(self, condition):
+        """Wait for the drawer's thread."""
+        until_s = time.monotonic() + 150
+        while not condition(self.pages.state):
+            assert time.monotonic() < until_s
+            time.sleep(0.01)
+        return self.pages.state
+
+
+@pytest.fixture
+def shown(tmp_path):
+    found = Shown(tmp_path)
+    found.until(lambda: found.director.state is State.READY)
+    yield found
+    found.console.close()
+
+
+def test_a_page_sees_the_vehicle_its_fence_the_plan_and_the_drive(shown):
+    state = shown.drawn(lambda state: state.get("fence") and state["fence"].meant)
+    assert state["fence"].where == "vehicle"
+    assert state["link"].state == "ok"
+    assert (state["vehicle"].autopilot, state["vehicle"].mode_text) == ("ArduPilot", "MANUAL")
+    shown.do(deeds.TakeTargets(Tour(targets=(FAR,), clearance_m=2.5)))
+    shown.until(lambda: shown.director.awaits_confirmation)
+    shown.wait(0.3)
+    state = shown.drawn(lambda state: state.get("plan") and state["plan"].state == "planned")
+    assert state["plan"].by == "director"
+    assert state["drive"].awaits_upload
+    assert state["drive"].plan_id == state["plan"].id
+    shown.do(deeds.UploadPlan(state["plan"].id))
+    shown.until(lambda: shown.director.state is State.VERIFIED)
+    shown.wait(0.3)
+    assert (shown.pages.state["upload"].state, shown.pages.state["mission"].matches_plan) == (
+        "verified",
+        True,
+    )
+    shown.do(deeds.Start(state["plan"].id))
+    shown.until(
+        lambda: (
+            shown.pages.state["drive"].progress_m not in (None, 0.0)
+            and shown.pages.state["drive"].progress_m > 20
+        )
+    )
+    drive = shown.pages.state["drive"]
+    assert drive.is_driving
+    assert drive.corridor_ok
+    assert drive.least_clearance_m >= drive.asked_m == 2.5
+    assert drive.left_m + drive.progress_m == pytest.approx(drive.length_m, abs=0.2)
+    shown.until(lambda: shown.director.state is State.ARRIVED, 200)
+    shown.wait(0.5)
+    assert not shown.pages.state["drive"].is_driving
+    assert shown.pages.state["drive"].least_clearance_m >= 2.5  # stays to be seen
+    until_s = time.monotonic() + 150
+    while shown.backend.after() is None:
+        assert time.monotonic() < until_s
+        time.sleep(0.01)
+    after = shown.backend.after()
+    assert after.least_m >= after.promised_m == 2.5
+    assert after.outside_max_m == 0.0
+    assert len(shown.pages.rows) > 100
+    names = [event.name for event in shown.pages.events]
+    assert "progress" not in names
+    assert {"planned", "verified", "arrived", "statustext"} <= set(names)
+
+
+def test_why_there_is_no_route_is_shown_and_the_link_that_is_lost(shown):
+    shown.do(deeds.TakeTargets(Tour(targets=(IN_BARN,), clearance_m=2.5)))
+    shown.until(lambda: shown.director.state is State.READY and shown.director.trouble is not None)
+    shown.wait(0.3)
+    state = shown.drawn(lambda state: state.get("plan") and state["plan"].state == "no_route")
+    assert state["plan"].no_route.kind == "TargetBlockedError"
+    assert state["plan"].no_route.message
+    shown.run.is_cut = True
+    shown.wait(4.0)
+    assert shown.pages.state["link"].state == "late"
+    shown.wait(3.0)
+    assert shown.pages.state["link"].state == "lost"
+    shown.console.link_closed("cable pulled")
+    shown.wait(0.3)
+    assert shown.pages.state["link"].trouble == "cable pulled"
+
+
+def test_a_defect_of_ours_is_told_and_nothing_ends(shown, monkeypatch):
+    def broken(*_):
+        raise ZeroDivisionError("of ours")
+
+    monkeypatch.setattr(shown.desk, "handle_timer", broken)
+    shown.console.step(shown.run.now_s)
+    shown.console._drawer.want("picture", broken)
+    until_s = time.monotonic() + 150
+    while sum("bug in pbpp" in event.text for event in shown.pages.events) < 2:
+        assert time.monotonic() < until_s
+        shown.console.show(shown.run.now_s)
+        shown.run.now_s += 0.2
+        time.sleep(0.01)
+
+
+def asked(backend, bridge) -> list:
+    """Ask for HOLD as the server does, with the bridge's loop in another thread."""
+    results = []
+
+    async def ask():
+        try:
+            results.append(await backend.do(deeds.Hold(), "page 1"))
+        except Refusal as refusal:
+            results.append(refusal.problem)
+
+    thread = threading.Thread(target=bridge)
+    thread.start()
+    asyncio.run(ask())
+    thread.join(100)
+    return results
+
+
+def test_deeds_are_done_in_the_bridges_own_loop(shown, monkeypatch):
+    def bridge():
+        until_s = time.monotonic() + 100
+        while not shown.backend._asked and time.monotonic() < until_s:
+            time.sleep(0.005)
+        shown.backend.take_asked(shown.run.now_s)
+
+    assert asked(shown.backend, bridge) == ["HOLD is being sent"]
+
+    def broken(*_):
+        raise ZeroDivisionError("of ours")
+
+    monkeypatch.setattr(shown.desk, "do", broken)
+    (problem,) = asked(shown.backend, bridge)
+    assert "bug in pbpp" in problem.message
+
+
+def test_a_bridge_that_does_not_answer_is_not_waited_for(shown, monkeypatch):
+    monkeypatch.setattr("mavlink_bridge.console.live._ANSWER_S", 0.05)
+    (problem,) = asked(shown.backend, lambda: None)
+    assert "whether it was done is not known" in problem.message
+
+
+@pytest.mark.parametrize(
+    ("message", "percent", "volts"),
+    [
+        (m.SysStatus(0, 0, 0, 12_340, 55), 55, 12.34),
+        (m.SysStatus(0, 0, 0, 0, 0), None, None),  # no monitor
+        (m.SysStatus(0, 0, 0, 65_535, -1), None, None),
+        (m.BatteryStatus(0, (4000, 4100, *(65_535,) * 8), 20), 20, 8.1),
+        (m.BatteryStatus(1, (4000, *(65_535,) * 9), 20), None, None),  # another battery
+    ],
+)
+def test_a_battery_is_shown_where_it_is_known(message, percent, volts):
+    instruments = Instruments()
+    instruments.receive(m.Frame(1, 1, message), 0.0)
+    seen = instruments.vehicle(Situation())
+    assert (seen.battery_percent, seen.battery_v) == (percent, volts)
+
+
+def test_heartbeats_that_are_missing_are_counted():
+    instruments = Instruments()
+    for second in range(30):
+        if second % 2:
+            instruments.receive(m.Frame(1, 1, m.Heartbeat(10, 3)), float(second))
+    assert instruments.link(29.0, 29.5, is_lost=False, trouble="").heartbeats_missed_percent == 50
+    assert instruments.link(None, 29.5, is_lost=False, trouble="").state == "listening"
+
+
+def test_an_upload_between_two_looks_is_shown_all_the_same(shown):
+    shown.do(deeds.UploadFence(shown.director.situation.fence.value))
+    shown.until(lambda: not shown.writer.is_busy)
+    shown.wait(0.3)
+    assert (shown.pages.state["upload"].what, shown.pages.state["upload"].state) == ("fence", "verified")
+    shown.do(deeds.TakeTargets(Tour(targets=(FAR,), clearance_m=2.5)))
+    shown.until(lambda: shown.director.awaits_confirmation)
+    shown.console._due_s = math.inf  # nobody looks
+    shown.director.confirm(shown.run.now_s)
+    shown.until(lambda: shown.director.state is State.VERIFIED)
+    shown.console._due_s = 0.0
+    shown.wait(0.3)
+    assert (shown.pages.state["upload"].what, shown.pages.state["upload"].state) == ("mission", "verified")

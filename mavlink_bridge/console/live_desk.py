@@ -21,7 +21,6 @@ from mavlink_bridge.mavlink.messages import MissionType
 from mavlink_bridge.replay.journal import request_to_text
 from missions.errors import MissionError
 from missions.fence import fence_to_items
-from missions.items import with_home
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -236,11 +235,16 @@ class LiveDesk:
 
     def _upload_mission(self, looked: Looked, now_s: float) -> str:
         """Write a mission that was checked or repaired: a file's, or way points of the page."""
+        peer = self._director.peer
         assert looked.plan is not None
+        if peer is None:
+            raise not_now("the vehicle is not known yet")
         if not looked.view.is_promised:
             raise not_now("this mission does not keep its clearance: it is not written", "repair it first")
         home = looked.plan.home or looked.plan.start
-        return self._queue(MissionType.MISSION, with_home(looked.items, home), now_s)
+        return self._queue(
+            MissionType.MISSION, peer.autopilot.lists.form.mission_of(looked.items, home), now_s
+        )
 
     def _upload_fence(self, deed: deeds.UploadFence, _page: str, now_s: float) -> str:
         return self._queue(MissionType.FENCE, fence_to_items(deed.fence), now_s)

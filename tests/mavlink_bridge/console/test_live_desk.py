@@ -133,6 +133,24 @@ def test_a_px4_rover_is_started_once_its_fence_counts_held_and_driven_on(tmp_pat
     assert console.run.vehicles[0].rover.breaches == 0
 
 
+def test_lists_of_a_page_are_written_as_px4_wants_them(tmp_path):
+    """No home before a mission, circles after polygons."""
+    console = SteppedConsole(tmp_path, conductor=px4_conductor)
+    console.until(lambda: console.director.state is State.READY)
+    looked = looked_at(console, replace(FAR_TOUR, clearance_m=1.5))
+    console.do(deeds.UploadPlan("x", replace(looked, request=None)))
+    console.until(lambda: not console.writer.is_busy)
+    assert console.writer.view().state == "verified"
+    vehicle = console.run.vehicles[0]
+    assert [one.command for one in vehicle.mission] == [one.command for one in looked.items]
+    circle = CircleZone(ZoneKind.EXCLUSION, LatLon(40.0715, -105.2290), 3.0)
+    console.wait(3.0)
+    console.do(deeds.UploadFence(Fence((circle, *FENCE.zones))))
+    console.until(lambda: not console.writer.is_busy)
+    assert console.writer.view().state == "verified"
+    assert vehicle.fence[-1].command == fence_to_items(Fence((circle,)))[0].command
+
+
 def test_hold_without_an_answer_says_so(tmp_path):
     console = driving(ready(tmp_path))
     console.run.is_cut = True

@@ -28,11 +28,12 @@ from director.test_bridge_director import reposition
 
 from mavlink_bridge.backup.drive_note import note_from_json, note_to_json
 from mavlink_bridge.director import Director, EventName, State
-from mavlink_bridge.director.orders import Homing, ObstacleSource
+from mavlink_bridge.director.orders import Homing, ObstacleSource, TargetSource
 from mavlink_bridge.mavlink import messages as m
 from missions.fence import CircleZone, Fence, ZoneKind
 from missions.geo import LatLon, distance_m
-from missions.items import Command
+from missions.items import Command, waypoint
+from missions.rally import RallyPoint, rally_to_items
 from missions.request import End, Tour
 
 VERSIONS = pytest.mark.parametrize("firmware", [V1_17, V1_18], ids=str)
@@ -390,3 +391,17 @@ def test_the_roll_out_of_hold_is_not_foreseen_straight():
     assert run.director._parts.halter.expected is None
     assert run.vehicles[0].rover.motion.speed_mps <= 0.6
     assert PX4_MISSION in run.modes_sent
+
+
+@pytest.mark.parametrize("kind", ["mission", "rally"])
+def test_a_place_in_a_list_is_a_target(kind):
+    """PX4 has no home before its mission: a mission of one item has a place, too."""
+    run = ready(conductor(target_sources=frozenset(TargetSource) - {TargetSource.HOME}))
+    if kind == "mission":
+        upload(run, m.MissionType.MISSION, (waypoint(FAR),))
+    else:
+        upload(run, m.MissionType.RALLY, rally_to_items((RallyPoint(*FAR),)))
+    run.run_until(run.happened(EventName.TARGET), 90)
+    assert run.last(EventName.TARGET).data["source"] == kind
+    run.run_until(lambda: run.director.state is State.DRIVING, 60)
+    arrives(run, FAR)

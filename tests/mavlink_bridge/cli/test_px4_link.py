@@ -185,6 +185,18 @@ class TestDrives:
             assert distance_m(simulator.vehicle.position, LatLon(40.0718, -105.2299)) < 1.0
             assert any("PX4 keeps no margin" in text for text in found["info"])
 
+    def test_its_own_mission_is_checked_uploaded_and_driven(self, firmware):
+        way = (waypoint(LatLon(40.0716, -105.2299)), waypoint(LatLon(40.0718, -105.2296)))
+        items = STATION.prepared(fence_to_items(INCLUSION), MissionType.FENCE)
+        own = STATION.prepared(way, MissionType.MISSION)
+        with rover(PX4S, firmware, fence=items, mission=own) as (simulator, sent):
+            simulator.vehicle.rover.arm("a station")
+            options = ("--via-mission", "own", "--clearance", "1.5", "--upload", "--drive")
+            code, found = run(simulator, "plan", *options)
+            assert (code, found["arrived"], found["mission_items"]) == (0, True, 2)
+            assert distance_m(simulator.vehicle.position, way[-1].position) < 1.0
+            assert set(modes_asked_for(sent)) == {(4.0, 4.0)}
+
     def test_one_job_of_the_bridge(self, firmware):
         with self.rover(firmware) as (simulator, sent):
             result = CliRunner().invoke(

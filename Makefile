@@ -73,6 +73,10 @@ screens: .venv/dev.stamp
 vendor: tools/page/node_modules/.installed
 	$(PAGE) vendor
 
+# The page's modules put together, for pages that are one file (after a change in the page's modules).
+bundle: tools/page/node_modules/.installed
+	$(PAGE) bundle
+
 walls: .venv/dev.stamp
 	$(BIN)/lint-imports
 

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from mavlink_bridge.cli.options_file import take_options
-from mavlink_bridge.cli.values import MOST_M, MOST_S, MOST_VEHICLE_M, stop_from, within
+from mavlink_bridge.cli.values import MOST_M, MOST_S, MOST_VEHICLE_M, autopilot_from, stop_from, within
 from missions.errors import VehicleError
 from missions.firmware import Firmware, read_firmware
 from missions.stops import Stop
@@ -88,6 +88,9 @@ FirmwareOption = Annotated[
         panel=VEHICLE_PANEL,
         parser=firmware_option,
     ),
+]
+SimulatedAutopilotOption = Annotated[
+    str, option("The autopilot that it answers as: ardupilot or px4.", "AUTOPILOT", parser=autopilot_from)
 ]
 SimulatedFirmwareOption = Annotated[
     Firmware | None,

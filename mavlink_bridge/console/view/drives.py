@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from mavlink_bridge.console.view.places import finite, place
 from mavlink_bridge.console.view.sections import DriveView, HoldView
-from mavlink_bridge.director import State
+from mavlink_bridge.director import ON_VEHICLE, State
 
 if TYPE_CHECKING:
     from mavlink_bridge.director import Director
@@ -25,6 +25,7 @@ STATE_TEXTS = {
     State.UPLOADING: "uploading and reading back",
     State.WITHDRAWING: "taken over; ending the upload",
     State.VERIFIED: "verified on the vehicle",
+    State.ENFORCED: "verified on the vehicle, its fence enforced",
     State.STARTING: "switching to AUTO",
     State.DRIVING: "driving",
     State.ARRIVED: "arrived",
@@ -74,7 +75,7 @@ class DriveShown:
             state=str(director.state),
             state_text=STATE_TEXTS[director.state],
             since_s=round(self._since_s, 1),
-            awaits_start=director.state is State.VERIFIED,
+            awaits_start=director.state in ON_VEHICLE,
             awaits_upload=director.awaits_confirmation,
             plan_id=plan_id,
             can_resume=can_resume,

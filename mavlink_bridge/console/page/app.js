@@ -78,6 +78,8 @@ function buildPage() {
     ["plan", planPanel(store, actions)], ["drive", drivePanel(store, actions)], ["fence", fencePanel(store, actions)],
     ["files", filesPanel(store, actions)], ["events", eventsPanel(store, (place) => view?.show(place))],
   ]);
+  // In one column the map may have been scrolled away from under who wants to draw on it.
+  store.watch(["tool"], ({ tool }) => ["polygon", "circle", "start"].includes(tool) && mapArea.scrollIntoView({ block: "nearest" }));
   const source = h("p", { class: "source" });
   store.watch(["server"], ({ server }) => { fill(source, texts.top.source(server.source, server.source_name)); });
   document.documentElement.lang = texts.language;

@@ -89,7 +89,7 @@ const en = {
     undone: /** @param {string | null} what */ (what) => (what ? `Undone: ${what}` : "Nothing to undo"),
     redone: /** @param {string | null} what */ (what) => (what ? `Redone: ${what}` : "Nothing to redo"),
     finish: "Close the polygon", stop: "Stop drawing",
-    drawing: { polygon: "Click the corners; click the first one again, or press Enter, to close. Esc gives up.", circle: "Click the centre, then the rim. Esc gives up." },
+    drawing: { polygon: "Click the corners; click the first one again, or press Enter or ✓, to close. Esc or ✗ gives up.", circle: "Click the centre, then the rim. Esc or ✗ gives up." },
   },
   steps: {
     start: "start set", target: "target set", addTarget: "target added", moveTarget: "target moved", removeTarget: "target removed", orderTargets: "targets put in order",

@@ -156,7 +156,7 @@ def _guarded(handler: Handler) -> Handler:
     return run
 
 
-class Console:
+class ConsoleRoutes:
     """The routes.
 
     Parameters

@@ -1,5 +1,7 @@
 /** The server: requests and their answers, and the live messages. Nothing else on this page talks to anyone. */
 
+import { isServed } from "./inside.js";
+
 /** @typedef {{kind: string, message: string, advice: string, details: Record<string, any>}} Refusal */
 
 const SILENT_MS = 3000; // the server says something every second: three missed are a lost connection
@@ -7,8 +9,13 @@ const AGAIN_MS = 1000; // between tries to connect anew; chosen
 const ANSWER_MS = 30_000; // no answer is waited for longer, except by plans, which are cancelled by newer ones
 
 /** A page's own secret name: control belongs to a tab. */
-export const PAGE_ID = sessionStorage.getItem("page-id") ?? crypto.getRandomValues(new Uint32Array(4)).join("-");
-sessionStorage.setItem("page-id", PAGE_ID);
+export const PAGE_ID = isServed ? ownId() : "";
+
+function ownId() {
+  const id = sessionStorage.getItem("page-id") ?? crypto.getRandomValues(new Uint32Array(4)).join("-");
+  sessionStorage.setItem("page-id", id);
+  return id;
+}
 
 /** What the server would not do, with its words. */
 export class RefusedError extends Error {

@@ -235,7 +235,7 @@ class LiveDesk:
         return "the same plan is made from where the rover is now, and uploaded"
 
     def _upload_mission(self, looked: Looked, now_s: float) -> str:
-        """Write a mission that was checked or repaired: a file's, or way points of the page."""
+        """Write a mission that was checked or repaired: a file's, or waypoints of the page."""
         assert looked.plan is not None
         if not looked.view.is_promised:
             raise not_now("this mission does not keep its clearance: it is not written", "repair it first")

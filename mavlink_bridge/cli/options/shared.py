@@ -109,7 +109,7 @@ _MANY_PANEL = "Many at once"
 JobsOption = Annotated[
     int | None,
     option(
-        "How many are done at the same time, each in a process. Default: one per processor.",
+        "How many processes work at the same time. Default: one per processor.",
         "N",
         panel=_MANY_PANEL,
         min=1,
@@ -119,7 +119,7 @@ JobsOption = Annotated[
 ClusterOption = Annotated[
     str | None,
     option(
-        "Have the workers of this dask scheduler do them (extra cluster).",
+        "Use the workers of this dask scheduler instead (extra cluster).",
         "tcp://HOST:PORT",
         panel=_MANY_PANEL,
         parser=cluster_option,

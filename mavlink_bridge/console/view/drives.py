@@ -115,7 +115,7 @@ class DriveShown:
                 "breaches",
             ]
             return {name: getattr(last, name) for name in kept}
-        # Before the first position of the drive its watch knows the way behind the first way point only.
+        # Before the first position of the drive its watch knows the way behind the first waypoint only.
         left_m = drive.distance_left_m if drive.driven_m else plan.length_m
         return {
             "is_driving": True,

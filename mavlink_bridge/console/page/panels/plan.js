@@ -262,7 +262,7 @@ function notesPart(store) {
 }
 
 /**
- * The way points as fields, for who cannot drag them.
+ * The waypoints as fields, for who cannot drag them.
  * @param {PageStore} store
  * @param {Actions} act
  */

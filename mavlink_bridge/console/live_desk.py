@@ -231,7 +231,7 @@ class LiveDesk:
             return self._upload_mission(looked, now_s)
         self._wanted = _Wanted(looked.plan, drives=False, page=page)
         self._request(looked.request, now_s)
-        return "the bridge makes the same plan, and uploads it"
+        return "the same plan is made from where the rover is now, and uploaded"
 
     def _upload_mission(self, looked: Looked, now_s: float) -> str:
         """Write a mission that was checked or repaired: a file's, or waypoints of the page."""

@@ -29,7 +29,7 @@ STATE_TEXTS = {
     State.STARTING: "switching to AUTO",
     State.DRIVING: "driving",
     State.ARRIVED: "arrived",
-    State.LET_GO: "let go: waiting for a new target",
+    State.LET_GO: "interrupted: waiting for a new target",
     State.CLASHING: "another program uses our ids; finishing the upload",
     State.CLASHED: "another program uses our ids",
     State.LOST: "no heartbeat",

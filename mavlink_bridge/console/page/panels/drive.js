@@ -63,11 +63,11 @@ function deedsPart(store, act) {
   const forget = button(texts.drive.clearBlocked, () => act.clearBlocked());
   const why = h("p", { class: "quiet" });
   const section = h("section", { "aria-label": texts.drive.blocked }, h("div", { class: "row" }, resume, blocked, forget), h("p", { class: "quiet" }, texts.drive.blockedHint), why);
-  store.watch(["server", "control", "page", "drive", "fence"], (state) => {
+  store.watch(["server", "control", "page", "isConnected", "drive", "fence"], (state) => {
     const { server, drive, fence } = state;
     show(section, server.source === "live" || server.source === "demo");
     const reason = cannotWrite(state);
-    resume.disabled = reason !== "" || !drive.can_resume;
+    resume.disabled = reason !== "" || !drive.can_resume || drive.state === "arrived";
     blocked.disabled = reason !== "" || !server.can.drive;
     forget.disabled = reason !== "" || fence.obstacles.length === 0;
     say(why, reason);

@@ -143,7 +143,10 @@ export function confirmed(question, yes) {
  * What stands between a person and writing to the vehicle, in words; empty where nothing does.
  * @param {import("../types.js").PageState} state
  */
-export function cannotWrite({ server, control, page }) {
+export function cannotWrite({ server, control, page, isConnected }) {
+  if (!isConnected) {
+    return texts.start.lost;
+  }
   if (!server.can.upload) {
     return texts.start.noUpload;
   }

@@ -1,4 +1,4 @@
-"""Hours of the bridge in stepped time, with everything that can happen to it: `python tests/mavlink_bridge/director/soak.py --hours 4`.
+"""Hours of the bridge in stepped time, with everything that can happen to it: `python tests/mavlink_bridge/director/soak.py --hours 4 --setting obstacles`.
 
 Random targets typed and clicked, fences and missions changed by another ground station, modes changed by an operator, links cut and
 lossy, reboots. After each step the promises are checked; at the end the counts are printed. Also run, for a little while, by the tests.
@@ -14,6 +14,7 @@ import sys
 import time
 import tracemalloc
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -22,6 +23,7 @@ from director.conducting import Conductor
 from director.promises import Promises
 
 from mavlink_bridge.director import Director, Orders, State
+from mavlink_bridge.director.orders import Homing, ObstacleSource
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.autopilots import autopilot_table
 from mavlink_bridge.mavlink.modes import PX4_MODES
@@ -66,6 +68,18 @@ MOST_GROWTH_KB = 250
 """How far apart the sizes of memory may be, once it has settled: they went up and down by up to 150 kB with what was planned last."""
 
 SAMPLE_S = 900.0
+_HOMING = Homing(is_kept=True, by_route=True, gcs_timeout_s=20.0)
+SETTINGS: dict[str, dict[str, object]] = {
+    "calm": {},
+    "dense": {"pace_s": (0.05, 2.5)},
+    "home": {"pace_s": (0.3, 6.0), "homing": _HOMING},
+    "obstacles": {
+        "pace_s": (0.3, 6.0),
+        "homing": replace(_HOMING, battery_percent=20),
+        "obstacle_sources": frozenset(ObstacleSource),
+    },
+}
+"""How much happens, and what the bridge is to do about it, by name."""
 
 
 class Soak:
@@ -304,6 +318,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--autopilot", choices=tuple(AUTOPILOTS), default="ardupilot")
     parser.add_argument("--firmware", type=read_firmware)
+    parser.add_argument("--setting", choices=SETTINGS, default="calm", help="how much happens")
     options = parser.parse_args()
     begun_s = time.monotonic()
     tracemalloc.start()
@@ -314,6 +329,7 @@ def main() -> None:
         options.minutes * 60,
         autopilot=autopilot,
         firmware=options.firmware,
+        **SETTINGS[options.setting],
     )
     print(f"{run.run.now_s / 3600:.2f} h of stepped time in {time.monotonic() - begun_s:.0f} s")
     print(", ".join(f"{name} {count}" for name, count in run.counts.most_common()))

@@ -14,7 +14,7 @@ LOCKED := --quiet --disable-pip-version-check --require-hashes --no-deps
 unexport PYTHONDONTWRITEBYTECODE
 quoted = '$(subst ','\'',$(1))'
 
-.PHONY: bench-console coverage locks package release bench bench-bridge bench-drive bench-transfer test-foreign docs soak bench-tlog bench-ladder campaign fuzz hunt demo test lint format types walls check lock clean
+.PHONY: screens vendor coverage locks package release bench bench-bridge bench-drive bench-transfer test-foreign docs soak bench-tlog bench-ladder campaign fuzz hunt demo test lint format types walls check lock clean bench-console
 
 demo: .venv/run.stamp
 	$(BIN)/pbpp demo --out $(call quoted,$(OUT))
@@ -44,19 +44,38 @@ COVERING := tests/pbpp tests/missions $(filter-out %/__pycache__ %/cli %/simulat
 
 coverage: .venv/dev.stamp
 	rm -f .coverage .coverage.*
-	$(BIN)/pytest -q -n 4 --dist worksteal -m "not campaign" --cov --cov-report= $(COVERING)
+	$(BIN)/pytest -q -n 4 --dist worksteal -m "not campaign" --ignore-glob "*/test_browser*" --cov --cov-report= $(COVERING)
 	$(BIN)/coverage report --include "$(PROMISING)" --precision 1 --fail-under $(COVERAGE_PERCENT)
 
-lint: .venv/dev.stamp
+# What the console's page is checked with: installed by its lock, once for lint and types.
+PAGE := $(BIN)/python tools/page/page_tools.py
+tools/page/node_modules/.installed: tools/page/package-lock.json .venv/dev.stamp
+	$(PAGE) install
+
+lint: .venv/dev.stamp tools/page/node_modules/.installed
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(PAGE) lint
 
 format: .venv/dev.stamp
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-types: .venv/dev.stamp
+types: .venv/dev.stamp tools/page/node_modules/.installed
 	$(BIN)/mypy
+	$(PAGE) types
+
+# The pictures of the console in the documentation, taken in a browser.
+screens: .venv/dev.stamp
+	$(BIN)/python docs/screens/shoot.py
+
+# What the page loads, copied anew from the locked packages (after a change in tools/page/package.json).
+vendor: tools/page/node_modules/.installed
+	$(PAGE) vendor
+
+# The page's modules put together, for pages that are one file (after a change in the page's modules).
+bundle: tools/page/node_modules/.installed
+	$(PAGE) bundle
 
 walls: .venv/dev.stamp
 	$(BIN)/lint-imports
@@ -128,4 +147,4 @@ hunt: .venv/dev.stamp
 	$(BIN)/python tests/pbpp/hunt_edges.py --count $(or $(COUNT),20000)
 
 clean:
-	rm -rf .venv demo-out dist build .coverage* .hypothesis .mypy_cache .ruff_cache .pytest_cache
+	rm -rf tools/page/node_modules .venv demo-out dist build .coverage* .hypothesis .mypy_cache .ruff_cache .pytest_cache

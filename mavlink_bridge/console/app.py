@@ -156,7 +156,7 @@ def _guarded(handler: Handler) -> Handler:
     return run
 
 
-class Console:
+class ConsoleRoutes:
     """The routes.
 
     Parameters
@@ -519,7 +519,7 @@ class Console:
         hub = self._hub
         you = hub.control.connect(page_id)
         hub.show_control()
-        stream = _Stream(socket, hub, you)
+        stream = _PageStream(socket, hub, you)
         listening = asyncio.create_task(stream.listen())
         try:
             await stream.show()
@@ -536,7 +536,7 @@ class Console:
                     await socket.close(1013)
 
 
-class _Stream:
+class _PageStream:
     """One page's connection."""
 
     def __init__(self, socket: WebSocket, hub: Hub, you: str) -> None:

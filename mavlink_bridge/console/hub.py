@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from mavlink_bridge.console.access import Access
     from mavlink_bridge.console.answers import Looked
-    from mavlink_bridge.console.backend import Backend
+    from mavlink_bridge.console.backend import PageBackend
     from mavlink_bridge.console.deeds import Deed
     from mavlink_bridge.console.view.sections import Permissions, Sections, TrackRow
 
@@ -33,7 +33,7 @@ class Hub:
     ----------
     sections : Sections
         What is shown at first.
-    backend : Backend
+    backend : PageBackend
         What is behind it.
     access : Access
         Who may speak to it.
@@ -42,7 +42,7 @@ class Hub:
     """
 
     def __init__(
-        self, sections: Sections, backend: Backend, access: Access, clock: Callable[[], float]
+        self, sections: Sections, backend: PageBackend, access: Access, clock: Callable[[], float]
     ) -> None:
         self.board = Board(sections, None if sections.replay is not None else MOST_EVENTS)
         self.backend = backend

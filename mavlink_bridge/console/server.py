@@ -7,11 +7,10 @@ import io
 import socket
 from dataclasses import dataclass
 from threading import Thread
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
 import segno
 import uvicorn
-from uvicorn.config import WS_PROTOCOLS
 
 from mavlink_bridge.errors import LinkError
 
@@ -25,10 +24,6 @@ if TYPE_CHECKING:
 
 FIRST_PORT, _PORTS = 8080, 20
 """Where nothing is asked for: the first that is free from here on."""
-
-_SANSIO = "websockets-sansio"
-_WEBSOCKETS: Any = _SANSIO if _SANSIO in WS_PROTOCOLS else "auto"
-"""Since uvicorn 0.35; before that it knows only what websockets calls its legacy."""
 
 _BACKLOG = 64
 _MOST_CONNECTIONS = 256  # at once, pages and strangers; chosen: a small computer holds them
@@ -130,7 +125,7 @@ class Served:
             server_header=False,
             date_header=False,
             lifespan="on",
-            ws=_WEBSOCKETS,
+            ws="websockets-sansio",
             ws_max_size=64 * 1024,
             ws_per_message_deflate=False,
             timeout_graceful_shutdown=_LEAVE_S,

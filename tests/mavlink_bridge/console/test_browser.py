@@ -1,0 +1,266 @@
+"""The console's page in a real browser, without a vehicle: plan, no route, fence, files, phone, no WebGL, who needs what.
+
+On every page there is no console error, no request leaves the computer, and axe-core finds nothing.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+import pytest
+from console.browser_kit import FIELDS, WAIT_MS, Served, Watched, launched, need_browser, serving
+from console.tiny_map import write_map
+from PIL import Image
+
+need_browser()
+
+from playwright.sync_api import Browser, Page, expect, sync_playwright  # noqa: E402 - only where there is a browser
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+pytestmark = pytest.mark.xdist_group("browser")
+
+expect.set_options(timeout=WAIT_MS)
+START = "40.0712247,-105.2302031"
+TARGET = "40.0723079, -105.2285800"
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with sync_playwright() as playwright:
+        found = launched(playwright)
+        yield found
+        found.close()
+
+
+@pytest.fixture(scope="module")
+def maze() -> Iterator[Served]:
+    with serving("--fence", str(FIELDS / "maze-fence.waypoints"), "--start", START) as server:
+        yield server
+
+
+@pytest.fixture
+def watched(browser: Browser, maze: Served) -> Iterator[Watched]:
+    context = browser.new_context(viewport={"width": 1280, "height": 800})
+    seen = Watched(context, maze.url)
+    seen.open()
+    yield seen
+    assert seen.troubles == []
+    context.close()
+
+
+def set_target(page: Page, place: str = TARGET) -> None:
+    """Type a target, as somebody does who cannot see the map."""
+    page.get_by_label("New target: latitude, longitude").fill(place)
+    page.get_by_label("New target: latitude, longitude").press("Enter")
+
+
+def legs(page: Page) -> list[str]:
+    """Return the verdicts of the leg table."""
+    return [text.split(" ", 1)[1] for text in page.locator("table.legs td.verdict").all_inner_texts()]
+
+
+def test_a_click_is_planned_and_a_dragged_way_point_is_judged_at_once(watched: Watched) -> None:
+    page = watched.page
+    watched.click_map(0.72, 0.7)
+    expect(page.locator(".headline")).to_have_text("✓ 2.50 m promised")
+    assert set(legs(page)) == {"keeps it"}
+    rows = page.locator("table.legs tbody tr")
+
+    # Table and map show the same leg.
+    rows.nth(1).hover()
+    expect(rows.nth(1)).to_have_class("leg keeps hovered")
+    handle = page.get_by_role("button", name="Way point 1.")
+    box = handle.bounding_box()
+    assert box is not None
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x - 40, y + 51)
+    expect(rows.nth(0)).to_have_class("leg keeps hovered")
+
+    # The view as a picture.
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Save a picture (PNG)").click()
+    with Image.open(download.value.path()) as picture:
+        assert len(picture.convert("RGB").getcolors(1 << 24)) > 50
+
+    # Into the wall and back.
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x - 8, y + 40, steps=4)
+    expect(page.locator(".headline")).to_contain_text(re.compile("breaks? the promise"))
+    page.mouse.up()
+    assert "BREAKS IT" in legs(page)
+    page.get_by_role("button", name="Repair around the fence").click()
+    expect(page.locator(".headline")).to_contain_text("✓")
+    page.locator("body").press("Control+z")
+    expect(page.locator(".headline")).to_contain_text(re.compile("breaks? the promise"))
+    page.locator("body").press("Control+z")
+    expect(page.locator(".headline")).to_have_text("✓ 2.50 m promised")
+    page.locator("body").press("Control+y")
+    expect(page.locator(".headline")).to_contain_text(re.compile("breaks? the promise"))
+    assert watched.accessible() == []
+
+
+def test_no_route_is_explained_and_the_widest_is_taken_by_a_button(watched: Watched) -> None:
+    page = watched.page
+    set_target(page, "40.071248, -105.229073")
+    expect(page.locator(".headline")).to_have_text("✓ 2.50 m promised")
+    widest = page.get_by_role("button", name="widest possible: ")
+    expect(widest).to_be_visible()
+    page.get_by_role("spinbutton", name="Clearance to keep while driving, metres").fill("8")
+    page.keyboard.press("Enter")
+    expect(page.locator(".headline")).to_have_text("✗ No route")
+    expect(page.locator("#outcome .card.bad")).to_contain_text("The widest route there is keeps")
+    expect(page.locator("#outcome .card.bad")).to_contain_text("In the way")
+    assert watched.accessible() == []
+    page.get_by_role("button", name="instead").click()
+    expect(page.locator(".headline")).to_contain_text("m promised")
+    widest.click()
+    expect(widest).to_have_attribute("aria-pressed", "true")
+    expect(page.locator(".headline")).to_contain_text("m promised")
+
+
+def test_targets_are_added_ordered_moved_and_removed_by_keys_alone(watched: Watched) -> None:
+    page = watched.page
+    page.get_by_label("adds a target").check()
+    page.locator(".map canvas").focus()
+    page.keyboard.press("t")
+    set_target(page)
+    expect(page.get_by_role("textbox", name="Target 2,")).to_have_value("40.0723079, -105.2285800")
+    first = page.get_by_role("textbox", name="Target 1,").input_value()
+    page.get_by_role("button", name="Target 2 earlier").press("Enter")
+    expect(page.get_by_role("textbox", name="Target 2,")).to_have_value(first)
+    expect(page.locator(".headline")).to_contain_text("✓")
+
+    # A handle on the map is a button: arrows move it by a quarter of a metre.
+    page.get_by_role("button", name="target 2.").focus()
+    page.keyboard.press("ArrowUp")
+    expect(page.get_by_role("textbox", name="Target 2,")).not_to_have_value(first)
+    page.keyboard.press("Delete")
+    expect(page.get_by_role("textbox", name="Target 2,")).to_have_count(0)
+    page.get_by_role("tab", name="Plan").focus()
+    page.keyboard.press("ArrowRight")
+    expect(page.get_by_role("tab", name="Drive")).to_be_focused()
+
+
+def test_a_fence_is_drawn_typed_edited_and_undone(watched: Watched) -> None:
+    page = watched.page
+    set_target(page)
+    expect(page.locator(".headline")).to_have_text("✓ 2.50 m promised")
+    before = page.locator(".big").inner_text()
+    page.get_by_role("tab", name="Fence").click()
+    page.get_by_role("button", name="Draw a polygon").click()
+    for east, north in ((0.4, 0.55), (0.5, 0.55), (0.5, 0.4), (0.42, 0.4), (0.4, 0.55)):
+        watched.click_map(east, north)
+    expect(page.locator("ol.plain > li")).to_have_count(10)
+    page.get_by_role("button", name="Draw a circle").click()
+    watched.click_map(0.3, 0.3)
+    watched.click_map(0.32, 0.3)
+    expect(page.locator("ol.plain > li")).to_have_count(11)
+    page.get_by_text("Type a zone").click()
+    page.get_by_label("A corner a line").fill("40.0716, -105.2299\n40.0716, -105.2298\n40.0717, -105.2298")
+    page.get_by_role("button", name="Add the zone").click()
+    expect(page.locator("ol.plain > li")).to_have_count(12)
+    expect(page.get_by_text("Drawn here; plans already go round it.")).to_be_visible()
+
+    # Its corners are buttons on the map, too.
+    page.get_by_role("button", name=re.compile(r"^Corner 1\.")).focus()
+    page.keyboard.press("Shift+ArrowUp")
+    expect(page.get_by_role("textbox", name="Corner 1:")).to_have_value("40.0716225, -105.2299000")
+    assert watched.accessible() == []
+    page.get_by_role("tab", name="Plan").click()
+    expect(page.locator(".big")).not_to_have_text(before)
+    for _ in range(4):
+        page.locator("body").press("Control+z")
+    expect(page.locator(".big")).to_have_text(before)
+
+
+def drop(page: Page, name: str, text: str) -> None:
+    """Drop a file onto the page."""
+    page.evaluate(
+        """([name, text]) => {
+          const data = new DataTransfer();
+          data.items.add(new File([text], name));
+          for (const type of ["dragenter", "dragover", "drop"])
+            document.body.dispatchEvent(new DragEvent(type, {bubbles: true, cancelable: true, dataTransfer: data}));
+        }""",
+        [name, text],
+    )
+
+
+def test_dropped_files_are_opened_and_saved_in_other_formats(watched: Watched) -> None:
+    page = watched.page
+    mission = (FIELDS / "yard-mission.waypoints").read_text(encoding="utf-8")
+    fence = (FIELDS / "yard-fence.waypoints").read_text(encoding="utf-8")
+    drop(page, "yard-fence.waypoints", fence)
+    expect(page.get_by_text("Opened yard-fence.waypoints: a fence of")).to_be_visible()
+    drop(page, "yard.waypoints", mission)
+    expect(page.get_by_text("Checked: yard.waypoints")).to_be_visible()
+    assert legs(page)
+    page.get_by_role("tab", name="Files").click()
+    saved = {}
+    for suffix in (".plan", ".kml"):
+        page.get_by_label("What", exact=True).select_option("fence")
+        page.get_by_label("Format").select_option(suffix)
+        with page.expect_download() as download:
+            page.get_by_role("button", name="Save the file").click()
+        saved[suffix] = download.value.path().read_text(encoding="utf-8")
+        assert download.value.suggested_filename.endswith(suffix)
+    assert watched.accessible() == []
+    # A name is a text, whatever it says.
+    drop(page, "<img src=x onerror=alert(1)>.waypoints", fence)
+    expect(page.get_by_text("Opened <img src=x onerror=alert(1)>.waypoints: a fence of")).to_be_visible()
+    assert page.locator("img").count() == 0
+    for suffix, text in saved.items():
+        drop(page, f"again{suffix}", text)
+        expect(page.get_by_text(f"Opened again{suffix}: a fence of")).to_be_visible()
+
+
+def test_a_phone_in_the_dark(browser: Browser, maze: Served) -> None:
+    context = browser.new_context(
+        viewport={"width": 360, "height": 740}, color_scheme="dark", has_touch=True, is_mobile=True
+    )
+    seen = Watched(context, maze.url)
+    page = seen.open()
+    x, y = seen.place(0.5, 0.45)
+    page.touchscreen.tap(x, y)
+    expect(page.locator(".headline")).to_have_text("✓ 2.50 m promised")
+    for name in ("Plan", "Drive", "Fence", "Files", "Events"):
+        page.get_by_role("tab", name=name).click()
+        assert page.evaluate("document.documentElement.scrollWidth") <= 360
+        assert seen.accessible() == []
+    assert seen.troubles == []
+    context.close()
+
+
+def test_a_map_lies_under_everything_and_comes_from_here(browser: Browser, tmp_path: Path) -> None:
+    tiles = tmp_path / "field.pmtiles"
+    write_map(tiles, (-105.2294, 40.0719), zooms=(16, 17))
+    with serving("--fence", str(FIELDS / "maze-fence.waypoints"), "--map", str(tiles)) as server:
+        context = browser.new_context(viewport={"width": 2560, "height": 1440})
+        seen = Watched(context, server.url)
+        with seen.page.expect_response(
+            lambda answer: answer.url.endswith("/map.pmtiles") and answer.status == 206
+        ):
+            seen.open()
+        assert seen.accessible() == []
+        assert seen.troubles == []
+        context.close()
+
+
+def test_without_webgl_there_is_the_servers_picture(browser: Browser, maze: Served) -> None:
+    context = browser.new_context()
+    context.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
+    seen = Watched(context, maze.url)
+    page = seen.page
+    page.goto(maze.url)
+    set_target(page)
+    expect(page.locator(".headline")).to_have_text("✓ 2.50 m promised")
+    picture = page.get_by_alt_text("The server's picture")
+    expect(picture).not_to_have_js_property("naturalWidth", 0)
+    assert seen.accessible() == []
+    assert seen.troubles == []
+    context.close()

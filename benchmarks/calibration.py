@@ -163,7 +163,9 @@ def calibration_of(drives: list[dict]) -> Calibration:
         "speed_mps": np.array([leg["speed_mps"] for leg in legs]),
         "more_m": np.array([leg["straight_m"] - leg["foreseen_straight_m"] for leg in legs]),
     }
-    classes = corner_classes(found, "ackermann", np.ones(len(found["turn_deg"]), bool))
+    classes = corner_classes(
+        found, vehicle_from_parameters(PARAMETERS), np.ones(len(found["turn_deg"]), bool)
+    )
     return Calibration(1, len(drives), "ackermann", tuple(classes), tuple(leg_classes(straight)), PARAMETERS)
 
 

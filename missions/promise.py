@@ -87,7 +87,7 @@ def known_vehicle(situation: Situation, request: Request) -> Vehicle:
         firmware=situation.firmware,
         ardupilot=known_ardupilot(situation),
     )
-    vehicle = calibrated(vehicle, situation.calibration, situation.parameters)
+    vehicle = calibrated(vehicle, situation)
     if request.speed_mps is None:
         return vehicle
     return replace(vehicle, speed_mps=request.speed_mps)
@@ -95,7 +95,7 @@ def known_vehicle(situation: Situation, request: Request) -> Vehicle:
 
 def promise(situation: Situation, request: Request, vehicle: Vehicle) -> Promise:
     """Return the clearance to promise: what is asked, but no less than the vehicle's own avoidance and its corners need."""
-    warnings = calibration_warnings(situation.calibration, situation.parameters)
+    warnings = calibration_warnings(vehicle, situation)
     told = calibration_info(vehicle)
     promised_m = request.clearance_m
     if promised_m is None:

@@ -216,6 +216,8 @@ class Calibration:
     legs : tuple of LegClass
     parameters : mapping of str to float
         Those that it drove with, by name.
+    firmware : str or None
+        The autopilot's version then.
     """
 
     system: int
@@ -224,6 +226,7 @@ class Calibration:
     corners: tuple[CornerClass, ...]
     legs: tuple[LegClass, ...]
     parameters: Mapping[str, float] = field(hash=False)
+    firmware: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

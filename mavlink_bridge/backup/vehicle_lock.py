@@ -96,7 +96,7 @@ class VehicleLock:
             for path in self._paths:
                 file: IO[bytes] = path.open("a+b")
                 files.append(file)
-                if not _lock(file):
+                if not lock_file(file):
                     holder = _holder(file)
                     _close(files)
                     return holder
@@ -145,7 +145,7 @@ def _holder(file: IO[bytes]) -> Holder:
 if sys.platform == "win32":
     import msvcrt
 
-    def _lock(file: IO[bytes]) -> bool:
+    def lock_file(file: IO[bytes]) -> bool:
         """Lock a file; False if somebody else has."""
         file.seek(_LOCKED_BYTE)
         try:
@@ -157,7 +157,7 @@ if sys.platform == "win32":
 else:
     import fcntl
 
-    def _lock(file: IO[bytes]) -> bool:
+    def lock_file(file: IO[bytes]) -> bool:
         """Lock a file; False if somebody else has."""
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

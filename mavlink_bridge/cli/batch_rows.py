@@ -41,10 +41,16 @@ def read_rows(path: Path) -> Iterator[Row]:
     if kind not in _SUFFIXES:
         raise UsageError(f"--batch {path}: expected a table ({', '.join(_SUFFIXES)})")
     rows = {".csv": _csv_rows, ".parquet": read_parquet}.get(kind, _json_rows)(path)
+    outputs: dict[str, int] = {}
     for number, row in enumerate(rows, start=1):
         if unknown := [name for name in row if name not in COLUMNS]:
             raise UsageError(
                 f"{path}: row {number}: unknown column {', '.join(map(repr, unknown))}; columns are {', '.join(COLUMNS)}"
+            )
+        output = str(row.get("output") or "").strip()
+        if output and outputs.setdefault(output, number) != number:
+            raise UsageError(
+                f"{path}: row {number}: output {output!r} is that of row {outputs[output]} too: one plan would take the other's place"
             )
         yield row
 
@@ -53,6 +59,9 @@ def _csv_rows(path: Path) -> Iterator[Row]:
     with path.open(encoding="utf-8-sig", newline="") as file:
         reader = csv.DictReader(file, restkey="more cells than columns", strict=True)
         try:
+            names = [name.strip() for name in reader.fieldnames or ()]
+            if twice := sorted({name for name in names if names.count(name) > 1}):
+                raise UsageError(f"{path}: column {twice[0]!r} is there twice")
             for row in reader:
                 yield {(name or "").strip(): value for name, value in row.items()}
         except (csv.Error, UnicodeDecodeError) as error:
@@ -65,7 +74,7 @@ def _json_rows(path: Path) -> Iterator[Row]:
             if not line.strip():
                 continue
             try:
-                row = json.loads(line)
+                row = json.loads(line, object_pairs_hook=_object)
             except (ValueError, RecursionError) as error:
                 raise MissionFormatError(
                     f"{path}: line {number}: not JSON: {error}", file=str(path)
@@ -75,6 +84,13 @@ def _json_rows(path: Path) -> Iterator[Row]:
                     f"{path}: line {number}: expected an object", file=str(path), line=number
                 )
             yield row
+
+
+def _object(pairs: list[tuple[str, Any]]) -> Row:
+    row = dict(pairs)
+    if len(row) < len(pairs):
+        raise ValueError("a key is there twice")
+    return row
 
 
 def options_of(row: Row, options: PlanOptions, folder: Path) -> PlanOptions:

@@ -255,7 +255,7 @@ def _vehicle(file: Path | None, firmware: Firmware | None) -> Iterator[_Finding]
         vehicle = vehicle_from_parameters(
             described.parameters, firmware=firmware, ardupilot=described.ardupilot
         )
-        vehicle = calibrated(vehicle, described.calibration, described.parameters)
+        vehicle = calibrated(vehicle, described)
     except MissionError as error:
         yield _Finding(_Verdict.ERROR, "vehicle", str(error))
         return

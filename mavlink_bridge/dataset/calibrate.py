@@ -22,13 +22,14 @@ from missions.vehicle.calibration import (
     speed_class,
     turn_class,
 )
+from missions.vehicle.parameters import PARAMETERS
 from missions.words import counted
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from mavlink_bridge.dataset.store import Dataset
-    from missions.firmware import Firmware
+    from missions.vehicle import Vehicle
 
 WITHIN: Final = 0.99
 CONFIDENCE: Final = 0.95
@@ -49,15 +50,12 @@ class Calibrated:
     ----------
     system : int
     calibration : Calibration
-    firmware : Firmware or None
-        Of the newest log.
     remarks : tuple of str
         What could not be used, and why.
     """
 
     system: int
     calibration: Calibration
-    firmware: Firmware | None
     remarks: tuple[str, ...]
 
 
@@ -70,9 +68,19 @@ WHERE turn_deg IS NOT NULL AND is_whole AND predicted_inside_cut_m IS NOT NULL O
 _LEGS = """SELECT speed_mps, straight_m - predicted_straight_m AS more_m FROM legs
 WHERE vehicle = ? AND is_whole AND straight_m IS NOT NULL AND predicted_straight_m IS NOT NULL"""
 _DRIVES = "SELECT count(*) FROM (SELECT DISTINCT log, drive FROM legs WHERE vehicle = ? AND is_whole AND predicted_straight_m IS NOT NULL)"
-_NEWEST = "SELECT log, firmware FROM vehicles WHERE vehicle = ? AND driven_m > 0 ORDER BY begins_utc DESC NULLS LAST, log LIMIT 1"
-_OTHER = """SELECT DISTINCT p.log FROM parameters p JOIN (SELECT name, value FROM parameters WHERE vehicle = ? AND log = ?) n USING (name)
-WHERE p.vehicle = ? AND p.value <> n.value AND n.name = ANY(?)"""
+_NEWEST = """SELECT v.log, v.firmware FROM vehicles v WHERE v.vehicle = ? AND v.driven_m > 0
+ORDER BY EXISTS (SELECT 1 FROM parameters p WHERE p.vehicle = v.vehicle AND p.log = v.log AND p.name = ANY(?)) DESC,
+    v.begins_utc DESC NULLS LAST, v.log LIMIT 1"""
+_SAME = """SELECT v.log FROM vehicles v WHERE v.vehicle = $system AND v.firmware IS NOT DISTINCT FROM $firmware AND NOT EXISTS
+    (SELECT 1 FROM parameters n LEFT JOIN parameters p ON p.name = n.name AND p.vehicle = n.vehicle AND p.log = v.log
+    WHERE n.vehicle = $system AND n.log = $newest AND n.name = ANY($bending) AND p.value IS DISTINCT FROM n.value)
+AND NOT EXISTS (SELECT 1 FROM events e WHERE e.vehicle = $system AND e.log = v.log AND e.event = 'parameter' AND e.name = ANY($bending))"""
+_TWICE = """WITH d AS (SELECT d.log, d.drive, d.driven_s, v.begins_utc + to_microseconds(CAST(d.begun_s * 1e6 AS BIGINT)) AS begun_utc
+    FROM drives d LEFT JOIN vehicles v USING (log, month, vehicle) WHERE d.vehicle = ?)
+SELECT DISTINCT a.log FROM d a JOIN d b ON a.log > b.log AND a.begun_utc < b.begun_utc + to_microseconds(CAST(b.driven_s * 1e6 AS BIGINT))
+    AND b.begun_utc < a.begun_utc + to_microseconds(CAST(a.driven_s * 1e6 AS BIGINT))
+UNION SELECT log FROM d WHERE begun_utc IS NULL"""
+"""Recordings of drives of which another log has a recording too, by the time of day; and those without one, of which that is not known."""
 
 
 def calibrate(dataset: Dataset, system: int | None) -> Calibrated:
@@ -99,29 +107,33 @@ def calibrate(dataset: Dataset, system: int | None) -> Calibrated:
                 system=system,
                 advice="record AUTO missions of plain waypoints, with mission and parameters in the log",
             )
-        newest, version = database.execute(_NEWEST, [system]).fetchone()
-        query = "SELECT name, value FROM parameters WHERE vehicle = ? AND log = ? ORDER BY name"
+        named = [one for one in PARAMETERS if bends_the_track(one)]
+        newest, version = database.execute(_NEWEST, [system, named]).fetchone()
+        query = "SELECT name, value FROM parameters WHERE vehicle = ? AND log = ? AND isfinite(value) ORDER BY name"
         parameters = dict(database.execute(query, [system, newest]).fetchall())
         bending = [name for name in parameters if bends_the_track(name)]
-        others = {log for (log,) in database.execute(_OTHER, [system, newest, system, bending]).fetchall()}
+        same = {"system": system, "firmware": version, "newest": newest, "bending": bending}
+        known = {log for (log,) in database.execute(_SAME, same).fetchall()} if bending else set()
+        twice = {log for (log,) in database.execute(_TWICE, [system]).fetchall()}
         corners = database.execute(_CORNERS, [system]).fetchnumpy()
         legs = database.execute(_LEGS, [system]).fetchnumpy()
     finally:
         database.close()
     firmware = read_firmware(version) if version else None
     vehicle = vehicle_from_parameters(parameters, firmware=firmware)
-    is_tuned_so = (
-        ~np.isin(corners["log"].astype(str), sorted(others)) if others else np.ones(len(corners["log"]), bool)
-    )
+    logs = corners["log"].astype(str)
+    is_tuned_so = np.isin(logs, sorted(known))
+    is_once = ~np.isin(logs, sorted(twice))
     calibration = Calibration(
         system=system,
         drives=int(drives),
         steering=str(vehicle.steering),
-        corners=tuple(corner_classes(corners, str(vehicle.steering), is_tuned_so)),
+        corners=tuple(corner_classes(corners, vehicle, is_tuned_so & is_once)),
         legs=tuple(leg_classes(legs)),
         parameters=parameters,
+        firmware=None if firmware is None else str(firmware),
     )
-    return Calibrated(system, calibration, firmware, tuple(_remarks(calibration, is_tuned_so)))
+    return Calibrated(system, calibration, tuple(_remarks(calibration, is_tuned_so, is_once)))
 
 
 def _chosen(database: Any, system: int | None) -> int:  # noqa: ANN401 - a duckdb connection
@@ -148,7 +160,7 @@ def _chosen(database: Any, system: int | None) -> int:  # noqa: ANN401 - a duckd
 
 
 def corner_classes(
-    columns: dict[str, NDArray[Any]], steering: str, is_tuned_so: NDArray[np.bool_]
+    columns: dict[str, NDArray[Any]], vehicle: Vehicle, is_tuned_so: NDArray[np.bool_]
 ) -> list[CornerClass]:
     """Return what each class of corners adds to the model's bounds, or takes from them.
 
@@ -157,7 +169,7 @@ def corner_classes(
     columns : dict of str to ndarray, shape (n,)
         Of each corner: ``turn_deg``, ``speed_mps``, ``stands``, ``inside_m`` and ``outside_m`` (measured less its bound), ``beyond_m`` (outside the
         corridor), ``gap_m``, ``is_bounded``.
-    steering : str
+    vehicle : Vehicle
     is_tuned_so : ndarray of bool, shape (n,)
         Whether it was driven with the parameters that the rover has now; others widen, and do not narrow.
     """
@@ -168,7 +180,7 @@ def corner_classes(
     found = []
     for turn, speed, stood in sorted(set(zip(turns.tolist(), speeds.tolist(), stands.tolist(), strict=True))):
         these = (turns == turn) & (speeds == speed) & (stands == stood)
-        least = (0.0, 0.0) if stood else least_more_m(steering, turn, speed)
+        least = least_more_m(vehicle, turn, speed, stands=stood)
         found.append(
             CornerClass(
                 turn_from_deg=turn * TURN_STEP_DEG,
@@ -245,7 +257,9 @@ def _rounded_up(value_m: float) -> float:
     return math.ceil(value_m * scale - 1e-9) / scale
 
 
-def _remarks(calibration: Calibration, is_tuned_so: NDArray[np.bool_]) -> list[str]:
+def _remarks(
+    calibration: Calibration, is_tuned_so: NDArray[np.bool_], is_once: NDArray[np.bool_]
+) -> list[str]:
     few = sum(one.corners < LEAST_CORNERS for one in calibration.corners)
     remarks = []
     if few:
@@ -254,11 +268,15 @@ def _remarks(calibration: Calibration, is_tuned_so: NDArray[np.bool_]) -> list[s
         )
     if others := int((~is_tuned_so).sum()):
         remarks.append(
-            f"{counted(others, 'corner')} driven with other parameters than the newest log's: that may widen the corridor, and narrows nothing"
+            f"{counted(others, 'corner')} driven with other parameters or firmware than the newest log's, or it is not known with which: that may widen the corridor, and narrows nothing"
+        )
+    if twice := int((~is_once).sum()):
+        remarks.append(
+            f"{counted(twice, 'corner')} in logs without times of day, or at a time when another log of the same system id has drives (another recording, or another rover): that may widen the corridor, and narrows nothing"
         )
     return remarks
 
 
 def calibration_text(found: Calibrated) -> str:
     """Return the file of a calibration."""
-    return write(found.calibration, found.firmware)
+    return write(found.calibration)

@@ -168,12 +168,14 @@ def ask_sql(dataset: Dataset, sql: str) -> AnswerRows:
     DatasetError
         There is no dataset; or DuckDB refuses the SQL, in its words.
     """
-    return _answer(dataset, sql, {})
+    return _answer(dataset, sql, {}, is_users=True)
 
 
-def _answer(dataset: Dataset, sql: str, values: dict[str, Any]) -> AnswerRows:
+def _answer(dataset: Dataset, sql: str, values: dict[str, Any], *, is_users: bool = False) -> AnswerRows:
     database = dataset.open()
     try:
+        if is_users:
+            _check_only_reads(database, sql)
         found = database.execute(sql, values) if values else database.execute(sql)
         columns = tuple(str(one[0]) for one in found.description or ())
         rows = tuple(found.fetchall())
@@ -187,6 +189,17 @@ def _answer(dataset: Dataset, sql: str, values: dict[str, Any]) -> AnswerRows:
     finally:
         database.close()
     return AnswerRows(columns, rows)
+
+
+def _check_only_reads(database: Any, sql: str) -> None:  # noqa: ANN401 - a duckdb connection
+    """Refuse what is not one query: COPY can write wherever DuckDB may read, into the dataset's own files too."""
+    kinds = [one.type.name for one in database.extract_statements(sql)]
+    if kinds != ["SELECT"]:
+        raise DatasetError(
+            f"the SQL is refused: it is {' and '.join(kinds) or 'empty'}; expected one SELECT",
+            sql=sql,
+            advice="ask with SELECT; --csv FILE keeps the answer",
+        )
 
 
 def chart(question: Question, answer: AnswerRows) -> Chart:

@@ -15,10 +15,11 @@ import shutil
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import IO, TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from mavlink_bridge.backup.vehicle_lock import lock_file
 from mavlink_bridge.dataset.schema import PARTITION, SCHEMA_VERSION, TABLES, VIEWS
 from mavlink_bridge.errors import DatasetError
 from missions.formats.files import write_file
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.dataset.schema import Column, Table
 
 LIST_NAME: Final = "pbpp-dataset.json"
-_STAGING, _INCOMING, _SCRATCH = ".staging", ".incoming", ".scratch"
+_STAGING, _INCOMING, _SCRATCH, _LOCK = ".staging", ".incoming", ".scratch", ".lock"
 _MEMORY: Final = "160MB"
 """What DuckDB may hold; beyond, it writes to the scratch folder. Chosen: with the workers below 400 MB."""
 
@@ -89,6 +90,7 @@ class Dataset:
         self.folder = folder
         self._files: dict[str, list[str]] = {name: [] for name in TABLES}
         self._published: list[str] = []
+        self._lock: IO[bytes] | None = None
         if (folder / LIST_NAME).is_file():
             self._read_list()
         elif folder.exists() and (not folder.is_dir() or not _is_ours(folder)):
@@ -178,8 +180,25 @@ class Dataset:
     # Building
 
     def begin(self) -> Any:  # noqa: ANN401 - as `connection`
-        """Make the folder ready for a build: take away what a killed one left; return a database to build with."""
+        """Make the folder ready for a build: take away what a killed one left; return a database to build with.
+
+        Raises
+        ------
+        DatasetError
+            Another build adds to it, or it is of another version.
+        """
         self.folder.mkdir(parents=True, exist_ok=True)
+        lock = (self.folder / _LOCK).open("ab")
+        if not lock_file(lock):
+            lock.close()
+            raise DatasetError(
+                f"{self.folder}: another `pbpp logs build` adds to this dataset; nothing was changed",
+                folder=str(self.folder),
+                advice="wait for it to finish, or stop it",
+            )
+        self._lock = lock
+        if self.is_there:
+            self._read_list()  # as it is now: another build may have ended since
         for name in (_INCOMING, _SCRATCH):
             shutil.rmtree(self.folder / name, ignore_errors=True)
         for folder in self._staged(every=True):
@@ -199,6 +218,8 @@ class Dataset:
         """Take away what a build needs only while it runs."""
         for name in (_INCOMING, _SCRATCH, _STAGING):
             shutil.rmtree(self.folder / name, ignore_errors=True)
+        if self._lock is not None:
+            self._lock.close()
 
     def _staged(self, *, every: bool = False) -> list[Path]:
         found = sorted((self.folder / _STAGING).glob("*"))
@@ -328,7 +349,7 @@ class Dataset:
 
 def _is_ours(folder: Path) -> bool:
     """Return whether a folder is empty, but for what a build that was killed may have left."""
-    return all(path.name in (_STAGING, _INCOMING, _SCRATCH) for path in folder.iterdir())
+    return all(path.name in (_STAGING, _INCOMING, _SCRATCH, _LOCK) for path in folder.iterdir())
 
 
 def _parquet(files: Iterable[object], table: Table | None = None) -> str:

@@ -12,14 +12,12 @@ from missions.firmware import read_firmware
 from missions.formats.texts import read_text
 from missions.situation import Calibration, CornerClass, LegClass, Situation
 from missions.vehicle import Steering
-from missions.vehicle.calibration import LEAST_CORNERS
+from missions.vehicle.calibration import LEAST_CORNERS, SPEED_STEP_MPS, TURN_STEP_DEG
 from missions.words import counted
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
-
-    from missions.firmware import Firmware
 
 SUFFIX: Final = ".toml"
 _VERSION: Final = 1
@@ -50,6 +48,9 @@ def calibration_from_plain(plain: Mapping[str, Any] | None) -> Calibration | Non
     """
     if plain is None:
         return None
+    classes = [(one["turn_from_deg"], one["speed_from_mps"], one["stands"]) for one in plain["corners"]]
+    if len(set(classes)) < len(classes):
+        raise ValueError("two classes of corners are the same")
     return Calibration(
         system=_count(plain, "system", 255),
         drives=_count(plain, "drives"),
@@ -57,6 +58,7 @@ def calibration_from_plain(plain: Mapping[str, Any] | None) -> Calibration | Non
         corners=tuple(_corner_class(one, number) for number, one in enumerate(plain["corners"], start=1)),
         legs=tuple(_leg_class(one) for one in plain["legs"]),
         parameters={str(name): _number(plain["parameters"], name, math.inf) for name in plain["parameters"]},
+        firmware=None if plain.get("firmware") is None else str(read_firmware(plain["firmware"])),
     )
 
 
@@ -72,6 +74,15 @@ def _corner_class(plain: Mapping[str, Any], number: int) -> CornerClass:
         outside_more_m=_number(plain, "outside_more_m", _MOST_MORE_M),
         beyond_m=_number(plain, "beyond_m", _MOST_MORE_M),
     )
+    _check_class(
+        f"turn_from_deg of class {number} of corners", found.turn_from_deg, found.turn_to_deg, TURN_STEP_DEG
+    )
+    _check_class(
+        f"speed_from_mps of class {number} of corners",
+        found.speed_from_mps,
+        found.speed_to_mps,
+        SPEED_STEP_MPS,
+    )
     if found.beyond_m < 0:
         raise ValueError(f"beyond_m of class {number} of corners is {found.beyond_m:g}; expected 0 or more")
     if min(found.inside_more_m, found.outside_more_m) < 0 and found.corners < LEAST_CORNERS:
@@ -81,11 +92,20 @@ def _corner_class(plain: Mapping[str, Any], number: int) -> CornerClass:
     return found
 
 
+def _check_class(name: str, least: float, end: float, step: float) -> None:
+    """Refuse a class that is not one of ours: only its lower end is looked at, and what lies above would silently not count."""
+    if least < 0 or least % step or end != least + step:
+        raise ValueError(
+            f"{name} is {least:g}, up to {end:g}; expected a multiple of {step:g}, and {step:g} more"
+        )
+
+
 def _leg_class(plain: Mapping[str, Any]) -> LegClass:
     more_m = _number(plain, "more_m", _MOST_MORE_M)
     if more_m < 0:
         raise ValueError(f"more_m is {more_m:g}: legs are not narrowed")
     speeds = (_number(plain, "speed_from_mps", 100.0), _number(plain, "speed_to_mps", 200.0))
+    _check_class("speed_from_mps of a class of legs", *speeds, SPEED_STEP_MPS)
     return LegClass(*speeds, _count(plain, "legs"), more_m)
 
 
@@ -110,7 +130,7 @@ def _truth(plain: Mapping[str, Any], name: str) -> bool:
     return value
 
 
-def write(calibration: Calibration, firmware: Firmware | None) -> str:
+def write(calibration: Calibration) -> str:
     """Return the text of a file."""
     plain = calibration_to_plain(calibration)
     assert plain is not None
@@ -123,8 +143,8 @@ def write(calibration: Calibration, firmware: Firmware | None) -> str:
     ]
     lines += [f"calibration = {_VERSION}"]
     lines += [f"{name} = {_toml(plain[name])}" for name in ("system", "drives", "steering")]
-    if firmware is not None:
-        lines.append(f"firmware = {_toml(str(firmware))}")
+    if calibration.firmware is not None:
+        lines.append(f"firmware = {_toml(calibration.firmware)}")
     for table in ("corners", "legs"):
         for one in plain[table]:
             lines += ["", f"[[{table}]]", *(f"{name} = {_toml(value)}" for name, value in one.items())]
@@ -159,7 +179,7 @@ def read_calibration(path: Path) -> Situation:
             raise ValueError(f"calibration = {plain.get('calibration')!r}; expected {_VERSION}")  # noqa: TRY301 - told as the others
         calibration = calibration_from_plain(plain)
         assert calibration is not None
-        firmware = read_firmware(plain["firmware"]) if "firmware" in plain else None
+        firmware = read_firmware(calibration.firmware) if calibration.firmware is not None else None
     except (ValueError, LookupError, TypeError, AttributeError, MissionError) as error:
         told = f"{error.args[0]!r} is missing" if isinstance(error, KeyError) else str(error)
         raise MissionFormatError(

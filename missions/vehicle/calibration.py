@@ -5,13 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from missions.vehicle import is_ardupilots
 from missions.vehicle.measured_corners import LEAST_MORE_M
+from missions.vehicle.model import Autopilot
+from missions.vehicle.parameters import PARAMETERS
 from missions.words import counted
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from missions.situation import Calibration, CornerClass
+    from missions.situation import Calibration, CornerClass, Situation
     from missions.vehicle.model import Vehicle
 
 TURN_STEP_DEG: Final = 15.0
@@ -67,7 +70,7 @@ def corner_more(vehicle: Vehicle, turn_deg: float, speed_mps: float, *, stands: 
     classes = [one for one in vehicle.calibration.corners if one.stands == stands]
     for one in classes:
         if turn_class(one.turn_from_deg) == turn and speed_class(one.speed_from_mps) == speed:
-            least = least_more_m(str(vehicle.steering), turn, speed)
+            least = least_more_m(vehicle, turn, speed, stands=stands)
             return CornerMore(
                 max(one.inside_more_m, least[0]), max(one.outside_more_m, least[1]), max(one.beyond_m, 0.0)
             )
@@ -89,9 +92,14 @@ def _nearest(classes: Iterable[CornerClass], turn: int, speed: int) -> list[Corn
     return [one for one, away in steps.items() if away <= least + 1]
 
 
-def least_more_m(steering: str, turn: int, speed: int) -> tuple[float, float]:
-    """Return how far bounds of a class may be narrowed at the most: what the autopilot's measured rows of it left unused; nothing where there are none."""
-    return LEAST_MORE_M.get((steering, turn, speed), (0.0, 0.0))
+def least_more_m(vehicle: Vehicle, turn: int, speed: int, *, stands: bool) -> tuple[float, float]:
+    """Return how far bounds of a class may be narrowed at the most: what the autopilot's measured rows of it left unused; nothing where there are none.
+
+    The rows are of ArduPilot since 4.6, of corners that it drives through; others have nothing to spare.
+    """
+    if stands or vehicle.autopilot is not Autopilot.ARDUPILOT or vehicle.has_measured_corners is not True:
+        return 0.0, 0.0
+    return LEAST_MORE_M.get((str(vehicle.steering), turn, speed), (0.0, 0.0))
 
 
 def leg_more_m(vehicle: Vehicle, speed_mps: float) -> float:
@@ -104,14 +112,43 @@ def leg_more_m(vehicle: Vehicle, speed_mps: float) -> float:
     return max(0.0, *(one.more_m for one, away in steps.items() if away == least))
 
 
-def calibrated(vehicle: Vehicle, calibration: Calibration | None, parameters: Mapping[str, float]) -> Vehicle:
-    """Return a vehicle with its calibration; where it steers otherwise now, or its parameters have changed, that narrows nothing."""
+def calibrated(vehicle: Vehicle, situation: Situation) -> Vehicle:
+    """Return a vehicle with its calibration, which narrows nothing where `what_differs` says anything."""
+    calibration = situation.calibration
     if calibration is None:
         return vehicle
-    is_as_it_was = calibration.steering == str(vehicle.steering) and not changed_parameters(
-        calibration, parameters
-    )
-    return replace(vehicle, calibration=calibration if is_as_it_was else _only_wider(calibration))
+    differs = what_differs(calibration, vehicle, situation)
+    return replace(vehicle, calibration=_only_wider(calibration) if differs else calibration)
+
+
+def what_differs(calibration: Calibration, vehicle: Vehicle, situation: Situation) -> list[str]:
+    """Return what keeps a calibration from narrowing bounds: that it is another rover's, or the rover is not as it was, or nobody knows."""
+    found = []
+    if situation.system is not None and situation.system != calibration.system:
+        found.append(
+            f"the calibration is of vehicle {calibration.system}, this is vehicle {situation.system}"
+        )
+    was_ardupilot = is_ardupilots(calibration.parameters)
+    if was_ardupilot is None:
+        found.append("the calibration does not say with which parameters the rover drove")
+    elif was_ardupilot != (vehicle.autopilot is Autopilot.ARDUPILOT):
+        found.append(f"the calibration is of another autopilot than {vehicle.autopilot}")
+    if calibration.steering != str(vehicle.steering):
+        found.append(f"the calibration is of {calibration.steering} steering, this is {vehicle.steering}")
+    if situation.firmware is not None and str(situation.firmware) != calibration.firmware:
+        then = calibration.firmware or "not known"
+        found.append(f"the firmware is {situation.firmware} (when the rover was calibrated: {then})")
+    if changed := changed_parameters(calibration, situation.parameters):
+        shown = ", ".join(
+            f"{name} {situation.parameters[name]:g} ({_then(calibration, name)})" for name in changed[:3]
+        )
+        more = f" and {len(changed) - 3} more" if len(changed) > 3 else ""
+        found.append(f"parameters have changed since the rover was calibrated: {shown}{more}")
+    return found
+
+
+def _then(calibration: Calibration, name: str) -> str:
+    return f"then {calibration.parameters[name]:g}" if name in calibration.parameters else "then not known"
 
 
 def _only_wider(calibration: Calibration) -> Calibration:
@@ -127,11 +164,17 @@ def _only_wider(calibration: Calibration) -> Calibration:
 
 
 def changed_parameters(calibration: Calibration, parameters: Mapping[str, float]) -> list[str]:
-    """Return which parameters that bend the track are other now than when the rover was calibrated."""
+    """Return which parameters that bend the track are other now than when the rover was calibrated, or were not known then."""
+    before = calibration.parameters
     return sorted(
         name
-        for name, before in calibration.parameters.items()
-        if bends_the_track(name) and abs(parameters.get(name, before) - before) > 1e-6 * max(1.0, abs(before))
+        for name, now in parameters.items()
+        if bends_the_track(name)
+        and (
+            abs(now - before[name]) > 1e-6 * max(1.0, abs(before[name]))
+            if name in before
+            else name in PARAMETERS
+        )
     )
 
 
@@ -151,14 +194,11 @@ def calibration_info(vehicle: Vehicle) -> tuple[str, ...]:
     )
 
 
-def calibration_warnings(calibration: Calibration | None, parameters: Mapping[str, float]) -> list[str]:
-    """Return a warning where the vehicle drives with other parameters than when it was calibrated."""
-    if calibration is None or not (changed := changed_parameters(calibration, parameters)):
+def calibration_warnings(vehicle: Vehicle, situation: Situation) -> list[str]:
+    """Return a warning for each reason why a calibration narrows nothing."""
+    if situation.calibration is None:
         return []
-    shown = ", ".join(
-        f"{name} {parameters[name]:g} (then {calibration.parameters[name]:g})" for name in changed[:3]
-    )
-    more = f" and {len(changed) - 3} more" if len(changed) > 3 else ""
     return [
-        f"parameters have changed since the rover was calibrated: {shown}{more}; the calibration widens the corridor, and narrows it nowhere"
+        f"{differs}; the calibration widens the corridor, and narrows it nowhere"
+        for differs in what_differs(situation.calibration, vehicle, situation)
     ]

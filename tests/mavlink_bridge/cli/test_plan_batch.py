@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 from mavlink_bridge.cli.app import app
 from mavlink_bridge.cli.batch_rows import COLUMNS, read_rows
 from mavlink_bridge.cli.plan_batch import _results_file
+from mavlink_bridge.errors import UsageError
 from missions.formats import read_mission
 
 YARD = Path(__file__).parents[3] / "examples" / "yard"
@@ -120,6 +121,8 @@ def test_json_lines_and_parquet_say_the_same(table):
     ("name", "text", "message"),
     [
         ("a.csv", "fence,clearence\nx,2\n", "unknown column 'clearence'"),
+        ("a.csv", "fence,start, start\nx,2,3\n", "column 'start' is there twice"),
+        ("a.jsonl", '{"start": "1,2", "start": "3,4"}\n', "a key is there twice"),
         ("a.csv", "fence\nx,2\n", "more cells than columns"),
         ("a.csv", b"fence\n\xff\n", "a.csv: line"),
         ("a.csv", 'fence\n"x\n', "a.csv: line"),
@@ -192,3 +195,12 @@ def test_a_run_that_ends_early_leaves_what_was_there(tmp_path):
     assert not results.__exit__(KeyboardInterrupt, KeyboardInterrupt(), None)
     assert path.read_text() == "before"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_no_plan_takes_anothers_place(tmp_path):
+    table = tmp_path / "a.csv"
+    table.write_text("fence,output\na,one.waypoints\nb,\nc,\nd,one.waypoints\n")
+    rows = read_rows(table)
+    assert [next(rows)["fence"] for _ in range(3)] == ["a", "b", "c"]
+    with pytest.raises(UsageError, match=r"row 4: output 'one.waypoints' is that of row 1 too"):
+        next(rows)

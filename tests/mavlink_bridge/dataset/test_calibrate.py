@@ -12,11 +12,20 @@ from typer.testing import CliRunner
 
 from mavlink_bridge.cli.app import app
 from mavlink_bridge.dataset.build import build, log_files
-from mavlink_bridge.dataset.calibrate import calibrate, corner_classes, leg_classes, more_m, rank_of_bound
+from mavlink_bridge.dataset.calibrate import (
+    calibrate,
+    calibration_text,
+    corner_classes,
+    leg_classes,
+    more_m,
+    rank_of_bound,
+)
+from mavlink_bridge.dataset.schema import TABLES
 from mavlink_bridge.dataset.store import Dataset
 from mavlink_bridge.errors import DatasetError
 from mavlink_bridge.many import open_workers
 from missions.formats.calibration import read_calibration
+from missions.vehicle import Vehicle
 
 
 def pbpp(*words: object):
@@ -71,7 +80,7 @@ def test_corners_are_parted_into_classes():
         "gap_m": np.full(count + 1, 0.5),
         "is_bounded": all_of(count + 1),
     }
-    gentle, sharp = corner_classes(columns, "ackermann", all_of(count + 1))
+    gentle, sharp = corner_classes(columns, Vehicle(), all_of(count + 1))
     assert (gentle.turn_from_deg, gentle.corners, gentle.inside_more_m, gentle.beyond_m) == (
         30.0,
         1,
@@ -81,8 +90,8 @@ def test_corners_are_parted_into_classes():
     assert (sharp.turn_from_deg, sharp.corners) == (105.0, count)
     assert -0.5 < sharp.inside_more_m < 0  # no farther than the measured rows allow
     seldom = {**columns, "gap_m": np.full(count + 1, 1.5)}
-    assert corner_classes(seldom, "ackermann", all_of(count + 1))[1].inside_more_m == 0.0
-    assert corner_classes(columns, "ackermann", ~all_of(count + 1))[1].inside_more_m == 0.0
+    assert corner_classes(seldom, Vehicle(), all_of(count + 1))[1].inside_more_m == 0.0
+    assert corner_classes(columns, Vehicle(), ~all_of(count + 1))[1].inside_more_m == 0.0
 
 
 def test_legs_only_widen():
@@ -136,3 +145,67 @@ def test_from_logs_to_a_plan(fleet, tmp_path, fields):
     assert any(
         one.startswith("calibrated from 1 drive of vehicle 3") for one in json.loads(told.stdout)["info"]
     )
+
+
+def made_dataset(folder, logs):
+    """Return a dataset of 402 equal corners of vehicle 1 in two logs; each log is (begins_s, firmware, parameters, name of a changed one)."""
+    dataset = Dataset(folder)
+    database = dataset.begin()
+    rows = {name: [] for name in TABLES}
+    for number, (begins_s, firmware, parameters, changed) in enumerate(logs):
+        log, end = f"log{number}", ("2026-08", 1)
+
+        def row(table, log=log, end=end, **values):
+            names = TABLES[table].names
+            assert set(values) <= set(names)
+            return (log, *(values.get(name) for name in names[1:]), *end)
+
+        rows["vehicles"].append(row("vehicles", begins_utc=begins_s, firmware=firmware, driven_m=900.0))
+        rows["drives"].append(row("drives", drive=1, begun_s=10.0, driven_s=500.0))
+        rows["parameters"] += [
+            row("parameters", name=name, value=value) for name, value in parameters.items()
+        ]
+        if changed:
+            rows["events"].append(
+                row("events", time_s=9.0, event="parameter", name=changed, before=1.0, after=2.0)
+            )
+        leg = {
+            "drive": 1, "item": 2, "length_m": 30.0, "speed_mps": 2.0, "straight_m": 0.1, "predicted_straight_m": 0.3, "turn_deg": 110.0,
+            "stands": False, "inside_cut_m": 0.1, "outside_overshoot_m": 0.1, "predicted_inside_cut_m": 0.9, "predicted_outside_overshoot_m": 0.9,
+            "inside_beyond_m": 0.0, "outside_beyond_m": 0.0, "is_bounded": True, "gap_m": 0.4, "is_whole": True,
+        }  # fmt: skip
+        rows["legs"] += [row("legs", leg=leg_number, **leg) for leg_number in range(1, 202)]
+    dataset.stage(database, rows)
+    dataset.publish(database)
+    database.close()
+    dataset.end()
+    return dataset
+
+
+TUNE = {"WP_RADIUS": 2.0, "TURN_RADIUS": 0.9, "ATC_TURN_MAX_G": 0.6}
+LATER_S = 1000.0
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "narrows", "said"),
+    [
+        ((0.0, "4.6.3", TUNE, None), (LATER_S, "4.6.3", TUNE, None), True, ""),
+        ((0.0, "4.5.7", TUNE, None), (LATER_S, "4.6.3", TUNE, None), False, "201 corners driven with"),
+        ((0.0, None, TUNE, None), (LATER_S, "4.6.3", TUNE, None), False, "201 corners driven with"),
+        ((0.0, "4.6.3", {}, None), (LATER_S, "4.6.3", TUNE, None), False, "201 corners driven with"),
+        ((0.0, "4.6.3", TUNE, None), (LATER_S, "4.6.3", {}, None), False, "201 corners driven with"),
+        ((0.0, "4.6.3", {}, None), (LATER_S, "4.6.3", {}, None), False, "402 corners driven with"),
+        ((0.0, "4.6.3", {"WP_RADIUS": 2.0}, None), (LATER_S, "4.6.3", TUNE, None), False, "201 corners"),
+        ((0.0, "4.6.3", TUNE, "WP_RADIUS"), (LATER_S, "4.6.3", TUNE, None), False, "201 corners driven"),
+        ((0.0, "4.6.3", TUNE, None), (100.0, "4.6.3", TUNE, None), False, "another recording, or another"),
+        ((None, "4.6.3", TUNE, None), (None, "4.6.3", TUNE, None), False, "in logs without times of day"),
+        ((0.0, "4.6.3", {**TUNE, "WP_SPEED": math.nan}, None), (LATER_S, "4.6.3", TUNE, None), True, ""),
+    ],
+)
+def test_only_corners_known_to_be_of_this_rover_as_it_is_narrow(tmp_path, first, second, narrows, said):
+    found = calibrate(made_dataset(tmp_path / "dataset", [first, second]), None)
+    (path := tmp_path / "rover.toml").write_text(calibration_text(found))
+    (one,) = read_calibration(path).calibration.corners
+    assert one.corners == 402
+    assert (one.inside_more_m < 0) == narrows
+    assert said in " ".join(found.remarks)

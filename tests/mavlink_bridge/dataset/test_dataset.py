@@ -150,7 +150,7 @@ def test_folders_are_those_of_month_and_vehicle(place):
     assert parts == ["drives/month=2026-08/vehicle=3", "drives/month=2026-11/vehicle=1"] or all(
         "month=" in part and "vehicle=" in part for part in parts
     )
-    assert {path.name for path in (place / "dataset").iterdir()} == {"pbpp-dataset.json", *TABLES}
+    assert {path.name for path in (place / "dataset").iterdir()} == {".lock", "pbpp-dataset.json", *TABLES}
 
 
 def test_processes_make_the_same(place, tmp_path):
@@ -343,3 +343,18 @@ def test_every_column_says_what_it_is():
         assert len(set(names)) == len(names)
         assert all(column.meaning for column in table.columns)
     assert {view.name for view in VIEWS}.isdisjoint(TABLES)
+
+
+def test_two_builds_at_once_do_not_mix(tmp_path, logs):
+    first, second = Dataset(tmp_path / "dataset"), Dataset(tmp_path / "dataset")
+    database = first.begin()
+    with pytest.raises(DatasetError, match="another `pbpp logs build` adds to this dataset"):
+        second.begin()
+    database.close()
+    first.end()
+    with open_workers(1) as workers:
+        build(first, log_files([logs / "mission-yard.tlog"]), workers)
+        found = build(
+            second, log_files([logs / "mission-yard.tlog"]), workers
+        )  # knows of the rows added since it was opened
+    assert (found.known, found.read) == (1, 0)

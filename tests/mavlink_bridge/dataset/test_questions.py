@@ -130,3 +130,22 @@ def test_what_does_not_fit_together_is_wrong_usage(words, said):
 def test_a_chart_has_a_suffix_that_can_be_drawn(fleet):
     code, _, err = pbpp("logs", "ask", fleet, "modes", "--plot", "a.html")
     assert (code, "is not a supported format of charts" in err) == (3, True)
+
+
+@pytest.mark.parametrize(
+    "sql",
+    [
+        "COPY (SELECT 1) TO '{}/pbpp-dataset.json'",
+        "COPY (SELECT 1) TO '{}/more.parquet'",
+        "SELECT 1; COPY (SELECT 1) TO '{}/more.parquet'",
+        "EXPLAIN ANALYZE COPY (SELECT 1) TO '{}/more.parquet'",
+        "DROP VIEW logs",
+        "",
+    ],
+)
+def test_sql_writes_nothing_into_the_dataset(fleet, sql):
+    before = {path: path.stat().st_mtime_ns for path in fleet.rglob("*")}
+    code, _, err = pbpp("logs", "ask", fleet, "--sql", sql.format(fleet))
+    assert code != 0
+    assert "the SQL is refused" in err
+    assert {path: path.stat().st_mtime_ns for path in fleet.rglob("*")} == before

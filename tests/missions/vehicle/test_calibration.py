@@ -10,11 +10,12 @@ import pytest
 import shapely
 
 from missions.drive_model import corner_forecast, envelope
+from missions.firmware import Firmware
 from missions.geo import LatLon
 from missions.promise import known_vehicle, promise
 from missions.request import GoTo
 from missions.situation import Calibration, CornerClass, LegClass, Situation
-from missions.vehicle import Steering, Vehicle
+from missions.vehicle import Autopilot, Steering, Vehicle
 from missions.vehicle.calibration import corner_more, leg_more_m, speed_class, turn_class
 from missions.vehicle.measured_corners import LEAST_MORE_M
 
@@ -88,6 +89,9 @@ def test_classes_take_float32_speeds():
     assert (speed_class(1.9999999), turn_class(-89.99999)) == (4, 6)
 
 
+BEFORE = Calibration(7, 12, "ackermann", (corners(-0.2, turn=105),), (), {"WP_RADIUS": 2.0}, "4.6.3")
+
+
 class TestOfASituation:
     request = GoTo(target=LatLon(40.0, -105.0), clearance_m=1.5)
 
@@ -119,6 +123,42 @@ class TestOfASituation:
         vehicle = known_vehicle(situation, self.request)
         assert vehicle.steering is Steering.SKID
         assert vehicle.calibration.corners[0].inside_more_m == 0.0
+
+
+def test_px4_has_no_rows_to_be_narrowed_by():
+    known = rover(corners(-0.2, -0.2, turn=105), autopilot=Autopilot.PX4)
+    assert corner_more(known, 110.0, 2.0, stands=False) == (0.0, 0.0, 0.0)
+    stood = rover(corners(-0.2, -0.2, turn=105, stands=True))
+    assert corner_more(stood, 110.0, 2.0, stands=True) == (0.0, 0.0, 0.0)
+    assert corner_more(rover(corners(-0.2, turn=105)), 110.0, 2.0, stands=False)[0] == -0.2
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ({"system": 3}, "of vehicle 7, this is vehicle 3"),
+        ({"ardupilot": False}, "of another autopilot than PX4"),
+        ({"firmware": Firmware(4, 5, 7)}, "the firmware is 4.5.7 (when the rover was calibrated: 4.6.3)"),
+        ({"parameters": {"WP_RADIUS": 2.0, "ATC_TURN_MAX_G": 0.9}}, "ATC_TURN_MAX_G 0.9 (then not known)"),
+        ({"calibration": replace(BEFORE, parameters={})}, "does not say with which parameters"),
+        ({"calibration": replace(BEFORE, firmware=None)}, "when the rover was calibrated: not known"),
+    ],
+)
+def test_what_is_not_as_it_was_narrows_nothing_and_is_said(more, said):
+    request = GoTo(target=LatLon(40.0, -105.0), clearance_m=1.5)
+    same = Situation(
+        system=7,
+        firmware=Firmware(4, 6, 3),
+        parameters={"WP_RADIUS": 2.0, "TUNE": 9.0},
+        calibration=BEFORE,
+    )
+    vehicle = known_vehicle(same, request)
+    assert vehicle.calibration.corners[0].inside_more_m == -0.2
+    assert not [one for one in promise(same, request, vehicle).warnings if "calibrat" in one]
+    other = replace(same, **more)
+    vehicle = known_vehicle(other, request)
+    assert vehicle.calibration.corners[0].inside_more_m == 0.0
+    assert any(said in one for one in promise(other, request, vehicle).warnings)
 
 
 def test_a_corridor_of_two_kinds_of_firmware_grows_in_both():

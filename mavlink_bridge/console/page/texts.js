@@ -143,7 +143,7 @@ const en = {
   },
   start: {
     hold: "Start: press and hold", holding: "Keep holding …", noUpload: "pbpp was started without --upload: nothing is written to the vehicle.", noDrive: "pbpp was started without --drive: it starts nothing.",
-    noControl: "Take control first.", noPlan: "To start, upload the plan: only what is verified on the vehicle is driven.", byHand: "Start drives only what was planned here. Start a mission of your own with your ground station or transmitter.", other: "Not what is on the vehicle: upload this plan, then start it.", arms: "Arms the vehicle and switches to AUTO.", noArm: "Switches to AUTO. The vehicle must be armed: pbpp was started without --arm.",
+    noControl: "Take control first.", noServer: "The page has lost pbpp.", noPlan: "To start, upload the plan: only what is verified on the vehicle is driven.", byHand: "Start drives only what was planned here. Start a mission of your own with your ground station or transmitter.", other: "Not what is on the vehicle: upload this plan, then start it.", arms: "Arms the vehicle and switches to AUTO.", noArm: "Switches to AUTO. The vehicle must be armed: pbpp was started without --arm.",
     name: "Start: press and hold for one second.",
   },
   hold: {
@@ -158,7 +158,7 @@ const en = {
     along: /** @param {number} progress_m @param {number} length_m */ (progress_m, length_m) => `${progress_m.toFixed(1)} of ${length_m.toFixed(1)} m`,
     off: /** @param {number} deviation_m @param {boolean} isInside */ (deviation_m, isInside) => `${deviation_m.toFixed(2)} m, ${isInside ? "inside the corridor" : "OUTSIDE THE CORRIDOR"}`,
     leastHere: /** @param {number} value */ (value) => `least ${m(value)}`,
-    resume: "Go on to the target", blocked: "Blocked here", clearBlocked: "Forget blocked places", blockedHint: "Marks what stands in front of the rover and plans round it. This protects no person.",
+    resume: "Go on to the target", resumeName: "Go on to the target: press and hold for one second.", blocked: "Blocked here", clearBlocked: "Forget blocked places", blockedHint: "Marks what stands in front of the rover and plans round it. This protects no person.",
     going: "Go on with the drive", breaches: /** @param {number} n */ (n) => `${n} fence breaches`, wayHome: "Way home",
     holdState: "HOLD", none: "No drive under way.",
     trouble: "Trouble",

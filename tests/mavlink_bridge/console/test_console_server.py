@@ -395,6 +395,41 @@ def test_one_page_holds_control_and_every_page_may_hold_the_vehicle():
     assert backend.deeds == [("Start", "page 2"), ("Hold", "page 1"), ("Resume", "page 2")]
 
 
+@pytest.mark.parametrize(
+    "more", [{"x-run-id": "of-yesterday"}, {"x-asked-s": "1000.0"}, {"x-asked-s": "nan"}, {"x-asked-s": "?"}]
+)
+def test_a_request_that_comes_late_or_was_meant_for_an_earlier_server_moves_nothing(more):
+    backend = Recorder()
+    can = Permissions(upload=True, drive=True)
+    with (
+        served(can, backend) as (_, address),
+        httpx.Client(base_url=f"http://{address}", timeout=30) as client,
+    ):
+        for path in ("/api/start", "/api/upload"):
+            found = client.post(path, json={"plan_id": "x"}, headers={**PAGE, **more})
+            assert found.json()["error"]["kind"] in ("late", "invalid"), found.text
+        assert client.post("/api/resume", headers={**PAGE, **more}).json()["error"]["kind"] != "not_now"
+        assert backend.deeds == []
+        assert client.post("/api/hold", headers={**PAGE, **more}).status_code == 202  # never too late
+        now = {"x-run-id": "r", "x-asked-s": str(time.time() - 1.0)}
+        assert client.post("/api/start", json={"plan_id": "x"}, headers={**PAGE, **now}).status_code == 202
+
+
+@pytest.mark.parametrize(
+    ("path", "status"),
+    [
+        ("/page/a%00b", 404),
+        (f"/page/{'x' * 300}", 404),
+        ("/page/%2e%2e/app.py", 404),
+        ("/api/export?what=x", 422),
+    ],
+)
+def test_odd_addresses_are_answered_and_no_defects(path, status):
+    with served() as (_, address):
+        found = httpx.get(f"http://{address}{path}", timeout=30)
+        assert (found.status_code, "bug" in found.text) == (status, False), found.text
+
+
 def test_files_have_no_vehicle_to_be_asked():
     with served(Permissions(upload=True, drive=True)) as (_, address):
         found = httpx.post(f"http://{address}/api/hold", headers=PAGE, timeout=30)

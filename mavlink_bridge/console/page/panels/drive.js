@@ -3,7 +3,7 @@
 import { h, say, show } from "../dom.js";
 import { texts } from "../texts.js";
 import { comparison } from "./after.js";
-import { button, cannotWrite, facts } from "./parts.js";
+import { button, cannotWrite, facts, pressButton } from "./parts.js";
 
 /** @typedef {import("../types.js").PageState} PageState */
 
@@ -57,12 +57,12 @@ function showKept(list, drive) {
  * @param {import("../actions.js").Actions} act
  */
 function deedsPart(store, act) {
-  const resume = button(texts.drive.resume, () => act.resume(), { class: "main" });
+  const resume = pressButton(texts.drive.resume, texts.start.holding, texts.drive.resumeName, () => act.resume());
   const blocked = button(texts.drive.blocked, () => act.blocked());
   const forget = button(texts.drive.clearBlocked, () => act.clearBlocked());
   const why = h("p", { class: "quiet" });
   const section = h("section", { "aria-label": texts.drive.blocked }, h("div", { class: "row" }, resume, blocked, forget), h("p", { class: "quiet" }, texts.drive.blockedHint), why);
-  store.watch(["server", "control", "page", "drive", "fence"], (state) => {
+  store.watch(["server", "control", "page", "isConnected", "drive", "fence"], (state) => {
     const { server, drive, fence } = state;
     show(section, server.source === "live" || server.source === "demo");
     const reason = cannotWrite(state);

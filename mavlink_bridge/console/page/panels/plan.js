@@ -206,7 +206,7 @@ function writePart(store, act) {
   const start = pressButton(texts.start.hold, texts.start.holding, texts.start.name, () => act.start());
   const why = h("p", { class: "quiet" });
   const section = h("section", { "aria-label": texts.plan.upload }, h("div", { class: "row" }, upload, start), why);
-  store.watch(["server", "control", "page", "plan", "standing", "drive", "isPlanning", "doc", "link"], (state) => {
+  store.watch(["server", "control", "page", "isConnected", "plan", "standing", "drive", "isPlanning", "doc", "link"], (state) => {
     const { server, plan, isPlanning } = state;
     show(section, server.source === "live" || server.source === "demo");
     const reason = cannotWrite(state);

@@ -50,6 +50,7 @@ _ALIVE_S = 1.0  # something comes so often, so that a page knows that it is conn
 _SEND_S = 15.0  # a page that takes nothing for so long is gone; chosen, not measured
 _FRESH_S = 5.0  # so late a request may come and still change something; chosen: longer than any hitch of a network that can be driven by
 _PAGE_ID = re.compile(r"[A-Za-z0-9_-]{8,64}")
+_BODY_S = 30.0  # for a request of 4 MB to come: 1.1 Mbit/s; chosen
 _JSON = "application/json"
 _TYPES = {
     ".mjs": "text/javascript",
@@ -93,14 +94,22 @@ async def _body(request: Request) -> bytes:
     Raises
     ------
     Refusal
-        It is.
+        It is, or it comes too slowly.
     """
     data = bytearray()
-    async for piece in request.stream():
-        data += piece
-        if len(data) > wire.MOST_BYTES:
-            most = wire.MOST_BYTES // (1024 * 1024)
-            raise Refusal(Problem(kind="too_large", message=f"the request is larger than {most} MB"), 413)
+    try:
+        async with asyncio.timeout(_BODY_S):
+            async for piece in request.stream():
+                data += piece
+                if len(data) > wire.MOST_BYTES:
+                    most = wire.MOST_BYTES // (1024 * 1024)
+                    raise Refusal(
+                        Problem(kind="too_large", message=f"the request is larger than {most} MB"), 413
+                    )
+    except TimeoutError:
+        raise Refusal(
+            Problem(kind="late", message=f"the request took more than {_BODY_S:.0f} s"), 408
+        ) from None
     return bytes(data)
 
 

@@ -7,6 +7,7 @@ import json
 import socket
 import threading
 import time
+from contextlib import suppress
 from dataclasses import replace
 
 import httpx
@@ -18,7 +19,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from mavlink_bridge.console import app as app_module
-from mavlink_bridge.console import wire
+from mavlink_bridge.console import server, wire
 from mavlink_bridge.console.access import Access
 from mavlink_bridge.console.deeds import Refusal, not_now
 from mavlink_bridge.console.server import open_socket, page_link, qr_code
@@ -556,3 +557,27 @@ def test_a_refusal_is_no_failure():
             )
 
     asyncio.run(ask())
+
+
+def test_one_stranger_cannot_take_all_connections_and_hold_with_them(monkeypatch):
+    monkeypatch.setattr(server, "_REQUEST_S", 1.0)
+    with served(Permissions(upload=True, drive=True), Recorder()) as (_, address):
+        host, port = address.split(":")
+        page = connect(f"ws://{address}/api/live?page=stream-page", ping_interval=None)
+        idle = [
+            socket.create_connection((host, int(port)), source_address=("127.0.0.2", 0)) for _ in range(300)
+        ]
+        for one in idle:
+            with suppress(OSError):  # most are closed at once
+                one.send(b"GET / HTTP/1.1\r\nHost: ")
+        assert httpx.post(f"http://{address}/api/hold", headers=PAGE, timeout=30).status_code == 202
+        for one in idle:  # and the others soon
+            one.settimeout(30)
+            with suppress(ConnectionError):
+                assert one.recv(1) == b""
+            one.close()
+        with page:
+            assert json.loads(page.recv(30))["type"] == "snapshot"
+            assert json.loads(page.recv(30))  # it is closed by nobody
+            time.sleep(2.5)
+            assert json.loads(page.recv(30))

@@ -44,7 +44,7 @@ COVERING := tests/pbpp tests/missions $(filter-out %/__pycache__ %/cli %/simulat
 
 coverage: .venv/dev.stamp
 	rm -f .coverage .coverage.*
-	$(BIN)/pytest -q -n 4 --dist worksteal -m "not campaign" --cov --cov-report= $(COVERING)
+	$(BIN)/pytest -q -n 4 --dist worksteal -m "not campaign" --ignore-glob "*/test_browser*" --cov --cov-report= $(COVERING)
 	$(BIN)/coverage report --include "$(PROMISING)" --precision 1 --fail-under $(COVERAGE_PERCENT)
 
 # What the console's page is checked with: installed by its lock, once for lint and types.
@@ -72,6 +72,10 @@ screens: .venv/dev.stamp
 # What the page loads, copied anew from the locked packages (after a change in tools/page/package.json).
 vendor: tools/page/node_modules/.installed
 	$(PAGE) vendor
+
+# The page's modules put together, for pages that are one file (after a change in the page's modules).
+bundle: tools/page/node_modules/.installed
+	$(PAGE) bundle
 
 walls: .venv/dev.stamp
 	$(BIN)/lint-imports

@@ -196,12 +196,12 @@ class Plan:
         write_mission(to_write, path, write=write)
 
     def plot(self, path: Path | str, *, title: str | None = None, blocks: bool = False) -> None:
-        """Draw the plan to a file: an image or a page, as the suffix says; `missions.picture.draw_plan` can do more.
+        """Draw the plan to an image, as the suffix says; `missions.picture.draw_plan` can do more.
 
         Parameters
         ----------
         path : Path or str
-            ``.png``, ``.svg``, ``.pdf`` or ``.html``.
+            ``.png``, ``.svg`` or ``.pdf``. Pages are made by `mavlink_bridge.console.stills.plan_page`.
         title : str, optional
             Default: length, time and clearance.
         blocks : bool

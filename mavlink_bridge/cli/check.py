@@ -14,8 +14,8 @@ from mavlink_bridge.cli.common import inform, warn
 from mavlink_bridge.cli.drawing import cell, console
 from mavlink_bridge.cli.failing import ExitCode
 from mavlink_bridge.cli.home_parts import with_parts
-from mavlink_bridge.cli.mission_source import check_source
-from mavlink_bridge.cli.pictures import check_plots, draw
+from mavlink_bridge.cli.mission_source import check_source, source_kind
+from mavlink_bridge.cli.pictures import check_plots, draw, stills
 from mavlink_bridge.cli.terminal import echo, print_json
 from missions.checking.findings import leg_sentence, not_confirmed_text
 from missions.picture.plans import plan_scene
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from mavlink_bridge.cli.checked_mission import CheckedMission
     from mavlink_bridge.cli.options.check import CheckOptions
+    from mavlink_bridge.console.one_file import StillPage
     from missions.checking.check import CheckedLeg, MissionCheck
     from missions.picture.scene import PictureScene
 
@@ -40,7 +41,7 @@ def check(options: CheckOptions) -> None:
     found = checked_of(options)
     inform(found.checked.info)
     warn(found.warnings)
-    draw(partial(_scene, found), options.plot)
+    draw(partial(_scene, found), partial(_page, options, found), options.plot)
     if options.json_output:
         print_json({**document_of(found), "outputs": [str(path) for path in options.plot]})
     else:
@@ -64,6 +65,14 @@ def _scene(found: CheckedMission) -> PictureScene:
     unsafe = {number: leg.at for number, leg in enumerate(checked.legs) if leg.breaks}
     scene = with_parts(plan_scene(planned, title=title, unsafe=unsafe), planned.items)
     return ways.drawn(scene) if ways is not None else scene
+
+
+def _page(options: CheckOptions, found: CheckedMission, scene: PictureScene) -> StillPage:
+    where = source_kind(options)
+    page: StillPage = stills().check_still(
+        scene, found.checked, found.planned, found.situation, found.request, where, found.warnings
+    )
+    return page
 
 
 def _report(checked: MissionCheck, plots: list[Path], *, is_quiet: bool) -> None:

@@ -22,14 +22,16 @@ if TYPE_CHECKING:
     from mavlink_bridge.cli.options.check import CheckOptions
     from missions.checking.check import CheckedLeg, MissionCheck
     from missions.planned import Plan
+    from missions.request import Request
     from missions.situation import Situation
 
 
 @dataclass(frozen=True, slots=True)
 class CheckedMission:
-    """A check, the mission as a plan, the ways home from it, and every warning."""
+    """A check, what it was asked for, the mission as a plan, the ways home from it, and every warning."""
 
     situation: Situation
+    request: Request
     checked: MissionCheck
     planned: Plan
     ways: RouteWays | None
@@ -61,7 +63,7 @@ def checked_of(options: CheckOptions) -> CheckedMission:
         *(ways.warnings if ways is not None else ()),
         *_storage_warnings(checked, situation),
     ]
-    return CheckedMission(situation, checked, planned, ways, warnings)
+    return CheckedMission(situation, request, checked, planned, ways, warnings)
 
 
 def items_text(checked: MissionCheck) -> str:

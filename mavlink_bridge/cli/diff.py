@@ -9,7 +9,7 @@ import typer
 
 from mavlink_bridge.cli.failing import ExitCode
 from mavlink_bridge.cli.field_files import read_file
-from mavlink_bridge.cli.pictures import check_plots, draw
+from mavlink_bridge.cli.pictures import check_plots, draw, stills
 from mavlink_bridge.cli.terminal import echo, print_json
 from mavlink_bridge.errors import UsageError
 from missions.checking.differences import ChangeKind, differences, summary
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from mavlink_bridge.cli.options.diff import DiffOptions
+    from mavlink_bridge.console.one_file import StillPage
     from missions.checking.differences import FileDifference
     from missions.geo import LatLon
     from missions.picture.scene import PictureScene
@@ -43,7 +44,7 @@ def diff(options: DiffOptions) -> None:
     parts = _compared(options, a, b)
     found = differences(a, b, parts)
     code = ExitCode.CHECK if found else ExitCode.DONE
-    drawn = draw(partial(_scene, options, a, b, found), options.plot)
+    drawn = draw(partial(_scene, options, a, b, found), partial(_page, b, found), options.plot)
     if options.json_output:
         print_json(
             {
@@ -130,3 +131,8 @@ def _scene(options: DiffOptions, a: Situation, b: Situation, found: Sequence[Fil
         counted(len(found), "difference") if found else "the same",
     ]
     return differences_scene(a, b, title, marks)
+
+
+def _page(b: Situation, found: Sequence[FileDifference], scene: PictureScene) -> StillPage:
+    page: StillPage = stills().files_still(scene, b, [f"{one.change} {one.text}" for one in found])
+    return page

@@ -28,8 +28,10 @@ from missions.words import counted
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
+    from pathlib import Path
 
     from mavlink_bridge.cli.options.log import LogOptions
+    from mavlink_bridge.console.one_file import StillPage
     from mavlink_bridge.logbook import Logbook, VehicleLog
     from missions.picture.scene import PictureScene
 
@@ -59,7 +61,7 @@ def log(options: LogOptions) -> None:
                 documents.append({"log": path.name, "error": "LogError", "message": str(error)})
                 say(f"error: {error}", typer.colors.RED)
                 continue
-            drawn = draw(partial(_scene, book), plots)
+            drawn = draw(partial(_scene, book), partial(_page, book, path), plots)
             if options.json_output:
                 documents.append(as_document(book))
             elif not options.quiet:
@@ -95,6 +97,16 @@ def _scene(book: Logbook) -> PictureScene:
             (f"breach {number}", one.begun_at) for number, one in enumerate(vehicle.intrusions, start=1)
         ],
     )
+
+
+def _page(book: Logbook, log: Path, scene: PictureScene) -> StillPage:
+    """Return the director's run over the log, with what the logbook found in it."""
+    from mavlink_bridge.console.log_page import log_page  # noqa: PLC0415 - the director, for a page alone
+
+    vehicle = book.vehicles[0]
+    breaches = [(f"breach {number}", one.begun_at) for number, one in enumerate(vehicle.intrusions, start=1)]
+    targets = [target.position for target in vehicle.targets]
+    return log_page(log, vehicle.system, scene.title, list(findings(vehicle)), breaches, targets)
 
 
 def _is_union(vehicle: VehicleLog) -> bool:

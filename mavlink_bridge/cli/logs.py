@@ -164,7 +164,7 @@ def _print(answer: AnswerRows, title: str) -> None:
         is_number = any(isinstance(row[name], (int, float)) for row in rows)
         table.add_column(cell(name), justify="right" if is_number else "left", overflow="fold")
     for row in rows[:_MOST_ROWS]:
-        table.add_row(*(cell(_shown(value)) for value in row.values()))
+        table.add_row(*map(cell, map(_shown, row.values())))
     if len(rows) > _MOST_ROWS:
         table.caption = f"the first {_MOST_ROWS} of {len(rows)}; all with --json or --csv"
     console().print(table)

@@ -14,7 +14,9 @@ from missions.situation import Situation
 
 if TYPE_CHECKING:
     from mavlink_bridge.cli.options.check import CheckOptions
+    from mavlink_bridge.cli.options.plan import PlanOptions
     from mavlink_bridge.cli.options.rally import RallyOptions
+    from mavlink_bridge.console.view.fields import Where
     from missions.geo import LatLon
 
     MissionOptions = CheckOptions | RallyOptions
@@ -34,6 +36,11 @@ def check_source(options: MissionOptions) -> None:
         raise UsageError("give one of --log and --connect")
     if options.home is not None and options.connect is not None:
         raise UsageError("--home goes with files and logs: a live vehicle reports its own home")
+
+
+def source_kind(options: MissionOptions | PlanOptions) -> Where:
+    """Return where the field comes from."""
+    return "vehicle" if options.connect is not None else "log" if options.log is not None else "file"
 
 
 def mission_situation(options: MissionOptions) -> tuple[Situation, list[str]]:

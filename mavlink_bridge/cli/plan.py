@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.cli.common import is_same_file
+from mavlink_bridge.cli.mission_source import source_kind
 from mavlink_bridge.cli.permissions import check_permissions
 from mavlink_bridge.cli.pictures import check_plots
 from mavlink_bridge.cli.plan_request import plan_request
@@ -40,6 +41,7 @@ def plan(options: PlanOptions) -> None:
         options.output,
         options.plot,
         given_places(options.place) if options.json_output or options.plot or options.place else None,
+        asked=(request, source_kind(options)),
         blocks=options.blocks,
         is_silent=options.is_silent,
         drives=options.drive,

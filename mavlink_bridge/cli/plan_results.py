@@ -9,22 +9,26 @@ from typing import TYPE_CHECKING
 from mavlink_bridge.cli.common import inform, remarks_document, warn
 from mavlink_bridge.cli.home_parts import parts_document, with_parts
 from mavlink_bridge.cli.kept_files import write_kept
-from mavlink_bridge.cli.pictures import draw
+from mavlink_bridge.cli.pictures import draw, stills
 from mavlink_bridge.cli.terminal import echo
 from mavlink_bridge.cli.way_home import RouteWays
 from missions.checking.holding import hold_info
 from missions.checking.home_part import drive_end
 from missions.fence import CircleZone, PolygonZone, ZoneKind
 from missions.picture.plans import plan_scene
+from missions.request import GoTo
 from missions.words import counted
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
+    from mavlink_bridge.console.one_file import StillPage
+    from mavlink_bridge.console.view.fields import Where
     from missions.drive_model.stopping import HoldCheck
     from missions.geo import LatLon
     from missions.picture.scene import PictureScene
     from missions.planned import Plan
+    from missions.request import Request
     from missions.situation import Situation
 
 
@@ -34,6 +38,7 @@ def write_outputs(
     outputs: list[Path],
     plots: list[Path],
     *,
+    asked: tuple[Request, Where] | None = None,
     blocks: bool = False,
     ways: RouteWays | None = None,
 ) -> list[Path]:
@@ -45,7 +50,12 @@ def write_outputs(
         plain = with_parts(plan_scene(planned, blocks=blocks), planned.items)
         return plain if ways is None or plain.tracks else ways.drawn(plain)
 
-    return [*outputs, *draw(scene, plots)]
+    def page(drawn: PictureScene) -> StillPage:
+        request, where = asked or (GoTo(), "file")
+        page: StillPage = stills().plan_still(drawn, planned, situation, request, where)
+        return page
+
+    return [*outputs, *draw(scene, page, plots)]
 
 
 def plan_document(planned: Plan) -> dict[str, object]:
@@ -125,6 +135,8 @@ class Told:
         Where the mission and its pictures go.
     places : mapping of str to LatLon, optional
         Where ways home may lead, beside home and the rally points; None looks for no ways.
+    asked : tuple of Request and str
+        What was asked, and where the fence is from: ``file``, ``log`` or ``vehicle``.
     blocks : bool
         Draw the blocks of the free space too.
     is_silent : bool
@@ -139,6 +151,7 @@ class Told:
         plots: list[Path],
         places: Mapping[str, LatLon] | None,
         *,
+        asked: tuple[Request, Where],
         blocks: bool,
         is_silent: bool,
         drives: bool = False,
@@ -147,6 +160,7 @@ class Told:
         self._ways: RouteWays | None = None
         self._outputs = outputs
         self._plots = plots
+        self._asked = asked
         self._blocks = blocks
         self._is_silent = is_silent
         self._drives = drives
@@ -164,7 +178,13 @@ class Told:
         inform((*self._taken, *planned.info, *(hold_info(planned.hold) if self._drives else ())))
         warn(planned.warnings)
         self._written = write_outputs(
-            planned, situation, self._outputs, self._plots, blocks=self._blocks, ways=self._ways
+            planned,
+            situation,
+            self._outputs,
+            self._plots,
+            asked=self._asked,
+            blocks=self._blocks,
+            ways=self._ways,
         )
         if not self._is_silent:
             if self._plan is not None:

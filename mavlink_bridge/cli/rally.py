@@ -9,8 +9,8 @@ import numpy as np
 
 from mavlink_bridge.cli.common import inform, remarks_document, warn
 from mavlink_bridge.cli.kept_files import write_kept
-from mavlink_bridge.cli.mission_source import check_source, mission_situation, start_of
-from mavlink_bridge.cli.pictures import check_plots, draw
+from mavlink_bridge.cli.mission_source import check_source, mission_situation, source_kind, start_of
+from mavlink_bridge.cli.pictures import check_plots, draw, stills
 from mavlink_bridge.cli.terminal import echo, print_json
 from mavlink_bridge.cli.vehicle_options import with_vehicle
 from mavlink_bridge.errors import UsageError
@@ -52,7 +52,20 @@ def rally(options: RallyOptions) -> None:
     warn(warnings)
     for path in options.output:
         _write(path, choice, situation)
-    drawn = draw(lambda: _scene(checked, situation, choice), options.plot)
+    drawn = draw(
+        lambda: _scene(checked, situation, choice),
+        lambda scene: stills().check_still(
+            scene,
+            checked,
+            plan_of(checked, situation),
+            situation,
+            request,
+            source_kind(options),
+            warnings,
+            choice.points,
+        ),
+        options.plot,
+    )
     verified = False
     if options.upload:
         from mavlink_bridge.cli.rally_upload import upload_rally  # noqa: PLC0415 - pymavlink only with a link
@@ -150,7 +163,6 @@ def _scene(checked: MissionCheck, situation: Situation, choice: RallyChoice) -> 
         marks_name="rally point",
         targets=np.empty((0, 2)),
         asked=np.empty((0, 2)),
-        target_texts=(),
         marks_narrowest=False,
     )
 

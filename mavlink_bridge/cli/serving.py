@@ -24,7 +24,7 @@ from mavlink_bridge.cli.plan_request import request_from_options
 from mavlink_bridge.cli.recording import open_recording
 from mavlink_bridge.cli.run_log import RunLog, SafeTeller
 from mavlink_bridge.cli.session import signing_of
-from mavlink_bridge.cli.terminal import echo, print_json, say
+from mavlink_bridge.cli.terminal import echo, echo_lines, print_json, say
 from mavlink_bridge.cli.values import position_from
 from mavlink_bridge.cli.vehicle_options import (
     described_vehicle,
@@ -33,13 +33,14 @@ from mavlink_bridge.cli.vehicle_options import (
     with_vehicle,
 )
 from mavlink_bridge.console.access import Access, is_loopback
-from mavlink_bridge.console.app import Console
-from mavlink_bridge.console.backend import FilesBackend, field_sections
+from mavlink_bridge.console.app import ConsoleRoutes
+from mavlink_bridge.console.backend import FilesBackend
 from mavlink_bridge.console.hub import Hub
 from mavlink_bridge.console.list_writer import ListWriter
 from mavlink_bridge.console.live import LiveBackend, LiveConsole
 from mavlink_bridge.console.live_desk import LiveDesk
-from mavlink_bridge.console.recorded import RecordedBackend, Recording
+from mavlink_bridge.console.recorded import RecordedBackend
+from mavlink_bridge.console.recording import Recording
 from mavlink_bridge.console.server import (
     Certificate,
     Served,
@@ -48,6 +49,7 @@ from mavlink_bridge.console.server import (
     page_link,
     qr_code,
 )
+from mavlink_bridge.console.view.fields import field_sections
 from mavlink_bridge.console.view.sections import MapSource, Permissions, Sections, ServerView
 from mavlink_bridge.director import Director, Orders, TargetSource
 from mavlink_bridge.director.orders import Homing, ObstacleSource
@@ -140,7 +142,7 @@ def served(
         writes=tuple(suffix for suffix, one in FORMATS.items() if one.write is not None),
     )
     hub = Hub(Sections(server=server, **sections), backend, access, now_s)  # type: ignore[arg-type]
-    with Served(Console(hub, tiles, origin).app(), listening, certificate):
+    with Served(ConsoleRoutes(hub, tiles, origin).app(), listening, certificate):
         _announce(options, access)
         yield hub
 
@@ -189,8 +191,7 @@ def _announce(options: ServeOptions, access: Access) -> None:
     else:
         echo(f"Console: {link}")
         if access.needs_token and sys.stdout.isatty():
-            for line in qr_code(link).splitlines():
-                sys.stdout.write(f"{line}\n")
+            echo_lines(qr_code(link).splitlines())
         echo("Stop with Ctrl-C")
         sys.stdout.flush()
     if not is_loopback(access.host) and not access.is_secure:

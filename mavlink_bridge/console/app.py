@@ -168,7 +168,7 @@ def _guarded(handler: Handler) -> Handler:
     return run
 
 
-class Console:
+class ConsoleRoutes:
     """The routes.
 
     Parameters

@@ -5,15 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Protocol
 
 from mavlink_bridge.console.deeds import NOT_HERE
-from mavlink_bridge.console.view.fields import asked_view, fence_view
-from mavlink_bridge.console.view.places import place, places
-from mavlink_bridge.console.view.sections import VehicleView
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from mavlink_bridge.console.deeds import Deed
-    from mavlink_bridge.console.view.fields import Where
     from mavlink_bridge.console.view.sections import AfterView
     from mavlink_bridge.console.wire import BackupView
     from missions.request import Request
@@ -52,18 +48,6 @@ class PageBackend(Protocol):
     def at(self, time_s: float) -> dict[str, Any] | None:
         """Return the sections of a replay at a time; None where there is no replay."""
         ...
-
-
-def field_sections(situation: Situation, request: Request, where: Where) -> dict[str, Any]:
-    """Return the sections that a file's field fills."""
-    rally, pose = situation.rally, situation.pose
-    return {
-        "vehicle": VehicleView(position=place(pose.value.position)) if pose else VehicleView(),
-        "fence": fence_view(situation, request, where),
-        "rally": places(point.position for point in rally.value) if rally else (),
-        "home": place(situation.home.value) if situation.home else None,
-        "request": asked_view(request),
-    }
 
 
 class FilesBackend:

@@ -1,6 +1,6 @@
-"""Pictures of plans, checks and drives: images (matplotlib), interactive HTML (plotly), a sketch for the terminal; the suffix chooses.
+"""Pictures of plans, checks and drives: images (matplotlib, the extra ``plot``) and a sketch for the terminal; the suffix chooses.
 
-Images and HTML need the extra ``plot``.
+Pages (``.html``) are the console's, and made by what knows it: `mavlink_bridge.console.stills.plan_page`, and the commands' ``--plot``.
 """
 
 from __future__ import annotations
@@ -33,17 +33,22 @@ __all__ = [
     "sketch_plan",
 ]
 
-_LIBRARIES = {".png": "matplotlib", ".svg": "matplotlib", ".pdf": "matplotlib", ".html": "plotly"}
-
-PICTURE_SUFFIXES = tuple(_LIBRARIES)
+PICTURE_SUFFIXES = (".png", ".svg", ".pdf")
 """The suffixes that a picture's file may have."""
 
 TERMINAL = "-"
 """In place of a file: a sketch for the terminal."""
 
 
-def check_picture_format(path: Path | str) -> None:
+def check_picture_format(path: Path | str, *, beside: Sequence[str] = ()) -> None:
     """Check, before any work is done, that a picture can be drawn to a path.
+
+    Parameters
+    ----------
+    path : Path or str
+        The suffix chooses the format.
+    beside : sequence of str
+        Suffixes that the caller writes itself.
 
     Raises
     ------
@@ -53,17 +58,21 @@ def check_picture_format(path: Path | str) -> None:
     if str(path) == TERMINAL:
         return
     path = Path(path)
-    library = _LIBRARIES.get(path.suffix.lower())
-    if library is None:
+    if path.suffix.lower() in beside:
+        return
+    if path.suffix.lower() not in PICTURE_SUFFIXES:
+        is_page = path.suffix.lower() == ".html"
         raise MissionFormatError(
-            f"{path}: {path.suffix!r} is not a supported picture format; supported: {', '.join(PICTURE_SUFFIXES)}, "
+            f"{path}: {path.suffix!r} is not a supported picture format; supported: {', '.join((*PICTURE_SUFFIXES, *beside))}, "
             f"and {TERMINAL} for a sketch in the terminal",
             file=str(path),
-            advice="choose another file extension",
+            advice="pages are the console's: pbpp plan --plot, or mavlink_bridge.console.stills.plan_page"
+            if is_page
+            else "choose another file extension",
         )
-    if find_spec(library) is None:
+    if find_spec("matplotlib") is None:
         raise MissionFormatError(
-            f"{path.suffix} pictures need {library}: pip install 'pbpp-rover[plot]'",
+            f"{path.suffix} pictures need matplotlib: pip install 'pbpp-rover[plot]'",
             file=str(path),
             advice="install it, or use - for a sketch in the terminal",
         )
@@ -117,14 +126,9 @@ def draw_scene(scene: PictureScene, path: Path | str, *, write: Writer = write_f
     """
     path = Path(path)
     check_picture_format(path)
-    if path.suffix.lower() == ".html":
-        from missions.picture.html import scene_page  # noqa: PLC0415 - slow to come, an extra
+    from missions.picture.figure import scene_image  # noqa: PLC0415 - slow to come, an extra
 
-        write(path, scene_page(scene))
-    else:
-        from missions.picture.figure import scene_image  # noqa: PLC0415 - slow to come, an extra
-
-        write(path, scene_image(scene, path.suffix))
+    write(path, scene_image(scene, path.suffix))
 
 
 def sketch_plan(

@@ -75,7 +75,6 @@ def differences_scene(
         point_texts=tuple(
             f"item {number}\n{place}" for number, place in zip(numbers, routes[1], strict=True)
         ),
-        leg_texts=("",) * max(0, len(routes[1]) - 1),
         marks_name="differs",
         marks=tuple(
             Mark(local([place])[0], name if len(marks) <= _MOST_NAMES else "") for place, name in marks

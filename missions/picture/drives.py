@@ -73,13 +73,11 @@ def drive_scene(
         route=route,
         numbers=tuple(number for number, _ in mission),
         point_texts=tuple(items),
-        leg_texts=tuple(f"to {text}" for text in items[1:]),
         marks_name="left the fence",
         marks=tuple(Mark(frame.to_local_array([at])[0], name) for name, at in breaches),
         start=frame.to_local_array(driven[:1])[0] if driven else None,
         targets=frame.to_local_array(targets),
         asked=np.full((len(targets), 2), np.nan) if targets else no_points(),
-        target_texts=tuple(map(str, targets)),
         tracks=_tracks(parts, frame),
     )
 

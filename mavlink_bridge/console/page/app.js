@@ -5,6 +5,7 @@ import { Live, beginSession, meant } from "./connection.js";
 import { EMPTY, question } from "./doc.js";
 import { fill, h } from "./dom.js";
 import { acceptDrops } from "./dropping.js";
+import { INSIDE, Shown, isServed } from "./inside.js";
 import { take, unknown } from "./live.js";
 import { Scene } from "./map/scene.js";
 import { Pointing } from "./map/pointing.js";
@@ -53,7 +54,7 @@ const mapArea = h("section", { class: "map-area", id: "map", "aria-label": texts
 /** @param {PageState} state */
 async function buildMap(state) {
   if (!hasWebGl()) {
-    fill(mapArea, plainPicture(store));
+    fill(mapArea, isServed ? plainPicture(store) : h("p", { class: "no-webgl card unsure" }, texts.map.noWebGlHere));
     return;
   }
   const box = h("div", { class: "map" });
@@ -63,6 +64,9 @@ async function buildMap(state) {
   scene = new Scene(view, store);
   scene.track.add(early);
   early = [];
+  if (!isServed) {
+    scene.showAll();
+  }
   const pointing = new Pointing(view, store, actions);
   mapArea.append(toolbar(store, actions, scene, view, pointing));
   requestAnimationFrame(drawTrack);
@@ -74,10 +78,6 @@ function drawTrack() {
 }
 
 function buildPage() {
-  const panels = tabs(store, [
-    ["plan", planPanel(store, actions)], ["drive", drivePanel(store, actions)], ["fence", fencePanel(store, actions)],
-    ["files", filesPanel(store, actions)], ["events", eventsPanel(store, (place) => view?.show(place))],
-  ]);
   const source = h("p", { class: "source" });
   store.watch(["server"], ({ server }) => { fill(source, texts.top.source(server.source, server.source_name)); });
   document.documentElement.lang = texts.language;
@@ -85,8 +85,32 @@ function buildPage() {
     h("a", { class: "jump", href: "#hold-bar" }, texts.skipHold), h("a", { class: "jump", href: "#panel" }, texts.skip),
     h("header", { class: "top" }, h("div", { class: "brand" }, h("h1", {}, texts.name), source), vehicleBar(store), controlBar(store, actions)),
     alarmBar(store),
-    h("main", {}, mapArea, h("div", { class: "side", id: "panel" }, transferNote(store), panels), timeline(store, seek), profileChart(store), holdBar(store, actions)),
+    h("main", {}, mapArea, h("div", { class: "side", id: "panel" }, transferNote(store), panels()), timeline(store, seek), profileChart(store), holdBar(store, actions)),
     toastList);
+}
+
+/**
+ * A page that is one file: nothing in it is live, so there is no HOLD and nothing to ask for.
+ * @param {import("./inside.js").Held} held
+ */
+function buildStill(held) {
+  document.documentElement.lang = texts.language;
+  fill(document.body,
+    h("a", { class: "jump", href: "#panel" }, texts.skip),
+    h("header", { class: "top" }, h("div", { class: "brand" }, h("h1", {}, texts.name), held.title.map((line) => h("p", { class: "source" }, line)), h("p", { class: "source" }, texts.top.still)), vehicleBar(store)),
+    h("main", {}, mapArea, h("div", { class: "side", id: "panel" }, panels()), timeline(store, (time_s) => shown?.seek(time_s)), profileChart(store)));
+}
+
+/** The parts of the side: in a page that is one file those that only show. */
+function panels() {
+  /** @type {Parameters<typeof tabs>[1]} */
+  const all = [
+    ["plan", planPanel(store, actions)], ["drive", drivePanel(store, actions)], ["fence", fencePanel(store, actions)],
+    ["files", filesPanel(store, actions)], ["events", eventsPanel(store, (place) => view?.show(place))],
+  ];
+  /** @type {string[]} */
+  const still = INSIDE && INSIDE.moments.length > 0 ? ["drive", "plan", "fence", "events"] : ["plan", "fence"];
+  return tabs(store, isServed ? all : still.flatMap((name) => all.filter(([one]) => one === name)));
 }
 
 /** Keys that act everywhere but in a text. @param {KeyboardEvent} event */
@@ -174,8 +198,16 @@ function isSame(request, doc) {
 
 /** @type {Live | null} */
 let live = null;
+/** @type {Shown | null} */
+let shown = null;
 
 async function run() {
+  if (INSIDE) {
+    buildStill(INSIDE);
+    store.set({ doc: EMPTY, lines: INSIDE.lines, marks: INSIDE.marks, tool: "none" });
+    shown = new Shown(INSIDE, hear);
+    return;
+  }
   buildPage();
   document.addEventListener("keydown", press);
   acceptDrops((file) => actions.open(file));

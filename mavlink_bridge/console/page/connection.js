@@ -1,5 +1,7 @@
 /** The server: requests and their answers, and the live messages. Nothing else on this page talks to anyone. */
 
+import { isServed } from "./inside.js";
+
 /** @typedef {{kind: string, message: string, advice: string, details: Record<string, any>}} Refusal */
 
 const SILENT_MS = 3000; // the server says something every second: three missed are a lost connection
@@ -7,10 +9,15 @@ const AGAIN_MS = 1000; // between tries to connect anew; chosen
 const ANSWER_MS = 30_000; // no answer is waited for longer, except by plans, which are cancelled by newer ones
 
 /** A page's own secret name: control belongs to a tab. It lies in the tab's store only while the page is reloaded, so that a tab that is duplicated gets one of its own. */
-export const PAGE_ID = sessionStorage.getItem("page-id") ?? crypto.getRandomValues(new Uint32Array(4)).join("-");
-sessionStorage.removeItem("page-id");
-addEventListener("pagehide", () => sessionStorage.setItem("page-id", PAGE_ID));
-addEventListener("pageshow", () => sessionStorage.removeItem("page-id"));
+export const PAGE_ID = isServed ? ownId() : "";
+
+function ownId() {
+  const id = sessionStorage.getItem("page-id") ?? crypto.getRandomValues(new Uint32Array(4)).join("-");
+  sessionStorage.removeItem("page-id");
+  addEventListener("pagehide", () => sessionStorage.setItem("page-id", id));
+  addEventListener("pageshow", () => sessionStorage.removeItem("page-id"));
+  return id;
+}
 
 /** The server that this page shows, and its clock: what is asked for is meant for that one and for now, and refused by another and later. */
 export const meant = { run_id: "", ahead_s: NaN };

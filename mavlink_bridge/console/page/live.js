@@ -22,7 +22,7 @@ export function unknown() {
     upload: null, replay: null, events: [],
     doc: { start: null, targets: [], clearance_m: null, widest: false, order: "given", comes_back: false, zones: null, mission: null },
     page: "", isConnected: true, clock_s: 0, isPlanning: false, planTrouble: null, hoverLeg: null, hoverAlong_m: null, widest_m: null,
-    tool: "target", newKind: "exclusion", zone: null, holdSent: "", opened: null, after: null,
+    lines: [], marks: [], tool: "target", newKind: "exclusion", zone: null, holdSent: "", opened: null, after: null,
   };
 }
 

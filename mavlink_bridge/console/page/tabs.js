@@ -1,6 +1,7 @@
 /** The parts of the side, one at a time; as the patterns for tabs have it: arrows move, one tab stop. */
 
 import { h } from "./dom.js";
+import { isServed } from "./inside.js";
 import { texts } from "./texts.js";
 
 /**
@@ -19,7 +20,7 @@ export function tabs(store, parts) {
     const name = parts[chosen][0];
     const { tool } = store.state;
     // A click on the map sets targets where targets are asked for, and nothing by accident elsewhere.
-    store.set({ tool: name === "plan" ? (tool === "add" ? "add" : "target") : "none", ...(name === "fence" ? {} : { zone: null }) });
+    store.set({ tool: isServed && name === "plan" ? (tool === "add" ? "add" : "target") : "none", ...(name === "fence" ? {} : { zone: null }) });
   };
   const list = h("div", { role: "tablist", class: "tabs", "aria-label": texts.tabsName, onkeydown: (/** @type {KeyboardEvent} */ event) => {
     const at = buttons.findIndex((button) => button === document.activeElement);

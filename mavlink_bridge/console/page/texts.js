@@ -32,6 +32,7 @@ const en = {
   skip: "Skip to the panel",
   skipHold: "Skip to HOLD",
   tabs: { plan: "Plan", drive: "Drive", fence: "Fence", files: "Files", events: "Events" },
+  foundHere: "What was found",
   tabsName: "Parts of the page",
   noScript: "This page needs JavaScript. HOLD: use your transmitter or your ground station.",
   close: "Close",
@@ -40,6 +41,7 @@ const en = {
   badPlace: "Type latitude and longitude in degrees, such as 51.5, -0.12.",
 
   top: {
+    still: "A picture in one file: nothing in it is live.",
     state: "State of the vehicle",
     source: /** @param {string} kind @param {string} name */ (kind, name) => ({ live: `Live: ${name}`, demo: "Demonstration: a simulated rover", log: `Log: ${name}`, files: `Files: ${name}` })[kind] ?? name,
     mode: "Mode", armed: "Armed", disarmed: "Disarmed", armedUnknown: "Armed?", fix: "Fix", battery: "Battery", speed: "Speed", link: "Link",
@@ -63,6 +65,7 @@ const en = {
     restarted: "pbpp was started anew: everything is shown as it is now.",
   },
   map: {
+    nameHere: "Map. Arrow keys move it, plus and minus zoom.",
     name: "Map. Arrow keys move it, plus and minus zoom, T puts a target in its middle.",
     area: "Map",
     home: "home", target: "target", start: "start",
@@ -76,6 +79,7 @@ const en = {
     controls: { "NavigationControl.ZoomIn": "Zoom in", "NavigationControl.ZoomOut": "Zoom out", "NavigationControl.ResetBearing": "North up: drag to turn the map, press to turn north up",
       "ScaleControl.Meters": "m", "ScaleControl.Kilometers": "km", "AttributionControl.ToggleAttribution": "Who made the map", "Map.Title": "Map" },
     noWebGl: "This browser has no WebGL: this is the server's picture, to look at only. Plans are asked for by typing targets.",
+    noWebGlHere: "This browser has no WebGL, so there is no map. The tables hold what it would show.",
     pictureName: "The server's picture of fence, plan and rover",
     legend: "What the map shows",
     legendRows: [
@@ -114,6 +118,7 @@ const en = {
     working: "Planning …", checking: "Checking …",
     cancelled: "Planning was cancelled.", again: "Plan",
     nothing: "No plan yet: click the map to set a target.",
+    nothingHere: "No plan here.",
     promised: /** @param {number} value */ (value) => `${m(value)} promised`,
     predictedOnly: "Predicted, not promised", drawnOnly: "Drawn lines only, nothing promised",
     holds: "Every leg keeps its clearance", breaks: /** @param {number} n */ (n) => (n === 1 ? "1 leg breaks the promise" : `${n} legs break the promise`),
@@ -121,6 +126,7 @@ const en = {
     took: /** @param {number} seconds */ (seconds) => `${seconds < 1 ? `${Math.round(seconds * 1000)} ms` : `${seconds.toFixed(1)} s`}`,
     narrowest: /** @param {number} width_m */ (width_m) => `narrowest: ${m(width_m)} wide`,
     byDirector: "This is the plan that stands on the bridge.", byPage: "A look at what would be; nothing is on the vehicle.",
+    byPlan: "As planned when this file was written.", byLog: "What the bridge planned, or would have planned, at this moment of the log.", byCheck: "A mission as it was checked when this file was written.",
     keeps: /** @param {Record<string, number | null>} keeps */ ({ drawn_m, driven_m }) => `Drawn lines keep ${m(drawn_m)}, the predicted track ${m(driven_m)}.`,
     startKeeps: /** @param {number} value */ (value) => `Leaving the start it keeps ${m(value)}: more is not free there.`,
     extrapolated: "Extrapolated: outside what was measured",

@@ -53,6 +53,9 @@
  * @typedef {[number, number, number, number, number | null]} TrackRow time_s, longitude, latitude, speed_mps, mode
  * @typedef {{begin_s: number, end_s: number, now_s: number, is_read: boolean, name: string}} Replay
  *
+ * @typedef {{name: string, places: Place[]}} NamedLine
+ * @typedef {{name: string, at: Place, icon: "blocked" | "target"}} NamedMark
+ *
  * @typedef {{kind: "inclusion" | "exclusion", shape: "polygon", ring: Place[]} | {kind: "inclusion" | "exclusion", shape: "circle", centre: Place, radius_m: number}} Zone
  * @typedef {{at: Place, speed_mps: number | null}} MissionPoint
  *
@@ -96,6 +99,8 @@
  * @property {number | null} hoverLeg
  * @property {number | null} hoverAlong_m
  * @property {number | null} widest_m the widest clearance possible for the shown targets
+ * @property {NamedLine[]} lines what is drawn besides in a page that is one file: ways home, lines to rally points
+ * @property {NamedMark[]} marks places that must not be missed in it
  * @property {"target" | "add" | "start" | "polygon" | "circle" | "none"} tool what a click on the map does
  * @property {"inclusion" | "exclusion"} newKind what a zone that is drawn next will be
  * @property {number | null} zone which drawn zone is being edited

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from hashlib import blake2s
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from mavlink_bridge.console.view.places import multi_polygon, place, places
 from mavlink_bridge.console.view.sections import (
@@ -16,6 +16,7 @@ from mavlink_bridge.console.view.sections import (
     MissionView,
     ObstacleView,
     Polygon,
+    VehicleView,
     ZoneFacts,
     ZoneFeature,
     Zones,
@@ -140,6 +141,18 @@ def _obstacles(situation: Situation) -> tuple[ObstacleView, ...]:
         )
         for one in known.known
     )
+
+
+def field_sections(situation: Situation, request: Request, where: Where) -> dict[str, Any]:
+    """Return the sections that a file's field fills."""
+    rally, pose = situation.rally, situation.pose
+    return {
+        "vehicle": VehicleView(position=place(pose.value.position)) if pose else VehicleView(),
+        "fence": fence_view(situation, request, where),
+        "rally": places(point.position for point in rally.value) if rally else (),
+        "home": place(situation.home.value) if situation.home else None,
+        "request": asked_view(request),
+    }
 
 
 def asked_view(request: Request) -> AskedView:

@@ -163,13 +163,13 @@ class TestDoctor:
 
     def test_missing_packages(self, monkeypatch):
         def version(name):
-            if name in ("plotly", "pyserial"):
+            if name in ("matplotlib", "pyserial"):
                 raise metadata.PackageNotFoundError(name)
             return "1"
 
         monkeypatch.setattr(metadata, "version", version)
         found = findings()
-        assert (found["plotly"]["verdict"], found["pyserial"]["verdict"]) == ("info", "error")
+        assert (found["matplotlib"]["verdict"], found["pyserial"]["verdict"]) == ("info", "error")
 
     def test_options_that_cannot_be_read(self):
         write_options("[plan]\nclearence = 2\n")
@@ -280,7 +280,7 @@ def test_completion_is_offered_for_three_shells(tmp_path, monkeypatch):
     question = {**environment, "_PBPP_COMPLETE": "complete_bash", "COMP_WORDS": "pbpp do", "COMP_CWORD": "1"}
     answer = subprocess.run([pbpp], env=question, capture_output=True, text=True, check=False)
     assert answer.stdout.split() == ["download", "doctor"]
-    question["COMP_WORDS"] = "pbpp plan --cl"
+    question["COMP_WORDS"] = "pbpp plan --cle"
     question["COMP_CWORD"] = "2"
     assert subprocess.run(
         [pbpp], env=question, capture_output=True, text=True, check=False

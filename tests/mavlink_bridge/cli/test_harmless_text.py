@@ -304,16 +304,6 @@ class TestPictures:
         ET.fromstring(text)
         assert is_plain(text)
 
-    def test_html(self, tmp_path):
-        draw_scene(self.SCENE, tmp_path / "x.html")
-        page = (tmp_path / "x.html").read_text(encoding="utf-8")
-        assert "javascript:1'>" not in page
-        shown = r"\x1b]0;PWNED\x07&lt;b&gt;a&lt;/b&gt; &lt;a href='javascript:1'&gt;$x_{$ &amp; [red].tlog"
-        found = re.findall(r'"name":("[^"]*PWNED[^"]*")', page)
-        assert {json.loads(name) for name in found} == {shown}
-        assert f"<h1>{shown}</h1>" in page
-        assert is_plain(re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL))
-
 
 def test_what_the_bridge_says_to_ground_stations():
     announcer = Announcer()

@@ -46,7 +46,7 @@ def test_a_plan_of_a_file_loads_no_link_and_no_picture(fields):
     loaded = loaded_after(
         "plan", "--fence", fields / "yard-fence.waypoints", "--start", START, "--target", TARGET
     )
-    assert not {"pymavlink", "serial", "matplotlib", "plotly", "mavlink_bridge.director"} & loaded
+    assert not {"pymavlink", "serial", "matplotlib", "mavlink_bridge.director"} & loaded
 
 
 def test_help_names_every_command():

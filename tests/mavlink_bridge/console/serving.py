@@ -15,12 +15,13 @@ from director.test_bridge_director import conductor
 from mavlink_bridge.backup.store import BackupStore
 from mavlink_bridge.backup.vehicle_mark import VehicleMark
 from mavlink_bridge.console.access import Access
-from mavlink_bridge.console.app import Console
-from mavlink_bridge.console.backend import FilesBackend, field_sections
+from mavlink_bridge.console.app import ConsoleRoutes
+from mavlink_bridge.console.backend import FilesBackend
 from mavlink_bridge.console.hub import Hub
 from mavlink_bridge.console.list_writer import ListWriter
 from mavlink_bridge.console.live_desk import LiveDesk
 from mavlink_bridge.console.server import Served, open_socket
+from mavlink_bridge.console.view.fields import field_sections
 from mavlink_bridge.console.view.sections import Permissions, Sections, ServerView
 from mavlink_bridge.mavlink.messages import Frame
 from missions.formats import read_situation
@@ -55,7 +56,7 @@ def served(can: Permissions | None = None, backend=None, access=None, **more) ->
     port = listening.getsockname()[1]
     access = replace(access, port=port) if access is not None else Access.of("127.0.0.1", port)
     hub = files_hub(access, can, backend)
-    with Served(Console(hub, **more).app(), listening):
+    with Served(ConsoleRoutes(hub, **more).app(), listening):
         yield hub, f"127.0.0.1:{port}"
 
 

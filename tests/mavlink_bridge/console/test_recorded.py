@@ -12,7 +12,8 @@ from websockets.sync.client import connect
 
 from mavlink_bridge.console import deeds, wire
 from mavlink_bridge.console.deeds import Refusal
-from mavlink_bridge.console.recorded import RecordedBackend, Recording
+from mavlink_bridge.console.recorded import RecordedBackend
+from mavlink_bridge.console.recording import Recording
 from mavlink_bridge.director import Orders, TargetSource
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.replay.replay import replay_log

@@ -112,11 +112,24 @@ export function marks(state) {
   if (start) {
     found.push(spot(start, { icon: "start", name: state.vehicle.position ? "" : texts.map.start }));
   }
-  found.push(...troubles(plan));
+  found.push(...troubles(plan), ...state.marks.filter((mark) => mark.icon !== "target" || !targets.some((at) => isSame(at, mark.at))).map(({ at, icon, name }) => spot(at, { icon, name })));
   if (drive.least_at && drive.least_clearance_m !== null) {
     found.push(spot(drive.least_at, { icon: "least", name: texts.drive.leastHere(drive.least_clearance_m) }));
   }
   return found;
+}
+
+/**
+ * @param {Place} a
+ * @param {Place} b
+ */
+function isSame(a, b) {
+  return Math.abs(a[0] - b[0]) + Math.abs(a[1] - b[1]) < 2e-7;
+}
+
+/** @param {import("../types.js").NamedLine[]} named */
+export function lines(named) {
+  return named.map((one) => line(one.places, { name: one.name }));
 }
 
 /** @param {Plan | null} plan */

@@ -1,6 +1,7 @@
 /** What is done on the map with mouse and finger, and with keys where the map has the focus: targets, way points, fences. */
 
 import { ringOf } from "../doc.js";
+import { isServed } from "../inside.js";
 import { distance_m, moved, rounded } from "../geo.js";
 import { middle } from "../panels/fence.js";
 import { texts } from "../texts.js";
@@ -29,9 +30,12 @@ export class Pointing {
     /** @type {Place[]} */
     this.drawn = [];
     const { map } = view;
-    map.on("click", (event) => this.click([event.lngLat.lng, event.lngLat.lat], event.point));
     map.on("mousemove", (event) => this.hover([event.lngLat.lng, event.lngLat.lat], event.point));
     map.on("mouseout", () => store.state.hoverLeg !== null && store.set({ hoverLeg: null }));
+    if (!isServed) {
+      return; // a page that is one file shows: nothing can be asked for
+    }
+    map.on("click", (event) => this.click([event.lngLat.lng, event.lngLat.lat], event.point));
     map.getCanvas().addEventListener("keydown", (event) => this.press(event));
     map.doubleClickZoom.disable();
     view.whenReady(() => store.watch(["doc", "plan", "zone", "tool"], (state) => this.show(state)));

@@ -21,6 +21,7 @@ export class Scene {
     this.store = store;
     this.track = new Track(view, (mode) => lookOf(mode, store.state.vehicle.autopilot));
     this.isFitted = false;
+    this.fitted = FITTED;
     this.isFollowing = false;
     /** @type {number | null} */
     this.hovered = null;
@@ -55,7 +56,8 @@ export class Scene {
       view.set("points", features.points(plan));
     });
     store.watch(["mission", "plan"], ({ mission, plan }) => view.set("mission", mission && !(mission.matches_plan && plan?.by === "director") && mission.points.length > 1 ? [features.line(mission.points)] : []));
-    store.watch(["doc", "home", "rally", "plan", "drive", "vehicle"], (state) => this.setIfOther("places", features.marks(state)));
+    store.watch(["doc", "home", "rally", "plan", "drive", "vehicle", "marks"], (state) => this.setIfOther("places", features.marks(state)));
+    store.watch(["lines"], ({ lines }) => view.set("lines", features.lines(lines)));
     store.watch(["vehicle", "link"], (state) => this.showRover(state));
     store.watch(["hoverLeg"], ({ hoverLeg }) => { view.hoverLeg(hoverLeg, this.hovered); this.hovered = hoverLeg; });
     store.watch(["hoverAlong_m"], (state) => this.showAlong(state));
@@ -108,7 +110,13 @@ export class Scene {
   /** @param {boolean} [isSudden] */
   fit(isSudden = false) {
     this.isMoved = false;
-    this.view.fit(FITTED, isSudden);
+    this.view.fit(this.fitted, isSudden);
+  }
+
+  /** Show the whole track too, from the beginning: there is no rover to follow in a page that is one file. */
+  showAll() {
+    this.fitted = [...FITTED, "lines", "track-old", "track"];
+    this.view.whenReady(() => { this.track.draw(true); this.isFitted = true; this.fit(true); });
   }
 }
 

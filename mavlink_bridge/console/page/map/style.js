@@ -28,7 +28,7 @@ export function colours(isDark) {
 }
 
 const FONT = ["system-ui", "sans-serif"];
-export const SOURCES = ["grid", "meant", "zones", "obstacles", "corridor", "legs", "mission", "widest", "blockers", "narrow", "track-old", "track",
+export const SOURCES = ["grid", "meant", "zones", "obstacles", "corridor", "legs", "lines", "mission", "widest", "blockers", "narrow", "track-old", "track",
   "rover", "points", "places", "draft", "draft-points", "along"];
 
 const EMPTY = /** @type {const} */ ({ type: "FeatureCollection", features: [] });
@@ -109,6 +109,8 @@ function route(colour) {
   return [
     { id: "corridor", type: "fill", source: "corridor", paint: { "fill-color": colour.corridor, "fill-opacity": 0.28 } },
     { id: "corridor-edge", type: "line", source: "corridor", paint: { "line-color": colour.corridor, "line-width": 1 } },
+    { id: "blocks", type: "line", source: "lines", filter: ["==", ["get", "name"], ""], paint: { "line-color": colour.plain, "line-width": 0.7 } },
+    { id: "lines", type: "line", source: "lines", filter: ["!=", ["get", "name"], ""], paint: { "line-color": colour.target, "line-width": 1.5, "line-dasharray": [5, 3] } },
     { id: "mission", type: "line", source: "mission", paint: { "line-color": colour.plain, "line-width": 2, "line-dasharray": [3, 2] } },
     { id: "widest", type: "line", source: "widest", paint: { "line-color": colour.near, "line-width": 3, "line-dasharray": [4, 2] } },
     leg("keeps", null), leg("near", [4, 1]), leg("breaks", [1.2, 0.8]), leg("extrapolated", [2, 1, 0.5, 1]), leg("", [1, 1]),
@@ -163,6 +165,7 @@ function labels(colour) {
     { id: "place-names", type: "symbol", source: "places", layout: { ...aside, "text-field": ["get", "name"], "text-size": 14, "text-radial-offset": 1.2, "symbol-sort-key": 0 }, paint: words },
     { id: "narrow-name", type: "symbol", source: "narrow", filter: ["==", ["geometry-type"], "Point"], layout: { ...aside, "text-field": ["get", "name"], "text-size": 13, "symbol-sort-key": 1 }, paint: words },
     { id: "point-numbers", type: "symbol", source: "points", layout: { ...aside, "text-field": ["get", "name"], "text-size": 13, "symbol-sort-key": ["get", "order"] }, paint: words },
+    { id: "line-names", type: "symbol", source: "lines", layout: { "text-font": FONT, "text-field": ["get", "name"], "text-size": 12, "symbol-placement": "line", "symbol-spacing": 400, "text-offset": [0, 0.9], "symbol-sort-key": 960 }, paint: { ...words, "text-color": colour.target } },
     { id: "inclusion-names", type: "symbol", source: "zones", minzoom: 15, filter: ["==", ["get", "kind"], "inclusion"],
       layout: { "text-font": FONT, "text-field": ["get", "name"], "text-size": 12, "symbol-placement": "line", "symbol-spacing": 600, "text-offset": [0, 0.9], "symbol-sort-key": 950 }, paint: { ...words, "text-color": colour.fence } },
     { id: "zone-names", type: "symbol", source: "zones", minzoom: 15, filter: ["==", ["get", "kind"], "exclusion"], layout: { "text-font": FONT, "text-field": ["get", "name"], "text-size": 12, "text-max-width": 8, "symbol-sort-key": 900 },

@@ -2,6 +2,7 @@
 
 import { saveAs } from "../actions.js";
 import { h, svg } from "../dom.js";
+import { INSIDE, isServed } from "../inside.js";
 import { signButton } from "../panels/parts.js";
 import { texts } from "../texts.js";
 
@@ -14,6 +15,7 @@ import { texts } from "../texts.js";
  */
 export function toolbar(store, act, scene, view, pointing) {
   const words = texts.tools;
+  const hasRover = INSIDE === null || INSIDE.moments.length > 0;
   const follow = signButton("follow", words.follow, () => {
     scene.isFollowing = !scene.isFollowing;
     follow.setAttribute("aria-pressed", String(scene.isFollowing));
@@ -40,7 +42,7 @@ export function toolbar(store, act, scene, view, pointing) {
     finish.hidden = tool !== "polygon";
     stop.hidden = tool !== "polygon" && tool !== "circle";
   });
-  return h("div", { class: "map-tools", role: "group", "aria-label": words.name }, signButton("fit", words.fit, () => scene.fit()), follow, undo, redo, finish, stop,
+  return h("div", { class: "map-tools", role: "group", "aria-label": words.name }, signButton("fit", words.fit, () => scene.fit()), hasRover && follow, isServed && [undo, redo, finish, stop],
     signButton("save", words.picture, async () => { saveAs("pbpp.png", /** @type {Blob} */ (await view.picture())); }), legendButton, legend);
 }
 

@@ -2,6 +2,7 @@
 
 import * as maplibre from "../vendor/maplibre-gl/maplibre-gl.mjs";
 import { box, places } from "../geo.js";
+import { isServed, ownWorkerUrl } from "../inside.js";
 import { texts } from "../texts.js";
 import { gridLines } from "./grid.js";
 import { addIcons } from "./icons.js";
@@ -10,7 +11,7 @@ import { tileSource } from "./tiles.js";
 
 /** @typedef {import("../geo.js").Place} Place */
 
-maplibre.setWorkerUrl(new URL("../vendor/maplibre-gl/maplibre-gl-worker.mjs", import.meta.url).href);
+maplibre.setWorkerUrl(ownWorkerUrl() ?? new URL("../vendor/maplibre-gl/maplibre-gl-worker.mjs", import.meta.url).href);
 
 const FIT_PADDING_PX = { top: 70, right: 40, bottom: 50, left: 40 }; // tools above, the scale bar below
 const FIT_ZOOM = 20.5; // the nearest look that "fit" takes: some ten metres; chosen
@@ -46,7 +47,7 @@ export class MapView {
       pitchWithRotate: false, maxPitch: 0, renderWorldCopies: false, fadeDuration: 0, clickTolerance: 4, cancelPendingTileRequestsWhileZooming: true,
       locale: texts.map.controls,
     });
-    this.map.getCanvas().setAttribute("aria-label", texts.map.name);
+    this.map.getCanvas().setAttribute("aria-label", isServed ? texts.map.name : texts.map.nameHere);
     this.map.addControl(new maplibre.NavigationControl({ visualizePitch: false }), "top-right");
     this.map.addControl(new maplibre.ScaleControl({ unit: "metric", maxWidth: 140 }), "bottom-left");
     if (tiles?.attribution) {

@@ -1,9 +1,10 @@
 /** The drive: where the rover is on its route, how near it came, and what may be done about it. */
 
 import { h, say, show } from "../dom.js";
+import { isServed } from "../inside.js";
 import { texts } from "../texts.js";
 import { comparison } from "./after.js";
-import { button, cannotWrite, facts, pressButton } from "./parts.js";
+import { button, cannotWrite, facts, foundPart, pressButton } from "./parts.js";
 
 /** @typedef {import("../types.js").PageState} PageState */
 
@@ -12,7 +13,7 @@ import { button, cannotWrite, facts, pressButton } from "./parts.js";
  * @param {import("../actions.js").Actions} act
  */
 export function drivePanel(store, act) {
-  return h("div", { class: "panel-body" }, progressPart(store), deedsPart(store, act), comparison(store));
+  return h("div", { class: "panel-body" }, foundPart(), progressPart(store), isServed && [deedsPart(store, act), comparison(store)]);
 }
 
 /** @param {import("../store.js").Store<PageState>} store */

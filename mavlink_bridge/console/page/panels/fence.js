@@ -2,6 +2,7 @@
 
 import { fill, h, say, show } from "../dom.js";
 import { readPlace } from "../geo.js";
+import { isServed } from "../inside.js";
 import { texts } from "../texts.js";
 import { button, cannotWrite, notes, placeField, signButton } from "./parts.js";
 import { keepFocus } from "./plan.js";
@@ -16,7 +17,7 @@ import { keepFocus } from "./plan.js";
  * @param {Actions} act
  */
 export function fencePanel(store, act) {
-  return h("div", { class: "panel-body" }, shownPart(store, act), drawPart(store), zonesPart(store, act), typePart(act));
+  return h("div", { class: "panel-body" }, shownPart(store, act), isServed && [drawPart(store), zonesPart(store, act), typePart(act)]);
 }
 
 /**
@@ -41,7 +42,7 @@ function shownPart(store, act) {
     upload.disabled = reason !== "" || (looked !== null && looked.trouble !== "");
     say(why, isDrawn && isLive ? reason : "");
   });
-  return h("section", { "aria-label": texts.fence.title }, h("h2", {}, texts.fence.title), text, h("div", { class: "row" }, edit, back, upload), why);
+  return h("section", { "aria-label": texts.fence.title }, h("h2", {}, texts.fence.title), text, isServed && [h("div", { class: "row" }, edit, back, upload), why]);
 }
 
 /**

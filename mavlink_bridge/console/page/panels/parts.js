@@ -3,6 +3,7 @@
 import { fill, h, say } from "../dom.js";
 import { readPlace, writePlace } from "../geo.js";
 import { icon } from "../icons.js";
+import { INSIDE } from "../inside.js";
 import { texts } from "../texts.js";
 
 /** @typedef {import("../geo.js").Place} Place */
@@ -165,4 +166,10 @@ export function cannotWrite({ server, control, page, isConnected }) {
     return texts.start.noUpload;
   }
   return control.holder === page ? "" : texts.start.noControl;
+}
+
+/** What was found in a log, or between two files: in a page that is one file. */
+export function foundPart() {
+  const found = INSIDE?.notes ?? [];
+  return found.length > 0 && h("section", { "aria-label": texts.foundHere }, h("h2", {}, texts.foundHere), h("ul", {}, found.map((text) => h("li", {}, text))));
 }

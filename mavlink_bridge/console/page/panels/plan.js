@@ -1,9 +1,10 @@
 /** The plan: what is asked for, and what comes of it. */
 
 import { fill, h, say, show } from "../dom.js";
+import { INSIDE, isServed } from "../inside.js";
 import { texts } from "../texts.js";
 import { legTable } from "./legs.js";
-import { button, cannotWrite, notes, placeField, pressButton, signButton } from "./parts.js";
+import { button, cannotWrite, foundPart, notes, placeField, pressButton, signButton } from "./parts.js";
 
 /** @typedef {import("../types.js").PageState} PageState */
 /** @typedef {import("../actions.js").Actions} Actions */
@@ -17,6 +18,9 @@ const MOST_M = 20; // the slider's end while the widest clearance is not known
  * @param {Actions} act
  */
 export function planPanel(store, act) {
+  if (!isServed) {
+    return h("div", { class: "panel-body" }, INSIDE?.moments.length === 0 && foundPart(), resultPart(store, act), notesPart(store), legTable(store));
+  }
   return h("div", { class: "panel-body" },
     resultPart(store, act), writePart(store, act), targetsPart(store, act), clearancePart(store, act), notesPart(store), pointsPart(store, act), legTable(store));
 }
@@ -132,8 +136,9 @@ function resultPart(store, act) {
     } else if (plan && plan.state !== "planning") {
       fill(card, outcome(plan, state, act));
     } else {
-      fill(card, h("p", {}, state.isPlanning || state.doc.targets.length === 0 ? texts.plan.nothing : texts.plan.cancelled),
-        !state.isPlanning && state.doc.targets.length > 0 && button(texts.plan.again, () => act.planner.change(true)));
+      const isEmpty = state.isPlanning || state.doc.targets.length === 0;
+      fill(card, h("p", {}, isServed ? (isEmpty ? texts.plan.nothing : texts.plan.cancelled) : texts.plan.nothingHere),
+        !isEmpty && button(texts.plan.again, () => act.planner.change(true)));
     }
   });
   return section;
@@ -165,10 +170,18 @@ function outcome(plan, { doc }, act) {
     plan.narrowest && h("p", {}, texts.plan.narrowest(plan.narrowest.width_m)),
     h("p", {}, texts.plan.keeps({ drawn_m: plan.drawn_m, driven_m: plan.driven_m })),
     plan.start_m !== null && h("p", {}, texts.plan.startKeeps(plan.start_m)),
-    h("p", { class: "quiet" }, doc.mission ? (doc.mission.name ? texts.plan.opened(doc.mission.name) : texts.plan.moved) : plan.by === "director" ? texts.plan.byDirector : texts.plan.byPage,
+    h("p", { class: "quiet" }, doc.mission ? (doc.mission.name ? texts.plan.opened(doc.mission.name) : texts.plan.moved) : bySource(plan),
       plan.took_s !== null && ` (${texts.plan.took(plan.took_s)})`),
     doc.mission && h("div", { class: "row" }, button(texts.plan.backToPlanning, () => act.backToPlanning()), isBad && button(texts.plan.repair, () => act.repair(), { class: "main" })),
   ];
+}
+
+/** @param {import("../types.js").Plan} plan */
+function bySource({ by, state }) {
+  if (isServed) {
+    return by === "director" ? texts.plan.byDirector : texts.plan.byPage;
+  }
+  return by === "director" ? texts.plan.byLog : state === "checked" ? texts.plan.byCheck : texts.plan.byPlan;
 }
 
 /** @param {import("../types.js").Plan} plan */
@@ -193,7 +206,7 @@ function noRoute(why, act) {
     h("strong", { class: "headline" }, `✗ ${texts.noRoute.title}`), h("p", {}, why.message), why.advice && h("p", {}, why.advice),
     widest && h("p", {}, texts.noRoute.widest(widest.clearance_m), widest.between.length > 0 && ` ${texts.noRoute.between(widest.between)}`),
     why.blockers.length > 0 && h("p", {}, `${texts.noRoute.blockers}: ${why.blockers.map((one) => one.name).join(", ")}`),
-    widest && metres > 0 && button(texts.noRoute.take(metres), () => act.setClearance(metres), { class: "main" }),
+    isServed && widest && metres > 0 && button(texts.noRoute.take(metres), () => act.setClearance(metres), { class: "main" }),
   ];
 }
 

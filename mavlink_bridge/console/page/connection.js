@@ -14,8 +14,8 @@ export const PAGE_ID = isServed ? ownId() : "";
 function ownId() {
   const id = sessionStorage.getItem("page-id") ?? crypto.getRandomValues(new Uint32Array(4)).join("-");
   sessionStorage.removeItem("page-id");
-  addEventListener("pagehide", () => sessionStorage.setItem("page-id", id));
-  addEventListener("pageshow", () => sessionStorage.removeItem("page-id"));
+  window.addEventListener("pagehide", () => sessionStorage.setItem("page-id", id));
+  window.addEventListener("pageshow", () => sessionStorage.removeItem("page-id"));
   return id;
 }
 

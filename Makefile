@@ -132,7 +132,7 @@ test-foreign: .venv/dev.stamp
 	$(BIN)/python tests/foreign/run.py
 
 soak: .venv/dev.stamp
-	$(BIN)/python tests/mavlink_bridge/director/soak.py --hours 100 --minutes $(or $(MINUTES),30)
+	$(BIN)/python tests/mavlink_bridge/director/soak.py --hours 100 --minutes $(or $(MINUTES),30) --setting $(or $(SETTING),calm)
 
 bench-tlog: .venv/dev.stamp
 	$(BIN)/python benchmarks/tlog.py

@@ -14,6 +14,7 @@ from mavlink_bridge.errors import LinkError
 from mavlink_bridge.mavlink.callers import FORGOTTEN_AFTER_S, Callers
 from mavlink_bridge.mavlink.codec import Codec
 from mavlink_bridge.mavlink.messages import Autopilot, Heartbeat, MavType
+from mavlink_bridge.protocol.open_transfer import OpenTransfer
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Sequence
@@ -146,6 +147,11 @@ class Link:
     sent : SentFrames, optional
         What was sent on the link before this one, where that is opened again: its echoes are left out too.
 
+    Attributes
+    ----------
+    transfer : OpenTransfer
+        Which transfer of a list was begun on it and not ended.
+
     Raises
     ------
     LinkError
@@ -166,6 +172,7 @@ class Link:
         self._codec = Codec(*identity, signing, sent)
         self._recorder = recorder
         self._heartbeat_due_s = 0.0
+        self.transfer = OpenTransfer()
 
     @property
     def identity(self) -> tuple[int, int]:
@@ -201,6 +208,7 @@ class Link:
 
     def send(self, message: Message) -> None:
         """Send one message."""
+        self.transfer.note_sent(message)
         data = self._codec.encode(message)
         self._transport.send(data)
         if self._recorder:
@@ -212,6 +220,8 @@ class Link:
             for message in messages:
                 self.send(message)
             return
+        for message in messages:
+            self.transfer.note_sent(message)
         packets = [self._codec.encode(message) for message in messages]
         if packets:
             self._transport.send(b"".join(packets))
@@ -244,7 +254,10 @@ class Link:
         if self._recorder:
             for frame_bytes, _ in decoded:
                 self._recorder.write(came_s, frame_bytes)
-        return came_s, [frame for _, frame in decoded if frame is not None]
+        frames = [frame for _, frame in decoded if frame is not None]
+        for frame in frames:
+            self.transfer.note_heard(frame.message, self.identity)
+        return came_s, frames
 
     def _decode(self, source: Hashable, data: bytes) -> list[tuple[bytes, Frame | None]]:
         decoded = self._codec.decode_with_bytes(data, source)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections import defaultdict
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -14,8 +15,19 @@ PACKAGES = ("pbpp", "missions", "mavlink_bridge")
 SOURCES = {
     path: path.read_text(encoding="utf-8") for name in PACKAGES for path in (ROOT / name).rglob("*.py")
 }
-NODES = [(path, node) for path, text in SOURCES.items() for node in ast.walk(ast.parse(text))]
 MOST_LINES, MOST_ATTRIBUTES, MOST_LATE_IMPORTS = 60, 20, 30
+
+
+@cache
+def nodes() -> list[tuple[Path, ast.ClassDef | ast.FunctionDef | ast.Module]]:
+    """Return what is looked at; once, and not while tests are collected, which every process of a run does."""
+    kinds = (ast.Module, ast.ClassDef, ast.FunctionDef)
+    return [
+        (path, node)
+        for path, text in SOURCES.items()
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, kinds)
+    ]
 
 
 def attributes(kind: ast.ClassDef) -> set[str]:
@@ -42,7 +54,7 @@ def has_reason(path: Path, node: ast.FunctionDef | ast.ClassDef, word: str) -> b
 def test_functions_are_short_or_say_why_not():
     long = [
         f"{path.relative_to(ROOT)}:{node.lineno} {node.name}"
-        for path, node in NODES
+        for path, node in nodes()
         if isinstance(node, ast.FunctionDef)
         and node.end_lineno - node.lineno >= MOST_LINES
         and not has_reason(path, node, "Long")
@@ -53,7 +65,7 @@ def test_functions_are_short_or_say_why_not():
 def test_classes_hold_little_or_say_why_not():
     large = [
         f"{path.relative_to(ROOT)}:{node.lineno} {node.name} {len(attributes(node))}"
-        for path, node in NODES
+        for path, node in nodes()
         if isinstance(node, ast.ClassDef)
         and len(attributes(node)) > MOST_ATTRIBUTES
         and not has_reason(path, node, "Many attributes")
@@ -74,14 +86,13 @@ def test_few_imports_are_late():
 
 
 def test_docstrings_begin_with_what_is_returned_or_done():
-    kinds = (ast.Module, ast.ClassDef, ast.FunctionDef)
-    texts = [ast.get_docstring(node) or "" for _, node in NODES if isinstance(node, kinds)]
+    texts = [ast.get_docstring(node) or "" for _, node in nodes()]
     assert len([text for text in texts if re.match(r"(Give|Tell|Say)s?\b", text)]) <= 5
 
 
 def test_a_class_name_for_two_things_stands_in_the_glossary():
     places = defaultdict(list)
-    for path, node in NODES:
+    for path, node in nodes():
         if isinstance(node, ast.ClassDef):
             places[node.name].append(path)
     glossary = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")

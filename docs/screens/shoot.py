@@ -62,7 +62,7 @@ def set_target(page: Page, place: str) -> None:
 
 
 def plans(browser: Browser, tiles: Path) -> None:
-    """Without a vehicle: a plan, why there is none, a way point moved by hand, a phone, and a map."""
+    """Without a vehicle: a plan, why there is none, a waypoint moved by hand, a phone, and a map."""
     with serving("--fence", FENCE, "--start", START) as server:
         with page_of(browser, server.url) as seen:
             set_target(seen.page, "40.071248, -105.229073")
@@ -73,7 +73,7 @@ def plans(browser: Browser, tiles: Path) -> None:
             shoot(seen.page, "console-no-route")
         with page_of(browser, server.url) as seen:
             set_target(seen.page, "40.0723079, -105.2285800")
-            seen.page.get_by_role("button", name="Way point 1.").focus()
+            seen.page.get_by_role("button", name="Waypoint 1.").focus()
             for _ in range(3):
                 seen.page.keyboard.press("Shift+ArrowDown")
             expect(seen.page.locator(".headline")).to_contain_text("the promise")

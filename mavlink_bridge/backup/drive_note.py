@@ -51,7 +51,7 @@ class DriveNote:
     vehicle : VehicleMark
         Which vehicle.
     mission : tuple of MissionItem
-        The list as it was read back from it, home at 0.
+        The list as it was read back from it, ArduPilot's with home at 0.
     boot_ms : int
         How long the autopilot had been on, in milliseconds: later less says that it was switched off and on since.
     record : DriveRecord
@@ -88,6 +88,8 @@ def note_to_json(note: DriveNote) -> dict[str, Any]:
         "firmware": str(record.firmware) if record.firmware is not None else None,
         "calibration": calibration_to_plain(record.calibration),
     }
+    if not record.ardupilot:  # notes of ArduPilot's drives have no word of it
+        content["ardupilot"] = False
     return {**content, "sha256": checksum(content)}
 
 
@@ -121,6 +123,7 @@ def note_from_json(content: dict[str, Any]) -> DriveNote:
         parameters={name: float(value) for name, value in content["parameters"].items()},
         vehicle_type=content["vehicle_type"],
         firmware=read_firmware(firmware) if firmware is not None else None,
+        ardupilot=bool(content.get("ardupilot", True)),
         calibration=calibration_from_plain(content.get("calibration")),
     )
     mark = mark_from_json(int(content["system"]), content["vehicle"])

@@ -253,7 +253,11 @@ def _drive_rows(drive: DriveView) -> list[Row]:
 
 
 def _route_rows(plan: Plan | None) -> list[Row]:
-    return [] if plan is None else [("route", f"{plan.length_m:.0f} m, {len(plan.items) + 1} items")]
+    return (
+        []
+        if plan is None
+        else [("route", f"{plan.length_m:.0f} m, {len(plan.items) + plan.vehicle.home_items} items")]
+    )
 
 
 def _of_then(text: str, time_s: float | None, now_s: float) -> Text:

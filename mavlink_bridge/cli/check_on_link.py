@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 from mavlink_bridge.cli.options_session import session_for
 from mavlink_bridge.director.learning import Learning
 from mavlink_bridge.fold import fold
+from mavlink_bridge.mavlink.autopilot_facts import with_autopilot
 from mavlink_bridge.protocol.undisturbed_read import UndisturbedRead
 from missions.situation import ListKind, Situation
-from missions.vehicle.asked_parameters import CHECKED_NAMES
 
 if TYPE_CHECKING:
     from mavlink_bridge.cli.options.shared import LinkOptions
@@ -30,7 +30,10 @@ def live_situation(options: LinkOptions, connection: str) -> tuple[Situation, li
     """
     with session_for(options, connection) as (session, _show):
         peer, link = session.vehicle, session.link
-        heard = Situation(system=peer.system, component=peer.component)
+        # What a list means rests on whose it is: the next heartbeat may come after the lists.
+        heard = with_autopilot(
+            Situation(system=peer.system, component=peer.component), peer.autopilot.autopilot
+        )
 
         def listen(frames: list[Frame]) -> None:
             nonlocal heard
@@ -44,7 +47,7 @@ def live_situation(options: LinkOptions, connection: str) -> tuple[Situation, li
             tuple(ListKind),
             UndisturbedRead,
             needs_position=False,
-            names=CHECKED_NAMES,
+            names=peer.autopilot.parameters.checked,
         )
         session.run(learning, "reading parameters, mission, fence and rally points")
         if learning.trouble is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import secrets
 import time
 from contextlib import ExitStack
@@ -20,8 +21,10 @@ from mavlink_bridge.cli.plan_results import write_outputs
 from mavlink_bridge.cli.terminal import echo, print_json
 from mavlink_bridge.director import Orders
 from mavlink_bridge.link import Link
-from mavlink_bridge.mavlink.messages import FenceStatus, GlobalPositionInt
-from mavlink_bridge.simulator import SimulatedVehicle, Simulator, SimulatorConfig, SteppedRover
+from mavlink_bridge.mavlink.autopilots import autopilot_table
+from mavlink_bridge.mavlink.messages import Autopilot, FenceStatus, GlobalPositionInt, MissionType, Statustext
+from mavlink_bridge.simulator import Simulator, SimulatorConfig, SteppedRover
+from mavlink_bridge.simulator.any_vehicle import AUTOPILOTS, vehicle_of
 from mavlink_bridge.tlog import TlogWriter
 from missions.fence import fence_to_items
 from missions.formats import read_fence
@@ -31,6 +34,7 @@ from missions.request import GoTo
 
 if TYPE_CHECKING:
     from mavlink_bridge.cli.options.demo import DemoOptions
+    from mavlink_bridge.mavlink.incident_rules import IncidentRules
     from mavlink_bridge.mavlink.messages import Frame
     from missions.fence import Fence
     from missions.firmware import Firmware
@@ -40,14 +44,20 @@ if TYPE_CHECKING:
 _HOME = (40.071374, -105.229930)
 _TARGET = (40.0726316, -105.2290497)
 _CLEARANCE_M = 2.5
+_PARAMETERS = {
+    Autopilot.ARDUPILOTMEGA: {"FENCE_ENABLE": 1.0, "WP_RADIUS": 2.0, "WP_SPEED": 4.0},
+    Autopilot.PX4: {},  # its airframe's own, 3 m/s: so it was measured
+}
+_AUTOPILOT, _CRITICAL = 1, 2  # MAV_COMP_ID_AUTOPILOT1, MAV_SEVERITY_CRITICAL
 _ANY_PORT = "tcpin:127.0.0.1:0"
 _IDENTITY = (245, 190)  # the one-shot commands' own, `link.ONE_SHOT_IDENTITY`
 
 
 @dataclass(slots=True)
 class _Heard:
-    """What was heard while driving."""
+    """What was heard while driving; PX4 tells of breaches by text alone."""
 
+    incidents: IncidentRules
     track: list[LatLon] = field(default_factory=list)
     breaches: int = 0
 
@@ -57,7 +67,9 @@ def demo(options: DemoOptions) -> None:
     out = options.out
     out.mkdir(parents=True, exist_ok=True)
     make_room(out / "demo.tlog")
-    drive = _Heard()
+    table = autopilot_table(AUTOPILOTS[options.autopilot], options.firmware)
+    assert table is not None
+    drive = _Heard(table.incidents)
     begun_s = time.monotonic()
     with ExitStack() as stack:
         recorder = stack.enter_context(TlogWriter(out / "demo.tlog"))
@@ -103,19 +115,23 @@ def demo(options: DemoOptions) -> None:
 
 def demo_rover(speedup: float) -> Simulator:
     """Return a rover in the maze on a link of its own, for who wants to see it drive."""
-    return Simulator(_config(None), _ANY_PORT, speedup=speedup)
+    return Simulator(_config(Autopilot.ARDUPILOTMEGA, None), _ANY_PORT, speedup=speedup)
 
 
 def _rover(options: DemoOptions) -> SteppedRover:
     """Return a rover in the maze, on a link that no slow computer breaks."""
-    return SteppedRover(SimulatedVehicle(_config(options.firmware)), options.speedup)
+    config = _config(AUTOPILOTS[options.autopilot], options.firmware)
+    return SteppedRover(vehicle_of(config), options.speedup)
 
 
-def _config(firmware: Firmware | None) -> SimulatorConfig:
+def _config(autopilot: Autopilot, firmware: Firmware | None) -> SimulatorConfig:
+    table = autopilot_table(autopilot, firmware)
+    assert table is not None
     return SimulatorConfig(
         home=LatLon(*_HOME),
-        fence=fence_to_items(_maze()),
-        parameters={"FENCE_ENABLE": 1.0, "WP_RADIUS": 2.0, "WP_SPEED": 4.0},
+        fence=table.lists.form.prepared(fence_to_items(_maze()), MissionType.FENCE),
+        parameters=_PARAMETERS[autopilot],
+        autopilot=autopilot,
         firmware=firmware,
         uid=secrets.token_bytes(12),  # each demo is a new rover: an interrupted one does not bear on the next
     )
@@ -133,6 +149,10 @@ def _observe(drive: _Heard, frames: list[Frame]) -> None:
             drive.track.append(from_e7(frame.message.lat, frame.message.lon))
         elif isinstance(frame.message, FenceStatus):
             drive.breaches = max(drive.breaches, frame.message.breach_count)
+        elif isinstance(frame.message, Statustext) and frame.component == _AUTOPILOT:
+            rules = drive.incidents
+            is_breach = re.match(rules.breach_text, frame.message.text, re.IGNORECASE) is not None
+            drive.breaches += is_breach and not rules.counts_breaches and frame.message.severity <= _CRITICAL
 
 
 def _driven(plan: Plan, track: list[LatLon]) -> tuple[float, float]:

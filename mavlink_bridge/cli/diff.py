@@ -82,7 +82,7 @@ def _compared(options: DiffOptions, a: Situation, b: Situation) -> list[Part]:
         raise UsageError(f"neither {options.a} nor {options.b} holds a {what}")
     if options.only is None and not set(held[0]) & set(held[1]):
         told = [
-            f"{path} holds {' and '.join(parts) or 'none'}"
+            f"{path} holds {' and '.join(parts) or 'no mission, fence or rally points'}"
             for path, parts in zip((options.a, options.b), held, strict=True)
         ]
         raise UsageError(f"nothing to compare: {'; '.join(told)}")

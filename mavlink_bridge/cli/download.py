@@ -46,7 +46,7 @@ def download(options: DownloadOptions) -> None:
     _check(what, options.connect, options.output)
     items: tuple[MissionItem, ...] = ()
     parameters = ParametersOutcome()
-    with session_for(options, options.connect, any_autopilot=True) as (session, _show):
+    with session_for(options, options.connect) as (session, _show):
         store = BackupStore()
         if what == "parameters" or store.notes():  # else nothing needs to be distinguished
             warn(reader_warnings(store, session.which_vehicle()))

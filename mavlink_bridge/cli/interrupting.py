@@ -214,6 +214,7 @@ def _settled(at_hand: AtHand, interrupt: KeyboardInterrupt) -> Interrupted:
     was_asked, is_held = reaction is Reaction.ASK, None
     is_link_lost = at_hand.link is None
     try:
+        _end_transfer(at_hand)
         if was_asked:
             reaction = _ask(at_hand)
         if reaction is Reaction.HOLD:
@@ -237,6 +238,13 @@ def _settled(at_hand: AtHand, interrupt: KeyboardInterrupt) -> Interrupted:
         changed=at_hand.changed(),
     )
     return Interrupted(ending.message(), ending.details())
+
+
+def _end_transfer(at_hand: AtHand) -> None:
+    """End a transfer that was interrupted, on a vehicle that heeds that: its old list stays, and it is free for others at once."""
+    link, peer = at_hand.link, at_hand.peer()
+    if link is not None and peer is not None:
+        link.send_all(link.transfer.ending(peer))
 
 
 def _ask(at_hand: AtHand) -> Reaction:

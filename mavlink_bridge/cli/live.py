@@ -27,7 +27,7 @@ from mavlink_bridge.director import Director, EventName, Orders, State
 from mavlink_bridge.director.plan_task import HomeWays, PlanTask, WaysTask
 from mavlink_bridge.errors import BackupError, BridgeError, LinkError, VehicleInUseError
 from mavlink_bridge.link import ONE_SHOT_IDENTITY, open_link, parse_connection
-from mavlink_bridge.mavlink.messages import Autopilot, MissionType
+from mavlink_bridge.mavlink.messages import MissionType
 from mavlink_bridge.protocol.outcomes import Writing, ends_in_words, held_text
 from mavlink_bridge.protocol.vehicle_watch import Doing
 from mavlink_bridge.protocol.verified_upload import Held
@@ -431,7 +431,7 @@ class BackupKeeper:
         if peer is None:
             return None
         return VehicleMark(
-            peer.system, self._director.vehicle_uid, self._connection, int(Autopilot.ARDUPILOTMEGA)
+            peer.system, self._director.vehicle_uid, self._connection, int(peer.autopilot.autopilot)
         )
 
     def _guard(self, vehicle: VehicleMark) -> None:

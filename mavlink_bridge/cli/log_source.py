@@ -8,7 +8,6 @@ from mavlink_bridge.cli.common import warn
 from mavlink_bridge.cli.log_times import log_begin
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.logbook.log_situation import situation_from_log
-from mavlink_bridge.mavlink.vehicles import not_ardupilot
 from missions.items import last_place
 from missions.vehicle import known_ardupilot
 from missions.words import counted, mission_items
@@ -36,7 +35,10 @@ def situation_of(log: Path, options: LinkOptions, *, drives_its_items: bool) -> 
         on_damage=lambda damage: warn([f"{log}: {damage}"]),
     )
     if drives_its_items and situation.ardupilot is False:
-        raise LogError(f"{log}: {not_ardupilot(situation.system, None)}", file=str(log))
+        raise LogError(
+            f"{log}: the autopilot of system {situation.system} is not ArduPilot: its own mission is not taken from a log; give it as a file (--mission)",
+            file=str(log),
+        )
     return situation
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import datetime as dt
 import io
 from importlib import import_module
 from pathlib import Path
@@ -92,6 +93,10 @@ def _build(options: LogsOptions) -> None:
         )
         return
     warn(_bad_lines(progress))
+    if not progress.files:
+        warn(
+            ("no log was found: folders are searched for .tlog, .raw and .bin; name other files one by one",)
+        )
     if not options.quiet:
         echo(
             f"{options.output}: {counted(progress.files, 'file')}, {progress.read} read now, {progress.known} known before, "
@@ -162,9 +167,10 @@ def _print(answer: AnswerRows, title: str) -> None:
     rows = as_json(answer)
     for name in answer.columns:
         is_number = any(isinstance(row[name], (int, float)) for row in rows)
-        table.add_column(cell(name), justify="right" if is_number else "left", overflow="fold")
-    for row in rows[:_MOST_ROWS]:
-        table.add_row(*map(cell, map(_shown, row.values())))
+        heading = cell(name.replace("_", " "))  # so that a narrow terminal breaks it between words
+        table.add_column(heading, justify="right" if is_number else "left", overflow="fold")
+    for row in answer.rows[:_MOST_ROWS]:
+        table.add_row(*map(cell, map(_shown, row)))
     if len(rows) > _MOST_ROWS:
         table.caption = f"the first {_MOST_ROWS} of {len(rows)}; all with --json or --csv"
     console().print(table)
@@ -175,6 +181,8 @@ def _shown(value: Any) -> str:  # noqa: ANN401 - whatever a database holds
         return ""
     if isinstance(value, bool):
         return "yes" if value else "no"
+    if isinstance(value, dt.datetime):
+        return f"{value.isoformat(' ', 'seconds')}{'' if value.tzinfo else 'Z'}"
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 

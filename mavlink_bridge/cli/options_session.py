@@ -15,12 +15,8 @@ if TYPE_CHECKING:
 
 
 @contextmanager
-def session_for(
-    options: LinkOptions, connection: str, *, any_autopilot: bool = False
-) -> Iterator[tuple[Session, Shown]]:
+def session_for(options: LinkOptions, connection: str) -> Iterator[tuple[Session, Shown]]:
     """Open a link and find the vehicle, with a progress bar; both are closed at the end.
-
-    Every autopilot whose transfers are known will do for what only transfers; otherwise ArduPilot alone.
 
     Raises
     ------
@@ -36,7 +32,6 @@ def session_for(
         options.any_vehicle,
         options.timeout,
         options.signing_key,
-        any_autopilot,
     )
     with progress_bar(quiet=options.is_silent) as show, open_session(contact, show) as session:
         yield session, show

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,7 @@ from mavlink_bridge.link import open_link, parse_connection
 from mavlink_bridge.mavlink.autopilots import autopilot_table
 from mavlink_bridge.mavlink.messages import Autopilot
 from mavlink_bridge.mavlink.signing import Signing, SigningKey
-from mavlink_bridge.mavlink.vehicles import not_ardupilot
+from mavlink_bridge.mavlink.vehicles import not_known
 from mavlink_bridge.protocol.ask_version import AskVersion
 from mavlink_bridge.protocol.find import FindVehicle, identity_shared, identity_taken
 from mavlink_bridge.protocol.mode_switch import ModeSwitch
@@ -60,8 +60,6 @@ class Contact:
         How long to wait for the vehicle.
     key_file : Path, optional
         The signing key.
-    any_autopilot : bool
-        Take every autopilot whose transfers are known, for what only transfers; otherwise ArduPilot alone.
     """
 
     connection: str
@@ -70,7 +68,6 @@ class Contact:
     any_vehicle: bool = False
     timeout_s: float = 30.0
     key_file: Path | None = None
-    any_autopilot: bool = False
 
 
 class Session:
@@ -99,7 +96,7 @@ class Session:
     Raises
     ------
     LinkError
-        The vehicle is not there, or its autopilot is not one that this is known of.
+        The vehicle is not there, or its autopilot is not known here.
     IdentityTakenError
         Somebody else on the link speaks with our ids.
     """
@@ -129,10 +126,8 @@ class Session:
         assert finder.heartbeat is not None
         self.watch.receive(finder.heartbeat, link.now_s())
         table = autopilot_table(finder.heartbeat.autopilot)
-        other = not_ardupilot(finder.vehicle.system, finder.heartbeat.autopilot)
-        if other is not None and (table is None or not contact.any_autopilot):
-            raise other
-        assert table is not None
+        if table is None:
+            raise not_known(finder.vehicle.system, finder.heartbeat.autopilot)
         self.peer = replace(self.peer, autopilot=table)
         self.heard = Situation(
             system=finder.vehicle.system,
@@ -322,4 +317,10 @@ def open_session(contact: Contact, show: Callable[[str, int, int], None]) -> Ite
         signing=signing_of(contact.key_file),
         timeout_s=contact.timeout_s,
     ) as link:
-        yield Session(link, contact, show)
+        session = Session(link, contact, show)
+        try:
+            yield session
+        except KeyboardInterrupt:
+            with suppress(LinkError):
+                link.send_all(link.transfer.ending(session.vehicle))
+            raise

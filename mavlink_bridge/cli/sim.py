@@ -15,6 +15,7 @@ from mavlink_bridge.cli.values import MOST_FLOAT32, MOST_MPS, MOST_VEHICLE_M, ch
 from mavlink_bridge.errors import LinkError, UsageError
 from mavlink_bridge.mavlink.autopilots import autopilot_table
 from mavlink_bridge.mavlink.messages import Autopilot, MissionType
+from mavlink_bridge.simulator.any_vehicle import AUTOPILOTS
 from mavlink_bridge.simulator.config import MovingDisc, SimulatorConfig
 from mavlink_bridge.simulator.faults import Faults
 from mavlink_bridge.simulator.parameters import DEFAULTS
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
 
 _SEES_M = 15.0
 """How far the distance sensor sees; chosen, as usual ones see outdoors."""
-_AUTOPILOTS = {"ardupilot": Autopilot.ARDUPILOTMEGA, "px4": Autopilot.PX4}
 
 
 def sim(options: SimOptions) -> None:
@@ -59,7 +59,7 @@ def sim(options: SimOptions) -> None:
 
 def _config(options: SimOptions) -> SimulatorConfig:
     position, heading_deg = _parse_home(options.home)
-    autopilot = _AUTOPILOTS[options.autopilot]
+    autopilot = AUTOPILOTS[options.autopilot]
     if options.disc and autopilot is Autopilot.PX4:
         raise UsageError("--disc: the simulated PX4 rover has no distance sensor; use --autopilot ardupilot")
     table = autopilot_table(autopilot, options.firmware)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.errors import BridgeError, OutcomeError, RefusedError
-from mavlink_bridge.mavlink.messages import MissionType
+from mavlink_bridge.mavlink.drive_rules import FirstItem
+from mavlink_bridge.mavlink.messages import MissionSetCurrent, MissionType
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -14,6 +15,9 @@ if TYPE_CHECKING:
 
 _STATE_PATIENCE_S = 2.0
 """MISSION_CURRENT comes at least once a second where it is streamed."""
+
+_TIMES = 3
+"""So often a message is sent that nothing answers; chosen."""
 
 _ADVICE = "arm it in HOLD, then run this again or switch it to AUTO yourself"
 
@@ -46,27 +50,11 @@ def make_ready(session: Session, *, hold: bool, replace_active: bool) -> None:
 
 
 def fence_warnings(session: Session, lists: Iterable[MissionType]) -> list[str]:
-    """Return what to know of a new fence: an armed vehicle that stands outside may drive off, and not every zone may be enforced."""
+    """Return what to know of a new fence: an armed vehicle that stands outside may drive off."""
     if MissionType.FENCE not in lists:
         return []
     table = session.autopilot
-    texts = (table.new_fence, table.new_fence_armed if session.doing.is_armed else "")
-    return [text for text in texts if text]
-
-
-def check_drives(session: Session) -> None:
-    """Refuse to set a vehicle driving whose autopilot's drives are not watched; before anything is written.
-
-    Raises
-    ------
-    RefusedError
-        Only transfers are known of its autopilot.
-    """
-    if not session.autopilot.is_driven:
-        raise RefusedError(
-            f"--drive is not possible on {session.autopilot.kind}: pbpp does not start or watch its drives yet; nothing was written",
-            advice="upload without --drive, check the mission in the ground station, and start it there",
-        )
+    return [table.new_fence_armed] if table.new_fence_armed and session.doing.is_armed else []
 
 
 def start_driving(session: Session) -> None:
@@ -94,6 +82,9 @@ def start_driving(session: Session) -> None:
             advice=_ADVICE,
             mode=mode,
         )
+    if session.autopilot.driving.first_item is FirstItem.BY_MESSAGE_BEFORE:
+        peer = session.vehicle
+        session.link.send_all([MissionSetCurrent(peer.system, peer.component, 0) for _ in range(_TIMES)])
     if doing.mode == modes.mission and doing.has_completed:
         session.change_mode(modes.hold)  # AUTO begins anew only out of another mode
     session.drives_by_us = True

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.backup.store import BackupStore, read_backup
 from mavlink_bridge.cli.common import warn
+from mavlink_bridge.cli.enforcing import Enforcement
 from mavlink_bridge.cli.field_files import read_file, read_vehicle_file
 from mavlink_bridge.cli.interrupting import interruptible, terminable
 from mavlink_bridge.cli.options.upload import LISTS
 from mavlink_bridge.cli.options_session import session_for
 from mavlink_bridge.cli.restoring import Restoration, backups_to_restore, interrupted_warnings
-from mavlink_bridge.cli.starting import check_drives, fence_warnings, make_ready, start_driving
+from mavlink_bridge.cli.starting import fence_warnings, make_ready, start_driving
 from mavlink_bridge.cli.terminal import echo, print_json
 from mavlink_bridge.cli.uploading import Uploads
 from mavlink_bridge.errors import UsageError
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
+    from mavlink_bridge.backup.store import Backup
     from mavlink_bridge.cli.options.upload import UploadOptions
     from mavlink_bridge.cli.session import Session
     from mavlink_bridge.cli.uploading import Done, Lists
@@ -49,9 +51,7 @@ def upload(options: UploadOptions) -> None:
     if options.forget:
         _forget(store, options)
         return
-    with terminable(), session_for(options, options.connect, any_autopilot=True) as (session, show):
-        if options.drive:
-            check_drives(session)
+    with terminable(), session_for(options, options.connect) as (session, show):
         uploads = Uploads(session, store, replace_active=options.replace_active)
         with interruptible(session.at_hand(show.aside, uploads.on_it)), uploads.begin():
             backups = backups_to_restore(store, uploads.vehicle, restoration) if restoration else []
@@ -60,14 +60,25 @@ def upload(options: UploadOptions) -> None:
             warn(_file_remarks(options.file, held, session.heard))
             make_ready(session, hold=options.hold, replace_active=options.replace_active)
             warn(fence_warnings(session, [kind for kind, _ in lists] + [one.mission_type for one in backups]))
+            fences = [items for kind, items in _kinds(lists, backups) if kind is MissionType.FENCE]
+            watch = Enforcement(session) if fences and Enforcement.is_needed(session) else None
+            if watch is not None:
+                warn(watch.foreseen(fences[0]))
             for backup in backups:
                 uploads.write_lists([(backup.mission_type, backup.items)], backup.path)
             uploads.write_lists([(kind, _as_sent(session, kind, items)) for kind, items in lists])
+            if watch is not None:
+                warn(uploads.await_fence(watch, fences[0]))
             if parameters:
                 uploads.write_parameters(parameters)
             if options.drive:
                 start_driving(session)
     _report(session, uploads.done, uploads.changed, options)
+
+
+def _kinds(lists: Lists, backups: Sequence[Backup]) -> Lists:
+    """Return the lists that are written, whatever they come from."""
+    return [*lists, *((one.mission_type, one.items) for one in backups)]
 
 
 def _check(options: UploadOptions) -> None:
@@ -85,7 +96,7 @@ def _check(options: UploadOptions) -> None:
 def _forget(store: BackupStore, options: UploadOptions) -> None:
     """Put notes aside: all that there are, those of a system id, or those that may be about the vehicle on a link."""
     if options.connect:
-        with session_for(options, options.connect, any_autopilot=True) as (session, _show):
+        with session_for(options, options.connect) as (session, _show):
             notes = store.interrupted(session.which_vehicle())
     else:
         notes = [note for note in store.notes() if options.system in (None, note.vehicle.system)]
@@ -188,7 +199,8 @@ def _report(
         how = "already on the vehicle" if entry.outcome.pushes == 0 else f"uploaded in {entry.took_s:.1f} s"
         coarse = " (positions read back to about 1 m only)" if entry.outcome.is_coarse else ""
         name = entry.mission_type.name.lower()
-        echo(f"{name}: {len(entry.outcome.found or ())} items, {how}, read back and verified{coarse}")
+        counts = "" if entry.not_enforced is None or entry.not_enforced else ", counts by now"
+        echo(f"{name}: {len(entry.outcome.found or ())} items, {how}, read back and verified{coarse}{counts}")
         if entry.backup:
             echo(f"  the list before is kept in {entry.backup}")
     for name, (old, new) in changed.items():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from mavlink_bridge.backup.store import BackupStore
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from mavlink_bridge.backup.vehicle_mark import VehicleMark
+    from mavlink_bridge.cli.enforcing import Enforcement
     from mavlink_bridge.cli.session import Session
     from mavlink_bridge.protocol.parameters import SetParameterOutcome
     from mavlink_bridge.protocol.verified_upload import VerifiedUploadOutcome
@@ -38,15 +39,17 @@ _LOCK_LOOK_S = 0.2  # between attempts at another process's lock; chosen, not me
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """One list that is on the vehicle now, verified."""
+    """One list that is on the vehicle now, verified; of a fence that does not count at once, which of its zones the vehicle leaves out."""
 
     mission_type: MissionType
     outcome: VerifiedUploadOutcome
     backup: Path | None
     took_s: float
+    not_enforced: tuple[str, ...] | None = None
 
     def document(self) -> dict[str, Any]:
         """Return it for JSON."""
+        enforced = {} if self.not_enforced is None else {"not_enforced": list(self.not_enforced)}
         return {
             "list": self.mission_type.name.lower(),
             "items": len(self.outcome.found or ()),
@@ -54,6 +57,7 @@ class Done:
             "pushes": self.outcome.pushes,
             "backup": str(self.backup) if self.backup else None,
             "transfer_s": round(self.took_s, 3),
+            **enforced,
         }
 
 
@@ -172,6 +176,16 @@ class Uploads:
         self._writing = None
         if outcome.pushes:
             self._verified.append(name)
+
+    def await_fence(self, watch: Enforcement, items: Sequence[MissionItem]) -> list[str]:
+        """Wait until the fence that was written counts; return warnings of what of it does not."""
+        zones = tuple(watch.awaited(items))
+        self.done = [
+            replace(one, not_enforced=zones) if one.mission_type is MissionType.FENCE else one
+            for one in self.done
+        ]
+        name = self._session.autopilot.kind
+        return [f"{name} does not enforce {', '.join(zones)}"] if zones else []
 
     def write_parameters(self, wanted: Mapping[str, float]) -> None:
         """Set the parameters that differ.

@@ -16,13 +16,12 @@ from mavlink_bridge.console.deeds import Refusal, not_now
 from mavlink_bridge.console.view.drives import NO_LINK, HoldShown
 from mavlink_bridge.console.view.plans import is_same_route, plan_id
 from mavlink_bridge.console.wire import BackupView, Problem
-from mavlink_bridge.director import AT_WORK, State
+from mavlink_bridge.director import AT_WORK, ON_VEHICLE, State
 from mavlink_bridge.errors import BridgeError
 from mavlink_bridge.mavlink.messages import MissionType
 from mavlink_bridge.replay.journal import request_to_text
 from missions.errors import MissionError
 from missions.fence import fence_to_items
-from missions.items import with_home
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -191,7 +190,7 @@ class LiveDesk:
 
     def _start(self, deed: deeds.Start, page: str, now_s: float) -> str:
         director = self._director
-        if director.state is not State.VERIFIED or director.plan is None:
+        if director.state not in ON_VEHICLE or director.plan is None:
             raise not_now(f"nothing to start: {director.state.replace('_', ' ')}", "upload a plan first")
         if plan_id(director.plan) != deed.plan_id:
             raise not_now(
@@ -246,11 +245,14 @@ class LiveDesk:
             return self._upload_mission(looked, now_s)
         self._wanted = _Wanted(looked.plan, None, page)
         self._request(looked.request, now_s)
-        return "the bridge makes the same plan, and uploads it"
+        return "the same plan is made from where the rover is now, and uploaded"
 
     def _upload_mission(self, looked: Looked, now_s: float) -> str:
-        """Write a mission that was checked or repaired: a file's, or way points of the page."""
+        """Write a mission that was checked or repaired: a file's, or waypoints of the page."""
+        peer = self._director.peer
         assert looked.plan is not None
+        if peer is None:
+            raise not_now("the vehicle is not known yet")
         if not looked.view.is_promised:
             raise not_now("this mission does not keep its clearance: it is not written", "repair it first")
         if looked.field != field_of(self._director.situation):
@@ -259,7 +261,9 @@ class LiveDesk:
                 "upload the drawn fence first, or check it again",
             )
         home = looked.plan.home or looked.plan.start
-        return self._queue(MissionType.MISSION, with_home(looked.items, home), now_s)
+        return self._queue(
+            MissionType.MISSION, peer.autopilot.lists.form.mission_of(looked.items, home), now_s
+        )
 
     def _upload_fence(self, deed: deeds.UploadFence, _page: str, now_s: float) -> str:
         return self._queue(MissionType.FENCE, fence_to_items(deed.fence), now_s)

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from missions.formats.parts import Part
     from missions.planned import Plan
 
-_MOST_PLACES = 1000  # targets or way points in one request; chosen: more than any vehicle holds items of a mission that a person draws
+_MOST_PLACES = 1000  # targets or waypoints in one request; chosen: more than any vehicle holds items of a mission that a person draws
 _DRAWN = "drawn on the page"
 
 
@@ -117,7 +117,7 @@ def mission_of(body: CheckRequest, situation: Situation) -> Mission:
         return Mission(tuple(map(waypoint, _positions(body.points))), home)
     if situation.mission is None:
         raise RequestError(
-            "no mission: draw way points, drop a file, or read one from the vehicle", field="items"
+            "no mission: draw waypoints, drop a file, or read one from the vehicle", field="items"
         )
     return situation.mission.value
 

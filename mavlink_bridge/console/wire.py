@@ -29,7 +29,7 @@ MOST_MESSAGE_BYTES = 4096
 """Of a page's message on the WebSocket."""
 
 _MOST_PLACES = (
-    500  # targets or way points of one request; chosen: more than any vehicle's mission that a person draws
+    500  # targets or waypoints of one request; chosen: more than any vehicle's mission that a person draws
 )
 
 
@@ -106,7 +106,7 @@ class Item:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckRequest:
-    """A mission to check or to repair: its items, or the places of its way points; neither means the one that the vehicle holds."""
+    """A mission to check or to repair: its items, or the places of its waypoints; neither means the one that the vehicle holds."""
 
     items: tuple[Item, ...] = ()
     points: tuple[Place, ...] = ()
@@ -209,7 +209,7 @@ class Failure:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TakenUp:
-    """A request was taken up; what comes of it is seen in the sections."""
+    """A request was accepted; the sections show what comes of it."""
 
     ok: Literal[True] = True
     text: str = ""

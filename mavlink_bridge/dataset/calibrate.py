@@ -22,6 +22,7 @@ from missions.vehicle.calibration import (
     speed_class,
     turn_class,
 )
+from missions.words import counted
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -131,6 +132,9 @@ def _chosen(database: Any, system: int | None) -> int:  # noqa: ANN401 - a duckd
                 f"the dataset has no drives of vehicle {system}, only of {', '.join(map(str, found)) or 'none'}",
                 system=system,
                 vehicles=found,
+                advice="choose one of them: --system N"
+                if found
+                else "build a dataset from logs with AUTO missions",
             )
         return system
     if len(found) != 1:
@@ -250,7 +254,7 @@ def _remarks(calibration: Calibration, is_tuned_so: NDArray[np.bool_]) -> list[s
         )
     if others := int((~is_tuned_so).sum()):
         remarks.append(
-            f"{others} corners were driven with other parameters than the newest log's: they may widen the corridor, and do not narrow it"
+            f"{counted(others, 'corner')} driven with other parameters than the newest log's: that may widen the corridor, and narrows nothing"
         )
     return remarks
 

@@ -106,11 +106,11 @@ _LOGS = Table(
         Column("duration_s", "DOUBLE", "from the first record to the last"),
         Column("has_timestamps", "BOOLEAN", "false for a raw log"),
         Column("clock_jumps", "INTEGER", "how often its clock was set while it was written"),
-        *_texts("clock_trouble", "that its clock stands still: no time or speed of it means anything"),
+        *_texts("clock_trouble", "says if its clock stands still; then its times and speeds mean nothing"),
         *_numbers(
             "BIGINT",
-            *("frames", "messages in it", "unknown_ids", "of ids that our dialect does not have"),
-            *("bad_crcs", "with a wrong checksum", "gaps", "places where bytes had to be skipped"),
+            *("frames", "messages in it", "unknown_ids", "messages of ids that pbpp's dialect does not have"),
+            *("bad_crcs", "messages with a wrong checksum", "gaps", "places where bytes had to be skipped"),
             *("skipped_bytes", "bytes in those places", "orphan_timestamps", "times without a message"),
             *(
                 "untimed_frames",
@@ -120,9 +120,9 @@ _LOGS = Table(
             ),
             *(
                 "truncated_bytes",
-                "of a record that the end cuts off",
+                "bytes of a record that the end of the file cuts off",
                 "broken_gzip",
-                "1 if the packing broke off",
+                "1 if the gzip data ends too early",
             ),
         ),
         Column("vehicles", "INTEGER", "how many vehicles were heard"),
@@ -156,12 +156,23 @@ _VEHICLES = Table(
         Column("driven_m", "DOUBLE", "while armed, without the wandering of a standing vehicle's position"),
         *_numbers(
             "INTEGER",
-            *("positions", "GLOBAL_POSITION_INT in all", "positions_without_fix", "of them without a place"),
+            *(
+                "positions",
+                "GLOBAL_POSITION_INT in all",
+                "positions_without_fix",
+                "positions without a place",
+            ),
             *("targets_seen", "targets it was sent", "parameters_seen", "parameters that the log reports"),
         ),
         Column("least_clearance_m", "DOUBLE", "of its track while armed; 0 where it left the fence"),
-        Column("nearest_time_s", "DOUBLE", "when that was"),
-        *_numbers("DOUBLE", "nearest_lat_deg", "where that was", "nearest_lon_deg", "where that was"),
+        Column("nearest_time_s", "DOUBLE", "when the track was nearest"),
+        *_numbers(
+            "DOUBLE",
+            "nearest_lat_deg",
+            "where the track was nearest",
+            "nearest_lon_deg",
+            "where the track was nearest",
+        ),
         *_texts("nearest_zone", "to which zone"),
     ),
 )
@@ -297,7 +308,13 @@ _BREACHES = Table(
         *_numbers("DOUBLE", "lat_deg", "where it was deepest", "lon_deg", "where it was deepest"),
         *_numbers("DOUBLE", "begun_lat_deg", "where it began", "begun_lon_deg", "where it began"),
         *_texts("zone", "the zone that forbids it there"),
-        *_numbers("INTEGER", "count", "the autopilot's count of breaches", "breach_type", "FENCE_BREACH"),
+        *_numbers(
+            "INTEGER",
+            "count",
+            "the autopilot's count of breaches",
+            "breach_type",
+            "FENCE_BREACH, as MAVLink numbers it",
+        ),
     ),
 )
 _TARGETS = Table(
@@ -307,7 +324,13 @@ _TARGETS = Table(
         *(_LOG, _TIME, _LAT, _LON),
         *_texts("source", "which message"),
         *_numbers(
-            "INTEGER", "station_system", "who", "station_component", "who", "said", "how often within seconds"
+            "INTEGER",
+            "station_system",
+            "who sent it",
+            "station_component",
+            "who sent it",
+            "said",
+            "how often it was repeated within seconds",
         ),
     ),
 )

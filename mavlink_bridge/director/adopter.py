@@ -15,6 +15,7 @@ going on. Any change of mode that is seen from then on is a takeover, as ever. O
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.backup.drive_note import DriveNote
@@ -25,7 +26,6 @@ from mavlink_bridge.director.orders import TargetSource
 from mavlink_bridge.director.states import Cue, Signal, State
 from mavlink_bridge.director.targets import HomeCall, Target, is_same_place
 from mavlink_bridge.mavlink import messages as m
-from mavlink_bridge.mavlink.rover import Mode, mode_name
 from mavlink_bridge.protocol.vehicle_watch import MISSION_COMPLETE
 from missions.checking.drive_record import plan_again, record_of, situation_of
 from missions.errors import MissionError
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.director.list_watch import ListWatch
     from mavlink_bridge.director.route_desk import RouteDesk
     from mavlink_bridge.mavlink.messages import Frame
+    from mavlink_bridge.mavlink.stored_form import StoredForm
     from missions.geo import LatLon
     from missions.items import MissionItem
 
@@ -105,7 +106,7 @@ class Adopter(Part):
         self._was_in_other_hands |= core.state is State.LEARNING and not self._is_driving
         if not (self._awaits_item and isinstance(message, m.MissionCurrent)):
             return []
-        is_told = bool(message.seq) or message.mission_state == MISSION_COMPLETE
+        is_told = bool(core.number_of(message.seq)) or message.mission_state == MISSION_COMPLETE
         if core.state is not State.READY or not is_told or core.steps or self._lists.has_suspects:
             return []
         self._awaits_item = False
@@ -172,7 +173,7 @@ class Adopter(Part):
         core.ours = note.mission
         self._until_s = now_s + _PATIENCE_S
         self._lists.suspect_all()
-        core.operator.expect(Mode.AUTO, set(), is_armed=True)
+        core.operator.expect(core.modes.mission, set(), is_armed=True)
         return True
 
     def leads_to(self, target: LatLon) -> bool:
@@ -195,7 +196,7 @@ class Adopter(Part):
 
     @property
     def _is_driving(self) -> bool:
-        return bool(self.core.situation.armed) and self.core.situation.mode == Mode.AUTO
+        return self.core.is_in_mission
 
     def _why_not_known(self, notes: tuple[DriveNote, ...]) -> str:
         if not notes:
@@ -208,27 +209,33 @@ class Adopter(Part):
 
     def _why_not(self, note: DriveNote) -> str:
         """Return what speaks against adopting; empty where nothing does."""
-        situation = self.core.situation
+        situation, modes = self.core.situation, self.core.modes
         if not situation.armed:
             return "the vehicle is disarmed"
-        if situation.mode != Mode.AUTO:
-            return f"the vehicle is in {mode_name(situation.mode)}, not in AUTO"
+        if situation.mode != modes.mission:
+            return f"the vehicle is in {modes.words(situation.mode)}, not in {modes.words(modes.mission)}"
         if self._was_in_other_hands:
             return "it was disarmed, or not in AUTO, while this bridge read its lists"
         if self._boot_ms < note.boot_ms:
             return "the vehicle has been rebooted since"
         if situation.mission is None:
             return "the vehicle's mission is not known"
-        return _difference(situation.mission.value.items, note.mission[1:])
+        form = self.core.autopilot.lists.form
+        return _difference(situation.mission.value.items, form.own_items(note.mission), form)
 
     def _tell_why_not(self, why_not: str, now_s: float) -> None:
         text = f"the vehicle's drive is neither adopted nor watched: {why_not}"
         self.core.voice.tell(now_s, EventName.NOT_ADOPTED, text, why_not)
 
 
-def _difference(found: tuple[MissionItem, ...], noted: tuple[MissionItem, ...]) -> str:
-    """Return in words how a mission differs from the noted one; empty where it does not."""
+def _difference(found: tuple[MissionItem, ...], noted: tuple[MissionItem, ...], form: StoredForm) -> str:
+    """Return in words how a mission differs from the noted one; empty where it does not. Which of its items is the current one does not matter."""
+    first = int(form.has_home_item)
     if len(found) != len(noted):
-        return f"its mission has {len(found) + 1} items, the noted one {len(noted) + 1}"
-    different = [seq for seq, (one, other) in enumerate(zip(found, noted, strict=True), 1) if one != other]
+        return f"its mission has {len(found) + first} items, the noted one {len(noted) + first}"
+    different = [
+        seq
+        for seq, (one, other) in enumerate(zip(found, noted, strict=True), first)
+        if replace(one, current=False) != replace(other, current=False)
+    ]
     return f"item {different[0]} of its mission is not the noted one" if different else ""

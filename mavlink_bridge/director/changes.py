@@ -18,13 +18,15 @@ _TEXTS = {
     "flight plan received": ListKind.MISSION,
     "mission upload timeout": ListKind.MISSION,
 }
-_CURRENT = (
-    ("total", ListKind.MISSION),
+_IDS = (
     ("mission_id", ListKind.MISSION),
     ("fence_id", ListKind.FENCE),
     ("rally_points_id", ListKind.RALLY),
 )
-"""What MISSION_CURRENT tells of each list; the ids are 0 where the autopilot does not fill them."""
+"""What MISSION_CURRENT tells of each list; the ids are 0 where the autopilot does not fill them, and of an empty list."""
+
+_ID_LATE_S = 1.5
+"""For so long after a list was changed MISSION_CURRENT may tell its former id: measured was a second."""
 
 _FENCE_TOTAL, _MISSION_TOTAL = "FENCE_TOTAL", "MIS_TOTAL"
 _REBOOT_MS = 5000  # GLOBAL_POSITION_INT.time_boot_ms this much earlier is no message out of order; chosen, not measured
@@ -57,6 +59,7 @@ class ChangeWatch:
         self._kinds = kinds
         self._totals: dict[str, float] = {}
         self._asked_for_s: dict[ListKind, float] = {}  # lists that somebody is writing
+        self._known_ids: dict[ListKind, tuple[int, float]] = {}  # as we wrote or read the list, and when
 
     def deadline_s(self, *, is_driving: bool) -> float:
         """When lists are to be read again."""
@@ -95,7 +98,7 @@ class ChangeWatch:
     def look(self, frame: Frame, now_s: float) -> None:
         """Suspect the lists that a frame of the vehicle says may have changed."""
         message = frame.message
-        signs = self._signs(message) & self._kinds
+        signs = self._signs(message, now_s) & self._kinds
         self.suspects |= signs
         for kind in signs:
             self._asked_for_s.pop(kind, None)
@@ -104,23 +107,66 @@ class ChangeWatch:
             if asked_for in self._kinds:
                 self._asked_for_s[asked_for] = now_s
 
-    def _is_to_us(self, message: m.MissionAck | m.MissionRequest | m.MissionRequestInt) -> bool:
+    def _is_to_us(
+        self, message: m.MissionAck | m.MissionCount | m.MissionRequest | m.MissionRequestInt
+    ) -> bool:
         return (message.target_system, message.target_component) == self._identity
 
-    def _signs(self, message: Message) -> set[ListKind]:
+    def _signs(self, message: Message, now_s: float) -> set[ListKind]:
         if isinstance(message, m.MissionAck):
-            if self._is_to_us(message) or message.type != m.MissionResult.ACCEPTED:
+            if message.type != m.MissionResult.ACCEPTED:
+                return set()
+            if self._is_to_us(message):
+                self._note_id(message, now_s)
                 return set()
             return set(kinds_of(message.mission_type))
+        if isinstance(message, m.MissionCount):
+            return self._signs_of_count(message, now_s)
         if isinstance(message, m.Statustext):
             text = message.text.lower()
             return {kind for start, kind in _TEXTS.items() if text.startswith(start)}
         if isinstance(message, m.MissionCurrent):
-            return {kind for field, kind in _CURRENT if self._changed(field, getattr(message, field))}
+            return self._signs_of_current(message, now_s)
         if isinstance(message, m.ParamValue) and message.param_id in (_FENCE_TOTAL, _MISSION_TOTAL):
             kind = ListKind.FENCE if message.param_id == _FENCE_TOTAL else ListKind.MISSION
             return {kind} if self._changed(message.param_id, message.param_value) else set()
         return set()
+
+    def _note_id(self, message: m.MissionAck | m.MissionCount, now_s: float) -> None:
+        """Remember the id of a list that we have just written or read."""
+        for kind in kinds_of(message.mission_type):
+            if message.opaque_id:
+                self._known_ids[kind] = (message.opaque_id, now_s)
+            elif isinstance(message, m.MissionCount):
+                self._known_ids.pop(kind, None)  # empty, or the autopilot has no ids
+
+    def _signs_of_count(self, message: m.MissionCount, now_s: float) -> set[ListKind]:
+        """Compare the list that somebody reads with what is known of it, where it has an id."""
+        if self._is_to_us(message):
+            self._note_id(message, now_s)
+            return set()
+        known = self._known_ids
+        return {
+            kind
+            for kind in kinds_of(message.mission_type)
+            if message.opaque_id and kind in known and known[kind][0] != message.opaque_id
+        }
+
+    def _signs_of_current(self, message: m.MissionCurrent, now_s: float) -> set[ListKind]:
+        """Compare ids with those that are known; where a list has none, what is told with what was told before."""
+        signs: set[ListKind] = set()
+        for field, kind in _IDS:
+            told, known = getattr(message, field), self._known_ids.get(kind)
+            has_changed = self._changed(field, told)
+            if told and known is not None:
+                is_other = told != known[0] and now_s >= known[1] + _ID_LATE_S
+                signs |= {kind} if is_other else set()
+            elif has_changed:
+                signs.add(kind)
+        has_id = bool(message.mission_id) and ListKind.MISSION in self._known_ids
+        if self._changed("total", message.total) and not has_id:
+            signs.add(ListKind.MISSION)
+        return signs
 
     def _changed(self, name: str, value: float) -> bool:
         before = self._totals.get(name)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.director.operator_watch import OperatorWatch
 from mavlink_bridge.director.states import TRANSITIONS, Cue, Signal, State
 from mavlink_bridge.director.steps import Steps
 from mavlink_bridge.director.voice import Voice
-from mavlink_bridge.mavlink.rover import Mode
+from mavlink_bridge.mavlink.autopilots import ARDUPILOT
 from mavlink_bridge.protocol.table_machine import TableMachine
 from mavlink_bridge.protocol.vehicle_watch import VehicleWatch
 
@@ -20,7 +21,9 @@ if TYPE_CHECKING:
     from mavlink_bridge.director.plan_task import PlanTask
     from mavlink_bridge.director.targets import Target
     from mavlink_bridge.errors import BridgeError
+    from mavlink_bridge.mavlink.autopilots import AutopilotTable
     from mavlink_bridge.mavlink.messages import Frame, Message
+    from mavlink_bridge.mavlink.modes import Modes
     from mavlink_bridge.protocol.peer import Peer
     from missions.errors import MissionError
     from missions.items import MissionItem
@@ -57,7 +60,7 @@ class Core(TableMachine[State, Cue]):
     plan : Plan or None
         The plan that stands.
     ours : tuple of MissionItem or None
-        The mission that is on the vehicle by us.
+        The list that is on the vehicle by us, as it goes over the wire.
     """
 
     def __init__(
@@ -89,17 +92,48 @@ class Core(TableMachine[State, Cue]):
             return orders.identity
         return orders.system, orders.own_component
 
+    # The vehicle's autopilot
+
+    @property
+    def autopilot(self) -> AutopilotTable:
+        """How the vehicle's autopilot speaks; ArduPilot before it is known."""
+        return self.peer.autopilot if self.peer is not None else ARDUPILOT
+
+    @property
+    def modes(self) -> Modes:
+        """The modes of the vehicle's autopilot."""
+        return self.autopilot.modes
+
+    def meet(self, peer: Peer) -> None:
+        """Take notice which vehicle it is, and of which version."""
+        self.peer = peer
+        self.operator.modes = peer.autopilot.modes
+
+    def number_of(self, seq: int) -> int:
+        """Return which of a plan's items the vehicle means: they are counted from 1 on, as on a vehicle whose item 0 is its home."""
+        return seq + int(not self.autopilot.lists.form.has_home_item)
+
+    def has_items(self, items: Sequence[MissionItem]) -> bool:
+        """Return whether a mission, its home left out, is ours; which of its items is the current one does not matter."""
+        return self.ours is not None and _plain(items) == _plain(
+            self.autopilot.lists.form.own_items(self.ours)
+        )
+
     @property
     def has_our_mission(self) -> bool:
         """Whether the vehicle's mission is ours."""
         mission = self.situation.mission
-        return self.ours is not None and mission is not None and mission.value.items == self.ours[1:]
+        return mission is not None and self.has_items(mission.value.items)
+
+    @property
+    def is_in_mission(self) -> bool:
+        """Whether the vehicle drives a mission."""
+        return bool(self.situation.armed) and self.situation.mode == self.modes.mission
 
     @property
     def is_driving_ours(self) -> bool:
         """Whether the vehicle drives our mission, whoever started it."""
-        is_auto = bool(self.situation.armed) and self.situation.mode == Mode.AUTO
-        return is_auto and self.has_our_mission
+        return self.is_in_mission and self.has_our_mission
 
     def is_from_vehicle(self, frame: Frame) -> bool:
         """Return whether a frame comes from the vehicle's autopilot."""
@@ -145,6 +179,10 @@ class Core(TableMachine[State, Cue]):
     def fail_step(self, trouble: BridgeError | MissionError) -> Sequence[Signal]:
         """Return that what is under way came to a bad end."""
         return [Cue.TROUBLE, *self.give_up(trouble)]
+
+
+def _plain(items: Iterable[MissionItem]) -> list[MissionItem]:
+    return [replace(item, current=False) if item.current else item for item in items]
 
 
 class Part:

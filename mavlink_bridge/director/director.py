@@ -24,6 +24,7 @@ in `handlers`.
 `RouteDesk`         has plans made, drops those nobody waits for, and checks the one that stands
 `MissionWriter`     a plan that stands → a verified mission on the vehicle
 `Adopter`           has drives noted before they begin, and goes on with one that an earlier run has begun
+`FenceGuard`        when the vehicle's fence counts, which zones do not, and whether it takes the mission
 `Starter`           standing still where the mission holds, the last look, arming, AUTO, the first item
 `HomeKeeper`        the way to the nearest place to go home to, from where the vehicle is
 `HomeCaller`        what calls the vehicle home by a route: RTL, a low battery, no ground station, a breach
@@ -66,7 +67,7 @@ from mavlink_bridge.director.handlers import HANDLERS
 from mavlink_bridge.director.parts import Parts
 from mavlink_bridge.director.states import Cue, Signal, State
 from mavlink_bridge.fold import fold
-from mavlink_bridge.mavlink.messages import Autopilot, Heartbeat
+from mavlink_bridge.mavlink.messages import Heartbeat
 from missions.situation import Situation
 
 if TYPE_CHECKING:
@@ -344,7 +345,7 @@ class Director:
         if core.state is State.LISTENING:
             self._heed(self._parts.learner.look_for(frame, now_s), now_s)
             return
-        if not core.orders.passive and core.is_from_vehicle(frame) and _is_no_ardupilots(frame.message):
+        if not core.orders.passive and core.is_from_vehicle(frame) and self._is_anothers(frame.message):
             return
         self._heed(self._parts.halter.hear_answer(frame, now_s), now_s)
         frame = as_to_vehicle(frame, core.peer)
@@ -371,6 +372,10 @@ class Director:
             *core.steps.messages_to_send(),
         ]
 
+    def _is_anothers(self, message: Message) -> bool:
+        """Return whether a message is a HEARTBEAT of another autopilot than was learnt: its modes mean something else, and it is not that vehicle."""
+        return isinstance(message, Heartbeat) and message.autopilot != self._core.autopilot.autopilot
+
     # Cues and notices
 
     def _heed(self, signals: Iterable[Signal], now_s: float) -> None:
@@ -380,8 +385,3 @@ class Director:
                 continue
             if (handler := HANDLERS.get(signal)) is not None:
                 self._heed(handler(self._parts, now_s) or (), now_s)
-
-
-def _is_no_ardupilots(message: Message) -> bool:
-    """Return whether a message is a HEARTBEAT of no ArduPilot: its modes mean something else, and it is not the vehicle that was learnt."""
-    return isinstance(message, Heartbeat) and message.autopilot != Autopilot.ARDUPILOTMEGA

@@ -12,7 +12,6 @@ from mavlink_bridge.director.states import Cue, Notice, Signal, State
 from mavlink_bridge.director.targets import Target
 from mavlink_bridge.errors import OutcomeError
 from mavlink_bridge.mavlink import messages as m
-from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.protocol.vehicle_watch import MISSION_COMPLETE
 from missions.checking.from_here import on_way_home
 from missions.checking.home_part import home_parts
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from mavlink_bridge.director.halter import Halter
+    from mavlink_bridge.director.takeover import Takeover
     from mavlink_bridge.mavlink.messages import Frame
     from missions.checking.home_part import HomePart
     from missions.planned import Plan
@@ -96,6 +96,13 @@ class DriveSupervisor(Part):
             self.drive.follow(core.plan, self._item_now)
         return [Notice.WAY_CHOSEN]
 
+    def has_ended(self, taken: Takeover, now_s: float) -> bool:
+        """Return whether a change of mode is the end of our drive: some autopilots hold by themselves where their mission ends."""
+        core = self.core
+        may_be = core.state is State.DRIVING and taken.asker is None and not taken.shows_failsafe
+        ends_so = core.autopilot.driving.ends_in_hold and taken.mode == core.modes.hold
+        return may_be and ends_so and self.drive is not None and self.drive.is_at_end(now_s)
+
     def handle_timer(self, now_s: float) -> Sequence[Signal]:
         """Report how far the drive is."""
         if self.drive is not None and now_s >= self.drive.progress_due_s:
@@ -125,7 +132,7 @@ class DriveSupervisor(Part):
         """Watch a drive that we have started."""
         self._is_our_start = True
         self._route = self._part = None
-        self._watch("AUTO", now_s)
+        self._watch(self._mode, now_s)
 
     def resume(self, text: str) -> Sequence[Signal]:
         """Return that our mission is being driven, though we did not start it just now, where there is a plan to watch it by."""
@@ -134,7 +141,7 @@ class DriveSupervisor(Part):
 
     def resumed(self, now_s: float) -> None:
         """Watch a drive that we did not start just now."""
-        self.core.operator.expect(Mode.AUTO, set(), is_armed=True)
+        self.core.operator.expect(self.core.modes.mission, set(), is_armed=True)
         self._is_our_start = False
         self._watch(self._resumed_text, now_s).item = self._item_now
 
@@ -142,22 +149,28 @@ class DriveSupervisor(Part):
         """Watch a drive that an earlier run has begun; ours where it may be held at its end."""
         self._is_our_start = is_ours
         self._route = self._part = None
-        self._watch("AUTO, as before the restart", now_s).join(self._item_now)
+        self._watch(f"{self._mode}, as before the restart", now_s).join(self._item_now)
         self._follow_choice(now_s)  # made while no bridge ran
 
     def _note_item(self, message: m.MissionCurrent) -> None:
         """Remember the item that the vehicle drives to; once its mission is complete, the last one (ArduPilot tells 0 then)."""
-        ours = self.core.ours
-        if message.seq:
-            self._item_now = message.seq
-        elif message.mission_state == MISSION_COMPLETE and ours is not None:
-            self._item_now = len(ours) - 1
+        core = self.core
+        if number := core.number_of(message.seq):
+            self._item_now = number
+        elif message.mission_state == MISSION_COMPLETE and core.ours is not None:
+            self._item_now = len(core.ours) - 1
+
+    @property
+    def _mode(self) -> str:
+        """The name of the mode that drives missions."""
+        return self.core.modes.named(self.core.modes.mission)
 
     def _watch(self, text: str, now_s: float) -> DriveWatch:
         core = self.core
         assert core.plan is not None
-        self.drive = DriveWatch(core.plan, core.voice, now_s)
-        core.voice.tell(now_s, EventName.DRIVING, text, len(core.plan.items) + 1)
+        self.drive = DriveWatch(core.plan, core.voice, now_s, core.autopilot)
+        count = len(core.plan.items) + int(core.autopilot.lists.form.has_home_item)
+        core.voice.tell(now_s, EventName.DRIVING, text, count)
         return self.drive
 
     # Ends
@@ -166,7 +179,8 @@ class DriveSupervisor(Part):
         """Report the arrival, and hold the vehicle where we have started it and it is not to go on."""
         assert self.drive is not None
         self.drive.tell_progress(now_s)
-        self.holds_after_arrival = self._is_our_start and not self._goes_on_after_arrival
+        holds_itself = self.core.autopilot.driving.ends_in_hold
+        self.holds_after_arrival = self._is_our_start and not (self._goes_on_after_arrival or holds_itself)
         self.drive.tell_arrival(now_s, holds=self.holds_after_arrival)
         self.drive = None
         if not self.holds_after_arrival:

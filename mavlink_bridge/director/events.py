@@ -33,6 +33,8 @@ class EventName(StrEnum):
     WAITING = auto()
     UPLOADING = auto()
     VERIFIED = auto()
+    ENFORCED = auto()
+    NOT_ENFORCED = auto()
     UPLOAD_FAILED = auto()
     COMMAND_FAILED = auto()
     DRIVING = auto()
@@ -81,6 +83,8 @@ SCHEMA: dict[EventName, tuple[Severity, tuple[str, ...]]] = {
     EventName.WAITING: (Severity.WARNING, ("obstacle", "forgotten_in_s")),
     EventName.UPLOADING: (Severity.INFO, ("mission_items",)),
     EventName.VERIFIED: (Severity.INFO, ("mission_items", "pushes")),
+    EventName.ENFORCED: (Severity.INFO, ("zones", "vertices", "not_enforced")),
+    EventName.NOT_ENFORCED: (Severity.WARNING, ("zones", "reason")),
     EventName.UPLOAD_FAILED: (Severity.ERROR, ("error", "details")),
     EventName.COMMAND_FAILED: (Severity.ERROR, ("command", "result")),
     EventName.DRIVING: (Severity.INFO, ("mission_items",)),

@@ -23,6 +23,8 @@ _PARAMETERS = (
     "FENCE_OPTIONS",
     "FENCE_MARGIN",
     "FENCE_MARGIN_XY",
+    "GF_ACTION",
+    "GF_MAX_HOR_DIST",
 )
 _CIRCLE_ABOUT_HOME = 2
 _HOME_MOVED_M = 0.5  # HOME_POSITION repeated may differ by the fix; chosen, not measured
@@ -63,6 +65,8 @@ class Grounds:
 
 def _has_circle(parameters: Mapping[str, float]) -> bool:
     """Return whether home matters; of a FENCE_TYPE that is none it may (a plan refuses it by name)."""
+    if parameters.get("GF_MAX_HOR_DIST", 0) > 0:
+        return True
     try:
         return bool(bits(parameters, "FENCE_TYPE", 0) & _CIRCLE_ABOUT_HOME)
     except VehicleError:

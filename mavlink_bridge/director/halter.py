@@ -14,8 +14,8 @@ from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.orders import TargetSource
 from mavlink_bridge.director.states import Cue, Notice, Signal, State
 from mavlink_bridge.mavlink import messages as m
-from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.protocol.mode_switch import ModeSwitch, ask_for_heartbeat
+from mavlink_bridge.protocol.stop_here import StopHere
 from missions.checking.holding import resting_pose
 from missions.stops import Rolling
 
@@ -42,14 +42,24 @@ _SOON_S = 1.0
 # Then a vehicle in HOLD that still reports a speed (a drifting fix, a slope) is taken for stopped; chosen, not measured.
 _STOP_PATIENCE_S = 8.0
 
+_DRIVEN_MPS = 0.8
+"""Faster than a PX4 rover at rest in HOLD was ever told to be: 0.6 m/s, in recordings of both versions."""
+
+_DIVERTED_AFTER_S = 5.0
+"""A vehicle that a click drives in HOLD still moves so long after it: every other is at rest by then (PX4's loop takes 3.5 s at the most, as measured)."""
+
+
+_LATE_CLICK_S = _DIVERTED_AFTER_S + 4.0
+"""A click that came to us at once may come to the vehicle 3 s later, by a radio that repeats it; and so long it is waited for."""
+
 
 class Halter(Part):
     """Brings the vehicle to rest.
 
     Attributes
     ----------
-    stopping : ModeSwitch or None
-        Our HOLD, while it is under way.
+    stopping : ModeSwitch or StopHere or None
+        Our HOLD, or what else stops it, while it is under way.
     may_be_in_auto : bool
         Whether our AUTO may be on its way, or no heartbeat may have told of it yet.
     is_hold_granted : bool
@@ -61,7 +71,7 @@ class Halter(Part):
     def __init__(self, core: Core, lists: ListWatch) -> None:
         super().__init__(core)
         self._lists = lists
-        self.stopping: ModeSwitch | None = None
+        self.stopping: ModeSwitch | StopHere | None = None
         self.may_be_in_auto = False
         self.is_hold_granted = False
         self.expected: Pose | None = None
@@ -70,6 +80,9 @@ class Halter(Part):
         self._is_seen = False  # a heartbeat has shown it
         self._held_at_s: float | None = None
         self._standstill_due_s = math.inf
+        self._is_diverted = False  # a click may drive it in HOLD
+        self._clicked_s = -math.inf
+        self._is_for_good = False  # a person asks for it: said until a heartbeat shows it
         self._rolling: Rolling | None = None  # while it may tell where it ends
 
     @property
@@ -99,6 +112,8 @@ class Halter(Part):
             return []
         if self._rolling is not None:
             self._rolling = self._rolling.moved(pose.value.position, pose.value.speed_mps, now_s)
+        if self._is_driven_in_hold(now_s):
+            return self._stop_diverted(now_s)
         if self._has_come_to_rest(now_s):
             return [Cue.HELD]
         if self.stopping is None and self._rolling is not None and core.orders.drive:
@@ -114,6 +129,8 @@ class Halter(Part):
                 return signals
         if self.core.state is not State.HOLDING:
             return []
+        if self._is_driven_in_hold(now_s):
+            return self._stop_diverted(now_s)
         if self._has_come_to_rest(now_s):
             return [Cue.HELD]
         if self._rereading_due:
@@ -153,7 +170,7 @@ class Halter(Part):
         core = self.core
         if core.peer is None:
             return False
-        if core.orders.hold and core.situation.armed and core.situation.mode == Mode.AUTO:
+        if core.orders.hold and core.is_in_mission:
             return True
         if not core.orders.drive:
             return False
@@ -165,7 +182,15 @@ class Halter(Part):
         """Return whether the vehicle may be on its way; a click, or an RTL, sets it going before any heartbeat says so."""
         has_set_off = target is not None and target.has_set_off
         situation = self.core.situation
-        return has_set_off or (bool(situation.armed) and situation.mode != Mode.HOLD)
+        is_driving = situation.mode != self.core.modes.hold or self._moves_in_hold
+        return has_set_off or (bool(situation.armed) and is_driving)
+
+    @property
+    def _moves_in_hold(self) -> bool:
+        """Whether a vehicle that a click drives in HOLD moves there."""
+        pose = self.core.situation.pose
+        drives_in_hold = self.core.autopilot.driving.clicks_drive_in_hold
+        return drives_in_hold and pose is not None and pose.value.speed_mps > _DRIVEN_MPS
 
     # Stopping
 
@@ -175,6 +200,7 @@ class Halter(Part):
         if target.source is not TargetSource.REPOSITION or not core.operator.is_on or core.orders.once:
             return []
         core.operator.take_target(now_s, is_click=True)
+        self._note_click(target, now_s)
         if core.state in (State.STARTING, State.DRIVING):
             return [Notice.ROUTE_WANTED]
         self.command_hold(now_s)
@@ -191,6 +217,7 @@ class Halter(Part):
                 else "a target was received; it is handled next"
             )
             core.voice.tell(now_s, EventName.HOLDING, f"HOLD: {reason}", reason)
+            self._note_click(target, now_s)
             self.command_hold(now_s)
 
     def hold(self, reason: str, now_s: float) -> None:
@@ -200,19 +227,37 @@ class Halter(Part):
         self.expected = self._rolling = None
         self.core.voice.tell(now_s, EventName.HOLDING, f"HOLD: {reason}", reason)
         self.core.steps.clear()
+        if self.core.target is not None:
+            self._note_click(self.core.target, now_s)
         self.command_hold(now_s)
 
     def hold_for_good(self, reason: str, now_s: float) -> None:
         """Stop the vehicle because a person asks for it: said until its heartbeat shows HOLD."""
         self.core.voice.tell(now_s, EventName.HOLDING, f"HOLD: {reason}", reason)
-        self.may_be_in_auto = True
+        self.may_be_in_auto = self._is_for_good = True
+        drives_in_hold = self.core.autopilot.driving.clicks_drive_in_hold
+        self._is_diverted = drives_in_hold and (
+            self._moves_in_hold or now_s <= self._clicked_s + _LATE_CLICK_S
+        )
         self.command_hold(now_s)
 
+    def _note_click(self, target: Target, now_s: float) -> None:
+        """Remember that a click may drive the vehicle in the mode that is to stop it."""
+        if target.is_click and self.core.autopilot.driving.clicks_drive_in_hold:
+            self._is_diverted, self._clicked_s = True, now_s
+
     def command_hold(self, now_s: float) -> None:
-        """Switch to HOLD."""
-        assert self.core.peer is not None
+        """Switch to HOLD; where a click may drive the vehicle in that, stop it where it is."""
+        core, pose = self.core, self.core.situation.pose
+        assert core.peer is not None
         self.expect_hold()
-        self.stopping = ModeSwitch(self.core.peer, Mode.HOLD, is_urgent=True, until_seen=self.may_be_in_auto)
+        if self._is_diverted and pose is not None:
+            self.stopping = StopHere(core.peer, pose.value.position)
+        else:
+            self.stopping = ModeSwitch(
+                core.peer, core.modes.hold, is_urgent=True, until_seen=self.may_be_in_auto
+            )
+        self._is_diverted = False
         self.stopping.start(now_s)
 
     def expect_hold(self) -> None:
@@ -220,34 +265,41 @@ class Halter(Part):
         situation = self.core.situation
         before = {situation.mode}
         if self.may_be_in_auto:
-            before.add(Mode.AUTO)
-        self.core.operator.expect(Mode.HOLD, before, is_armed=bool(situation.armed))
+            before.add(self.core.modes.mission)
+        self.core.operator.expect(self.core.modes.hold, before, is_armed=bool(situation.armed))
 
     def let_go(self) -> None:
         """Stop nothing any more."""
         self.stopping = None
-        self.may_be_in_auto = False
+        self.may_be_in_auto = self._is_for_good = False
 
-    def _look_after_hold(self, stopping: ModeSwitch, now_s: float) -> Sequence[Signal]:
+    def _look_after_hold(self, stopping: ModeSwitch | StopHere, now_s: float) -> Sequence[Signal]:
         core = self.core
         if stopping.is_granted and core.state is State.HOLDING and self._held_at_s is None:
             assert core.peer is not None
             self._held_at_s = now_s
             self._standstill_due_s = now_s + _STOP_AT_LEAST_S
             self._rolling = Rolling(now_s)
-            core.send(
-                ask_for_heartbeat(core.peer)
-            )  # the HOLD may have to be seen; the next one would come a second later
+            # The HOLD may have to be seen; the next one would come a second later.
+            core.send(ask_for_heartbeat(core.peer))
         if not stopping.is_done:
             return []
         core.send(*stopping.messages_to_send())
+        if self._is_for_good and isinstance(stopping, StopHere):
+            self.command_hold(
+                now_s
+            )  # it stops where it was driven to, granted or not; its mode is still to be seen
+            return []
         self.let_go()
-        self.is_hold_granted, self._is_seen = stopping.is_granted, stopping.is_seen
+        self.is_hold_granted = stopping.is_granted
+        self._is_seen = isinstance(stopping, ModeSwitch) and stopping.is_seen
         self._stopped_s = now_s
         core.operator.settle(now_s)
         if not stopping.is_granted:
             text = "the vehicle did not switch to HOLD"
-            core.voice.tell(now_s, EventName.COMMAND_FAILED, text, "DO_SET_MODE", stopping.result_name)
+            core.voice.tell(
+                now_s, EventName.COMMAND_FAILED, text, stopping.command_name, stopping.result_name
+            )
         return [Notice.HOLD_ENDED]
 
     def is_mode_known(self, now_s: float) -> bool:
@@ -259,12 +311,27 @@ class Halter(Part):
         is_news = self.stopping is None and is_after
         return is_news and now_s - self.core.heartbeat_s <= FRESH_S
 
+    def _is_driven_in_hold(self, now_s: float) -> bool:
+        """Return whether the vehicle drives in HOLD, longer than its stop takes."""
+        if self._held_at_s is None or self.stopping is not None:
+            return False
+        return now_s >= self._held_at_s + _DIVERTED_AFTER_S and self._moves_in_hold
+
+    def _stop_diverted(self, now_s: float) -> Sequence[Signal]:
+        """Stop a vehicle that a click has sent away after our HOLD; where none was heard, somebody else drives it."""
+        if now_s > self._clicked_s + _LATE_CLICK_S:
+            return [Notice.DRIVEN_IN_HOLD]
+        self._is_diverted, self._held_at_s = True, None
+        self._standstill_due_s = math.inf
+        self.command_hold(now_s)
+        return []
+
     def _has_come_to_rest(self, now_s: float) -> bool:
         """Return whether the vehicle stands, or will not; else look again a little later."""
         if self._held_at_s is None or now_s < self._held_at_s + _STOP_AT_LEAST_S:
             return False
-        is_patience_over = now_s >= self.patience_over_s and self.core.situation.mode == Mode.HOLD
-        if self.stands or is_patience_over:
+        is_held = self.core.situation.mode == self.core.modes.hold
+        if self.stands or (now_s >= self.patience_over_s and is_held):
             return True
         self._standstill_due_s = now_s + _STOP_AT_LEAST_S
         return False

@@ -11,12 +11,11 @@ from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.incidents import Incidents
 from mavlink_bridge.director.put_back import PutBack
 from mavlink_bridge.director.starter import START_YOURSELF
-from mavlink_bridge.director.states import Cue, Notice, Signal, State
+from mavlink_bridge.director.states import ON_VEHICLE, Cue, Notice, Signal, State
 from mavlink_bridge.director.steps import step
 from mavlink_bridge.director.takeover import Takeover, account_of
 from mavlink_bridge.errors import OutcomeError
 from mavlink_bridge.mavlink import messages as m
-from mavlink_bridge.mavlink.rover import Mode, mode_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -56,6 +55,7 @@ class HandOver(Part):
     def receive(self, frame: Frame, now_s: float) -> Iterable[Signal]:
         """Look at what the vehicle shows and what others ask of it."""
         core = self.core
+        self.incidents.autopilot = core.autopilot
         if core.is_from_vehicle(frame):
             self.incidents.receive(frame.message, core.situation, now_s)
         if core.state in clash.CLASHES:
@@ -69,16 +69,18 @@ class HandOver(Part):
     def _take_heartbeat(self, heartbeat: m.Heartbeat, now_s: float) -> Iterable[Signal]:
         core = self.core
         taken = core.operator.take_heartbeat(heartbeat, now_s)
+        if taken is not None and self._driver.has_ended(taken, now_s):
+            return [Cue.REACHED]
         if taken is None and self._driver.is_unarmed(now_s):
             taken = Takeover(None)
         if taken is not None:
             return self._let_go(taken, now_s)
         if core.operator.is_late_click(heartbeat, now_s) and self._halter.stopping is None:
             self._halter.command_hold(now_s)
-        elif core.state is State.VERIFIED and not core.orders.drive and core.is_driving_ours:
+        elif core.state in ON_VEHICLE and not core.orders.drive and core.is_driving_ours:
             return self._driver.resume("somebody else started the mission")
         if self._caller.sees_rtl(heartbeat.custom_mode):
-            taken = Takeover(heartbeat.custom_mode)
+            taken = Takeover(heartbeat.custom_mode, shows_failsafe=core.operator.shows_failsafe(heartbeat))
             return self._caller.answer(taken, now_s, by_autopilot=self._is_by_autopilot(taken, now_s)) or []
         return []
 
@@ -103,8 +105,16 @@ class HandOver(Part):
             return [Notice.DRIVE_ENDED]  # it has arrived; whoever has it now
         if not core.heeds(Cue.TAKEN_OVER):
             return []
+        if self._is_refusal(taken, now_s):
+            return [Notice.MISSION_INVALID]
         self.taken = taken
         return [Cue.TAKEN_OVER]
+
+    def _is_refusal(self, taken: Takeover, now_s: float) -> bool:
+        """Return whether the autopilot itself has held a drive of ours for a mission that it does not take any more: its fence is another one than ours."""
+        core = self.core
+        is_ours = core.state is State.DRIVING and core.orders.drive and taken.asker is None
+        return is_ours and taken.mode == core.modes.hold and self.incidents.refuses_mission(now_s)
 
     def hold_asked(self, reason: str) -> Sequence[Signal]:
         """Return that a person at a page of ours stops the vehicle: all that was wanted is let go of, as where somebody takes over."""
@@ -135,8 +145,8 @@ class HandOver(Part):
         is_withdrawing = core.state is State.WITHDRAWING
         then = "the upload is finished first" if is_withdrawing else "waiting for a new target"
         cause = self.incidents.cause_of(taken, now_s)
-        account = account_of(taken, cause, self.incidents.heard_before(now_s))
-        mode = mode_name(core.situation.mode if taken.mode is None else taken.mode)
+        account = account_of(taken, cause, self.incidents.heard_before(now_s), core.modes)
+        mode = core.modes.words(core.situation.mode if taken.mode is None else taken.mode)
         text = f"{account.text}; {then}"
         core.voice.tell(now_s, EventName.TAKEN_OVER, text, mode, str(account.by), account.reason)
         trouble = OutcomeError(f"{account.text}, before it arrived{so_far}", mode=mode)
@@ -164,7 +174,7 @@ class HandOver(Part):
         """Take a vehicle that is heard again out of our AUTO, where it was disarmed meanwhile."""
         was_in_auto_by_us, self.was_in_auto_by_us = self.was_in_auto_by_us, False
         situation = self.core.situation
-        if was_in_auto_by_us and situation.mode == Mode.AUTO and not situation.armed:
+        if was_in_auto_by_us and situation.mode == self.core.modes.mission and not situation.armed:
             self._put_back("the vehicle was disarmed while the link was lost", now_s)
 
     def _put_back(self, what: str, now_s: float) -> None:
@@ -179,7 +189,9 @@ class HandOver(Part):
             text = f"{what}; it was switched back from AUTO to HOLD, so that arming it does not make it drive"
         else:
             text = what
-        trouble = OutcomeError(text, advice=START_YOURSELF, mode=mode_name(self.core.situation.mode))
+        trouble = OutcomeError(
+            text, advice=START_YOURSELF, mode=self.core.modes.words(self.core.situation.mode)
+        )
         if machine.was_needed:
             self.core.voice.error(now_s, EventName.TROUBLE, trouble, dict(trouble.details))
         return self.core.give_up(trouble)

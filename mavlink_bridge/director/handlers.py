@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.orders import TargetSource
 from mavlink_bridge.director.states import Cue, Notice, Signal, State
+from mavlink_bridge.director.takeover import Takeover
 from mavlink_bridge.director.targets import Target
 from mavlink_bridge.errors import OutcomeError
 from mavlink_bridge.mavlink import messages as m
@@ -245,7 +246,19 @@ def _after_upload(parts: Parts, now_s: float) -> Iterable[Signal]:
     found = parts.desk.recheck(1)
     if not found.holds and parts.desk.is_stale:
         return parts.desk.broke(found, now_s)
-    return [Cue.DRIVE] if parts.starter.may_begin else parts.core.end()
+    return parts.fence.verified(now_s, may_begin=parts.starter.may_begin)
+
+
+def _on_mission_invalid(parts: Parts, now_s: float) -> Iterable[Signal]:
+    """Go on from where the vehicle itself holds: our mission is not valid any more to it, for its fence is another one. It is read, and a new route made."""
+    parts.lists.suspect_all()
+    parts.halter.expect_hold()
+    return _on_gone_on(parts, now_s)
+
+
+def _on_driven_in_hold(parts: Parts, _now_s: float) -> Iterable[Signal]:
+    parts.hand_over.taken = Takeover(parts.core.modes.hold)
+    return [Cue.TAKEN_OVER]
 
 
 def _on_hold_ended(parts: Parts, _now_s: float) -> Iterable[Signal]:
@@ -315,6 +328,8 @@ HANDLERS: dict[Signal, Callable[[Parts, float], Iterable[Signal] | None]] = {
     Cue.PLANNED: _on_planned,
     Cue.NO_PLAN: _on_no_plan,
     Cue.UPLOAD: lambda parts, now_s: parts.writer.begin(now_s),
+    Cue.ENFORCED: lambda parts, now_s: parts.fence.enforced(now_s, may_begin=parts.starter.may_begin),
+    Cue.RENEWED: lambda parts, now_s: parts.fence.verified(now_s, may_begin=parts.starter.may_begin),
     Cue.DRIVE: lambda parts, now_s: parts.starter.begin(now_s),
     Cue.RESUMED: lambda parts, now_s: parts.driver.resumed(now_s),
     Cue.STILL_THERE: _on_still_there,
@@ -347,6 +362,8 @@ HANDLERS: dict[Signal, Callable[[Parts, float], Iterable[Signal] | None]] = {
     Notice.LEARNING_FAILED: _learn_again,
     Notice.HOLD_ASKED: _on_hold_asked,
     Notice.HOLD_ENDED: _on_hold_ended,
+    Notice.DRIVEN_IN_HOLD: _on_driven_in_hold,
+    Notice.MISSION_INVALID: _on_mission_invalid,
     Notice.UPLOAD_ENDED: _on_upload_ended,
     Notice.DRIVE_ENDED: _on_drive_ended,
 }

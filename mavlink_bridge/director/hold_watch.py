@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.director.halter import Halter
     from mavlink_bridge.mavlink.messages import Frame
     from mavlink_bridge.protocol.mode_switch import ModeSwitch
+    from mavlink_bridge.protocol.stop_here import StopHere
 
 _SAME_S = 1.0
 """A HOLD that follows an announcement so soon is the one that was announced."""
@@ -44,7 +45,7 @@ class HoldWatch(Part):
         super().__init__(core)
         self._halter = halter
         self._driver = driver
-        self._seen: ModeSwitch | None = None  # the newest HOLD that was looked at
+        self._seen: ModeSwitch | StopHere | None = None  # the newest HOLD that was looked at
         self._told_s = -math.inf
         self._going_on: DriveWatch | None = None  # the drive that goes on before its HOLD
         self._hold_due_s = math.inf

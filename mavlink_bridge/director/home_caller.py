@@ -44,10 +44,9 @@ from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.fixes import fix_trouble, is_better
 from mavlink_bridge.director.orders import TargetSource
-from mavlink_bridge.director.states import Notice, Signal, State
+from mavlink_bridge.director.states import ON_VEHICLE, Notice, Signal, State
 from mavlink_bridge.director.targets import HomeCall, Target
 from mavlink_bridge.mavlink import messages as m
-from mavlink_bridge.mavlink.rover import Mode, mode_name
 from missions.geo import LatLon
 
 if TYPE_CHECKING:
@@ -59,9 +58,6 @@ if TYPE_CHECKING:
     from mavlink_bridge.director.target_inbox import TargetInbox
     from mavlink_bridge.mavlink.messages import Frame
     from missions.situation import Fix
-
-HOMING = frozenset({Mode.RTL, Mode.SMART_RTL})
-"""The modes in which a Rover drives home by itself."""
 
 SAME_PRESS_S = 4.0
 """QGroundControl says a command that is not answered again after 3 s, Mission Planner says each mode twice at once; a link adds to it. Chosen, not measured."""
@@ -90,7 +86,7 @@ _IN_HAND = frozenset(
         State.PLANNING,
         State.PROPOSED,
         State.UPLOADING,
-        State.VERIFIED,
+        *ON_VEHICLE,
         State.STARTING,
         State.DRIVING,
         State.ARRIVED,  # until its HOLD is taken; who is watched for after that is said by `_arrived_s`
@@ -195,7 +191,7 @@ class HomeCaller(Part):
         by_autopilot : bool
             Whether the autopilot is known to have done it by a failsafe or a breach.
         """
-        if taken.mode not in HOMING or not self._is_on or not self.core.situation.armed:
+        if taken.mode not in self.core.modes.homing or not self._is_on or not self.core.situation.armed:
             return None
         if self._rtl_s is not None and now_s <= self._rtl_s + SAME_PRESS_S:
             return self._hold_again(now_s)
@@ -207,12 +203,12 @@ class HomeCaller(Part):
             self._rtl_s = now_s
         if self._is_called and by_autopilot:
             return self._hold_again(now_s)
-        return self._call(HomeCall.RTL, mode_name(taken.mode), now_s)
+        return self._call(HomeCall.RTL, self.core.modes.words(taken.mode), now_s)
 
     def _leave_second(self, mode: int, now_s: float) -> None:
         """Report once that this RTL is the second one, which is not answered: who pressed it may wait for a route."""
         if now_s > self._second_s + SAME_PRESS_S:
-            name = mode_name(mode)
+            name = self.core.modes.words(mode)
             text = f"second {name}: yours, it drives straight home"
             why = "the second one: the vehicle is left to the operator"
             self.core.voice.tell(now_s, EventName.CALL_IGNORED, text, name, why)
@@ -221,14 +217,15 @@ class HomeCaller(Part):
     def sees_rtl(self, mode: int) -> bool:
         """Return whether a heartbeat shows an RTL that has just begun, where nobody watches for takeovers; one from before the first heartbeat is nobody's call."""
         before = self.core.before.mode if self._is_seen else None
-        is_new = mode in HOMING and before is not None and before not in HOMING
+        homing = self.core.modes.homing
+        is_new = mode in homing and before is not None and before not in homing
         return is_new and self._is_on and not (self.core.operator.is_on or self._is_called)
 
     def _take_heartbeat(self, heartbeat: m.Heartbeat, now_s: float) -> Sequence[Signal]:
         """Notice whether a vehicle still stands where it has arrived."""
         self._is_seen = True
         is_armed = bool(heartbeat.base_mode & m.ModeFlag.SAFETY_ARMED)
-        is_held = is_armed and heartbeat.custom_mode == Mode.HOLD
+        is_held = is_armed and heartbeat.custom_mode == self.core.modes.hold
         if self._arrived_s is not None and not is_held and now_s > self._arrived_s + _STALE_S:
             self._arrived_s = None
         return []
@@ -265,7 +262,7 @@ class HomeCaller(Part):
         core = self.core
         if core.state is State.ARRIVED and self._arrived_s is not None:
             return True
-        is_held = core.state is State.READY and core.operator.is_ours(Mode.HOLD)
+        is_held = core.state is State.READY and core.operator.is_ours(core.modes.hold)
         return core.operator.is_on and (core.state in _IN_HAND or is_held)
 
     def _call(self, call: HomeCall, detail: str, now_s: float) -> Sequence[Signal]:
@@ -398,7 +395,7 @@ class HomeCaller(Part):
 
 
 def _named(call: HomeCall, detail: str) -> str:
-    if call is HomeCall.RTL and detail == Mode.RTL.name:
+    if call is HomeCall.RTL and detail == HomeCall.RTL:
         return detail
     if call is HomeCall.GCS:
         return f"{call} {detail}"

@@ -28,7 +28,7 @@ from missions.fence import Obstacles
 from missions.geo import distance_m
 from missions.promise import FIX_ERRORS_M
 from missions.routing.way_home import places_of
-from missions.vehicle import PARAMETER_NAMES
+from missions.vehicle.parameters import PARAMETERS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -89,7 +89,7 @@ class _Field:
             and abs((self.error_m or 0.0) - (other.error_m or 0.0)) <= _ERROR_CHANGED_M
             and (
                 self.parameters is other.parameters
-                or all(self.parameters.get(name) == other.parameters.get(name) for name in PARAMETER_NAMES)
+                or all(self.parameters.get(name) == other.parameters.get(name) for name in PARAMETERS)
             )
         )
 

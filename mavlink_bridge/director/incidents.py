@@ -1,9 +1,9 @@
 """What the autopilot tells of breaches and failsafes, with a drive of ours or without; and which change of mode it answers them with.
 
-A breach is told by FENCE_STATUS, which ArduPilot sends at once and then in its stream; Rover gives no text of it, other vehicles do. A failsafe is
-told by a text: "Radio Failsafe" and "GCS Failsafe" before the mode is switched, "EKF failsafe" after it, "Crash: Going to HOLD", "Battery 1 is low
-…" (Rover's fence.cpp, failsafe.cpp, ekf_check.cpp, crash_check.cpp; AP_BattMonitor). The heartbeat of the new mode goes out on its own and
-may come before or after: neither order may lead to a claim that is not true.
+A breach is told by FENCE_STATUS, which ArduPilot sends at once and then in its stream; Rover gives no text of it, other vehicles do, and PX4 tells it by
+text alone. A failsafe is told by a text: of ArduPilot's "Radio Failsafe" and "GCS Failsafe" before the mode is switched, "EKF failsafe" after it, "Crash: Going
+to HOLD", "Battery 1 is low …"; on PX4 the heartbeat shows it. Which texts those are, and what they are answered with, stands in the autopilot's table
+(`mavlink.incident_rules`). The heartbeat of the new mode goes out on its own and may come before or after: neither order may lead to a claim that is not true.
 """
 
 from __future__ import annotations
@@ -13,22 +13,17 @@ import re
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.director.events import EventName
-from mavlink_bridge.director.takeover import DISARMING, Cause
+from mavlink_bridge.director.takeover import Cause
 from mavlink_bridge.mavlink import messages as m
-from mavlink_bridge.mavlink.rover import Mode, mode_name
+from mavlink_bridge.mavlink.autopilots import ARDUPILOT, AutopilotTable
 from missions.checking.fence_place import fence_place
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from mavlink_bridge.director.takeover import Takeover
     from mavlink_bridge.director.voice import Voice
     from missions.checking.fence_place import FencePlace
     from missions.request import Request
     from missions.situation import Known, Pose, Situation
-
-_ANSWERED_WITHIN_S = 1.5
-"""ArduPilot switches in the same turn of its loop; a heartbeat tells of it at once, and where that is lost, the next one a second later."""
 
 _SAME_S = 2.0
 """A text and a FENCE_STATUS, or two texts on one failsafe, that come so soon after another tell of the same."""
@@ -46,44 +41,8 @@ _BREACH = "fence breach"
 _BREACH_TYPES = {1: "minimum altitude", 2: "maximum altitude", 3: "boundary"}
 """FENCE_BREACH; ArduPilot calls circles and polygons alike boundary."""
 
-_ACTIONS: dict[int, frozenset[int]] = {
-    0: frozenset(),
-    1: frozenset({Mode.RTL, Mode.HOLD}),
-    2: frozenset({Mode.HOLD}),
-    3: frozenset({Mode.SMART_RTL, Mode.RTL, Mode.HOLD}),
-    4: frozenset({Mode.SMART_RTL, Mode.HOLD}),
-    5: frozenset({DISARMING}),
-    6: frozenset({Mode.LOITER, Mode.HOLD}),
-}
-"""What FENCE_ACTION and FS_ACTION let a Rover do: it goes to HOLD where it cannot do what is asked, or is more than 100 m outside."""
-
-_ANY_ACTION = frozenset({Mode.RTL, Mode.SMART_RTL, Mode.HOLD, Mode.LOITER, DISARMING})
-_RADIO, _GCS, _EKF, _BATTERY = "radio failsafe", "ground station failsafe", "EKF failsafe", "battery failsafe"
-_CRASH, _TERMINATION = "crash check", "termination"
-_FAILSAFES: tuple[tuple[re.Pattern[str], str], ...] = (
-    (re.compile(r"(radio|throttle) failsafe$", re.IGNORECASE), _RADIO),
-    (re.compile(r"gcs failsafe$", re.IGNORECASE), _GCS),
-    (re.compile(r"ekf failsafe$", re.IGNORECASE), _EKF),
-    (re.compile(r"battery \d+ is (low|critical)|low battery|battery failsafe", re.IGNORECASE), _BATTERY),
-    (re.compile(r"crash: ", re.IGNORECASE), _CRASH),
-    (re.compile(r"terminating due to ", re.IGNORECASE), _TERMINATION),
-    (re.compile(r"[\w ]{1,30}\bfailsafe$", re.IGNORECASE), "failsafe"),
-)
-"""Texts of failsafes, and what they are called."""
-
-_ACTIONS_OF = {
-    _EKF: frozenset({Mode.HOLD}),
-    _CRASH: frozenset({Mode.HOLD, DISARMING}),
-    _TERMINATION: frozenset({Mode.HOLD, DISARMING}),
-}
-_FS_ACTION = frozenset({_RADIO, _GCS})
-"""Failsafes whose answer is FS_ACTION's."""
-
-_VARIANCE = re.compile(r"ekf variance$", re.IGNORECASE)
-"""Comes before the change of mode of an EKF failsafe, whose own text comes after it."""
-
-_CONTINUING = re.compile(r"failsafe - continuing", re.IGNORECASE)
-_BREACH_TEXT = re.compile(r".*\bfences? breached|fence breach(ed)?$", re.IGNORECASE)
+_UNTOLD = "failsafe"
+"""What a heartbeat shows where no text told of it."""
 
 
 class Incidents:
@@ -95,9 +54,15 @@ class Incidents:
         Whom to tell.
     request : Request
         What is asked of routes; it says by which margins the ground is laid out.
+
+    Attributes
+    ----------
+    autopilot : AutopilotTable
+        How the vehicle's autopilot speaks.
     """
 
     def __init__(self, voice: Voice, request: Request) -> None:
+        self.autopilot: AutopilotTable = ARDUPILOT
         self._voice = voice
         self._request = request
         self._causes: dict[str, Cause] = {}
@@ -123,20 +88,38 @@ class Incidents:
 
     def cause_of(self, takeover: Takeover, now_s: float) -> Cause | None:
         """Return what the autopilot has answered with a takeover; None where nothing was heard that explains it (yet)."""
-        found = [cause for cause in self._fresh(now_s) if cause.explains(takeover)]
+        found = [cause for cause in self._fresh(now_s) if cause.explains(takeover)] or self._shown(
+            takeover, now_s
+        )
         self._unexplained = (takeover, now_s) if not found and takeover.asker is None else None
         return min(found, key=lambda cause: cause.heard_s, default=None)
 
     def explains(self, takeover: Takeover, now_s: float) -> bool:
         """Return whether something was heard just before that the autopilot answers so."""
-        return any(cause.explains(takeover) for cause in self._fresh(now_s))
+        return any(cause.explains(takeover) for cause in (*self._fresh(now_s), *self._shown(takeover, now_s)))
+
+    def refuses_mission(self, now_s: float) -> bool:
+        """Return whether the autopilot has just told that it does not drive the mission any more."""
+        told = self.autopilot.incidents.shown_by_text
+        return any(
+            cause.reason in told and now_s <= cause.heard_s + _SAME_S for cause in self._causes.values()
+        )
 
     def heard_before(self, now_s: float) -> Cause | None:
         """Return the newest thing heard that the autopilot may answer, if it was just now."""
         return max(self._fresh(now_s), key=lambda cause: cause.heard_s, default=None)
 
     def _fresh(self, now_s: float) -> list[Cause]:
-        return [cause for cause in self._causes.values() if now_s <= cause.heard_s + _ANSWERED_WITHIN_S]
+        within_s = self.autopilot.incidents.answered_within_s
+        return [cause for cause in self._causes.values() if now_s <= cause.heard_s + within_s]
+
+    def _shown(self, takeover: Takeover, now_s: float) -> list[Cause]:
+        """Return the failsafe that a heartbeat shows, where no text told of it."""
+        rules = self.autopilot.incidents
+        if not (rules.shown_by_heartbeat and takeover.shows_failsafe):
+            return []
+        cause = Cause(_UNTOLD, now_s, rules.any_action)
+        return [cause] if cause.explains(takeover) else []
 
     def _note(self, cause: Cause) -> str | None:
         """Remember a cause; return the name of the mode that the vehicle went to for it, where that was seen before it."""
@@ -144,10 +127,12 @@ class Incidents:
         if self._unexplained is None:
             return None
         takeover, seen_s = self._unexplained
-        if cause.heard_s > seen_s + _ANSWERED_WITHIN_S or not cause.explains(takeover):
+        if cause.heard_s > seen_s + self.autopilot.incidents.answered_within_s or not cause.explains(
+            takeover
+        ):
             return None
         self._unexplained = None
-        return "disarmed" if takeover.mode is None else mode_name(takeover.mode)
+        return "disarmed" if takeover.mode is None else self.autopilot.modes.words(takeover.mode)
 
     # Breaches
 
@@ -166,9 +151,14 @@ class Incidents:
             new -= 1
         if new and now_s < self._breach_told_s + _AT_MOST_EVERY_S:  # counted with the next status after that
             self._count, self._is_breached = before, was_breached
-            self._note(Cause(_BREACH, now_s, _actions(situation.parameters, "FENCE_ACTION")))
+            self._note(self._breach(situation, now_s))
         elif new:
             self._tell_breach(new, status.breach_type, situation, now_s)
+
+    def _breach(self, situation: Situation, now_s: float) -> Cause:
+        rules = self.autopilot.incidents
+        modes = rules.breach_action.answers(situation.parameters)
+        return Cause(_BREACH, now_s, modes, needs_heartbeat=rules.shown_by_heartbeat)
 
     def _take_breach_text(self, situation: Situation, now_s: float) -> None:
         if now_s > self._breach_told_s + _SAME_S:
@@ -183,7 +173,7 @@ class Incidents:
         self._breaches += new
         mode = None
         if is_new:
-            mode = self._note(Cause(_BREACH, now_s, _actions(situation.parameters, "FENCE_ACTION")))
+            mode = self._note(self._breach(situation, now_s))
         pose = situation.pose
         place = fence_place(situation, self._request, pose.value.position) if pose is not None else None
         since = "" if is_new else ", from before pbpp connected"
@@ -203,30 +193,38 @@ class Incidents:
     # Failsafes
 
     def _take_text(self, text: str, situation: Situation, now_s: float) -> None:
-        if _BREACH_TEXT.match(text):
+        rules = self.autopilot.incidents
+        if _matches(rules.breach_text, text):
             self._take_breach_text(situation, now_s)
-        elif _CONTINUING.match(text):  # then it does not switch
+        elif rules.goes_on_text is not None and _matches(rules.goes_on_text, text):  # then it does not switch
             self._causes.clear()
-        elif _VARIANCE.match(text):
-            self._note(Cause(_EKF, now_s, _ACTIONS_OF[_EKF]))
+        elif rules.warning is not None and _matches(rules.warning[0], text):
+            self._note(Cause(rules.warning[1], now_s, rules.actions_of[rules.warning[1]]))
         elif (
-            reason := next((name for pattern, name in _FAILSAFES if pattern.match(text)), None)
+            reason := next((name for pattern, name in rules.failsafes if _matches(pattern, text)), None)
         ) is not None:
             self._tell_failsafe(reason, text, situation, now_s)
 
     def _tell_failsafe(self, reason: str, text: str, situation: Situation, now_s: float) -> None:
-        modes = _ACTIONS_OF.get(reason, _ANY_ACTION)
-        if reason in _FS_ACTION and "FS_ACTION" in situation.parameters:
-            modes = _actions(situation.parameters, "FS_ACTION")
-        elif reason in _FS_ACTION and "FS_ACTION" in situation.no_numbers:
+        rules = self.autopilot.incidents
+        modes = rules.actions_of.get(reason, rules.any_action)
+        action = rules.failsafe_action if reason in rules.by_parameter else None
+        if action is not None and action.parameter in situation.parameters:
+            modes = action.answers(situation.parameters)
+        elif action is not None and action.parameter in situation.no_numbers:
             modes = frozenset()  # the vehicle's own word for it says nothing, so nothing is claimed
-        mode = self._note(Cause(reason, now_s, modes))
+        needs_heartbeat = rules.shown_by_heartbeat and reason not in rules.shown_by_text
+        mode = self._note(Cause(reason, now_s, modes, needs_heartbeat=needs_heartbeat))
         is_told = now_s <= self._told_s.get(reason, -math.inf) + _SAME_S
         self._told_s[reason] = now_s
         if is_told and mode is None:
             return
         answer = f"; the autopilot switched to {mode}" if mode is not None else ""
         self._voice.tell(now_s, EventName.FAILSAFE, f"{reason}: {text}{answer}", reason, mode)
+
+
+def _matches(pattern: str, text: str) -> bool:
+    return re.match(pattern, text, re.IGNORECASE) is not None
 
 
 def _by(place: FencePlace | None) -> str:
@@ -247,9 +245,3 @@ def _at(pose: Known[Pose] | None, now_s: float) -> str:
         return ""
     age_s = 0.0 if pose.time_s is None else now_s - pose.time_s
     return f", at {pose.value.position}" + (f" ({age_s:.0f} s earlier)" if age_s > _OLD_S else "")
-
-
-def _actions(parameters: Mapping[str, float], name: str) -> frozenset[int]:
-    """Return what a parameter lets the vehicle do; nothing where it is not known or means nothing, for then nothing can be claimed."""
-    value = parameters.get(name, math.nan)
-    return _ACTIONS.get(int(value), frozenset()) if math.isfinite(value) else frozenset()

@@ -15,8 +15,9 @@ from mavlink_bridge.director.steps import step
 from mavlink_bridge.errors import LinkError
 from mavlink_bridge.fold import fold
 from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.autopilots import ARDUPILOT, autopilot_table
 from mavlink_bridge.mavlink.messages import Frame
-from mavlink_bridge.mavlink.vehicles import not_ardupilot
+from mavlink_bridge.mavlink.vehicles import not_known
 from mavlink_bridge.protocol.find import FindVehicle
 from mavlink_bridge.protocol.peer import Peer
 from missions.situation import ListKind
@@ -106,10 +107,11 @@ class Learner(Part):
         if find.vehicle is None or find.heartbeat is None:
             return []
         vehicle = find.vehicle
-        if not core.orders.passive and (other := not_ardupilot(vehicle.system, find.heartbeat.autopilot)):
-            return self.refuse(other, now_s)
+        table = autopilot_table(find.heartbeat.autopilot)
+        if table is None and not core.orders.passive:
+            return self.refuse(not_known(vehicle.system, find.heartbeat.autopilot), now_s)
         identity = core.orders.identity or (vehicle.system, core.orders.own_component)
-        core.peer = Peer(vehicle.system, vehicle.component, *identity)
+        core.meet(Peer(vehicle.system, vehicle.component, *identity, table or ARDUPILOT))
         core.voice.tell(now_s, EventName.VEHICLE_FOUND, f"vehicle found: system {vehicle.system}", *vehicle)
         known = replace(
             core.situation, system=vehicle.system, component=vehicle.component, vehicle_type=vehicle.type
@@ -148,7 +150,17 @@ class Learner(Part):
             return [*core.give_up(machine.trouble), Notice.LEARNING_FAILED]
         core.vehicle_uid = machine.uid
         core.situation = machine.merged(core.situation, now_s)
+        self._note_version(now_s)
         return [Cue.LEARNT]
+
+    def _note_version(self, now_s: float) -> None:
+        """Take notice of the version, which decides how the vehicle is spoken to where versions differ."""
+        core, firmware = self.core, self.core.situation.firmware
+        assert core.peer is not None
+        table = autopilot_table(core.autopilot.autopilot, firmware) or core.autopilot
+        core.meet(replace(core.peer, autopilot=table))
+        if self.is_first_time and (remark := table.remark(firmware)):
+            core.voice.tell(now_s, EventName.TROUBLE, remark, "VehicleError", {})
 
     def _listen(self) -> Iterable[Signal]:
         """Learn from what others transfer; it is enough once the place is known, the fence may come later."""

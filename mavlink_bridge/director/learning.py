@@ -19,9 +19,7 @@ from mavlink_bridge.protocol.pace import MOST_S
 from mavlink_bridge.protocol.parameters import ReadParameters
 from mavlink_bridge.protocol.table_machine import Outbox
 from mavlink_bridge.protocol.telemetry import stream_requests
-from missions.items import Command
 from missions.situation import ListKind
-from missions.vehicle.asked_parameters import ASKED_NAMES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -56,7 +54,7 @@ class Learning(Outbox):
     needs_position : bool
         Whether it is a trouble where the vehicle tells no position.
     names : sequence of str
-        The parameters that are asked for.
+        The parameters that are asked for; those of the vehicle's autopilot where a mission is to be driven if not given.
     may_lack : frozenset of ListKind
         Lists that a vehicle may not have, or not tell; they are not known then.
 
@@ -78,7 +76,7 @@ class Learning(Outbox):
         read: Callable[[Peer, m.MissionType], Download | UndisturbedRead] = Download,
         *,
         needs_position: bool = True,
-        names: Sequence[str] = ASKED_NAMES,
+        names: Sequence[str] | None = None,
         may_lack: frozenset[ListKind] = frozenset(),
     ) -> None:
         super().__init__()
@@ -89,7 +87,7 @@ class Learning(Outbox):
         self._kinds = tuple(kinds)
         self._read = read
         self._needs_position = needs_position
-        self._names = tuple(names)
+        self._names = tuple(peer.autopilot.parameters.asked if names is None else names)
         self._may_lack = may_lack
         self.coarse: list[ListKind] = []
         self._steps = Steps()
@@ -134,7 +132,8 @@ class Learning(Outbox):
         peer = self._peer
         self._streams_due_s = now_s
         self._ask_streams(now_s)
-        home = m.CommandLong(peer.system, peer.component, Command.GET_HOME_POSITION)
+        command, param1 = peer.autopilot.driving.home_asked_by
+        home = m.CommandLong(peer.system, peer.component, command, param1=param1)
         self._steps.run(
             [
                 step(ReadParameters(peer, self._names), self._take_parameters),

@@ -11,15 +11,15 @@ from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.grounds import Grounds
 from mavlink_bridge.director.learning import MISSION_TYPES, with_read_list
-from mavlink_bridge.director.states import Notice, Signal, State
+from mavlink_bridge.director.states import ON_VEHICLE, Notice, Signal, State
 from mavlink_bridge.director.steps import step
 from mavlink_bridge.errors import BridgeError
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.protocol.download import Download
 from mavlink_bridge.protocol.outcomes import list_read
 from missions.situation import ListKind
-from missions.vehicle import PARAMETER_NAMES
 from missions.vehicle.parameter_remarks import no_number_remarks
+from missions.vehicle.parameters import PARAMETERS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -28,9 +28,7 @@ if TYPE_CHECKING:
     from missions.items import MissionItem
     from missions.situation import Situation
 
-_AT_REST = frozenset(
-    {State.READY, State.PROPOSED, State.VERIFIED, State.DRIVING, State.ARRIVED, State.LET_GO}
-)
+_AT_REST = frozenset({State.READY, State.PROPOSED, *ON_VEHICLE, State.DRIVING, State.ARRIVED, State.LET_GO})
 _WRITING = frozenset({State.UPLOADING, State.WITHDRAWING, State.CLASHING})
 
 
@@ -119,7 +117,7 @@ class ListWatch(Part):
         came = {
             name: text
             for name, text in after.no_numbers.items()
-            if name in PARAMETER_NAMES and before.no_numbers.get(name) != text
+            if name in PARAMETERS and before.no_numbers.get(name) != text
         }
         for text in no_number_remarks(came, after.parameters):
             self.core.voice.tell(now_s, EventName.TROUBLE, text, "VehicleError", came)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
-from mavlink_bridge.director.states import Cue, Notice, Signal, State
+from mavlink_bridge.director.states import ON_VEHICLE, Cue, Notice, Signal, State
 from mavlink_bridge.director.steps import step
 from mavlink_bridge.errors import BridgeError
 from mavlink_bridge.mavlink import messages as m
@@ -15,7 +15,6 @@ from mavlink_bridge.protocol.outcomes import Writing, end_of_upload, upload_trou
 from mavlink_bridge.protocol.sendable import check_items
 from mavlink_bridge.protocol.verified_upload import VerifiedUpload, VerifiedUploadOutcome
 from missions.errors import MissionError
-from missions.items import with_home
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.director.route_desk import RouteDesk
     from missions.items import MissionItem
 
-_ON_OUR_MISSION = frozenset({State.VERIFIED, State.STARTING, State.DRIVING})
+_ON_OUR_MISSION = frozenset({*ON_VEHICLE, State.STARTING, State.DRIVING})
 
 
 class MissionWriter(Part):
@@ -123,13 +122,14 @@ class MissionWriter(Part):
         assert core.plan is not None
         assert core.peer is not None
         core.steps.clear()
-        items = with_home(core.plan.items, core.plan.home or core.plan.start)
+        form = core.autopilot.lists.form
+        items = form.mission_of(core.plan.items, core.plan.home or core.plan.start)
         try:
             check_items(items, m.MissionType.MISSION)
         except MissionError as error:
             return self._failed(error, dict(error.details), now_s)
         self._backup_path = None
-        limits = Limits.from_parameters(core.situation.parameters)
+        limits = Limits.of_vehicle(core.autopilot, core.situation.parameters)
         upload = self.upload = VerifiedUpload(core.peer, m.MissionType.MISSION, items, limits=limits)
         if self._halter.is_mode_known(now_s):
             upload.know_vehicle(core.watch, now_s)
@@ -148,7 +148,7 @@ class MissionWriter(Part):
             return [*self._failed(ended, dict(ended.details), now_s), Notice.UPLOAD_ENDED]
         core.ours = outcome.found if outcome.found is not None else outcome.backup
         assert core.plan is not None
-        count = len(core.plan.items) + 1
+        count = len(core.autopilot.lists.form.mission_of(core.plan.items, core.plan.start))
         text = f"mission of {count} items verified on the vehicle"
         core.voice.tell(now_s, EventName.VERIFIED, text, count, outcome.pushes)
         return [Cue.UPLOAD_VERIFIED, Notice.UPLOAD_ENDED]
@@ -164,18 +164,22 @@ class MissionWriter(Part):
     def look_at_old_mission(self) -> Sequence[Signal]:
         """Leave an upload of our own idea whose old mission, just read, is not ours any more."""
         ours, old = self.core.ours, self.pending_backup
-        if old is None or not self._desk.is_own_idea or ours is None or old[1:] == ours[1:]:
+        if old is None or not self._desk.is_own_idea or ours is None or self._is_ours(old):
             return []
         self.core.steps.clear()  # nothing was written yet
         self._others_items = len(old)
         return [Cue.TROUBLE, Notice.MISSION_TAKEN]
+
+    def _is_ours(self, items: Sequence[MissionItem]) -> bool:
+        """Return whether a list as it goes over the wire is our mission."""
+        return self.core.has_items(self.core.autopilot.lists.form.own_items(items))
 
     def mission_read(self) -> Sequence[Signal]:
         """Look at the vehicle's mission, which was read again."""
         ours, items = self.core.ours, self._lists.mission_items
         if ours is None:
             return [Notice.MISSION_HEARD]
-        if items[1:] == ours[1:]:
+        if self._is_ours(items):
             return []
         self._others_items = len(items)
         return [Notice.MISSION_TAKEN, Notice.MISSION_HEARD]

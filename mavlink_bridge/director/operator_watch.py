@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.director.takeover import Takeover
 from mavlink_bridge.mavlink import messages as m
-from mavlink_bridge.mavlink.rover import Mode, mode_of
+from mavlink_bridge.mavlink.modes import ARDUPILOT_MODES, Modes
 from missions.items import Command
 
 if TYPE_CHECKING:
@@ -29,21 +29,23 @@ _ON_ITS_WAY_S = 0.5
 _CLICK_S = 1.5
 """A ground station's GUIDED within this time of its go-to click is part of the click."""
 
+_CRITICAL = 5  # MAV_STATE_CRITICAL
+
 _LATE_CLICK_S = 3.0
 """A click that came to us at once may come to the vehicle so much later, by a radio that repeats it; chosen, not measured."""
 
-_MODE_OF_COMMAND = {
-    Command.NAV_RETURN_TO_LAUNCH: Mode.RTL,
-    Command.NAV_LOITER_UNLIM: Mode.HOLD,
-    Command.MISSION_START: Mode.AUTO,
-}
-"""Commands that ArduPilot answers with a change of mode."""
-
 
 class OperatorWatch:
-    """Knows in which mode the vehicle is by our doing, and tells what is not."""
+    """Knows in which mode the vehicle is by our doing, and tells what is not.
+
+    Attributes
+    ----------
+    modes : Modes
+        Those of the vehicle's autopilot.
+    """
 
     def __init__(self) -> None:
+        self.modes: Modes = ARDUPILOT_MODES
         self._ours: int | None = None
         self._fading: frozenset[int] = frozenset()
         self._fading_until_s = math.inf
@@ -88,7 +90,7 @@ class OperatorWatch:
             return None
         is_armed = bool(heartbeat.base_mode & m.ModeFlag.SAFETY_ARMED)
         if self._was_armed and not is_armed:
-            return Takeover(None)
+            return Takeover(None, shows_failsafe=self.shows_failsafe(heartbeat))
         self._was_armed = is_armed
         mode = heartbeat.custom_mode
         if mode == self._ours:
@@ -97,12 +99,17 @@ class OperatorWatch:
         is_stale = mode in self._fading and now_s <= self._fading_until_s
         if is_stale or self.is_late_click(heartbeat, now_s):
             return None
-        return Takeover(mode)
+        return Takeover(mode, shows_failsafe=self.shows_failsafe(heartbeat))
+
+    @staticmethod
+    def shows_failsafe(heartbeat: m.Heartbeat) -> bool:
+        """Return whether a heartbeat says MAV_STATE_CRITICAL."""
+        return heartbeat.system_status == _CRITICAL
 
     def is_late_click(self, heartbeat: m.Heartbeat, now_s: float) -> bool:
         """Return whether a click has set the vehicle going after our HOLD, having come to it by a slower way than to us."""
-        is_guided = heartbeat.custom_mode == Mode.GUIDED
-        return is_guided and self._ours == Mode.HOLD and now_s - self._clicked_s <= _LATE_CLICK_S
+        is_guided = heartbeat.custom_mode == self.modes.guided
+        return is_guided and self._ours == self.modes.hold and now_s - self._clicked_s <= _LATE_CLICK_S
 
     def overhear(self, frame: Frame, system: int, component: int, now_s: float) -> Takeover | None:
         """Return what somebody asks of the vehicle; None where it takes nothing out of our hands."""
@@ -115,12 +122,21 @@ class OperatorWatch:
             return None
         if _is_disarming(message):
             return Takeover(None, asker)
-        mode = _mode_asked_for(message)
-        if mode is None or (mode == Mode.AUTO and self._ours == Mode.AUTO):
+        mode = self._mode_asked_for(message)
+        if mode is None or (mode == self._ours == self.modes.mission):
             return None
-        if mode == Mode.GUIDED and now_s - self._clicked_s <= _CLICK_S:
+        if mode == self.modes.guided and now_s - self._clicked_s <= _CLICK_S:
             return None
         return Takeover(mode, asker)
+
+    def _mode_asked_for(self, message: Message) -> int | None:
+        if isinstance(message, m.SetMode):
+            return message.custom_mode
+        if not isinstance(message, m.CommandLong | m.CommandInt):
+            return None
+        if message.command == Command.DO_SET_MODE:
+            return self.modes.asked_for(message.param2, message.param3)
+        return self.modes.of_commands.get(message.command)
 
 
 def _is_disarming(message: Message) -> bool:
@@ -129,13 +145,3 @@ def _is_disarming(message: Message) -> bool:
         and message.command == Command.COMPONENT_ARM_DISARM
         and message.param1 == 0
     )
-
-
-def _mode_asked_for(message: Message) -> int | None:
-    if isinstance(message, m.SetMode):
-        return message.custom_mode
-    if not isinstance(message, m.CommandLong | m.CommandInt):
-        return None
-    if message.command == Command.DO_SET_MODE:
-        return mode_of(message.param2)
-    return _MODE_OF_COMMAND.get(message.command)  # type: ignore[call-overload, no-any-return]

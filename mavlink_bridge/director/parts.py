@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.director.adopter import Adopter
 from mavlink_bridge.director.drive_supervisor import DriveSupervisor
+from mavlink_bridge.director.fence_guard import FenceGuard
 from mavlink_bridge.director.halter import Halter
 from mavlink_bridge.director.hand_over import HandOver
 from mavlink_bridge.director.hold_watch import HoldWatch
@@ -58,7 +59,10 @@ class Parts:
         )
         self.writer: MissionWriter = MissionWriter(core, self.lists, self.halter, self.desk)
         self.adopter: Adopter = Adopter(core, self.lists, self.halter, self.driver, self.desk, notes)
-        self.starter: Starter = Starter(core, self.lists, self.halter, self.driver, self.desk, self.adopter)
+        self.fence: FenceGuard = FenceGuard(core)
+        self.starter: Starter = Starter(
+            core, self.lists, self.halter, self.driver, self.desk, self.adopter, self.fence
+        )
         self.caller: HomeCaller = HomeCaller(core, self.inbox, self.halter, self.keeper)
         self.hand_over: HandOver = HandOver(core, self.halter, self.driver, self.caller)
         self.guard: IdentityGuard = IdentityGuard(core, self.learner, self.halter, self.inbox, self.writer)
@@ -71,6 +75,7 @@ class Parts:
             self.driver,
             self.hold_watch,
             self.lists,
+            self.fence,
             self.obstacles,
             self.inbox,
             self.adopter,
@@ -82,6 +87,7 @@ class Parts:
             self.driver,
             self.learner,
             self.lists,
+            self.fence,
             self.obstacles,
             self.adopter,
             self.caller,

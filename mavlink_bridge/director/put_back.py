@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.mavlink.messages import Heartbeat, ModeFlag
-from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.protocol.mode_switch import set_mode
 from mavlink_bridge.protocol.table_machine import Outbox
 
@@ -57,7 +56,7 @@ class PutBack(Outbox):
     @property
     def is_left_in_auto(self) -> bool:
         """Whether the vehicle was last shown disarmed and in AUTO all the same."""
-        return self._mode == Mode.AUTO and self._is_armed is False
+        return self._mode == self._peer.autopilot.modes.mission and self._is_armed is False
 
     @property
     def was_needed(self) -> bool:
@@ -80,7 +79,8 @@ class PutBack(Outbox):
         elif self._sends:
             self.is_done = now_s >= self._sent_s + _STALE_S
         else:
-            self.is_done = self._mode not in (Mode.AUTO, Mode.HOLD)
+            modes = self._peer.autopilot.modes
+            self.is_done = self._mode not in (modes.mission, modes.hold)
 
     def handle_timer(self, now_s: float) -> None:
         """Take notice that time has passed."""
@@ -92,5 +92,5 @@ class PutBack(Outbox):
             return
         self._until_s = now_s + _PATIENCE_S
         self._sent_s = now_s
-        self._send(set_mode(self._peer, Mode.HOLD, self._sends))
+        self._send(set_mode(self._peer, self._peer.autopilot.modes.hold, self._sends))
         self._sends += 1

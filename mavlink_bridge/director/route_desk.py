@@ -11,13 +11,14 @@ from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.fixes import no_fix
 from mavlink_bridge.director.grounds import Grounds
 from mavlink_bridge.director.plan_task import AtHomeError, HomeTask, PlanTask
-from mavlink_bridge.director.states import Cue, Notice, Signal, State
+from mavlink_bridge.director.states import ON_VEHICLE, Cue, Notice, Signal, State
 from missions.checking.from_here import from_here
 from missions.checking.obstacle_ahead import obstacle_across
 from missions.checking.recheck import Recheck, recheck
-from missions.errors import MissionError
+from missions.errors import MissionError, SituationError
 from missions.fence import Obstacles
 from missions.geo import distance_m
+from missions.items import Command
 from missions.planning.marking import unpromised
 from missions.promise import asked_clearance
 from missions.words import metres
@@ -49,7 +50,7 @@ _AT_ONCE_S = 1.0  # at the soonest, where nothing seems to stand in it any more:
 _MAKING_A_ROUTE = frozenset({State.HOLDING, State.PLANNING})
 """States whose plan is yet to come: it is made around the fence as it is then."""
 
-_WITH_A_ROUTE = frozenset({State.PROPOSED, State.VERIFIED, State.STARTING, State.DRIVING})
+_WITH_A_ROUTE = frozenset({State.PROPOSED, *ON_VEHICLE, State.STARTING, State.DRIVING})
 """States in which a route is left at once for an obstacle; an upload is ended first, and looked at then."""
 
 
@@ -122,9 +123,26 @@ class RouteDesk(Part):
         """Take a plan, or why there is none; what is not waited for any more is left."""
         if task is not self.pending:
             return []
-        refused = unpromised(made) if self.core.orders.upload and not isinstance(made, MissionError) else None
-        self._made = refused or made
+        self._made = (
+            made
+            if isinstance(made, MissionError)
+            else self._refused_end(made) or self._unpromised(made) or made
+        )
         return self._go_on(now_s)
+
+    def _unpromised(self, made: Plan) -> MissionError | None:
+        return unpromised(made) if self.core.orders.upload else None
+
+    def _refused_end(self, made: Plan) -> MissionError | None:
+        """Return why a mission is not driven whose end looks like somebody's taking over; None where it does not."""
+        core = self.core
+        ends_so = any(item.command == Command.NAV_RETURN_TO_LAUNCH for item in made.items)
+        if not (ends_so and core.orders.drive and core.autopilot.driving.ends_in_hold):
+            return None
+        return SituationError(
+            f"{core.autopilot.kind} leaves its mission mode for an RTL item, which cannot be told from an operator who takes over; nothing was written: "
+            "plan the way home with --return, or upload it without --drive and start it yourself"
+        )
 
     def _go_on(self, now_s: float) -> Sequence[Signal]:
         """Have a plan made around what is known by now, and go on with the one that was."""

@@ -1,4 +1,7 @@
-"""The part of the director that sets the vehicle going on its verified mission: nothing else arms or switches to AUTO."""
+"""The part of the director that sets the vehicle going on its verified mission: nothing else arms or switches to AUTO.
+
+How its mission is begun at the first item, and whether before or after the change of mode, stands in its autopilot's table (`mavlink.drive_rules`).
+"""
 
 from __future__ import annotations
 
@@ -7,11 +10,11 @@ from typing import TYPE_CHECKING
 from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.halter import STILL_MPS
-from mavlink_bridge.director.states import Cue, Signal, State
+from mavlink_bridge.director.states import ON_VEHICLE, Cue, Signal, State
 from mavlink_bridge.director.steps import Step, step
 from mavlink_bridge.errors import OutcomeError, RefusedError
 from mavlink_bridge.mavlink import messages as m
-from mavlink_bridge.mavlink.rover import Mode, mode_name
+from mavlink_bridge.mavlink.drive_rules import FirstItem
 from mavlink_bridge.protocol.command import SendCommand
 from mavlink_bridge.protocol.mode_switch import AwaitHeartbeat, ModeSwitch
 from mavlink_bridge.protocol.standstill import AwaitStandstill
@@ -22,6 +25,7 @@ if TYPE_CHECKING:
 
     from mavlink_bridge.director.adopter import Adopter
     from mavlink_bridge.director.drive_supervisor import DriveSupervisor
+    from mavlink_bridge.director.fence_guard import FenceGuard
     from mavlink_bridge.director.halter import Halter
     from mavlink_bridge.director.list_watch import ListWatch
     from mavlink_bridge.director.route_desk import RouteDesk
@@ -31,6 +35,10 @@ START_YOURSELF = "arm it, then give the target again (or run the command again);
 
 _MOVED_M = 1.0
 """A vehicle that stands within this of where its route begins counts as not having moved since it was planned."""
+
+
+_TIMES = 3
+"""So often a message is sent that nothing answers: it changes nothing where it came before. Chosen."""
 
 
 class Starter(Part):
@@ -50,8 +58,10 @@ class Starter(Part):
         driver: DriveSupervisor,
         desk: RouteDesk,
         adopter: Adopter,
+        fence: FenceGuard,
     ) -> None:
         super().__init__(core)
+        self._fence = fence
         self._lists = lists
         self._halter = halter
         self._driver = driver
@@ -69,7 +79,8 @@ class Starter(Part):
     def begin_on_word(self) -> Sequence[Signal]:
         """Return that a person gives the word to drive: now, or once the mission is verified."""
         self.is_told = True
-        return [Cue.DRIVE] if self.core.state is State.VERIFIED and self.may_begin else []
+        is_ready = self.core.state in ON_VEHICLE and not self._fence.is_waiting
+        return [Cue.DRIVE] if is_ready and self.may_begin else []
 
     def begin(self, now_s: float) -> Sequence[Signal]:
         """Begin the drive; a vehicle that still rolls to where it was expected to stand is waited for."""
@@ -100,10 +111,13 @@ class Starter(Part):
         if self._lists.has_suspects or is_waiting or not core.operator.is_ours(situation.mode):
             self.look_once_more(now_s)
             return []
+        if not self._fence.counts(now_s):
+            self._adopter.forget()
+            return [Cue.RENEWED]
         if not situation.armed and not core.orders.arm:
             return self._refuse_unarmed(now_s)
         if (
-            situation.mode != Mode.HOLD
+            situation.mode != core.modes.hold
         ):  # it starts from HOLD: any other mode is then known for somebody else's
             halter.command_hold(now_s)
             self.look_once_more(now_s)
@@ -129,8 +143,9 @@ class Starter(Part):
     def _refuse_unarmed(self, now_s: float) -> Sequence[Signal]:
         """Leave the mode of a disarmed vehicle alone: in AUTO, arming it would drive off."""
         situation = self.core.situation
-        mode = mode_name(situation.mode)
-        drives_off = ": arming it makes it drive" if situation.mode == Mode.AUTO else ""
+        modes = self.core.modes
+        mode = modes.words(situation.mode)
+        drives_off = ": arming it makes it drive" if situation.mode == modes.mission else ""
         trouble = OutcomeError(
             f"the mission is verified on the vehicle, which is not armed and does not drive: its mode was not changed ({mode}{drives_off})",
             advice=START_YOURSELF,
@@ -148,7 +163,7 @@ class Starter(Part):
     def _armed(self, machine: SendCommand, now_s: float) -> Sequence[Signal]:
         if not _is_accepted(machine):
             return self._refused(machine, now_s)
-        if self.core.situation.mode == Mode.HOLD:
+        if self.core.situation.mode == self.core.modes.hold:
             self._switch_to_auto(now_s)
         else:  # a heartbeat from before our HOLD, overtaken on the way, or an operator: the next one tells which
             self.look_once_more(now_s)
@@ -158,14 +173,22 @@ class Starter(Part):
         core, situation = self.core, self.core.situation
         assert core.peer is not None
         self._halter.may_be_in_auto = True
-        core.operator.expect(Mode.AUTO, {situation.mode}, is_armed=bool(situation.armed))
-        core.steps.run([step(ModeSwitch(core.peer, Mode.AUTO), self._in_auto)], now_s)
+        core.operator.expect(core.modes.mission, {situation.mode}, is_armed=bool(situation.armed))
+        if self._first_item is FirstItem.BY_MESSAGE_BEFORE:
+            core.send(*(m.MissionSetCurrent(core.peer.system, core.peer.component, 0) for _ in range(_TIMES)))
+        core.steps.run([step(ModeSwitch(core.peer, core.modes.mission), self._in_auto)], now_s)
+
+    @property
+    def _first_item(self) -> FirstItem:
+        return self.core.autopilot.driving.first_item
 
     def _in_auto(self, machine: ModeSwitch, now_s: float) -> Sequence[Signal]:
         if not machine.is_granted:
             self._driver.stand_by()
             return self._failed("DO_SET_MODE", machine.result_name, "", now_s)
         self.core.operator.settle(now_s)
+        if self._first_item is not FirstItem.BY_COMMAND_IN_MISSION:
+            return [Cue.STARTED]
         # Only after the mode change: before it, in HOLD, ArduPilot reports internal errors.
         first = self._command(Command.DO_SET_MISSION_CURRENT, self._started, param2=1.0)
         self.core.steps.run([first], now_s)

@@ -22,6 +22,9 @@ class State(StrEnum):
     UPLOADING = auto()
     WITHDRAWING = auto()  # taken over in mid-upload: no half mission is left behind, nothing more is done
     VERIFIED = auto()  # the mission is on the vehicle
+    ENFORCED = (
+        auto()
+    )  # and its fence counts, as far as it will; on ArduPilot a fence counts at once, and this is passed over
     STARTING = auto()  # looking once more, arming where asked, switching to AUTO, to the first item
     DRIVING = auto()
     ARRIVED = auto()
@@ -48,6 +51,8 @@ class Cue(StrEnum):
     NO_PLAN = auto()
     UPLOAD = auto()
     UPLOAD_VERIFIED = auto()
+    ENFORCED = auto()  # the vehicle's fence counts by now, and it takes the mission
+    RENEWED = auto()  # its fence is another one, and does not count yet
     DRIVE = auto()
     ADOPTED = auto()  # the vehicle is on a drive that an earlier run has begun
     RESUMED = auto()  # our mission is being driven, though we did not start it just now
@@ -86,6 +91,8 @@ class Notice(StrEnum):
     GONE_ON = auto()  # on the route, as far as was better than a HOLD at once
     HOLD_ASKED = auto()  # by a person at a page of ours, who has let go of everything else with it
     HOLD_ENDED = auto()  # taken, or not
+    DRIVEN_IN_HOLD = auto()  # somebody sends the vehicle to a place in the mode that stops
+    MISSION_INVALID = auto()  # the vehicle does not drive our mission any more, and holds
     UPLOAD_ENDED = auto()  # well or badly; the state has moved already
     DRIVE_ENDED = auto()
 
@@ -140,8 +147,25 @@ TRANSITIONS: dict[State, dict[Cue, State]] = {
         Cue.TROUBLE: State.LET_GO,
         Cue.GIVE_UP: State.FAILED,
     },
-    State.VERIFIED: {**_OURS, Cue.DRIVE: State.STARTING, Cue.RESUMED: State.DRIVING, Cue.END: State.DONE},
-    State.STARTING: {**_OURS, Cue.STARTED: State.DRIVING, Cue.TROUBLE: State.VERIFIED},
+    State.VERIFIED: {
+        **_OURS,
+        Cue.ENFORCED: State.ENFORCED,
+        Cue.DRIVE: State.STARTING,
+        Cue.RESUMED: State.DRIVING,
+        Cue.END: State.DONE,
+    },
+    State.ENFORCED: {
+        **_OURS,
+        Cue.RENEWED: State.VERIFIED,
+        Cue.DRIVE: State.STARTING,
+        Cue.RESUMED: State.DRIVING,
+    },
+    State.STARTING: {
+        **_OURS,
+        Cue.STARTED: State.DRIVING,
+        Cue.RENEWED: State.VERIFIED,
+        Cue.TROUBLE: State.VERIFIED,
+    },
     State.DRIVING: {**_OURS, Cue.REACHED: State.ARRIVED},
     State.ARRIVED: {**_OURS, Cue.END: State.DONE},
     State.LET_GO: {**_ALWAYS, **_WANTED},
@@ -161,6 +185,9 @@ TRANSITIONS: dict[State, dict[Cue, State]] = {
     State.DONE: {},
     State.FAILED: {},
 }
+
+ON_VEHICLE = frozenset({State.VERIFIED, State.ENFORCED})
+"""States in which our mission is on the vehicle, and nobody drives it."""
 
 AT_WORK = frozenset(
     {

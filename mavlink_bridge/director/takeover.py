@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import TYPE_CHECKING
 
-from mavlink_bridge.mavlink.rover import mode_name
+from mavlink_bridge.mavlink.incident_rules import DISARMING
 
-DISARMING = -1
-"""Stands among modes for disarming."""
+if TYPE_CHECKING:
+    from mavlink_bridge.mavlink.modes import Modes
 
 
 class Doer(StrEnum):
@@ -33,10 +34,13 @@ class Takeover:
         The mode that the vehicle is in, or was asked to go to; None: it was disarmed.
     asker : tuple of int, optional
         System and component whose command was overheard; None: the vehicle's heartbeat tells of it.
+    shows_failsafe : bool
+        Whether that heartbeat says MAV_STATE_CRITICAL.
     """
 
     mode: int | None
     asker: tuple[int, int] | None = None
+    shows_failsafe: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,14 +55,19 @@ class Cause:
         When it was heard.
     modes : frozenset of int
         The modes that it may answer with.
+    needs_heartbeat : bool
+        Whether the heartbeat has to show a failsafe, too.
     """
 
     reason: str
     heard_s: float
     modes: frozenset[int]
+    needs_heartbeat: bool = False
 
     def explains(self, takeover: Takeover) -> bool:
         """Return whether the autopilot answers it with just that."""
+        if self.needs_heartbeat and not takeover.shows_failsafe:
+            return False
         return (DISARMING if takeover.mode is None else takeover.mode) in self.modes
 
 
@@ -81,7 +90,7 @@ class Account:
     reason: str | None
 
 
-def account_of(takeover: Takeover, cause: Cause | None, heard: Cause | None) -> Account:
+def account_of(takeover: Takeover, cause: Cause | None, heard: Cause | None, modes: Modes) -> Account:
     """Return what can be said of a takeover.
 
     Parameters
@@ -92,15 +101,17 @@ def account_of(takeover: Takeover, cause: Cause | None, heard: Cause | None) -> 
         What the autopilot answers with just that, heard just before.
     heard : Cause, optional
         What else was heard just before; it explains nothing for certain.
+    modes : Modes
+        The modes of the vehicle's autopilot.
     """
     if takeover.asker is not None:
         who = f"system {takeover.asker[0]} component {takeover.asker[1]}"
-        return Account(f"{who} {_done(takeover)}", Doer.GROUND_STATION, who)
+        return Account(f"{who} {_done(takeover, modes)}", Doer.GROUND_STATION, who)
     if cause is not None:
         return Account(
-            f"the autopilot {_done(takeover)} itself: {cause.reason}", Doer.AUTOPILOT, cause.reason
+            f"the autopilot {_done(takeover, modes)} itself: {cause.reason}", Doer.AUTOPILOT, cause.reason
         )
-    what = "was disarmed" if takeover.mode is None else f"went to {mode_name(takeover.mode)}"
+    what = "was disarmed" if takeover.mode is None else f"went to {modes.words(takeover.mode)}"
     before = f" ({heard.reason} was heard just before)" if heard is not None else ""
     return Account(
         f"the vehicle {what} by itself or by somebody not heard on this link, such as an RC transmitter{before}",
@@ -109,7 +120,7 @@ def account_of(takeover: Takeover, cause: Cause | None, heard: Cause | None) -> 
     )
 
 
-def _done(takeover: Takeover) -> str:
+def _done(takeover: Takeover, modes: Modes) -> str:
     if takeover.mode is None:
         return "disarmed the vehicle"
-    return f"switched the vehicle to {mode_name(takeover.mode)}"
+    return f"switched the vehicle to {modes.words(takeover.mode)}"

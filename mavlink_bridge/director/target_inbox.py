@@ -58,7 +58,7 @@ class TargetInbox(Part):
         core = self.core
         if core.identity is None or core.state in clash.CLASHES:
             return []
-        target = self._heard.look(frame, core.before, core.situation, now_s, core.identity)
+        target = self._heard.look(frame, core.before, core.situation, now_s, core.identity, core.modes)
         is_to_us = is_command_to(frame, core.identity, core.situation.system)
         if target is None:
             if is_to_us:
@@ -143,7 +143,7 @@ class TargetInbox(Part):
     def _warn_of_straight_line(self, target: Target, now_s: float) -> None:
         """Warn at once: a go-to click makes the vehicle drive straight, before any plan exists."""
         situation = self.core.situation
-        if not situation.armed or not target.sets_going(situation.mode):
+        if not situation.armed or not target.sets_going(situation.mode, self.core.modes):
             return
         found = straight_line(situation, self.core.orders.request, target.position)
         if found is not None and not found.holds:

@@ -10,11 +10,11 @@ from mavlink_bridge.director.addressed import is_command_to
 from mavlink_bridge.director.orders import TargetSource
 from mavlink_bridge.fold import TargetMessage
 from mavlink_bridge.mavlink import messages as m
-from mavlink_bridge.mavlink.rover import Mode
 from missions.geo import distance_m, from_e7
 
 if TYPE_CHECKING:
     from mavlink_bridge.mavlink.messages import Frame
+    from mavlink_bridge.mavlink.modes import Modes
     from missions.geo import LatLon
     from missions.situation import Situation
 
@@ -82,10 +82,10 @@ class Target:
         """Whether it may set the vehicle going, straight, before any plan exists."""
         return self.source in _CLICKS and not self.is_to_us
 
-    def sets_going(self, mode: int | None) -> bool:
+    def sets_going(self, mode: int | None, modes: Modes) -> bool:
         """Return whether it has made a vehicle in this mode drive straight to it."""
         is_command = self.source is TargetSource.REPOSITION
-        return self.is_click and (is_command or mode == Mode.GUIDED)
+        return self.is_click and (is_command or (mode is not None and mode == modes.guided))
 
 
 class TargetWatch:
@@ -104,10 +104,16 @@ class TargetWatch:
         self._commands_count_anew = False
 
     def look(
-        self, frame: Frame, before: Situation, after: Situation, now_s: float, identity: tuple[int, int]
+        self,
+        frame: Frame,
+        before: Situation,
+        after: Situation,
+        now_s: float,
+        identity: tuple[int, int],
+        modes: Modes,
     ) -> Target | None:
         """Return the target that a frame brought, None where it brought none that is heeded."""
-        target = self._asked(frame, before, after, identity) or self._echoed(frame, after)
+        target = self._asked(frame, before, after, identity) or self._echoed(frame, after, modes)
         if target is None or target.source not in self._sources:
             return None
         is_same = is_same_place(self._newest, target.position)
@@ -138,10 +144,12 @@ class TargetWatch:
             asker=(frame.system, frame.component),
         )
 
-    def _echoed(self, frame: Frame, after: Situation) -> Target | None:
+    def _echoed(self, frame: Frame, after: Situation, modes: Modes) -> Target | None:
         """Take the vehicle's echo for a target: in GUIDED only, in AUTO it may be a corner of its own avoidance."""
         message = frame.message
-        if not isinstance(message, m.PositionTargetGlobalInt) or after.mode != Mode.GUIDED:
+        if not isinstance(message, m.PositionTargetGlobalInt) or modes.guided is None:
+            return None
+        if after.mode != modes.guided:
             return None
         if frame.system != after.system or (message.lat_int, message.lon_int) == (0, 0):
             return None

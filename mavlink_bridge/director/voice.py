@@ -64,7 +64,7 @@ class Voice:
         """Report what is known of the vehicle."""
         fence, mission, pose = situation.fence, situation.mission, situation.pose
         zones = len(fence.value.zones) if fence else 0
-        items = mission.value.item_count() if mission else 0
+        items = mission.value.item_count(has_home=situation.ardupilot is not False) if mission else 0
         seen = (
             f"fence of {counted(zones, 'zone')}" if fence else "no fence seen",
             f"mission of {counted(items, 'item')}" if mission else "no mission seen",

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from mavlink_bridge.logbook.track import TrackFix
-    from mavlink_bridge.mavlink.autopilots import Texts
+    from mavlink_bridge.mavlink.incident_rules import IncidentRules
     from mavlink_bridge.mavlink.messages import FenceStatus
     from missions.situation import Situation
 
@@ -56,9 +56,9 @@ class FenceRecord:
         if message.breach_count > (known or 0) and (known is not None or message.breach_status):
             self.breaches.append(ReportedBreach(now_s, message.breach_count, message.breach_type))
 
-    def take_text(self, text: str, texts: Texts, now_s: float) -> None:
+    def take_text(self, text: str, rules: IncidentRules, now_s: float) -> None:
         """Take a text of the vehicle, where a text is how the autopilot reports that it left the fence."""
-        if texts.breach is not None and re.match(texts.breach, text, re.IGNORECASE):
+        if not rules.counts_breaches and re.match(rules.breach_text, text, re.IGNORECASE):
             self.breaches.append(ReportedBreach(now_s, len(self.breaches) + 1, _BOUNDARY))
 
     def measure(

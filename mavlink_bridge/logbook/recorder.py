@@ -224,8 +224,8 @@ class VehicleRecorder:
         elif isinstance(message, m.FenceStatus):
             self._fence.take_status(message, now_s)
         elif isinstance(message, m.Statustext):
-            texts = autopilot_of(ardupilot=self.situation.ardupilot).texts
-            self._fence.take_text(message.text, texts, now_s)
+            rules = autopilot_of(ardupilot=self.situation.ardupilot).incidents
+            self._fence.take_text(message.text, rules, now_s)
 
     def _take_item(self, item: int) -> None:
         if 0 < item < self._item:  # begun anew, or jumped back: another drive

@@ -9,11 +9,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from mavlink_bridge.mavlink.drive_rules import (
+    ARDUPILOT_DRIVING,
+    ARDUPILOT_FENCE,
+    PX4_DRIVING,
+    PX4_FENCE,
+    DriveRules,
+    FenceRules,
+)
+from mavlink_bridge.mavlink.incident_rules import ARDUPILOT_INCIDENTS, PX4_INCIDENTS, IncidentRules
 from mavlink_bridge.mavlink.messages import Autopilot, MissionResult, MissionType
 from mavlink_bridge.mavlink.modes import ARDUPILOT_MODES, PX4_MODES, Modes
 from mavlink_bridge.mavlink.px4_form import PX4_1_17_FORM, PX4_1_18_FORM
 from mavlink_bridge.mavlink.stored_form import ARDUPILOT_FORM, StoredForm
 from missions.firmware import Firmware
+from missions.vehicle.asked_parameters import ASKED_NAMES, CHECKED_NAMES, PX4_ASKED_NAMES
 from missions.vehicle.item_limit import MISSION_ITEMS
 
 if TYPE_CHECKING:
@@ -77,11 +87,15 @@ class ParameterRules:
     ----------
     is_bytewise : bool
         Whether the float's bits hold a whole number; otherwise it is cast. A PARAM_SET of another type than the parameter's is then not answered.
+    asked, checked : tuple of str
+        Which are asked for where a mission is to be planned and driven, and where any mission is checked. A name that is missing takes most of a second to find out.
     left_out : frozenset of str
         What it sends among its parameters that is none.
     """
 
     is_bytewise: bool
+    asked: tuple[str, ...]
+    checked: tuple[str, ...]
     left_out: frozenset[str] = frozenset()
 
 
@@ -99,15 +113,12 @@ class Texts:
         What a text that a mission was stored begins with; None where there is none.
     busy : str, optional
         What a text begins with that is all the answer to a download request while another transfer runs; None where DENIED is the answer.
-    breach : str, optional
-        What a text begins with that reports that the vehicle left its fence; None where FENCE_STATUS does.
     """
 
     noise: str
     own_state: str
     list_stored: str | None = None
     busy: str | None = None
-    breach: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,12 +139,16 @@ class AutopilotTable:
         How it encodes parameters.
     texts : Texts
         Its texts.
+    driving : DriveRules
+        How it is set driving and stopped.
+    fence : FenceRules
+        When a new fence counts.
+    incidents : IncidentRules
+        How it tells of breaches and failsafes.
     goes_to_position_targets, goes_to_guided_items : bool
         Whether SET_POSITION_TARGET_GLOBAL_INT, or a mission item with ``current`` 2, makes it drive there. DO_REPOSITION does on all.
-    new_fence, new_fence_armed : str
-        What a person should know before a new fence is sent, at any time and to an armed vehicle; empty where there is nothing.
-    is_driven : bool
-        Whether it is set driving and watched: that takes a model of how it drives, and of how it stops.
+    new_fence_armed : str
+        What a person should know before a new fence is sent to an armed vehicle; empty where there is nothing.
     measured_from : Firmware, optional
         The oldest version of which this was measured; None where versions do not differ here.
     """
@@ -144,11 +159,12 @@ class AutopilotTable:
     lists: ListRules
     parameters: ParameterRules
     texts: Texts
+    driving: DriveRules
+    fence: FenceRules
+    incidents: IncidentRules
     goes_to_position_targets: bool
     goes_to_guided_items: bool
-    new_fence: str = ""
     new_fence_armed: str = ""
-    is_driven: bool = False
     measured_from: Firmware | None = None
 
     @property
@@ -186,7 +202,7 @@ ARDUPILOT = AutopilotTable(
         fence_bytes=672,
         has_storage_parameters=True,
     ),
-    parameters=ParameterRules(is_bytewise=False),
+    parameters=ParameterRules(is_bytewise=False, asked=ASKED_NAMES, checked=CHECKED_NAMES),
     texts=Texts(
         noise=(
             r"flight plan received|fence indexed|(rally points? received)|got mission_request"
@@ -199,13 +215,15 @@ ARDUPILOT = AutopilotTable(
         ),
         list_stored="flight plan received",
     ),
+    driving=ARDUPILOT_DRIVING,
+    fence=ARDUPILOT_FENCE,
+    incidents=ARDUPILOT_INCIDENTS,
     goes_to_position_targets=True,
     goes_to_guided_items=True,
     new_fence_armed=(
         "the vehicle is armed, and a new fence takes effect at once: if it stands outside and FENCE_ENABLE is 1, it does what "
         "FENCE_ACTION says (1: RTL, it drives straight home)"
     ),
-    is_driven=True,
 )
 
 
@@ -227,7 +245,12 @@ def _px4(name: str, form: StoredForm) -> AutopilotTable:
             # Of missions a board holds 500 or 1000, compiled in (read), the simulator 10000: no parameter tells.
             most_items={MissionType.FENCE: 64, MissionType.RALLY: 32},
         ),
-        parameters=ParameterRules(is_bytewise=True, left_out=frozenset({"_HASH_CHECK"})),
+        parameters=ParameterRules(
+            is_bytewise=True,
+            asked=PX4_ASKED_NAMES,
+            checked=PX4_ASKED_NAMES,
+            left_out=frozenset({"_HASH_CHECK"}),
+        ),
         texts=Texts(
             noise=(
                 r"mission finished|takeoff detected|landing detected|armed by|disarmed by|gcs connection|ready for takeoff"
@@ -235,14 +258,12 @@ def _px4(name: str, form: StoredForm) -> AutopilotTable:
             ),
             own_state=r"preflight|arming denied|battery|ekf|gps|compass|mag|baro|accel|gyro|switching to|\[\w+\]|.*\bfailsafe\b|rtl",
             busy="mission download request ignored",
-            breach="geofence: (approaching or outside|exceeding maximum distance)",
         ),
+        driving=PX4_DRIVING,
+        fence=PX4_FENCE,
+        incidents=PX4_INCIDENTS,
         goes_to_position_targets=False,
         goes_to_guided_items=False,
-        new_fence=(
-            "PX4 accepts a fence and still does not enforce a zone that has home, or the armed rover, on its forbidden side, and none before about 0.1 s a "
-            'vertex have passed; it says so by text only ("Geofence invalid…"), which is not watched here yet'
-        ),
         measured_from=Firmware(1, 17, 0),
     )
 

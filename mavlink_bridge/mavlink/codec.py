@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from mavlink_bridge.mavlink.echoes import SentFrames
-from mavlink_bridge.mavlink.messages import MESSAGES, Frame, Message, MissionCurrent
+from mavlink_bridge.mavlink.messages import (
+    MESSAGES,
+    Frame,
+    Message,
+    MissionAck,
+    MissionCount,
+    MissionCurrent,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Hashable
@@ -22,52 +29,54 @@ _MOST_SOURCES = 64
 """Receive buffers that are kept: twice as many as there are sources that are answered."""
 
 
-class _MissionCurrent(dialect.MAVLink_mission_current_message):  # type: ignore[misc]  # pymavlink ships no types
-    """MISSION_CURRENT with the ids that MAVLink's common.xml has and ArduPilot's own does not: extension fields, after all others.
+def _extended(parent: Any, names: tuple[str, ...]) -> Any:  # noqa: ANN401 - pymavlink ships no types
+    """Return pymavlink's class of a message with the uint32 fields that MAVLink's common.xml has and ArduPilot's own does not: extensions, after all others.
 
     Only what is sent and where fields stand comes from here; pymavlink reads what it knows itself, `to_frame` the rest.
     """
+    own = tuple(parent.fieldnames)
 
-    _IDS = ("mission_id", "fence_id", "rally_points_id")
-    _parent = dialect.MAVLink_mission_current_message
-    fieldnames: ClassVar = [*_parent.fieldnames, *_IDS]
-    ordered_fieldnames: ClassVar = [*_parent.ordered_fieldnames, *_IDS]
-    fieldtypes: ClassVar = [*_parent.fieldtypes, *["uint32_t"] * len(_IDS)]
-    orders: ClassVar = [*_parent.orders, *range(len(_parent.orders), len(fieldnames))]
-    lengths: ClassVar = [*_parent.lengths, *[1] * len(_IDS)]
-    array_lengths: ClassVar = [*_parent.array_lengths, *[0] * len(_IDS)]
-    native_format = bytearray(_parent.native_format + b"I" * len(_IDS))
-    unpacker = struct.Struct(native_format.decode())
-    ids_at = _parent.unpacker.size
+    class Extended(parent):  # type: ignore[misc]  # pymavlink ships no types
+        fieldnames: ClassVar = [*own, *names]
+        ordered_fieldnames: ClassVar = [*parent.ordered_fieldnames, *names]
+        fieldtypes: ClassVar = [*parent.fieldtypes, *["uint32_t"] * len(names)]
+        orders: ClassVar = [*parent.orders, *range(len(own), len(own) + len(names))]
+        lengths: ClassVar = [*parent.lengths, *[1] * len(names)]
+        array_lengths: ClassVar = [*parent.array_lengths, *[0] * len(names)]
+        native_format = bytearray(parent.native_format + b"I" * len(names))
+        unpacker = struct.Struct(native_format.decode())
+        defaulted = len(parent.__init__.__defaults__ or ()) + len(names)
+        """How many fields at the end have a default: extensions, and HEARTBEAT's version."""
 
-    def __init__(
-        self,
-        seq: int,
-        total: int = 0,
-        mission_state: int = 0,
-        mission_mode: int = 0,
-        mission_id: int = 0,
-        fence_id: int = 0,
-        rally_points_id: int = 0,
-    ) -> None:
-        super().__init__(seq, total, mission_state, mission_mode)
-        self.mission_id = mission_id
-        self.fence_id = fence_id
-        self.rally_points_id = rally_points_id
+        def __init__(self, *args: Any, **values: Any) -> None:  # noqa: ANN401 - as pymavlink's own
+            given = {**dict(zip(self.fieldnames, args, strict=False)), **values}
+            super().__init__(**{name: given[name] for name in own if name in given})
+            for name in names:
+                setattr(self, name, given.get(name, 0))
 
-    def pack(self, mav: Any, force_mavlink1: bool = False) -> bytes:  # noqa: ANN401, FBT001, FBT002 - pymavlink's signature
-        values = [getattr(self, name) for name in self.ordered_fieldnames]
-        packed: bytes = self._pack(
-            mav, self.crc_extra, self.unpacker.pack(*values), force_mavlink1=force_mavlink1
-        )
-        return packed
+        def pack(self, mav: Any, force_mavlink1: bool = False) -> bytes:  # noqa: ANN401, FBT001, FBT002 - pymavlink's signature
+            values = [getattr(self, name) for name in self.ordered_fieldnames]
+            packed: bytes = self._pack(
+                mav, self.crc_extra, self.unpacker.pack(*values), force_mavlink1=force_mavlink1
+            )
+            return packed
+
+    return Extended
+
+
+_IDS = {
+    dialect.MAVLink_mission_current_message: ("mission_id", "fence_id", "rally_points_id"),
+    dialect.MAVLink_mission_count_message: ("opaque_id",),
+    dialect.MAVLink_mission_ack_message: ("opaque_id",),
+}
+"""Ids of lists."""
 
 
 def _dialect_classes() -> dict[int, Any]:
     classes = dict(dialect.mavlink_map)
-    known = classes[_MissionCurrent.id]
-    if not set(_MissionCurrent._IDS) <= set(known.fieldnames):  # noqa: SLF001 - our own class
-        classes[_MissionCurrent.id] = _MissionCurrent
+    for parent, names in _IDS.items():
+        if not set(names) <= set(parent.fieldnames):
+            classes[parent.id] = _extended(parent, names)
     return classes
 
 
@@ -81,6 +90,9 @@ _DIALECT_CLASSES: dict[str, Any] = {
     if message_class.msgname in MESSAGES
 }
 
+
+_IDS_LEFT_OUT: dict[type[Message], int] = {MissionCurrent: 3, MissionCount: 1, MissionAck: 1}
+"""How many ids stand at the end of a message, which pymavlink may not read."""
 
 _WITH_ARRAYS = frozenset(
     name
@@ -220,21 +232,21 @@ def to_frame(raw: Any) -> Frame | None:  # noqa: ANN401 - pymavlink ships no typ
     message_class = MESSAGES.get(name)
     if message_class is None:
         return None
-    if message_class is MissionCurrent and not hasattr(raw, "fence_id"):
-        values = [*(getattr(raw, field) for field in raw.fieldnames), *_ids_in(raw)]
-    else:
-        values = [getattr(raw, field) for field in _FIELDS[name]]
+    values = [getattr(raw, field, 0) for field in _FIELDS[name]]
+    if (count := _IDS_LEFT_OUT.get(message_class)) and not hasattr(raw, _FIELDS[name][-1]):
+        values[-count:] = _ids_in(raw, count)
     if name in _WITH_ARRAYS:
         values = [tuple(value) if isinstance(value, list) else value for value in values]
     return Frame(raw.get_srcSystem(), raw.get_srcComponent(), message_class(*values))
 
 
-def _ids_in(raw: Any) -> tuple[int, int, int]:  # noqa: ANN401 - pymavlink ships no types
-    """Read the end of a MISSION_CURRENT's payload; MAVLink 2 leaves off what is 0 there."""
+def _ids_in(raw: Any, count: int) -> tuple[int, ...]:  # noqa: ANN401 - pymavlink ships no types
+    """Read the end of a payload; MAVLink 2 leaves off what is 0 there."""
     frame_bytes = bytes(raw.get_msgbuf())
     begin = _HEADER_BYTES_V1 if frame_bytes[0] == dialect.PROTOCOL_MARKER_V1 else _HEADER_BYTES_V2
-    payload = frame_bytes[begin : begin + frame_bytes[1]].ljust(_MissionCurrent.unpacker.size, b"\0")
-    ids: tuple[int, int, int] = struct.unpack_from("<III", payload, _MissionCurrent.ids_at)
+    size = raw.unpacker.size
+    payload = frame_bytes[begin : begin + frame_bytes[1]].ljust(size + 4 * count, b"\0")
+    ids: tuple[int, ...] = struct.unpack_from(f"<{count}I", payload, size)
     return ids
 
 

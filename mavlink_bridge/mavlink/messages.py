@@ -283,10 +283,11 @@ class MissionRequestList(Addressed):
 
 @dataclass(frozen=True, slots=True)
 class MissionCount(Addressed):
-    """MISSION_COUNT (44)."""
+    """MISSION_COUNT (44); the id changes with the list, and is 0 where the autopilot does not fill it."""
 
     count: int
     mission_type: int = 0
+    opaque_id: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -305,10 +306,11 @@ class MissionItemReached(Message):
 
 @dataclass(frozen=True, slots=True)
 class MissionAck(Addressed):
-    """MISSION_ACK (47)."""
+    """MISSION_ACK (47); the id is that of the list as it is now, and 0 where the autopilot does not fill it."""
 
     type: int
     mission_type: int = 0
+    opaque_id: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,10 +13,14 @@ import struct
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mavlink_bridge.mavlink.messages import MissionType
 from mavlink_bridge.mavlink.parameter_values import float32
-from missions.items import Command, CoordinateFrame, MissionItem
+from missions.items import Command, CoordinateFrame, MissionItem, with_home
+
+if TYPE_CHECKING:
+    from missions.geo import LatLon
 
 _FRAMES = {
     int(CoordinateFrame.MISSION): int(CoordinateFrame.GLOBAL),
@@ -186,6 +190,14 @@ class StoredForm:
     def prepared(self, items: Sequence[MissionItem], mission_type: MissionType) -> tuple[MissionItem, ...]:
         """Return a list as it is to be sent."""
         return tuple(self.sendable(item, mission_type) for item in self.arranged(items, mission_type))
+
+    def own_items(self, items: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
+        """Return a mission as it goes over the wire without a home item."""
+        return tuple(items[int(self.has_home_item) :])
+
+    def mission_of(self, items: Sequence[MissionItem], home: LatLon) -> tuple[MissionItem, ...]:
+        """Return a mission as it goes over the wire."""
+        return with_home(items, home) if self.has_home_item else tuple(items)
 
     def first_compared(self, mission_type: MissionType) -> int:
         """Return the first item of a list that is compared: home is the vehicle's own."""

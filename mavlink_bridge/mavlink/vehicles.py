@@ -66,8 +66,8 @@ def choose_vehicle(heard: Sequence[HeardVehicle], system: int | None, *, any_veh
     raise VehicleNotFoundError(f"system {system} was not heard, only {names}")
 
 
-def not_ardupilot(system: int | None, autopilot: int | None) -> VehicleNotFoundError | None:
-    """Return the error that a vehicle is, whose autopilot is not ArduPilot; None where it is.
+def not_known(system: int | None, autopilot: int | None) -> VehicleNotFoundError:
+    """Return the error that a vehicle is, whose autopilot is not known here.
 
     Whether a mission's first item is home, how waypoints are driven, how lists are stored and what modes are called is each autopilot's own:
     of another one nothing could be promised.
@@ -79,17 +79,8 @@ def not_ardupilot(system: int | None, autopilot: int | None) -> VehicleNotFoundE
     autopilot : int or None
         MAV_AUTOPILOT of its heartbeat; None is one that is not known, but not ArduPilot.
     """
-    if autopilot == m.Autopilot.ARDUPILOTMEGA:
-        return None
-    if autopilot == m.Autopilot.PX4:
-        return VehicleNotFoundError(
-            f"the autopilot of system {system} is PX4: over a link nothing is planned, checked or driven for it yet; `pbpp download` and `pbpp upload` "
-            "work with it, and `pbpp plan` with its files (--fence, --vehicle) and recordings (--log)",
-            autopilot=autopilot,
-            advice="download its fence and its parameters, plan from the two files, and upload the mission; or choose another vehicle with --system N",
-        )
     name = "" if autopilot is None else f" (MAV_AUTOPILOT {autopilot})"
     return VehicleNotFoundError(
-        f"the autopilot of system {system} is not ArduPilot{name}: only ArduPilot is supported for now",
+        f"the autopilot of system {system} is neither ArduPilot nor PX4{name}: no other is supported for now",
         autopilot=autopilot,
     )

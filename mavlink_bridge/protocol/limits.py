@@ -59,6 +59,13 @@ class Limits:
             )
         return limits
 
+    @classmethod
+    def of_vehicle(cls, autopilot: AutopilotTable, parameters: Mapping[str, float]) -> Limits:
+        """Return what fits on a vehicle, by its parameters where they tell."""
+        return (
+            cls.from_parameters(parameters) if autopilot.lists.has_storage_parameters else cls.of(autopilot)
+        )
+
     def problem(self, items: Sequence[MissionItem], mission_type: MissionType) -> str | None:
         """Return why a list does not fit; None if it does."""
         most = {

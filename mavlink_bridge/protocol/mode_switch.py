@@ -51,6 +51,8 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
         Send it again until a heartbeat shows it: the answer may be that to another command.
     """
 
+    command_name = "DO_SET_MODE"
+
     def __init__(self, peer: Peer, mode: int, *, is_urgent: bool = False, until_seen: bool = False) -> None:
         only_seen = MODE_SWITCH_UNTIL_SEEN if until_seen else MODE_SWITCH_BY_HEARTBEAT
         answer_counts = peer.autopilot.modes.answer_counts and not until_seen

@@ -13,6 +13,10 @@ if TYPE_CHECKING:
     from mavlink_bridge.simulator.config import SimulatorConfig
 
 
+AUTOPILOTS = {"ardupilot": Autopilot.ARDUPILOTMEGA, "px4": Autopilot.PX4}
+"""Whose rover may be simulated, by the name that a person gives."""
+
+
 class AnyVehicle(Protocol):
     """What a link needs of a simulated vehicle."""
 

@@ -63,7 +63,7 @@ def _formats(cls: Any) -> dict[str, str]:  # noqa: ANN401 - pymavlink ships no t
 
 def _base_bytes(cls: Any, formats: dict[str, str]) -> int:  # noqa: ANN401 - pymavlink ships no types
     # The generated constructors give extension fields, and only them and HEARTBEAT's version, a default.
-    defaulted = len(cls.__init__.__defaults__ or ())
+    defaulted = getattr(cls, "defaulted", None) or len(cls.__init__.__defaults__ or ())
     extensions = set(cls.fieldnames[len(cls.fieldnames) - defaulted :])
     return struct.calcsize("<" + "".join(code for name, code in formats.items() if name not in extensions))
 

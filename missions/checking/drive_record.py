@@ -35,6 +35,8 @@ class DriveRecord:
     ----------
     heading_deg : float or None
         Where the vehicle faced at the start, clockwise from north.
+    ardupilot : bool
+        Whether its autopilot is ArduPilot.
     """
 
     items: tuple[MissionItem, ...]
@@ -52,6 +54,7 @@ class DriveRecord:
     parameters: Mapping[str, float]
     vehicle_type: int | None
     firmware: Firmware | None
+    ardupilot: bool = True
     calibration: Calibration | None = None
 
 
@@ -81,6 +84,7 @@ def record_of(plan: Plan, situation: Situation) -> DriveRecord:
         parameters=dict(situation.parameters),
         vehicle_type=situation.vehicle_type,
         firmware=situation.firmware,
+        ardupilot=situation.ardupilot is not False,
         calibration=situation.calibration,
     )
 
@@ -88,7 +92,7 @@ def record_of(plan: Plan, situation: Situation) -> DriveRecord:
 def situation_of(record: DriveRecord) -> Situation:
     """Return the situation that a record's plan was made in, as far as its drive depends on it."""
     return Situation(
-        ardupilot=True,
+        ardupilot=record.ardupilot,
         firmware=record.firmware,
         vehicle_type=record.vehicle_type,
         fence=Known(record.fence, None, _SOURCE),

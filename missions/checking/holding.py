@@ -19,6 +19,7 @@ from missions.ground.seams import is_seam
 from missions.promise import known_vehicle
 from missions.situation import Pose
 from missions.stops import NEARLY_MPS
+from missions.vehicle import known_ardupilot
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -195,8 +196,8 @@ def resting_pose(situation: Situation, request: Request, rolling: Rolling) -> Po
         stopping = ending_of(known_vehicle(situation, request), situation.stops)
     except MissionError:
         return None
-    if isinstance(stopping, HoldLoop):
-        return None
+    if isinstance(stopping, HoldLoop) or known_ardupilot(situation) is False:
+        return None  # PX4's HOLD steers
     left_m = stopping.distance_m(pose.speed_mps) - stopping.distance_m(NEARLY_MPS)
     so_far_m = stopping.distance_m(first_mps) - stopping.distance_m(pose.speed_mps)
     ahead_m = left_m * distance_m(began, pose.position) / so_far_m if so_far_m > 0 else 0.0

@@ -9,7 +9,7 @@ import shapely
 
 from missions.checking.holding import TAKES_S
 from missions.checking.recheck import Recheck
-from missions.drive_model.stopping import Stopping
+from missions.drive_model.hold_loop import ending_of
 from missions.errors import MissionError
 from missions.promise import known_vehicle
 
@@ -27,7 +27,7 @@ _STANDS_S = 5.0  # of a vehicle that is not known: more than the 4.6 s that the 
 
 
 def stands_after_s(situation: Situation, request: Request) -> float:
-    """Return how long after a HOLD that is sent now the vehicle stands, from its usual speed: at half of that on average.
+    """Return how long after a HOLD that is sent now the vehicle stands, from its usual speed.
 
     Parameters
     ----------
@@ -40,8 +40,7 @@ def stands_after_s(situation: Situation, request: Request) -> float:
         vehicle = known_vehicle(situation, request)
     except MissionError:
         return _STANDS_S
-    speed_mps = vehicle.speed_mps
-    return TAKES_S + 2 * Stopping(situation.stops, vehicle.steering).distance_m(speed_mps) / speed_mps
+    return TAKES_S + ending_of(vehicle, situation.stops).rest_s(vehicle.speed_mps)
 
 
 class Across(NamedTuple):

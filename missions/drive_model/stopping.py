@@ -97,6 +97,10 @@ class Stopping:
         longer_m = np.maximum(known_m, measured_m)
         return np.asarray(np.where(speeds_mps > most_mps, longer_m, known_m))
 
+    def rest_s(self, speed_mps: float) -> float:
+        """Return how long it rolls on from a speed: at half of that on average."""
+        return 2 * self.distance_m(speed_mps) / speed_mps
+
     def leaves(
         self, moving: Motion, allowed: BaseGeometry, more_m: NDArray[np.float64] | float = 0.0
     ) -> Leaving:

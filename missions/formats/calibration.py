@@ -13,6 +13,7 @@ from missions.formats.texts import read_text
 from missions.situation import Calibration, CornerClass, LegClass, Situation
 from missions.vehicle import Steering
 from missions.vehicle.calibration import LEAST_CORNERS
+from missions.words import counted
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -27,7 +28,7 @@ _MOST_MORE_M: Final = (
 )
 _MOST_CORNERS: Final = 2**53
 _HEAD = """\
-# How vehicle {system} drives, from {drives} recorded drives; written by `pbpp logs calibrate`, read by --vehicle.
+# How vehicle {system} drives, from {drives}; written by `pbpp logs calibrate`, read by --vehicle.
 # What is above 0 is added to the drive model's bounds, what is below 0 is taken from them; a class with fewer than {least} corners takes nothing.
 """
 
@@ -113,7 +114,13 @@ def write(calibration: Calibration, firmware: Firmware | None) -> str:
     """Return the text of a file."""
     plain = calibration_to_plain(calibration)
     assert plain is not None
-    lines = [_HEAD.format(system=calibration.system, drives=calibration.drives, least=LEAST_CORNERS)]
+    lines = [
+        _HEAD.format(
+            system=calibration.system,
+            drives=counted(calibration.drives, "recorded drive"),
+            least=LEAST_CORNERS,
+        )
+    ]
     lines += [f"calibration = {_VERSION}"]
     lines += [f"{name} = {_toml(plain[name])}" for name in ("system", "drives", "steering")]
     if firmware is not None:

@@ -1,4 +1,4 @@
-"""GPX 1.1: routes, tracks and way points; written are the mission's places as a route, home as a way point."""
+"""GPX 1.1: routes, tracks and waypoints; written are the mission's places as a route, home as a waypoint."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
 
 def read(text: str, source: str, choices: Choices = NO_CHOICES) -> Situation:
-    """Read a file's text: its one route is the mission, or where there is none its one track, or its way points.
+    """Read a file's text: its one route is the mission, or where there is none its one track, or its waypoints.
 
-    A way point named home is home.
+    A waypoint named home is home.
 
     Raises
     ------

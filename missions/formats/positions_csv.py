@@ -24,7 +24,7 @@ _ORDER = "latitude and longitude as line 1 names them"
 
 
 def read(text: str, source: str, choices: Choices = NO_CHOICES) -> Situation:
-    """Read a file's text: its rows are way points in their order, unless a column ``role`` says otherwise (and ``radius_m`` a circle).
+    """Read a file's text: its rows are waypoints in their order, unless a column ``role`` says otherwise (and ``radius_m`` a circle).
 
     Raises
     ------

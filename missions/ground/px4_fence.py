@@ -6,11 +6,17 @@ from typing import TYPE_CHECKING
 
 from shapely import Point
 
+from missions.errors import MissionError
 from missions.fence import ZoneKind
+from missions.ground.from_situation import ground_for
+from missions.promise import known_vehicle
+from missions.request import GoTo
 from missions.vehicle import Autopilot
 
 if TYPE_CHECKING:
-    from missions.ground.ground import Ground
+    from collections.abc import Iterator
+
+    from missions.ground.ground import Barrier, Ground
     from missions.situation import Situation
     from missions.vehicle import Vehicle
 
@@ -32,18 +38,46 @@ def own_promise_info(vehicle: Vehicle) -> list[str]:
 
 
 def unenforced_warnings(vehicle: Vehicle, situation: Situation, ground: Ground) -> list[str]:
-    """Return which zones PX4 would take and not enforce, by where home is (measured on v1.17.0 and the line of 1.18)."""
+    """Return which zones PX4 would take and not enforce, by where home is, and the vehicle if it is armed (measured on v1.17.0 and the line of 1.18)."""
     if vehicle.autopilot is not Autopilot.PX4:
         return []
-    if situation.home is None:
-        return [
+    unknown = (
+        [
             "home unknown: PX4 does not enforce an inclusion that home is outside of, or an exclusion that it is in (--home LAT,LON)"
         ]
-    home = Point(ground.frame.to_local(situation.home.value))
-    inside = "home is inside it"
-    outside = "home is outside it"
-    return [
-        f"PX4 will not enforce {barrier.name}: {outside if barrier.kind is ZoneKind.INCLUSION else inside}; this route keeps to it all the same"
-        for barrier in ground.barriers
-        if barrier.area.covers(home) is (barrier.kind is ZoneKind.EXCLUSION)
+        if situation.home is None
+        else []
+    )
+    return unknown + [
+        f"PX4 will not enforce {barrier.name}: {who} is {'outside' if barrier.kind is ZoneKind.INCLUSION else 'inside'} it; this route keeps to it all the same"
+        for barrier, who in _unenforced(situation, ground)
     ]
+
+
+def unenforced_zones(situation: Situation) -> list[tuple[str, str]]:
+    """Return the zones that PX4 does not enforce, each with what is on its forbidden side: "home", or "the vehicle", which is armed.
+
+    Nothing where the fence, or where those are, is not known, and for another autopilot.
+    """
+    if situation.ardupilot is not False or situation.fence is None:
+        return []
+    places = [known.value for known in (situation.home,) if known is not None]
+    places += [situation.pose.value.position] if situation.pose is not None else []
+    try:
+        ground = ground_for(situation, known_vehicle(situation, GoTo()), places)
+    except MissionError:
+        return []
+    return [(barrier.name, who) for barrier, who in _unenforced(situation, ground)]
+
+
+def _unenforced(situation: Situation, ground: Ground) -> Iterator[tuple[Barrier, str]]:
+    home = situation.home.value if situation.home is not None else None
+    here = situation.pose.value.position if situation.armed and situation.pose is not None else None
+    for barrier in ground.barriers:
+        for place, who in ((home, "home"), (here, "the vehicle")):
+            if place is None:
+                continue
+            is_inside = barrier.area.covers(Point(ground.frame.to_local(place)))
+            if is_inside is (barrier.kind is ZoneKind.EXCLUSION):
+                yield barrier, who
+                break

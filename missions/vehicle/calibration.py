@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from missions.vehicle.measured_corners import LEAST_MORE_M
+from missions.words import counted
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -146,7 +147,7 @@ def calibration_info(vehicle: Vehicle) -> tuple[str, ...]:
         return ()
     corners = sum(one.corners for one in calibration.corners)
     return (
-        f"calibrated from {calibration.drives} drives of vehicle {calibration.system} ({corners} corners)",
+        f"calibrated from {counted(calibration.drives, 'drive')} of vehicle {calibration.system} ({counted(corners, 'corner')})",
     )
 
 

@@ -1,4 +1,4 @@
-"""Random fields against a visibility graph: 2,100 of them, always the same ones; `benchmarks/planner/campaign.py` takes new ones."""
+"""Random fields against a visibility graph: 840 of them, always the same ones; `benchmarks/planner/campaign.py` takes 20,000 others."""
 
 import numpy as np
 import pytest
@@ -23,14 +23,11 @@ def many(count):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize(
-    "part", [0, *(pytest.param(part, marks=pytest.mark.campaign) for part in range(1, 5))]
-)
+@pytest.mark.parametrize("part", [0, pytest.param(1, marks=pytest.mark.campaign)])
 @given(seed=SEEDS)
 @many(70)
 def test_the_path_is_safe_and_shortest(kind, part, seed):
-    # Each part draws the same seeds. The paper's methods take half of the time: two parts ask for them, the campaign always does.
-    check_field(random_field((seed + part) % 2**32, kind), other_methods=part < 2)
+    check_field(random_field((seed + part) % 2**32, kind))  # each part draws the same seeds
 
 
 @pytest.mark.parametrize("offset_m", [(5e5, 4.6e6), (-5e5, 0.25)])

@@ -27,7 +27,7 @@ from mavlink_bridge.cli.options.shared import (
 class CheckOptions(DescriptionOptions, MapOptions, ClearanceOptions, ManyOptions, LinkOptions):
     """Check every leg of a mission against a fence: the clearance of its straight line and of the predicted track. Exit 8 if a leg fails.
 
-    Several missions are checked at the same time, each against `--fence` or the fence in its own file; one that cannot be read stops no other.
+    Several missions are checked at the same time, each against `--fence` or else the fence in its own file. One that cannot be read stops no other.
 
     For example:
 
@@ -41,7 +41,7 @@ class CheckOptions(DescriptionOptions, MapOptions, ClearanceOptions, ManyOptions
     """
 
     missions: Annotated[
-        list[Path], typer.Argument(metavar="[MISSION]...", help="Mission files, when there are several.")
+        list[Path], typer.Argument(metavar="[MISSION]...", help="Mission files, to check several at once.")
     ] = field(default_factory=list)
     mission: Annotated[Path | None, option("Mission file: .plan, .waypoints, …", "FILE")] = None
     fence: Annotated[
@@ -61,7 +61,7 @@ class CheckOptions(DescriptionOptions, MapOptions, ClearanceOptions, ManyOptions
     format: Annotated[
         str | None,
         option(
-            "Report on standard output with the line of each finding: for code hosts (SARIF 2.1.0) or build servers (JUnit's XML).",
+            "Write a report with the line of each finding to standard output: SARIF 2.1.0 for code hosts, JUnit's XML for build servers.",
             "sarif|junit",
             panel=OUTPUT_PANEL,
         ),

@@ -6,7 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from mavlink_bridge.cli.options.shared import CommonOptions, SimulatedFirmwareOption, option
+from mavlink_bridge.cli.options.shared import (
+    CommonOptions,
+    SimulatedAutopilotOption,
+    SimulatedFirmwareOption,
+    option,
+)
 from mavlink_bridge.cli.values import within
 
 
@@ -21,4 +26,5 @@ class DemoOptions(CommonOptions):
             "How many times faster than real time, if the computer keeps up.", "X", parser=within(1.0, 20.0)
         ),
     ] = 4.0
+    autopilot: SimulatedAutopilotOption = "ardupilot"
     firmware: SimulatedFirmwareOption = None

@@ -13,7 +13,7 @@ from mavlink_bridge.cli.options.shared import OUTPUT_PANEL, CommonOptions, MapOp
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DiffOptions(MapOptions, CommonOptions):
-    """Compare two missions or fences: which items, zones and rally points only one of them has, and what of the rest is otherwise. Exit 8 if they differ.
+    """Compare two missions or fences: which items, zones and rally points only one of them has, and how the others differ. Exit 8 if they differ.
 
     The files may be of different formats. Positions within 2 cm of each other are the same.
 
@@ -30,7 +30,7 @@ class DiffOptions(MapOptions, CommonOptions):
     plot: Annotated[
         list[Path],
         option(
-            "Draw B, and what A has otherwise: .png, .svg, .pdf, .html; - in the terminal.",
+            "Draw B, and where A differs: .png, .svg, .pdf, .html; - in the terminal.",
             "FILE",
             panel=OUTPUT_PANEL,
         ),

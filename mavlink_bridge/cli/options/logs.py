@@ -18,9 +18,9 @@ _ASK, _CALIBRATE = "ask", "calibrate"
 class LogsOptions(ManyOptions, CommonOptions):
     """Make tables of many logs, ask them questions, and calibrate the drive model to one rover.
 
-    `build` reads the logs in folders (.tlog, .raw, DataFlash .bin, packed with gzip or not) into a dataset of Parquet files; logs that it has are
-    skipped, bad ones are listed and stop nothing. `ask` answers a ready question (clearance, promise, corners, drift, links, modes) or SQL.
-    `calibrate` writes what one rover's corners and legs were like, for `--vehicle` of other commands.
+    `build` reads all logs in folders (.tlog, .raw, DataFlash .bin, packed with gzip or not) into a dataset of Parquet files. Logs that it already
+    has are skipped; bad ones are listed and stop nothing. `ask` answers a ready question (clearance, promise, corners, drift, links, modes) or SQL.
+    `calibrate` writes how one rover drives, for `--vehicle` of other commands.
 
     For example:
 
@@ -36,14 +36,14 @@ class LogsOptions(ManyOptions, CommonOptions):
     action: Annotated[
         str,
         typer.Argument(
-            metavar="|".join(ACTIONS), help="build a dataset, ask it a question, or calibrate a rover."
+            metavar="|".join(ACTIONS), help="Build a dataset, ask it a question, or calibrate a rover."
         ),
     ]
     words: Annotated[
         list[str],
         typer.Argument(
             metavar="FOLDER...|DATASET [QUESTION]",
-            help="For build: folders and logs. Else: the dataset, and a question.",
+            help="For build: folders and logs. For ask: the dataset, and a question. For calibrate: the dataset.",
         ),
     ]
     output: Annotated[
@@ -68,5 +68,7 @@ class LogsOptions(ManyOptions, CommonOptions):
     ] = field(default_factory=list)
     system: Annotated[
         int | None,
-        option("Which vehicle, when the dataset has several.", "N", min=1, max=255, panel=_CALIBRATE),
+        option(
+            "System id of the rover, when the dataset has several.", "N", min=1, max=255, panel=_CALIBRATE
+        ),
     ] = None

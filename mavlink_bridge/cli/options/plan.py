@@ -105,7 +105,7 @@ class PlanOptions(
     batch: Annotated[
         Path | None,
         option(
-            "Make a plan for each row of a table (.csv, .jsonl, .parquet): fence, start, target, vehicle, clearance, …; results as JSON lines, or to -o FILE.jsonl, FILE.parquet.",
+            "Make a plan for each row of a table (.csv, .jsonl, .parquet) with columns fence, start, target, vehicle, clearance, …; writes JSON lines, or -o FILE.jsonl, FILE.parquet.",
             "TABLE",
         ),
     ] = None

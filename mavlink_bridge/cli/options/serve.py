@@ -40,7 +40,7 @@ class ServerOptions:
     map: Annotated[
         str | None,
         option(
-            "Raster tiles under everything: a PMTiles file, or the URL of one. Without it: a metric grid.",
+            "Raster map as background: a PMTiles file, or the URL of one. Default: a grid in metres.",
             "FILE.pmtiles|URL",
             panel=_SERVER,
         ),
@@ -97,7 +97,9 @@ class ServeOptions(ServerOptions, DescriptionOptions, MapOptions, ClearanceOptio
     drive: Annotated[
         bool, flag("--drive", "With --upload: let the page start drives and hold the vehicle.")
     ] = False
-    arm: Annotated[bool, flag("--arm", "With --drive: arm before AUTO.")] = False
+    arm: Annotated[bool, flag("--arm", "With --drive: let the page arm the vehicle to start a drive.")] = (
+        False
+    )
     escape: Annotated[
         bool,
         flag("--escape", "Let a vehicle that stands inside an exclusion or outside the fence drive out."),
@@ -105,7 +107,7 @@ class ServeOptions(ServerOptions, DescriptionOptions, MapOptions, ClearanceOptio
     target_from: Annotated[
         list[str],
         option(
-            "Where targets may come from beside the page: reposition, position-target, guided-item, mission, rally, echo; repeatable.",
+            "Where targets may come from, besides the page: reposition, position-target, guided-item, mission, rally, echo; repeatable.",
             "SOURCE",
         ),
     ] = field(default_factory=list)

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from mavlink_bridge.cli.options_file import take_options
-from mavlink_bridge.cli.values import MOST_M, MOST_S, MOST_VEHICLE_M, stop_from, within
+from mavlink_bridge.cli.values import MOST_M, MOST_S, MOST_VEHICLE_M, autopilot_from, stop_from, within
 from missions.errors import VehicleError
 from missions.firmware import Firmware, read_firmware
 from missions.stops import Stop
@@ -89,6 +89,9 @@ FirmwareOption = Annotated[
         parser=firmware_option,
     ),
 ]
+SimulatedAutopilotOption = Annotated[
+    str, option("The autopilot that it answers as: ardupilot or px4.", "AUTOPILOT", parser=autopilot_from)
+]
 SimulatedFirmwareOption = Annotated[
     Firmware | None,
     option(
@@ -109,7 +112,7 @@ _MANY_PANEL = "Many at once"
 JobsOption = Annotated[
     int | None,
     option(
-        "How many are done at the same time, each in a process. Default: one per processor.",
+        "How many processes work at the same time. Default: one per processor.",
         "N",
         panel=_MANY_PANEL,
         min=1,
@@ -119,7 +122,7 @@ JobsOption = Annotated[
 ClusterOption = Annotated[
     str | None,
     option(
-        "Have the workers of this dask scheduler do them (extra cluster).",
+        "Use the workers of this dask scheduler instead (extra cluster).",
         "tcp://HOST:PORT",
         panel=_MANY_PANEL,
         parser=cluster_option,

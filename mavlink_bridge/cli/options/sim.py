@@ -6,8 +6,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
-from mavlink_bridge.cli.options.shared import CommonOptions, MapOptions, SimulatedFirmwareOption, option
-from mavlink_bridge.cli.values import MOST_S, autopilot_from, within
+from mavlink_bridge.cli.options.shared import (
+    CommonOptions,
+    MapOptions,
+    SimulatedAutopilotOption,
+    SimulatedFirmwareOption,
+    option,
+)
+from mavlink_bridge.cli.values import MOST_S, within
 
 MOST_SEED = 2**63 - 1
 """What fits everywhere a seed is kept."""
@@ -45,9 +51,7 @@ class SimOptions(MapOptions, CommonOptions):
             "LAT,LON,RADIUS[,SPEED,HEADING]",
         ),
     ] = field(default_factory=list)
-    autopilot: Annotated[
-        str, option("The autopilot that it answers as: ardupilot or px4.", "AUTOPILOT", parser=autopilot_from)
-    ] = "ardupilot"
+    autopilot: SimulatedAutopilotOption = "ardupilot"
     firmware: SimulatedFirmwareOption = None
     param: Annotated[list[str], option("Set a parameter; repeatable.", "NAME=VALUE")] = field(
         default_factory=list

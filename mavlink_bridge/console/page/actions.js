@@ -110,10 +110,10 @@ export class Actions {
     this.change(texts.steps.clear, { targets: [], mission: null });
   }
 
-  // Way points
+  // Waypoints
 
   /**
-   * Move a way point of the shown route by hand: from then on it is checked, not planned.
+   * Move a waypoint of the shown route by hand: from then on it is checked, not planned.
    * @param {number} index of the route's points, the start not counted
    * @param {Place} place
    * @param {boolean} [isLast]
@@ -361,7 +361,7 @@ export class Actions {
 }
 
 /**
- * The way points of a shown route, without its start.
+ * The waypoints of a shown route, without its start.
  * @param {import("./types.js").Plan | null} plan
  * @returns {Place[]}
  */

@@ -78,6 +78,8 @@ function drawTrack() {
 }
 
 function buildPage() {
+  // In one column the map may have been scrolled away from under who wants to draw on it.
+  store.watch(["tool"], ({ tool }) => ["polygon", "circle", "start"].includes(tool) && mapArea.scrollIntoView({ block: "nearest" }));
   const source = h("p", { class: "source" });
   store.watch(["server"], ({ server }) => { fill(source, texts.top.source(server.source, server.source_name)); });
   document.documentElement.lang = texts.language;

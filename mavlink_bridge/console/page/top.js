@@ -34,12 +34,12 @@ export function vehicleBar(store) {
     chips.battery.className = `chip-value ${vehicle.battery_percent !== null && vehicle.battery_percent <= 20 ? "alarm" : ""}`;
     say(chips.speed, vehicle.speed_mps === null ? words.unknown : `${vehicle.speed_mps.toFixed(1)} m/s`);
   });
-  store.watch(["link", "clock_s", "replay"], (state) => {
-    const { link } = state;
+  store.watch(["link", "clock_s", "replay", "isConnected"], (state) => {
+    const { link, isConnected } = state;
     const age_s = heartbeatAge_s(state);
     const missed = link.heartbeats_missed_percent ? `, ${words.missed(link.heartbeats_missed_percent)}` : "";
-    say(chips.link, `${words.links[link.state] ?? link.state}${age_s === null || link.state === "none" ? "" : `, ${words.heartbeat(age_s)}`}${missed}`);
-    chips.link.className = `chip-value ${link.state === "lost" || link.state === "closed" ? "alarm" : link.state === "late" ? "warn" : ""}`;
+    say(chips.link, !isConnected ? words.notKnown : `${words.links[link.state] ?? link.state}${age_s === null || link.state === "none" ? "" : `, ${words.heartbeat(age_s)}`}${missed}`);
+    chips.link.className = `chip-value ${!isConnected || link.state === "lost" || link.state === "closed" ? "alarm" : link.state === "late" ? "warn" : ""}`;
   });
   store.watch(["server"], ({ server }) => show(bar, server.source !== "files"));
   return bar;

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from mavlink_bridge.console.view.places import finite, place
 from mavlink_bridge.console.view.sections import DriveView, HoldView
-from mavlink_bridge.director import State
+from mavlink_bridge.director import ON_VEHICLE, State
 
 if TYPE_CHECKING:
     from mavlink_bridge.director import Director
@@ -25,10 +25,11 @@ STATE_TEXTS = {
     State.UPLOADING: "uploading and reading back",
     State.WITHDRAWING: "taken over; ending the upload",
     State.VERIFIED: "verified on the vehicle",
+    State.ENFORCED: "verified on the vehicle, its fence enforced",
     State.STARTING: "switching to AUTO",
     State.DRIVING: "driving",
     State.ARRIVED: "arrived",
-    State.LET_GO: "let go: waiting for a new target",
+    State.LET_GO: "interrupted: waiting for a new target",
     State.CLASHING: "another program uses our ids; finishing the upload",
     State.CLASHED: "another program uses our ids",
     State.LOST: "no heartbeat",
@@ -74,7 +75,7 @@ class DriveShown:
             state=str(director.state),
             state_text=STATE_TEXTS[director.state],
             since_s=round(self._since_s, 1),
-            awaits_start=director.state is State.VERIFIED,
+            awaits_start=director.state in ON_VEHICLE,
             awaits_upload=director.awaits_confirmation,
             plan_id=plan_id,
             can_resume=can_resume,
@@ -115,7 +116,7 @@ class DriveShown:
                 "breaches",
             ]
             return {name: getattr(last, name) for name in kept}
-        # Before the first position of the drive its watch knows the way behind the first way point only.
+        # Before the first position of the drive its watch knows the way behind the first waypoint only.
         left_m = drive.distance_left_m if drive.driven_m else plan.length_m
         return {
             "is_driving": True,

@@ -170,7 +170,7 @@ def _route(planned: Plan) -> dict[str, Any]:
             )
             for one in route_samples(planned)
         ),
-        "items": len(planned.items) + 1,
+        "items": len(planned.items) + planned.vehicle.home_items,
     }
 
 

@@ -94,10 +94,10 @@ class Px4Commands:
     def _arm(self, wanted: float) -> MavResult:
         if wanted == 0:
             self._rover.disarm("external command")
-        elif wanted == 1:
-            self._rover.arm("external command")
-        else:
+        elif wanted != 1:
             return MavResult.DENIED
+        elif not self._rover.arm("external command"):
+            return MavResult.TEMPORARILY_REJECTED
         return MavResult.ACCEPTED
 
     def _reposition(self, command: CommandLong | CommandInt) -> MavResult:

@@ -52,6 +52,13 @@ _LATE_TICKS = 4
 """How long it drives on before HOLD reaches it: with 0.2 s it rolls about as far past the place of the mode change as measured (2.3 m from 3 m/s, 1.9 m from 2 m/s)."""
 
 _CREEPS_MPS = 0.05  # how fast it comes there; chosen
+_ROLLS_MPS2 = 0.32
+"""How disarming slows it on 1.18: 14 m from 3 m/s. On 1.17 it rolls on for good."""
+
+_NOT_ARMED_S = 150.0
+"""For so long at the least it could not be armed after that."""
+
+# MISSION_STATE, MAV_SEVERITY
 _NO_MISSION, _NOT_STARTED, _ACTIVE, _PAUSED, _COMPLETE = 1, 2, 3, 4, 5
 _CRITICAL, _INFO = 2, 6
 
@@ -118,6 +125,7 @@ class Px4Rover:
         self._goal_m: complex | None = None  # outside of missions: where it is to go, or to stay
         self.breaches = 0
         self.texts: list[tuple[int, str]] = []
+        self._now_s = self._arms_from_s = 0.0
         self._counts_from_s = 0.0
         self._area = enforced_fence((), self.frame, 0j, None, 0.0).area
         self.reboot()
@@ -174,20 +182,34 @@ class Px4Rover:
                 self._say(_CRITICAL, "Unsupported auto mode" if main == AUTO else "Unsupported main mode")
             return False
         self._then = None
-        self._enter(wanted)
+        if wanted == self.mode == (AUTO, HOLD):
+            self.is_in_failsafe = (
+                False  # nothing begins anew: as read in the source, it goes on to where it was sent
+            )
+        else:
+            self._enter(wanted)
         return True
 
-    def arm(self, how: str) -> None:
-        """Let the motors run."""
+    def arm(self, how: str) -> bool:
+        """Let the motors run; return whether it is armed."""
         if not self.is_armed:
+            if self._arms_from_s > self._now_s:
+                self._say(_CRITICAL, "Arming denied: Resolve system health failures first")
+                return False
             self.is_armed = True
             self._say(_INFO, f"Armed by {how}")
+        return True
 
     def disarm(self, how: str) -> None:
         """Let the motors stop."""
         if self.is_armed:
             self.is_armed = False
-            self.motion.speed_mps = self.motion.ramped_mps = 0.0
+            if self._is_skid:
+                self.motion.speed_mps = 0.0
+            elif self.motion.speed_mps and self._tells_modes:
+                self._arms_from_s = self._now_s + _NOT_ARMED_S
+            self.motion.ramped_mps = 0.0
+            self._goal_m = None
             self._disarms_s = math.inf
             self._say(_INFO, f"Disarmed by {how}")
 
@@ -196,8 +218,9 @@ class Px4Rover:
         if not self.progress.is_valid or not 0 <= seq < len(self.mission):
             self._say(_CRITICAL, "Mission start denied! No valid mission")
             return False
+        if not self.arm("mission start"):
+            return False
         self.set_current(seq)
-        self.arm("mission start")
         self._enter((AUTO, MISSION))
         return True
 
@@ -223,6 +246,7 @@ class Px4Rover:
 
     def look(self, now_s: float) -> None:
         """Take notice of changed lists: a mission is judged at once, a fence counts after a while."""
+        self._now_s = now_s if math.isfinite(now_s) else self._now_s
         mission, fence = self._lists[MissionType.MISSION], self._lists[MissionType.FENCE]
         known = (mission.changes, fence.changes)
         if known != self._known:
@@ -255,12 +279,15 @@ class Px4Rover:
     @property
     def is_idle(self) -> bool:
         """Whether a tick would change nothing."""
+        if not self.is_armed:
+            return self.motion.speed_mps == 0
         moves = self.mode[1] in (MISSION, RTL, LAND) or self._goal_m is not None or self.motion.speed_mps > 0
-        return not self.is_armed or not (moves or self._then is not None)
+        return not (moves or self._then is not None)
 
     def step(self, now_s: float) -> None:
         """Let one tick pass."""
         if not self.is_armed:
+            self._roll()
             return
         if self._then is not None and now_s >= self._then[0]:
             self._enter((AUTO, self._then[1]))
@@ -272,6 +299,13 @@ class Px4Rover:
         if now_s >= self._looked_s + FENCE_LOOK_S:
             self._looked_s = now_s
             self._watch_fence(now_s)
+
+    def _roll(self) -> None:
+        """Roll on for a tick, disarmed."""
+        motion = self.motion
+        if self._tells_modes:
+            motion.speed_mps = max(0.0, motion.speed_mps - _ROLLS_MPS2 * TICK_S)
+        motion.position_m += cmath.rect(motion.speed_mps * TICK_S, motion.heading_rad)
 
     def _take_mission(self, mission: Px4List) -> None:
         if mission.current is not None:

@@ -12,7 +12,7 @@ from mavlink_bridge.simulator.mission_server import float_message, int_message, 
 from missions.items import CoordinateFrame
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from mavlink_bridge.simulator.px4.lists import Px4List
     from missions.items import MissionItem
@@ -47,12 +47,20 @@ class Px4Transfers:
         The vehicle's system id.
     repeats_count : bool
         Whether a MISSION_COUNT is repeated until the first request, and texts are those of 1.18.
+    current : callable
+        Returns the mission's item that is the current one: it is marked where the mission is read.
     """
 
     def __init__(
-        self, lists: Mapping[MissionType, Px4List], system: int = 1, *, repeats_count: bool = False
+        self,
+        lists: Mapping[MissionType, Px4List],
+        system: int = 1,
+        *,
+        repeats_count: bool = False,
+        current: Callable[[], int] = lambda: -1,
     ) -> None:
         self.lists = lists
+        self._current = current
         self._by_number = {int(kind): stored for kind, stored in lists.items()}
         self._system = system
         self._repeats_count = repeats_count
@@ -222,7 +230,9 @@ class Px4Transfers:
 
     def _send_count(self, now_s: float) -> None:
         self._sent_s = now_s
-        self._outbox.append(m.MissionCount(*self._partner, self._count, self._type))
+        stored = self._by_number.get(self._type)
+        list_id = stored.id if stored is not None else 0
+        self._outbox.append(m.MissionCount(*self._partner, self._count, self._type, list_id))
 
     def _give(self, client: tuple[int, int], seq: int, mission_type: int, now_s: float) -> None:
         if client != self._partner:
@@ -243,6 +253,8 @@ class Px4Transfers:
             self._say(_CRITICAL, "WPM: REJ. CMD: Req. WP was unexpected")
             return
         item = self._by_number[self._type].read(seq)
+        if self._type == MissionType.MISSION:
+            item = replace(item, current=seq == self._current())
         if self._is_exact:
             self._outbox.append(int_message(client, seq, item, self._type))
             return
@@ -282,7 +294,9 @@ class Px4Transfers:
 
     def _ack(self, client: tuple[int, int], result: MissionResult, mission_type: int | None = None) -> None:
         kind = self._type if mission_type is None else mission_type
-        self._outbox.append(m.MissionAck(*client, result, kind))
+        stored = self._by_number.get(kind)
+        list_id = stored.id if stored is not None and result is MissionResult.ACCEPTED else 0
+        self._outbox.append(m.MissionAck(*client, result, kind, list_id))
 
     def _say(self, severity: int, text: str) -> None:
         self._outbox.append(m.Statustext(severity, f"{text}\t"[:50]))

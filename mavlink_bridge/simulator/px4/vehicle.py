@@ -78,7 +78,12 @@ class Px4Vehicle:
         }
         for kind, items in zip(self.lists, (config.mission, config.fence, config.rally), strict=True):
             _store(self.lists[kind], items)
-        self._server = Px4Transfers(self.lists, config.system, repeats_count=self.is_1_18)
+        self._server = Px4Transfers(
+            self.lists,
+            config.system,
+            repeats_count=self.is_1_18,
+            current=lambda: self.rover.progress.seq,
+        )
         self.rover = Px4Rover(
             self.parameters, self.lists, config.home, config.heading_deg, tells_modes=self.is_1_18
         )

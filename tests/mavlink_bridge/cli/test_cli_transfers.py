@@ -459,7 +459,7 @@ def test_an_autopilot_that_is_not_known_is_refused_by_every_command(rover, tmp_p
     code, document = with_autopilot(0, rover, tmp_path, monkeypatch, command)
     assert (code, document["error"]) == (5, "VehicleNotFoundError")
     assert document["message"] == (
-        "the autopilot of system 1 is not ArduPilot (MAV_AUTOPILOT 0): only ArduPilot is supported for now"
+        "the autopilot of system 1 is neither ArduPilot nor PX4 (MAV_AUTOPILOT 0): no other is supported for now"
     )
     assert document["details"]["autopilot"] == 0
 

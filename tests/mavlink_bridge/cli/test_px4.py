@@ -97,7 +97,7 @@ def test_of_its_mission_nothing_is_claimed(tmp_path: Path, command: tuple[str, .
     code, found = run(*command, log := px4_log(tmp_path / "px4.tlog"))
     assert (code, found["error"]) == (3, "LogError")
     assert found["message"] == (
-        f"{log}: the autopilot of system 1 is not ArduPilot: only ArduPilot is supported for now"
+        f"{log}: the autopilot of system 1 is not ArduPilot: its own mission is not taken from a log; give it as a file (--mission)"
     )
 
 

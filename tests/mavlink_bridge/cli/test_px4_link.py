@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from contextlib import contextmanager
 
 import pytest
@@ -15,14 +16,16 @@ from mavlink_bridge.cli.app import app
 from mavlink_bridge.cli.interrupting import _hold
 from mavlink_bridge.cli.session import Contact, open_session
 from mavlink_bridge.errors import OutcomeError
+from mavlink_bridge.link import Link
 from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.autopilots import PX4_1_17
 from mavlink_bridge.mavlink.messages import MissionType
 from mavlink_bridge.mavlink.modes import ARDUPILOT_MODES, PX4_MODES
 from mavlink_bridge.simulator import Simulator, SimulatorConfig
-from missions.fence import CircleZone, Fence, PolygonZone, ZoneKind, fence_from_items
+from missions.fence import CircleZone, Fence, PolygonZone, ZoneKind, fence_from_items, fence_to_items
 from missions.firmware import Firmware
 from missions.formats import read_situation, write_mission
-from missions.geo import LatLon
+from missions.geo import LatLon, distance_m
 from missions.items import Command, change_speed, waypoint
 from missions.situation import Known, Mission, Situation
 
@@ -144,22 +147,108 @@ class TestTransfers:
                 "2.5 is not a whole number of this parameter's type; nothing was sent",
             )
 
-    def test_what_is_not_possible_yet(self, plan, firmware, tmp_path):
-        with rover(PX4S, firmware) as (simulator, sent):
-            code, found = run(simulator, "upload", plan, "--drive")
-            assert (code, found["error"]) == (6, "RefusedError")
-            assert found["message"] == (
-                "--drive is not possible on PX4: pbpp does not start or watch its drives yet; nothing was written"
-            )
+    def test_no_waypoints_file(self, firmware, tmp_path):
+        with rover(PX4S, firmware) as (simulator, _):
             code, found = run(simulator, "download", "mission", "-o", tmp_path / "back.waypoints")
             assert code == 2
             assert "the first row of such a file is home" in found["message"]
-            for command in (("check",), ("plan", "--target", "40.0718,-105.2299"), ("bridge", "--once")):
-                code, found = run(simulator, *command)
-                assert (code, found["error"]) == (5, "VehicleNotFoundError")
-                assert "`pbpp download` and `pbpp upload` work with it" in json.dumps(found)
-            assert not any(isinstance(message, m.MissionCount | m.ParamSet) for message in sent)
-            assert modes_asked_for(sent) == []
+
+
+INCLUSION = Fence((PolygonZone(ZoneKind.INCLUSION, BOX),))
+STATION = PX4_1_17.lists.form
+
+
+@pytest.mark.parametrize("firmware", [Firmware(1, 17, 0), Firmware(1, 18, 0, 0)], ids=str)
+class TestDrives:
+    """`plan --connect`, `check --connect`, `bridge --once` and `upload --drive`; every mode that is sent is read."""
+
+    TARGET = "40.0718,-105.2299"
+
+    def rover(self, firmware, fence=INCLUSION):
+        items = STATION.prepared(fence_to_items(fence), MissionType.FENCE)
+        return rover(PX4S, firmware, fence=items, heading_deg=0.0)
+
+    def test_planned_uploaded_and_driven(self, firmware):
+        with self.rover(firmware) as (simulator, sent):
+            code, found = run(simulator, "plan", "--target", self.TARGET, "--clearance", "1.5", "--upload")
+            assert (code, found["verified"], modes_asked_for(sent)) == (0, True, [])
+            code, found = run(simulator, "check")
+            assert (code, modes_asked_for(sent)) == (0, []), found
+            assert any("PX4 keeps no margin" in text for text in found["info"])
+            simulator.vehicle.rover.arm("a station")
+            code, found = run(
+                simulator, "plan", "--target", self.TARGET, "--clearance", "1.5", "--upload", "--drive"
+            )
+            assert code == 0
+            assert found["arrived"] is True
+            assert set(modes_asked_for(sent)) == {(4.0, 4.0)}
+            assert distance_m(simulator.vehicle.position, LatLon(40.0718, -105.2299)) < 1.0
+            assert any("PX4 keeps no margin" in text for text in found["info"])
+
+    def test_its_own_mission_is_checked_uploaded_and_driven(self, firmware):
+        way = (waypoint(LatLon(40.0716, -105.2299)), waypoint(LatLon(40.0718, -105.2296)))
+        items = STATION.prepared(fence_to_items(INCLUSION), MissionType.FENCE)
+        own = STATION.prepared(way, MissionType.MISSION)
+        with rover(PX4S, firmware, fence=items, mission=own) as (simulator, sent):
+            simulator.vehicle.rover.arm("a station")
+            options = ("--via-mission", "own", "--clearance", "1.5", "--upload", "--drive")
+            code, found = run(simulator, "plan", *options)
+            assert (code, found["arrived"], found["mission_items"]) == (0, True, 2)
+            assert distance_m(simulator.vehicle.position, way[-1].position) < 1.0
+            assert set(modes_asked_for(sent)) == {(4.0, 4.0)}
+
+    def test_one_job_of_the_bridge(self, firmware):
+        with self.rover(firmware) as (simulator, sent):
+            result = CliRunner().invoke(
+                app,
+                [
+                    "bridge",
+                    "--once",
+                    "--upload",
+                    "--drive",
+                    "--arm",
+                    "--target",
+                    self.TARGET,
+                    "--clearance",
+                    "1.5",
+                    "--json",
+                    "--connect",
+                    simulator.connection,
+                ],
+            )
+            assert result.exit_code == 0, result.output
+            names = [json.loads(line)["event"] for line in result.stdout.splitlines() if line.startswith("{")]
+            assert (
+                max(names.index("verified"), names.index("enforced"))
+                < names.index("driving")
+                < names.index("arrived")
+            )
+            assert set(modes_asked_for(sent)) == {(4.0, 4.0)}
+
+    def test_uploaded_and_set_driving(self, plan, firmware):
+        with rover(PX4S, firmware) as (simulator, sent):
+            code, found = run(simulator, "upload", plan, "--drive")
+            assert (code, found["error"]) == (7, "OutcomeError")  # not armed: its mode was not changed
+            simulator.vehicle.rover.arm("a station")
+            code, found = run(simulator, "upload", plan, "--drive")
+            assert code == 0
+            assert [one.get("not_enforced") for one in found["lists"]] == [[], None]
+            assert simulator.vehicle.mode == PX4_MODES.mission
+            assert set(modes_asked_for(sent)) == {(4.0, 4.0)}
+
+    def test_a_zone_that_will_not_be_enforced_is_told_before_and_after(self, tmp_path, firmware):
+        fence = Fence((*INCLUSION.zones, CircleZone(ZoneKind.EXCLUSION, HOME, 3.0)))
+        write_mission(Situation(fence=Known(fence, None, "test")), tmp_path / "fence.plan")
+        with rover(PX4S, firmware) as (simulator, _):
+            code, found = run(simulator, "upload", tmp_path / "fence.plan")
+            assert code == 0
+            (zone,) = found["lists"][0]["not_enforced"]
+            assert "exclusion" in zone
+            result = CliRunner().invoke(
+                app, ["upload", str(tmp_path / "fence.plan"), "--connect", simulator.connection]
+            )
+            assert f"PX4 will not enforce {zone}: home is on its forbidden side" in result.stderr
+            assert f"PX4 does not enforce {zone}" in result.stderr
 
 
 def test_a_refused_list_leaves_the_old_one_and_says_why(tmp_path):
@@ -231,7 +320,7 @@ class TestEveryModeThatIsSent:
     @staticmethod
     def switch(simulator):
         """Switch to HOLD as an interrupt does, and to the mission and back."""
-        contact = Contact(simulator.connection, (245, 190), any_autopilot=True)
+        contact = Contact(simulator.connection, (245, 190))
         with open_session(contact, lambda *_: None) as session:
             assert _hold(session.at_hand(lambda: None, lambda: ""))
             modes = session.autopilot.modes
@@ -243,9 +332,60 @@ class TestEveryModeThatIsSent:
                     session.change_mode(mode)
 
 
+@pytest.mark.parametrize("firmware", [Firmware(1, 17, 0), Firmware(1, 18, 0, 0)], ids=str)
+@pytest.mark.parametrize("what", ["upload", "download", "plan", "bridge"])
+def test_an_interrupt_ends_the_transfer_that_we_began(plan, monkeypatch, firmware, what):
+    """Else PX4 is busy for everybody for 5 s more; the old list stays whole."""
+    lost = m.MissionItemInt if what != "download" else m.MissionRequestInt
+    fence = fence_to_items(Fence((PolygonZone(ZoneKind.INCLUSION, BOX),)))
+    with rover(PX4S, firmware, fence=fence, mission=WAY) as (simulator, sent):
+        vehicle, old = simulator.vehicle, simulator.vehicle.mission
+        receive_at, receive = Link.receive_at, vehicle.receive
+        begun: list[m.Message] = []
+        is_due = [True]
+
+        def deaf(frame, now_s):
+            if isinstance(frame.message, lost):
+                begun.append(frame.message)
+            else:
+                receive(frame, now_s)
+
+        def interrupted(link, timeout_s):
+            if is_due[0] and begun:
+                is_due[0] = False
+                raise KeyboardInterrupt
+            return receive_at(link, timeout_s)
+
+        vehicle.receive = deaf
+        monkeypatch.setattr(Link, "receive_at", interrupted)
+        arguments = {
+            "upload": ["upload", plan],
+            "download": ["download", "mission"],
+            "plan": ["plan", "--target", "40.0718,-105.2299", "--clearance", "1.5", "--upload"],
+            "bridge": ["bridge", "--target", "40.0718,-105.2299", "--clearance", "1.5", "--upload"],
+        }[what]
+        result = CliRunner().invoke(app, [*map(str, arguments), "--connect", simulator.connection])
+        assert result.exit_code == 130
+        assert not is_due[0]
+        assert vehicle.mission == old
+        until_s = time.monotonic() + 5.0
+        while not (vehicle._server.is_idle and ended(sent)) and time.monotonic() < until_s:
+            time.sleep(0.02)  # it is on its way yet
+        assert len(ended(sent)) == 1
+        assert vehicle._server.is_idle
+
+
+def ended(sent):
+    return [
+        one
+        for one in sent
+        if isinstance(one, m.MissionAck) and one.type == m.MissionResult.OPERATION_CANCELLED
+    ]
+
+
 def test_a_mode_that_px4_1_17_accepts_and_never_enters_is_not_believed():
     with rover(PX4S, Firmware(1, 17, 0)) as (simulator, _):
-        contact = Contact(simulator.connection, (245, 190), any_autopilot=True)
+        contact = Contact(simulator.connection, (245, 190))
         with (
             open_session(contact, lambda *_: None) as session,
             pytest.raises(OutcomeError, match="did not confirm mode MANUAL"),

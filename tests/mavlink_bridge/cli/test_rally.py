@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
@@ -36,20 +38,18 @@ def run(*arguments, code=0):
     return result
 
 
-@pytest.fixture
-def mission(fields, tmp_path):
-    """A mission round the barn, with its fence."""
-    path = tmp_path / "mission.plan"
-    fence = fields / "yard-fence.waypoints"
-    run(
-        "plan",
-        "--fence",
-        fence,
-        *ROUND_THE_BARN,
-        "-o",
-        path,
-    )
+@pytest.fixture(scope="module")
+def planned(fields, tmp_path_factory):
+    """What `mission` is a copy of."""
+    path = tmp_path_factory.mktemp("planned") / "mission.plan"
+    run("plan", "--fence", fields / "yard-fence.waypoints", *ROUND_THE_BARN, "-o", path)
     return path
+
+
+@pytest.fixture
+def mission(planned, tmp_path):
+    """A mission round the barn, with its fence."""
+    return Path(shutil.copy(planned, tmp_path / "mission.plan"))
 
 
 def test_points_are_chosen_written_drawn_and_told(mission, tmp_path):

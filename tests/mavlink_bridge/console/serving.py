@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -30,6 +30,8 @@ from missions.request import Tour
 from missions.situation import Known, Pose
 
 if TYPE_CHECKING:
+    from director.conducting import Conductor
+
     from mavlink_bridge.console.deeds import Deed
 
 FIELDS = Path(__file__).parents[2] / "fields"
@@ -66,12 +68,13 @@ class SteppedConsole:
 
     folder: Path
     orders: dict = field(default_factory=dict)
+    conductor: Callable[..., Conductor] = conductor
     told: list = field(default_factory=list)
     calls: list = field(default_factory=list)
 
     def __post_init__(self) -> None:
         given = {"confirm": True, "starts_on_word": True, "arm": True, **self.orders}
-        self.run = conductor(**given)
+        self.run = self.conductor(**given)
         self.director = self.run.director
         self.store = BackupStore(self.folder)
         self.writer = ListWriter(self.director, self.store)

@@ -73,7 +73,7 @@ def test_a_click_is_planned_and_a_dragged_way_point_is_judged_at_once(watched: W
     # Table and map show the same leg.
     rows.nth(1).hover()
     expect(rows.nth(1)).to_have_class("leg keeps hovered")
-    handle = page.get_by_role("button", name="Way point 1.")
+    handle = page.get_by_role("button", name="Waypoint 1.")
     box = handle.bounding_box()
     assert box is not None
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2

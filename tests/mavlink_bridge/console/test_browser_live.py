@@ -112,7 +112,7 @@ def type_a_clearance(seen: Watched) -> None:
 
 
 def move_a_way_point(seen: Watched) -> None:
-    seen.page.get_by_role("button", name="Way point 1.").focus()
+    seen.page.get_by_role("button", name="Waypoint 1.").focus()
     for _ in range(6):
         seen.page.keyboard.press("Shift+ArrowRight")
     expect(seen.page.locator(HEADLINE)).to_contain_text(re.compile("legs? breaks? the promise"))
@@ -177,7 +177,7 @@ STEPS = [
         type_a_clearance,
     ),
     (
-        "Drag a way point across the fence, or move it there with the arrow keys. The headline says at once how many legs break the promise.",
+        "Drag a waypoint across the fence, or move it there with the arrow keys. The headline says at once how many legs break the promise.",
         move_a_way_point,
     ),
     ("Press **Back to planning**.", back_to_planning),

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 from console.serving import SteppedConsole
+from director.px4.px4_runs import conductor as px4_conductor
 from director.test_bridge_director import FAR, FENCE, HOME, NEAR, upload, wall_across_the_route
 
 from mavlink_bridge.console import deeds
@@ -111,6 +112,44 @@ def test_hold_is_answered_by_what_the_vehicle_did_and_a_person_goes_on(tmp_path)
     console.do(deeds.Resume())
     console.until(console.run.happened(EventName.ARRIVED), 200)
     assert console.run.last(EventName.ARRIVED).data["breaches"] == 0
+
+
+def test_a_px4_rover_is_started_once_its_fence_counts_held_and_driven_on(tmp_path):
+    request = replace(FAR_TOUR, clearance_m=1.5)
+    console = SteppedConsole(tmp_path, conductor=px4_conductor)
+    console.until(lambda: console.director.state is State.READY)
+    looked = looked_at(console, request)
+    assert looked.view.items == len(looked.items)  # PX4 has no home item
+    console.do(deeds.UploadPlan("x", looked))
+    console.until(lambda: console.director.state is State.ENFORCED)
+    drive = console.desk.hold_shown
+    console.do(deeds.Start(plan_id(console.director.plan)))
+    console.until(lambda: console.director.state is State.DRIVING)
+    console.wait(8.0)
+    console.do(deeds.Hold(), "page 7")
+    console.until(lambda: drive.view(console.director, console.run.now_s).state == "stopped", 20)
+    assert console.director.situation.mode == console.director.peer.autopilot.modes.hold
+    console.do(deeds.Resume())
+    console.until(console.run.happened(EventName.ARRIVED), 200)
+    assert console.run.vehicles[0].rover.breaches == 0
+
+
+def test_lists_of_a_page_are_written_as_px4_wants_them(tmp_path):
+    """No home before a mission, circles after polygons."""
+    console = SteppedConsole(tmp_path, conductor=px4_conductor)
+    console.until(lambda: console.director.state is State.READY)
+    looked = looked_at(console, replace(FAR_TOUR, clearance_m=1.5))
+    console.do(deeds.UploadPlan("x", replace(looked, request=None)))
+    console.until(lambda: not console.writer.is_busy)
+    assert console.writer.view().state == "verified"
+    vehicle = console.run.vehicles[0]
+    assert [one.command for one in vehicle.mission] == [one.command for one in looked.items]
+    circle = CircleZone(ZoneKind.EXCLUSION, LatLon(40.0715, -105.2290), 3.0)
+    console.wait(3.0)
+    console.do(deeds.UploadFence(Fence((circle, *FENCE.zones))))
+    console.until(lambda: not console.writer.is_busy)
+    assert console.writer.view().state == "verified"
+    assert vehicle.fence[-1].command == fence_to_items(Fence((circle,)))[0].command
 
 
 def test_hold_without_an_answer_says_so(tmp_path):

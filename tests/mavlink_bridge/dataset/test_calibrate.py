@@ -134,5 +134,5 @@ def test_from_logs_to_a_plan(fleet, tmp_path, fields):
     told = pbpp(*words, "--vehicle", tmp_path / "rover.toml", "--trust-model", "--json")
     assert told.exit_code == 0, told.output
     assert any(
-        one.startswith("calibrated from 1 drives of vehicle 3") for one in json.loads(told.stdout)["info"]
+        one.startswith("calibrated from 1 drive of vehicle 3") for one in json.loads(told.stdout)["info"]
     )

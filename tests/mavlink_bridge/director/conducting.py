@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.mavlink.messages import Frame
+from mavlink_bridge.mavlink.messages import Autopilot, CommandInt, CommandLong, Frame, SetMode
 from mavlink_bridge.simulator.faults import Faults, FaultyLink
+from missions.items import Command
 from missions.planning.plan import plan as make_plan
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ class Conductor:
     now_s: float = 0.0
     backups: list = field(default_factory=list)
     sent: list = field(default_factory=list)
+    modes_sent: list = field(default_factory=list)
     events: list = field(default_factory=list)
     is_cut: bool = False
     is_started: bool = False
@@ -74,6 +76,7 @@ class Conductor:
         self.make_plan()
         for message in self.director.messages_to_send():
             self.sent.append(message)
+            self._check_modes(message)
             self.up.push(Frame(*(self.director.identity or (245, 190)), message), self.now_s)
         for frame in self.up.due(self.now_s):
             for vehicle in self.vehicles:
@@ -92,6 +95,18 @@ class Conductor:
         if self.meddle:
             self.meddle(self)
         self.now_s += 0.02
+
+    def _check_modes(self, message: Message) -> None:
+        """Read every message that is sent: no mode of one autopilot may go to another, where ArduPilot's HOLD makes a PX4 rover drive its mission."""
+        for vehicle in self.vehicles:
+            is_px4 = vehicle.config.autopilot is Autopilot.PX4
+            if isinstance(message, SetMode):
+                raise AssertionError("the bridge sends no SET_MODE")  # noqa: TRY004 - it is what is tested
+            if isinstance(message, CommandInt | CommandLong) and message.command == Command.DO_SET_MODE:
+                params = message.param1, message.param2, message.param3
+                known = {(1.0, 4.0, 3.0), (1.0, 4.0, 4.0)} if is_px4 else {(1.0, 4.0, 0.0), (1.0, 10.0, 0.0)}
+                assert params in known, f"mode {params} to {vehicle.config.autopilot.name}"
+                self.modes_sent.append(params[1:])
 
     def make_plan(self) -> None:
         """Make the plan that is waited for, once the time has passed that planning takes."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.director import EventName, State
 from mavlink_bridge.mavlink import messages as m
-from mavlink_bridge.mavlink.rover import Mode
+from mavlink_bridge.mavlink.autopilots import autopilot_table
 from missions.fence import CircleZone, ZoneKind
 from missions.items import Command
 
@@ -46,6 +46,8 @@ class Promises:
     def __init__(self, run: Conductor) -> None:
         self.broken: list[str] = []
         self._run = run
+        self._is_px4 = run.vehicles[0].config.autopilot is m.Autopilot.PX4
+        self._modes = autopilot_table(run.vehicles[0].config.autopilot).modes
         self._mode: int | None = None
         self._is_armed = False
         self._heartbeats = 0
@@ -129,7 +131,7 @@ class Promises:
             return
         mode = self._took[1]
         # HOLD by somebody looks like our own; GUIDED right after a click may be the click's.
-        shows_mode = mode not in (None, Mode.HOLD, Mode.GUIDED) and self._mode == mode
+        shows_mode = mode not in (None, self._modes.hold, self._modes.guided) and self._mode == mode
         self._knows = self._knows or shows_mode
 
     # Breaches to come
@@ -160,21 +162,31 @@ class Promises:
     def _check_breach(self) -> None:
         """Look whether a HOLD of ours has led into a fence that was known, without a word."""
         run, vehicle = self._run, self._run.vehicles[0]
-        if vehicle.mode == Mode.HOLD != self._mode_before and self._hold_s is not None:
+        if vehicle.mode == self._modes.hold != self._mode_before and self._hold_s is not None:
             is_late = run.now_s > self._hold_s + TAKEN_S
             self._hold_s = None if is_late else self._hold_s
         is_rolling = self._hold_s is not None and run.now_s <= self._hold_s + ROLLING_S
         if (
-            vehicle.breaches > self._breaches
-            and self._mode_before == Mode.HOLD
+            self._told_breaches > self._breaches
+            and self._mode_before == self._modes.hold
             and is_rolling
             and vehicle.is_armed
-            and vehicle.rover.body.speed_mps > 0
+            and self._speed_mps > 0
             and self._fence == self._held_fence
             and self._announced_s < self._hold_s - 2.0
         ):
             self._break("a breach by our HOLD that was not announced")
-        self._mode_before, self._breaches = vehicle.mode, vehicle.breaches
+        self._mode_before, self._breaches = vehicle.mode, self._told_breaches
+
+    @property
+    def _told_breaches(self) -> int:
+        vehicle = self._run.vehicles[0]
+        return vehicle.rover.breaches if self._is_px4 else vehicle.breaches
+
+    @property
+    def _speed_mps(self) -> float:
+        rover = self._run.vehicles[0].rover
+        return rover.motion.speed_mps if self._is_px4 else rover.body.speed_mps
 
     # What the bridge sends
 
@@ -195,15 +207,13 @@ class Promises:
                 if message.param1 != 1.0:
                     self._break("disarmed")
             elif message.command == Command.DO_SET_MODE:
-                self._check_mode(int(message.param2))
+                self._check_mode(self._modes.asked_for(message.param2, message.param3))
 
     def _check_clashed(self, message: m.Message) -> None:
         if not self._has_clashed or isinstance(message, m.Statustext | m.CommandAck):
             return
-        is_hold = isinstance(message, m.CommandLong) and (message.command, message.param2) == (
-            Command.DO_SET_MODE,
-            Mode.HOLD,
-        )
+        is_switch = isinstance(message, m.CommandLong) and message.command == Command.DO_SET_MODE
+        is_hold = is_switch and self._modes.asked_for(message.param2, message.param3) == self._modes.hold
         is_uploads_end = isinstance(message, m.MissionAck | m.MissionRequestInt) and self._was_clashing
         if is_uploads_end or self._run.director.state is State.CLASHING or is_hold:
             return
@@ -213,14 +223,14 @@ class Promises:
         self._check_taken_over(f"mode {mode}")
         if not self._run.director.orders.drive:
             self._break("a mode change without orders to drive")
-        if mode not in (Mode.HOLD, Mode.AUTO):
+        if mode not in (self._modes.hold, self._modes.mission):
             self._break(f"mode {mode} is none of ours")
-        if mode == Mode.HOLD and self._mode_before != Mode.HOLD:
+        if mode == self._modes.hold != self._mode_before:
             self._hold_s, self._held_fence = self._run.now_s, self._fence
-        if mode != Mode.AUTO:
+        if mode != self._modes.mission:
             return
         self._hold_s = None
-        if self._mode != Mode.HOLD:
+        if self._mode != self._modes.hold:
             self._break(f"AUTO though the last heartbeat said mode {self._mode}")
         if self._heartbeats == self._last_auto_heartbeats:
             self._break("AUTO twice without a heartbeat in between")
@@ -234,7 +244,7 @@ class Promises:
             self._break("an upload without orders to")
         if self._run.director.state is State.WITHDRAWING:
             return  # no half mission is left behind
-        if self._mode == Mode.AUTO and self._is_armed:
+        if self._mode == self._modes.mission and self._is_armed:
             self._break("an upload under a vehicle that drives")
 
     def _check_taken_over(self, what: str) -> None:

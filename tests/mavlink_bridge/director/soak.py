@@ -1,4 +1,4 @@
-"""Hours of the bridge in stepped time, with everything that can happen to it: `python tests/mavlink_bridge/director/soak.py --hours 4`.
+"""Hours of the bridge in stepped time, with everything that can happen to it: `python tests/mavlink_bridge/director/soak.py --hours 4 --setting obstacles`.
 
 Random targets typed and clicked, fences and missions changed by another ground station, modes changed by an operator, links cut and
 lossy, reboots. After each step the promises are checked; at the end the counts are printed. Also run, for a little while, by the tests.
@@ -7,12 +7,14 @@ lossy, reboots. After each step the promises are checked; at the end the counts 
 from __future__ import annotations
 
 import argparse
+import cmath
 import gc
 import random
 import sys
 import time
 import tracemalloc
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -21,16 +23,21 @@ from director.conducting import Conductor
 from director.promises import Promises
 
 from mavlink_bridge.director import Director, Orders, State
+from mavlink_bridge.director.orders import Homing, ObstacleSource
 from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.mavlink.autopilots import autopilot_table
+from mavlink_bridge.mavlink.modes import PX4_MODES
 from mavlink_bridge.mavlink.rover import Mode
 from mavlink_bridge.protocol.peer import Peer
 from mavlink_bridge.protocol.upload import Upload
-from mavlink_bridge.simulator import Battery, SimulatedVehicle, SimulatorConfig
+from mavlink_bridge.simulator import Battery, SimulatorConfig
+from mavlink_bridge.simulator.any_vehicle import AUTOPILOTS, vehicle_of
 from mavlink_bridge.simulator.faults import Faults
 from missions.fence import CircleZone, Fence, ZoneKind, fence_to_items
+from missions.firmware import Firmware, read_firmware
 from missions.formats import read_fence
 from missions.geo import LatLon, LocalPoint, to_e7
-from missions.items import Command, waypoint, with_home
+from missions.items import Command, waypoint
 from missions.request import Request
 
 YARD = read_fence(Path(__file__).parents[2] / "fields" / "yard-fence.waypoints")
@@ -48,11 +55,31 @@ PLACES = (
     LatLon(40.0714600, -105.2295800),  # in the barn
     LatLon(40.0740000, -105.2286152),  # outside
 )
-OPERATOR_MODES = (0, Mode.HOLD, 11)
+OPERATOR_MODES = {
+    m.Autopilot.ARDUPILOTMEGA: (0, Mode.HOLD, 11),
+    m.Autopilot.PX4: (PX4_MODES.hold, PX4_MODES.rtl, PX4_MODES.mission),
+}
+PARAMETERS = {
+    m.Autopilot.ARDUPILOTMEGA: {"FENCE_ENABLE": 1.0, "WP_SPEED": 4.0, "AVOID_BACKUP_SPD": 0.0},
+    m.Autopilot.PX4: {},
+}
+CLEARANCES_M = {m.Autopilot.ARDUPILOTMEGA: 2.5, m.Autopilot.PX4: 1.5}
 MOST_GROWTH_KB = 250
 """How far apart the sizes of memory may be, once it has settled: they went up and down by up to 150 kB with what was planned last."""
 
 SAMPLE_S = 900.0
+_HOMING = Homing(is_kept=True, by_route=True, gcs_timeout_s=20.0)
+SETTINGS: dict[str, dict[str, object]] = {
+    "calm": {},
+    "dense": {"pace_s": (0.05, 2.5)},
+    "home": {"pace_s": (0.3, 6.0), "homing": _HOMING},
+    "obstacles": {
+        "pace_s": (0.3, 6.0),
+        "homing": replace(_HOMING, battery_percent=20),
+        "obstacle_sources": frozenset(ObstacleSource),
+    },
+}
+"""How much happens, and what the bridge is to do about it, by name."""
 
 
 class Soak:
@@ -64,21 +91,36 @@ class Soak:
         Of everything that happens.
     pace_s : tuple of float
         Shortest and longest time between what others do.
+    autopilot, firmware : Autopilot, Firmware or None
+        Whose rover it is.
     """
 
-    def __init__(self, seed: int, pace_s: tuple[float, float] = (3.0, 45.0), **orders: object) -> None:
+    def __init__(
+        self,
+        seed: int,
+        pace_s: tuple[float, float] = (3.0, 45.0),
+        autopilot: m.Autopilot = m.Autopilot.ARDUPILOTMEGA,
+        firmware: Firmware | None = None,
+        **orders: object,
+    ) -> None:
         self.random = random.Random(seed)
         self.pace_s = pace_s
         # With AVOID_BACKUP_SPD 0 it may start inside a fence's margin, where an operator has left it: else nothing is driven any more.
+        self.table = autopilot_table(autopilot, firmware)
+        self.modes = self.table.modes
         config = SimulatorConfig(
             home=HOME,
-            fence=fence_to_items(YARD),
-            parameters={"FENCE_ENABLE": 1.0, "WP_SPEED": 4.0, "AVOID_BACKUP_SPD": 0.0},
+            fence=self._sent(m.MissionType.FENCE, fence_to_items(YARD)),
+            parameters=PARAMETERS[autopilot],
+            autopilot=autopilot,
+            firmware=firmware,
         )
         given = {"upload": True, "drive": True, "arm": True, "announce": True, **orders}
-        self.vehicle = SimulatedVehicle(config)
+        self.vehicle = vehicle_of(config)
         self.run = Conductor(
-            Director(Orders(request=Request(clearance_m=2.5), **given)), [self.vehicle], Faults()
+            Director(Orders(request=Request(clearance_m=CLEARANCES_M[autopilot]), **given)),
+            [self.vehicle],
+            Faults(),
         )
         self.run.meddle = self._step
         self.promises = Promises(self.run)
@@ -176,23 +218,38 @@ class Soak:
         if self._rival is None:
             self._begin(m.MissionType.FENCE, fence_to_items(self.random.choice(FENCES)))
 
+    def _sent(self, mission_type: m.MissionType, items: tuple) -> tuple:
+        """Return a list as the vehicle's autopilot takes it."""
+        return self.table.lists.form.prepared(items, mission_type)
+
+    @property
+    def _ahead(self) -> tuple[complex, complex, float]:
+        """Where the vehicle is and looks, in its plane, and how fast it is."""
+        rover = self.vehicle.rover
+        if self.table.autopilot == m.Autopilot.PX4:
+            motion = rover.motion
+            return motion.position_m, cmath.rect(1.0, motion.heading_rad), motion.speed_mps
+        return rover.body.position_m, rover.body.direction, rover.body.speed_mps
+
     def _block_way(self) -> None:
         """Put a fence in the vehicle's way, nearer than it can stop or farther."""
-        body = self.vehicle.rover.body
-        if self._rival is None and body.speed_mps > 0.5:
+        position_m, direction, speed_mps = self._ahead
+        if self._rival is None and speed_mps > 0.5:
             radius_m = 3.0
             place = self.vehicle.rover.frame.to_lat_lon(
-                body.position_m + body.direction * (radius_m + self.random.uniform(0.5, 12.0))
+                position_m + direction * (radius_m + self.random.uniform(0.5, 12.0))
             )
             circle = CircleZone(ZoneKind.EXCLUSION, place, radius_m)
             self._begin(m.MissionType.FENCE, fence_to_items(Fence((*YARD.zones, circle))))
 
     def _change_mission(self) -> None:
         if self._rival is None:
-            self._begin(m.MissionType.MISSION, with_home([waypoint(place) for place in PLACES[1:4]], HOME))
+            mission = [waypoint(place) for place in PLACES[1:4]]
+            self._begin(m.MissionType.MISSION, self.table.lists.form.mission_of(mission, HOME))
 
     def _begin(self, mission_type: m.MissionType, items: tuple) -> None:
-        self._rival = Upload(Peer(1, 1, 255, 190), mission_type, items)
+        peer = Peer(1, 1, 255, 190, self.table)
+        self._rival = Upload(peer, mission_type, self._sent(mission_type, items))
         self._rival.start(self.run.now_s)
 
     def _serve_rival(self) -> None:
@@ -205,8 +262,8 @@ class Soak:
             self._rival = None
 
     def _take_over(self) -> None:
-        mode = self.random.choice(OPERATOR_MODES)
-        if mode == Mode.RTL and self.run.director.orders.homing.by_route:
+        mode = self.random.choice(OPERATOR_MODES[self.table.autopilot])
+        if mode == self.modes.rtl and self.run.director.orders.homing.by_route:
             self.promises.asked()  # the first one is answered; which one is the second stands in test_coming_home
         else:
             self.promises.taken_over(mode)
@@ -259,10 +316,21 @@ def main() -> None:
     parser.add_argument("--hours", type=float, default=4.0)
     parser.add_argument("--minutes", type=float, default=1e9, help="at most so many real minutes")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--autopilot", choices=tuple(AUTOPILOTS), default="ardupilot")
+    parser.add_argument("--firmware", type=read_firmware)
+    parser.add_argument("--setting", choices=SETTINGS, default="calm", help="how much happens")
     options = parser.parse_args()
     begun_s = time.monotonic()
     tracemalloc.start()
-    run = soak(options.seed, options.hours, options.minutes * 60)
+    autopilot = AUTOPILOTS[options.autopilot]
+    run = soak(
+        options.seed,
+        options.hours,
+        options.minutes * 60,
+        autopilot=autopilot,
+        firmware=options.firmware,
+        **SETTINGS[options.setting],
+    )
     print(f"{run.run.now_s / 3600:.2f} h of stepped time in {time.monotonic() - begun_s:.0f} s")
     print(", ".join(f"{name} {count}" for name, count in run.counts.most_common()))
     print("memory every quarter of an hour (kB):", ", ".join(f"{size_kb:.0f}" for size_kb in run.sizes_kb))

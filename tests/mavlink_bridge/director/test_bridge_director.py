@@ -511,15 +511,15 @@ def test_another_autopilot_is_refused_with_a_clear_word():
     run = conductor()
     push = run.down.push
 
-    def as_px4(frame: m.Frame, now_s: float) -> None:
+    def as_another(frame: m.Frame, now_s: float) -> None:
         if isinstance(frame.message, m.Heartbeat):
-            frame = replace(frame, message=replace(frame.message, autopilot=m.Autopilot.PX4))
+            frame = replace(frame, message=replace(frame.message, autopilot=4))
         push(frame, now_s)
 
-    run.down.push = as_px4
+    run.down.push = as_another
     run.run_until(lambda: run.director.is_done, 10)
     assert run.director.state is State.FAILED
-    assert "PX4" in str(run.director.trouble)
+    assert "neither ArduPilot nor PX4 (MAV_AUTOPILOT 4)" in str(run.director.trouble)
     assert not run.sent
 
 

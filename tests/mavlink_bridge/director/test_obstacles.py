@@ -168,11 +168,15 @@ def test_where_no_way_is_left_it_says_what_it_waits_for_and_drives_on_by_itself(
     run.run_until(lambda: run.director.state is State.ARRIVED, 200)
 
 
-def test_it_drives_on_once_what_was_typed_is_forgotten():
+def test_it_drives_on_once_what_was_typed_is_forgotten(monkeypatch):
+    kept_s = 60.0  # ten minutes of waiting show no more
+    monkeypatch.setattr("mavlink_bridge.director.obstacle_watch.TYPED_S", kept_s)
     run = driving()
     block(run)
     run.run_until(run.happened(EventName.WAITING), 60)
-    run.run_until(lambda: run.director.state is State.DRIVING, TYPED_S + 20)
+    waited_s = run.now_s
+    run.run_until(lambda: run.director.state is State.DRIVING, kept_s + 20)
+    assert run.now_s - waited_s > kept_s - 20
     assert run.director.situation.obstacles.known == ()
 
 

@@ -125,12 +125,19 @@ def test_processes_end_with_a_parent_that_is_killed(tmp_path):
     script = tmp_path / "program.py"
     script.write_text(program)
     path = str(Path(__file__).parents[1])
-    with subprocess.Popen(
-        [sys.executable, str(script)],
-        stdout=subprocess.PIPE,
-        text=True,
-        env={**os.environ, "PYTHONPATH": path},
-    ) as process:
+    said = (
+        tmp_path / "said.txt"
+    )  # multiprocessing tells that a killed program has cleaned up nothing: not the tests' leak
+    with (
+        said.open("w") as errors,
+        subprocess.Popen(
+            [sys.executable, str(script)],
+            stdout=subprocess.PIPE,
+            stderr=errors,
+            text=True,
+            env={**os.environ, "PYTHONPATH": path},
+        ) as process,
+    ):
         workers = {int(process.stdout.readline()) for _ in range(2)}
         process.kill()
     until_s = time.monotonic() + 30.0

@@ -68,10 +68,9 @@ def test_transfers_tell_the_truth(autopilot):
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize("hundred", range(6))
-def test_more_transfers_tell_the_truth(hundred):
+def test_more_transfers_tell_the_truth():
     lies = {}
-    for seed in range(100 * hundred, 100 * hundred + 100):
+    for seed in range(60, 160):  # `make campaign AUTOPILOT=px4` goes on
         judged = transfer(replace(scenario_of(seed), autopilot=(PX4_1_17, PX4_1_18)[seed % 2]))
         if judged.lies:
             lies[seed] = judged.lies

@@ -13,10 +13,9 @@ from mavlink_bridge.protocol.verified_upload import Held, OutcomeKind, VerifiedU
 MISSION, FENCE, RALLY = MissionType.MISSION, MissionType.FENCE, MissionType.RALLY
 
 
-@pytest.mark.parametrize(
-    "hundred", [0, 1, *(pytest.param(hundred, marks=pytest.mark.campaign) for hundred in range(2, 10))]
-)
-def test_a_thousand_transfers_tell_the_truth(hundred):
+@pytest.mark.parametrize("hundred", [0, 1, pytest.param(2, marks=pytest.mark.campaign)])
+def test_hundreds_of_transfers_tell_the_truth(hundred):
+    # `make campaign` goes on with the same seeds
     lies = {}
     for seed in range(100 * hundred, 100 * hundred + 100):
         judged = transfer(scenario_of(seed))

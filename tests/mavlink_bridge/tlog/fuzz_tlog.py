@@ -1,6 +1,6 @@
 """Damaged variants of recorded logs, and the check that the reader gets out of each all that damage left whole.
 
-``python tests/mavlink_bridge/tlog/fuzz_tlog.py --count 100000`` runs the long campaign; the tests run the first 2,000 of the same seeds.
+``python tests/mavlink_bridge/tlog/fuzz_tlog.py --count 100000`` runs the long campaign; the tests run the first 500 of the same seeds.
 """
 
 from __future__ import annotations

@@ -59,10 +59,16 @@ def trees(fields: Path) -> tuple[Mission, Situation]:
     return read_mission(fields / "trees-rows.waypoints"), Situation(fence=fence, parameters=parameters)
 
 
-def test_rows_of_a_survey_leave_their_lines_only_near_the_trees(trees):
+@pytest.fixture(scope="module")
+def repaired(trees: tuple[Mission, Situation]) -> Repair:
+    """The survey, round the trees."""
+    return repair_mission(*trees, Request())
+
+
+def test_rows_of_a_survey_leave_their_lines_only_near_the_trees(trees, repaired):
     mission, situation = trees
     drawn = check_mission(mission, situation)
-    found = repair_mission(mission, situation, Request())
+    found = repaired
     assert found.check.holds
     assert [item for item in found.mission.items if item in mission.items] == list(mission.items)
     chart = Chart(mission.home)
@@ -80,10 +86,8 @@ def test_rows_of_a_survey_leave_their_lines_only_near_the_trees(trees):
     assert found.check.duration_s < 1.05 * drawn.duration_s
 
 
-def test_a_repaired_survey_keeps_its_speed(trees):
-    mission, situation = trees
-    found = repair_mission(mission, situation, Request())
-    assert all(item.command != Command.DO_CHANGE_SPEED for item in found.mission.items)
+def test_a_repaired_survey_keeps_its_speed(repaired):
+    assert all(item.command != Command.DO_CHANGE_SPEED for item in repaired.mission.items)
 
 
 def test_rows_are_bent_where_the_vehicle_holds_no_more_items(trees, monkeypatch):

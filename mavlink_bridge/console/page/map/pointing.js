@@ -1,4 +1,4 @@
-/** What is done on the map with mouse and finger, and with keys where the map has the focus: targets, way points, fences. */
+/** What is done on the map with mouse and finger, and with keys where the map has the focus: targets, waypoints, fences. */
 
 import { ringOf } from "../doc.js";
 import { isServed } from "../inside.js";
@@ -13,7 +13,7 @@ import { Handles } from "./handles.js";
 /** @typedef {import("../types.js").Zone} Zone */
 /** @typedef {import("./handles.js").Handle} Handle */
 
-const MOST_POINTS = 60; // way points that get a handle on the map; all can be typed. Chosen: more would not be hit
+const MOST_POINTS = 60; // waypoints that get a handle on the map; all can be typed. Chosen: more would not be hit
 const CLOSE_PX = 14; // a click so near to the first corner closes the ring
 
 export class Pointing {

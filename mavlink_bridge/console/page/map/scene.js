@@ -30,6 +30,7 @@ export class Scene {
     view.whenReady(() => this.begin());
     // As long as nobody has moved the map it shows all, whatever room it has.
     this.isMoved = false;
+    this.isFar = false;
     for (const kind of /** @type {const} */ (["dragstart", "zoomstart", "rotatestart"])) {
       view.map.on(kind, (event) => { this.isMoved ||= "originalEvent" in event && Boolean(event.originalEvent); });
     }
@@ -58,6 +59,7 @@ export class Scene {
     store.watch(["mission", "plan"], ({ mission, plan }) => view.set("mission", mission && !(mission.matches_plan && plan?.by === "director") && mission.points.length > 1 ? [features.line(mission.points)] : []));
     store.watch(["doc", "home", "rally", "plan", "drive", "vehicle", "marks"], (state) => this.setIfOther("places", features.marks(state)));
     store.watch(["lines"], ({ lines }) => view.set("lines", features.lines(lines)));
+    store.watch(["doc"], (state) => this.showTargets(state));
     store.watch(["vehicle", "link"], (state) => this.showRover(state));
     store.watch(["hoverLeg"], ({ hoverLeg }) => { view.hoverLeg(hoverLeg, this.hovered); this.hovered = hoverLeg; });
     store.watch(["hoverAlong_m"], (state) => this.showAlong(state));
@@ -105,6 +107,16 @@ export class Scene {
     } else if (!this.isFitted && vehicle.position) {
       this.view.map.jumpTo({ center: vehicle.position, zoom: 18 });
     }
+  }
+
+  /** A target that was typed may lie beyond the fence, and so beyond what is seen. @param {PageState} state */
+  showTargets({ doc, fence }) {
+    const seen = box(fence.held.features.flatMap((zone) => [...places(zone.geometry.coordinates)]));
+    const isFar = seen !== null && doc.targets.some(([lon, lat]) => lon < seen[0] || lon > seen[2] || lat < seen[1] || lat > seen[3]);
+    if (isFar !== this.isFar && this.isFitted && !this.isMoved && !this.isFollowing) {
+      this.fit();
+    }
+    this.isFar = isFar;
   }
 
   /** @param {boolean} [isSudden] */

@@ -67,7 +67,7 @@ function deedsPart(store, act) {
     const { server, drive, fence } = state;
     show(section, server.source === "live" || server.source === "demo");
     const reason = cannotWrite(state);
-    resume.disabled = reason !== "" || !drive.can_resume;
+    resume.disabled = reason !== "" || !drive.can_resume || drive.state === "arrived";
     blocked.disabled = reason !== "" || !server.can.drive;
     forget.disabled = reason !== "" || fence.obstacles.length === 0;
     say(why, reason);

@@ -30,7 +30,7 @@ function shownPart(store, act) {
   const back = button(texts.fence.back, () => act.heldFence());
   const upload = button(texts.fence.upload, () => act.uploadFence(), { class: "main" });
   const why = h("p", { class: "quiet" });
-  store.watch(["fence", "looked", "doc", "server", "control", "page"], (state) => {
+  store.watch(["fence", "looked", "doc", "server", "control", "page", "isConnected"], (state) => {
     const { fence, looked, doc, server } = state;
     const isDrawn = doc.zones !== null;
     fill(text, described(isDrawn ? looked : fence, isDrawn));

@@ -160,7 +160,7 @@ export function confirmed(question, yes) {
  */
 export function cannotWrite({ server, control, page, isConnected }) {
   if (!isConnected) {
-    return texts.start.noServer;
+    return texts.start.lost;
   }
   if (!server.can.upload) {
     return texts.start.noUpload;

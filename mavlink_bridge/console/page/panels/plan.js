@@ -53,8 +53,8 @@ function targetsPart(store, act) {
     const { targets } = doc;
     show(none, targets.length === 0);
     keepFocus(list, () => fill(list, targets.map((place, i) => h("li", {}, placeField(texts.plan.targetN(i + 1), place, (typed) => act.moveTarget(i, typed)),
-      signButton("up", texts.plan.up(i + 1), () => act.swapTargets(i, i - 1), { disabled: i === 0 }),
-      signButton("down", texts.plan.down(i + 1), () => act.swapTargets(i, i + 1), { disabled: i === targets.length - 1 }),
+      targets.length > 1 && signButton("up", texts.plan.up(i + 1), () => act.swapTargets(i, i - 1), { disabled: i === 0 }),
+      targets.length > 1 && signButton("down", texts.plan.down(i + 1), () => act.swapTargets(i, i + 1), { disabled: i === targets.length - 1 }),
       signButton("no", texts.plan.remove(i + 1), () => act.removeTarget(i))))));
     best.checked = doc.order === "best";
     back.checked = doc.comes_back;
@@ -127,21 +127,32 @@ function resultPart(store, act) {
     say(working, doc.mission ? texts.plan.checking : texts.plan.working);
   });
   store.watch(["plan", "planTrouble", "doc", "isPlanning"], (state) => {
-    const { plan, planTrouble } = state;
-    card.className = `card ${planTrouble || plan?.no_route ? "bad" : look(plan)}`;
+    const { plan, planTrouble, isPlanning } = state;
+    // What is shown while a newer question is being answered is no answer to it.
+    show(card, true);
+    card.className = `card ${planTrouble || plan?.no_route ? "bad" : isPlanning ? "" : look(plan)}`;
     if (planTrouble) {
       fill(card, h("strong", {}, texts.failed), h("p", {}, planTrouble.message), planTrouble.advice && h("p", {}, planTrouble.advice));
+    } else if (isServed && plan?.no_route && hasNoStart(state)) {
+      card.className = "card unsure";
+      fill(card, h("strong", { class: "headline" }, texts.plan.needsStart), h("p", {}, texts.plan.needsStartWhy), button(texts.plan.askStart, () => store.set({ tool: "start" }), { class: "main" }));
     } else if (plan?.no_route) {
       fill(card, noRoute(plan.no_route, act));
     } else if (plan && plan.state !== "planning") {
       fill(card, outcome(plan, state, act));
     } else {
+      show(card, !isPlanning || state.doc.targets.length === 0);
       const isEmpty = state.isPlanning || state.doc.targets.length === 0;
       fill(card, h("p", {}, isServed ? (isEmpty ? texts.plan.nothing : texts.plan.cancelled) : texts.plan.nothingHere),
         !isEmpty && button(texts.plan.again, () => act.planner.change(true)));
     }
   });
   return section;
+}
+
+/** Whether nothing tells where a route would begin. @param {PageState} state */
+function hasNoStart({ doc, vehicle, home, server }) {
+  return server.source === "files" && doc.start === null && doc.mission === null && vehicle.position === null && home === null;
 }
 
 /** @param {import("../types.js").Plan | null} plan */
@@ -251,7 +262,7 @@ function notesPart(store) {
 }
 
 /**
- * The way points as fields, for who cannot drag them.
+ * The waypoints as fields, for who cannot drag them.
  * @param {PageStore} store
  * @param {Actions} act
  */

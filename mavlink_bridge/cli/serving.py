@@ -152,6 +152,8 @@ def _listen(text: str) -> tuple[str, int | None]:
     host, colon, port = text.rpartition(":")
     if not colon or text.endswith("]"):
         return ("127.0.0.1", int(text)) if text.isdigit() else (text.strip("[]"), None)
+    if ":" in host and not host.startswith("["):
+        raise UsageError(f"--listen {text!r}: an IPv6 address stands in brackets: [::1]:8080")
     if not port.isdigit() or int(port) > 65535:
         raise UsageError(f"--listen {text!r}: expected HOST:PORT, with a port of 0 to 65535")
     return host.strip("[]") or "0.0.0.0", int(port)  # noqa: S104 - as the user says

@@ -43,12 +43,26 @@ class Looked:
     items : tuple of MissionItem
         The mission of it.
     plan : Plan or None
+    field : tuple or None
+        What it rests on, of `field_of`.
     """
 
     view: PlanView
     request: Tour | None = None
     items: tuple[MissionItem, ...] = ()
     plan: Plan | None = None
+    field: tuple[object, ...] | None = None
+
+
+def field_of(situation: Situation) -> tuple[object, ...]:
+    """Return what a checked mission's promise rests on beside its items; where it is equal, it still holds."""
+    fence, home = situation.fence, situation.home
+    return (
+        fence.value if fence is not None else None,
+        home.value if home is not None else None,
+        situation.parameters,
+        situation.obstacles.known,
+    )
 
 
 def look_at_plan(
@@ -111,7 +125,7 @@ def look_at_mission(
     checked = check_mission(mission, situation, request)
     planned = plan_of(checked, situation)
     view = checked_view(checked, planned, request, took_s=round(clock() - begun_s, 4))
-    return Looked(view, items=mission.items, plan=planned)
+    return Looked(view, items=mission.items, plan=planned, field=field_of(situation))
 
 
 def repaired(
@@ -137,7 +151,7 @@ def repaired(
     view = replace(
         plan_view(planned, situation, request, took_s=took_s), state="repaired", changed=planned.info
     )
-    return Looked(view, items=planned.items, plan=planned)
+    return Looked(view, items=planned.items, plan=planned, field=field_of(situation))
 
 
 def look_at_fence(body: FenceRequest, situation: Situation, own: Request) -> FenceView:

@@ -48,7 +48,9 @@ PERIOD_S = 0.1
 
 _ALIVE_S = 1.0  # something comes so often, so that a page knows that it is connected
 _SEND_S = 15.0  # a page that takes nothing for so long is gone; chosen, not measured
+_FRESH_S = 5.0  # so late a request may come and still change something; chosen: longer than any hitch of a network that can be driven by
 _PAGE_ID = re.compile(r"[A-Za-z0-9_-]{8,64}")
+_BODY_S = 30.0  # for a request of 4 MB to come: 1.1 Mbit/s; chosen
 _JSON = "application/json"
 _TYPES = {
     ".mjs": "text/javascript",
@@ -92,14 +94,22 @@ async def _body(request: Request) -> bytes:
     Raises
     ------
     Refusal
-        It is.
+        It is, or it comes too slowly.
     """
     data = bytearray()
-    async for piece in request.stream():
-        data += piece
-        if len(data) > wire.MOST_BYTES:
-            most = wire.MOST_BYTES // (1024 * 1024)
-            raise Refusal(Problem(kind="too_large", message=f"the request is larger than {most} MB"), 413)
+    try:
+        async with asyncio.timeout(_BODY_S):
+            async for piece in request.stream():
+                data += piece
+                if len(data) > wire.MOST_BYTES:
+                    most = wire.MOST_BYTES // (1024 * 1024)
+                    raise Refusal(
+                        Problem(kind="too_large", message=f"the request is larger than {most} MB"), 413
+                    )
+    except TimeoutError:
+        raise Refusal(
+            Problem(kind="late", message=f"the request took more than {_BODY_S:.0f} s"), 408
+        ) from None
     return bytes(data)
 
 
@@ -149,6 +159,8 @@ def _guarded(handler: Handler) -> Handler:
             return failure(Problem(kind="superseded", message="a newer request took its place"), 409)
         except (MissionError, BridgeError) as error:
             return failure(problem_of(error), 422)
+        except msgspec.ValidationError as error:
+            return failure(Problem(kind="invalid", message=f"the request cannot be read: {error}"), 422)
         except Exception as error:  # noqa: BLE001 - the last place where it can be answered
             text = f"{type(error).__name__}: {error}. This is a bug in pbpp"
             return failure(Problem(kind="internal", message=text), 500)
@@ -238,8 +250,12 @@ class ConsoleRoutes:
 
     def _file(self, name: str, known: str) -> Response:
         root = Path(str(files(_PAGE).joinpath("page"))).resolve()
-        path = (root / name).resolve()
-        if not path.is_relative_to(root) or not path.is_file():
+        try:
+            path = (root / name).resolve()
+            is_there = path.is_relative_to(root) and path.is_file()
+        except (ValueError, OSError):  # no name of a file at all: too long, or with a NUL
+            is_there = False
+        if not is_there:
             return failure(Problem(kind="not_found", message="there is no such file"), 404)
         data = path.read_bytes()
         tag = f'"{hashlib.blake2s(data, digest_size=12).hexdigest()}"'
@@ -494,7 +510,30 @@ class ConsoleRoutes:
 
     async def _do(self, request: Request, deed: deeds.Deed) -> Response:
         page_id = _page_id(request.headers.get("x-page-id"))
+        if deed.needs_control:
+            self._check_fresh(request)
         return answer(TakenUp(text=await self._hub.do(deed, page_id)), 202)
+
+    def _check_fresh(self, request: Request) -> None:
+        """Refuse what a page asked for long ago, or of a server before this one: the network or the browser may keep a request, and send it again.
+
+        Raises
+        ------
+        Refusal
+            It comes late.
+        """
+        run_id, asked_s = request.headers.get("x-run-id"), request.headers.get("x-asked-s")
+        if run_id is not None and run_id != self._hub.board.sections["server"].run_id:
+            raise Refusal(Problem(kind="late", message="pbpp was started anew since: nothing was sent"), 409)
+        if asked_s is None:
+            return
+        try:
+            age_s = self._hub.clock() - float(asked_s)
+        except ValueError:
+            raise Refusal(Problem(kind="invalid", message="expected X-Asked-S in seconds"), 400) from None
+        if not age_s <= _FRESH_S:
+            message = f"this was asked for {age_s:.0f} s ago: nothing was sent"
+            raise Refusal(Problem(kind="late", message=message, advice="ask for it again"), 409)
 
     async def take_control(self, request: Request) -> Response:
         """Let the page have control."""

@@ -8,7 +8,7 @@ from collections import deque
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from mavlink_bridge.console.deeds import Refusal, not_now
+from mavlink_bridge.console.deeds import Hold, Refusal, not_now
 from mavlink_bridge.console.drawer import Drawer
 from mavlink_bridge.console.view.driven import DriveLog, after_view
 from mavlink_bridge.console.view.drives import DriveShown
@@ -97,9 +97,14 @@ class LiveBackend:
 
     def take_asked(self, now_s: float) -> None:
         """Do what pages asked for since the last call; for the bridge's loop."""
-        while self._asked:
-            asked = self._asked.popleft()
-            if asked.answer.cancelled() or self.desk is None:
+        batch = [self._asked.popleft() for _ in range(len(self._asked))]
+        holds = [index for index, asked in enumerate(batch) if isinstance(asked.deed, Hold)]
+        for index, asked in enumerate(batch):
+            is_hold = index in holds
+            if self.desk is None or (asked.answer.cancelled() and not is_hold):
+                continue  # a HOLD is done though nobody waits for its answer any more
+            if not is_hold and holds and index < holds[-1]:
+                _tell(asked, asked.answer.set_exception, not_now("HOLD came after it: nothing was sent"))
                 continue
             try:
                 text = self.desk.do(asked.deed, asked.page, now_s)

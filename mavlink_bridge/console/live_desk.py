@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from mavlink_bridge.backup.vehicle_mark import Kinship
 from mavlink_bridge.console import deeds
+from mavlink_bridge.console.answers import field_of
 from mavlink_bridge.console.deeds import Refusal, not_now
 from mavlink_bridge.console.view.drives import NO_LINK, HoldShown
 from mavlink_bridge.console.view.plans import is_same_route, plan_id
@@ -33,10 +34,13 @@ if TYPE_CHECKING:
     from mavlink_bridge.director import Director
     from missions.items import MissionItem
     from missions.planned import Plan
-    from missions.request import Tour
+    from missions.request import Request, Tour
 
 _LIST_PATIENCE_S = 15.0
 """So long a list waits for the director to have asked what it asks the vehicle just now; chosen, not measured."""
+
+_GO_ON_S = 60.0
+"""So long after "Go on" the vehicle may still begin to drive: whoever pressed it may look elsewhere by then; chosen, not measured."""
 
 _MAKING = frozenset({State.HOLDING, State.PLANNING, State.LISTENING, State.LEARNING})
 """States in which the plan that is wanted may still come."""
@@ -55,8 +59,13 @@ class _Wanted:
     """What a page wants done with the director's next plan."""
 
     like: Plan | None  # confirmed where it is this route; None whatever it is
-    drives: bool
+    until_s: float | None  # drives at once, until then; None: it is uploaded only
     page: str
+
+    @property
+    def drives(self) -> bool:
+        """Whether it is driven as well."""
+        return self.until_s is not None
 
 
 @dataclass(slots=True)
@@ -105,7 +114,7 @@ class LiveDesk:
         self._tell = tell
         self._wanted: _Wanted | None = None
         self._list: _List | None = None
-        self._asked: Tour | None = None
+        self._driven: Request | None = None
         self._is_linked = True
         self.hold_shown = HoldShown()
         self._deeds: dict[type[Deed], Callable[[Any, str, float], str]] = {
@@ -123,7 +132,7 @@ class LiveDesk:
     @property
     def can_resume(self) -> bool:
         """Whether there is a target to go on to."""
-        return self._last_request is not None and self._director.state not in AT_WORK
+        return self._driven == self._director.orders.request and self._director.state not in AT_WORK
 
     def do(self, deed: Deed, page: str, now_s: float) -> str:
         """Do a permitted deed for a page; return what was done, for people.
@@ -137,6 +146,7 @@ class LiveDesk:
 
     def handle_timer(self, now_s: float) -> None:
         """Go on with what had to wait: for the director's plan, or for room on the link."""
+        self._note_drive()
         self._go_on_with_plan(now_s)
         self._go_on_with_list(now_s)
 
@@ -175,7 +185,6 @@ class LiveDesk:
         return "the bridge plans"
 
     def _request(self, request: Tour, now_s: float) -> None:
-        self._asked = request
         self._journal("request", now_s, text=request_to_text(request))
         self._director.take_request(request, now_s)
 
@@ -194,23 +203,28 @@ class LiveDesk:
         return "starting"
 
     def _resume(self, _deed: deeds.Resume, page: str, now_s: float) -> str:
-        request = self._last_request
+        request = self._driven
         if request is None:
-            raise not_now("there is no target to go on to", "choose a target")
+            raise not_now("there is no target to go on to", "choose a target, upload its plan and start it")
+        if request != self._director.orders.request:
+            raise not_now(
+                "another target was asked for since the drive", "look at its plan, upload and start it"
+            )
         if self._director.state in AT_WORK:
             raise not_now(f"the bridge is at work: {self._director.state}")
         self._check_free()
-        self._wanted = _Wanted(None, drives=True, page=page)
+        self._wanted = _Wanted(None, now_s + _GO_ON_S, page)
         self._tell(f"{page} goes on to the last target", "notice")
-        self._request(request, now_s)
+        self._request(request, now_s)  # type: ignore[arg-type] # a Tour: it has targets
         return "planning the way from here"
 
-    @property
-    def _last_request(self) -> Tour | None:
-        if self._asked is not None:
-            return self._asked
+    def _note_drive(self) -> None:
+        """Remember what is driven to, so that a person can go on to it after a HOLD: nothing else that was only asked for."""
         own = self._director.orders.request
-        return own if own.targets else None  # type: ignore[return-value] # a Tour where it has targets
+        if self._director.state is State.DRIVING and own.targets:
+            self._driven = own
+        elif self._director.state is State.ARRIVED:
+            self._driven = None
 
     # Writing
 
@@ -229,7 +243,7 @@ class LiveDesk:
             )
         if looked.request is None:
             return self._upload_mission(looked, now_s)
-        self._wanted = _Wanted(looked.plan, drives=False, page=page)
+        self._wanted = _Wanted(looked.plan, None, page)
         self._request(looked.request, now_s)
         return "the same plan is made from where the rover is now, and uploaded"
 
@@ -241,6 +255,11 @@ class LiveDesk:
             raise not_now("the vehicle is not known yet")
         if not looked.view.is_promised:
             raise not_now("this mission does not keep its clearance: it is not written", "repair it first")
+        if looked.field != field_of(self._director.situation):
+            raise not_now(
+                "this mission was checked against another fence, home or parameters than the vehicle's now: it is not written",
+                "upload the drawn fence first, or check it again",
+            )
         home = looked.plan.home or looked.plan.start
         return self._queue(
             MissionType.MISSION, peer.autopilot.lists.form.mission_of(looked.items, home), now_s
@@ -308,6 +327,12 @@ class LiveDesk:
         """Confirm the director's plan where it is what a page wants."""
         wanted, director = self._wanted, self._director
         if wanted is None:
+            return
+        if wanted.until_s is not None and now_s > wanted.until_s:
+            self._wanted = None
+            self._tell(
+                "planning took too long to go on unseen: look at the plan, upload and start it", "warning"
+            )
             return
         if not director.awaits_confirmation:
             if director.state not in _MAKING:

@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING, Self
 
 import segno
 import uvicorn
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from mavlink_bridge.errors import LinkError
 
 if TYPE_CHECKING:
+    from asyncio import Transport
     from pathlib import Path
     from types import TracebackType
 
@@ -27,6 +29,12 @@ FIRST_PORT, _PORTS = 8080, 20
 
 _BACKLOG = 64
 _MOST_CONNECTIONS = 256  # at once, pages and strangers; chosen: a small computer holds them
+_MOST_OF_ONE = 64
+"""Connections of one address: so one stranger on the network cannot take them all, and HOLD with them. Chosen: more than ten browsers have."""
+
+_REQUEST_S = (
+    10.0  # for a request's head to be there; chosen: longer than any network that can be driven by takes
+)
 _LEAVE_S = 2  # for open connections to end; chosen: pages connect again
 
 
@@ -102,6 +110,29 @@ def qr_code(link: str) -> str:
     return out.getvalue()
 
 
+class PatientProtocol(H11Protocol):
+    """HTTP to those who ask for something: a connection that does not is closed, and one address has only so many."""
+
+    def connection_made(self, transport: Transport) -> None:  # type: ignore[override]
+        """Take a connection, or not."""
+        super().connection_made(transport)
+        own = self.client[0] if self.client else ""
+        clients = [getattr(one, "client", None) or ("",) for one in self.connections]
+        if sum(client[0] == own for client in clients) > _MOST_OF_ONE:
+            transport.abort()
+            return
+        self.loop.call_later(_REQUEST_S, self._look, None)
+
+    def _look(self, before: object) -> None:
+        """Close it where no request has come since the last look, nor is one being answered."""
+        if self not in self.connections:  # gone, or a WebSocket by now
+            return
+        if self.cycle is before and (before is None or self.cycle.response_complete):
+            self.transport.close()
+            return
+        self.loop.call_later(_REQUEST_S, self._look, self.cycle)
+
+
 class Served:
     """An application that is served in a thread of its own; a context manager.
 
@@ -125,6 +156,7 @@ class Served:
             server_header=False,
             date_header=False,
             lifespan="on",
+            http=PatientProtocol,
             ws="websockets-sansio",
             ws_max_size=64 * 1024,
             ws_per_message_deflate=False,

@@ -1,7 +1,7 @@
 /** The page: its parts made and tied together. */
 
 import { Actions } from "./actions.js";
-import { Live, beginSession } from "./connection.js";
+import { Live, beginSession, meant } from "./connection.js";
 import { EMPTY, question } from "./doc.js";
 import { fill, h } from "./dom.js";
 import { acceptDrops } from "./dropping.js";
@@ -141,12 +141,13 @@ function hear(message) {
   ahead_s = message.time_s - performance.now() / 1000;
   take(store, message, track);
   const { server, fence } = store.state;
+  Object.assign(meant, { run_id: server.run_id, ahead_s });
   if (message.type === "snapshot") {
     begin(before, store.state);
   }
   if (before.fence.id !== fence.id || (message.type === "snapshot" && before.server.run_id !== server.run_id)) {
     // What was planned rests on another fence now.
-    planner.change(true);
+    planner.mistrust();
   }
   if ("plan" in (message.state ?? {})) {
     showStanding();

@@ -8,14 +8,19 @@ const SILENT_MS = 3000; // the server says something every second: three missed 
 const AGAIN_MS = 1000; // between tries to connect anew; chosen
 const ANSWER_MS = 30_000; // no answer is waited for longer, except by plans, which are cancelled by newer ones
 
-/** A page's own secret name: control belongs to a tab. */
+/** A page's own secret name: control belongs to a tab. It lies in the tab's store only while the page is reloaded, so that a tab that is duplicated gets one of its own. */
 export const PAGE_ID = isServed ? ownId() : "";
 
 function ownId() {
   const id = sessionStorage.getItem("page-id") ?? crypto.getRandomValues(new Uint32Array(4)).join("-");
-  sessionStorage.setItem("page-id", id);
+  sessionStorage.removeItem("page-id");
+  window.addEventListener("pagehide", () => sessionStorage.setItem("page-id", id));
+  window.addEventListener("pageshow", () => sessionStorage.removeItem("page-id"));
   return id;
 }
+
+/** The server that this page shows, and its clock: what is asked for is meant for that one and for now, and refused by another and later. */
+export const meant = { run_id: "", ahead_s: NaN };
 
 /** What the server would not do, with its words. */
 export class RefusedError extends Error {
@@ -39,13 +44,18 @@ async function request(path, { body, method = "POST", signal } = {}) {
   const isBytes = body instanceof Blob;
   const answer = await fetch(path, {
     method, signal: signal ?? AbortSignal.timeout(ANSWER_MS), cache: "no-store", credentials: "same-origin",
-    headers: { "X-Page-Id": PAGE_ID, ...(method === "POST" ? { "Content-Type": isBytes ? "application/octet-stream" : "application/json" } : {}) },
+    headers: { "X-Page-Id": PAGE_ID, ...whenMeant(), ...(method === "POST" ? { "Content-Type": isBytes ? "application/octet-stream" : "application/json" } : {}) },
     ...(method === "POST" ? { body: isBytes ? body : JSON.stringify(body ?? {}) } : {}),
   });
   if (!answer.ok) {
     throw new RefusedError(await refusalOf(answer));
   }
   return answer;
+}
+
+/** @returns {Record<string, string>} */
+function whenMeant() {
+  return meant.run_id ? { "X-Run-Id": meant.run_id, "X-Asked-S": (performance.now() / 1000 + meant.ahead_s).toFixed(3) } : {};
 }
 
 /** @param {Response} answer @returns {Promise<Refusal>} */
@@ -104,6 +114,8 @@ export class Live {
     /** @type {WebSocket | null} */
     this.socket = null;
     this.seq = -1;
+    /** The server's clock ahead of ours, by the message of this connection that came quickest. */
+    this.ahead_s = -Infinity;
     this.silence = 0;
     this.again = 0;
     this.connect();
@@ -117,6 +129,7 @@ export class Live {
     const socket = new WebSocket(address);
     this.socket = socket;
     this.seq = -1;
+    this.ahead_s = -Infinity;
     socket.addEventListener("message", (event) => this.hear(socket, JSON.parse(event.data)));
     socket.addEventListener("close", () => this.lose(socket));
     this.watch();
@@ -130,7 +143,10 @@ export class Live {
     if (socket !== this.socket) {
       return;
     }
-    if (message.type !== "snapshot" && message.seq !== this.seq + 1) {
+    const ahead_s = message.time_s - performance.now() / 1000;
+    this.ahead_s = Math.max(this.ahead_s, ahead_s);
+    // What comes so late is no picture of now, however much of it comes: a network that holds things up is as good as none.
+    if ((message.type !== "snapshot" && message.seq !== this.seq + 1) || this.ahead_s - ahead_s > SILENT_MS / 1000) {
       this.lose(socket);
       return;
     }

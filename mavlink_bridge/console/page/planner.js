@@ -33,6 +33,16 @@ export class Planner {
     this.timer = setTimeout(() => this.ask(isAnew), PAUSE_MS);
   }
 
+  /** What a plan rests on has changed: it is not shown with its promise until it is made anew. */
+  mistrust() {
+    this.running?.abort();
+    this.running = null;
+    if (question(this.store.state.doc) !== null) {
+      this.store.set({ plan: null, isPlanning: true });
+    }
+    this.change(true);
+  }
+
   /**
    * A plan for this document is shown already: it is not asked for again.
    * @param {import("./types.js").Doc} doc

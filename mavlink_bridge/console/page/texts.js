@@ -165,7 +165,7 @@ const en = {
     along: /** @param {number} progress_m @param {number} length_m */ (progress_m, length_m) => `${progress_m.toFixed(1)} of ${length_m.toFixed(1)} m`,
     off: /** @param {number} deviation_m @param {boolean} isInside */ (deviation_m, isInside) => `${deviation_m.toFixed(2)} m, ${isInside ? "inside the corridor" : "OUTSIDE THE CORRIDOR"}`,
     leastHere: /** @param {number} value */ (value) => `least ${m(value)}`,
-    resume: "Go on to the target", blocked: "Blocked here", clearBlocked: "Forget blocked places", blockedHint: "Marks what stands in front of the rover and plans round it. This protects no person.",
+    resume: "Go on to the target", resumeName: "Go on to the target: press and hold for one second.", blocked: "Blocked here", clearBlocked: "Forget blocked places", blockedHint: "Marks what stands in front of the rover and plans round it. This protects no person.",
     going: "Go on with the drive", breaches: /** @param {number} n */ (n) => (n === 1 ? "1 fence breach" : `${n} fence breaches`), wayHome: "Way home",
     holdState: "HOLD", none: "No drive under way.",
     trouble: "Trouble",

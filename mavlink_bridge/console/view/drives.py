@@ -154,9 +154,14 @@ class HoldShown:
     def view(self, director: Director, now_s: float) -> HoldView:
         """Return what came of it so far: what heartbeats show, never what was acknowledged."""
         view, asked_s = self._view, self._view.asked_s
-        if asked_s is None or view.state in ("stopped", "none"):
+        if asked_s is None or view.state == "none":
             return view
         doing = director.watch.doing(now_s)
+        if view.state in ("answered", "stopped") and doing.mode not in (None, doing.modes.hold):
+            self._view = HoldView(text="the vehicle has left HOLD", by=view.by)
+            return self._view
+        if view.state == "stopped":
+            return view
         is_shown = director.watch.heartbeat_s > asked_s and doing.mode == doing.modes.hold
         if is_shown and view.state != "answered":
             self._view = HoldView(

@@ -142,7 +142,13 @@ def hold(seen: Watched) -> None:
 
 def go_on(seen: Watched) -> None:
     seen.page.get_by_role("tab", name="Drive").click()
-    seen.page.get_by_role("button", name="Go on to the target").click()
+    button = seen.page.get_by_role("button", name="Go on to the target")
+    expect(button).to_be_enabled()
+    button.click()  # a click moves nothing
+    seen.page.wait_for_timeout(1500)
+    expect(seen.page.locator(".chip-mode")).to_contain_text("HOLD")
+    button.click(delay=1500)
+    expect(seen.page.locator(".chip-mode")).to_contain_text("AUTO")
 
 
 def arrive(seen: Watched) -> None:
@@ -182,7 +188,7 @@ STEPS = [
         hold,
     ),
     (
-        "Open **Drive** and press **Go on to the target**. A new route is planned from where the rover stands, uploaded, verified and driven.",
+        "Open **Drive** and press **Go on to the target** for a second. A new route is planned from where the rover stands, uploaded, verified and driven.",
         go_on,
     ),
     ('Wait until the state is "arrived". Below stands what was driven against what was promised.', arrive),
@@ -337,4 +343,43 @@ def test_a_replay_is_scrubbed_and_played(browser: Browser) -> None:
         expect(page.get_by_role("button", name="Play")).to_be_visible()
         expect(page.locator("#hold-bar")).to_contain_text("nothing to hold")
         assert seen.accessible() == []
+        close(seen)
+
+
+def test_start_is_meant_once_by_a_page_that_still_may(browser: Browser) -> None:
+    asked: list[dict] = []
+    with serving("--demo") as server:
+        seen = open_page(browser, server.url, expected="409")
+        seen.page.on("request", lambda one: asked.append(one.headers) if "/api/start" in one.url else None)
+        take_control(seen)
+        set_target(seen.page, FAR)
+        upload(seen)
+        start = seen.page.get_by_role("button", name="Start: press and hold")
+        start.click(delay=300)  # let go too early
+        start.dblclick()
+        start.click(button="right", delay=1300)
+        start.focus()
+        # Something lies on the key: the browser says so again and again.
+        start.evaluate(
+            "b => { for (const repeat of [true, true]) b.dispatchEvent(new KeyboardEvent('keydown', {key: 'Enter', repeat})) }"
+        )
+        seen.page.wait_for_timeout(1500)
+        # Control is taken away while it is pressed.
+        with seen.page.expect_popup() as opened:
+            seen.page.evaluate("() => { open(location.href) }")  # a duplicate has the tab's store
+        twin = opened.value
+        twin.wait_for_selector('.map-area[data-ready="yes"]')
+        expect(twin.get_by_text("page 1 holds control")).to_be_visible()  # it is another page
+        seen.page.bring_to_front()
+        start.hover()
+        seen.page.mouse.down()
+        twin.evaluate(
+            "async () => { const { post } = await import('/page/connection.js'); await post('/api/control/take') }"
+        )
+        seen.page.wait_for_timeout(1500)
+        seen.page.mouse.up()
+        assert asked == []
+        seen.page.reload()  # keeps its name
+        expect(seen.page.get_by_text("page 2 holds control")).to_be_visible()
+        assert seen.page.locator(".who").get_attribute("title") == "You are page 1"
         close(seen)

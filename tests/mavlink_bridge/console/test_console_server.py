@@ -7,6 +7,7 @@ import json
 import socket
 import threading
 import time
+from contextlib import suppress
 from dataclasses import replace
 
 import httpx
@@ -18,7 +19,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from mavlink_bridge.console import app as app_module
-from mavlink_bridge.console import wire
+from mavlink_bridge.console import server, wire
 from mavlink_bridge.console.access import Access
 from mavlink_bridge.console.deeds import Refusal, not_now
 from mavlink_bridge.console.server import open_socket, page_link, qr_code
@@ -395,6 +396,41 @@ def test_one_page_holds_control_and_every_page_may_hold_the_vehicle():
     assert backend.deeds == [("Start", "page 2"), ("Hold", "page 1"), ("Resume", "page 2")]
 
 
+@pytest.mark.parametrize(
+    "more", [{"x-run-id": "of-yesterday"}, {"x-asked-s": "1000.0"}, {"x-asked-s": "nan"}, {"x-asked-s": "?"}]
+)
+def test_a_request_that_comes_late_or_was_meant_for_an_earlier_server_moves_nothing(more):
+    backend = Recorder()
+    can = Permissions(upload=True, drive=True)
+    with (
+        served(can, backend) as (_, address),
+        httpx.Client(base_url=f"http://{address}", timeout=30) as client,
+    ):
+        for path in ("/api/start", "/api/upload"):
+            found = client.post(path, json={"plan_id": "x"}, headers={**PAGE, **more})
+            assert found.json()["error"]["kind"] in ("late", "invalid"), found.text
+        assert client.post("/api/resume", headers={**PAGE, **more}).json()["error"]["kind"] != "not_now"
+        assert backend.deeds == []
+        assert client.post("/api/hold", headers={**PAGE, **more}).status_code == 202  # never too late
+        now = {"x-run-id": "r", "x-asked-s": str(time.time() - 1.0)}
+        assert client.post("/api/start", json={"plan_id": "x"}, headers={**PAGE, **now}).status_code == 202
+
+
+@pytest.mark.parametrize(
+    ("path", "status"),
+    [
+        ("/page/a%00b", 404),
+        (f"/page/{'x' * 300}", 404),
+        ("/page/%2e%2e/app.py", 404),
+        ("/api/export?what=x", 422),
+    ],
+)
+def test_odd_addresses_are_answered_and_no_defects(path, status):
+    with served() as (_, address):
+        found = httpx.get(f"http://{address}{path}", timeout=30)
+        assert (found.status_code, "bug" in found.text) == (status, False), found.text
+
+
 def test_files_have_no_vehicle_to_be_asked():
     with served(Permissions(upload=True, drive=True)) as (_, address):
         found = httpx.post(f"http://{address}/api/hold", headers=PAGE, timeout=30)
@@ -521,3 +557,27 @@ def test_a_refusal_is_no_failure():
             )
 
     asyncio.run(ask())
+
+
+def test_one_stranger_cannot_take_all_connections_and_hold_with_them(monkeypatch):
+    monkeypatch.setattr(server, "_REQUEST_S", 1.0)
+    with served(Permissions(upload=True, drive=True), Recorder()) as (_, address):
+        host, port = address.split(":")
+        page = connect(f"ws://{address}/api/live?page=stream-page", ping_interval=None)
+        idle = [
+            socket.create_connection((host, int(port)), source_address=("127.0.0.2", 0)) for _ in range(300)
+        ]
+        for one in idle:
+            with suppress(OSError):  # most are closed at once
+                one.send(b"GET / HTTP/1.1\r\nHost: ")
+        assert httpx.post(f"http://{address}/api/hold", headers=PAGE, timeout=30).status_code == 202
+        for one in idle:  # and the others soon
+            one.settimeout(30)
+            with suppress(ConnectionError):
+                assert one.recv(1) == b""
+            one.close()
+        with page:
+            assert json.loads(page.recv(30))["type"] == "snapshot"
+            assert json.loads(page.recv(30))  # it is closed by nobody
+            time.sleep(2.5)
+            assert json.loads(page.recv(30))

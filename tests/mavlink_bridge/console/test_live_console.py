@@ -243,3 +243,23 @@ def test_an_upload_between_two_looks_is_shown_all_the_same(shown):
     shown.console._due_s = 0.0
     shown.wait(0.3)
     assert (shown.pages.state["upload"].what, shown.pages.state["upload"].state) == ("mission", "verified")
+
+
+def test_hold_is_done_though_its_page_does_not_wait_any_more_and_before_all_else(shown):
+    async def ask():
+        held = asyncio.create_task(shown.backend.do(deeds.Hold(), "page 1"))
+        await asyncio.sleep(0)
+        held.cancel()
+        begun = asyncio.create_task(shown.backend.do(deeds.TakeTargets(Tour(targets=(FAR,))), "page 2"))
+        late = asyncio.create_task(shown.backend.do(deeds.Hold(), "page 3"))
+        await asyncio.sleep(0)
+        shown.backend.take_asked(shown.run.now_s)
+        assert "sent" in await late
+        with pytest.raises(Refusal, match="HOLD came after it"):
+            await begun
+
+    asyncio.run(ask())
+    assert [(name, text.split(" of ")[0]) for name, _, text in shown.calls] == [
+        ("hold", "asked for by page 1"),
+        ("hold", "asked for by page 3"),
+    ]

@@ -10,7 +10,7 @@ from director.px4.px4_runs import conductor as px4_conductor
 from director.test_bridge_director import FAR, FENCE, HOME, NEAR, upload, wall_across_the_route
 
 from mavlink_bridge.console import deeds
-from mavlink_bridge.console.answers import Looked
+from mavlink_bridge.console.answers import Looked, field_of
 from mavlink_bridge.console.deeds import Refusal
 from mavlink_bridge.console.view.plans import is_same_route, plan_id, plan_view
 from mavlink_bridge.director import EventName, State
@@ -35,7 +35,8 @@ def ready(folder, **orders) -> SteppedConsole:
 def looked_at(console, request=FAR_TOUR) -> Looked:
     situation = console.director.situation
     planned = make_plan(situation, request)
-    return Looked(plan_view(planned, situation, request), request, planned.items, planned)
+    field = field_of(situation)
+    return Looked(plan_view(planned, situation, request), request, planned.items, planned, field)
 
 
 def driving(console) -> SteppedConsole:
@@ -250,6 +251,8 @@ def test_a_checked_mission_is_written_only_where_it_keeps_its_clearance(tmp_path
     broken = replace(looked, request=None, view=replace(looked.view, is_promised=False))
     with pytest.raises(Refusal, match="does not keep its clearance"):
         console.do(deeds.UploadPlan("x", broken))
+    with pytest.raises(Refusal, match="another fence"):  # one that was only drawn, or that of a while ago
+        console.do(deeds.UploadPlan("x", replace(looked, request=None, field=None)))
     console.do(deeds.UploadPlan("x", replace(looked, request=None)))
     console.until(lambda: not console.writer.is_busy)
     held = console.run.vehicles[0].mission[1:]
@@ -277,3 +280,62 @@ def test_a_hold_while_the_link_is_closed_is_never_said_to_be_on_its_way(tmp_path
     console.until(
         lambda: console.desk.hold_shown.view(console.director, console.run.now_s).state == "stopped", 30
     )
+
+
+def test_a_mission_checked_before_the_fence_changed_is_not_written(tmp_path):
+    console = ready(tmp_path)
+    looked = replace(looked_at(console), request=None)
+    upload(console.run, MissionType.FENCE, fence_to_items(wall_across_the_route()))
+    console.until(console.run.happened(EventName.FENCE_CHANGED))
+    with pytest.raises(Refusal, match="another fence"):
+        console.do(deeds.UploadPlan("x", looked))
+    assert not console.run.vehicles[0].mission[1:]
+
+
+def test_nobody_goes_on_to_a_target_that_was_never_driven_to(tmp_path):
+    console = ready(tmp_path)
+    console.do(deeds.TakeTargets(FAR_TOUR))
+    console.until(lambda: console.director.awaits_confirmation)
+    assert not console.desk.can_resume
+    with pytest.raises(Refusal, match="no target to go on to"):
+        console.do(deeds.Resume())
+    console.wait(5.0)
+    assert not console.run.vehicles[0].is_armed
+
+
+def test_going_on_is_given_up_where_another_target_was_asked_for_meanwhile(tmp_path):
+    console = driving(ready(tmp_path))
+    console.wait(5.0)
+    console.do(deeds.Hold())
+    console.until(lambda: console.desk.can_resume, 20)
+    console.do(deeds.TakeTargets(Tour(targets=(NEAR,), clearance_m=2.5)))
+    console.until(lambda: console.director.awaits_confirmation)
+    with pytest.raises(Refusal, match="another target"):
+        console.do(deeds.Resume())
+    assert not console.desk.can_resume
+
+
+def test_going_on_does_not_drive_long_after_it_was_asked_for(tmp_path):
+    console = driving(ready(tmp_path))
+    console.wait(5.0)
+    console.do(deeds.Hold())
+    console.until(lambda: console.desk.can_resume, 20)
+    console.do(deeds.Resume())
+    console.desk.handle_timer(console.run.now_s + 61.0)
+    console.wait(10.0)
+    assert console.director.state is State.PROPOSED
+    assert any("took too long" in text for text, _ in console.told)
+
+
+def test_hold_is_not_said_to_stand_once_somebody_drives_on(tmp_path):
+    console = driving(ready(tmp_path))
+    console.wait(5.0)
+    console.do(deeds.Hold())
+
+    def view():
+        return console.desk.hold_shown.view(console.director, console.run.now_s)
+
+    console.until(lambda: view().state == "stopped", 20)
+    console.run.vehicles[0].rover.mode = Mode.MANUAL  # by the transmitter
+    console.until(lambda: view().state == "none", 10)
+    assert "left HOLD" in view().text

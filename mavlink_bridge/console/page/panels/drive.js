@@ -4,7 +4,7 @@ import { h, say, show } from "../dom.js";
 import { isServed } from "../inside.js";
 import { texts } from "../texts.js";
 import { comparison } from "./after.js";
-import { button, cannotWrite, facts, foundPart } from "./parts.js";
+import { button, cannotWrite, facts, foundPart, pressButton } from "./parts.js";
 
 /** @typedef {import("../types.js").PageState} PageState */
 
@@ -58,7 +58,7 @@ function showKept(list, drive) {
  * @param {import("../actions.js").Actions} act
  */
 function deedsPart(store, act) {
-  const resume = button(texts.drive.resume, () => act.resume(), { class: "main" });
+  const resume = pressButton(texts.drive.resume, texts.start.holding, texts.drive.resumeName, () => act.resume());
   const blocked = button(texts.drive.blocked, () => act.blocked());
   const forget = button(texts.drive.clearBlocked, () => act.clearBlocked());
   const why = h("p", { class: "quiet" });

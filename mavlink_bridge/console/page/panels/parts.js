@@ -71,17 +71,32 @@ export function pressButton(text, whilePressed, name, act) {
     if (!timer && !element.disabled) {
       element.classList.add("pressed");
       say(label, whilePressed);
-      timer = setTimeout(() => { end(); act(); }, PRESS_MS);
+      timer = setTimeout(() => {
+        // Control, plan or server may be another one since it was pressed.
+        const isStill = !element.disabled && element.isConnected && !document.hidden;
+        end();
+        if (isStill) {
+          act();
+        }
+      }, PRESS_MS);
     }
   };
-  element.addEventListener("pointerdown", (event) => { element.setPointerCapture(event.pointerId); begin(); });
+  element.addEventListener("pointerdown", (event) => {
+    if (event.isPrimary && event.button === 0) {
+      element.setPointerCapture(event.pointerId);
+      begin();
+    }
+  });
   for (const stop of ["pointerup", "pointercancel", "blur", "contextmenu"]) {
     element.addEventListener(stop, end);
   }
   element.addEventListener("keydown", (event) => {
     if (event.key === "Enter" || event.key === " ") {
       event.preventDefault();
-      begin();
+      // A key that something lies on presses once, and not again every second.
+      if (!event.repeat) {
+        begin();
+      }
     }
   });
   element.addEventListener("keyup", end);

@@ -161,6 +161,11 @@ def test_nothing_else_creates_files(package):
             'mavlink_bridge/cli/kept_files.py: return os.fdopen(create_exclusively(path), "w", encoding="utf-8", newline="\\n")',
             'mavlink_bridge/cli/kept_files.py: with known.open("a", encoding="utf-8") as file:',
             'mavlink_bridge/backup/vehicle_lock.py: file: IO[bytes] = path.open("a+b")',  # locked, and told who has it
+            'mavlink_bridge/dataset/store.py: lock = (self.folder / _LOCK).open("ab")',  # locked, and stays empty
+            # In a temporary folder; what becomes a result is put in place as a whole.
+            'mavlink_bridge/cli/plan_batch.py: with lines.open("w", encoding="ascii", newline="\\n") as file:',
+            "mavlink_bridge/many/parcel.py: paths[file.path].write_bytes(file.content)",
+            "mavlink_bridge/console/reading.py: path.write_bytes(data)",
             "mavlink_bridge/cli/failing.py: os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())",
         }
     )

@@ -60,6 +60,7 @@ class Barrier:
     kind: ZoneKind
     area: Area
     is_reported: bool = False
+    is_home_circle: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,8 +159,8 @@ class Ground:
         return [b for b in self.barriers if b.kind is ZoneKind.EXCLUSION and b.area.covers(point)] + outside
 
     def is_in_some_inclusions_only(self, point: Point) -> bool:
-        """Return whether a point is forbidden although an inclusion covers it, because others do not."""
-        inclusions = [b for b in self.barriers if b.kind is ZoneKind.INCLUSION]
+        """Return whether a point is forbidden although a drawn inclusion covers it, because other drawn ones do not."""
+        inclusions = [b for b in self.barriers if b.kind is ZoneKind.INCLUSION and not b.is_home_circle]
         covered = sum(barrier.area.covers(point) for barrier in inclusions)
         return not self.union and 0 < covered < len(inclusions)
 
@@ -219,7 +220,7 @@ def lay_out(
         if union and any(barrier.kind is ZoneKind.INCLUSION for barrier in barriers):
             barriers = _within(barriers, area, name)
         else:
-            barriers.append(Barrier(name, ZoneKind.INCLUSION, area))
+            barriers.append(Barrier(name, ZoneKind.INCLUSION, area, is_home_circle=True))
     points = frame.to_local_array(around)
     extent = shapely.union_all([*(b.area.envelope for b in barriers), shapely.MultiPoint(points)])
     bounds = extent.envelope.buffer(_OPEN_GROUND_M, join_style="mitre")
@@ -240,7 +241,10 @@ def check_ground(ground: Ground) -> None:
     names = " and ".join(inclusions)
     if not ground.keep_in.is_empty:
         raise FenceError(f"the exclusions cover all of {names}", zones=inclusions)
-    raise FenceError(f"{names} have no area in common; {_COMMON_GROUND}", zones=inclusions)
+    drawn = [b.area for b in ground.barriers if b.kind is ZoneKind.INCLUSION and not b.is_home_circle]
+    is_circle_apart = len(drawn) < len(inclusions) and not shapely.intersection_all(drawn).is_empty
+    why = "set home inside the fence, or a greater radius" if is_circle_apart else _COMMON_GROUND
+    raise FenceError(f"{names} have no area in common; {why}", zones=inclusions)
 
 
 def _within(barriers: list[Barrier], circle: Area, name: str) -> list[Barrier]:

@@ -316,7 +316,19 @@ def test_inclusions_that_overlap_leave_their_intersection_and_that_is_said() -> 
     union = ground(*areas, union=True)
     assert union.warnings == ()
     assert not union.is_in_some_inclusions_only(first)
-    assert ground(areas[0], home=HOME, home_radius_m=50).warnings == ()
+
+
+def test_one_inclusion_and_the_home_circle_are_not_two_drawn_areas() -> None:
+    # Nobody can draw the home circle and a polygon as one: what lies in one of them only hears nothing of it.
+    one = ground(square(IN, 0, 0, 10), home=HOME, home_radius_m=50)
+    assert one.warnings == ()
+    beside = Point(one.frame.to_local(offset(HOME, 30, 0)))
+    assert not is_allowed(one, 30, 0)
+    assert not one.is_in_some_inclusions_only(beside)
+    with pytest.raises(FenceError, match="no area in common; set home inside the fence, or a greater radius"):
+        check_ground(ground(square(IN, 500, 0, 10), home=HOME, home_radius_m=50))
+    with pytest.raises(FenceError, match="no area in common; the autopilot allows only the intersection"):
+        check_ground(ground(square(IN, -40, 0, 10), square(IN, 40, 0, 10), home=HOME, home_radius_m=90))
 
 
 def test_a_fence_that_leaves_no_ground_is_refused() -> None:

@@ -464,17 +464,6 @@ def test_an_autopilot_that_is_not_known_is_refused_by_every_command(rover, tmp_p
     assert document["details"]["autopilot"] == 0
 
 
-@pytest.mark.parametrize("command", [("check",), ("plan", "--target", "40.0726,-105.2290")])
-def test_px4_is_refused_by_what_plans_or_checks(rover, tmp_path, monkeypatch, command):
-    code, document = with_autopilot(12, rover, tmp_path, monkeypatch, command)
-    assert (code, document["error"]) == (5, "VehicleNotFoundError")
-    assert document["message"] == (
-        "the autopilot of system 1 is PX4: over a link nothing is planned, checked or driven for it yet; `pbpp download` and `pbpp upload` "
-        "work with it, and `pbpp plan` with its files (--fence, --vehicle) and recordings (--log)"
-    )
-    assert document["details"]["autopilot"] == 12
-
-
 def with_autopilot(autopilot, rover, tmp_path, monkeypatch, command):
     """Run a command on a rover that says it has another autopilot."""
     from mavlink_bridge.simulator import telemetry

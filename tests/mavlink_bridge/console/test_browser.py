@@ -172,7 +172,8 @@ def test_a_fence_is_drawn_typed_edited_and_undone(watched: Watched) -> None:
     expect(page.get_by_role("textbox", name="Corner 1:")).to_have_value("40.0716225, -105.2299000")
     assert watched.accessible() == []
     page.get_by_role("tab", name="Plan").click()
-    expect(page.locator(".big")).not_to_have_text(before)
+    # Another plan, or none: where the clicks fall depends on how the map fits its window.
+    expect(page.get_by_role("tabpanel", name="Plan")).not_to_contain_text(before)
     for _ in range(4):
         page.locator("body").press("Control+z")
     expect(page.locator(".big")).to_have_text(before)

@@ -59,6 +59,7 @@ def checked_lat_lon(lat_deg: float, lon_deg: float) -> LatLon:
 
 
 _MOST_M_PER_LAT_DEG, _MOST_M_PER_LON_DEG = 111_695.0, 111_320.0  # at the poles; on the equator
+_ROUNDED_M = 2e-8  # what differences of degrees lose to rounding: the last bit of 360 degrees is 6e-14, 6e-9 m, a few times
 
 _ANGLE = (
     r"([NSEW])?\s*([+-]?)(\d+(?:\.\d*)?|\.\d+)(?:\s*°)?"
@@ -142,7 +143,7 @@ def distance_m(a: LatLon, b: LatLon) -> float:
 def upper_distance_m(a: LatLon, b: LatLon) -> float:
     """Return no less than the geodesic distance, in a hundredth of its time: the way along a meridian and a parallel, each degree as long as WGS 84 has any."""
     lat_deg, lon_deg = abs(b.lat_deg - a.lat_deg), abs(wrap_lon_deg(b.lon_deg - a.lon_deg))
-    return _MOST_M_PER_LAT_DEG * lat_deg + _MOST_M_PER_LON_DEG * lon_deg
+    return _MOST_M_PER_LAT_DEG * lat_deg + _MOST_M_PER_LON_DEG * lon_deg + _ROUNDED_M
 
 
 def path_length_m(path: Sequence[LatLon]) -> float:

@@ -3,7 +3,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from strategies import GEOD, away, lat_lons, wire_lat_lons
 
@@ -34,6 +34,7 @@ def test_distance_and_bearing_agree_with_the_direct_geodesic(
 
 
 @given(lat_lons, lat_lons, st.floats(0, 1))
+@example(LatLon(0, 0), LatLon(0, 1), 2.0**-52)
 def test_the_quick_bound_of_a_distance_is_no_less(a: LatLon, b: LatLon, share: float) -> None:
     nearer = LatLon(a.lat_deg + share * (b.lat_deg - a.lat_deg), a.lon_deg + share * (b.lon_deg - a.lon_deg))
     for there in (b, nearer):

@@ -67,7 +67,7 @@ def many(count):
 
 @given(ring=RINGS, clearance_m=CLEARANCES_M, rounded=st.booleans())
 @example(ring=np.array(NEEDLE), clearance_m=2.5, rounded=False)
-@many(200)
+@many(400)
 def test_what_is_grown_keeps_the_clearance_from_every_point_of_the_ring(ring, clearance_m, rounded):
     (exclusion,) = parse_rings([ring], "exclusion")
     (grown,) = grow(np.array([exclusion], dtype=object), clearance_m, rounded=rounded)
@@ -86,7 +86,7 @@ PAIRS = st.tuples(MILLIMETRES, MILLIMETRES)
 
 
 @given(rings=FENCES, clearance_m=CLEARANCES_M, start=PAIRS, goal=PAIRS)
-@many(75)
+@many(150)
 def test_a_path_keeps_clear_of_collapsed_rings(rings, clearance_m, start, goal):
     check_field(RandomField([SQUARE], rings, clearance_m, False, start, goal))
 
@@ -107,7 +107,7 @@ TRIANGLE = [(12, 12), (15, 12), (17, 12.5), (15, 12), (15, 14), (12, 14)]
 @given(rings=FENCES, start=PAIRS, goal=PAIRS)
 @example(rings=[np.array(TRIANGLE)], start=(12.888, 12.888), goal=(8.487, 14.776))
 @example(rings=[np.array(SLIVER), np.array(NEEDLE)], start=(8.807, 0.059), goal=(4.508, 18.728))
-@many(125)
+@many(250)
 def test_without_a_clearance_they_may_be_touched(rings, start, goal):
     lines = shapely.MultiLineString([[*ring, ring[0]] for ring in rings])
     # On a wall without width no one can say which side of it an end is on.
@@ -126,7 +126,7 @@ def test_without_a_clearance_they_may_be_touched(rings, start, goal):
 
 
 @given(rings=FENCES, clearance_m=st.just(0.0) | CLEARANCES_M, start=PAIRS, goal=PAIRS)
-@many(60)
+@many(100)
 def test_they_are_kept_clear_of_far_from_the_origin_too(rings, clearance_m, start, goal):
     shift = np.array((5e5, 4.6e6))
     area, *exclusions = [np.asarray(ring) + shift for ring in (SQUARE, *rings)]

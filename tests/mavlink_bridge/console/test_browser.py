@@ -9,31 +9,23 @@ import re
 from typing import TYPE_CHECKING
 
 import pytest
-from console.browser_kit import FIELDS, WAIT_MS, Served, Watched, launched, need_browser, serving
+from console.browser_kit import FIELDS, WAIT_MS, Served, Watched, need_browser, serving
 from console.tiny_map import write_map
 from PIL import Image
 
 need_browser()
 
-from playwright.sync_api import Browser, Page, expect, sync_playwright  # noqa: E402 - only where there is a browser
+from playwright.sync_api import Browser, Page, expect  # noqa: E402 - only where there is a browser
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-pytestmark = pytest.mark.xdist_group("browser")
+pytestmark = pytest.mark.timeout(240, func_only=True)  # waiting for the browser is not counted
 
 expect.set_options(timeout=WAIT_MS)
 START = "40.0712247,-105.2302031"
 TARGET = "40.0723079, -105.2285800"
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        found = launched(playwright)
-        yield found
-        found.close()
 
 
 @pytest.fixture(scope="module")

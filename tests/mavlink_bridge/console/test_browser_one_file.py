@@ -7,21 +7,20 @@ from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 import pytest
-from console.browser_kit import FIELDS, WAIT_MS, Watched, launched, need_browser
+from console.browser_kit import FIELDS, WAIT_MS, Watched, need_browser
 from PIL import Image
 from typer.testing import CliRunner
 
 need_browser()
 
-from playwright.sync_api import Browser, BrowserContext, expect, sync_playwright  # noqa: E402 - only where there is a browser
+from playwright.sync_api import BrowserContext, expect  # noqa: E402 - only where there is a browser
 
 from mavlink_bridge.cli.app import app  # noqa: E402 - as above
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from pathlib import Path
 
-pytestmark = pytest.mark.xdist_group("browser")
+pytestmark = pytest.mark.timeout(240, func_only=True)  # waiting for the browser is not counted
 
 expect.set_options(timeout=WAIT_MS)
 YARD = ("--fence", FIELDS / "yard-fence.waypoints")
@@ -36,14 +35,6 @@ PLAN = (
 )
 CHECK = ("check", "--mission", FIELDS / "yard-mission.waypoints", *YARD)
 LOG = ("log", FIELDS.parents[1] / "sitl_logs" / "mission-yard.tlog")
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        found = launched(playwright)
-        yield found
-        found.close()
 
 
 class Still(Watched):

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
 from director.conducting import Conductor
 from director.test_bridge_director import FAR, HOME, NEAR, arm, ready, upload
 
-from mavlink_bridge.director import Director, Orders, State
+from mavlink_bridge.director import Director, EventName, Orders, State
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.autopilots import PX4_1_17
 from mavlink_bridge.simulator import SimulatorConfig
@@ -17,12 +18,15 @@ from missions.fence import CircleZone, Fence, ZoneKind, fence_to_items
 from missions.firmware import Firmware
 from missions.formats import read_fence
 from missions.geo import LatLon
+from missions.items import Command
 from missions.request import Request
 
 FENCE = read_fence(Path(__file__).parents[3] / "fields" / "yard-fence.waypoints")
 V1_17, V1_18 = Firmware(1, 17, 0), Firmware(1, 18, 0, 0)
 MODES = PX4_1_17.modes
 MANUAL = 1 << 16
+VERSIONS = pytest.mark.parametrize("firmware", [V1_17, V1_18], ids=str)
+PX4_HOLD, PX4_MISSION = (4.0, 3.0), (4.0, 4.0)
 WALL = Fence((*FENCE.zones, CircleZone(ZoneKind.EXCLUSION, LatLon(40.0720000, -105.2289500), 6.0)))
 """The yard's fence with a circle on the way to the far target."""
 
@@ -78,3 +82,22 @@ __all__ = [
     "sent_items",
     "upload",
 ]
+
+
+def unheard(run, message) -> None:
+    """Let somebody act on the vehicle whom the bridge does not hear."""
+    run.vehicles[0].receive(m.Frame(255, 190, message), run.now_s)
+
+
+def mode_command(mode: int) -> m.CommandLong:
+    return m.CommandLong(1, 1, Command.DO_SET_MODE, 0, *MODES.command_params(mode))
+
+
+def wait(run, seconds: float) -> None:
+    until_s = run.now_s + seconds
+    while run.now_s < until_s:
+        run.step()
+
+
+def names(run) -> list[EventName]:
+    return [event.name for event in run.events if event.name is not EventName.PROGRESS]

@@ -9,15 +9,20 @@ from director.px4.px4_runs import (
     HOME,
     MODES,
     NEAR,
-    V1_17,
-    V1_18,
+    PX4_HOLD,
+    PX4_MISSION,
+    VERSIONS,
     WALL,
     conductor,
     driving,
+    mode_command,
+    names,
     ready,
     rover,
     sent_items,
+    unheard,
     upload,
+    wait,
 )
 from director.test_bridge_director import reposition
 
@@ -30,28 +35,6 @@ from missions.fence import CircleZone, Fence, ZoneKind
 from missions.geo import distance_m
 from missions.items import Command
 from missions.request import Request
-
-VERSIONS = pytest.mark.parametrize("firmware", [V1_17, V1_18], ids=str)
-PX4_HOLD, PX4_MISSION = (4.0, 3.0), (4.0, 4.0)
-
-
-def unheard(run, message) -> None:
-    """Let somebody act on the vehicle whom the bridge does not hear."""
-    run.vehicles[0].receive(m.Frame(255, 190, message), run.now_s)
-
-
-def mode_command(mode: int) -> m.CommandLong:
-    return m.CommandLong(1, 1, Command.DO_SET_MODE, 0, *MODES.command_params(mode))
-
-
-def wait(run, seconds: float) -> None:
-    until_s = run.now_s + seconds
-    while run.now_s < until_s:
-        run.step()
-
-
-def names(run) -> list[EventName]:
-    return [event.name for event in run.events if event.name is not EventName.PROGRESS]
 
 
 @VERSIONS

@@ -13,17 +13,22 @@ from director.px4.px4_runs import (
     HOME,
     MODES,
     NEAR,
-    V1_17,
+    PX4_HOLD,
+    PX4_MISSION,
     V1_18,
+    VERSIONS,
     WALL,
     conductor,
     driving,
+    mode_command,
+    names,
     ready,
     rover,
     sent_items,
+    unheard,
     upload,
+    wait,
 )
-from director.px4.test_px4_bridge import PX4_HOLD, PX4_MISSION, mode_command, names, unheard, wait
 from director.test_bridge_director import reposition
 
 from mavlink_bridge.backup.drive_note import note_from_json, note_to_json
@@ -36,7 +41,6 @@ from missions.items import Command, waypoint
 from missions.rally import RallyPoint, rally_to_items
 from missions.request import End, Tour
 
-VERSIONS = pytest.mark.parametrize("firmware", [V1_17, V1_18], ids=str)
 UID = b"rover of px4"
 
 

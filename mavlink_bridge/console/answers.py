@@ -109,9 +109,13 @@ def _widest_plan(situation: Situation, request: Request, should_stop: Callable[[
 
 
 def look_at_mission(
-    body: CheckRequest, situation: Situation, own: Request, clock: Callable[[], float]
+    body: CheckRequest,
+    situation: Situation,
+    own: Request,
+    _should_stop: Callable[[], bool],
+    clock: Callable[[], float],
 ) -> Looked:
-    """Check a mission against the fence.
+    """Check a mission against the fence, to its end: nothing interrupts a check.
 
     Raises
     ------
@@ -154,7 +158,9 @@ def repaired(
     return Looked(view, items=planned.items, plan=planned, field=field_of(situation))
 
 
-def look_at_fence(body: FenceRequest, situation: Situation, own: Request) -> FenceView:
+def look_at_fence(
+    body: FenceRequest, situation: Situation, own: Request, _should_stop: Callable[[], bool]
+) -> FenceView:
     """Return what a drawn fence comes to; why it cannot be used, where it cannot: half-drawn ones are usual."""
     try:
         drawn = reading.with_fence(situation, body.fence)

@@ -39,9 +39,12 @@ if TYPE_CHECKING:
     from starlette.types import ASGIApp, Message, Receive, Scope, Send
     from starlette.websockets import WebSocket
 
+    from mavlink_bridge.console.answers import Looked
     from mavlink_bridge.console.hub import Hub
+    from missions.request import Request as PlanningRequest
 
 BodyT = TypeVar("BodyT")
+FoundT = TypeVar("FoundT")
 
 PERIOD_S = 0.1
 """Between two messages to one page: at most 10 a second."""
@@ -331,15 +334,7 @@ class ConsoleRoutes:
 
     async def plan(self, request: Request) -> Response:
         """Plan what the page asks for."""
-        body = await _typed(request, wire.PlanRequest)
-        hub, backend = self._hub, self._hub.backend
-        situation, own = backend.situation(), backend.request()
-        looked = await hub.jobs.run(
-            self._purpose(request, "plan"),
-            lambda stop: answers.look_at_plan(body, situation, own, stop, hub.clock),
-        )
-        hub.keep(looked)
-        return answer(looked.view)
+        return await self._looked(request, wire.PlanRequest, "plan", answers.look_at_plan)
 
     async def cancel(self, request: Request) -> Response:
         """Stop planning for this page."""
@@ -349,47 +344,48 @@ class ConsoleRoutes:
 
     async def check(self, request: Request) -> Response:
         """Check a mission."""
-        body = await _typed(request, wire.CheckRequest)
-        hub, backend = self._hub, self._hub.backend
-        situation, own = backend.situation(), backend.request()
-        looked = await hub.jobs.run(
-            self._purpose(request, "check"),
-            lambda _stop: answers.look_at_mission(body, situation, own, hub.clock),
-        )
-        hub.keep(looked)
-        return answer(looked.view)
+        return await self._looked(request, wire.CheckRequest, "check", answers.look_at_mission)
 
     async def repair(self, request: Request) -> Response:
         """Repair a mission."""
-        body = await _typed(request, wire.CheckRequest)
-        hub, backend = self._hub, self._hub.backend
-        situation, own = backend.situation(), backend.request()
-        looked = await hub.jobs.run(
-            self._purpose(request, "check"),
-            lambda stop: answers.repaired(body, situation, own, stop, hub.clock),
-        )
-        hub.keep(looked)
-        return answer(looked.view)
+        return await self._looked(request, wire.CheckRequest, "check", answers.repaired)
 
     async def widest(self, request: Request) -> Response:
         """Find the most clearance that a route over the targets keeps."""
-        body = await _typed(request, wire.PlanRequest)
-        situation, own = self._hub.backend.situation(), self._hub.backend.request()
-        return answer(
-            await self._hub.jobs.run(
-                self._purpose(request, "widest"), lambda stop: answers.widest(body, situation, own, stop)
-            )
-        )
+        return answer(await self._ask(request, wire.PlanRequest, "widest", answers.widest))
 
     async def look_at_fence(self, request: Request) -> Response:
         """Return what a drawn fence comes to."""
-        body = await _typed(request, wire.FenceRequest)
+        return answer(await self._ask(request, wire.FenceRequest, "fence", answers.look_at_fence))
+
+    async def _ask(
+        self,
+        request: Request,
+        kind: type[BodyT],
+        name: str,
+        look: Callable[[BodyT, Situation, PlanningRequest, Callable[[], bool]], FoundT],
+    ) -> FoundT:
+        """Return the answer to a page's question by what is known now, found beside the loop."""
+        body = await _typed(request, kind)
         situation, own = self._hub.backend.situation(), self._hub.backend.request()
-        return answer(
-            await self._hub.jobs.run(
-                self._purpose(request, "fence"), lambda _stop: answers.look_at_fence(body, situation, own)
-            )
+        return await self._hub.jobs.run(
+            self._purpose(request, name), lambda stop: look(body, situation, own, stop)
         )
+
+    async def _looked(
+        self,
+        request: Request,
+        kind: type[BodyT],
+        name: str,
+        look: Callable[[BodyT, Situation, PlanningRequest, Callable[[], bool], Callable[[], float]], Looked],
+    ) -> Response:
+        """Answer with a plan or a check as it is shown, and keep it for what is asked of it later."""
+        clock = self._hub.clock
+        looked = await self._ask(
+            request, kind, name, lambda body, situation, own, stop: look(body, situation, own, stop, clock)
+        )
+        self._hub.keep(looked)
+        return answer(looked.view)
 
     async def import_file(self, request: Request) -> Response:
         """Return what a file holds that was dropped onto the page."""

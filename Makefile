@@ -145,6 +145,7 @@ fuzz: .venv/dev.stamp
 
 hunt: .venv/dev.stamp
 	$(BIN)/python tests/pbpp/hunt_edges.py --count $(or $(COUNT),20000)
+	$(BIN)/python tests/pbpp/hunt_walls.py --count $(or $(COUNT),20000)
 
 clean:
 	rm -rf tools/page/node_modules .venv demo-out dist build .coverage* .hypothesis .mypy_cache .ruff_cache .pytest_cache

@@ -2,7 +2,7 @@
 
 A ring may be an (n, 2) array-like of east and north in metres, closed or not, or a shapely polygon. Self-crossing rings are read
 on the safe side: an exclusion excludes everything its line encloses, an inclusion includes what an odd number of its windings
-encloses. A ring without area is a wall: it matters as soon as there is a clearance.
+encloses. A ring without area is a wall, or a post, as soon as there is a clearance; without one paths may pass it.
 """
 
 from __future__ import annotations

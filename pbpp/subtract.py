@@ -129,7 +129,7 @@ def _within_walls(parts: Geometries, cluster: Ints) -> dict[int, list[Polygon]]:
     rings[is_turned] = shapely.reverse(rings[is_turned])
     points, ring = shapely.get_coordinates(rings, return_index=True)
     places, number = np.unique(points.view(np.complex128).ravel(), return_inverse=True)
-    is_wall = ring[1:] == ring[:-1]
+    is_wall = (ring[1:] == ring[:-1]) & (number[1:] != number[:-1])  # a corner said twice is none
     start, end = number[:-1][is_wall], number[1:][is_wall]
     members = cluster[owner[ring[:-1][is_wall]]]
     low, high = np.minimum(start, end), np.maximum(start, end)

@@ -278,8 +278,11 @@ class Vertices:
         if ((in_x == 0.0) & (out_x == 0.0) & ~onwards).any():
             raise ValueError("a spike of the boundary stands on one line")
         corner = (turn < 0.0) | (onwards & (turn <= slack))
-        # Edges a rounding apart may have come to lie on each other with their ends on one line: then the points as given decide.
-        for place in np.flatnonzero((turn == 0.0) & ~onwards).tolist():
-            into, out = np.diff(self.points[[before[place], which[place], after[place]]], axis=0)
-            corner[place] = into[0] * out[1] - into[1] * out[0] < 0.0
+        # Edges a rounding apart may have come to lie on each other with their ends on one line: then the points as given decide. Or past each other.
+        for place in np.flatnonzero((np.abs(turn) <= slack) & ~onwards).tolist():
+            start, here, end = map(tuple, self.points[[before[place], which[place], after[place]]].tolist())
+            side = _left_of((start, here), end)
+            if side * turn[place] < 0.0:
+                raise ValueError("a sliver of the boundary is turned inside out")
+            corner[place] = side < 0 or (side == 0 and turn[place] < 0.0)
         return corner

@@ -45,6 +45,7 @@ class ExactReference:
         self._a = np.concatenate(rings)
         self._b = np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])
         self._before = np.concatenate([np.roll(ring, 1, axis=0) for ring in rings])
+        self._ring = np.repeat(np.arange(len(rings)), [len(ring) for ring in rings])
         self._free = shapely.MultiPolygon(parts)
         self._eps = 64 * np.finfo(float).eps * max(1.0, np.abs(self._a).max())
         self._edge = self._b - self._a
@@ -54,11 +55,15 @@ class ExactReference:
 
     @cached_property
     def narrowest_m(self):
-        """The least distance between a vertex and an edge that do not touch: the width of the narrowest gap, wall or step."""
-        to_a = self._node[:, None] - self._a[None]
+        """The least distance between a vertex and an edge that do not touch: the width of the narrowest gap, wall or step; 0 where a ring lies on itself."""
+        to_a = self._a[:, None] - self._a[None]
         share = np.clip(dot(to_a, self._edge[None]) / self._edge_m**2, 0, 1)
         off = np.hypot(*np.moveaxis(to_a - share[..., None] * self._edge[None], 2, 0))
-        return float(off[off > 0.0].min(initial=np.inf))
+        touches = off == 0.0
+        is_end = (to_a == 0.0).all(axis=2) | (self._a[:, None] == self._b[None]).all(axis=2)
+        if (touches & ~is_end & (self._ring[:, None] == self._ring)).any():
+            return 0.0
+        return float(off[~touches].min(initial=np.inf))
 
     def _sectors(self):
         """One node for each free sector: where it is, and its first and last direction, counter-clockwise."""

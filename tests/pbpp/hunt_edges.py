@@ -141,8 +141,9 @@ def _nearest(length_m, reference, ends):
     return length_m if length_m in lengths_m else min(lengths_m, key=lambda one_m: abs(one_m - length_m))
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def hunt(about, check):
+    """Check as many fields as the command line says; return how many failed."""
+    parser = argparse.ArgumentParser(description=about.splitlines()[0])
     parser.add_argument("--count", type=int, default=1000)
     parser.add_argument("--first", type=int, default=0)
     asked = parser.parse_args()
@@ -161,4 +162,4 @@ def main():
 
 
 if __name__ == "__main__":
-    sys.exit(1 if main() else 0)
+    sys.exit(1 if hunt(__doc__, check) else 0)

@@ -120,6 +120,7 @@ def test_an_end_in_a_closed_gap_has_no_way_in_either_direction(square, upright):
         "turned_inside_out",  # by taking out repeated points
         "tips_on_the_grid",
         "crossed_by_joining",
+        "turned_over_on_one_line",
     ],
 )
 def test_slivers_take_no_path_away(load_case, name):

@@ -86,3 +86,12 @@ def test_nothing_to_take_away_and_nothing_left():
     assert subtracted(GROUND, [shapely.MultiPolygon()]).equals(GROUND)
     assert polygons_only(subtracted(GROUND, [shapely.box(-30, -30, 300, 300)])) == []
     assert polygons_only(subtracted(shapely.MultiPolygon(), [shapely.box(0, 0, 1, 1)])) == []
+
+
+@pytest.mark.parametrize("twice", range(8))
+def test_a_corner_said_twice_is_no_wall(twice):
+    left, right = [[5, 5], [10, 5], [10, 10], [5, 10]], [[10, 5], [15, 5], [15, 10], [10, 10]]
+    expected = subtracted(GROUND, [shapely.Polygon(left), shapely.Polygon(right)])
+    ring, at = (left, right)[twice // 4], twice % 4
+    ring.insert(at, ring[at])
+    assert assert_same(GROUND, [shapely.Polygon(left), shapely.Polygon(right)]).equals(expected)

@@ -7,8 +7,8 @@ implement DO_LAND_START" (issue 19055). So somebody chooses: the operator, or a 
 the item to which the vehicle drives when the part is chosen.
 
 The drive ends with a jump to the last item (DO_JUMP, repeated without end), a tag behind which there is nothing: so the mission is complete, and the vehicle
-stops. Nothing but a choice leads into the parts between; each ends with the same jump. (LOITER_UNLIM would be a simpler end, but a rover goes on steering
-at it: the simulated one, steered at 5 m/s, rocked out of its fence within a minute.)
+stops. Nothing but a choice leads into the parts between; each ends with the same jump. (LOITER_UNLIM would be a simpler end, but before
+ArduPilot 4.5 a steered rover goes on steering at it.)
 """
 
 from __future__ import annotations

@@ -92,7 +92,7 @@ def add_start(pieces: Pieces, drive: DrivePlan, array: NDArray[np.float64], behi
     vertices = [place]
     swings = stray.widest_m >= NEGLIGIBLE_M
     ahead_m = min(at_corner.swing_length_m(drive.vehicle), leg.profile.length_m) if swings else 0.0
-    for along_m in (-behind_m, ahead_m):
+    for along_m in (-behind_m - drive.start_more_m, ahead_m):
         vertices += _beside(_shifted(place, leg.direction, along_m), leg.direction, stray)
     pieces.add(vertices, leg.band_m, 0)
 

@@ -9,7 +9,7 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from missions.drive_model.corner import SHORT_START_M, SLOW_MPS, unsettled
+from missions.drive_model.corner import SHORT_START_M, SLOW_MPS, is_early, unsettled_m
 from missions.vehicle import Autopilot, Steering
 from missions.vehicle.parameters import PARAMETERS
 
@@ -74,11 +74,11 @@ def extrapolated(
 
 
 def _beyond_loiter(vehicle: Vehicle) -> Iterator[str]:
-    """Yield that a steered rover's end was not measured: ArduPilot goes on steering at the place of LOITER_UNLIM (Rover/mode_auto.cpp), and turns need room."""
-    if vehicle.autopilot is Autopilot.ARDUPILOT and vehicle.steering is Steering.ACKERMANN:
+    """Yield that a steered rover may go on steering at LOITER_UNLIM: since 4.5 it stands (AR_PosControl.cpp, November 2023), as measured on 4.5 and later."""
+    if is_early(vehicle) and vehicle.steering is Steering.ACKERMANN:
         yield (
-            "what a steered rover does at LOITER_UNLIM was not measured: ArduPilot goes on steering there, and the simulated one rocked 10 m away "
-            "within a minute; use --end hold"
+            "ArduPilot before 4.5 goes on steering at LOITER_UNLIM, which was not measured; of a firmware before 4.6 it is not looked at which it is: "
+            "use --end hold"
         )
 
 
@@ -88,7 +88,8 @@ def _beyond_short_drives(vehicle: Vehicle, band: Envelope) -> Iterator[str]:
     for number, leg in enumerate(band.legs):
         turned = number == 0 or abs(band.corners[number - 1].turn_deg) > _TURNED_DEG
         swung_m = max(leg.left_m, leg.right_m) - leg.half_width_m
-        if rests[number] and rests[number + 1] and turned and unsettled(vehicle, swung_m, leg.length_m):
+        is_short = leg.length_m < SHORT_START_M and unsettled_m(vehicle, swung_m, leg.length_m) > 0
+        if rests[number] and rests[number + 1] and turned and is_short:
             yield (
                 f"a steered rover that turns into a drive of {leg.length_m:.1f} m and stops was not measured, only on longer ones: it may circle to get "
                 f"there; choose a target at least {SHORT_START_M:g} m away"

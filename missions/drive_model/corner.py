@@ -87,17 +87,23 @@ MEASURED_TURN_RADIUS_M = 0.9
 START_HOLD_S = 1.5
 """A swing at the start begins to die away only then."""
 
-END_OVERRUN_M = 0.5
+END_OVERRUN_M, EARLY_END_OVERRUN_M = 0.8, 1.2
+"""Past the last waypoint, the farthest measured, and with firmware before 4.6 (docs/drive-model.md, 3)."""
+
 STOP_LAG_S = 2.0
-"""Past the last waypoint, the farthest measured; time to settle at a stop (docs/drive-model.md, 3 and 5)."""
+"""Time to settle at a stop (docs/drive-model.md, 5)."""
 
 # Measured: all but two of the 83 rows that left the band by more than 0.1 m turn sharper, on shorter legs (docs/drive-model.md).
 UNBOUNDED_TURN_DEG = 115.0
 UNBOUNDED_LEG_M = 15.0
-SHORT_START_M, START_TURNED_M, UNSETTLED_M = 3.0, 0.4, 0.9
-"""A steered rover that swings out so far at its start (it faces 45 degrees away) has not settled after so short a run: with a corner there its corridor is so
-much wider. Simulated, not measured: it left it by up to 0.9 m, with that by 0.4 m (0.7 m long, facing back), from 3 m on by no more than elsewhere; on a drive
-of 0.8 m, facing away, by 16 m, of 3 m by 0.9 m."""
+SHORT_START_M, EARLY_SHORT_START_M, START_TURNED_M, UNSETTLED_M = 3.0, 5.0, 0.4, 0.9
+"""A steered rover that swings out so far at its start (it faces 45 degrees away) has not settled after so short a run (the second: with firmware
+before 4.6): with a corner there its corridor is so much wider, and reaches so much farther back (tests/missions/drive_model/data/short_starts.csv: real starts on legs of 0.8 m and more)."""
+
+BACK_SWING_M = 2.5
+EARLY_UNSETTLED_M = ((0.8, 3.9), (1.2, 1.9), (1.5, 1.3), (2.0, 0.9), (8.0, 0.9), (10.0, 0.0))
+"""The same for firmware before 4.6 where it faces back (it swings out so far), by the length of the run; from the same rows, with 0.2 m more."""
+
 PIVOT_DOUBT_DEG = 2.0
 """Corners this near to the pivot angle may be cut or pivoted: rounding of coordinates decides."""
 
@@ -107,6 +113,7 @@ _START_SWINGS, _START_BEHINDS, _SKID_START_SWINGS, _SKID_START_BEHINDS = (
     tuple(zip(*rows, strict=True))
     for rows in (START_SWING_M, START_BEHIND_M, SKID_START_SWING_M, SKID_START_BEHIND_M)
 )
+_EARLY_UNSETTLED = tuple(zip(*EARLY_UNSETTLED_M, strict=True))
 """As columns."""
 
 
@@ -240,10 +247,16 @@ def is_bounded(vehicle: Vehicle, turn_deg: float, shorter_leg_m: float, *, stops
     return vehicle.steering is Steering.SKID or not sharp
 
 
-def unsettled(vehicle: Vehicle, swung_m: float, run_m: float) -> bool:
-    """Whether a run from rest is too short for what the rover swings out at its start."""
-    is_steered = vehicle.autopilot is Autopilot.ARDUPILOT and vehicle.steering is Steering.ACKERMANN
-    return is_steered and swung_m > START_TURNED_M and run_m < SHORT_START_M
+def unsettled_m(vehicle: Vehicle, swung_m: float, run_m: float) -> float:
+    """Return how much more room a run from rest needs that is too short for what the rover swings out at its start."""
+    if vehicle.autopilot is not Autopilot.ARDUPILOT or vehicle.steering is not Steering.ACKERMANN:
+        return 0.0
+    short_m = EARLY_SHORT_START_M if is_early(vehicle) else SHORT_START_M
+    usual_m = UNSETTLED_M if swung_m > START_TURNED_M and run_m < short_m else 0.0
+    wider = _swing_radius_m(vehicle) / MEASURED_TURN_RADIUS_M
+    if is_early(vehicle) and swung_m > BACK_SWING_M * wider:
+        return max(usual_m, _interpolated(run_m / wider, *_EARLY_UNSETTLED) * wider)
+    return usual_m
 
 
 def pivot_time_s(vehicle: Vehicle, turn_deg: float) -> float:
@@ -258,7 +271,9 @@ def may_pivot_or_cut(vehicle: Vehicle, turn_deg: float) -> bool:
 
 def overrun_m(vehicle: Vehicle) -> float:
     """Return how far past the last waypoint it may stop."""
-    return END_OVERRUN_M if vehicle.pursuit is None else pursuit.END_OVERRUN_M
+    if vehicle.pursuit is not None:
+        return pursuit.END_OVERRUN_M
+    return EARLY_END_OVERRUN_M if is_early(vehicle) else END_OVERRUN_M
 
 
 def swing_time_s(swing_m: float, speed_mps: float) -> float:

@@ -47,7 +47,7 @@ def drive_plan(
     asked_mps = [vehicle.speed_mps if speed_mps is None else speed_mps for speed_mps in asked]
     corners = []
     whole_deg = 0.0
-    is_first_run = True
+    is_first_run, start_more_m = True, 0.0
     swung_m = start.widest_m  # what the present run swings out that began from rest
     for number, (group, (before, after)) in enumerate(
         zip(groups[1:], itertools.pairwise(legs), strict=False)
@@ -59,14 +59,14 @@ def drive_plan(
         bend = Bend(turn_deg, whole_deg, min(runs_m[number], runs_m[number + 1]), fastest_mps, changes_speed)
         corner = _corner(vehicle, group, (before, after), bend, stops)
         goes_on = abs(turn_deg) < at_corner.STRAIGHT_ON_DEG
-        if not goes_on and at_corner.unsettled(vehicle, swung_m, runs_m[number]):
-            corner = corner._replace(stray_m=max(corner.stray_m, at_corner.UNSETTLED_M))
-            start = start.widened(at_corner.UNSETTLED_M) if is_first_run else start
+        more_m = 0.0 if goes_on else at_corner.unsettled_m(vehicle, swung_m, runs_m[number])
+        corner = corner._replace(stray_m=max(corner.stray_m, more_m))
+        start_more_m = more_m if is_first_run and not goes_on else start_more_m
         if corner.stops or not goes_on:
             is_first_run = False
             swung_m = corner.swing_m if corner.stops and not corner.pivots else 0.0
         corners.append(corner)
-    strays = [start]
+    strays = [start.widened(start_more_m)]
     middle_s = at_corner.START_HOLD_S
     for leg, corner in zip(legs, corners, strict=False):
         passed_s = leg.profile.duration_s - middle_s - corner.blend.duration_s / 2
@@ -78,7 +78,9 @@ def drive_plan(
         )
         stray = kept.swung(corner.turn_deg, corner.swing_m)
         strays.append(stray.widened(corner.stray_m))
-    return DrivePlan(vehicle, legs, tuple(corners), tuple(strays), _tails(vehicle, legs, corners))
+    return DrivePlan(
+        vehicle, legs, tuple(corners), tuple(strays), _tails(vehicle, legs, corners), start_more_m
+    )
 
 
 def _tails(vehicle: Vehicle, legs: Sequence[LegPlan], corners: Sequence[CornerPlan]) -> tuple[Stray, ...]:

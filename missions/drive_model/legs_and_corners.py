@@ -82,13 +82,17 @@ class CornerPlan(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class DrivePlan:
-    """A drive: n legs, the n - 1 corners between them, and the errors that each leg begins with (`tails`: before 4.6, those that hardly die away)."""
+    """A drive: n legs, the n - 1 corners between them, and the errors that each leg begins with (`tails`: before 4.6, those that hardly die away).
+
+    At its start it needs `start_more_m` more than the swing there, where its first run is too short for it.
+    """
 
     vehicle: Vehicle
     legs: tuple[LegPlan, ...]
     corners: tuple[CornerPlan, ...]
     strays: tuple[Stray, ...]
     tails: tuple[Stray, ...]
+    start_more_m: float
 
     def span_s(self, leg: int) -> tuple[float, float]:
         """Return the time (since the leg's own start) when only this leg's motion runs: from one blend to the next."""

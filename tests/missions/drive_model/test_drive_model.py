@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from shapely import LineString, Point, Polygon
 
 from missions.drive_model import Corner, Envelope, beyond_measured, corner_forecast, envelope
-from missions.drive_model.corner import blend
+from missions.drive_model.corner import END_OVERRUN_M, blend
 from missions.drive_model.motion import LegProfile, all_travelled_m, leg_profile
 from missions.errors import InvalidPositionError, VehicleError
 from missions.fence import PolygonZone, ZoneKind
@@ -391,7 +391,7 @@ def test_a_cut_stays_in_the_triangle_of_its_legs(vehicle: Vehicle, turn_deg: flo
     track = envelope(points, vehicle, heading_deg=0.0)
     band_m = max(leg.half_width_m for leg in track.legs)
     outside_m = max(corner.outside_overshoot_m for corner in track.corners)
-    allowed = Polygon([*points, points[0]]).convex_hull.buffer(max(outside_m, band_m) * 1.02 + 0.5)
+    allowed = Polygon([*points, points[0]]).convex_hull.buffer(max(outside_m, band_m) * 1.02 + END_OVERRUN_M)
     assert allowed.covers(track.area)
     bisector = points[0] + points[2] - 2 * points[1]
     length_m = np.hypot(*bisector)

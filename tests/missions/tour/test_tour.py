@@ -128,21 +128,21 @@ def test_ends():
     assert loitering.items[-1].position == held.items[-1].position == FAR_BUT_HERE
 
 
-def test_what_a_steered_rover_does_where_it_loiters_was_not_measured():
-    """ArduPilot goes on steering at LOITER_UNLIM's place; skid steer turns on the spot there."""
+def test_a_steered_rover_stands_where_it_loiters_but_before_4_5():
+    """tests/missions/drive_model/data/loiter_unlimited.csv; before 4.5 it goes on steering there, by its source."""
     loitering = plan(WALLED, request(FAR_BUT_HERE, end="loiter"))
-    assert loitering.clearance_m is None
-    assert [text[:49] for text in loitering.extrapolated] == [
-        "what a steered rover does at LOITER_UNLIM was not"
+    assert loitering.extrapolated == ()
+    assert loitering.clearance_m == 2.0
+    old = replace(WALLED, firmware=Firmware(4, 5))
+    unsure = plan(old, request(FAR_BUT_HERE, end="loiter"))
+    assert unsure.clearance_m is None
+    assert [text[:56] for text in unsure.extrapolated] == [
+        "ArduPilot before 4.5 goes on steering at LOITER_UNLIM, w"
     ]
-    assert plan(WALLED, request(FAR_BUT_HERE, end="loiter", trusts_model=True)).clearance_m == 2.0
-    assert plan(WALLED, request(FAR_BUT_HERE)).extrapolated == ()
-    skid = situation_of(
-        FIELD, WALL, FRAME_CLASS=1.0, SERVO1_FUNCTION=73.0, SERVO3_FUNCTION=74.0, WP_SPEED=2.0
-    )
-    assert not any("LOITER" in text for text in plan(skid, request(FAR_BUT_HERE, end="loiter")).extrapolated)
-    checked = check_mission(Mission(loitering.items, HOME), WALLED, Request(clearance_m=2.0))
-    assert checked.extrapolated == loitering.extrapolated
+    assert plan(old, request(FAR_BUT_HERE, end="loiter", trusts_model=True)).clearance_m == 2.0
+    assert plan(old, request(FAR_BUT_HERE)).extrapolated == ()
+    checked = check_mission(Mission(unsure.items, HOME), old, Request(clearance_m=2.0))
+    assert checked.extrapolated == unsure.extrapolated
     assert checked.holds
     assert not checked.is_promised
 
@@ -236,9 +236,8 @@ def test_a_tour_outside_what_was_measured_is_planned_for_its_clearance_and_promi
     asked = request(place(-30, 0), place(-30, 30), end=end)
     usual = plan(situation_of(FIELD, WALL), asked)
     found = plan(situation_of(FIELD, WALL, OA_TYPE=2.0), asked)
-    assert (usual.clearance_m is None) == bool(usual.extrapolated) == (end == "loiter")
+    assert usual.clearance_m is not None
+    assert not usual.extrapolated
     assert found.clearance_m is None
     assert found.items == usual.items
-    assert [text.split(":")[0] for text in found.extrapolated if text not in usual.extrapolated] == [
-        "OA_TYPE 2"
-    ]
+    assert [text.split(":")[0] for text in found.extrapolated] == ["OA_TYPE 2"]

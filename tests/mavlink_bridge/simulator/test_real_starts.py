@@ -1,0 +1,106 @@
+"""The simulated rover beside a real one: starts that face away, and LOITER_UNLIM (tests/missions/drive_model/data)."""
+
+from __future__ import annotations
+
+import csv
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from simulator.station import HOME, at
+
+from mavlink_bridge.mavlink.rover import Mode
+from mavlink_bridge.simulator.config import SimulatorConfig
+from mavlink_bridge.simulator.rover import TICK_S
+from mavlink_bridge.simulator.vehicle import SimulatedVehicle
+from missions.firmware import Firmware
+from missions.geo import LatLon, distance_m
+from missions.items import Command, MissionItem, waypoint
+
+DATA = Path(__file__).parents[2] / "missions" / "drive_model" / "data"
+FIRMWARE = {"2024-02": Firmware(4, 5), "2025-10": Firmware(4, 7, 0, 0)}
+FOLLOWED_M = 0.3
+
+
+def rows_of(name: str) -> list[dict[str, str]]:
+    with (DATA / name).open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def driven(
+    row: dict[str, str], heading_deg: float, items: list[MissionItem], watched_s: float
+) -> list[LatLon]:
+    """Return the places of the simulated rover from AUTO on."""
+    vehicle = SimulatedVehicle(
+        SimulatorConfig(
+            home=HOME,
+            heading_deg=heading_deg,
+            mission=tuple(items),
+            parameters={
+                "FENCE_ENABLE": 0.0,
+                "TURN_RADIUS": 0.9,
+                "WP_SPEED": float(row["speed_mps"]),
+                "WP_RADIUS": float(row["wp_radius_m"]),
+            },
+            firmware=FIRMWARE[row["firmware"]],
+            streams=False,
+        )
+    )
+    vehicle.rover.arm()
+    now_s = 1.0
+    vehicle.rover.set_mode(Mode.AUTO, now_s)
+    places = []
+    while now_s < watched_s:
+        now_s += TICK_S
+        vehicle.rover.step(now_s)
+        places.append(vehicle.position)
+    return places
+
+
+def starts() -> list[dict[str, str]]:
+    """Return the starts that the simulated rover is held to; facing back, a degree decides on the side and on how far."""
+    return [
+        row
+        for row in rows_of("short_starts.csv")
+        if float(row["heading_off_deg"]) < 165 and row["onward_m"] != "0"
+    ]
+
+
+@pytest.mark.parametrize("row", starts(), ids=lambda row: "-".join(list(row.values())[:6]))
+def test_a_start_swings_out_as_far(row: dict[str, str]) -> None:
+    leg_m, speed_mps = float(row["leg_m"]), float(row["speed_mps"])
+    real = [tuple(map(float, pair.split(","))) for pair in row["track_m"].split()]
+    items = [waypoint(at(leg_m, 0)), waypoint(at(leg_m, float(row["onward_m"])))]
+    places = driven(row, float(row["heading_off_deg"]), items, 30.0 / speed_mps + 14.0)
+    simulated = [offset_m(place) for place in places]
+    for east, sign in ((False, -1), (False, 1), (True, 1)):
+        farthest = [max(sign * place[0 if east else 1] for place in one) for one in (real, simulated)]
+        assert farthest[1] == pytest.approx(farthest[0], abs=FOLLOWED_M)
+
+
+def offset_m(place: LatLon) -> tuple[float, float]:
+    """Return how far east and north of the start a place is."""
+    north_m = math.copysign(
+        distance_m(HOME, LatLon(place.lat_deg, HOME.lon_deg)), place.lat_deg - HOME.lat_deg
+    )
+    east_m = math.copysign(
+        distance_m(HOME, LatLon(HOME.lat_deg, place.lon_deg)), place.lon_deg - HOME.lon_deg
+    )
+    return east_m, north_m
+
+
+@pytest.mark.parametrize("row", rows_of("loiter_unlimited.csv"), ids=lambda row: "-".join(row.values()))
+def test_a_steered_rover_stands_where_it_loiters(row: dict[str, str]) -> None:
+    """The simulated one rocked out of its fence there until it had AR_PosControl's rule that what stops does not steer (since 4.5)."""
+    aside_m = float(row["last_leg_m"]) if row["turn_deg"] == "90" else 0.0
+    goal = at(30, aside_m) if aside_m else at(60, 0)
+    items = [
+        waypoint(at(30 if aside_m else 40, 0)),
+        replace(waypoint(goal), command=Command.NAV_LOITER_UNLIM),
+    ]
+    places = driven(row, 0.0, items, 120.0)
+    left_m = [distance_m(place, goal) for place in places]
+    near = next(i for i, one in enumerate(left_m) if one < 1.0)
+    assert max(left_m[near + int(5 / TICK_S) :]) == pytest.approx(float(row["farthest_m"]), abs=FOLLOWED_M)
+    assert left_m[-1] == pytest.approx(float(row["end_m"]), abs=FOLLOWED_M)

@@ -115,11 +115,10 @@ class Gauge:
     """
 
     def __init__(self, ground: Ground, vehicle: Vehicle, heading_deg: float | None) -> None:
-        self.ground, self.vehicle = ground, vehicle
-        self.edges = FenceEdges(ground.avoided_edge)
-        self.heading_deg = heading_deg
+        self.ground, self.vehicle, self.heading_deg = ground, vehicle, heading_deg
+        # Trials hold this and not the gauge, which holds them: that would be a cycle, which only garbage collection frees.
+        self._surroundings = Surroundings(ground, vehicle, heading_deg)
         self._trials: dict[tuple[Drawing, bool, bool], Trial] = {}
-        self._legs_m: dict[tuple[LocalPoint, LocalPoint], float] = {}
 
     def trial(self, drawing: Drawing, begin: int, end: int) -> Trial:
         """Return the points from ``begin`` to before ``end``, for measuring; its ends that are not ends of the lines do not count."""
@@ -128,17 +127,34 @@ class Gauge:
         if trial is None:
             if len(self._trials) >= MOST_KNOWN:
                 self._trials.clear()
-            trial = self._trials[key] = Trial(self, *key)
+            trial = self._trials[key] = Trial(self._surroundings, *key)
         return trial
 
     def measure(self, drawing: Drawing) -> Measured:
         """Measure whole lines."""
         return self.trial(drawing, 0, len(drawing)).measured()
 
+
+class Surroundings:
+    """What lines are measured against: a field and a vehicle, as `Gauge` takes them; how far legs are from the fence is known.
+
+    Parameters
+    ----------
+    ground : Ground
+    vehicle : Vehicle
+    heading_deg : float or None
+    """
+
+    def __init__(self, ground: Ground, vehicle: Vehicle, heading_deg: float | None) -> None:
+        self.ground, self.vehicle = ground, vehicle
+        self.edges = FenceEdges(ground.avoided_edge)
+        self._heading_deg = heading_deg
+        self._legs_m: dict[tuple[LocalPoint, LocalPoint], float] = {}
+
     def part_heading_deg(self, part: Drawing, *, is_first: bool) -> float:
         """Return the vehicle's heading where a part of the lines begins."""
-        if is_first and self.heading_deg is not None:
-            return self.heading_deg
+        if is_first and self._heading_deg is not None:
+            return self._heading_deg
         east, north = drawn.direction(part[0], part[1])
         return math.degrees(math.atan2(east, north))
 
@@ -161,8 +177,8 @@ class Trial:
 
     Parameters
     ----------
-    gauge : Gauge
-        What measures.
+    surroundings : Surroundings
+        What they are measured against.
     part : tuple of DrawnPoint
         The points.
     is_first, is_last : bool
@@ -175,7 +191,6 @@ class Trial:
         "_cores",
         "_drive",
         "_duration_s",
-        "_gauge",
         "_is_first",
         "_is_last",
         "_looked",
@@ -186,6 +201,7 @@ class Trial:
         "_part",
         "_required_m",
         "_steps",
+        "_surroundings",
         "_waypoints",
         "cost_s",
         "may_be_enough",
@@ -207,8 +223,8 @@ class Trial:
     _waypoints: NDArray[np.int64]
     _clearances_m: NDArray[np.float64]
 
-    def __init__(self, gauge: Gauge, part: Drawing, is_first: bool, is_last: bool) -> None:  # noqa: FBT001 - two of a kind
-        self._gauge, self._part = gauge, part
+    def __init__(self, surroundings: Surroundings, part: Drawing, is_first: bool, is_last: bool) -> None:  # noqa: FBT001 - two of a kind
+        self._surroundings, self._part = surroundings, part
         self._is_first, self._is_last = is_first, is_last
         self._duration_s = 0.0
         self._near_turns = _near_turns(part)
@@ -248,7 +264,7 @@ class Trial:
 
     def _look_at_lines(self) -> None:
         missing_m, crossings = [0.0], 0
-        for point, line_m in zip(self._part[1:], self._gauge.legs_m(self._part), strict=True):
+        for point, line_m in zip(self._part[1:], self._surroundings.legs_m(self._part), strict=True):
             missing_m.append(max(point.line_m - line_m, 0.0))
             crossings += line_m <= 0 and math.isfinite(point.line_m)
         self._missing_by_lines_m = np.array(missing_m)
@@ -260,8 +276,8 @@ class Trial:
         self._required_m = np.array([point.required_m for point in part])
         self._drive = plan_drive(
             drawn.places(part),
-            self._gauge.vehicle,
-            heading_deg=self._gauge.part_heading_deg(part, is_first=self._is_first),
+            self._surroundings.vehicle,
+            heading_deg=self._surroundings.part_heading_deg(part, is_first=self._is_first),
             speeds=drawn.speeds(part),
             stops=drawn.stops(part),
         )
@@ -274,7 +290,7 @@ class Trial:
     def _look_at_band(self, way: int) -> None:
         pieces = self._drive.pieces(way)
         cores, bands_m = pieces.convex(), np.array(pieces.bands_m)
-        clearances_m = self._gauge.distances_m(cores) - bands_m
+        clearances_m = self._surroundings.distances_m(cores) - bands_m
         self._looked.insert(0, (cores, bands_m, np.array(pieces.waypoints, dtype=np.int64), clearances_m))
         if len(self._looked) == 1:
             self._cores, self._bands_m, self._waypoints, self._clearances_m = self._looked[0]
@@ -288,20 +304,20 @@ class Trial:
         """Count pieces inside a fence for more, the deeper they lie."""
         inside = begin + (self._clearances_m[begin:] <= -self._bands_m[begin:]).nonzero()[0]
         if len(inside):
-            beyond = shapely.difference(self._cores[inside], self._gauge.ground.allowed)
+            beyond = shapely.difference(self._cores[inside], self._surroundings.ground.allowed)
             self._clearances_m[inside] -= np.sqrt(shapely.area(beyond)) + shapely.length(beyond) / 10
             self._settle()
 
     def _avoid(self) -> None:
         """Count what the vehicle's avoidance adds, where the band is not far from enough without it."""
-        gauge = self._gauge
+        around = self._surroundings
         if (self._required_m[self._waypoints] - self._clearances_m).max() >= _FAR_FROM_ENOUGH_M:
             return
         band = self._drive.with_cores(self._cores, self._bands_m, self._waypoints)
-        slowed = with_avoidance(band, gauge.vehicle, gauge.edges)
+        slowed = with_avoidance(band, around.vehicle, around.edges)
         if slowed is not band:
             plain = len(self._cores)
-            more_m = gauge.distances_m(slowed.cores[plain:]) - slowed.bands_m[plain:]
+            more_m = around.distances_m(slowed.cores[plain:]) - slowed.bands_m[plain:]
             self._cores, self._bands_m, self._waypoints = slowed.cores, slowed.bands_m, slowed.waypoints
             self._clearances_m = np.concatenate([self._clearances_m, more_m])
             self._steps.append(partial(Trial._dive, begin=plain))
@@ -350,7 +366,7 @@ class Trial:
         )
 
     def _nearest(self, piece: int) -> LocalPoint:
-        line = shapely.shortest_line(self._cores[piece], self._gauge.ground.edge)
+        line = shapely.shortest_line(self._cores[piece], self._surroundings.ground.edge)
         return LocalPoint(*shapely.get_coordinates(line)[0].tolist())
 
 

@@ -20,9 +20,6 @@ Fits that begin millimetres apart may end far apart, each with another place whe
 quickest is not certain to win, lines are made that follow one of them and then another (`fitting.splice`): of five starts within 0.3 m that took
 31 to 49 s, and one that was refused, all took 29 to 35 s.
 
-Thousands of lines are measured for one plan and kept until it is made: without Python's garbage collection, which would look through all of them again
-and again, ten hard plans took 0.88 of the CPU time.
-
 What the vehicle keeps on its first legs, as it leaves the place where it stands, no clearance that is asked for can change: it is told apart
 (`DrivenRoute.lead_away_m`).
 """
@@ -42,7 +39,6 @@ from missions.routing.drawn_route import widest_drawn_m
 from missions.routing.no_route import NoRoute, NoRouteKind
 from missions.routing.route_search import SLOW_MPS, DrivenRoute, RouteSearch, SharedWork
 from missions.words import metres
-from pbpp.uncollected import uncollected
 
 if TYPE_CHECKING:
     from missions.fitting.cost import Measured
@@ -105,7 +101,6 @@ class PromisedRoute:
     _tried: dict[float, RouteSearch] = field(default_factory=dict, init=False)
     _known: SharedWork = field(default_factory=SharedWork, init=False)
 
-    @uncollected()
     def find(self, asked: Promise) -> Found | NoRoute:
         """Return a route that keeps at least what is asked, and what is promised for it; else why there is none."""
         found = self._fitted(asked)
@@ -174,7 +169,6 @@ class PromisedRoute:
             found = min(found, other, key=lambda one: one.cost_s)
         return found
 
-    @uncollected()
     def widest(self, asked: Promise) -> Found | NoRoute:
         """Return the route that keeps most, and what is promised for it; else why there is none."""
         most_m = self._most_drawn_m

@@ -203,3 +203,16 @@ def test_what_is_forgotten_is_freed_at_once() -> None:
             assert drive is None or drive() is None
     finally:
         gc.enable()
+
+
+def test_what_was_measured_goes_with_the_gauge() -> None:
+    """A plan keeps tens of thousands of objects that no garbage collection is to look through: they may hold one another in no circle."""
+    gauge = gauge_of(FIELD, WALL, POND, **AVOIDING)
+    gauge.measure(lines((0, 0), (30, 0), (30, 30)))
+    left = weakref.ref(gauge)
+    gc.disable()
+    try:
+        del gauge
+        assert left() is None
+    finally:
+        gc.enable()
